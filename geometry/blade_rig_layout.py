@@ -47,6 +47,12 @@ def fine(p: BladeRig, count: float, ratio: float = 1.0) -> Interval:
     return Interval(max(1, round(count)) * int(p.refine), ratio ** (1.0 / p.refine))
 
 
+def inside(p: BladeRig, count: float) -> Interval:
+    """As `fine`, sizes growing from both ends to the middle."""
+    found = fine(p, count, p.growth_inside)
+    return Interval(found.count, found.ratio, both=True)
+
+
 def y_lines(p: BladeRig) -> Lines:
     """Lines of the half y >= 0.
 
@@ -244,7 +250,11 @@ class _Blade:
                 for column, s in (("bl", -1.0), ("br", 1.0))
             ]
             rows.append([ends[0], left, right, ends[1]])
-        columns = [fine(p, p.base_columns, 1.0 / g), fine(p, p.across), fine(p, p.base_columns, g)]
+        columns = [
+            fine(p, p.base_columns, 1.0 / g),
+            inside(p, p.across),
+            fine(p, p.base_columns, g),
+        ]
         self.part("base", _columns(rows), columns, [fine(p, p.base_layers, 1.0 / g)], "yb")
 
     def shank(self, foot: list[str], neck: list[str]) -> None:
@@ -252,7 +262,7 @@ class _Blade:
         rows = [foot, self.pair("k", p.shank_length / 2.0, p.shank_tx, "shank"), neck]
         heights = [fine(p, p.shank_layers, p.growth), fine(p, p.shank_layers, 1.0 / p.growth)]
         last = "yi" if p.shank_wy < p.platform_wy else "yp" if p.shank_wy == p.platform_wy else "ys"
-        self.part("shank", _columns(rows), [fine(p, p.across)], heights, last)
+        self.part("shank", _columns(rows), [inside(p, p.across)], heights, last)
 
     def core(self, throat: list[str]) -> None:
         p = self.p
@@ -269,7 +279,7 @@ class _Blade:
         self.part(
             "core",
             _columns(rows),
-            [fine(p, p.across)],
+            [inside(p, p.across)],
             heights,
             "yi" if p.core_wy < p.platform_wy else "yp",
         )
@@ -285,7 +295,7 @@ class _Blade:
             for ends in zip(neck, throat, strict=True)
         ]
         corners = [*left[0][::-1], *middle, *right[0]]
-        columns = [*_reversed(left[1]), fine(p, p.across), *right[1]]
+        columns = [*_reversed(left[1]), inside(p, p.across), *right[1]]
         self.part("platform", corners, columns, heights, "yp")
 
     def _levels(self) -> tuple[list[tuple[str, float]], list[Interval]]:
@@ -295,7 +305,7 @@ class _Blade:
         """
         p = self.p
         if p.arrangement == "symmetric" or self.side == "right":
-            return [("p0", 0.0), ("p1", 1.0)], [fine(p, p.platform_layers)]
+            return [("p0", 0.0), ("p1", 1.0)], [inside(p, p.platform_layers)]
         share = (p.left_face[1] - p.shank_length) / p.platform_height
         rows = [fine(p, p.face_along_z), fine(p, p.platform_layers * (1.0 - share))]
         return [("p0", 0.0), ("pa", share), ("p1", 1.0)], rows

@@ -77,6 +77,9 @@ class BladeRig:
         counts that are not whole are rounded, see `rounded`. Cost: elements grow with its cube.
     growth : float
         Ratio of neighbouring element sizes away from re-entrant corners and the clamped edge.
+    growth_inside : float
+        The same from both sides of shank, core and platform to their middles, through the thickness
+        and over the height.
     across : int
         Elements through the thickness of shank and core. Cost: dofs of the blades grow in
         proportion.
@@ -147,6 +150,7 @@ class BladeRig:
     element_nodes: int = choice(20, 8, 20, 27)
     refine: float = ratio(1.0, 0.5)
     growth: float = ratio(1.6, 1.0, 3.0)
+    growth_inside: float = ratio(1.0, 1.0, 3.0)
     across: int = whole(2)
     base_columns: int = whole(3)
     base_side: int = whole(2)
@@ -271,8 +275,11 @@ def rounded(p: BladeRig) -> BladeRig:
         step = 2 if bounds[name].even else 1
         count = step * round(share * getattr(p, name) / step)
         counts[name] = max(int(bounds[name].least), count)
-    growth = min(p.growth ** (1.0 / share), bounds["growth"].most)
-    return replace(p, **counts, growth=growth, refine=whole_part)
+    growths = {
+        name: min(getattr(p, name) ** (1.0 / share), bounds[name].most)
+        for name in ("growth", "growth_inside")
+    }
+    return replace(p, **counts, **growths, refine=whole_part)
 
 
 def _misfits(p: BladeRig) -> list[str]:

@@ -2,7 +2,9 @@
 
 Stuck frequencies of ``symmetric-response`` with the thesis's stiffness on points of lines, of equal
 strips and of Gauss; peaks with friction of both rigs on Gauss points; the free in-phase frequency
-with every count of elements off the contact doubled alone, and all of them times 1 to 3.
+with every count of elements off the contact doubled alone, and all of them times 1 to 3; free and
+stuck frequencies on meshes graded toward re-entrant edges, as an accuracy takes them (``graded``);
+maxima of the path at the symmetric second peak on many rows of Gauss points (``maxima``).
 """
 
 from __future__ import annotations
@@ -21,7 +23,9 @@ from rig_response import rig
 
 from upd.analyses.forced.linear_limits import linear_limits_of
 from upd.analyses.forced.measures import Unsolved, accelerance, path_maxima
+from upd.analyses.forced.merged_points import fewer_gauss
 from upd.analyses.forced.mesh_counts import OFF_CONTACT, count_of, times
+from upd.analyses.forced.mesh_counts import graded as graded_mesh
 from upd.analyses.forced.paths import balance_of, respond
 from upd.scene import load_scene
 
@@ -40,13 +44,16 @@ POINTS: Mapping[str, Mapping[str, Any]] = {
 #: rows of Gauss points, the band of the peak in Hz, and harmonics of the peaks with friction
 SLIPPING = {"symmetric": (330.0, 365.0), "asymmetric": (370.0, 395.0)}
 ROWS, HIGHEST, RATIO = (4, 6, 8, 12), 7, 194.0
+#: levels of graded meshes, and rows of Gauss points on them
+GRADED, GRADED_ROWS = (1, 1.5, 2, 2.5), 6
+#: rows, band in Hz, harmonics and samples of the maxima
+MANY_ROWS, MANY_BAND, MANY_HIGHEST, MANY_SAMPLES = (24, 32, 48, 64), (420.0, 445.0), 5, 256
 
 
 def run() -> Iterator[Row]:
-    """Rows of all three."""
-    yield from points()
-    yield from elements()
-    yield from slipping()
+    """Rows of all."""
+    for one in (points, elements, slipping, graded, maxima):
+        yield from one()
 
 
 def _row(name: str, case: str, value: float, unit: str, begin: float, note: str = "") -> Row:
@@ -119,7 +126,56 @@ def slipping() -> Iterator[Row]:
             yield _row("peak with friction", case, top.frequency, "Hz", begin, height)
 
 
+def _gauss(rows: int) -> dict[str, Any]:
+    return {
+        "contact.rule": "gauss",
+        "contact.rows": rows,
+        "contact.columns": 2,
+        "left_out.solve": "no",
+        "accuracy": "unknown",
+    }
+
+
+def graded() -> Iterator[Row]:
+    """Free and stuck frequencies, graded meshes of 20 nodes an element."""
+    scene = load_scene("symmetric-response", _gauss(GRADED_ROWS))
+    for level in GRADED:
+        begin = time.process_time()
+        counts = {f"geometry.{k}": v for k, v in graded_mesh(scene, level).items()}
+        made = rig("symmetric-response", **_gauss(GRADED_ROWS), **counts)
+        force = made.plan.scene.damper.centrifugal
+        numbers = (0, *made.model.excitation.harmonics)
+        answer = Unsolved(balance_of(made.plan, made.model, force, numbers))
+        modes = linear_limits_of(made.plan, made.model, answer, force).modes
+        size = f"{made.bodies.blades['right'].K.shape[0]} dofs a blade"
+        case = f"graded x {level:g}"
+        free = float(np.min(made.model.frequency))
+        yield _row("free frequency", case, free, "Hz", begin, size)
+        for in_phase, word in ((True, "in phase"), (False, "out of phase")):
+            found = next(m.frequency for m in modes if m.axis == "x" and m.in_phase == in_phase)
+            yield _row("stuck frequency", f"{case}, {word}", found, "Hz", begin, size)
+
+
+def maxima() -> Iterator[Row]:
+    """The highest maximum of the path at the symmetric second peak, and the others."""
+    scenes = {"contact.static": "seated", **_gauss(max(MANY_ROWS))}
+    made, (low, high) = rig("symmetric-response", **scenes), MANY_BAND
+    force = made.plan.scene.damper.centrifugal / RATIO
+    grid = np.linspace(low, high, round(high - low) + 1)
+    for rows in MANY_ROWS:
+        begin = time.process_time()
+        found = fewer_gauss(made.model, rows / max(MANY_ROWS))
+        model = made.model if found is None else found.model
+        given = {"harmonics": range(MANY_HIGHEST + 1), "samples": MANY_SAMPLES}
+        answer = respond(made.plan, model, force, grid, **given)
+        size = np.abs(accelerance(answer, model.row("right"), force))
+        top, *others = sorted(path_maxima(answer.frequency, size), key=lambda p: -p.height)
+        told = ", ".join(f"{p.height:.1f} at {p.frequency:.2f} Hz" for p in others) or "none"
+        height = f"{top.height:.2f} (m/s2)/N; others: {told}"
+        yield _row("maxima of the path", f"{rows} rows", top.frequency, "Hz", begin, height)
+
+
 if __name__ == "__main__":
-    for name in sys.argv[1:] or ("points", "elements", "slipping"):
+    for name in sys.argv[1:] or ("points", "elements", "slipping", "graded", "maxima"):
         for row in globals()[name]():
             print(row, flush=True)

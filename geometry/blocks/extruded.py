@@ -30,10 +30,13 @@ class Interval:
         Their number.
     ratio : float
         By which their sizes grow.
+    both : bool
+        From both ends to the middle.
     """
 
     count: int
     ratio: float = 1.0
+    both: bool = False
 
 
 @dataclass(frozen=True)
@@ -174,7 +177,8 @@ class Layout:
         for corner, line in sorted({end for curve in curves for end in curve}):
             blocks.point(f"{corner}@{line}", self.position(corner, line))
         for (start, end), interval in curves.items():
-            blocks.curve("@".join(start), "@".join(end), interval.count, ratio=interval.ratio)
+            first, last = "@".join(start), "@".join(end)
+            blocks.curve(first, last, interval.count, ratio=interval.ratio, both=interval.both)
         for part in self.parts:
             for i, j, k in part.cells():
                 a, b, c, d = self.ring(part, i, j)

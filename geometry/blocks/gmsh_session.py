@@ -183,7 +183,14 @@ class Blocks:
         self._points[name] = self._gmsh.model.geo.addPoint(*[float(x) for x in position])
 
     def curve(
-        self, start: str, end: str, count: int, *, ratio: float = 1.0, centre: str | None = None
+        self,
+        start: str,
+        end: str,
+        count: int,
+        *,
+        ratio: float = 1.0,
+        both: bool = False,
+        centre: str | None = None,
     ) -> None:
         """Straight edge, or arc about a point, cut into elements.
 
@@ -195,6 +202,9 @@ class Blocks:
             Number of elements.
         ratio : float, default 1
             By which their sizes grow from start to end.
+        both : bool, default False
+            They grow from both ends to the middle, which has as many of them as one by one would
+            give; sizes are a parabola of the place.
         centre : str, optional
             The point an arc goes about.
         """
@@ -205,7 +215,11 @@ class Blocks:
             if centre is None
             else geo.addCircleArc(ends[0], self._points[centre], ends[1])
         )
-        geo.mesh.setTransfiniteCurve(tag, count + 1, "Progression", ratio)
+        last = ratio ** ((count - 1) // 2)
+        if both and last != 1.0:
+            geo.mesh.setTransfiniteCurve(tag, count + 1, "Bump", 1.0 / last)
+        else:
+            geo.mesh.setTransfiniteCurve(tag, count + 1, "Progression", 1.0 if both else ratio)
         self._curves[start, end] = (tag, count)
         self._curves[end, start] = (-tag, count)
 

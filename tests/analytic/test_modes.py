@@ -13,7 +13,7 @@ from scipy.sparse import csr_array, diags_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, box_mesh, mass, stiffness
-from upd.linalg import Eigenproblem, modes
+from upd.linalg import Eigenproblem, eigen, modes
 from upd.linalg.eigen_checks import finished
 from upd.linalg.lanczos import block_lanczos
 from upd.linalg.select import has_pardiso
@@ -149,6 +149,33 @@ def test_factor_is_kept_between_questions():
     again = problem.modes(count=12)
     np.testing.assert_allclose(again.frequency[:3], first.frequency, rtol=1e-9)
     np.testing.assert_allclose(again.frequency, exact[:12], rtol=1e-7)
+
+
+def test_displacements_take_the_factor_of_the_modes():
+    K, M, exact = chain(900)
+    loads = np.random.default_rng(1).standard_normal((900, 2))
+    problem = Eigenproblem(K, M, sigma=0.0, solver="superlu")
+    np.testing.assert_allclose(K @ problem.displacements(loads), loads, atol=1e-9)
+    np.testing.assert_allclose(problem.modes(count=3).frequency, exact[:3], rtol=1e-7)
+    with pytest.raises(InputError, match="displacements take the factor of K"):
+        Eigenproblem(K, M, sigma=-1.0, solver="superlu").displacements(loads)
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_modes_are_counted_with_one_factor_where_it_is_alone(alone, monkeypatch):
+    """A second factor beside the first, or in its place."""
+    K, M, exact = chain(900)
+    problem = Eigenproblem(K, M, sigma=0.0, solver="superlu", alone=alone)
+    kept = []
+    counted = eigen.count_modes
+
+    def seen(*arguments):
+        kept.append(len(problem._inverse))
+        return counted(*arguments)
+
+    monkeypatch.setattr(eigen, "count_modes", seen)
+    np.testing.assert_allclose(problem.modes(count=3).frequency, exact[:3], rtol=1e-7)
+    assert kept == [0 if alone else 1]
 
 
 def test_many_modes_and_all_of_them():

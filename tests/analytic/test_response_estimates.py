@@ -19,7 +19,7 @@ from upd.analyses.forced.effects import HARMONICS, MODES, SAMPLES
 from upd.analyses.forced.estimates import bound, estimate
 from upd.analyses.forced.level_values import ForcedLevels, LevelValue
 from upd.analyses.forced.merged_points import Axis, merged, transfer
-from upd.analyses.forced.peaks_again import PathPeakAt
+from upd.analyses.forced.peaks_again import ClimbedPeak, PathPeakAt, maxima_about
 from upd.analyses.forced.solution import ForcedSolution
 from upd.hbm import climb, contacts, frequency_response
 from upd.progress import Stages, silent
@@ -343,6 +343,52 @@ def test_rows_of_a_coarser_lattice_tell_what_finer_ones_show() -> None:
     key = next(k for k in found if k[0] == "stuck_in_phase")
     (part,) = (p for p in found[key] if p.source == "contact points")
     assert true <= part.error <= 5.0 * true
+
+
+def test_on_other_points_the_highest_of_several_maxima_is_climbed_to(
+    slipping: tuple[ForcedSolution, list[Result], Estimates], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From those of the run's path about its peak; further starts only where none gets anywhere. On
+    the same points the one that is climbed to from the peak itself.
+    """
+    solution = slipping[0]
+    at, tried = peak_at(solution), list[float]()
+    top, f = at.peak.sample, at.curve.answer.frequency
+    beside = [top, top - 1, top + 1]
+    heights = dict(zip(f[beside], (140.0, 160.0, 150.0), strict=True))
+
+    def climbed(self: PathPeakAt, b: Any, model: Any, guess: Any, start: float) -> Any:
+        tried.append(start)
+        height = heights.get(start)
+        return [] if height is None else [ClimbedPeak(start, height, 0.0)]
+
+    monkeypatch.setattr(PathPeakAt, "_climbed_from", climbed)
+    at.__dict__["maxima"] = beside
+    made = ModelMaker(solution).make("thesis", solution.models["thesis"].laws)
+    points, modes = (
+        next(m for m in made if isinstance(m, OtherModel) and m.source == source)
+        for source in ("contact points", "modes kept")
+    )
+    assert at.on(points, 1.0).height == 160.0
+    assert tried == list(f[beside])
+    tried.clear()
+    assert at.on(modes, 1.0).height == 140.0
+    assert tried == [f[top]]
+    tried.clear()
+    heights.clear()
+    heights[f[top + 2]] = 130.0
+    monkeypatch.setattr(PathPeakAt, "_band", lambda *_: iter([(at.curve.answer.x[0], f[top + 2])]))
+    assert at.on(points, 1.0).height == 130.0
+    assert len(tried) > len(beside)
+
+
+def test_maxima_about_a_peak_are_those_nearly_as_high() -> None:
+    """Maxima of 1, 3/4, 8/10 and half the height, and one far in frequency."""
+    f, size = np.linspace(400.0, 404.0, 60), np.full(60, 0.1)
+    size[[20, 30, 36, 45]] = 1.0, 0.75, 0.8, 0.5
+    size[55], f[52:] = 0.9, np.linspace(420.0, 421.0, 8)
+    assert maxima_about(f, size, 20) == [20, 36, 30]
+    assert maxima_about(f, size, 45) == [45, 20, 36, 30]
 
 
 def test_the_peak_of_an_acceleration_is_climbed_to() -> None:

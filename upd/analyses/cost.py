@@ -186,18 +186,16 @@ class CostModel:
         )
 
     def attached(self, task: str, hexes: int, nodes: int, loads: int) -> None:
-        """A body reduced to its lowest modes and its displacements under loads: the factor, those
-        of its modes, a right side per load.
+        """A body reduced to its lowest modes and its displacements under loads: the factor of both,
+        in its place another that counts the modes, a right side per load.
         """
         solid = self.solid(hexes, nodes)
         found = self.choice(task, 3 * nodes, 0, solid, direct=True)
         columns = 0.5 * loads * found.substitution()
         columns += dense_s(4.0 * 3.0 * nodes * float(loads) ** 2)
-        self.shared += calls_s(0.15) + 4.0 * found.seconds + 30.0 * found.substitution() + columns
+        self.shared += calls_s(0.15) + 3.0 * found.seconds + 30.0 * found.substitution() + columns
         self.jobs.append(
-            2.0 * found.bytes
-            + 4.0 * 24.0 * nodes * loads
-            + 2.0 * 3.0 * nodes * solid.entries * _COPIES
+            found.bytes + 4.0 * 24.0 * nodes * loads + 2.0 * 3.0 * nodes * solid.entries * _COPIES
         )
 
     @property

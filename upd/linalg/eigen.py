@@ -139,6 +139,8 @@ class Eigenproblem:
     ----------
     K, M, sigma, solver, stiffness_size
         As for `modes`.
+    alone : bool, default False
+        The factor that modes are counted by takes the place of the first, whatever the memory.
 
     Attributes
     ----------
@@ -151,6 +153,7 @@ class Eigenproblem:
     sigma: float | None = None
     solver: str = "auto"
     stiffness_size: ArrayLike | None = None
+    alone: bool = False
     n_massive: int = field(init=False)
     _size: FloatArray = field(init=False, repr=False)
     _inverse: list[_Inverse] = field(default_factory=list, repr=False)
@@ -230,6 +233,30 @@ class Eigenproblem:
             perf_counter() - begin,
         )
         return finished(self.K, self.M, found, keep, residual_limit, perf_counter() - begin)
+
+    def displacements(self, loads: FloatArray) -> FloatArray:
+        """Of (n, k) loads, by the factor of K that the modes are sought with.
+
+        Parameters
+        ----------
+        loads
+            N.
+
+        Returns
+        -------
+        (n, k) ndarray
+            mm.
+
+        Raises
+        ------
+        ConvergenceError
+            When the body floats.
+        InputError
+            For a shift other than 0: its factor is not that of K.
+        """
+        if self.sigma != 0.0:
+            raise InputError(f"sigma = {self.sigma}: displacements take the factor of K, sigma = 0")
+        return self._factor().factor(loads)
 
     def _lowest(self, count: int) -> Modes:
         """At least `count` lowest modes, not yet checked."""
@@ -323,7 +350,7 @@ class Eigenproblem:
         A second factor beside the first where both fit with as much to spare for another problem
         solved at the same time, else in its place.
         """
-        if self._inverse and 2 * self._inverse[0].factor.peak_bytes > memory_left():
+        if self._inverse and (self.alone or 2 * self._inverse[0].factor.peak_bytes > memory_left()):
             self._inverse.clear()
         return count_modes(self.K, self.M, found, keep, limit, found.solver)
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.errors import InputError
-from upd.linalg import factorise, modes
 from upd.linalg.common import EPS, FloatArray, checked_vectors
+from upd.linalg.eigen import Eigenproblem
 from upd.linalg.symmetric import checked
 
 
@@ -44,8 +44,9 @@ def attachment_modes(
         X_p' K X_p = B X - (B Phi) Lambda^-1 (B Phi)',    B X_p likewise,
 
     and X_p' M X_p is brought to the unit. The static compliance B K^-1 B' and the modes are those
-    of the body, whatever else the loads' shapes do. Takes n (k + m) doubles, one factor, k right
-    sides: loads spread over many nodes cost no more than those on one.
+    of the body, whatever else the loads' shapes do. Takes n (k + m) doubles, a factor and then, in
+    its place, one that counts the modes, k right sides: loads spread over many nodes cost no more
+    than those on one.
 
     Parameters
     ----------
@@ -92,10 +93,11 @@ def attachment_modes(
     rows = checked_vectors(np.asarray(B, float).T, A.shape[0], "loads").T
     if n_modes < 1:
         raise InputError(f"n_modes = {n_modes}: give 1 or more")
-    found = modes(K, M, count=n_modes, solver=solver)
+    problem = Eigenproblem(A, M, sigma=0.0, solver=solver, alone=True)
+    X = problem.displacements(rows.T)
+    found = problem.modes(count=n_modes)
     value = (2.0 * np.pi * found.frequency) ** 2
     seen = rows @ found.shapes
-    X = factorise(A, solver=solver)(rows.T)
     X -= found.shapes @ (seen / value).T
     stiffness, mass = rows @ X, X.T @ (checked(M) @ X)
     size = np.sqrt(np.diag(mass))

@@ -72,6 +72,7 @@ def blade_volume(p: BladeRig, side: str) -> float:
 SHAPES: list[dict[str, Any]] = [
     {},
     {"clamped": "bottom", "growth": 1.0, "across": 3},
+    {"growth_inside": 1.8, "across": 5, "platform_layers": 4},
     {"shank_wy": 46.0, "base_x": 48.0},
     {"shank_wy": 30.0},
     {"core_wy": 42.5, "core_tx": 17.0},
@@ -93,6 +94,25 @@ def test_volumes_are_the_closed_forms_and_no_node_is_double(
             "every node belongs to an element"
         )
         assert quality(mesh).min > 0.3
+
+
+@pytest.mark.parametrize("refine", [1, 2])
+def test_sizes_grow_from_both_sides_of_the_core_to_its_middle(refine: int) -> None:
+    """Even about the middle; the largest over the smallest as growth from one to the next gives,
+    also with twice the elements.
+    """
+    p = rig(growth_inside=2.0, across=6, symmetry="half", element_nodes=8, refine=refine)
+    points = build(p)["right"].points
+    top = np.unique(np.round(points[np.isclose(points[:, 2], p.top), 0], 9))
+    sizes = np.diff(top)
+    assert len(sizes) == 6 * refine
+    assert sizes == pytest.approx(sizes[::-1])
+    assert (np.diff(sizes[: 3 * refine]) > 0.0).all()
+    # the sizes are those of elements, not of places: a part of the ratio is inside the last ones
+    assert 2.5 <= sizes.max() / sizes.min() <= 4.0 * 2.0**0.5
+    even = build(replace(p, growth_inside=1.0))["right"].points
+    wide = np.diff(np.unique(np.round(even[np.isclose(even[:, 2], p.top), 0], 9)))
+    assert wide == pytest.approx(wide[0])
 
 
 @pytest.mark.parametrize("damper", ["none", "free", "glued"])

@@ -14,7 +14,7 @@ from upd.analyses.accuracy_rounds import AT_BEST, Rounds, Setting, mesh_falls
 from upd.analyses.forced.companions import MESH, MODES, POINTS
 from upd.analyses.forced.estimates import estimate
 from upd.analyses.forced.levels import HARMONICS, PATH, SAMPLES, STEPS
-from upd.analyses.forced.mesh_counts import RECIPE, meshed, times
+from upd.analyses.forced.mesh_counts import RECIPE, graded
 from upd.analyses.forced.plan import CoarserMesh, ForcedPlan, make_plan, time_steps
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution
@@ -27,10 +27,15 @@ from upd.scene.forced_contact import GAUSS, SIDES, FaceLines
 
 #: names of accuracies -> numbers they are asked of
 ASKED = {"peak_frequency": "peak_?_frequency", "peak": "peak_?_accelerance"}
-#: times the elements along an edge, the samples and the points of a sweep
-_FINER, _MORE_SAMPLES, _MORE_STEPS = (1, 1.5, 2, 3, 4), (1, 2, 4, 8), (1, 2, 4)
+#: times the elements of the coarsest graded mesh; of the first level, the scene's own mesh, at best
+#: so much is left by that one
+_FINER, _GRADED = (1, 1.5, 2, 2.5, 3), 0.5
+#: levels that are compared are so far apart: nearer ones differ by the rounding of counts as well
+_APART = 1.25
+#: times the samples and the points of a sweep
+_MORE_SAMPLES, _MORE_STEPS = (1, 2, 4, 8), (1, 2, 4)
 #: Gauss points up the slope in place of the scene's lines, and those along the damper
-_GAUSS, _COLUMNS = (3, 4, 6, 8, 12, 16, 24), 2
+_GAUSS, _COLUMNS = (3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 2
 _MODES = (5, 10, 20, 40)
 _HARMONICS = (1, 3, 5, 7, 9, 11, 13)
 
@@ -38,9 +43,9 @@ _HARMONICS = (1, 3, 5, 7, 9, 11, 13)
 def settings_of(scene: ForcedScene) -> list[Setting]:
     """What may be chosen of a scene, by source.
 
-    The scene's own numbers of elements and frequencies, and its own contact points, are the lowest
-    levels; numbers of modes and harmonics may fall below its own. Gauss points stand for a face
-    whatever its mesh, so that both errors fall, each by its own knob.
+    The scene's own mesh and frequencies, and its own contact points, are the lowest levels, finer
+    meshes are graded (`mesh_counts.graded`); numbers of modes and harmonics may fall below its own.
+    Gauss points stand for a face whatever its mesh, so that both errors fall, each by its own knob.
     """
     found = [
         _setting((MODES,), "modes kept", _MODES, _with_modes, "{} a blade"),
@@ -49,8 +54,11 @@ def settings_of(scene: ForcedScene) -> list[Setting]:
         _setting((PATH,), "points of the sweep", _MORE_STEPS, _with_steps, "x {}"),
     ]
     if scene.recipe == RECIPE:
-        knob = Knob((MESH,), "mesh", tuple(f"x {n:g}" for n in _FINER), mesh_falls(_FINER))
-        found.insert(0, Setting(knob, lambda one, k: _with_mesh(one, _FINER[k])))
+        labels = ("of the scene", *(f"graded x {n:g}" for n in _FINER[1:]))
+        falls = tuple(_GRADED * mesh_falls(_compared(n))[-1] for n in _FINER[1:])
+        falls = (1.0, *falls)
+        knob = Knob((MESH,), "mesh", labels, falls)
+        found.insert(0, Setting(knob, _with_mesh))
     if _raisable(scene):
         # before the mesh, which it decides the counts of
         labels = ("of the scene", *(f"{n} Gauss points up the slope" for n in _GAUSS))
@@ -85,10 +93,10 @@ def _raisable(scene: ForcedScene) -> bool:
     )
 
 
-def _with_mesh(scene: ForcedScene, factor: float) -> ForcedScene:
-    if factor == 1:
+def _with_mesh(scene: ForcedScene, level: int) -> ForcedScene:
+    if level == 0:
         return scene
-    return replace(scene, geometry={**scene.geometry, **times(scene, meshed(scene), factor)})
+    return replace(scene, geometry={**scene.geometry, **graded(scene, _FINER[level])})
 
 
 def _with_points(scene: ForcedScene, level: int) -> ForcedScene:
@@ -129,18 +137,28 @@ def _with_steps(scene: ForcedScene, factor: int) -> ForcedScene:
 def _coarser(
     asked: ForcedScene, settings: Sequence[Setting], levels: Levels
 ) -> tuple[CoarserMesh, ...]:
-    """Meshes of the levels before, the finest first."""
+    """Graded meshes of the levels before, the finest first; usual ones of the scene's own."""
     place = next((k for k, s in enumerate(settings) if s.knob.sources == (MESH,)), None)
     if place is None or levels[place] == 0:
         return ()
     scene = replace(asked, accuracy=None)
     for setting, level in zip(settings[:place], levels, strict=False):
         scene = setting.at(scene, level)
+    compared = _compared(_FINER[levels[place]])[:-1]
     return tuple(
         # counts are rounded: their meshes tell the sizes
-        CoarserMesh(times(scene, meshed(scene), n), 0.0, f"{n:g} x the elements")
-        for n in reversed(_FINER[: levels[place]])
+        CoarserMesh(graded(scene, n), 0.0, f"graded x {n:g}")
+        for n in reversed(compared)
     )
+
+
+def _compared(finest: float) -> tuple[float, ...]:
+    """Levels that tell what the finest of them leaves, rising."""
+    out = [finest]
+    for n in reversed(_FINER):
+        if _APART * n <= out[0]:
+            out.insert(0, n)
+    return tuple(out)
 
 
 def _planned(

@@ -10,12 +10,13 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 
 import numpy as np
 
-from upd.analyses.forced.companions import OtherModel
+from upd.analyses.forced.companions import POINTS, OtherModel
 from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.measures import accelerance, path_maxima
 from upd.analyses.forced.mode_peaks import ModePeak
@@ -48,6 +49,9 @@ class ClimbedPeak:
         return bool(np.isfinite(self.height))
 
 
+_NONE = ClimbedPeak(float("nan"), float("nan"), 0.0)
+
+
 @dataclass(frozen=True)
 class PathPeakAt:
     """A peak of a path that is to be found again.
@@ -76,6 +80,12 @@ class PathPeakAt:
         """Its highest harmonic."""
         return int(self.curve.answer.highest_harmonic[self.peak.sample])
 
+    @cached_property
+    def maxima(self) -> list[int]:
+        """Points of the path at the peak, and at other maxima about it (`maxima_about`)."""
+        size = np.abs(self.curve.accelerance[self.side])
+        return maxima_about(self.curve.answer.frequency, size, self.peak.sample)
+
     def as_run(self) -> ClimbedPeak:
         """With nothing changed, between the points of the path."""
         b = self.curve.answer.balance
@@ -96,7 +106,11 @@ class PathPeakAt:
         return self._climbed(b, self.model, starts)
 
     def on(self, companion: OtherModel, ratio: float) -> ClimbedPeak:
-        """On another model.
+        """On another model; on other contact points the highest of the maxima that are climbed to.
+
+        Where points slip or open one after another, a path has maxima beside each other, of which a
+        run tells the highest. Those of other points lie elsewhere: the one that is climbed to from
+        the run's peak need not be their highest.
 
         Parameters
         ----------
@@ -105,14 +119,16 @@ class PathPeakAt:
         """
         old = self.curve.answer.balance
         b = self._balance(companion.model, old.harmonics.numbers, old.samples)
+        answer, among = self.curve.answer, self.maxima if companion.source == POINTS else []
+        first = [(answer.x[i], float(answer.frequency[i])) for i in among]
         # from where the linear limits expect the peak; points that slip may leave it where it was
         starts = (
             (_carried(b, old, x, companion.move), f * one)
             for one in dict.fromkeys((ratio, 1.0))
-            for x, f in self._starts(old)
+            for x, f in chain(first, self._starts(old))
         )
         band = self._band(b, companion.model, ratio)
-        return self._climbed(b, companion.model, chain(starts, band))
+        return self._climbed(b, companion.model, chain(starts, band), max(len(among), 1))
 
     def _balance(self, model: Model, numbers: Sequence[int], samples: int | None) -> Balance:
         b = balance_of(self.plan, model, self.curve.force, numbers, samples)
@@ -160,21 +176,52 @@ class PathPeakAt:
                 yield found.x[peak.sample], float(found.frequency[peak.sample])
 
     def _climbed(
-        self, b: Balance, model: Model, starts: Iterator[tuple[Array, float]]
+        self, b: Balance, model: Model, starts: Iterator[tuple[Array, float]], among: int = 1
     ) -> ClimbedPeak:
-        begin = time.thread_time()
-        k, row = model.excitation.lowest, model.row(self.side)
-        for guess, f in starts:
-            x = newton(b, guess, f)
-            if x is None:
-                continue
-            top = climb(b, row, x, f, harmonic=k, power=2)
-            omega = 2.0 * np.pi * k * top.frequency
-            height = 1e-3 * omega**2 * top.amplitude / self.curve.force
-            grown = height / self.peak.height
-            if top.found and is_near(top.frequency / f, grown):
-                return ClimbedPeak(top.frequency, float(height), time.thread_time() - begin)
-        return ClimbedPeak(float("nan"), float("nan"), time.thread_time() - begin)
+        """The highest peak that is climbed to from so many starts; where none is, the first from
+        further ones.
+        """
+        begin, found = time.thread_time(), list[ClimbedPeak]()
+        for k, start in enumerate(starts):
+            if found and k >= among:
+                break
+            found += self._climbed_from(b, model, *start)
+        top = max(found, key=lambda one: one.height, default=_NONE)
+        return replace(top, seconds=time.thread_time() - begin)
+
+    def _climbed_from(self, b: Balance, model: Model, guess: Array, f: float) -> list[ClimbedPeak]:
+        """The peak uphill from there; empty without one."""
+        x = newton(b, guess, f)
+        if x is None:
+            return []
+        k = model.excitation.lowest
+        top = climb(b, model.row(self.side), x, f, harmonic=k, power=2)
+        omega = 2.0 * np.pi * k * top.frequency
+        height = 1e-3 * omega**2 * top.amplitude / self.curve.force
+        if not top.found or not is_near(top.frequency / f, height / self.peak.height):
+            return []
+        return [ClimbedPeak(top.frequency, float(height), 0.0)]
+
+
+def maxima_about(frequency: Array, height: Array, top: int) -> list[int]:
+    """Points of a path at a maximum, and at others about it that are nearly as high, the highest
+    first.
+
+    Parameters
+    ----------
+    frequency, height
+        (n,) along the path, Hz and (m/s2)/N.
+    top
+        Point of the maximum.
+    """
+    others = [
+        one.sample
+        for one in path_maxima(frequency, height)
+        if one.sample != top
+        and height[one.sample] > _FROM[-1] * height[top]
+        and is_near(frequency[one.sample] / frequency[top], height[one.sample] / height[top])
+    ]
+    return [top, *sorted(others, key=lambda i: -height[i])]
 
 
 def _carried(b: Balance, old: Balance, x: Array, move: Array) -> Array:

@@ -66,11 +66,11 @@ _FILES_S, _CURVE_S = 4.0, 1.0
 
 @dataclass(frozen=True)
 class CoarserMesh:
-    """A level before that of the run: its counts, its size over that of the run or 0 where only the
-    meshes tell it, in words.
+    """A level before that of the run: its counts and growths, its size over that of the run or 0
+    where only the meshes tell it, in words.
     """
 
-    counts: Mapping[str, int]
+    counts: Mapping[str, float]
     size: float
     label: str
 
