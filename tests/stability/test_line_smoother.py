@@ -11,7 +11,7 @@ from scipy.sparse import bsr_array, csr_array
 from upd.fem import Material, box_mesh, rigid_body_modes, stiffness
 from upd.linalg import amg_solve
 from upd.linalg.blocks import WIDTH
-from upd.linalg.lines import find_lines
+from upd.linalg.lines import find_lines, in_line_order
 from upd.linalg.smoothers import LineSmoother
 
 
@@ -71,6 +71,25 @@ def test_a_line_is_tridiagonal_where_links_go_round() -> None:
     for first, end in pairwise(starts):
         on = order[first:end]
         assert not np.triu(A[np.ix_(on, on)], 2).any()
+
+
+def test_rows_in_another_order() -> None:
+    """One row is coupled with all, as of a node of a rigid set."""
+    rng = np.random.default_rng(1)
+    n = 40
+    on = rng.random((n, n)) < 0.1
+    on[0] = True
+    M = np.kron(on | on.T | np.eye(n, dtype=bool), np.ones((3, 3)))
+    half = rng.standard_normal(M.shape)
+    M *= half + half.T
+    A = bsr_array(csr_array(M).tobsr(blocksize=(3, 3)))
+    order = rng.permutation(n)
+    pointers, columns, blocks = in_line_order(A.indptr, A.indices, A.data, order)
+    for first, end in pairwise(pointers):
+        assert (np.diff(columns[first:end]) > 0).all()
+    dofs = (3 * order[:, None] + np.arange(3)).ravel()
+    found = bsr_array((blocks, columns, pointers), shape=M.shape).toarray()
+    np.testing.assert_array_equal(found, M[np.ix_(dofs, dofs)].astype(np.float32))
 
 
 def test_sweeps_are_those_of_the_block_matrix() -> None:

@@ -208,7 +208,8 @@ def stopped(count: int, error: float, size: float, accuracy: float, why: str) ->
     return ConvergenceError(
         f"Multigrid: conjugate gradients stopped after {count} iterations with a relative error "
         f"in energy of {reached:.1e}, {accuracy:.0e} was asked: {why}. "
-        "A part of the body floats (hold the distant set), hexahedra are stretched, or nu is near "
-        'one half: use a direct solver (solver.name = "pardiso"), a mesh with smaller aspect '
-        "ratios, or more iterations; and give the rigid-body modes as near null space."
+        "A part of the body floats (hold the distant set) or hangs on a much softer one, hexahedra "
+        "are stretched, or nu is near one half: use a direct solver (solver.name = "
+        '"pardiso"), a mesh with smaller aspect ratios, or more iterations; and give the '
+        "rigid-body modes as near null space."
     )

@@ -142,7 +142,10 @@ def _in_order(beside: Index, indptr: Index, indices: Index) -> tuple[Index, Inde
 def in_line_order(
     indptr: Index, indices: Index, data: Any, order: Index
 ) -> tuple[Index, Index, Single]:
-    """Rows and columns of a matrix of blocks of 3 in another order, in single precision.
+    """Rows and columns of a symmetric matrix of blocks of 3 in another order, in single precision.
+
+    Row by row of A in the new order, which is column by column: so the columns of each row come
+    in their order, and a column's blocks are those of the row, transposed.
 
     Parameters
     ----------
@@ -157,25 +160,22 @@ def in_line_order(
     """
     n = len(order)
     place = np.empty(n, indices.dtype)
-    for at in range(n):
-        place[order[at]] = at
     pointers, columns = np.empty_like(indptr), np.empty_like(indices)
     blocks = np.empty(data.shape, np.float32)
     pointers[0] = 0
     for at in range(n):
-        row, first = order[at], pointers[at]
-        count = indptr[row + 1] - indptr[row]
-        pointers[at + 1] = first + count
-        for k in range(count):
-            old = indptr[row] + k
-            column, free = place[indices[old]], first + k
-            while free > first and columns[free - 1] > column:
-                columns[free], blocks[free] = columns[free - 1], blocks[free - 1]
-                free -= 1
-            columns[free] = column
+        place[order[at]] = at
+        pointers[at + 1] = pointers[at] + indptr[order[at] + 1] - indptr[order[at]]
+    free = pointers[:-1].copy()
+    for at in range(n):
+        row = order[at]
+        for k in range(indptr[row], indptr[row + 1]):
+            to = place[indices[k]]
+            columns[free[to]] = at
             for a in range(3):
                 for b in range(3):
-                    blocks[free, a, b] = data[old, a, b]
+                    blocks[free[to], a, b] = data[k, b, a]
+            free[to] += 1
     return pointers, columns, blocks
 
 

@@ -110,6 +110,6 @@ class DirectSolver:
                     f"{self.name}: the refined answer has a relative error in energy of "
                     f"{error / size if size else float('nan'):.1e}, {accuracy:.0e} was asked: the "
                     "stiffness is nearly singular. A part of the body floats (hold the distant "
-                    "set), or elements are distorted."
+                    "set), elements are distorted, or a stiff part hangs on a much softer one."
                 )
         return [Solved(one, float(error), 1) for one, error in zip(x.T, errors, strict=True)]
