@@ -38,13 +38,13 @@ def _free(scene: ForcedScene, parameters: dict[str, Any]) -> tuple[float, int]:
 
 
 def test_graded_meshes_are_nearer_to_the_limit_with_fewer_dofs() -> None:
-    """A stiffer mesh has the higher frequency: finer ones, graded far more, tend to 292.3 Hz."""
+    """A stiffer mesh has the higher frequency: finer ones, graded far more, tend to 292.4 Hz."""
     scene = _scene(**GAUSS)
     found, few = _free(scene, graded(scene, 1))
     even, many = _free(scene, times(scene, (*OFF_CONTACT, "patch_along_slope"), 1.5))
     finer, _ = _free(scene, graded(scene, 1.5))
-    assert few < 0.65 * many
-    assert finer < 293.0 < even < found < 294.0
+    assert few < 0.6 * many
+    assert finer < 293.0 < found < even < 294.0
 
 
 @pytest.mark.parametrize(
