@@ -26,7 +26,7 @@ BARE = {
     *("nu", "friction", "coupling_limit", "transverse_limit", "tangential", "cycle_amplitude"),
     *("accuracy", "error", "damping", "centrifugal_to_force", "lowest", "highest"),
     *("left_out.stiffness", "left_out.frequency", "left_out.peak"),
-    *("growth", "core_depth", "first_layer", "refine", "seating.over"),
+    *("growth", "growth_inside", "core_depth", "first_layer", "refine", "seating.over"),
 }
 
 
