@@ -44,11 +44,11 @@ def problem(
 @pytest.mark.parametrize(
     ("n", "kinds", "worth", "how"),
     [
-        (12, [MOVES, MOVES, MOVES], 0.0, "_Whole"),
-        (12, [MOVES, STICKS, OPEN], np.inf, "_Whole"),
-        (12, [MOVES, STICKS, OPEN, MOVES], 0.0, "_Eliminated"),
-        (12, [STICKS, STICKS, OPEN], 0.0, "_Eliminated"),
-        (3, [MOVES, MOVES, STICKS, MOVES, OPEN], 0.0, "_LowRank"),
+        (12, [MOVES, MOVES, MOVES], 0.0, "Whole"),
+        (12, [MOVES, STICKS, OPEN], np.inf, "Whole"),
+        (12, [MOVES, STICKS, OPEN, MOVES], 0.0, "Eliminated"),
+        (12, [STICKS, STICKS, OPEN], 0.0, "Eliminated"),
+        (3, [MOVES, MOVES, STICKS, MOVES, OPEN], 0.0, "LowRank"),
     ],
 )
 @settings(max_examples=8, deadline=None)

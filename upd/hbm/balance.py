@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from upd.hbm.condensed import Linearised, Rows, rows_of
+from upd.hbm.condensed import BalanceJacobian
 from upd.hbm.friction import MOST_PERIODS, START_CODE, Harmonic, March, harmonic_force, march
+from upd.hbm.linearised import Rows, rows_of
 from upd.hbm.problem import ComplexArray, CondensedProblem, FloatArray
 from upd.hbm.terms import contact_terms, residual_terms
 
@@ -109,7 +110,7 @@ class Balance(CondensedProblem):
 
     def linearised(
         self, x: FloatArray, omega: float, jacobian: bool = True
-    ) -> tuple[FloatArray, Linearised | None, FloatArray]:
+    ) -> tuple[FloatArray, BalanceJacobian | None, FloatArray]:
         """What `evaluate` gives, compiled, with the Jacobian in parts.
 
         Parameters
@@ -120,7 +121,7 @@ class Balance(CondensedProblem):
         Returns
         -------
         residual : (n,) ndarray
-        jacobian : Linearised or None
+        jacobian : BalanceJacobian or None
         by_frequency : (n,) ndarray
             Derivative by the angular frequency; zero unless asked for.
         """
@@ -164,7 +165,7 @@ class Balance(CondensedProblem):
         )
         if not jacobian:
             return residual, None, by_frequency
-        parts = Linearised(
+        parts = BalanceJacobian(
             self.modal,
             fixed.rows,
             fixed.k * omega,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.hbm.balance import Balance
-from upd.hbm.condensed import Linearised
+from upd.hbm.condensed import BalanceJacobian
 from upd.hbm.newton import Function, Scale
 from upd.linalg.compiled import compiled
 
@@ -41,7 +41,7 @@ def over_frequency(b: Balance) -> Function:
 
     def function(
         x: FloatArray, f: float, jacobian: bool
-    ) -> tuple[FloatArray, Linearised | None, FloatArray]:
+    ) -> tuple[FloatArray, BalanceJacobian | None, FloatArray]:
         residual, parts, slope = b.linearised(x, 2 * np.pi * f, jacobian)
         return residual, parts, 2 * np.pi * slope
 
@@ -71,7 +71,7 @@ def over_load(b: Balance, frequency: float, static: bool = False) -> Function:
 
     def function(
         x: FloatArray, s: float, jacobian: bool
-    ) -> tuple[FloatArray, Linearised | None, FloatArray]:
+    ) -> tuple[FloatArray, BalanceJacobian | None, FloatArray]:
         residual, parts, _ = none.linearised(x, omega, jacobian)
         return residual + s * slope, parts, slope
 
@@ -211,7 +211,7 @@ def over_preload(b: Balance, frequency: float, P: FloatArray) -> Function:
 
     def function(
         x: FloatArray, q: float, jacobian: bool
-    ) -> tuple[FloatArray, Linearised | None, FloatArray]:
+    ) -> tuple[FloatArray, BalanceJacobian | None, FloatArray]:
         residual, parts, _ = b.pressed((1 - q) * P).linearised(x, omega, jacobian)
         h = EPS ** (1 / 3)
         if not jacobian:

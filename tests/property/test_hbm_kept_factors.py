@@ -1,0 +1,168 @@
+"""Newton's corrections from the factors of an earlier point against those of the matrix itself."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.property.test_hbm_condensed import MOVES, OPEN, STICKS, problem
+from upd.hbm import condensed, kept_factors
+from upd.hbm.kept_factors import LEFT, LEFT_OF_TANGENT, KeptFactors
+from upd.hbm.newton import bordered_factors
+
+
+class Dense(NamedTuple):
+    """A bordered matrix as it is: all unknowns of size one."""
+
+    A: np.ndarray
+
+    @property
+    def sizes(self) -> np.ndarray:
+        return np.ones(len(self.A))
+
+    def factored(self):
+        n = len(self.A) - 1
+        return bordered_factors(self.A[:n, :n], self.A[:n, n], np.ones(n), 1.0, self.A[n])
+
+    def product(self, z: np.ndarray) -> np.ndarray:
+        return self.A @ z
+
+
+@pytest.fixture
+def always(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Factors are kept of small matrices, and solutions are cheap beside them."""
+    monkeypatch.setattr(condensed, "WORTH_KEEPING", 0)
+    monkeypatch.setattr(kept_factors, "SOLUTIONS", 0.01)
+
+
+def kept(of: np.ndarray) -> KeptFactors:
+    """Kept factors of a matrix."""
+    out = KeptFactors()
+    out.near(Dense(of), len(of))
+    return out
+
+
+def near_identity(rng: np.random.Generator, n: int) -> np.ndarray:
+    return np.eye(n) + 0.3 * rng.normal(size=(n, n)) / n**0.5
+
+
+@pytest.mark.parametrize(
+    ("n", "kinds"),
+    [
+        (12, [MOVES, MOVES, MOVES]),
+        (14, [MOVES, STICKS, OPEN, MOVES]),
+        (3, [MOVES, MOVES, STICKS, MOVES, OPEN]),
+    ],
+)
+@settings(max_examples=8, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    tangents=st.integers(1, 2),
+    static=st.booleans(),
+    proportional=st.booleans(),
+)
+def test_corrections_from_an_earlier_point_are_those_of_the_matrix(
+    n: int, kinds: list[int], seed: int, tangents: int, static: bool, proportional: bool
+) -> None:
+    b, x = problem(seed, n, kinds, tangents, static, proportional)
+    rng = np.random.default_rng(seed + 1)
+    other = x * rng.uniform(0.97, 1.03, b.size)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(condensed, "WORTH_KEEPING", 0)
+        patch.setattr(kept_factors, "SOLUTIONS", 0.01)
+        _, parts, slope = b.linearised(x, 1.3)
+        assert parts is not None
+        parts.bordered(slope, rng.uniform(0.5, 2, b.size), 0.8, rng.normal(size=b.size + 1))
+        _, parts, slope = b.linearised(other, 1.31)
+        assert parts is not None
+        D, normal, right = rng.uniform(0.5, 2, b.size), rng.normal(size=b.size + 1), rng.normal()
+        r, p_scale = rng.normal(size=b.size), 1.7
+        found = parts.bordered(slope, D, p_scale, normal)
+        assert type(found).__name__ == "_Near"
+        correction, tangent = found.solve(r, right), found.tangent()
+        sign = found.sign
+    whole = b.evaluate(other, 1.31)
+    assert whole.jacobian is not None
+    top = np.column_stack([whole.jacobian * D, whole.by_frequency * p_scale])
+    A = np.vstack([top, normal[None]])
+    wanted = np.linalg.solve(A, np.append(r, right))
+    condition = np.linalg.cond(A)
+    size = np.linalg.norm(wanted)
+    assert np.linalg.norm(correction - wanted) <= 100 * (LEFT + 1e-14 * condition) * size
+    along = np.linalg.solve(A, np.append(np.zeros(b.size), 1.0))
+    along /= np.linalg.norm(along)
+    limit = 100 * (LEFT_OF_TANGENT + 1e-14 * condition)
+    assert np.linalg.norm(tangent - along) <= limit
+    assert sign == np.linalg.slogdet(A)[0]
+
+
+@pytest.mark.usefixtures("always")
+@pytest.mark.parametrize("seed", range(20))
+def test_a_determinant_of_the_other_sign_is_seen(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n = 30
+    P = near_identity(rng, n)
+    u, v = rng.normal(size=n), rng.normal(size=n)
+    # det(P + s u v') = det P (1 + s v' P^-1 u): of the other sign by this s
+    s = -1.5 / (v @ np.linalg.solve(P, u))
+    M = P + s * np.outer(u, v)
+    found = kept(P).near(Dense(M), n)
+    r = rng.normal(size=n)
+    np.testing.assert_allclose(M @ found.solve(r[:-1], r[-1]), r, atol=1e-6)
+    assert found.sign == np.linalg.slogdet(M)[0] == -np.linalg.slogdet(P)[0]
+
+
+@pytest.mark.usefixtures("always")
+def test_a_matrix_too_far_is_factored() -> None:
+    rng = np.random.default_rng(1)
+    M = rng.normal(size=(40, 40))
+    of = kept(rng.normal(size=(40, 40)))
+    with pytest.MonkeyPatch.context() as patch:
+        # ten solutions at most
+        patch.setattr(kept_factors, "SOLUTIONS", 2.0)
+        found = of.near(Dense(M), 40)
+        r = rng.normal(size=40)
+        np.testing.assert_allclose(found.solve(r[:-1], r[-1]), np.linalg.solve(M, r), rtol=1e-9)
+    own = Dense(M).factored()
+    assert (found.sign, found.ratio) == (own.sign, own.ratio)
+    # and kept for the next one: one product
+    of.near(Dense(M), 40).solve(r[:-1], r[-1])
+    assert of._newest == 2
+
+
+@pytest.mark.usefixtures("always")
+def test_a_singular_matrix_has_no_finite_correction() -> None:
+    """A path shortens its step then."""
+    M = np.eye(6)
+    M[2] = 0.0
+    found = kept(np.eye(6)).near(Dense(M), 6)
+    with np.errstate(all="ignore"):
+        assert not np.isfinite(found.solve(np.ones(5), 1.0)).all()
+
+
+@pytest.mark.usefixtures("always")
+def test_factors_are_renewed_when_waiting_costs_more() -> None:
+    """Costs of a correction rise by one each time: the best is where the average is least."""
+    of, A = KeptFactors(), np.eye(1)
+    dear, costs = 0.5 / kept_factors.SOLUTIONS, list[int]()
+    of.near(Dense(np.eye(1)), 0)
+    of._spent = dear
+    first = of._factors
+    for cost in range(1, 100):
+        of.near(Dense(A), 0)
+        if of._factors is not first:
+            break
+        of.note(cost)
+        costs.append(cost)
+    average = [(dear + sum(costs[:k])) / (1 + k) for k in range(len(costs) + 1)]
+    # one beyond the least average: a cost is known afterwards
+    assert len(costs) == int(np.argmin(average)) + 1
+
+
+def test_another_size_of_problem_is_factored() -> None:
+    of = kept(np.eye(5))
+    assert type(of.near(Dense(np.eye(7)), 7)).__name__ == "_Bordered"
