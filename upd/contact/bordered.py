@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,6 +12,7 @@ from scipy.linalg import lapack, lu_factor, lu_solve
 
 from upd.contact.checks import EPS
 from upd.contact.coupled_systems import ClosedSystem, NewtonRows
+from upd.linalg.gmres import gmres
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -90,7 +90,8 @@ class Bordered:
         size = base.scale if missing is not None else none
         mine, others, G = base.dofs, border.dofs, border.across
 
-        def product(df: FloatArray, ds: FloatArray) -> FloatArray:
+        def product(x: FloatArray) -> FloatArray:
+            df, ds = np.split(x, [len(of.C)])
             y = -of.B @ ds
             y[mine] += self._block @ df[mine]
             if len(others):
@@ -103,12 +104,16 @@ class Bordered:
                 ((weight * out).ravel(), none if missing is None else of.B.T @ df / size)
             )
 
-        def near(v: FloatArray) -> Correction:
+        def near(v: FloatArray) -> FloatArray:
             rest = v[: left.size].reshape(left.shape) / weight
-            return self._solved(border, rest, None if missing is None else v[left.size :] * size)
+            return np.concatenate(
+                self._solved(border, rest, None if missing is None else v[left.size :] * size)
+            )
 
         r = np.concatenate(((weight * left).ravel(), none if missing is None else missing / size))
-        return _flexible_gmres(product, near, r)
+        found = gmres(product, r, _INEXACT, _KRYLOV, near)
+        df, ds = np.split(found.x, [len(of.C)])
+        return (df, ds) if found.reached else None
 
     @cached_property
     def _block(self) -> FloatArray:
@@ -231,34 +236,3 @@ class _Border:
     X: FloatArray
     size: FloatArray
     lu: tuple[FloatArray, NDArray[np.signedinteger[Any]]] | None
-
-
-def _flexible_gmres(
-    product: Callable[[FloatArray, FloatArray], FloatArray],
-    near: Callable[[FloatArray], Correction],
-    r: FloatArray,
-) -> Correction | None:
-    """x with product(x) = r, near to `near(r)`; None where that is too far."""
-    size = float(np.linalg.norm(r))
-    if not size > 0.0:
-        return near(r)
-    V, Z = [r / size], []
-    H = np.zeros((_KRYLOV + 1, _KRYLOV))
-    for k in range(_KRYLOV):
-        Z.append(near(V[k]))
-        w = product(*Z[k])
-        for i, v in enumerate(V):
-            H[i, k] = v @ w
-            w = w - H[i, k] * v
-        H[k + 1, k] = np.linalg.norm(w)
-        if not np.isfinite(H[k + 1, k]):
-            return None
-        rest = np.zeros(k + 2)
-        rest[0] = size
-        c = np.linalg.lstsq(H[: k + 2, : k + 1], rest)[0]
-        if np.linalg.norm(H[: k + 2, : k + 1] @ c - rest) <= _INEXACT * size:
-            return sum(a * df for a, (df, _) in zip(c, Z, strict=True)), sum(
-                a * ds for a, (_, ds) in zip(c, Z, strict=True)
-            )
-        V.append(w / H[k + 1, k])
-    return None
