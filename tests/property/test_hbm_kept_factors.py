@@ -9,7 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.literature.test_hbm_blade_damper_blade import Y2, response
 from tests.property.test_hbm_condensed import MOVES, OPEN, STICKS, problem
+from tests.stability.test_hbm_hard_cases import gap_oscillator
 from upd.hbm import condensed, kept_factors
 from upd.hbm.kept_factors import LEFT, LEFT_OF_TANGENT, KeptFactors
 from upd.hbm.newton import bordered_factors
@@ -74,6 +76,7 @@ def test_corrections_from_an_earlier_point_are_those_of_the_matrix(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(condensed, "WORTH_KEEPING", 0)
         patch.setattr(kept_factors, "SOLUTIONS", 0.01)
+        patch.setattr(kept_factors, "LEFT", LEFT_OF_TANGENT)
         _, parts, slope = b.linearised(x, 1.3)
         assert parts is not None
         parts.bordered(slope, rng.uniform(0.5, 2, b.size), 0.8, rng.normal(size=b.size + 1))
@@ -92,12 +95,23 @@ def test_corrections_from_an_earlier_point_are_those_of_the_matrix(
     wanted = np.linalg.solve(A, np.append(r, right))
     condition = np.linalg.cond(A)
     size = np.linalg.norm(wanted)
-    assert np.linalg.norm(correction - wanted) <= 100 * (LEFT + 1e-14 * condition) * size
+    limit = 100 * (LEFT_OF_TANGENT + 1e-14 * condition)
+    assert np.linalg.norm(correction - wanted) <= limit * size
     along = np.linalg.solve(A, np.append(np.zeros(b.size), 1.0))
     along /= np.linalg.norm(along)
-    limit = 100 * (LEFT_OF_TANGENT + 1e-14 * condition)
     assert np.linalg.norm(tangent - along) <= limit
     assert sign == np.linalg.slogdet(A)[0]
+
+
+@pytest.mark.usefixtures("always")
+def test_a_correction_leaves_its_share() -> None:
+    rng = np.random.default_rng(3)
+    P = near_identity(rng, 60)
+    M = P + 0.2 * near_identity(rng, 60)
+    r = rng.normal(size=60)
+    z = kept(P).near(Dense(M), 60).solve(r[:-1], r[-1])
+    left, whole = (np.linalg.norm(np.linalg.solve(P, x)) for x in (r - M @ z, r))
+    assert LEFT / 100 < left / whole <= LEFT * 1.001
 
 
 @pytest.mark.usefixtures("always")
@@ -111,8 +125,7 @@ def test_a_determinant_of_the_other_sign_is_seen(seed: int) -> None:
     s = -1.5 / (v @ np.linalg.solve(P, u))
     M = P + s * np.outer(u, v)
     found = kept(P).near(Dense(M), n)
-    r = rng.normal(size=n)
-    np.testing.assert_allclose(M @ found.solve(r[:-1], r[-1]), r, atol=1e-6)
+    found.tangent()
     assert found.sign == np.linalg.slogdet(M)[0] == -np.linalg.slogdet(P)[0]
 
 
@@ -166,3 +179,33 @@ def test_factors_are_renewed_when_waiting_costs_more() -> None:
 def test_another_size_of_problem_is_factored() -> None:
     of = kept(np.eye(5))
     assert type(of.near(Dense(np.eye(7)), 7)).__name__ == "_Bordered"
+
+
+def test_curves_are_those_of_new_factors_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Through slip and lift-off of two contacts, and round a fold."""
+    ways = np.linspace(0.8, 1.5, 71)
+
+    def curves():
+        return response(np.linspace(155.0, 170.0, 31)), gap_oscillator(ways, harmonics=range(6))
+
+    usual = curves()
+    used: list[int] = []
+    found = kept_factors.gmres
+
+    def counted(*args, **options):
+        used.append(1)
+        return found(*args, **options)
+
+    monkeypatch.setattr(kept_factors, "gmres", counted)
+    monkeypatch.setattr(condensed, "WORTH_KEEPING", 0)
+    monkeypatch.setattr(kept_factors, "SOLUTIONS", 0.5)
+    near = curves()
+    assert len(used) > 500
+    for row, one, other in zip((Y2, [1.0]), usual, near, strict=True):
+        assert (one.status, other.status) == ("complete", "complete")
+        met = np.intersect1d(one.frequency, other.frequency)
+        assert len(met) >= 31
+        for w in met:
+            mine, its = (np.sort(c.amplitude(row)[c.frequency == w]) for c in (one, other))
+            np.testing.assert_allclose(its, mine, rtol=1e-8)
+        assert other.peak(row)[1] == pytest.approx(one.peak(row)[1], rel=1e-4)
