@@ -34,7 +34,7 @@ from upd.linalg.gmres import gmres
 FloatArray = NDArray[np.float64]
 
 #: what a correction leaves of the equations, in scaled unknowns: well below the shrinkage of
-#: corrections (`upd.hbm.newton.CHORD`) that spares a new Jacobian, so that as many of them are taken
+#: corrections that spares a new Jacobian (`upd.hbm.newton.CHORD`), so that no more are needed
 LEFT = 1e-3
 #: the same of a tangent: paths go by its angles
 LEFT_OF_TANGENT = 1e-10

@@ -17,6 +17,7 @@ from upd.analyses.forced.estimates_cost import estimate_seconds, reduced
 from upd.analyses.forced.faces_cost import balance_seconds
 from upd.analyses.forced.stiffness import check_sources, plans_to_solve
 from upd.cache.sources import key_of
+from upd.hbm.kept_factors import SOLUTIONS, WORTH_KEEPING
 from upd.mesh import recipes
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import GAUSS
@@ -29,6 +30,9 @@ _STUCK_S = 1.9e-4
 # the march of each contact point, the products for each entry of the Jacobian, times of its LU.
 # About half of the points stick or are open over the whole cycle and are left out of the last two.
 _STEP_S, _MARCH_S, _ENTRY_S, _STEP_LU = 4.5e-4, 4.5e-5, 1.7e-8, 0.55
+# Of large ones, steps for each new factor, and solutions with the kept ones in a step (64 rows of
+# Gauss points a face, harmonics to 7, F_C/F_E 194: 2943 unknowns).
+_STEPS_KEPT, _SOLVED = 10.0, 19.0
 # Newton steps of a curve over F_C/F_E: points that begin or end to slip are kinks of the path. Both
 # faces of the symmetric damper slip, of the asymmetric one mostly the slope; finer lattices have no
 # more kinks. At most so many per frequency asked for, and to begin with.
@@ -259,13 +263,13 @@ def _again_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) ->
 def _step_seconds(
     scene: ForcedScene, size: Mapping[str, Mapping[str, int]], times: float = 1.0
 ) -> float:
-    """Seconds of a Newton step with new factors, with so many times the contact points."""
+    """Seconds of a Newton step with its factors, with so many times the contact points."""
     points, n = times * _points(scene, size), times * _unknowns(scene, size)
-    return (
-        calls_s(_STEP_S + _MARCH_S * points)
-        + arrays_s(_ENTRY_S * n**2)
-        + dense_s(_STEP_LU * 2.0 / 3.0 * n**3)
-    )
+    factor = dense_s(_STEP_LU * 2.0 / 3.0 * n**3)
+    factors = arrays_s(_ENTRY_S * n**2) + factor
+    if n > WORTH_KEEPING:
+        factors = min(factors, factors / _STEPS_KEPT + _SOLVED * factor * SOLUTIONS / n)
+    return calls_s(_STEP_S + _MARCH_S * points) + factors
 
 
 def _points(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
@@ -285,7 +289,7 @@ def _unknowns(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> floa
 
 
 def newton_seconds(plan: ForcedPlan) -> float:
-    """Of a Newton step of the run, with new factors."""
+    """Of a Newton step of the run, with its factors."""
     return _step_seconds(plan.scene, plan.size)
 
 
