@@ -27,6 +27,7 @@ from upd.hbm.interface_march import Fallback
 from upd.hbm.interface_samples import given_blades
 from upd.hbm.interface_state import FloatArray, InterfaceModel, InterfaceState
 from upd.hbm.interface_step import STICK, judge
+from upd.linalg.parallel import SideBySide
 
 IntArray = NDArray[np.int64]
 Inverses = tuple[IntArray, IntArray, IntArray, IntArray, FloatArray]
@@ -140,6 +141,8 @@ class InterfaceEquations:
             )
         self.model, self.samples, self.highest, self.fallback = model, samples, highest, fallback
         self.start = start
+        #: what is independent runs on its threads
+        self.beside = SideBySide()
         basis = harmonics(range(highest + 1))
         #: samples are at the ends of the steps
         self.E = np.roll(synthesis(basis, samples), -1, axis=0)

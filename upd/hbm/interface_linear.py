@@ -6,12 +6,18 @@ and only unknowns of nodes that move are directions. See `upd.hbm.interface_jaco
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from upd.hbm.interface_equations import ContactPeriod, IntArray, InterfaceEquations
 from upd.hbm.interface_jacobian import factor_period, march_directions
 from upd.hbm.interface_state import FloatArray
 from upd.hbm.interface_step import OPEN, STICK
+
+#: directions marched together, samples factored together; they weigh costs only: what many share
+#: against what fits the cache and keeps all threads busy
+DIRECTIONS, SAMPLES = 256, 16
 
 
 class PeriodDerivative:
@@ -56,17 +62,25 @@ class PeriodDerivative:
         PZ, Z_rows = np.empty((rows, m + r)), np.empty((rows, m + r))
         inverse = np.empty(square[-1])
         self.rows = (at, square, cols, owner, P, left, keep, PZ, Z_rows, inverse)
-        self.fine = factor_period(
-            period.force,
-            period.relative,
-            state,
-            step.W,
-            self.Z,
-            model.friction,
-            step.rho_n,
-            step.rho_t,
-            *self.rows,
-        )
+        N = len(state)
+        jobs = [
+            partial(
+                factor_period,
+                first,
+                min(first + SAMPLES, N),
+                period.force,
+                period.relative,
+                state,
+                step.W,
+                self.Z,
+                model.friction,
+                step.rho_n,
+                step.rho_t,
+                *self.rows,
+            )
+            for first in range(0, N, SAMPLES)
+        ]
+        self.fine = all(e.beside.run(jobs))
         if self.fine:
             e.inverses = state, at, square, cols, inverse
         self.lacks = bool((left != 0.0).any())
@@ -103,11 +117,37 @@ class PeriodDerivative:
         rigid, slips : ndarray
             Changes of the same after the period.
         """
+        if not self.fine:
+            return np.full_like(q, np.nan), np.full_like(rigid, np.nan), np.full_like(slips, np.nan)
+        C = len(faster)
+        parts = [slice(a, a + DIRECTIONS) for a in range(0, C, DIRECTIONS)]
+        jobs = [
+            partial(
+                self._march,
+                q[:, :, one],
+                rigid[:, one].copy(),
+                slips[:, one].copy(),
+                faster[one],
+                verge[one],
+            )
+            for one in parts
+        ]
+        found = self.e.beside.run(jobs)
+        modal, ends, slid = (np.concatenate(one, axis=-1) for one in zip(*found, strict=True))
+        return modal, ends, slid
+
+    def _march(
+        self,
+        q: FloatArray,
+        rigid: FloatArray,
+        slips: FloatArray,
+        faster: FloatArray,
+        verge: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Some of the directions; rigid and slips are overwritten."""
         e, (h, m, C), N = self.e, q.shape, len(self.state)
         motion = (e.E @ q.reshape(h, m * C)).reshape(N, m, C)
-        forces, R, z = np.empty((N, m, C)), rigid.copy(), slips.copy()
-        if not self.fine:
-            return np.full(q.shape, np.nan), np.full_like(R, np.nan), np.full_like(z, np.nan)
+        forces = np.empty((N, m, C))
         march_directions(
             self.state,
             self.step.W,
@@ -121,8 +161,8 @@ class PeriodDerivative:
             motion,
             faster,
             verge,
-            R,
-            z,
+            rigid,
+            slips,
             forces,
         )
-        return (e.Q @ forces.reshape(N, m * C)).reshape(q.shape), R, z
+        return (e.Q @ forces.reshape(N, m * C)).reshape(q.shape), rigid, slips
