@@ -196,11 +196,11 @@ def test_answers_do_not_depend_on_the_number_of_threads(monkeypatch: pytest.Monk
     monkeypatch.setattr(linear, "march_directions", told)
     for workers in (1, 2):
         used.clear()
-        found.append(response([436.0, 444.0], F_C / 300.0, samples=64, workers=workers))
+        found.append(response([436.0, 444.0, 447.0], F_C / 300.0, samples=64, workers=workers))
         assert len(used - {get_ident()}) == (workers if workers > 1 else 0)
     np.testing.assert_array_equal(found[0].frequency, found[1].frequency)
     np.testing.assert_array_equal(found[0].amplitude, found[1].amplitude)
-    assert (found[0].share[-1] > 0.05).all(), found[0].share[-1]
+    assert (found[0].share[-1] > 0.1).all(), found[0].share[-1]
 
 
 # -- answers that are known ------------------------------------------------------------------------
