@@ -166,23 +166,6 @@ def test_a_node_out_of_the_equations_is_told() -> None:
     assert told.value.moving.any()
 
 
-def test_samples_solved_by_chords_are_those_of_newtons_method() -> None:
-    """With the inverses of a motion nearby: the same forces as without, and most samples so."""
-    e, x, w = at_a_motion()
-    assert np.isfinite(evaluate(e, x, w).derivative).all()
-    inverses, known = e.inverses, e.known
-    assert len(inverses[0]) == e.samples
-    for scale in (1e-6, 1e-3, 1e-1):
-        moved, found = x * (1.0 + scale), []
-        for given in (inverses, tuple(one[:0] for one in inverses)):
-            e.known, e.inverses = known, given
-            e.forget()
-            found.append(e.march(moved, w))
-        size = np.abs(found[1].force).max()
-        np.testing.assert_allclose(found[0].force, found[1].force, rtol=0.0, atol=1e-9 * size)
-        np.testing.assert_array_equal(found[0].state, found[1].state)
-
-
 def test_answers_do_not_depend_on_the_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     """A curve through slip and lift-off in many pieces: the same digits."""
     monkeypatch.setattr(linear, "DIRECTIONS", 16)

@@ -10,6 +10,7 @@ from upd.analyses import make_plan
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
+from upd.hbm.interface_equations import InterfaceEquations
 from upd.hbm.interface_kept import border, kept_inverses, kept_step
 from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_settle import SteadyPoint, settle
@@ -122,3 +123,30 @@ def test_settling_by_kept_inverses_ends_in_the_same_motion(accelerate: bool) -> 
     np.testing.assert_allclose(at.f, there.f, rtol=0.0, atol=1e-6 * np.abs(there.f).max())
     # matrices formed in the last period; samples of few rows are left to elimination
     assert kept.last.newton < 0.7 * plain.last.newton
+
+
+def test_samples_of_a_period_by_kept_inverses() -> None:
+    """Under motions of the blades near each other: forces and states as without them."""
+    model, start = worn()
+    e = InterfaceEquations(model, [-1j * F_C / 100.0], start, 3, 64, by_coulomb)
+    q, w, rng = np.zeros(e.shape), 2.0 * np.pi * 440.0, np.random.default_rng(7)
+    q[0] = start.q
+    # millimetres of a face by a mode
+    q[1:3] = 5e-3 / np.abs(model.shapes).max(axis=0) * rng.uniform(-1.0, 1.0, (2, e.shape[1]))
+    rigid = np.zeros((3, len(model.load)))
+    rigid[0] = start.s
+    e.march_from(q, rigid, start.slip, w)
+    e.known = e.march_from(q, rigid, start.slip, w)
+    states, inverses = e.kept
+    for scale in (1e-6, 1e-3, 1e-1):
+        q[1:] *= 1.0 + scale
+        found = []
+        for given in (inverses, inverses[:, :0]):
+            e.kept = states, given
+            found.append(e.march_from(q, rigid, start.slip, w))
+            if given is inverses:
+                assert (states[:, 0] >= 0).sum() > 0.5 * e.samples
+        size = np.abs(found[1].force).max()
+        np.testing.assert_allclose(found[0].force, found[1].force, rtol=0.0, atol=1e-8 * size)
+        np.testing.assert_array_equal(found[0].state, found[1].state)
+        e.known = found[1]

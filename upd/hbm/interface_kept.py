@@ -20,8 +20,8 @@ from upd.linalg.compiled import compiled, inlined
 CONTRACTS = 0.75
 #: inverses formed in a step, and chord steps, after which it is left to Newton's method
 MOST_FORMED, MOST_CHORDS = 8, 60
-#: rows of the largest matrix that is kept: 128 samples of them take 256 MB
-MOST_ROWS = 500
+#: rows of the largest matrix that is kept: 128 samples of them would take 370 MB
+MOST_ROWS = 600
 
 
 def kept_inverses(samples: int, n: int) -> tuple[np.ndarray, np.ndarray]:

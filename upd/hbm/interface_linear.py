@@ -81,8 +81,6 @@ class PeriodDerivative:
             for first in range(0, N, SAMPLES)
         ]
         self.fine = all(e.beside.run(jobs))
-        if self.fine:
-            e.inverses = state, at, square, cols, inverse
         self.lacks = bool((left != 0.0).any())
         self.late = (model.load - period.force @ model.columns) @ step.dJ.T
 
