@@ -168,7 +168,7 @@ def test_a_node_out_of_the_equations_is_told() -> None:
 
 def test_answers_do_not_depend_on_the_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     """A curve through slip and lift-off in many pieces: the same digits."""
-    monkeypatch.setattr(linear, "DIRECTIONS", 16)
+    monkeypatch.setattr(linear, "FEW", 1)
     found, used = [], set[int]()
     march = linear.march_directions
 

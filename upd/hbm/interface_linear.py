@@ -13,11 +13,11 @@ import numpy as np
 from upd.hbm.interface_equations import ContactPeriod, IntArray, InterfaceEquations
 from upd.hbm.interface_jacobian import factor_period, march_directions
 from upd.hbm.interface_state import FloatArray
-from upd.hbm.interface_step import OPEN, STICK
+from upd.hbm.interface_step import OPEN, SLIP, STICK
 
-#: directions marched together, samples factored together; they weigh costs only: what many share
-#: against what fits the cache and keeps all threads busy
-DIRECTIONS, SAMPLES = 256, 16
+#: most directions that are marched together, and those below which they are not split; samples
+#: factored together. They weigh costs only: what many share against all threads being busy
+DIRECTIONS, FEW, SAMPLES = 400, 32, 16
 
 
 class PeriodDerivative:
@@ -38,6 +38,10 @@ class PeriodDerivative:
         Tangents of the nodes that move, first ones, then second ones.
     lacks : bool
         Whether nodes on the verge do something by themselves.
+    remembered : (2 c, d) ndarray
+        Unit slips before the period that it depends on. A node that is open at the first sample
+        does not remember its slip, and one that slips only that across its slip: its traction has
+        that direction, whatever it has slipped along it.
     """
 
     def __init__(
@@ -82,6 +86,7 @@ class PeriodDerivative:
         ]
         self.fine = all(e.beside.run(jobs))
         self.lacks = bool((left != 0.0).any())
+        self.remembered = _remembered(period, state[0], on, step.rho_t)
         self.late = (model.load - period.force @ model.columns) @ step.dJ.T
 
     def march(
@@ -118,7 +123,9 @@ class PeriodDerivative:
         if not self.fine:
             return np.full_like(q, np.nan), np.full_like(rigid, np.nan), np.full_like(slips, np.nan)
         C = len(faster)
-        parts = [slice(a, a + DIRECTIONS) for a in range(0, C, DIRECTIONS)]
+        # an even number of equal pieces, whatever the threads
+        wide = C if C <= FEW else -(-C // (2 * -(-C // (2 * DIRECTIONS))))
+        parts = [slice(a, a + wide) for a in range(0, C, wide)]
         jobs = [
             partial(
                 self._march,
@@ -164,3 +171,19 @@ class PeriodDerivative:
             forces,
         )
         return (e.Q @ forces.reshape(N, m * C)).reshape(q.shape), rigid, slips
+
+
+def _remembered(
+    period: ContactPeriod, state: IntArray, on: IntArray, rho_t: FloatArray
+) -> FloatArray:
+    """Slips of the nodes `on` that the first sample depends on, by its states (n,)."""
+    n, c = len(state), len(on)
+    t1, t2 = (period.force[0] + np.tile(rho_t, 3) * period.relative[0]).reshape(3, n)[1:, on]
+    both, across = np.flatnonzero(state[on] >= STICK), np.flatnonzero(state[on] == SLIP)
+    both = np.setdiff1d(both, across)
+    size = np.hypot(t1, t2)[across]
+    out = np.zeros((2 * c, 2 * len(both) + len(across)))
+    out[np.concatenate([both, c + both]), np.arange(2 * len(both))] = 1.0
+    places = 2 * len(both) + np.arange(len(across))
+    out[across, places], out[c + across, places] = -t2[across] / size, t1[across] / size
+    return out
