@@ -97,7 +97,7 @@ def run(
                 "value": found.seconds,
                 "unit": "s",
                 "target": most if ratio == 600.0 else None,
-                "note": f"by the clock, {threads_used()} threads; {seconds:.3g} s of processor, "
+                "note": f"by the clock, {threads_used()} threads; {seconds:.3g} s of processors; "
                 f"{len(found.frequency)} points, {int(found.iterations.sum())} derivatives",
             }
             if ratio == 600.0:
