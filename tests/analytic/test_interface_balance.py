@@ -3,12 +3,14 @@ the same system, linear answers, differences, and what holds for any periodic mo
 """
 
 from functools import cache
+from threading import get_ident
 from typing import Any
 
 import numpy as np
 import pytest
 
 import upd.hbm.interface_equations as module
+import upd.hbm.interface_linear as linear
 from upd.analyses import make_plan
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
 from upd.analyses.seated.bodies import make_bodies
@@ -164,21 +166,24 @@ def test_a_node_out_of_the_equations_is_told() -> None:
     assert told.value.moving.any()
 
 
-def test_samples_solved_by_chords_are_those_of_newtons_method() -> None:
-    """With the inverses of a motion nearby: the same forces as without, and most samples so."""
-    e, x, w = at_a_motion()
-    assert np.isfinite(evaluate(e, x, w).derivative).all()
-    inverses, known = e.inverses, e.known
-    assert len(inverses[0]) == e.samples
-    for scale in (1e-6, 1e-3, 1e-1):
-        moved, found = x * (1.0 + scale), []
-        for given in (inverses, tuple(one[:0] for one in inverses)):
-            e.known, e.inverses = known, given
-            e.forget()
-            found.append(e.march(moved, w))
-        size = np.abs(found[1].force).max()
-        np.testing.assert_allclose(found[0].force, found[1].force, rtol=0.0, atol=1e-9 * size)
-        np.testing.assert_array_equal(found[0].state, found[1].state)
+def test_answers_do_not_depend_on_the_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A curve through slip and lift-off in many pieces: the same digits."""
+    monkeypatch.setattr(linear, "FEW", 1)
+    found, used = [], set[int]()
+    march = linear.march_directions
+
+    def told(*given: Any) -> None:
+        used.add(get_ident())
+        march(*given)
+
+    monkeypatch.setattr(linear, "march_directions", told)
+    for workers in (1, 2):
+        used.clear()
+        found.append(response([436.0, 444.0, 447.0], F_C / 300.0, samples=64, workers=workers))
+        assert len(used - {get_ident()}) == (workers if workers > 1 else 0)
+    np.testing.assert_array_equal(found[0].frequency, found[1].frequency)
+    np.testing.assert_array_equal(found[0].amplitude, found[1].amplitude)
+    assert (found[0].share[-1] > 0.1).all(), found[0].share[-1]
 
 
 # -- answers that are known ------------------------------------------------------------------------

@@ -20,6 +20,8 @@ from upd.hbm.interface_march import Fallback
 from upd.hbm.interface_point import InterfacePoint
 from upd.hbm.interface_state import ComplexArray, FloatArray, InterfaceModel, InterfaceState
 from upd.hbm.newton import Settings
+from upd.linalg.parallel import SideBySide
+from upd.linalg.select import threads_used
 
 #: of the Newton corrections over the sizes of the unknowns; the samples are solved to 1e-11 of the
 #: forces
@@ -108,6 +110,7 @@ def interface_response(
     samples: int = 128,
     settings: Settings | None = None,
     fallback: Fallback | None = None,
+    workers: int | None = None,
 ) -> InterfaceResponse:
     """Follow the curve from the first to the last frequency, through all of them.
 
@@ -132,6 +135,8 @@ def interface_response(
         Step control of the continuation.
     fallback : callable, optional
         As for `upd.hbm.interface_march.InterfaceMarch`.
+    workers : int, optional
+        Threads; by default all that libraries may use. The answer is the same with any number.
 
     Returns
     -------
@@ -151,9 +156,11 @@ def interface_response(
             "in Hz"
         )
     s = settings or replace(Settings(), tolerance=TOLERANCE, smallest_step=SHORTEST)
-    equations = InterfaceEquations(model, drive, start, harmonics, samples, fallback)
-    curve = InterfaceCurve(equations, drive, s, float(np.mean(f)))
-    status, message = curve.follow(f)
+    with SideBySide(threads_used() if workers is None else workers) as beside:
+        equations = InterfaceEquations(model, drive, start, harmonics, samples, fallback)
+        equations.beside = beside
+        curve = InterfaceCurve(equations, drive, s, float(np.mean(f)))
+        status, message = curve.follow(f)
     points, outputs = curve.places, len(model.seen_modes)
     return InterfaceResponse(
         np.array([one.frequency for one in points]),

@@ -5,7 +5,67 @@ from __future__ import annotations
 import numpy as np
 
 from upd.hbm.interface_step import OPEN
-from upd.linalg.compiled import compiled
+from upd.linalg.compiled import compiled, inlined
+
+
+@inlined
+def bring_up(c, w, slip, Tt, base, one):  # type: ignore[no-untyped-def]
+    """Bring c = -L W w_ref of a base up to the slips that were made since.
+
+    Parameters
+    ----------
+    c : (B, 3 n) ndarray
+        Overwritten.
+    w : (B, 2 n) ndarray
+        Sums of slips it is for; overwritten by `slip`.
+    slip : (2 n,) ndarray
+        Sums of slips now.
+    Tt, base, one
+        As `contact_step`.
+    """
+    n = base.shape[1]
+    for d in range(2 * n):
+        moved = slip[d] - w[one, d]
+        if moved != 0.0:
+            w[one, d] = slip[d]
+            if base[one, d % n]:
+                # L W of a node that is open in the base
+                c[one, n + d] -= moved
+            else:
+                for e in range(3 * n):
+                    c[one, e] -= moved * Tt[one, n + d, e]
+
+
+@compiled
+def begin(bases, gap, slip):  # type: ignore[no-untyped-def]
+    """-L W w_ref of each base, anew every period so that its rounding does not add up.
+
+    Parameters
+    ----------
+    bases : Bases
+    gap, slip : (n,), (2 n,) ndarray
+        Gap before any load, sums of slips [mm].
+
+    Returns
+    -------
+    c, w : (B, 3 n), (B, 2 n) ndarray
+        And the sums of slips it is for.
+    """
+    bases_open, bases_Tt, _ = bases
+    B, n = bases_open.shape
+    c, w = np.zeros((B, 3 * n)), np.empty((B, 2 * n))
+    for one in range(B):
+        w[one] = slip
+        for d in range(3 * n):
+            ref = gap[d] if d < n else slip[d - n]
+            if ref == 0.0:
+                continue
+            if bases_open[one, d % n]:
+                c[one, d] -= ref
+            else:
+                for e in range(3 * n):
+                    c[one, e] -= ref * bases_Tt[one, d, e]
+    return c, w
 
 
 @compiled

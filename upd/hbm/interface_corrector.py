@@ -20,6 +20,10 @@ from upd.hbm.interface_step import SOLVED
 from upd.hbm.interface_steps import SHRINKS, BroydenSteps, KnownFactors
 from upd.hbm.newton import Settings, bordered_factors, finite_jacobian
 
+#: share of the correction before, two of which in a row end a correction: at it twelve would not
+#: take a step of the curve to the tolerance; it weighs costs against those of a shorter step
+WAVERS = 0.6
+
 
 @dataclass(frozen=True)
 class InterfacePlace:
@@ -129,7 +133,8 @@ class InterfaceCorrector:
                 step = steps.next(found.residual)
             sizes.append(float(np.linalg.norm(step)))
             # nodes that change their states to and fro: a shorter step tells them apart
-            if not sizes[-1] < sizes[-3]:
+            wavers = all(sizes[k] > WAVERS * sizes[k - 1] for k in (-1, -2))
+            if wavers or not sizes[-1] < sizes[-3]:
                 return None
             assert steps is not None
             slip = x[first:].reshape(2, -1)

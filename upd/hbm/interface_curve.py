@@ -36,6 +36,8 @@ SAME = 0.1
 NEAR_FOLD = 0.005
 #: share of a step beyond a fold that the next one may have at most, so that the approach ends
 TURNED = 0.95
+#: share of a step without an answer that is tried next; it weighs costs
+FAILED = 0.25
 #: how far the corrector may move from the predicted point, in steps
 STRAY = 0.5
 
@@ -234,7 +236,8 @@ class InterfaceCurve:
                         tangent=tangent / np.linalg.norm(tangent),
                         step=min(step, s.largest_step),
                     )
-            h = 0.5 * min(h, length)
+            # states that change to and fro ahead of a fold do so at half of the step as well
+            h = (FAILED if found is None else 0.5) * min(h, length)
         return None
 
     def _first(self, f: float) -> InterfacePlace | None:

@@ -23,13 +23,14 @@ from scipy.linalg import cho_factor, cho_solve
 
 from upd.errors import ConvergenceError, InputError
 from upd.hbm.fourier import analysis, harmonics, synthesis
+from upd.hbm.interface_kept import kept_inverses
 from upd.hbm.interface_march import Fallback
 from upd.hbm.interface_samples import given_blades
 from upd.hbm.interface_state import FloatArray, InterfaceModel, InterfaceState
 from upd.hbm.interface_step import STICK, judge
+from upd.linalg.parallel import SideBySide
 
 IntArray = NDArray[np.int64]
-Inverses = tuple[IntArray, IntArray, IntArray, IntArray, FloatArray]
 
 
 @dataclass
@@ -140,6 +141,8 @@ class InterfaceEquations:
             )
         self.model, self.samples, self.highest, self.fallback = model, samples, highest, fallback
         self.start = start
+        #: what is independent runs on its threads
+        self.beside = SideBySide()
         basis = harmonics(range(highest + 1))
         #: samples are at the ends of the steps
         self.E = np.roll(synthesis(basis, samples), -1, axis=0)
@@ -155,9 +158,8 @@ class InterfaceEquations:
         self.slip = start.slip.copy()
         #: guess of every sample
         self.known: ContactPeriod | None = None
-        #: states, and inverses of the samples' matrices in them, as `given_blades` takes them
-        none = np.zeros(0, np.int64)
-        self.inverses: Inverses = np.zeros((0, model.n), np.int64), none, none, none, np.zeros(0)
+        #: inverses of the samples' matrices, and for which states
+        self.kept = kept_inverses(samples, model.n)
         self._at: tuple[FloatArray, float] | None = None
         self._step: tuple[float, Step] | None = None
         try:
@@ -391,7 +393,7 @@ class InterfaceEquations:
                 F,
                 Y,
                 S,
-                *self.inverses,
+                *self.kept,
                 x0,
                 self.work,
             )

@@ -124,12 +124,33 @@ def law_rows(  # type: ignore[no-untyped-def]
 
 @compiled
 def factor_period(  # type: ignore[no-untyped-def]
-    F, Y, S, W, Z, mu, rho_n, rho_t, at, square, cols, owner, P, left, keep, PZ, Z_rows, inverse
+    first_sample,
+    last_sample,
+    F,
+    Y,
+    S,
+    W,
+    Z,
+    mu,
+    rho_n,
+    rho_t,
+    at,
+    square,
+    cols,
+    owner,
+    P,
+    left,
+    keep,
+    PZ,
+    Z_rows,
+    inverse,
 ):
-    """Rows of all samples, and the inverses of their matrices.
+    """Rows of samples, and the inverses of their matrices.
 
     Parameters
     ----------
+    first_sample, last_sample : int
+        From the first on, up to the one before the last.
     F, Y, S
         Answers of all samples, as `upd.hbm.interface_samples.given_blades` leaves them; states with
         the verges.
@@ -157,11 +178,11 @@ def factor_period(  # type: ignore[no-untyped-def]
     """
     n, wide = len(mu), Z.shape[1]
     most = 0
-    for j in range(len(F)):
+    for j in range(first_sample, last_sample):
         most = max(most, at[j + 1] - at[j])
     H = np.empty((most, most))
     on = np.empty(n, np.int64)
-    for j in range(len(F)):
+    for j in range(first_sample, last_sample):
         a, b = at[j], at[j + 1]
         k = b - a
         if k == 0:

@@ -6,12 +6,18 @@ and only unknowns of nodes that move are directions. See `upd.hbm.interface_jaco
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from upd.hbm.interface_equations import ContactPeriod, IntArray, InterfaceEquations
 from upd.hbm.interface_jacobian import factor_period, march_directions
 from upd.hbm.interface_state import FloatArray
-from upd.hbm.interface_step import OPEN, STICK
+from upd.hbm.interface_step import OPEN, SLIP, STICK
+
+#: most directions that are marched together, and those below which they are not split; samples
+#: factored together. They weigh costs only: what many share against all threads being busy
+DIRECTIONS, FEW, SAMPLES = 400, 32, 16
 
 
 class PeriodDerivative:
@@ -32,6 +38,10 @@ class PeriodDerivative:
         Tangents of the nodes that move, first ones, then second ones.
     lacks : bool
         Whether nodes on the verge do something by themselves.
+    remembered : (2 c, d) ndarray
+        Unit slips before the period that it depends on. A node that is open at the first sample
+        does not remember its slip, and one that slips only that across its slip: its traction has
+        that direction, whatever it has slipped along it.
     """
 
     def __init__(
@@ -56,20 +66,27 @@ class PeriodDerivative:
         PZ, Z_rows = np.empty((rows, m + r)), np.empty((rows, m + r))
         inverse = np.empty(square[-1])
         self.rows = (at, square, cols, owner, P, left, keep, PZ, Z_rows, inverse)
-        self.fine = factor_period(
-            period.force,
-            period.relative,
-            state,
-            step.W,
-            self.Z,
-            model.friction,
-            step.rho_n,
-            step.rho_t,
-            *self.rows,
-        )
-        if self.fine:
-            e.inverses = state, at, square, cols, inverse
+        N = len(state)
+        jobs = [
+            partial(
+                factor_period,
+                first,
+                min(first + SAMPLES, N),
+                period.force,
+                period.relative,
+                state,
+                step.W,
+                self.Z,
+                model.friction,
+                step.rho_n,
+                step.rho_t,
+                *self.rows,
+            )
+            for first in range(0, N, SAMPLES)
+        ]
+        self.fine = all(e.beside.run(jobs))
         self.lacks = bool((left != 0.0).any())
+        self.remembered = _remembered(period, state[0], on, step.rho_t)
         self.late = (model.load - period.force @ model.columns) @ step.dJ.T
 
     def march(
@@ -103,11 +120,39 @@ class PeriodDerivative:
         rigid, slips : ndarray
             Changes of the same after the period.
         """
+        if not self.fine:
+            return np.full_like(q, np.nan), np.full_like(rigid, np.nan), np.full_like(slips, np.nan)
+        C = len(faster)
+        # an even number of equal pieces, whatever the threads
+        wide = C if C <= FEW else -(-C // (2 * -(-C // (2 * DIRECTIONS))))
+        parts = [slice(a, a + wide) for a in range(0, C, wide)]
+        jobs = [
+            partial(
+                self._march,
+                q[:, :, one],
+                rigid[:, one].copy(),
+                slips[:, one].copy(),
+                faster[one],
+                verge[one],
+            )
+            for one in parts
+        ]
+        found = self.e.beside.run(jobs)
+        modal, ends, slid = (np.concatenate(one, axis=-1) for one in zip(*found, strict=True))
+        return modal, ends, slid
+
+    def _march(
+        self,
+        q: FloatArray,
+        rigid: FloatArray,
+        slips: FloatArray,
+        faster: FloatArray,
+        verge: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Some of the directions; rigid and slips are overwritten."""
         e, (h, m, C), N = self.e, q.shape, len(self.state)
         motion = (e.E @ q.reshape(h, m * C)).reshape(N, m, C)
-        forces, R, z = np.empty((N, m, C)), rigid.copy(), slips.copy()
-        if not self.fine:
-            return np.full(q.shape, np.nan), np.full_like(R, np.nan), np.full_like(z, np.nan)
+        forces = np.empty((N, m, C))
         march_directions(
             self.state,
             self.step.W,
@@ -121,8 +166,24 @@ class PeriodDerivative:
             motion,
             faster,
             verge,
-            R,
-            z,
+            rigid,
+            slips,
             forces,
         )
-        return (e.Q @ forces.reshape(N, m * C)).reshape(q.shape), R, z
+        return (e.Q @ forces.reshape(N, m * C)).reshape(q.shape), rigid, slips
+
+
+def _remembered(
+    period: ContactPeriod, state: IntArray, on: IntArray, rho_t: FloatArray
+) -> FloatArray:
+    """Slips of the nodes `on` that the first sample depends on, by its states (n,)."""
+    n, c = len(state), len(on)
+    t1, t2 = (period.force[0] + np.tile(rho_t, 3) * period.relative[0]).reshape(3, n)[1:, on]
+    both, across = np.flatnonzero(state[on] >= STICK), np.flatnonzero(state[on] == SLIP)
+    both = np.setdiff1d(both, across)
+    size = np.hypot(t1, t2)[across]
+    out = np.zeros((2 * c, 2 * len(both) + len(across)))
+    out[np.concatenate([both, c + both]), np.arange(2 * len(both))] = 1.0
+    places = 2 * len(both) + np.arange(len(across))
+    out[across, places], out[c + across, places] = -t2[across] / size, t1[across] / size
+    return out

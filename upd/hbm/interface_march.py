@@ -52,6 +52,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from upd.errors import ConvergenceError
 from upd.hbm.interface_bases import suit_bases
+from upd.hbm.interface_kept import kept_inverses
 from upd.hbm.interface_modes import modal_step, resolved
 from upd.hbm.interface_period import Bases, Past, StepParts, march_steps
 from upd.hbm.interface_state import FloatArray, InterfaceModel, InterfaceState
@@ -185,7 +186,10 @@ class InterfaceMarch:
         self.bases: Bases
         if like is None or not alike or like.model.n != n:
             self.past = Past(
-                np.empty((samples, 3 * n)), np.empty((samples, 3 * n)), np.zeros((samples, n), int)
+                np.empty((samples, 3 * n)),
+                np.empty((samples, 3 * n)),
+                np.zeros((samples, n), int),
+                *kept_inverses(samples, n),
             )
             self.rebase(np.zeros(n, bool))
         else:
@@ -337,27 +341,29 @@ class InterfaceMarch:
             suit_bases(self.past.state, self.bases.open, self.which, np.inf)
 
     def _add(self, open_: NDArray[np.bool_]) -> None:
-        """Add a base, in place of the one that is missed least where there are as many as may be.
+        """Add a base; where there are as many as may be, in place of another if that pays.
 
         Parameters
         ----------
         open_ : (n,) ndarray of bool
         """
-        Tt, Z = self._pivoted(open_)
-        bases = self.bases
-        most = max(2, min(MOST_BASES, BASES_BYTES // Tt.nbytes))
+        bases, bytes_each = self.bases, self.W.nbytes
+        most = max(2, min(MOST_BASES, BASES_BYTES // bytes_each))
         if len(bases.open) < most:
+            Tt, Z = self._pivoted(open_)
             self.bases = Bases(
                 np.append(bases.open, open_[None], 0),
                 np.append(bases.Tt, Tt[None], 0),
                 np.append(bases.Z, Z[None], 0),
             )
             return
-        off = (self.past.state[:, None] == OPEN) != bases.open
-        nodes = off.sum(axis=2)
-        without = [np.delete(nodes, k, axis=1).min(axis=1).sum() for k in range(len(bases.open))]
-        k = int(np.argmin(without))
-        bases.open[k], bases.Tt[k], bases.Z[k] = open_, Tt, Z
+        opens = self.past.state == OPEN
+        nodes = np.array([(opens != one).sum(axis=1) for one in (*bases.open, open_)])
+        with_ = [np.delete(nodes, k, axis=0).min(axis=0).sum() for k in range(len(bases.open))]
+        k = int(np.argmin(with_))
+        if with_[k] + PAYS * self.samples < nodes[:-1].min(axis=0).sum():
+            bases.open[k] = open_
+            bases.Tt[k], bases.Z[k] = self._pivoted(open_)
 
     def finish_step(self, sample: int, at: InterfaceState) -> None:
         """The step that Newton's method did not solve: forces into x0, the rest into `at`.

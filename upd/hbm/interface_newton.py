@@ -102,8 +102,17 @@ class InterfaceEvaluation:
         first = u - len(self.e.tangents)
         own = np.concatenate([np.arange(first), self.slips, [u]])
         formed = np.eye(u, u + 1)
-        frequency = np.eye(1, len(own), len(own) - 1)[0]
-        formed[:, own] = self.product(formed[:, own], frequency)
+        dx, dw = formed[:, own], np.eye(1, len(own), len(own) - 1)[0]
+        memory = self.linear.remembered
+        slip = slice(first, first + len(memory))
+        wanted = np.zeros((u, first + memory.shape[1] + 1))
+        wanted[:first, :first] = np.eye(first)
+        wanted[self.slips, first:-1] = memory
+        found = self._marched(wanted, np.eye(1, wanted.shape[1], wanted.shape[1] - 1)[0])
+        out = np.empty_like(dx)
+        out[:, :first], out[:, -1] = found[:, :first], found[:, -1]
+        out[:, slip] = found[:, first:-1] @ memory.T
+        formed[:, own] = self._with_blades(out, dx, dw)
         return formed
 
     @property
@@ -116,24 +125,11 @@ class InterfaceEvaluation:
         """(u,) derivative by the frequency in rad/s."""
         return self.derivative[:, -1]
 
-    def product(self, dx: FloatArray, dw: FloatArray) -> FloatArray:
-        """Derivative of the residual in directions.
-
-        Parameters
-        ----------
-        dx : (u, C) ndarray
-            Changes of the unknowns.
-        dw : (C,) ndarray
-            Changes of the frequency [rad/s].
-
-        Returns
-        -------
-        (u, C) ndarray
-        """
+    def _with_blades(self, out: FloatArray, dx: FloatArray, dw: FloatArray) -> FloatArray:
+        """What the period takes from the residual, overwritten, and all else of the residual."""
         e, w = self.e, self.w
         h, m = e.shape
         q = self.x[: h * m].reshape(h, m)
-        out = self._marched(dx, dw, np.zeros(len(dw)))
         alpha, beta = e.stiffness(w)
         change = dx[: h * m].reshape(h, m, -1)
         blades = alpha[:, :, None] * change
@@ -145,8 +141,11 @@ class InterfaceEvaluation:
         self._hold_across(out, dx)
         return out
 
-    def _marched(self, dx: FloatArray, dw: FloatArray, verge: FloatArray) -> FloatArray:
+    def _marched(
+        self, dx: FloatArray, dw: FloatArray, verge: FloatArray | None = None
+    ) -> FloatArray:
         """What the period takes from the residual (u, C): forces of the blades, ends."""
+        verge = np.zeros(len(dw)) if verge is None else verge
         h, m = self.e.shape
         own = slice(h * m, h * m + 3 * len(self.e.model.load))
         modal, rigid, slips = self.linear.march(

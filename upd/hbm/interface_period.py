@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.hbm.interface_bases import begin, bring_up
+from upd.hbm.interface_kept import kept_step
 from upd.hbm.interface_rows import add_rows, fetch_row, put, put_row
 from upd.hbm.interface_step import OPEN, contact_scratch, contact_step
 from upd.linalg.compiled import compiled, inlined
@@ -81,71 +83,21 @@ class Bases(NamedTuple):
 
 
 class Past(NamedTuple):
-    """Forces, relative motions (N, 3 n) and states (N, n) of the samples of a period."""
+    """Forces, relative motions (N, 3 n) and states (N, n) of the samples of a period.
+
+    Attributes
+    ----------
+    force, move : (N, 3 n) ndarray
+    state : (N, n) ndarray of int
+    kept, inverses : ndarray
+        As of `upd.hbm.interface_kept.kept_inverses`.
+    """
 
     force: FloatArray
     move: FloatArray
     state: NDArray[np.int64]
-
-
-@inlined
-def bring_up(c, w, slip, Tt, base, one):  # type: ignore[no-untyped-def]
-    """Bring c = -L W w_ref of a base up to the slips that were made since.
-
-    Parameters
-    ----------
-    c : (B, 3 n) ndarray
-        Overwritten.
-    w : (B, 2 n) ndarray
-        Sums of slips it is for; overwritten by `slip`.
-    slip : (2 n,) ndarray
-        Sums of slips now.
-    Tt, base, one
-        As `contact_step`.
-    """
-    n = base.shape[1]
-    for d in range(2 * n):
-        moved = slip[d] - w[one, d]
-        if moved != 0.0:
-            w[one, d] = slip[d]
-            if base[one, d % n]:
-                # L W of a node that is open in the base
-                c[one, n + d] -= moved
-            else:
-                for e in range(3 * n):
-                    c[one, e] -= moved * Tt[one, n + d, e]
-
-
-@compiled
-def begin(bases, gap, slip):  # type: ignore[no-untyped-def]
-    """-L W w_ref of each base, anew every period so that its rounding does not add up.
-
-    Parameters
-    ----------
-    bases : Bases
-    gap, slip : (n,), (2 n,) ndarray
-        Gap before any load, sums of slips [mm].
-
-    Returns
-    -------
-    c, w : (B, 3 n), (B, 2 n) ndarray
-        And the sums of slips it is for.
-    """
-    bases_open, bases_Tt, _ = bases
-    B, n = bases_open.shape
-    c, w = np.zeros((B, 3 * n)), np.empty((B, 2 * n))
-    for one in range(B):
-        w[one] = slip
-        for d in range(3 * n):
-            ref = gap[d] if d < n else slip[d - n]
-            if ref == 0.0:
-                continue
-            if bases_open[one, d % n]:
-                c[one, d] -= ref
-            else:
-                for e in range(3 * n):
-                    c[one, e] -= ref * bases_Tt[one, d, e]
-    return c, w
+    kept: NDArray[np.int64]
+    inverses: FloatArray
 
 
 @inlined
@@ -246,7 +198,7 @@ def march_steps(  # type: ignore[no-untyped-def]
     ) = parts
     q, v, p, s, sv, sa, f, y, slip, state, held = at
     bases_open, Tt, Z = bases
-    forces, moves, states = past
+    forces, moves, states, kept, inverses = past
     bias = held_share * held
     c, w = begin(bases, gap, slip)
     scratch = contact_scratch(len(mu))
@@ -291,8 +243,31 @@ def march_steps(  # type: ignore[no-untyped-def]
             put(y, slid, 0)
             put(state, was, 0)
             used = -1
+            if known:
+                fetch_row(forces, step, f)
+                fetch_row(moves, step, y)
+                fetch_row(states, step, state)
+                used = kept_step(
+                    step,
+                    x0,
+                    Tt,
+                    bases_open,
+                    one,
+                    mu,
+                    rho_n,
+                    rho_t,
+                    f,
+                    y,
+                    state,
+                    kept,
+                    inverses,
+                    work,
+                    *scratch,
+                )
             # from the sample a period ago, from the step before, from nothing
             for start in range(0 if known else 1, 3):
+                if used >= 0:
+                    break
                 if start == 0:
                     fetch_row(forces, step, f)
                     fetch_row(moves, step, y)
@@ -316,8 +291,6 @@ def march_steps(  # type: ignore[no-untyped-def]
                     work,
                     *scratch,
                 )
-                if used >= 0:
-                    break
             if used < 0:
                 put(before, f, 0)
                 # for whoever solves the step, and comes back

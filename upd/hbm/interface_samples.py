@@ -17,96 +17,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.hbm.interface_step import OPEN, SLIP, SOLVED, STICK, contact_scratch, contact_step, judge
+from upd.hbm.interface_kept import kept_step
+from upd.hbm.interface_step import contact_scratch, contact_step
 from upd.linalg.compiled import compiled
-
-#: a chord step must take at least this share of the misfit away; it only weighs costs
-CONTRACTS = 0.75
-#: chord steps cost a Newton step of many rows together; it only weighs costs
-MOST_CHORDS = 8
-
-
-@compiled
-def chord_steps(  # type: ignore[no-untyped-def]
-    x0, W, mu, rho_n, rho_t, f, y, state, usual, cols, inverse, f_new, y_new, states
-):
-    """Solve a sample with the inverse of another's matrix, where all nodes are in its states.
-
-    The rows are those of `upd.hbm.interface_jacobian.law_rows`; what is left of the laws tells how
-    far each step leads, so that the answer is as exact as that of `contact_step`.
-
-    Parameters
-    ----------
-    x0 : (3 n,) ndarray
-        Forces if everything sticks [N].
-    W : (3 n, 3 n) ndarray
-        Inverse of A [N/mm]; symmetric.
-    mu, rho_n, rho_t : (n,) ndarray
-        Friction, weights of displacements against forces.
-    f, y, state : ndarray
-        Guess; overwritten by the answer, if there is one.
-    usual : (n,) ndarray of int
-        States for which the inverse is.
-    cols : (k,) ndarray of int
-        Dofs of its rows, the dofs of a node one after the other.
-    inverse : (k, k) ndarray
-    f_new, y_new, states : ndarray
-        Scratch as f, y, state.
-
-    Returns
-    -------
-    bool
-        Whether the sample is solved.
-    """
-    n, k = len(mu), len(cols)
-    for i in range(n):
-        if state[i] != usual[i]:
-            return False
-    f_new[:], y_new[:] = x0, 0.0
-    for row in range(k):
-        d = cols[row]
-        y_new[d] = y[d]
-        weight, row_of = y[d], W[d]
-        for e in range(3 * n):
-            f_new[e] -= weight * row_of[e]
-    left, before, allowed = np.empty(k), np.inf, 0.0
-    for d in range(3 * n):
-        allowed = max(allowed, SOLVED * abs(x0[d]))
-    for _ in range(MOST_CHORDS):
-        for d in range(3 * n):
-            allowed = max(allowed, SOLVED * abs(f_new[d]))
-        worst = judge(f_new, y_new, mu, rho_n, rho_t, states)
-        for i in range(n):
-            if states[i] != usual[i]:
-                return False
-        if worst <= allowed:
-            for i in range(n):
-                for d in (i, n + i, 2 * n + i):
-                    f[d], y[d] = f_new[d], y_new[d]
-                    if state[i] == OPEN:
-                        f[d] = 0.0
-                    elif state[i] == STICK or d == i:
-                        y[d] = 0.0
-            return True
-        if not worst <= (1.0 - CONTRACTS) * before:
-            return False
-        before = worst
-        for row in range(k):
-            d = cols[row]
-            i = d % n
-            left[row] = f_new[d]
-            if usual[i] == SLIP:
-                q1 = f_new[n + i] + rho_t[i] * y_new[n + i]
-                q2 = f_new[2 * n + i] + rho_t[i] * y_new[2 * n + i]
-                q = q1 if d == n + i else q2
-                left[row] -= mu[i] * f_new[i] * q / np.sqrt(q1 * q1 + q2 * q2)
-        change = np.dot(inverse, left)
-        for row in range(k):
-            y_new[cols[row]] += change[row]
-            weight, row_of = change[row], W[cols[row]]
-            for e in range(3 * n):
-                f_new[e] -= weight * row_of[e]
-    return False
 
 
 @compiled
@@ -128,11 +41,8 @@ def given_blades(  # type: ignore[no-untyped-def]
     F,
     Y,
     S,
-    usual,
-    at,
-    square,
-    cols,
-    inverse,
+    kept,
+    inverses,
     x0,
     work,
 ):
@@ -167,10 +77,8 @@ def given_blades(  # type: ignore[no-untyped-def]
         Forces [N]; minus gaps, and slips of the step [mm]; overwritten.
     S : (N, n) ndarray of int
         States; overwritten.
-    usual : (N or 0, n) ndarray of int
-        States of the samples whose inverses are known, if they are.
-    at, square, cols, inverse
-        Of them, as in `upd.hbm.interface_jacobian.factor_period`.
+    kept, inverses
+        As of `upd.hbm.interface_kept.kept_inverses`; overwritten.
     x0, work : ndarray
         Scratch (3 n,), (3 n, 3 n).
 
@@ -183,7 +91,6 @@ def given_blades(  # type: ignore[no-untyped-def]
     one_base, only = np.zeros((1, n), np.bool_), W.reshape(1, 3 * n, 3 * n)
     scratch = contact_scratch(n)
     z, b, pull = np.empty(r), np.empty(r), np.empty(r)
-    f_new, y_new, states = np.empty(3 * n), np.empty(3 * n), np.empty(n, np.int64)
     for j in range(first, N):
         f, y, state = F[j], Y[j], S[j]
         for i in range(r):
@@ -196,25 +103,24 @@ def given_blades(  # type: ignore[no-untyped-def]
                 for d in range(3 * n):
                     x0[d] += z[i] * rigid[i, d]
             used = -1
-            if known and len(usual) > 0 and at[j + 1] > at[j]:
-                k = at[j + 1] - at[j]
-                if chord_steps(
+            if known:
+                used = kept_step(
+                    j,
                     x0,
-                    W,
+                    only,
+                    one_base,
+                    0,
                     mu,
                     rho_n,
                     rho_t,
                     f,
                     y,
                     state,
-                    usual[j],
-                    cols[at[j] : at[j + 1]],
-                    inverse[square[j] : square[j + 1]].reshape(k, k),
-                    f_new,
-                    y_new,
-                    states,
-                ):
-                    used = 0
+                    kept,
+                    inverses,
+                    work,
+                    *scratch,
+                )
             # from the sample's own guess, from the sample before, from nothing
             for start in range(3):
                 if used >= 0 or (start == 0 and not (known or j == 0)) or (start == 1 and j == 0):
