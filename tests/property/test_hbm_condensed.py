@@ -44,8 +44,8 @@ def problem(
 @pytest.mark.parametrize(
     ("n", "kinds", "worth", "how"),
     [
-        (12, [MOVES, MOVES, MOVES], 0.0, "Whole"),
-        (12, [MOVES, STICKS, OPEN], np.inf, "Whole"),
+        (12, [MOVES, MOVES, MOVES], 0.0, "EveryPoint"),
+        (12, [MOVES, STICKS, OPEN], np.inf, "EveryPoint"),
         (12, [MOVES, STICKS, OPEN, MOVES], 0.0, "Eliminated"),
         (12, [STICKS, STICKS, OPEN], 0.0, "Eliminated"),
         (3, [MOVES, MOVES, STICKS, MOVES, OPEN], 0.0, "LowRank"),

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.condensed_factors import Eliminated, Factors, LowRank, Whole
+from upd.hbm.condensed_factors import Eliminated, Factors, LowRank, EveryPoint
 from upd.hbm.kept_factors import WORTH_KEEPING
 from upd.hbm.linearised import Linearised
 from upd.hbm.newton import BorderedFactors
@@ -73,7 +73,7 @@ class _Matrix(NamedTuple):
             return LowRank
         n = len(self.D)
         left = n - (len(J.state) - moving) * d1 * (J.offset + 2 * len(J.w))
-        return Eliminated if 2 * (n**3 - left**3) / 3 > WORTH else Whole
+        return Eliminated if 2 * (n**3 - left**3) / 3 > WORTH else EveryPoint
 
     @property
     def unknowns(self) -> int:

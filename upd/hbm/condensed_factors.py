@@ -117,7 +117,7 @@ class Factors:
         return np.asarray(t / np.linalg.norm(t))
 
 
-class Whole(Factors):
+class EveryPoint(Factors):
     """Every point has its unknowns."""
 
     def __init__(

@@ -45,7 +45,7 @@ WORTH_KEEPING = 1000
 SOLUTIONS = 24.0
 
 
-class Bordered(Protocol):
+class BorderedMatrix(Protocol):
     """[[J, r_p], [normal]], in scaled unknowns, with the equations as they are."""
 
     def product(self, z: FloatArray) -> FloatArray:
@@ -71,12 +71,12 @@ class KeptFactors:
         self._sizes = np.zeros(0)
         self._spent, self._uses, self._newest = 0.0, 0, 0.0
 
-    def near(self, matrix: Bordered, unknowns: int) -> BorderedFactors:
+    def near(self, matrix: BorderedMatrix, unknowns: int) -> BorderedFactors:
         """Factors of a matrix, or what solves with it from those that are kept.
 
         Parameters
         ----------
-        matrix : Bordered
+        matrix : BorderedMatrix
         unknowns : int
             Rows of its factors.
 
@@ -94,7 +94,7 @@ class KeptFactors:
     def _dear(self) -> bool:
         return self._newest * max(self._uses, 1) > self._spent
 
-    def renewed(self, matrix: Bordered, unknowns: int) -> BorderedFactors:
+    def renewed(self, matrix: BorderedMatrix, unknowns: int) -> BorderedFactors:
         """Factors of the matrix, kept from now on; parameters as of `near`."""
         self._factors, self._sizes = matrix.factored(), matrix.sizes
         self._spent, self._uses, self._newest = unknowns / SOLUTIONS, 1, 0.0
@@ -114,7 +114,7 @@ class _Near:
     def __init__(
         self,
         kept: KeptFactors,
-        matrix: Bordered,
+        matrix: BorderedMatrix,
         factors: BorderedFactors,
         sizes: FloatArray,
         unknowns: int,

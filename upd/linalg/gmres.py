@@ -13,7 +13,7 @@ ComplexArray = NDArray[np.complex128]
 Map = Callable[[FloatArray], FloatArray]
 
 
-class Krylov(NamedTuple):
+class FewProducts(NamedTuple):
     """What GMRES found.
 
     Attributes
@@ -34,7 +34,9 @@ class Krylov(NamedTuple):
     ritz: ComplexArray
 
 
-def gmres(product: Map, r: FloatArray, share: float, most: int, near: Map | None = None) -> Krylov:
+def gmres(
+    product: Map, r: FloatArray, share: float, most: int, near: Map | None = None
+) -> FewProducts:
     """x with A x = r to a share of |r|, in a few products with A.
 
     Parameters
@@ -52,7 +54,7 @@ def gmres(product: Map, r: FloatArray, share: float, most: int, near: Map | None
 
     Returns
     -------
-    Krylov
+    FewProducts
         Not reached where the residual is not finite, too.
 
     References
@@ -63,7 +65,7 @@ def gmres(product: Map, r: FloatArray, share: float, most: int, near: Map | None
     size = float(np.linalg.norm(r))
     if not size > 0.0 or not np.isfinite(size) or most < 1:
         x = r if near is None else near(r)
-        return Krylov(x, size == 0.0, 0, np.zeros(0, complex))
+        return FewProducts(x, size == 0.0, 0, np.zeros(0, complex))
     V, H = np.empty((most + 1, len(r))), np.zeros((most + 1, most))
     V[0] = r / size
     Z: list[FloatArray] = []
@@ -90,4 +92,4 @@ def gmres(product: Map, r: FloatArray, share: float, most: int, near: Map | None
             break
         V[k] = w / H[k, k - 1]
     x = c @ np.asarray(Z[:k]) if k else np.zeros_like(r if near is None else Z[0])
-    return Krylov(x, reached, k, np.linalg.eigvals(H[:k, :k]).astype(complex))
+    return FewProducts(x, reached, k, np.linalg.eigvals(H[:k, :k]).astype(complex))
