@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.condensed_factors import Eliminated, Factors, LowRank, EveryPoint
+from upd.hbm.condensed_factors import Eliminated, EveryPoint, Factors, LowRank
 from upd.hbm.kept_factors import WORTH_KEEPING
 from upd.hbm.linearised import Linearised
 from upd.hbm.newton import BorderedFactors
