@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+import upd.hbm.interface_corrector as corrector
 import upd.hbm.interface_equations as module
 import upd.hbm.interface_linear as linear
+import upd.hbm.interface_steps as steps
+import upd.hbm.kept_factors as kept_factors
 from upd.analyses import make_plan
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
 from upd.analyses.seated.bodies import make_bodies
@@ -111,6 +114,45 @@ def test_derivative_against_differences() -> None:
                 np.testing.assert_allclose(have[part], want[part], rtol=0.0, atol=allowed)
             checked += 1
     assert checked >= 8
+
+
+def test_one_direction_is_that_of_the_derivative() -> None:
+    """By factors of the samples, and by their inverses, which the derivative leaves."""
+    e, x, w = at_a_motion()
+    q, rigid, slip = e.split(x)
+    e.let_move(~e.mobile)
+    x = e.joined(q, rigid, slip)
+    found, d, dw = evaluate(e, x, w, e.start.slip), 1e-3 * x, 1e-3 * w
+    assert not found.linear.inverted
+    by_factors = found.in_direction(d, dw)
+    want = found.jacobian @ d + found.by_w * dw
+    assert found.linear.inverted
+    for have in (by_factors, found.in_direction(d, dw)):
+        np.testing.assert_allclose(have, want, rtol=0.0, atol=1e-9 * np.abs(want).max())
+
+
+def test_curve_by_few_directions_is_that_by_derivatives(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same answers to the corrections' tolerance, from fewer derivatives."""
+    formed, found, frequencies = [], [], [436.0, 440.0, 444.0, 446.0]
+    factored = steps.PlaneMatrix.factored
+    for many in (10**6, 1):
+        count: list[int] = []
+
+        def told(one: Any, count: list[int] = count) -> Any:
+            count.append(1)
+            return factored(one)
+
+        monkeypatch.setattr(steps.PlaneMatrix, "factored", told)
+        monkeypatch.setattr(corrector, "MANY", many)
+        # factors of so few unknowns are quick; here they are to be kept all the same
+        monkeypatch.setattr(kept_factors, "SOLUTIONS", 4.0)
+        found.append(response(frequencies, F_C / 300.0, samples=64))
+        formed.append(len(count))
+    assert formed[1] < 0.7 * formed[0], formed
+    at = [[int(np.flatnonzero(one.frequency == f)[0]) for f in frequencies] for one in found]
+    have, want = found[1].amplitude[at[1]], found[0].amplitude[at[0]]
+    assert (found[0].share[-1, SLIP] > 0.0).all()
+    np.testing.assert_allclose(have, want, rtol=0.0, atol=1e-5 * np.abs(want[:, 1]).max())
 
 
 def test_newton_is_quadratic() -> None:

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from upd.hbm.interface_newton import InterfaceEvaluation
-from upd.hbm.interface_steps import BroydenSteps, KnownFactors
+from upd.hbm.interface_steps import BroydenSteps, KnownFactors, NewtonSteps
 from upd.hbm.newton import bordered_factors
 
 FloatArray = NDArray[np.float64]
@@ -58,3 +58,11 @@ def test_without_updates_the_same_steps_do_not_end() -> None:
     for _ in range(5):
         x = x + BroydenSteps(known, normal, D).next(J @ x - b) * np.append(D, 1.0)
     assert np.linalg.norm(J @ x - b) > 1e-3 * np.linalg.norm(b)
+
+
+def test_a_step_of_newton_s_stays_in_the_plane() -> None:
+    """Whatever the factors leave of the border: a frequency that is asked for is met exactly."""
+    _, b, _, known = problem(0)
+    across = np.eye(1, U + 1, U)[0]
+    step = NewtonSteps(known, across).next(-b)
+    assert np.linalg.norm(step) > 0.0 and step[-1] == 0.0

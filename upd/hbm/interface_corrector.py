@@ -17,12 +17,26 @@ from upd.hbm.interface_newton import (
 )
 from upd.hbm.interface_state import FloatArray
 from upd.hbm.interface_step import SOLVED
-from upd.hbm.interface_steps import SHRINKS, BroydenSteps, KnownFactors
-from upd.hbm.newton import Settings, bordered_factors, finite_jacobian
+from upd.hbm.interface_steps import (
+    SHRINKS,
+    BroydenSteps,
+    KnownFactors,
+    NewtonSteps,
+    PlaneMatrix,
+)
+from upd.hbm.kept_factors import KeptFactors
+from upd.hbm.newton import Settings
 
 #: share of the correction before, two of which in a row end a correction: at it twelve would not
 #: take a step of the curve to the tolerance; it weighs costs against those of a shorter step
 WAVERS = 0.6
+#: unknowns from which on few directions are cheaper than a derivative. It only weighs costs
+MANY = 300
+
+#: share of the step before that one of Newton's has at most where it starts close enough to the
+#: answer: such steps are no reason for a shorter one along the curve (P. Deuflhard, Newton Methods
+#: for Nonlinear Problems, 2004, 2.1: contraction 1/4 keeps the iteration in its tube)
+FAST = 0.25
 
 
 @dataclass(frozen=True)
@@ -69,6 +83,7 @@ class InterfaceCorrector:
 
     def __init__(self, equations: InterfaceEquations, settings: Settings, p_scale: float) -> None:
         self.equations, self.settings, self.p_scale = equations, settings, p_scale
+        self.kept = KeptFactors()
 
     def correct(
         self,
@@ -105,8 +120,8 @@ class InterfaceCorrector:
         first = len(x) - len(e.tangents)
         before = past[e.tangents - e.model.n].reshape(2, -1)
         count, sizes = 0, [np.inf, np.inf]
-        steps = None
-        if known is not None and len(known.D) == len(D):
+        steps: BroydenSteps | NewtonSteps | None = None
+        if known is not None and len(known.D) == len(D) < MANY:
             steps = BroydenSteps(known, normal, D)
         while True:
             try:
@@ -119,18 +134,23 @@ class InterfaceCorrector:
                 steps = None
                 continue
             step = None
-            if steps is not None and steps.known.suits(found):
+            if steps is not None and steps.learns and steps.known.suits(found):
                 step = steps.next(found.residual)
                 if not float(np.linalg.norm(step)) <= SHRINKS * sizes[-1]:
                     step = None
             if step is None:
                 if count == 0:
                     sizes = [np.inf, np.inf]
-                known, count = self._factors(found, normal, D), count + 1
-                if known is None or count > s.iterations:
+                known = self._factors(found, normal, D)
+                if known is None:
                     return None
-                steps = BroydenSteps(known, normal, D)
+                steps = self._steps(known, normal, D)
                 step = steps.next(found.residual)
+                # steps in few directions cost little where they converge fast
+                fast = not steps.learns and float(np.linalg.norm(step)) <= FAST * sizes[-1]
+                count += count == 0 or not fast
+                if count > s.iterations:
+                    return None
             sizes.append(float(np.linalg.norm(step)))
             # nodes that change their states to and fro: a shorter step tells them apart
             wavers = all(sizes[k] > WAVERS * sizes[k - 1] for k in (-1, -2))
@@ -141,7 +161,7 @@ class InterfaceCorrector:
             x, p = x + step[:-1] * D, p + float(step[-1]) * self.p_scale
             if self._stay(x[first:].reshape(2, -1), slip, before, found.period):
                 # the step taken is not the one that was told
-                steps = BroydenSteps(steps.known, normal, D)
+                steps = self._steps(steps.known, normal, D)
             if float(np.abs(step).max()) * len(step) ** 0.5 <= s.tolerance:
                 # the way on is that of the answer, not of the point whose factors led to it
                 here = steps.known if steps.known.of is found else self._factors(found, normal, D)
@@ -212,11 +232,18 @@ class InterfaceCorrector:
         self, found: InterfaceEvaluation, normal: FloatArray, D: FloatArray
     ) -> KnownFactors | None:
         """Of the derivative at a point; None where it has none, or is singular."""
-        J = found.jacobian
-        if not finite_jacobian(J):
+        if not found.linear.fine:
             return None
-        factors = bordered_factors(J, 2.0 * np.pi * found.by_w, D, self.p_scale, normal)
+        matrix = PlaneMatrix(found, normal, D, self.p_scale)
+        factors = matrix.factored() if len(D) < MANY else self.kept.near(matrix, len(D))
         return None if factors.singular else KnownFactors(factors, D, found)
+
+    @staticmethod
+    def _steps(
+        known: KnownFactors, normal: FloatArray, D: FloatArray
+    ) -> BroydenSteps | NewtonSteps:
+        """Corrections by the factors of a point."""
+        return BroydenSteps(known, normal, D) if len(D) < MANY else NewtonSteps(known, normal)
 
     def _stay(
         self, moved: FloatArray, slip: FloatArray, before: FloatArray, period: ContactPeriod

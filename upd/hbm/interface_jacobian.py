@@ -26,6 +26,7 @@ import numpy as np
 
 from upd.hbm.interface_step import OPEN, STICK, slip_rows
 from upd.linalg.compiled import compiled
+from upd.linalg.compiled_lu import factor_columns, invert_columns, solve_columns
 
 #: state of a node that is asked to come to the verge of slipping
 VERGE = 3
@@ -143,9 +144,10 @@ def factor_period(  # type: ignore[no-untyped-def]
     keep,
     PZ,
     Z_rows,
-    inverse,
+    factors,
+    pivots,
 ):
-    """Rows of samples, and the inverses of their matrices.
+    """Rows of samples, and the factors of their matrices.
 
     Parameters
     ----------
@@ -168,8 +170,10 @@ def factor_period(  # type: ignore[no-untyped-def]
         Overwritten, as in `law_rows`.
     PZ, Z_rows : (K, m + r) ndarray
         Overwritten: P Z, and Z in the rows of the dofs.
-    inverse : ndarray
-        Overwritten: (P W_R - Q)^-1 of each sample, one after the other.
+    factors : ndarray
+        Overwritten: LU of P W_R - Q of each sample, column by column, one after the other.
+    pivots : (K,) ndarray of int
+        Overwritten: rows that were exchanged.
 
     Returns
     -------
@@ -219,14 +223,30 @@ def factor_period(  # type: ignore[no-untyped-def]
                 if P[row, c] != 0.0:
                     for e in range(wide):
                         PZ[row, e] += P[row, c] * Z[c * n + i, e]
-        try:
-            solved = np.linalg.inv(H[:k, :k].copy())
-        except Exception:
-            return False
         first = square[j]
-        for row in range(k):
-            for e in range(k):
-                inverse[first + row * k + e] = solved[row, e]
+        for e in range(k):
+            for row in range(k):
+                factors[first + e * k + row] = H[row, e]
+        if not factor_columns(factors[first : first + k * k], pivots[a:b]):
+            return False
+    return True
+
+
+@compiled
+def invert_period(  # type: ignore[no-untyped-def]
+    first_sample, last_sample, at, square, factors, pivots
+):
+    """Factors of samples overwritten by inverses, column by column; parameters as above.
+
+    Returns
+    -------
+    bool
+        False where one is singular.
+    """
+    for j in range(first_sample, last_sample):
+        a, b = at[j], at[j + 1]
+        if b > a and not invert_columns(factors[square[j] : square[j + 1]], pivots[a:b]):
+            return False
     return True
 
 
@@ -247,7 +267,9 @@ def march_directions(  # type: ignore[no-untyped-def]
     keep,
     PZ,
     Z_rows,
-    inverse,
+    factors,
+    pivots,
+    inverted,
     J,
     late,
     motion,
@@ -261,8 +283,10 @@ def march_directions(  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    S, W, Z, at, square, cols, owner, P, left, keep, PZ, Z_rows, inverse
+    S, W, Z, at, square, cols, owner, P, left, keep, PZ, Z_rows, factors, pivots
         As in `factor_period`.
+    inverted : bool
+        Whether the factors have been overwritten by inverses, which many directions share.
     M : (m + r, m + r) ndarray
         (Phi, B)' W (Phi, B).
     moved : (2 c,) ndarray of int
@@ -337,7 +361,12 @@ def march_directions(  # type: ignore[no-untyped-def]
                 if weight != 0.0:
                     for c in range(C):
                         rhs[row, c] -= weight * verge[c]
-            np.dot(inverse[square[j] : square[j + 1]].reshape(k, k), rhs, z)
+            matrix = factors[square[j] : square[j + 1]]
+            if inverted:
+                np.dot(matrix.reshape(k, k).T, rhs, z)
+            else:
+                z[:] = rhs
+                solve_columns(matrix, pivots[a:b], z)
             np.dot(Z_rows[a:b].T, z, part)
             for e in range(wide):
                 for c in range(C):

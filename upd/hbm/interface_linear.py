@@ -1,7 +1,8 @@
 """The period of contact and damper linearised about an answer: what directions do to its end.
 
-The matrices of all samples are inverted once; a direction then costs a product with each of them,
-and only unknowns of nodes that move are directions. See `upd.hbm.interface_jacobian`.
+The matrices of all samples are factored once; a direction then costs a solution with each of them,
+and only unknowns of nodes that move are directions. Where many directions are asked for, the
+matrices are inverted first. See `upd.hbm.interface_jacobian`.
 """
 
 from __future__ import annotations
@@ -11,9 +12,10 @@ from functools import partial
 import numpy as np
 
 from upd.hbm.interface_equations import ContactPeriod, IntArray, InterfaceEquations
-from upd.hbm.interface_jacobian import factor_period, march_directions
+from upd.hbm.interface_jacobian import factor_period, invert_period, march_directions
 from upd.hbm.interface_state import FloatArray
 from upd.hbm.interface_step import OPEN, SLIP, STICK
+from upd.linalg.compiled_lu import PIVOT
 
 #: most directions that are marched together, and those below which they are not split; samples
 #: factored together. They weigh costs only: what many share against all threads being busy
@@ -64,8 +66,9 @@ class PeriodDerivative:
         cols, owner = np.empty(rows, np.int64), np.empty(rows, np.int64)
         P, left, keep = np.empty((rows, 3)), np.empty(rows), np.empty((rows, 2))
         PZ, Z_rows = np.empty((rows, m + r)), np.empty((rows, m + r))
-        inverse = np.empty(square[-1])
-        self.rows = (at, square, cols, owner, P, left, keep, PZ, Z_rows, inverse)
+        factors, pivots = np.empty(square[-1]), np.empty(rows, PIVOT)
+        self.rows = (at, square, cols, owner, P, left, keep, PZ, Z_rows, factors, pivots)
+        self.inverted = False
         N = len(state)
         jobs = [
             partial(
@@ -120,6 +123,8 @@ class PeriodDerivative:
         rigid, slips : ndarray
             Changes of the same after the period.
         """
+        if len(faster) > FEW and self.fine and not self.inverted:
+            self._invert()
         if not self.fine:
             return np.full_like(q, np.nan), np.full_like(rigid, np.nan), np.full_like(slips, np.nan)
         C = len(faster)
@@ -141,6 +146,16 @@ class PeriodDerivative:
         modal, ends, slid = (np.concatenate(one, axis=-1) for one in zip(*found, strict=True))
         return modal, ends, slid
 
+    def _invert(self) -> None:
+        """Overwrite the factors by inverses."""
+        at, square, *_, factors, pivots = self.rows
+        N = len(self.state)
+        jobs = [
+            partial(invert_period, first, min(first + SAMPLES, N), at, square, factors, pivots)
+            for first in range(0, N, SAMPLES)
+        ]
+        self.inverted, self.fine = True, all(self.e.beside.run(jobs))
+
     def _march(
         self,
         q: FloatArray,
@@ -161,6 +176,7 @@ class PeriodDerivative:
             self.moved,
             self.place,
             *self.rows,
+            self.inverted,
             self.step.J,
             self.late,
             motion,

@@ -115,6 +115,23 @@ class InterfaceEvaluation:
         formed[:, own] = self._with_blades(out, dx, dw)
         return formed
 
+    def in_direction(self, dx: FloatArray, dw: float) -> FloatArray:
+        """Derivative in one direction, without the others.
+
+        Parameters
+        ----------
+        dx : (u,) ndarray
+            Of the unknowns.
+        dw : float
+            Of the frequency [rad/s].
+
+        Returns
+        -------
+        (u,) ndarray
+        """
+        one, faster = dx[:, None], np.array([dw])
+        return self._with_blades(self._marched(one, faster), one, faster)[:, 0]
+
     @property
     def jacobian(self) -> FloatArray:
         """(u, u) derivative by the unknowns."""

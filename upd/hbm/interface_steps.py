@@ -4,6 +4,11 @@ A derivative costs as much as several residuals, and there is a kink wherever a 
 changes its state, so that Newton's method with a new one at every step hardly gains on an old one
 that learns from the steps: Broyden's.
 
+With many unknowns even less has to be formed. The derivative in one direction costs a small part of
+a residual, and factors of an earlier derivative leave so little to do that a step of Newton's
+method takes a few directions (`upd.hbm.kept_factors`); it then costs less than a residual, and
+learning from steps gains nothing.
+
 References
 ----------
 C. T. Kelley, Iterative Methods for Linear and Nonlinear Equations (1995), 7.3 (`brsol`).
@@ -17,7 +22,7 @@ import numpy as np
 
 from upd.hbm.interface_newton import InterfaceEvaluation
 from upd.hbm.interface_state import FloatArray
-from upd.hbm.newton import BorderedFactors
+from upd.hbm.newton import BorderedFactors, bordered_factors
 
 #: share of the step before that a step by updated factors may have. A derivative costs about four
 #: residuals and its step leaves some hundredths, the fifth root of which this is; it weighs costs
@@ -46,6 +51,64 @@ class KnownFactors:
         return len(self.D) == len(found.x) and found.like(self.of)
 
 
+class PlaneMatrix:
+    """The bordered derivative at a point, direction by direction (`upd.hbm.kept_factors`).
+
+    Parameters
+    ----------
+    of : InterfaceEvaluation
+    normal : (u + 1,) ndarray
+        The border, in units of D.
+    D : (u,) ndarray
+        Units of the unknowns.
+    p_scale : float
+        Unit of the frequency [Hz].
+    """
+
+    def __init__(
+        self, of: InterfaceEvaluation, normal: FloatArray, D: FloatArray, p_scale: float
+    ) -> None:
+        self.of, self.normal, self.D, self.p_scale = of, normal, D, p_scale
+
+    @property
+    def sizes(self) -> FloatArray:
+        """(u + 1,) units of the unknowns and of the frequency."""
+        return np.append(self.D, self.p_scale)
+
+    def product(self, z: FloatArray) -> FloatArray:
+        """What scaled unknowns (u + 1,) give: the equations (u,), and the border."""
+        faster = 2.0 * np.pi * self.p_scale * float(z[-1])
+        return np.append(self.of.in_direction(z[:-1] * self.D, faster), self.normal @ z)
+
+    def factored(self) -> BorderedFactors:
+        """Its factors."""
+        J, by_p = self.of.jacobian, 2.0 * np.pi * self.of.by_w
+        return bordered_factors(J, by_p, self.D, self.p_scale, self.normal)
+
+
+class NewtonSteps:
+    """A correction in a plane, by a few directions of the derivative at the point itself.
+
+    Parameters
+    ----------
+    known : KnownFactors
+        Of the point, with the plane for its border.
+    normal : (u + 1,) ndarray
+        Across the plane, a unit vector in units of D.
+    """
+
+    #: whether they lead on from the next point
+    learns = False
+
+    def __init__(self, known: KnownFactors, normal: FloatArray) -> None:
+        self.known, self.normal = known, normal
+
+    def next(self, residual: FloatArray) -> FloatArray:
+        """The step from a residual (u,), in units of D (u + 1,), exactly in the plane."""
+        z = self.known.factors.solve(-residual, 0.0)
+        return np.asarray(z - self.normal * float(self.normal @ z))
+
+
 class BroydenSteps:
     """Corrections in a plane, by factors of another point that are updated by every step.
 
@@ -64,6 +127,8 @@ class BroydenSteps:
     D : (u,) ndarray
         Units of the unknowns here.
     """
+
+    learns = True
 
     def __init__(self, known: KnownFactors, normal: FloatArray, D: FloatArray) -> None:
         self.known, self.normal = known, normal
