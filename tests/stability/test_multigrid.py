@@ -6,15 +6,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.sparse import bsr_matrix, csr_array
+from pyamg.aggregation.aggregate import standard_aggregation
+from scipy.sparse import bsr_matrix, csr_array, diags_array, kron
 
 from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, box_mesh, rigid_body_modes, stiffness
-from upd.linalg import amg_solve, factorise
+from upd.linalg import amg_solve, factorise, multigrid
 from upd.linalg.block_conjugate import block_conjugate_gradients
 from upd.linalg.conjugate import conjugate_gradients
 from upd.linalg.multigrid import MultigridSolver
-from upd.linalg.strength import near_neighbours
+from upd.linalg.strength import aggregates, near_neighbours
 
 
 def clamped(
@@ -64,6 +65,32 @@ def test_cycle_is_symmetric_and_no_step_too_long() -> None:
     assert x @ (K @ solver._precondition(K @ x)) < 1.0 + 1e-4
 
 
+@pytest.mark.parametrize("with_modes", [True, False])
+def test_levels_visited_twice_keep_the_cycle_symmetric_and_positive(
+    monkeypatch: pytest.MonkeyPatch, with_modes: bool
+) -> None:
+    """I - M K of all dofs, the second of three levels twice: without modes by lines there too."""
+    monkeypatch.setattr(multigrid, "COARSEST", 3)
+    K, modes, free = clamped(n=8)
+    modes = modes if with_modes else None
+    solver = MultigridSolver(K, modes, layout=free)
+    assert len(solver._cycle.sizes) == 3
+    lowest = []
+    root = np.linalg.cholesky(K.toarray())
+    for visited_twice in (1, multigrid.MOST_LEVELS):
+        monkeypatch.setattr(multigrid, "TWICE", visited_twice)
+        M = np.column_stack([solver._precondition(e) for e in np.eye(K.shape[0])])
+        assert np.abs(M - M.T).max() < 1e-5 * np.abs(M).max()
+        eigenvalues = np.linalg.eigvalsh(root.T @ (0.5 * (M + M.T)) @ root)
+        assert eigenvalues[-1] < 1.0 + 1e-4
+        lowest.append(eigenvalues[0])
+        R = np.random.default_rng(1).standard_normal((K.shape[0], 5))
+        one_by_one = np.column_stack([solver._precondition(r) for r in R.T])
+        together = solver._precondition_many(R)
+        np.testing.assert_allclose(together, one_by_one, atol=1e-5 * np.abs(one_by_one).max())
+    assert lowest[0] > 1.2 * lowest[1] > 0.0
+
+
 def test_iterations_hardly_grow_with_the_mesh() -> None:
     counts = []
     for n in (11, 19):
@@ -102,9 +129,30 @@ def test_near_neighbours_are_those_of_either_side() -> None:
     np.testing.assert_array_equal(near_neighbours(A, points).toarray(), expected)
     points[3] = np.nan
     np.testing.assert_array_equal(near_neighbours(A, points).toarray()[3], np.ones(4))
-    x = np.array([0.0, 1.0, 5.1, 6.1])
+    # 3.54 steps apart couplings fall to the 0.08 of the first
+    x = np.array([0.0, 1.0, 4.55, 5.55])
     found = near_neighbours(A, np.column_stack([x, x * 0.0, x * 0.0])).toarray()
     np.testing.assert_array_equal(found, np.kron(np.eye(2), np.ones((2, 2))))
+
+
+def test_rows_that_are_left_over_are_not_joined_to_far_ones() -> None:
+    """Six rows of nodes 3.2 steps apart: two and three are joined, and the last."""
+    row, n = 30, 6
+    beside = diags_array([1.0, 1.0, 1.0], offsets=[-1, 0, 1], shape=(row, row))
+    across = diags_array([1.0, 1.0, 1.0], offsets=[-1, 0, 1], shape=(n, n))
+    pattern = kron(across, beside).toarray()
+    pattern = np.pad(pattern, (0, 1))  # and a node by itself, which is not joined
+    pattern[-1, -1] = 1.0
+    A = bsr_matrix(np.kron(pattern, np.eye(3)), blocksize=(3, 3))
+    y, x = np.divmod(np.arange(row * n), row)
+    points = np.column_stack([x, 3.2 * y, 0.0 * x])
+    near = near_neighbours(A, np.vstack([points, [[0.0, 0.0, 9.0]]]))
+    joined = aggregates(A, near, np.vstack([points, [[0.0, 0.0, 9.0]]]))
+    np.testing.assert_array_equal(joined.sum(axis=1).ravel(), [[*np.ones(row * n), 0.0]])
+    depth = [len(np.unique(y[one.indices])) for one in joined.T.tocsr()]
+    assert min(depth) >= 1 and max(depth) == 3
+    usual = standard_aggregation(near)[0].T.tocsr()
+    assert max(len(np.unique(y[one.indices])) for one in usual) == 4
 
 
 def test_points_that_are_not_those_of_the_layout() -> None:

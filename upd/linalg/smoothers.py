@@ -46,11 +46,16 @@ class BlockSmoother:
         """A forward sweep from zero: x and b - A x, for (n,) or (n, WIDTH)."""
         x = np.zeros_like(b)
         self._sweep(b, x, 1)
-        return x, b - self._A @ x
+        return x, self.residual(b, x)
 
     def last(self, b: Single, x: Single) -> None:
         """A backward sweep of x."""
         self._sweep(b, x, -1)
+
+    def residual(self, b: Single, x: Single) -> Single:
+        """b - A x."""
+        found: Single = b - self._A @ x
+        return found
 
     def _sweep(self, b: Single, x: Single, step: int) -> None:
         A = self._A
@@ -97,6 +102,12 @@ class LineSmoother:
         """A backward sweep of x."""
         back = last_lines if b.ndim == 1 else last_lines_many
         back(*self._A, self._inverse, self._down, self._starts, b, x)
+
+    def residual(self, b: Single, x: Single) -> Single:
+        """b - A x, both in the smoother's order."""
+        indptr, indices, data = self._A
+        found: Single = b - bsr_array((data, indices, indptr), shape=(len(b), len(b))) @ x
+        return found
 
 
 def _factors(A: bsr_array, nodes: IntArray, starts: IntArray) -> tuple[FloatArray, FloatArray]:
