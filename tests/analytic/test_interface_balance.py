@@ -155,6 +155,28 @@ def test_curve_by_few_directions_is_that_by_derivatives(monkeypatch: pytest.Monk
     np.testing.assert_allclose(have, want, rtol=0.0, atol=1e-5 * np.abs(want[:, 1]).max())
 
 
+@pytest.mark.parametrize(("near", "taken"), [(True, 2), (False, 3)])
+def test_steps_that_grow_near_a_known_point_end(
+    monkeypatch: pytest.MonkeyPatch, near: bool, taken: int
+) -> None:
+    """A shorter step is tried instead; where there is none to be tried, one may grow."""
+    e, x, w = at_a_motion()
+    monkeypatch.setattr(corrector, "MANY", 1)
+    sizes: list[float] = []
+
+    def grown(_: Any, residual: np.ndarray) -> np.ndarray:
+        sizes.append(1e-9 * 2.0 ** len(sizes))
+        return np.eye(1, len(residual) + 1, 0)[0] * sizes[-1]
+
+    monkeypatch.setattr(steps.NewtonSteps, "next", grown)
+    of = corrector.InterfaceCorrector(e, Settings(tolerance=1e-12), 1.0)
+    known = of._factors(evaluate(e, x, w), of.across(1.0, x), of.scale(x))
+    assert known is not None
+    start = (x, w / (2.0 * np.pi), of.across(1.0, x), of.scale(x), e.split(x)[2])
+    assert of.correct(*start, known if near else None) is None
+    assert len(sizes) == taken
+
+
 def test_newton_is_quadratic() -> None:
     """From a motion disturbed: each correction is of the order of the square of the one before."""
     e, x, w = at_a_motion()

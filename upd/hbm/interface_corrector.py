@@ -114,12 +114,12 @@ class InterfaceCorrector:
         past : (2 n,) ndarray
             Slips at the point before.
         known : KnownFactors, optional
-            Of a point near by.
+            Of a point near by, from which shorter steps can be taken where this one fails.
         """
         e, s = self.equations, self.settings
         first = len(x) - len(e.tangents)
         before = past[e.tangents - e.model.n].reshape(2, -1)
-        count, sizes = 0, [np.inf, np.inf]
+        count, sizes, near = 0, [np.inf, np.inf], known is not None
         steps: BroydenSteps | NewtonSteps | None = None
         if known is not None and len(known.D) == len(D) < MANY:
             steps = BroydenSteps(known, normal, D)
@@ -154,9 +154,11 @@ class InterfaceCorrector:
             sizes.append(float(np.linalg.norm(step)))
             # nodes that change their states to and fro: a shorter step tells them apart
             wavers = all(sizes[k] > WAVERS * sizes[k - 1] for k in (-1, -2))
-            if wavers or not sizes[-1] < sizes[-3]:
-                return None
             assert steps is not None
+            # Newton's own that grow near a known point: there is a shorter step to be taken
+            grows = near and not steps.learns and not sizes[-1] < sizes[-2]
+            if wavers or grows or not sizes[-1] < sizes[-3]:
+                return None
             slip = x[first:].reshape(2, -1)
             x, p = x + step[:-1] * D, p + float(step[-1]) * self.p_scale
             if self._stay(x[first:].reshape(2, -1), slip, before, found.period):
