@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from typing import NamedTuple
 
 import numpy as np
@@ -200,6 +201,7 @@ def test_curves_are_those_of_new_factors_each_time(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(condensed, "WORTH_KEEPING", 0)
     monkeypatch.setattr(kept_factors, "SOLUTIONS", 0.5)
     near = curves()
+    assert all(one.balance._fixed.rows.kept._factors is None for one in near)
     assert len(used) > 500
     for row, one, other in zip((Y2, [1.0]), usual, near, strict=True):
         assert (one.status, other.status) == ("complete", "complete")
@@ -209,3 +211,9 @@ def test_curves_are_those_of_new_factors_each_time(monkeypatch: pytest.MonkeyPat
             mine, its = (np.sort(c.amplitude(row)[c.frequency == w]) for c in (one, other))
             np.testing.assert_allclose(its, mine, rtol=1e-8)
         assert other.peak(row)[1] == pytest.approx(one.peak(row)[1], rel=1e-4)
+
+
+def test_files_hold_no_factors() -> None:
+    of = kept(np.eye(5))
+    assert of._factors is not None
+    assert pickle.loads(pickle.dumps(of))._factors is None

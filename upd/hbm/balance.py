@@ -178,6 +178,11 @@ class Balance(CondensedProblem):
         )
         return residual, parts, by_frequency
 
+    def forget_factors(self) -> None:
+        """Let the factors go that corrections keep for later ones: their memory."""
+        if "_fixed" in self.__dict__:
+            self._fixed.rows.kept.forget()
+
     @cached_property
     def _fixed(self) -> _Fixed:
         # loads, preload and sliders may change in copies: none of them enters

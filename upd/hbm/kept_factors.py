@@ -100,6 +100,14 @@ class KeptFactors:
         self._spent, self._uses, self._newest = unknowns / SOLUTIONS, 1, 0.0
         return self._factors
 
+    def forget(self) -> None:
+        """Let the factors go: the next ones are new."""
+        self._factors, self._sizes = None, np.zeros(0)
+
+    def __reduce__(self) -> tuple[type[KeptFactors], tuple[()]]:
+        # files and other processes do without them
+        return KeptFactors, ()
+
     def note(self, solutions: int) -> None:
         """Count solutions that a correction took."""
         self._spent += solutions

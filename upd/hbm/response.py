@@ -406,6 +406,8 @@ def frequency_response(
             if adaptive
             else solve_curve(problem(first), order, fast_exits, settings)
         )
+        for part in found.pieces:
+            part.balance.forget_factors()
         return _answer(found, adaptive)
 
 
