@@ -5,7 +5,8 @@ numbers that were asked for over what was wanted of them, the levels, and the pr
 one level for all sources over those of the choice. A response is then solved again with every level
 raised by one and 13 harmonics, as far as the memory goes, for the true error, of numbers that were
 given up too. ``python benchmarks/accuracy/bench_wanted_accuracy.py asymmetric`` runs the last
-accuracy of these responses alone.
+accuracy of these responses alone, ``... asymmetric 3,2,1,2,1,0`` one trial of these levels, in the
+order that the plan tells them.
 """
 
 from __future__ import annotations
@@ -115,6 +116,37 @@ def _response(name: str, wanted: Mapping[str, str]) -> Iterator[Row]:
             }
 
 
+def _trial(name: str, levels: Levels) -> Iterator[Row]:
+    """Numbers of one choice of levels, with what they leave in shares of what is wanted."""
+    asked = load_scene(f"{name}-response", {**AT_194, "accuracy": dict(WANTED[-1])})
+    chooser, begin = Chooser(forced.ROUNDS, asked), time.process_time()
+    if len(levels) != len(chooser.settings):
+        names = ", ".join(one.knob.name for one in chooser.settings)
+        sys.exit(f"{len(levels)} levels for {len(chooser.settings)} sources: give one of {names}.")
+    solution = solve(chooser.trial(levels), Stages())
+    numbers = make_results(solution)
+    shares = shares_of(estimate(solution, numbers, Stages()), chooser.wanted)
+    took = time.process_time() - begin
+    yield {
+        "name": f"trial of {name}-response",
+        "case": chooser.words(levels),
+        "value": took,
+        "unit": "s",
+    }
+    for one in numbers:
+        if (one.name, one.case) not in shares:
+            continue
+        parts = shares[one.name, one.case]
+        told = ", ".join(f"{source} {share:.2f}" for source, share in parts.items())
+        yield {
+            "name": f"{one.name}, {name}",
+            "case": one.case.label,
+            "value": one.value,
+            "unit": one.unit,
+            "note": f"{sum(parts.values()):.2f} of what is wanted: {told}",
+        }
+
+
 def _levels(chooser: Chooser, solution: Any) -> Levels:
     """Those of a solution: the levels whose scene is its own."""
     scene, trial = solution.plan.scene, chooser.rounds.trial
@@ -157,6 +189,13 @@ def _finer(chooser: Chooser, levels: Levels) -> Levels | None:
 
 
 if __name__ == "__main__":
-    for one in sys.argv[1:]:
-        for row in _response(one, WANTED[-1]):
+    words = [word for word in sys.argv[1:] if word in RESPONSES]
+    chosen = [word for word in sys.argv[1:] if word not in RESPONSES]
+    for one in words:
+        rows = (
+            _trial(one, tuple(int(k) for k in chosen[0].split(",")))
+            if chosen
+            else _response(one, WANTED[-1])
+        )
+        for row in rows:
             print(row, flush=True)

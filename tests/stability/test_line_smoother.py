@@ -111,6 +111,8 @@ def test_sweeps_are_those_of_the_block_matrix() -> None:
         smoother.last(b, found)
         back = wanted + np.linalg.solve(lower.T, b - M @ wanted)
         assert np.abs(found - back).max() < 1e-4 * np.abs(back).max()
+        left = b - M @ back
+        assert np.abs(smoother.residual(b, found) - left).max() < 1e-4 * np.abs(b).max()
 
 
 def test_stretched_elements_take_few_iterations(monkeypatch: pytest.MonkeyPatch) -> None:

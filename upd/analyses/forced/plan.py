@@ -30,8 +30,10 @@ _STUCK_S = 1.9e-4
 # the march of each contact point, the products for each entry of the Jacobian, times of its LU.
 # About half of the points stick or are open over the whole cycle and are left out of the last two.
 _STEP_S, _MARCH_S, _ENTRY_S, _STEP_LU = 4.5e-4, 4.5e-5, 1.7e-8, 0.55
-# Of large ones, steps for each new factor, and solutions with the kept ones in a step (64 rows of
-# Gauss points a face, harmonics to 7, F_C/F_E 194: 2943 unknowns).
+# Of large ones, steps for each new factor, and solutions with the kept ones in a step. Counted on
+# F_C/F_E 194 with 64 rows of Gauss points a face, harmonics to 7 (2943 unknowns): 150 factors, 5500
+# corrections, 24635 products. Rigs of 64 and 128 points with fewer harmonics take 4 to 5 steps a
+# factor and 18 solutions a step (`benchmarks/speed/bench_response.py`).
 _STEPS_KEPT, _SOLVED = 10.0, 19.0
 # Newton steps of a curve over F_C/F_E: points that begin or end to slip are kinks of the path. Both
 # faces of the symmetric damper slip, of the asymmetric one mostly the slope; finer lattices have no
