@@ -115,7 +115,7 @@ def _balance(name: str) -> Told:
                     continue
                 for peak in solution.numbered_peaks(curve):
                     at = PathPeakAt(solution.plan, solution.models[stiffness], curve, "right", peak)
-                    base = at.as_run()
+                    base = at.top
                     truths = {
                         "harmonics": _changes(base, _most(at)),
                         "samples": _changes(base, at.with_samples(SAMPLES)),
@@ -215,6 +215,6 @@ def _one_harmonic() -> Told:
             for peak in solution.numbered_peaks(curve):
                 model = solution.models[curve.stiffness]
                 at = PathPeakAt(solution.plan, model, curve, "right", peak)
-                truth = {"harmonics": _changes(at.as_run(), _most(at))}
+                truth = {"harmonics": _changes(at.top, _most(at))}
                 for row, ratios in _compared(numbers, parts, curve.case, peak.number, truth):
                     yield {**row, "case": f"1 harmonic, {row['case']}"}, ratios

@@ -128,6 +128,29 @@ def test_an_error_that_does_not_fall_is_given_up() -> None:
     assert forecast.obstacle(third) == "height: most of it by mesh"
 
 
+def test_what_scatters_is_tried_on_one_level_more() -> None:
+    """Estimates in no order may be low on the next level; each knob is raised for that once, and
+    only as far as the memory goes.
+    """
+    key = ("height", CASE)
+    forecast = LevelForecast(KNOBS)
+    first, second, third = (
+        Round((k, 0, 0), {key: parts(error, 0.1, 0.1)}) for k, error in enumerate((5.0, 6.0, 5.0))
+    )
+    assert forecast.one_more(first, [key], first.levels, seconds) is None  # its fall is not known
+    forecast.learn(first, second)
+    forecast.learn(second, third)
+    assert forecast.cheapest(third, seconds) is None
+    assert forecast.one_more(third, [key], third.levels, lambda _: math.inf) is None
+    assert forecast.one_more(third, [key], (2, 1, 0), seconds) == (3, 1, 0)
+    assert forecast.one_more(third, [key], third.levels, seconds) is None
+    top = Round((3, 0, 0), {key: parts(5.0, 0.1, 0.1)})
+    again = LevelForecast(KNOBS, _slow={0})
+    assert again.one_more(top, [key], top.levels, seconds) is None
+    lost = Round((2, 0, 0), {key: parts(5.0, math.nan, 0.1)})
+    assert again.one_more(lost, [key], lost.levels, seconds) is None
+
+
 def test_an_error_without_an_estimate_is_no_small_one() -> None:
     now = Round((0, 0, 0), {("height", CASE): parts(math.nan, 0.1, 0.1)})
     assert now.miss == (math.inf, ("height", CASE))

@@ -226,8 +226,9 @@ def solve_to_accuracy(rounds: Rounds, plan: Any, stages: Stages) -> tuple[Any, E
     """Run everything the plan calls for; where its scene asks for an accuracy, on the cheapest
     levels that are shown to reach it.
 
-    A number that no levels are expected to reach is given up; the others are still brought to
-    theirs, and the run ends with an error that names what it lacks.
+    A number that no levels are expected to reach is given up, after one level more of what keeps it
+    there where that has not fallen as expected; the others are still brought to theirs, and the run
+    ends with an error that names what it lacks.
 
     Returns
     -------
@@ -260,10 +261,15 @@ def solve_to_accuracy(rounds: Rounds, plan: Any, stages: Stages) -> tuple[Any, E
             break
         raised = chooser.forecast.cheapest(left, chooser.seconds)
         if raised is None:
-            given_up |= chooser.out_of_reach(left)
-            left = now.without(given_up)
-            if left.shares and left.miss[0] > 1.0:
-                raised = chooser.forecast.cheapest(left, chooser.seconds)
+            lost = chooser.out_of_reach(left)
+            rest = left.without(lost)
+            if rest.shares and rest.miss[0] > 1.0:
+                raised = chooser.forecast.cheapest(rest, chooser.seconds)
+            more = chooser.forecast.one_more(left, lost, raised or levels, chooser.seconds)
+            if more is None:
+                given_up |= lost
+                left = rest
+            raised = more or raised
             if raised is None:
                 break
         levels = raised

@@ -125,6 +125,7 @@ class LevelForecast:
     knobs: Sequence[Knob]
     powers: dict[int, float] = field(default_factory=dict)
     _slow: set[int] = field(default_factory=set)
+    _tried: set[int] = field(default_factory=set)
 
     def learn(self, before: Round, after: Round) -> None:
         """Take from two rounds how fast the errors of the knobs raised between them fall."""
@@ -209,9 +210,52 @@ class LevelForecast:
         name = f"{worst[0]} {worst[1].label}".rstrip()
         if lost:
             return f"{name}: no estimate of what {', '.join(lost)} leave"
-        factor = self._falls(now, top)
-        source = max(parts, key=lambda one: parts[one] * factor.get(one, 1.0))
-        return f"{name}: most of it by {source}"
+        return f"{name}: most of it by {self._largest(now, worst)}"
+
+    def _largest(self, now: Round, key: Key) -> str:
+        """The source expected to leave most of a number on the highest levels."""
+        factor = self._falls(now, tuple(len(knob.labels) - 1 for knob in self.knobs))
+        parts = now.shares[key]
+        return max(parts, key=lambda one: parts[one] * factor.get(one, 1.0))
+
+    def one_more(
+        self, now: Round, lost: Iterable[Key], levels: Levels, seconds: Callable[[Levels], float]
+    ) -> Levels | None:
+        """One level more of what keeps numbers out of reach, where that has not fallen as expected.
+
+        Estimates of errors without an order rise and fall from level to level, so that two of them
+        do not tell the next: each knob is raised by one once, before its numbers are given up.
+
+        Parameters
+        ----------
+        now
+            The last round.
+        lost
+            Numbers that no levels are expected to reach.
+        levels
+            Those to go on with for the others.
+        seconds
+            As of `cheapest`.
+
+        Returns
+        -------
+        tuple of int or None
+            None where there is nothing left to try.
+        """
+        tried = list(levels)
+        for key in lost:
+            if not all(map(math.isfinite, now.shares[key].values())):
+                continue
+            source = self._largest(now, key)
+            for k, knob in enumerate(self.knobs):
+                more = now.levels[k] + 1
+                if source not in knob.sources or k not in self._slow - self._tried:
+                    continue
+                one = (*tried[:k], max(tried[k], more), *tried[k + 1 :])
+                if more < len(knob.labels) and math.isfinite(seconds(one)):
+                    tried = list(one)
+                    self._tried.add(k)
+        return tuple(tried) if tuple(tried) != tuple(levels) else None
 
 
 def _of(parts: Mapping[str, float], knob: Knob) -> float:

@@ -147,10 +147,12 @@ def test_what_has_no_sign_has_no_relative_error(value: float, other: float, why:
     assert estimates.of_one_sign(2.0, key, same) is None
 
 
-def test_shares_of_a_face_are_known_to_a_row_of_nodes() -> None:
+def test_shares_of_a_face_are_known_to_a_row_of_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two rows of 6 elements touch, a quarter of the face; 2 elements have a quarter too, by
     chance. The edge lies between two rows: one of one and a half.
     """
+    # the time of more threads is enough for a third lattice
+    monkeypatch.setattr("upd.linalg.select.threads_used", lambda: 1)
     found = upd.run(
         "symmetric-seated",
         overrides=SMALL | {"geometry.patch_along_y": 16, "geometry.patch_along_slope": 6},

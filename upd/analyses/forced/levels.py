@@ -258,16 +258,11 @@ class _OfStiffness:
     def _climb(self, at: PathPeakAt) -> None:
         """Levels of a peak that the balance tells."""
         keys = self._keys(at.curve.case, at.side, at.peak)
-        base = at.as_run()
+        base = at.top
         for key, attribute in keys:
             self.out.curve_seconds[key] = at.curve.seconds
             self._tell_missing(key)
-            mine = getattr(at.peak, attribute)
-            left = abs(mine / getattr(base, attribute) - 1.0)
-            why = "against the peak on the path itself, between its points"
-            if not base.found:
-                left, why = math.nan, "not estimated: the peak was not climbed to"
-            self.out.tell(key, PATH, left, why)
+            self.out.tell(key, PATH, *at.between_points(attribute))
             if not at.slips:
                 exact = "nothing slips or opens there: the linear answer is exact"
                 self.out.tell(key, HARMONICS, 0.0, exact)
@@ -360,7 +355,7 @@ class _OfStiffness:
 
     def checks(self, at: PathPeakAt) -> list[Resolved]:
         """Changes of the checked peak with more harmonics, twice the samples and more modes."""
-        base = at.as_run()
+        base = at.top
         if not base.found:
             return []
         samples, harmonics = FINER * at.curve.answer.balance.samples, at.highest + MORE[0]

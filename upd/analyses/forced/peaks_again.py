@@ -3,20 +3,26 @@
 Newton's method takes the answer of the run beside its peak into the changed problem, and the peak
 of the acceleration is climbed to along its path: a few dozen steps, where a band around the peak
 takes hundreds. The band is followed where Newton's method does not get there.
+
+Where points slip or open one after another, the top of a peak is flat, with maxima side by side,
+some closer than the points of the path. Climbs therefore begin from the very top of the run, with a
+first step shorter than their distance: the same maximum is compared where a change moves it less.
 """
 
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
-from upd.analyses.forced.companions import POINTS, OtherModel
+from upd.analyses.forced.companions import AXES, OtherModel
 from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.measures import accelerance, path_maxima
 from upd.analyses.forced.mode_peaks import ModePeak
@@ -26,22 +32,29 @@ from upd.analyses.forced.plan import ForcedPlan
 from upd.errors import ConvergenceError, one_line
 from upd.hbm import climb
 from upd.hbm.balance import Balance
-from upd.hbm.peaks import is_near
+from upd.hbm.peaks import FIRST_REACH, is_near
 from upd.hbm.starts import newton
 from upd.scene.forced_contact import Side
 
 log = logging.getLogger(__name__)
+#: first step of a climb from where the peak is expected, over the usual one: 5e-5 of the frequency
+_CLOSE = 0.1
+#: tops whose frequencies differ by less are told as one
+_SAME = 1e-5
 #: points of the path beside the peak from which it is tried, as shares of its height
 _FROM = (1.0, 0.9, 0.8, 0.7)
 
 
 @dataclass(frozen=True)
 class ClimbedPeak:
-    """A peak of the acceleration of a blade: Hz, (m/s2)/N; NaN where it was not found."""
+    """A peak of the acceleration of a blade: Hz, (m/s2)/N, unknowns of the balance; NaN where it
+    was not found.
+    """
 
     frequency: float
     height: float
     seconds: float
+    x: Array | None = None
 
     @property
     def found(self) -> bool:
@@ -50,6 +63,17 @@ class ClimbedPeak:
 
 
 _NONE = ClimbedPeak(float("nan"), float("nan"), 0.0)
+
+
+class Start(NamedTuple):
+    """Where a climb begins: unknowns, Hz; the first step over the usual one; climbed from unless a
+    peak is known that is at least so high, (m/s2)/N.
+    """
+
+    x: Array
+    frequency: float
+    step: float = 1.0
+    unless: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -86,30 +110,64 @@ class PathPeakAt:
         size = np.abs(self.curve.accelerance[self.side])
         return maxima_about(self.curve.answer.frequency, size, self.peak.sample)
 
-    def as_run(self) -> ClimbedPeak:
+    @cached_property
+    def top(self) -> ClimbedPeak:
         """With nothing changed, between the points of the path."""
         b = self.curve.answer.balance
         return self._climbed(b, self.model, self._starts(b))
+
+    @cached_property
+    def _side_by_side(self) -> list[ClimbedPeak]:
+        """The top, and what is climbed to from the points beside the peak's own and is no lower
+        than that.
+        """
+        answer, i = self.curve.answer, self.peak.sample
+        size, found = np.abs(self.curve.accelerance[self.side]), [self.top]
+        for beside in (i - 1, i + 1):
+            if 0 <= beside < len(size):
+                start = Start(answer.x[beside], float(answer.frequency[beside]))
+                climbed = self._climbed_from(answer.balance, self.model, start)
+                found += [one for one in climbed if one.height >= size[i]]
+        return found
+
+    def between_points(self, attribute: str) -> tuple[float, str]:
+        """What the points of the path, and maxima side by side between them, leave in a number of
+        the peak, over the number, and how that is known.
+
+        Parameters
+        ----------
+        attribute
+            Of a peak: frequency or height.
+        """
+        if not self.top.found:
+            return math.nan, "not estimated: the peak was not climbed to"
+        tops, mine = self._side_by_side, getattr(self.peak, attribute)
+        left = max(abs(mine / getattr(one, attribute) - 1.0) for one in tops)
+        low, high = (least(one.frequency for one in tops) for least in (min, max))
+        why = "against the peak on the path itself, between its points"
+        if high - low > _SAME * high:
+            why += f"; maxima side by side at {low:.6g} to {high:.6g} Hz"
+        return left, why
 
     def with_harmonics(self, highest: int) -> ClimbedPeak:
         """With these harmonics."""
         old = self.curve.answer.balance
         b = self._balance(self.model, range(highest + 1), None)
-        starts = ((b.embedded(x, old), f) for x, f in self._starts(old))
+        starts = (one._replace(x=b.embedded(one.x, old)) for one in self._all_starts(old))
         return self._climbed(b, self.model, chain(starts, self._band(b, self.model)))
 
     def with_samples(self, times: int) -> ClimbedPeak:
         """With so many times the samples."""
         old = self.curve.answer.balance
         b = self._balance(self.model, old.harmonics.numbers, times * old.samples)
-        starts = chain(self._starts(old), self._band(b, self.model))
+        starts = chain(self._all_starts(old), self._band(b, self.model))
         return self._climbed(b, self.model, starts)
 
     def on(self, companion: OtherModel, ratio: float) -> ClimbedPeak:
-        """On another model; on other contact points the highest of the maxima that are climbed to.
+        """On another model; on other rows of contact points the highest of all maxima about it.
 
         Where points slip or open one after another, a path has maxima beside each other, of which a
-        run tells the highest. Those of other points lie elsewhere: the one that is climbed to from
+        run tells the highest. Those of other rows lie elsewhere: the one that is climbed to from
         the run's peak need not be their highest.
 
         Parameters
@@ -119,16 +177,16 @@ class PathPeakAt:
         """
         old = self.curve.answer.balance
         b = self._balance(companion.model, old.harmonics.numbers, old.samples)
-        answer, among = self.curve.answer, self.maxima if companion.source == POINTS else []
-        first = [(answer.x[i], float(answer.frequency[i])) for i in among]
+        everywhere = companion.ladder == AXES[0]
         # from where the linear limits expect the peak; points that slip may leave it where it was
         starts = (
-            (_carried(b, old, x, companion.move), f * one)
-            for one in dict.fromkeys((ratio, 1.0))
-            for x, f in chain(first, self._starts(old))
+            one._replace(x=_carried(b, old, one.x, companion.move), frequency=one.frequency * times)
+            for times in dict.fromkeys((ratio, 1.0))
+            for one in self._all_starts(old, everywhere)
         )
-        band = self._band(b, companion.model, ratio)
-        return self._climbed(b, companion.model, chain(starts, band), max(len(among), 1))
+        return self._climbed(
+            b, companion.model, chain(starts, self._band(b, companion.model, ratio))
+        )
 
     def _balance(self, model: Model, numbers: Sequence[int], samples: int | None) -> Balance:
         b = balance_of(self.plan, model, self.curve.force, numbers, samples)
@@ -137,7 +195,19 @@ class PathPeakAt:
             return b.with_sliders("static", old.slider)
         return b
 
-    def _starts(self, b: Balance) -> Iterator[tuple[Array, float]]:
+    def _all_starts(self, b: Balance, everywhere: bool = False) -> Iterator[Start]:
+        """The top; other maxima about it, the highest first, while what is climbed to is lower than
+        they were, or all of them; points of the path beside the peak.
+        """
+        answer, size = self.curve.answer, np.abs(self.curve.accelerance[self.side])
+        if self.top.x is not None:
+            yield Start(self.top.x, self.top.frequency, _CLOSE, math.inf)
+        for i in self.maxima[1:]:
+            unless = math.inf if everywhere else float(size[i])
+            yield Start(answer.x[i], float(answer.frequency[i]), unless=unless)
+        yield from self._starts(b)
+
+    def _starts(self, b: Balance) -> Iterator[Start]:
         """Points of the path at the peak and beside it, on both sides, until it falls too low."""
         answer, top = self.curve.answer, self.peak.sample
         size = np.abs(self.curve.accelerance[self.side])
@@ -149,9 +219,9 @@ class PathPeakAt:
                     i += step
                 if i not in seen:
                     seen.add(i)
-                    yield answer.x[i], float(answer.frequency[i])
+                    yield Start(answer.x[i], float(answer.frequency[i]))
 
-    def _band(self, b: Balance, model: Model, ratio: float = 1.0) -> Iterator[tuple[Array, float]]:
+    def _band(self, b: Balance, model: Model, ratio: float = 1.0) -> Iterator[Start]:
         """Peaks of a path along a band about where the peak is expected, the highest first; then of
         one three times as wide.
         """
@@ -173,34 +243,32 @@ class PathPeakAt:
                 continue
             size = np.abs(accelerance(found, model.row(self.side), self.curve.force))
             for peak in sorted(path_maxima(found.frequency, size), key=lambda one: -one.height):
-                yield found.x[peak.sample], float(found.frequency[peak.sample])
+                yield Start(found.x[peak.sample], float(found.frequency[peak.sample]))
 
-    def _climbed(
-        self, b: Balance, model: Model, starts: Iterator[tuple[Array, float]], among: int = 1
-    ) -> ClimbedPeak:
-        """The highest peak that is climbed to from so many starts; where none is, the first from
-        further ones.
-        """
-        begin, found = time.thread_time(), list[ClimbedPeak]()
-        for k, start in enumerate(starts):
-            if found and k >= among:
+    def _climbed(self, b: Balance, model: Model, starts: Iterator[Start]) -> ClimbedPeak:
+        """The highest peak that is climbed to from the starts that are to be tried."""
+        begin, top = time.thread_time(), _NONE
+        for start in starts:
+            if top.height >= start.unless:
                 break
-            found += self._climbed_from(b, model, *start)
-        top = max(found, key=lambda one: one.height, default=_NONE)
+            found = self._climbed_from(b, model, start)
+            top = max([top, *found], key=lambda one: one.height if one.found else 0.0)
         return replace(top, seconds=time.thread_time() - begin)
 
-    def _climbed_from(self, b: Balance, model: Model, guess: Array, f: float) -> list[ClimbedPeak]:
+    def _climbed_from(self, b: Balance, model: Model, start: Start) -> list[ClimbedPeak]:
         """The peak uphill from there; empty without one."""
-        x = newton(b, guess, f)
+        f = start.frequency
+        x = newton(b, start.x, f)
         if x is None:
             return []
         k = model.excitation.lowest
-        top = climb(b, model.row(self.side), x, f, harmonic=k, power=2)
+        row, reach = model.row(self.side), start.step * FIRST_REACH
+        top = climb(b, row, x, f, reach, harmonic=k, power=2)
         omega = 2.0 * np.pi * k * top.frequency
         height = 1e-3 * omega**2 * top.amplitude / self.curve.force
         if not top.found or not is_near(top.frequency / f, height / self.peak.height):
             return []
-        return [ClimbedPeak(top.frequency, float(height), 0.0)]
+        return [ClimbedPeak(top.frequency, float(height), 0.0, top.x)]
 
 
 def maxima_about(frequency: Array, height: Array, top: int) -> list[int]:

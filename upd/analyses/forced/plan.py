@@ -17,6 +17,7 @@ from upd.analyses.forced.estimates_cost import estimate_seconds, reduced
 from upd.analyses.forced.faces_cost import balance_seconds
 from upd.analyses.forced.stiffness import check_sources, plans_to_solve
 from upd.cache.sources import key_of
+from upd.hbm.fourier import harmonics, sample_count
 from upd.hbm.kept_factors import SOLUTIONS, WORTH_KEEPING
 from upd.mesh import recipes
 from upd.scene import ForcedScene
@@ -27,9 +28,10 @@ from upd.scene.rig import rig_parameters
 # that sticks, per contact point.
 _STUCK_S = 1.9e-4
 # A Newton step with new factors, and the steps beside it that go on with these: its small calls,
-# the march of each contact point, the products for each entry of the Jacobian, times of its LU.
-# About half of the points stick or are open over the whole cycle and are left out of the last two.
-_STEP_S, _MARCH_S, _ENTRY_S, _STEP_LU = 4.5e-4, 4.5e-5, 1.7e-8, 0.55
+# each contact point, and each of its samples; the products for each entry of the Jacobian, times of
+# its LU. About half of the points stick or are open over the whole cycle and are left out of the
+# last two.
+_STEP_S, _POINT_STEP_S, _SAMPLE_S, _ENTRY_S, _STEP_LU = 4.5e-4, 1.9e-5, 2e-7, 1.7e-8, 0.55
 # Of large ones, steps for each new factor, and solutions with the kept ones in a step. Counted on
 # F_C/F_E 194 with 64 rows of Gauss points a face, harmonics to 7 (2943 unknowns): 150 factors, 5500
 # corrections, 24635 products. Rigs of 64 and 128 points with fewer harmonics take 4 to 5 steps a
@@ -40,6 +42,9 @@ _STEPS_KEPT, _SOLVED = 10.0, 19.0
 # more kinks. At most so many per frequency asked for, and to begin with.
 _KINKS = {"symmetric": 3.3e5, "asymmetric": 1.1e5}
 _MOST, _LEAST = 12.0, 800.0
+# Of these steps, the share that goes with the frequencies asked for in a unit of the logarithm, and
+# how many of them that was counted with (1.3 points of the path for each, 1196 in all).
+_ASKED_SHARE, _ASKED = 0.43, 400.0 / math.log(500.0 / 280.0)
 # Newton steps of a peak at one ratio of the performance curve, for each of two peaks.
 _PEAK, _PEAKS = 50.0, 2
 # Curves of a band over the static states and the starts of the sliders.
@@ -193,10 +198,9 @@ def _path_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> 
     asked, e = scene.excitation.points, scene.excitation
     points, step = _points(scene, size), _step_seconds(scene, size)
     stuck = arrays_s(_STUCK_S * points) * asked * len(e.centrifugal_to_force)
-    steps = sum(
-        min(_KINKS[scene.arrangement] / ratio, _LEAST + _MOST * asked)
-        for ratio in e.centrifugal_to_force
-    )
+    dense = asked / math.log(e.stop / e.start) / _ASKED
+    kinks = _KINKS[scene.arrangement] * (1.0 - _ASKED_SHARE + _ASKED_SHARE * dense)
+    steps = sum(min(kinks / ratio, _LEAST + _MOST * asked) for ratio in e.centrifugal_to_force)
     seconds = len(scene.stiffnesses) * (stuck + steps * step * (scene.contact.friction > 0.0))
     marched = scene.balance.method != "balance"
     if scene.wants("performance") and not marched:
@@ -250,6 +254,12 @@ def time_steps(scene: ForcedScene) -> int:
     return MARCH_SAMPLES if given == "auto" else int(given)
 
 
+def balance_samples(scene: ForcedScene) -> int:
+    """Samples of a period of the balance."""
+    given = scene.balance.samples
+    return sample_count(harmonics(range(_highest(scene) + 1)), None if given == "auto" else given)
+
+
 def _again_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
     """A peak followed again for every effect left out, each with the unknowns it takes."""
     laws = sum(choice.from_contact for choice in scene.stiffnesses.values())
@@ -271,7 +281,8 @@ def _step_seconds(
     factors = arrays_s(_ENTRY_S * n**2) + factor
     if n > WORTH_KEEPING:
         factors = min(factors, factors / _STEPS_KEPT + _SOLVED * factor * SOLUTIONS / n)
-    return calls_s(_STEP_S + _MARCH_S * points) + factors
+    samples = _SAMPLE_S * balance_samples(scene)
+    return calls_s(_STEP_S + (_POINT_STEP_S + samples) * points) + factors
 
 
 def _points(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
