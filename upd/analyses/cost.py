@@ -169,7 +169,7 @@ class CostModel:
         self.shared += times * one
         self.jobs += times * [2.0 * found.bytes + 3.0 * nodes * solid.entries * _COPIES]
 
-    def reduction(self, task: str, hexes: int, nodes: int, n_kept: int) -> None:
+    def reduction(self, task: str, hexes: int, nodes: int, n_kept: int, modes: int = 10) -> None:
         """A body reduced to its kept dofs and some of its modes: its Schur complement, a right side
         per kept dof, modes with these held.
         """
@@ -177,7 +177,7 @@ class CostModel:
         found = self.choice(task, 3 * nodes, n_kept, solid, direct=True)
         columns = 0.5 * n_kept * found.substitution()
         columns += dense_s(2.0 * 3.0 * nodes * float(n_kept) ** 2)
-        lanczos = calls_s(0.15) + 1.5 * found.seconds + 30.0 * found.substitution()
+        lanczos = calls_s(0.15) + 1.5 * found.seconds + _lanczos(modes) * found.substitution()
         self.shared += found.seconds + columns + lanczos
         self.jobs.append(
             3.0 * found.bytes
@@ -185,7 +185,7 @@ class CostModel:
             + 2.0 * 3.0 * nodes * solid.entries * _COPIES
         )
 
-    def attached(self, task: str, hexes: int, nodes: int, loads: int) -> None:
+    def attached(self, task: str, hexes: int, nodes: int, loads: int, modes: int = 10) -> None:
         """A body reduced to its lowest modes and its displacements under loads: the factor of both,
         in its place another that counts the modes, a right side per load.
         """
@@ -193,7 +193,8 @@ class CostModel:
         found = self.choice(task, 3 * nodes, 0, solid, direct=True)
         columns = 0.5 * loads * found.substitution()
         columns += dense_s(4.0 * 3.0 * nodes * float(loads) ** 2)
-        self.shared += calls_s(0.15) + 3.0 * found.seconds + 30.0 * found.substitution() + columns
+        columns += _lanczos(modes) * found.substitution()
+        self.shared += calls_s(0.15) + 3.0 * found.seconds + columns
         self.jobs.append(
             found.bytes + 4.0 * 24.0 * nodes * loads + 2.0 * 3.0 * nodes * solid.entries * _COPIES
         )
@@ -245,3 +246,8 @@ class CostModel:
         many = max(workers, 1) if workers > 1 else 2
         gain = rates().speedup if min(many, select.threads_used()) > 1 else 1.0
         return self.seconds + self.shared / gain
+
+
+def _lanczos(modes: int) -> float:
+    """Substitutions of pairs of right sides for so many modes (counted with 5 to 40 of them)."""
+    return 14.0 + 1.6 * modes

@@ -79,11 +79,12 @@ def reduced(
         Hexahedra, nodes, and contact nodes.
     """
     hexes, nodes, contact = size
+    modes = scene.reduction.modes
     if scene.contact.rule == GAUSS:
         rows, columns = scene.contact.lines("left" if body == "left" else "right")
-        cost.attached(task, hexes, nodes, 3 * rows * columns + 2)
+        cost.attached(task, hexes, nodes, 3 * rows * columns + 2, modes)
     else:
-        cost.reduction(task, hexes, nodes, 3 * (contact + 2))
+        cost.reduction(task, hexes, nodes, 3 * (contact + 2), modes)
 
 
 def _companion(scene: ForcedScene) -> ForcedScene:
