@@ -392,10 +392,21 @@ def test_the_highest_of_several_maxima_is_climbed_to(
     tried.clear()
     heights.clear()
     heights[f[top + 2]] = 130.0
-    further = peaks_again.Start(at.curve.answer.x[0], float(f[top + 2]))
+    further = peaks_again.Start(at.curve.answer.x[0], float(f[top + 2]), float(first))
     monkeypatch.setattr(PathPeakAt, "_band", lambda *_: iter([further]))
     assert at.on(rows, 1.0).height == 130.0
     assert len(tried) > len(every)
+
+
+def test_a_peak_far_from_where_it_is_expected_is_another(
+    slipping: tuple[ForcedSolution, list[Result], Estimates],
+) -> None:
+    at = peak_at(slipping[0])
+    i, answer = at.peak.sample, at.curve.answer
+    f = float(answer.frequency[i])
+    for about, found in ((f, 1), (1.02 * f, 1), (1.05 * f, 0), (0.95 * f, 0)):
+        start = peaks_again.Start(answer.x[i], f, about)
+        assert len(at._climbed_from(answer.balance, at.model, start)) == found
 
 
 def test_maxima_side_by_side_are_told_of_a_frequency(

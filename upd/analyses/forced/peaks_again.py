@@ -66,12 +66,23 @@ _NONE = ClimbedPeak(float("nan"), float("nan"), 0.0)
 
 
 class Start(NamedTuple):
-    """Where a climb begins: unknowns, Hz; the first step over the usual one; climbed from unless a
-    peak is known that is at least so high, (m/s2)/N.
+    """Where a climb begins, and from where on what it finds is another peak.
+
+    Attributes
+    ----------
+    x, frequency
+        Unknowns; Hz.
+    about
+        Where the peak is expected, Hz.
+    step
+        The first one, over the usual one.
+    unless
+        Height of a peak that makes it needless, (m/s2)/N.
     """
 
     x: Array
     frequency: float
+    about: float
     step: float = 1.0
     unless: float = 0.0
 
@@ -125,7 +136,8 @@ class PathPeakAt:
         size, found = np.abs(self.curve.accelerance[self.side]), [self.top]
         for beside in (i - 1, i + 1):
             if 0 <= beside < len(size):
-                start = Start(answer.x[beside], float(answer.frequency[beside]))
+                f = float(answer.frequency[beside])
+                start = Start(answer.x[beside], f, self.top.frequency)
                 climbed = self._climbed_from(answer.balance, self.model, start)
                 found += [one for one in climbed if one.height >= size[i]]
         return found
@@ -201,10 +213,10 @@ class PathPeakAt:
         """
         answer, size = self.curve.answer, np.abs(self.curve.accelerance[self.side])
         if self.top.x is not None:
-            yield Start(self.top.x, self.top.frequency, _CLOSE, math.inf)
+            yield Start(self.top.x, self.top.frequency, self.peak.frequency, _CLOSE, math.inf)
         for i in self.maxima[1:]:
-            unless = math.inf if everywhere else float(size[i])
-            yield Start(answer.x[i], float(answer.frequency[i]), unless=unless)
+            f, unless = float(answer.frequency[i]), math.inf if everywhere else float(size[i])
+            yield Start(answer.x[i], f, self.peak.frequency, unless=unless)
         yield from self._starts(b)
 
     def _starts(self, b: Balance) -> Iterator[Start]:
@@ -219,7 +231,7 @@ class PathPeakAt:
                     i += step
                 if i not in seen:
                     seen.add(i)
-                    yield Start(answer.x[i], float(answer.frequency[i]))
+                    yield Start(answer.x[i], float(answer.frequency[i]), self.peak.frequency)
 
     def _band(self, b: Balance, model: Model, ratio: float = 1.0) -> Iterator[Start]:
         """Peaks of a path along a band about where the peak is expected, the highest first; then of
@@ -243,7 +255,7 @@ class PathPeakAt:
                 continue
             size = np.abs(accelerance(found, model.row(self.side), self.curve.force))
             for peak in sorted(path_maxima(found.frequency, size), key=lambda one: -one.height):
-                yield Start(found.x[peak.sample], float(found.frequency[peak.sample]))
+                yield Start(found.x[peak.sample], float(found.frequency[peak.sample]), f)
 
     def _climbed(self, b: Balance, model: Model, starts: Iterator[Start]) -> ClimbedPeak:
         """The highest peak that is climbed to from the starts that are to be tried."""
@@ -266,7 +278,7 @@ class PathPeakAt:
         top = climb(b, row, x, f, reach, harmonic=k, power=2)
         omega = 2.0 * np.pi * k * top.frequency
         height = 1e-3 * omega**2 * top.amplitude / self.curve.force
-        if not top.found or not is_near(top.frequency / f, height / self.peak.height):
+        if not top.found or not is_near(top.frequency / start.about, height / self.peak.height):
             return []
         return [ClimbedPeak(top.frequency, float(height), 0.0, top.x)]
 
