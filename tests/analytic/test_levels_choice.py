@@ -145,7 +145,7 @@ def test_what_scatters_is_tried_on_one_level_more() -> None:
     assert forecast.one_more(third, [key], (2, 1, 0), seconds) == (3, 1, 0)
     assert forecast.one_more(third, [key], third.levels, seconds) is None
     top = Round((3, 0, 0), {key: parts(5.0, 0.1, 0.1)})
-    again = LevelForecast(KNOBS, _slow={0})
+    again = LevelForecast(KNOBS, powers={0: 0.5})
     assert again.one_more(top, [key], top.levels, seconds) is None
     lost = Round((2, 0, 0), {key: parts(5.0, math.nan, 0.1)})
     assert again.one_more(lost, [key], lost.levels, seconds) is None

@@ -146,13 +146,13 @@ class Chooser:
         return float(plan.seconds)
 
     def out_of_reach(self, now: Round) -> dict[Key, str]:
-        """Numbers that no levels are expected to reach were each of them wanted alone -> how far
-        from it, and what keeps them there.
+        """Numbers that are not reached, and that no levels are expected to reach were each of them
+        wanted alone -> how far from it, and what keeps them there.
         """
         out = {}
         for key, parts in now.shares.items():
             alone = Round(now.levels, {key: parts})
-            if self.forecast.cheapest(alone, self.seconds) is None:
+            if alone.miss[0] > 1.0 and self.forecast.cheapest(alone, self.seconds) is None:
                 why = f"{self.forecast.obstacle(alone)}, {_times(alone.miss[0])}"
                 out[key] = why
         return out
@@ -247,7 +247,6 @@ def solve_to_accuracy(rounds: Rounds, plan: Any, stages: Stages) -> tuple[Any, E
         return rounds.solve(plan, stages), None
     chooser = Chooser(rounds, plan.asked)
     levels, before, told = chooser.lowest, None, list[str]()
-    given_up: dict[Key, str] = {}
     while True:
         trial = chooser.trial(levels)
         refuse_oversize(trial)
@@ -255,28 +254,21 @@ def solve_to_accuracy(rounds: Rounds, plan: Any, stages: Stages) -> tuple[Any, E
             solution, found, now = _solved(chooser, levels, trial, Stages())
         if before is not None:
             chooser.forecast.learn(before, now)
-        before, left = now, now.without(given_up)
-        told.append(_worst(chooser, left))
-        if left.miss[0] <= 1.0:
+        before = now
+        # anew each round: what was raised for others may have brought them within reach
+        lost = chooser.out_of_reach(now)
+        left = now.without(lost)
+        told.append(_worst(chooser, now))
+        missed = bool(left.shares) and left.miss[0] > 1.0
+        raised = chooser.forecast.cheapest(left, chooser.seconds) if missed else None
+        more = chooser.forecast.one_more(now, lost, raised or levels, chooser.seconds)
+        if more is None and raised is None:
             break
-        raised = chooser.forecast.cheapest(left, chooser.seconds)
-        if raised is None:
-            lost = chooser.out_of_reach(left)
-            rest = left.without(lost)
-            if rest.shares and rest.miss[0] > 1.0:
-                raised = chooser.forecast.cheapest(rest, chooser.seconds)
-            more = chooser.forecast.one_more(left, lost, raised or levels, chooser.seconds)
-            if more is None:
-                given_up |= lost
-                left = rest
-            raised = more or raised
-            if raised is None:
-                break
-        levels = raised
+        levels = more or raised or levels
         # its factors are the memory of the next
         del solution
-    if given_up or left.miss[0] > 1.0:
-        raise _missed(_lack(chooser, given_up, left, told), solution, found)
+    if lost or missed or not left.shares:
+        raise _missed(_lack(chooser, lost, left, told), solution, found)
     whole = chooser.planned(levels)
     effect = Effect(EFFECT, True, chooser.saving(now, told))
     whole = replace(whole, effects=(*whole.effects, effect))

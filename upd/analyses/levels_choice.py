@@ -249,7 +249,9 @@ class LevelForecast:
             source = self._largest(now, key)
             for k, knob in enumerate(self.knobs):
                 more = now.levels[k] + 1
-                if source not in knob.sources or k not in self._slow - self._tried:
+                if source not in knob.sources or k in self._tried:
+                    continue
+                if self.powers.get(k, 1.0) >= 1.0:
                     continue
                 one = (*tried[:k], max(tried[k], more), *tried[k + 1 :])
                 if more < len(knob.labels) and math.isfinite(seconds(one)):

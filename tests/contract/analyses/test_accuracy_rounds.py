@@ -162,6 +162,27 @@ def test_a_number_out_of_reach_is_given_up_and_the_others_are_reached() -> None:
     assert made.solved[-1] == last
 
 
+class WithANumberThatSettles(WithAScatteringNumber):
+    """The other number no longer scatters on the finest mesh."""
+
+    @staticmethod
+    def _estimate(solution: Any, numbers: Sequence[Result], stages: Stages) -> Estimates:
+        parts = MadeUp._estimate(solution, numbers, stages)["number", CASE]
+        # 1/64 of it is too much as well
+        lost = (*parts[:1], replace(parts[1], error=0.5))
+        settled = solution.plan.scene.mesh == 3
+        return {("number", CASE): parts, ("scattering", CASE): parts if settled else lost}
+
+
+def test_what_is_raised_for_others_may_bring_a_number_within_reach() -> None:
+    """It is given up by what it is in the last round, not in an early one."""
+    made = WithANumberThatSettles()
+    solution, found = made.run(MadeUpScene(accuracy=0.004, want=("number",)))
+    assert solution.plan.scene.mesh == 3
+    assert found is not None
+    assert all(sum(p.error for p in parts) <= 0.004 for parts in found.values())
+
+
 def test_numbers_alone_are_not_solved_twice() -> None:
     made = MadeUp()
     made.run(MadeUpScene(accuracy={"number": 0.5}, want=("number",)))
