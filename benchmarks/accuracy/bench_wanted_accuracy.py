@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -90,11 +90,12 @@ def _response(name: str, wanted: Mapping[str, str]) -> Iterator[Row]:
     yield {**row, "value": time.process_time() - begin, "note": told}
     numbers = make_results(solution)
     found = estimate(solution, numbers, Stages())
+    wanted_shares = shares_of(found, chooser.wanted)
+    yield from _left(name, numbers, wanted_shares)
     levels = _levels(chooser, solution)
     fine = _finer(chooser, levels)
     if fine is None:
         return
-    wanted_shares = shares_of(found, chooser.wanted)
     # its bodies are the memory of the finer ones
     del solution
     plan = chooser.trial(fine)
@@ -133,6 +134,13 @@ def _trial(name: str, levels: Levels) -> Iterator[Row]:
         "value": took,
         "unit": "s",
     }
+    yield from _left(name, numbers, shares)
+
+
+def _left(
+    name: str, numbers: Iterable[Any], shares: Mapping[Any, Mapping[str, float]]
+) -> Iterator[Row]:
+    """The numbers, with what every source leaves in shares of what is wanted."""
     for one in numbers:
         if (one.name, one.case) not in shares:
             continue
