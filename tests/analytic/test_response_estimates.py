@@ -124,6 +124,32 @@ def test_few_modes_tell_what_they_miss(
         assert abs(fine.value / run.value - 1.0) <= part.error < 0.01
 
 
+def test_the_top_is_the_highest_of_maxima_side_by_side(
+    slipping: tuple[ForcedSolution, list[Result], Estimates], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of what the points of the path lead to, and climbed from again with short steps."""
+    at = peak_at(slipping[0])
+    i, answer = at.peak.sample, at.curve.answer
+    size = float(np.abs(at.curve.accelerance["right"])[i])
+    names = {float(answer.frequency[i + k]): 440.0 + k for k in (-1, 0, 1)} | {441.0: 450.0}
+    heights = {439.0: 0.9, 440.0: 1.0, 441.0: 1.01, 450.0: 1.02}
+    tried = []
+
+    def climbed(self: PathPeakAt, b: Any, model: Any, start: Any) -> Any:
+        tried.append((start.frequency, start.step))
+        f = names.get(start.frequency, start.frequency)
+        return [ClimbedPeak(f, heights[f] * size, 1.0, answer.x[i])]
+
+    monkeypatch.setattr(PathPeakAt, "_climbed_from", climbed)
+    for name in ("top", "_side_by_side"):
+        at.__dict__.pop(name, None)
+    assert at.top.frequency == 450.0
+    close = peaks_again._CLOSE
+    assert tried[3:] == [(441.0, close), (450.0, close)]
+    left, _ = at.between_points("frequency")
+    assert left == pytest.approx(abs(at.peak.frequency / 450.0 - 1.0))
+
+
 def test_what_points_of_the_path_leave_is_the_peak_between_them(
     few_points: Sequence[str],
 ) -> None:
@@ -422,8 +448,9 @@ def test_maxima_side_by_side_are_told_of_a_frequency(
         float(f[top - 1]): ClimbedPeak(0.99 * at.top.frequency, 0.999 * size, 0.0),
         float(f[top + 1]): ClimbedPeak(1.002 * at.top.frequency, size, 0.0),
     }
+    own = at.top
     monkeypatch.setattr(
-        PathPeakAt, "_climbed_from", lambda self, b, model, start: [found[start.frequency]]
+        PathPeakAt, "_climbed_from", lambda self, b, model, at: [found.get(at.frequency, own)]
     )
     del at.__dict__["_side_by_side"]
     left, why = at.between_points("frequency")

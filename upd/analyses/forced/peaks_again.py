@@ -39,6 +39,8 @@ from upd.scene.forced_contact import Side
 log = logging.getLogger(__name__)
 #: first step of a climb from where the peak is expected, over the usual one: 5e-5 of the frequency
 _CLOSE = 0.1
+#: times that a top is climbed from again with short steps, while that leads higher
+_AGAIN = 4
 #: tops whose frequencies differ by less are told as one
 _SAME = 1e-5
 #: points of the path beside the peak from which it is tried, as shares of its height
@@ -123,22 +125,33 @@ class PathPeakAt:
 
     @cached_property
     def top(self) -> ClimbedPeak:
-        """With nothing changed, between the points of the path."""
-        b = self.curve.answer.balance
-        return self._climbed(b, self.model, self._starts(b))
+        """With nothing changed, between the points of the path: the highest of what is climbed to
+        from the peak's own point and from those beside it, and from there with short steps.
+        """
+        b, found = self.curve.answer.balance, self._side_by_side
+        best = max(found, key=lambda one: one.height if one.found else 0.0)
+        for _ in range(_AGAIN):
+            if best.x is None:
+                break
+            start = Start(best.x, best.frequency, self.peak.frequency, _CLOSE)
+            higher = self._climbed_from(b, self.model, start)
+            if not higher or not higher[0].height > best.height:
+                break
+            best = higher[0]
+        return replace(best, seconds=found[0].seconds)
 
     @cached_property
     def _side_by_side(self) -> list[ClimbedPeak]:
-        """The top, and what is climbed to from the points beside the peak's own and is no lower
-        than that.
+        """What is climbed to from the peak's own point; from the points beside it where it is no
+        lower than the own point.
         """
-        answer, i = self.curve.answer, self.peak.sample
-        size, found = np.abs(self.curve.accelerance[self.side]), [self.top]
+        b, i = self.curve.answer.balance, self.peak.sample
+        size, f = np.abs(self.curve.accelerance[self.side]), self.curve.answer.frequency
+        found = [self._climbed(b, self.model, self._starts(b))]
         for beside in (i - 1, i + 1):
             if 0 <= beside < len(size):
-                f = float(answer.frequency[beside])
-                start = Start(answer.x[beside], f, self.top.frequency)
-                climbed = self._climbed_from(answer.balance, self.model, start)
+                start = Start(self.curve.answer.x[beside], float(f[beside]), self.peak.frequency)
+                climbed = self._climbed_from(b, self.model, start)
                 found += [one for one in climbed if one.height >= size[i]]
         return found
 
@@ -153,7 +166,8 @@ class PathPeakAt:
         """
         if not self.top.found:
             return math.nan, "not estimated: the peak was not climbed to"
-        tops, mine = self._side_by_side, getattr(self.peak, attribute)
+        beside = [one for one in self._side_by_side if one.found]
+        tops, mine = [self.top, *beside], getattr(self.peak, attribute)
         left = max(abs(mine / getattr(one, attribute) - 1.0) for one in tops)
         low, high = (least(one.frequency for one in tops) for least in (min, max))
         why = "against the peak on the path itself, between its points"
