@@ -418,7 +418,7 @@ def test_the_highest_of_several_maxima_is_climbed_to(
     tried.clear()
     heights.clear()
     heights[f[top + 2]] = 130.0
-    further = peaks_again.Start(at.curve.answer.x[0], float(f[top + 2]), float(first))
+    further = peaks_again.ClimbStart(at.curve.answer.x[0], float(f[top + 2]), float(first))
     monkeypatch.setattr(PathPeakAt, "_band", lambda *_: iter([further]))
     assert at.on(rows, 1.0).height == 130.0
     assert len(tried) > len(every)
@@ -431,7 +431,7 @@ def test_a_peak_far_from_where_it_is_expected_is_another(
     i, answer = at.peak.sample, at.curve.answer
     f = float(answer.frequency[i])
     for about, found in ((f, 1), (1.02 * f, 1), (1.05 * f, 0), (0.95 * f, 0)):
-        start = peaks_again.Start(answer.x[i], f, about)
+        start = peaks_again.ClimbStart(answer.x[i], f, about)
         assert len(at._climbed_from(answer.balance, at.model, start)) == found
 
 

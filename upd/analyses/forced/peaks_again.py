@@ -67,7 +67,7 @@ class ClimbedPeak:
 _NONE = ClimbedPeak(float("nan"), float("nan"), 0.0)
 
 
-class Start(NamedTuple):
+class ClimbStart(NamedTuple):
     """Where a climb begins, and from where on what it finds is another peak.
 
     Attributes
@@ -133,7 +133,7 @@ class PathPeakAt:
         for _ in range(_AGAIN):
             if best.x is None:
                 break
-            start = Start(best.x, best.frequency, self.peak.frequency, _CLOSE)
+            start = ClimbStart(best.x, best.frequency, self.peak.frequency, _CLOSE)
             higher = self._climbed_from(b, self.model, start)
             if not higher or not higher[0].height > best.height:
                 break
@@ -150,7 +150,9 @@ class PathPeakAt:
         found = [self._climbed(b, self.model, self._starts(b))]
         for beside in (i - 1, i + 1):
             if 0 <= beside < len(size):
-                start = Start(self.curve.answer.x[beside], float(f[beside]), self.peak.frequency)
+                start = ClimbStart(
+                    self.curve.answer.x[beside], float(f[beside]), self.peak.frequency
+                )
                 climbed = self._climbed_from(b, self.model, start)
                 found += [one for one in climbed if one.height >= size[i]]
         return found
@@ -221,19 +223,19 @@ class PathPeakAt:
             return b.with_sliders("static", old.slider)
         return b
 
-    def _all_starts(self, b: Balance, everywhere: bool = False) -> Iterator[Start]:
+    def _all_starts(self, b: Balance, everywhere: bool = False) -> Iterator[ClimbStart]:
         """The top; other maxima about it, the highest first, while what is climbed to is lower than
         they were, or all of them; points of the path beside the peak.
         """
         answer, size = self.curve.answer, np.abs(self.curve.accelerance[self.side])
         if self.top.x is not None:
-            yield Start(self.top.x, self.top.frequency, self.peak.frequency, _CLOSE, math.inf)
+            yield ClimbStart(self.top.x, self.top.frequency, self.peak.frequency, _CLOSE, math.inf)
         for i in self.maxima[1:]:
             f, unless = float(answer.frequency[i]), math.inf if everywhere else float(size[i])
-            yield Start(answer.x[i], f, self.peak.frequency, unless=unless)
+            yield ClimbStart(answer.x[i], f, self.peak.frequency, unless=unless)
         yield from self._starts(b)
 
-    def _starts(self, b: Balance) -> Iterator[Start]:
+    def _starts(self, b: Balance) -> Iterator[ClimbStart]:
         """Points of the path at the peak and beside it, on both sides, until it falls too low."""
         answer, top = self.curve.answer, self.peak.sample
         size = np.abs(self.curve.accelerance[self.side])
@@ -245,9 +247,9 @@ class PathPeakAt:
                     i += step
                 if i not in seen:
                     seen.add(i)
-                    yield Start(answer.x[i], float(answer.frequency[i]), self.peak.frequency)
+                    yield ClimbStart(answer.x[i], float(answer.frequency[i]), self.peak.frequency)
 
-    def _band(self, b: Balance, model: Model, ratio: float = 1.0) -> Iterator[Start]:
+    def _band(self, b: Balance, model: Model, ratio: float = 1.0) -> Iterator[ClimbStart]:
         """Peaks of a path along a band about where the peak is expected, the highest first; then of
         one three times as wide.
         """
@@ -269,9 +271,9 @@ class PathPeakAt:
                 continue
             size = np.abs(accelerance(found, model.row(self.side), self.curve.force))
             for peak in sorted(path_maxima(found.frequency, size), key=lambda one: -one.height):
-                yield Start(found.x[peak.sample], float(found.frequency[peak.sample]), f)
+                yield ClimbStart(found.x[peak.sample], float(found.frequency[peak.sample]), f)
 
-    def _climbed(self, b: Balance, model: Model, starts: Iterator[Start]) -> ClimbedPeak:
+    def _climbed(self, b: Balance, model: Model, starts: Iterator[ClimbStart]) -> ClimbedPeak:
         """The highest peak that is climbed to from the starts that are to be tried."""
         begin, top = time.thread_time(), _NONE
         for start in starts:
@@ -281,7 +283,7 @@ class PathPeakAt:
             top = max([top, *found], key=lambda one: one.height if one.found else 0.0)
         return replace(top, seconds=time.thread_time() - begin)
 
-    def _climbed_from(self, b: Balance, model: Model, start: Start) -> list[ClimbedPeak]:
+    def _climbed_from(self, b: Balance, model: Model, start: ClimbStart) -> list[ClimbedPeak]:
         """The peak uphill from there; empty without one."""
         f = start.frequency
         x = newton(b, start.x, f)
