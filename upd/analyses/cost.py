@@ -169,7 +169,7 @@ class CostModel:
         self.shared += times * one
         self.jobs += times * [2.0 * found.bytes + 3.0 * nodes * solid.entries * _COPIES]
 
-    def reduction(self, task: str, hexes: int, nodes: int, n_kept: int, modes: int = 10) -> None:
+    def reduction(self, task: str, hexes: int, nodes: int, n_kept: int, modes: int) -> None:
         """A body reduced to its kept dofs and some of its modes: its Schur complement, a right side
         per kept dof, modes with these held.
         """
@@ -185,7 +185,7 @@ class CostModel:
             + 2.0 * 3.0 * nodes * solid.entries * _COPIES
         )
 
-    def attached(self, task: str, hexes: int, nodes: int, loads: int, modes: int = 10) -> None:
+    def attached(self, task: str, hexes: int, nodes: int, loads: int, modes: int) -> None:
         """A body reduced to its lowest modes and its displacements under loads: the factor of both,
         in its place another that counts the modes, a right side per load.
         """

@@ -268,9 +268,7 @@ class _OfStiffness:
                 self.out.tell(key, HARMONICS, 0.0, exact)
                 self.out.tell(key, SAMPLES, 0.0, exact)
 
-        def add(
-            source: str, label: str, size: float, found: ClimbedPeak, extra: float = 0.0
-        ) -> None:
+        def add(source: str, label: str, size: float, found: ClimbedPeak) -> None:
             for key, attribute in keys:
                 ratio = getattr(found, attribute) / getattr(base, attribute)
                 times = found.seconds / base.seconds

@@ -254,7 +254,7 @@ def time_steps(scene: ForcedScene) -> int:
     return MARCH_SAMPLES if given == "auto" else int(given)
 
 
-def balance_samples(scene: ForcedScene) -> int:
+def _balance_samples(scene: ForcedScene) -> int:
     """Samples of a period of the balance."""
     given = scene.balance.samples
     return sample_count(harmonics(range(_highest(scene) + 1)), None if given == "auto" else given)
@@ -281,7 +281,7 @@ def _step_seconds(
     factors = arrays_s(_ENTRY_S * n**2) + factor
     if n > WORTH_KEEPING:
         factors = min(factors, factors / _STEPS_KEPT + _SOLVED * factor * SOLUTIONS / n)
-    samples = _SAMPLE_S * balance_samples(scene)
+    samples = _SAMPLE_S * _balance_samples(scene)
     return calls_s(_STEP_S + (_POINT_STEP_S + samples) * points) + factors
 
 

@@ -99,7 +99,8 @@ def _add_more(
             cost.dynamic_body(count["hexes"], count["nodes"])
             # patch, force and accelerometer
             kept = 3 * (count["contact"] + 2)
-            cost.reduction(f"{body}, reduction", count["hexes"], count["nodes"], kept)
+            hexes, nodes, modes = count["hexes"], count["nodes"], scene.reduction.count
+            cost.reduction(f"{body}, reduction", hexes, nodes, kept, modes)
             if scene.wants("response") and body == "right":
                 cost.seconds += _direct_seconds(count["nodes"])
     right = size.get(f"right, {arrangement}")
