@@ -18,6 +18,7 @@ from upd.analyses.levels_choice import (
     Round,
     require_named,
     shares_of,
+    withheld_of,
 )
 from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages
@@ -256,17 +257,18 @@ def solve_to_accuracy(rounds: Rounds, plan: Any, stages: Stages) -> tuple[Any, E
             chooser.forecast.learn(before, now)
         before = now
         # anew each round: what was raised for others may have brought them within reach
-        lost = chooser.out_of_reach(now)
-        left = now.without(lost)
+        far = chooser.out_of_reach(now)
+        left = now.without(far)
         told.append(_worst(chooser, now))
         missed = bool(left.shares) and left.miss[0] > 1.0
         raised = chooser.forecast.cheapest(left, chooser.seconds) if missed else None
-        more = chooser.forecast.one_more(now, lost, raised or levels, chooser.seconds)
+        more = chooser.forecast.one_more(now, far, raised or levels, chooser.seconds)
         if more is None and raised is None:
             break
         levels = more or raised or levels
         # its factors are the memory of the next
         del solution
+    lost = {**far, **now.withheld}
     if lost or missed or not left.shares:
         raise _missed(_lack(chooser, lost, left, told), solution, found)
     whole = chooser.planned(levels)
@@ -276,8 +278,9 @@ def solve_to_accuracy(rounds: Rounds, plan: Any, stages: Stages) -> tuple[Any, E
         return replace(solution, plan=whole), found
     del solution
     solution, found, now = _solved(chooser, levels, whole, stages)
-    if now.miss[0] > 1.0:
-        why = f"the whole run misses what its numbers alone reached: {_times(now.miss[0])}"
+    if now.miss[0] > 1.0 or now.withheld:
+        miss = "; ".join(now.withheld.values()) or _times(now.miss[0])
+        why = f"the whole run misses what its numbers alone reached: {miss}"
         raise _missed(why, solution, found)
     return solution, found
 
@@ -317,7 +320,8 @@ def _solved(
     if isinstance(chooser.asked.wanted_accuracy, Mapping):
         require_named(chooser.wanted, numbers)
     found = rounds.estimate(solution, numbers, Stages())
-    return solution, found, Round(levels, shares_of(found, chooser.wanted))
+    absent = withheld_of(numbers, chooser.wanted)
+    return solution, found, Round(levels, shares_of(found, chooser.wanted), absent)
 
 
 def _times(miss: float) -> str:

@@ -55,11 +55,13 @@ class Knob:
 @dataclass(frozen=True)
 class Round:
     """One round: the levels, and for every wanted number the error of every source over the
-    accuracy that is wanted of the number; NaN where it was not found.
+    accuracy that is wanted of the number; NaN where it was not found. Wanted numbers that the round
+    withholds, and why.
     """
 
     levels: Levels
     shares: Mapping[Key, Mapping[str, float]]
+    withheld: Mapping[Key, str] = field(default_factory=dict)
 
     @property
     def miss(self) -> tuple[float, Key | None]:
@@ -72,7 +74,8 @@ class Round:
 
     def without(self, keys: Collection[Key]) -> Round:
         """The round without some of its numbers."""
-        return Round(self.levels, {k: v for k, v in self.shares.items() if k not in keys})
+        left = {k: v for k, v in self.shares.items() if k not in keys}
+        return Round(self.levels, left, self.withheld)
 
 
 def shares_of(
@@ -97,6 +100,15 @@ def shares_of(
                 mine[part.source] = mine.get(part.source, 0.0) + part.error / target
             out[key] = mine
     return out
+
+
+def withheld_of(results: Iterable[Result], wanted: Collection[str]) -> dict[Key, str]:
+    """Numbers with a wanted name (shell patterns) that a run withholds -> each and why."""
+    return {
+        (one.name, one.case): f"{one.name} {one.case.label}: {one.withheld}"
+        for one in results
+        if one.withheld and any(fnmatchcase(one.name, name) for name in wanted)
+    }
 
 
 def require_named(wanted: Collection[str], results: Iterable[Result]) -> None:

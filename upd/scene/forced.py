@@ -203,10 +203,10 @@ class BalanceChoice:
     Attributes
     ----------
     method
-        "balance": harmonic balance along the curve; "march": stepped sine by time march, up and
-        down; "auto": the balance, and where points slip or open the sweeps too: peaks that both
-        tell alike are the balance's, others a range. Cost: a sweep takes about a second for every
-        three frequencies.
+        "balance": harmonic balance along the curve, marches from its maxima, those that they leave
+        told as none; "march": stepped sine by time march, up and down; "auto": the balance, and
+        where points slip or open the sweeps too: peaks that both tell alike are the balance's,
+        others a range. Cost: a sweep takes about a second for every three frequencies.
     harmonics
         The highest, or "adaptive": as many as every point of a curve needs, 3 of the blades with
         whole faces. Cost: unknowns grow with 2 harmonics + 1, seconds faster.

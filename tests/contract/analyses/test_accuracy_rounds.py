@@ -16,7 +16,7 @@ from upd.analyses.base import Plan
 from upd.analyses.levels_choice import Knob, Levels
 from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages
-from upd.results import Case, ErrorPart, Estimates, Result
+from upd.results import Case, ErrorPart, Estimates, Result, withheld
 from upd.scene import load_scene
 
 pytestmark = pytest.mark.estimated
@@ -128,6 +128,24 @@ def test_the_cheapest_levels_are_solved_whole_and_say_what_was_not_needed() -> N
     # (64 * 1.2) / 64
     assert "one level for all, number 3, would take 1.2 times the seconds" in effect.why
     assert solution.plan.scene.accuracy is None
+
+
+def test_a_wanted_number_that_a_run_withholds_is_not_reached() -> None:
+    """Its error has no parts; the others are brought to theirs, and the run says what it lacks."""
+    made = MadeUp()
+    lost = withheld("number_2", CASE, "N", "no steady motion")
+    made.rounds = replace(
+        made.rounds,
+        governing={"all": "number*"},
+        make_results=lambda solution: [Result("number", CASE, 1.0, "N"), lost],
+    )
+    with pytest.raises(ConvergenceError, match="number_2 : no steady motion") as error:
+        made.run(MadeUpScene(accuracy={"all": 0.02}))
+    assert "reached are number" in str(error.value)
+    assert made.solved[-1].mesh == 2
+    unwanted = replace(made.rounds, governing={"all": "number"})
+    made.rounds = unwanted
+    assert made.run(MadeUpScene(accuracy={"all": 0.02}))[1] is not None
 
 
 class WithAScatteringNumber(MadeUp):

@@ -12,7 +12,7 @@ import pytest
 
 from upd.analyses import forced, make_plan, modal
 from upd.analyses.base import Resolved
-from upd.analyses.forced.curves import ForcedCurve
+from upd.analyses.forced.curves import ForcedCurve, LeftMaximum
 from upd.analyses.forced.march_modes import stuck_modes_of
 from upd.analyses.forced.marched_peaks import marched_peak
 from upd.analyses.forced.measures import accelerance, residual_error
@@ -240,6 +240,13 @@ def _lower_down(s: ForcedSolution) -> ForcedSolution:
     return replace(s, sweeps=[s.sweeps[0], replace(one, peaks=peaks)])
 
 
+def _unsteady(s: ForcedSolution) -> ForcedSolution:
+    """The peak as one that a march leaves; `test_steady_peaks` has peaks that marches do leave."""
+    curve = s.curves[0]
+    left = LeftMaximum("right", s.numbered_peaks(curve)[0], 1.0)
+    return replace(s, curves=[replace(curve, left=(left,))])
+
+
 SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
     "path complete": lambda s: with_answer(replace(s, sweeps=[]), status="stopped"),
     "contact forces periodic": lambda s: with_answer(
@@ -267,6 +274,7 @@ SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
         ],
     ),
     "one steady motion": _lower_down,
+    "maxima steady": _unsteady,
     "steady at the peak": lambda s: replace(
         s, confirmations=[replace(s.confirmations[0], marched=1.01 * s.confirmations[0].marched)]
     ),

@@ -27,6 +27,7 @@ from upd.analyses.forced.paths import STARTS, SWEEP_POINTS, path_settings, respo
 from upd.analyses.forced.ranges import peak_ranges
 from upd.analyses.forced.solution import AS_RUN, BandCurve, CurveBand, ForcedSolution
 from upd.analyses.forced.statics import StaticState, admissible, same
+from upd.analyses.forced.steady_peaks import with_steady_peaks
 from upd.analyses.forced.sweeps import SweepJob, make_springs, spread, stretch
 from upd.errors import InputError
 from upd.hbm.peaks import climb
@@ -80,7 +81,8 @@ def solve_band(solution: ForcedSolution, curve: ForcedCurve, stages: Stages) -> 
             side: measures.accelerance(answer, model.row(side), curve.force) for side in SIDES
         }
         took = time.perf_counter() - begin
-        again = replace(curve, answer=answer, accelerance=blades, seconds=took)
+        again = replace(curve, answer=answer, accelerance=blades, seconds=took, left=())
+        again = with_steady_peaks(solution.plan, choice.model, again)
         found.append(_read(solution, choice.name, again, choice.model))
     return CurveBand(curve, tuple(found))
 

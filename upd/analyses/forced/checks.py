@@ -57,6 +57,7 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
         checks.append(_path(curve, covered=_swept_whole(solution, curve)))
         if not curve.empty:
             checks.append(_periodic(curve))
+            checks.append(_left(curve, solution.plan.scene.balance.method))
             checks += _curve_checks(solution, curve)
     excitation = solution.plan.scene.excitation
     for path in solution.balanced:
@@ -318,6 +319,27 @@ def _told_alike(solution: ForcedSolution, name: str, ratio: float) -> list[Check
             fatal=False,
         )
     ]
+
+
+def _left(curve: ForcedCurve, method: str) -> Check:
+    """Maxima of the path that a march leaves."""
+    of = "; ".join(f"{'left blade, ' * (one.blade == 'left')}{one.words}" for one in curve.left)
+    remedy = (
+        "there the motion of the balance is not steady, or has too few harmonics (balance."
+        f"harmonics): a march goes from {of}. "
+        "A lower maximum of the mode that is steady is told as its peak; "
+    )
+    sweeps = 'balance.method = "auto" sweeps as a test does'
+    remedy += sweeps if method == "balance" else "the sweeps tell what a test shows"
+    return Check(
+        "maxima steady",
+        curve.case,
+        float(len(curve.left)),
+        0,
+        "of the maxima of the path that a march leaves by more than half the power",
+        remedy,
+        fatal=False,
+    )
 
 
 def _confirmed(one: Confirmation) -> Check:

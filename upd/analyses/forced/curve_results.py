@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import FacesCurve, ForcedCurve
+from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LeftMaximum
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Model
@@ -112,7 +112,9 @@ def _not_reached(
     """
     e, wanted = solution.plan.scene.excitation, solution.stuck_peaks(curve.stiffness)
     found = {peak.number for peak in peaks}.union(swept)
-    modes = {peak.number: peak.mode for peak in wanted} or ({} if found else {1: ""})
+    left = _left(curve) if isinstance(curve, ForcedCurve) else {}
+    modes = {peak.number: peak.mode for peak in (*wanted, *(one.peak for one in left.values()))}
+    modes = modes or ({} if found else {1: ""})
     if curve.stopped:
         # What one path lacks the one from the other end may have, under its own case.
         other = [
@@ -122,7 +124,7 @@ def _not_reached(
             return []
         found = found.union(*({one.number for one in solution.numbered_peaks(c)} for c in other))
         reason = f"{curve.where}: {curve.answer.message}"
-    elif not found:
+    elif not found and not left:
         reason = f"no peak between {e.start:g} and {e.stop:g} Hz: widen excitation.start and stop"
         modes = dict(list(modes.items())[:1])
     else:
@@ -131,11 +133,28 @@ def _not_reached(
             "move like that"
         )
     return [
-        withheld(f"peak_{number}_{kind}", replace(curve.case, mode=mode), unit, reason)
+        withheld(
+            f"peak_{number}_{kind}",
+            replace(curve.case, mode=mode),
+            unit,
+            "no steady motion of the balance, or too few harmonics: a march goes from "
+            f"{left[number].words}"
+            if number in left
+            else reason,
+        )
         for number, mode in modes.items()
         if number not in found
         for kind, unit in (("frequency", "Hz"), ("accelerance", "(m/s2)/N"))
     ]
+
+
+def _left(curve: ForcedCurve) -> dict[int, LeftMaximum]:
+    """The highest of the right blade's maxima that a march leaves, by the numbers of its peaks."""
+    out: dict[int, LeftMaximum] = {}
+    for one in curve.left:
+        if one.blade == "right":
+            out.setdefault(one.peak.number, one)
+    return out
 
 
 def _at_point(

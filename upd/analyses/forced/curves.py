@@ -81,6 +81,31 @@ class FrictionCurve:
 
 
 @dataclass(frozen=True)
+class LeftMaximum:
+    """A maximum of a path by harmonic balance that is no steady motion.
+
+    Attributes
+    ----------
+    blade
+        Whose maximum it is.
+    peak
+        What it would be.
+    marched
+        Where a march from it goes, (m/s2)/N of the blade.
+    """
+
+    blade: Side
+    peak: ModePeak
+    marched: float
+
+    @property
+    def words(self) -> str:
+        """It, and where the march goes."""
+        one = self.peak
+        return f"{one.height:.4g} (m/s2)/N at {one.frequency:.5g} Hz for {self.marched:.4g}"
+
+
+@dataclass(frozen=True)
 class ForcedCurve(FrictionCurve):
     """One curve with friction.
 
@@ -94,12 +119,20 @@ class ForcedCurve(FrictionCurve):
         It took.
     reversed
         Followed from the highest frequency downwards.
+    left
+        Maxima that a march leaves, which are no peaks.
     """
 
     answer: FrequencyResponse
     accelerance: Mapping[Side, ComplexArray]
     seconds: float
     reversed: bool = False
+    left: tuple[LeftMaximum, ...] = ()
+
+    @property
+    def left_points(self) -> frozenset[int]:
+        """Points of the path at maxima that a march leaves."""
+        return frozenset(one.peak.sample for one in self.left)
 
     @property
     def case(self) -> Case:

@@ -7,7 +7,7 @@ mode's own where two peaks cross as a parameter changes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -143,7 +143,11 @@ def tell_apart(share: Array, height: Array) -> dict[int, int]:
 
 
 def numbered_peaks(
-    model: Model, answer: FrequencyResponse, height: Array, stop: float
+    model: Model,
+    answer: FrequencyResponse,
+    height: Array,
+    stop: float,
+    without: Collection[int] = (),
 ) -> list[ModePeak]:
     """Peaks of a path by the numbers of their modes.
 
@@ -157,8 +161,11 @@ def numbered_peaks(
         (n,) what has peaks along it.
     stop
         End of the sweep, Hz.
+    without
+        Points of the path whose maxima are no peaks.
     """
-    maxima = measures.path_maxima(answer.frequency, height)
+    found = measures.path_maxima(answer.frequency, height)
+    maxima = [one for one in found if one.sample not in without]
     if not maxima:
         return []
     motion = first_harmonic(answer, np.array([one.sample for one in maxima]))

@@ -121,7 +121,8 @@ class PathPeakAt:
     def maxima(self) -> list[int]:
         """Points of the path at the peak, and at other maxima about it (`maxima_about`)."""
         size = np.abs(self.curve.accelerance[self.side])
-        return maxima_about(self.curve.answer.frequency, size, self.peak.sample)
+        found = maxima_about(self.curve.answer.frequency, size, self.peak.sample)
+        return [i for i in found if i not in self.curve.left_points]
 
     @cached_property
     def top(self) -> ClimbedPeak:

@@ -64,7 +64,14 @@ def reduction_results(
             "excitation.start and excitation.stop"
         )
         return [withheld(name, curve.case, "%", reason)]
-    value = 100.0 * (1.0 - max(_height(c, blade) for c in mine) / top)
+    heights = [_height(solution, c, blade) for c in mine]
+    if not all(heights):
+        reason = (
+            "a march leaves the maxima of the path, not steady or with too few harmonics: "
+            'balance.method = "auto" sweeps as a test does'
+        )
+        return [withheld(name, curve.case, "%", reason)]
+    value = 100.0 * (1.0 - max(heights) / top)
     return [Result(name, curve.case, value, "%")]
 
 
@@ -99,9 +106,13 @@ def _highest_at_end(curve: ForcedCurve | FacesCurve, blade: Side) -> bool:
     return bool(at in (f.min(), f.max()))
 
 
-def _height(curve: ForcedCurve | FacesCurve, blade: Side) -> float:
-    """Highest of a path, between its points as the free peak is."""
+def _height(solution: ForcedSolution, curve: ForcedCurve | FacesCurve, blade: Side) -> float:
+    """Highest of a path, between its points as the free peak is; where a march leaves maxima the
+    highest of the peaks, 0 without one.
+    """
     size = np.abs(curve.accelerance[blade])
+    if isinstance(curve, ForcedCurve) and curve.left:
+        return max((p.height for p in solution.numbered_peaks(curve, blade)), default=0.0)
     if isinstance(curve, FacesCurve):
         # nothing is read across a jump
         return max([float(size.max()), *(peak.height for peak in curve.peaks[blade])])

@@ -260,6 +260,7 @@ class ForcedSolution:
             curve.answer,
             np.abs(curve.accelerance[blade]),
             self.plan.scene.excitation.stop,
+            curve.left_points,
         )
 
     def marked_points(self, curve: ForcedCurve | FacesCurve) -> list[tuple[int, str, int]]:

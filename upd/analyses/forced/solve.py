@@ -26,6 +26,7 @@ from upd.analyses.forced.performance import beside_branches, follow_peaks
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import ForcedSolution, PeakAgain, TimeMarch
 from upd.analyses.forced.statics import StaticState, static_state
+from upd.analyses.forced.steady_peaks import with_steady_peaks
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.forced.sweeps import run_sweeps
 from upd.analyses.forced.whole_faces import INTERFACE, linear_limits, make_whole_faces
@@ -134,7 +135,11 @@ def _curve(solution: ForcedSolution, name: str, ratio: float, stages: Stages) ->
             answer = respond(plan, model, force, frequencies, sweep_down=down)
             took = time.perf_counter() - begin
             blades = {side: measures.accelerance(answer, model.row(side), force) for side in SIDES}
-            solution.curves.append(ForcedCurve(name, ratio, force, answer, blades, took, down))
+        curve = ForcedCurve(name, ratio, force, answer, blades, took, down)
+        if (answer.state[:, :, 1:] > 0.0).any():
+            with stages("steady peaks", f"{name}, F_C/F_E {ratio:g}: marches from the maxima"):
+                curve = with_steady_peaks(plan, model, curve)
+        solution.curves.append(curve)
         # What a path that stopped leaves unknown is swept, or may be reached from the other end.
         if answer.arrived or plan.scene.balance.method != "balance":
             break

@@ -21,6 +21,7 @@ from scipy.optimize import linear_sum_assignment
 
 from upd.analyses.forced.model import Array, Model
 from upd.hbm import FrequencyResponse
+from upd.hbm.balance import Balance
 from upd.hbm.fourier import to_complex
 from upd.hbm.interface_state import InterfaceModel, InterfaceState, resting
 from upd.hbm.interface_step import OPEN, STICK
@@ -136,11 +137,28 @@ def state_of(
     force
         F_E, N.
     """
+    return state_at(springs, model, answer.balance, answer.x[i], float(answer.frequency[i]), force)
+
+
+def state_at(
+    springs: SpringMarch, model: Model, b: Balance, x: Array, frequency: float, force: float
+) -> InterfaceState:
+    """As `state_of`, of one motion.
+
+    Parameters
+    ----------
+    b, x
+        The problem, and its unknowns there.
+    frequency
+        Hz.
+    """
     drive = force * model.excitation.at_start
-    march, b, h = springs.march, answer.balance, answer.harmonics
-    omega, k = 2.0 * np.pi * answer.frequency[i], h.dynamic
-    z = to_complex(answer.coefficients[i], h)
-    mean = answer.coefficients[i][:, 0] if h.static else np.zeros(len(z))
+    march, h, contact = springs.march, b.harmonics, b.force(x)
+    omega, k = 2.0 * np.pi * frequency, h.dynamic
+    flat = contact.force.reshape(1, len(b.Psi), h.size)
+    moving = b.displacement(np.array([omega]), flat, b.split(x)[1][None])[0]
+    z = to_complex(moving, h)
+    mean = moving[:, 0] if h.static else np.zeros(len(z))
     moved = mean + z.real.sum(axis=1)
     speed = (1j * omega * k * z).real.sum(axis=1)
     pull = (-((omega * k) ** 2) * z).real.sum(axis=1)
@@ -148,7 +166,7 @@ def state_of(
     q = springs.modes @ moved[:n_blade]
     q += (march.shapes.T @ springs.rest.T.ravel()) / march.omega**2
     carried = np.zeros((march.n, 3))
-    carried[:, _PLACES[model.contacts.tangents]] = b.force(answer.x[i]).march.force[:, :, 0]
+    carried[:, _PLACES[model.contacts.tangents]] = contact.march.force[:, :, 0]
     f = np.ascontiguousarray(carried.T).ravel()
     v = springs.modes @ speed[:n_blade]
     return _standing(springs, q, v, moved[n_blade:], speed[n_blade:], pull[n_blade:], f, drive)

@@ -26,10 +26,11 @@ from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, ModeShapes, num
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import MARCH_SAMPLES, ForcedPlan, time_steps
 from upd.analyses.forced.solution import Confirmation, ForcedSolution
-from upd.analyses.forced.spring_march import SpringMarch, spring_march, state_of
+from upd.analyses.forced.spring_march import SpringMarch, spring_march, state_at, state_of
 from upd.errors import ConvergenceError
+from upd.hbm.balance import Balance
 from upd.hbm.interface_march import InterfaceMarch
-from upd.hbm.interface_settle import settle
+from upd.hbm.interface_settle import SteadyPoint, settle
 from upd.hbm.interface_state import InterfaceModel, InterfaceState
 from upd.hbm.refined_sweep import RefinedSweep, Told, refined_sweep
 from upd.progress import Stages
@@ -326,17 +327,50 @@ def confirm(
     samples
         Steps in a period.
     """
-    f = float(curve.answer.frequency[peak.sample])
-    at = state_of(springs, model, curve.answer, peak.sample, curve.force)
-    excitation = model.excitation
-    drive = curve.force * excitation.drive
-    march = InterfaceMarch(springs.march, f, drive, samples, by_coulomb)
     height = float(np.abs(curve.accelerance["right"][peak.sample]))
     try:
-        found = settle(march, at, TOLERANCE, MOST_PERIODS)
+        a, i = curve.answer, peak.sample
+        at = a.balance, a.x[i], float(a.frequency[i])
+        found = marched_on(springs, model, *at, curve.force, samples)
     except ConvergenceError as error:
         log.info("%s, peak %d: %s", curve.case, peak.number, error)
         return Confirmation(curve, peak, height, float("nan"), False)
-    size = (2.0 * np.pi * excitation.lowest * f) ** 2 * 1e-3 / curve.force
+    f = float(curve.answer.frequency[peak.sample])
+    size = (2.0 * np.pi * model.excitation.lowest * f) ** 2 * 1e-3 / curve.force
     marched = size * abs(found.first_harmonic[SIDES.index("right")])
     return Confirmation(curve, peak, height, float(marched), found.settled)
+
+
+def marched_on(
+    springs: SpringMarch,
+    model: Model,
+    b: Balance,
+    x: Array,
+    frequency: float,
+    force: float,
+    samples: int = MARCH_SAMPLES,
+) -> SteadyPoint:
+    """March on from a motion of the balance until it settles.
+
+    Parameters
+    ----------
+    springs
+        Of the model.
+    b, x
+        The problem, and its unknowns there.
+    frequency
+        Hz.
+    force
+        F_E, N.
+    samples
+        Steps in a period.
+
+    Raises
+    ------
+    ConvergenceError
+        When a step finds no answer.
+    """
+    at = state_at(springs, model, b, x, frequency, force)
+    drive = force * model.excitation.drive
+    march = InterfaceMarch(springs.march, frequency, drive, samples, by_coulomb)
+    return settle(march, at, TOLERANCE, MOST_PERIODS)
