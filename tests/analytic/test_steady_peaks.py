@@ -14,6 +14,8 @@ from upd.analyses.forced.checks import check_solution
 from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.measures import path_maxima
 from upd.analyses.forced.mode_peaks import numbered_peaks
+from upd.analyses.forced.paths import balance_with
+from upd.analyses.forced.peaks_again import PathPeakAt
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.steady_peaks import HALF_POWER, LITTLE, with_steady_peaks
@@ -185,3 +187,17 @@ def test_a_march_that_fails_takes_no_peak_away(
     (curve,) = out_of_phase.curves
     model = out_of_phase.models["thesis"]
     assert not with_steady_peaks(out_of_phase.plan, model, replace(curve, left=())).left
+
+
+def test_few_samples_carry_no_more_harmonics() -> None:
+    """More of them are taken for the harmonics above, which errors are estimated with as well."""
+    found = _solved(*OUT_OF_PHASE, "balance.harmonics=3", "balance.samples=8")
+    model, curve = found.models["thesis"], found.curves[0]
+    old = curve.answer.balance
+    assert old.samples == 8
+    assert balance_with(found.plan, model, curve.force, old, 5).samples == 128
+    assert balance_with(found.plan, model, curve.force, old, 3).samples == 8
+    peak = numbered_peaks(model, curve.answer, np.abs(curve.accelerance["right"]), 440.0)[-1]
+    climbed = PathPeakAt(found.plan, model, curve, "right", peak).with_harmonics(5)
+    assert climbed.found
+    assert climbed.frequency == pytest.approx(peak.frequency, rel=0.03)

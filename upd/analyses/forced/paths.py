@@ -16,6 +16,7 @@ from upd.analyses.forced.solution import PeakAgain
 from upd.hbm import FrequencyResponse, Settings, frequency_response, harmonics
 from upd.hbm.assembled import assembled
 from upd.hbm.balance import Balance
+from upd.hbm.fourier import sample_count
 
 #: half width of the band around a peak in which it is followed again, as a share of its frequency,
 #: and the points in it
@@ -132,6 +133,28 @@ def balance_of(
         slider=slider,
     )
     return problem(harmonics(numbers))
+
+
+def balance_with(
+    plan: ForcedPlan, model: Model, force: float, old: Balance, highest: int
+) -> Balance:
+    """The run's own problem with more harmonics: on the scene's samples, or on as many as these
+    need where those cannot carry them.
+
+    Parameters
+    ----------
+    force
+        Excitation, N.
+    old
+        The problem of the run.
+    highest
+        The highest harmonic.
+    """
+    numbers, given = range(highest + 1), plan.scene.balance.samples
+    carry = given == "auto" or int(given) > 2 * highest
+    samples = None if carry else sample_count(harmonics(numbers))
+    b = balance_of(plan, model, force, numbers, samples)
+    return b.with_sliders("static", old.slider) if old.start == "static" else b
 
 
 def peak_again(

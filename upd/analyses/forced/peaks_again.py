@@ -27,7 +27,7 @@ from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.measures import accelerance, path_maxima
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.paths import BAND, BAND_POINTS, balance_of, respond
+from upd.analyses.forced.paths import BAND, BAND_POINTS, balance_of, balance_with, respond
 from upd.analyses.forced.plan import ForcedPlan
 from upd.errors import ConvergenceError, one_line
 from upd.hbm import climb
@@ -181,7 +181,7 @@ class PathPeakAt:
     def with_harmonics(self, highest: int) -> ClimbedPeak:
         """With these harmonics."""
         old = self.curve.answer.balance
-        b = self._balance(self.model, range(highest + 1), None)
+        b = balance_with(self.plan, self.model, self.curve.force, old, highest)
         starts = (one._replace(x=b.embedded(one.x, old)) for one in self._all_starts(old))
         return self._climbed(b, self.model, chain(starts, self._band(b, self.model)))
 

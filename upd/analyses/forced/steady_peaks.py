@@ -26,8 +26,8 @@ from upd.analyses.forced.curves import ForcedCurve, LeftMaximum
 from upd.analyses.forced.effects import MORE_HARMONICS
 from upd.analyses.forced.mode_peaks import ModePeak, numbered_peaks
 from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.paths import balance_of
-from upd.analyses.forced.plan import ForcedPlan, time_steps
+from upd.analyses.forced.paths import balance_with
+from upd.analyses.forced.plan import MARCH_SAMPLES, ForcedPlan, time_steps
 from upd.analyses.forced.spring_march import SpringMarch
 from upd.analyses.forced.sweeps import make_springs, marched_on
 from upd.errors import ConvergenceError, one_line
@@ -144,7 +144,7 @@ class _Marches:
     def _top(self, blade: Side, peak: ModePeak, more: int) -> _Motion | None:
         """The top with so many harmonics more, climbed to from the path beside it."""
         old, model, force = self.curve.answer.balance, self.model, self.curve.force
-        b = balance_of(self.plan, model, force, range(old.harmonics.highest + more + 1))
+        b = balance_with(self.plan, model, force, old, old.harmonics.highest + more)
         k, row = model.excitation.lowest, model.row(blade)
         for i in dict.fromkeys(i for one in FROM for i in self._beside(blade, peak.sample, one)):
             f = float(self.curve.frequency[i])
@@ -161,7 +161,8 @@ class _Marches:
         """Where a march from a motion goes, (m/s2)/N of the blades by SIDES, if not to the same."""
         model, force = self.model, self.curve.force
         try:
-            found = marched_on(self.springs, model, *at, force, time_steps(self.plan.scene))
+            steps = max(time_steps(self.plan.scene), MARCH_SAMPLES)
+            found = marched_on(self.springs, model, *at, force, steps)
         except ConvergenceError as error:
             where = f"{self.curve.case}, {at.frequency:.6g} Hz"
             log.info("%s not marched on: %s", where, one_line(error))
