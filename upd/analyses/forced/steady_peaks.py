@@ -142,19 +142,20 @@ class _Marches:
             yield i
 
     def _top(self, blade: Side, peak: ModePeak, more: int) -> _Motion | None:
-        """The top with so many harmonics more, climbed to from the path beside it."""
+        """The top with so many harmonics more, climbed to from the nearest motion beside it that
+        has one with these.
+        """
         old, model, force = self.curve.answer.balance, self.model, self.curve.force
         b = balance_with(self.plan, model, force, old, old.harmonics.highest + more)
         k, row = model.excitation.lowest, model.row(blade)
         for i in dict.fromkeys(i for one in FROM for i in self._beside(blade, peak.sample, one)):
             f = float(self.curve.frequency[i])
             x = newton(b, b.embedded(self.curve.answer.x[i], old), f)
-            if x is None:
-                continue
-            top = climb(b, row, x, f, harmonic=k, power=2)
-            height = 1e-3 * (2.0 * np.pi * k * top.frequency) ** 2 * top.amplitude / force
-            if top.found and is_near(top.frequency / peak.frequency, height / peak.height):
-                return _Motion(b, top.x, top.frequency)
+            if x is not None:
+                top = climb(b, row, x, f, harmonic=k, power=2)
+                height = 1e-3 * (2.0 * np.pi * k * top.frequency) ** 2 * top.amplitude / force
+                near = is_near(top.frequency / peak.frequency, height / peak.height)
+                return _Motion(b, top.x, top.frequency) if top.found and near else None
         return None
 
     def _gone(self, at: _Motion) -> Array | None:
