@@ -47,7 +47,7 @@ AT: Mapping[str, Any] = {
 }
 #: highest harmonics, steps in a period of the sweeps, and where these begin and end
 HARMONICS = {"symmetric": (1, 3, 5, 7), "asymmetric": (1, 3, 5, 7, 9)}
-STEPS, SWEPT = {"symmetric": (128, 256), "asymmetric": (128, 256)}, (280.0, 460.0)
+STEPS, SWEPT = (128, 256), (280.0, 460.0)
 #: steps in a period and periods of the other march
 OTHER, PERIODS = 512, 600
 
@@ -66,7 +66,7 @@ def _rig(name: str) -> Iterator[Row]:
     model = make_model(plan, bodies, laws["thesis"], static_state(plan, bodies, stages=stages))
     for highest in HARMONICS[name]:
         yield from _curve(name, plan, model, highest)
-    for steps in STEPS[name]:
+    for steps in STEPS:
         yield from _sweeps(name, plan, model, steps)
 
 

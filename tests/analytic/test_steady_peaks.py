@@ -48,7 +48,7 @@ IN_PHASE = (
     "excitation.stop=305 Hz",
     "excitation.points=30",
 )
-
+#: the wedge's around its in-phase one, with a single harmonic
 WEDGE = (
     "contact.columns=3",
     "balance.harmonics=1",

@@ -327,15 +327,13 @@ def confirm(
     samples
         Steps in a period.
     """
-    height = float(np.abs(curve.accelerance["right"][peak.sample]))
+    a, i = curve.answer, peak.sample
+    f, height = float(a.frequency[i]), float(np.abs(curve.accelerance["right"][i]))
     try:
-        a, i = curve.answer, peak.sample
-        at = a.balance, a.x[i], float(a.frequency[i])
-        found = marched_on(springs, model, *at, curve.force, samples)
+        found = marched_on(springs, model, a.balance, a.x[i], f, curve.force, samples)
     except ConvergenceError as error:
         log.info("%s, peak %d: %s", curve.case, peak.number, error)
         return Confirmation(curve, peak, height, float("nan"), False)
-    f = float(curve.answer.frequency[peak.sample])
     size = (2.0 * np.pi * model.excitation.lowest * f) ** 2 * 1e-3 / curve.force
     marched = size * abs(found.first_harmonic[SIDES.index("right")])
     return Confirmation(curve, peak, height, float(marched), found.settled)
