@@ -11,8 +11,8 @@ from scipy.sparse import bsr_array, csr_array
 from upd.fem import Material, box_mesh, rigid_body_modes, stiffness
 from upd.linalg import amg_solve
 from upd.linalg.blocks import WIDTH
-from upd.linalg.lines import find_lines, in_line_order
-from upd.linalg.smoothers import LineSmoother
+from upd.linalg.lines import find_cross_lines, find_lines, in_line_order
+from upd.linalg.smoothers import BlockSmoother, LineSmoother
 
 
 def plate(
@@ -92,27 +92,79 @@ def test_rows_in_another_order() -> None:
     np.testing.assert_array_equal(found, M[np.ix_(dofs, dofs)].astype(np.float32))
 
 
-def test_sweeps_are_those_of_the_block_matrix() -> None:
-    A, *_ = plate((5.0, 1.0, 0.5), n=4)
+def test_cross_lines_follow_the_other_long_edges() -> None:
+    """Of a plate's two long directions lines follow one where they can, cross lines the other."""
+    A, _, free, points = plate((6.0, 5.0, 1.0))
+    order, starts = find_lines(A)
+    line = np.empty(len(order), int)
+    line[order] = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    nodes, begins = find_cross_lines(A, order, starts)
+    assert len(np.unique(nodes)) == len(nodes)
+    blocks = A.toarray().reshape(6**3, 3, 6**3, 3).any(axis=(1, 3))
+    for first, end in pairwise(begins):
+        on = nodes[first:end]
+        assert end - first >= 2 and len(np.unique(line[on])) == end - first
+        assert np.ptp(points[on, 2]) == 0.0
+        assert not np.triu(blocks[np.ix_(on, on)], 2).any()
+    # of the nodes that are not held
+    assert len(nodes) > 0.8 * len(free) / 3
+    needles, *_ = plate((1.0, 1.0, 5.0))
+    none, begins = find_cross_lines(needles, *find_lines(needles))
+    assert len(none) == 0 and begins.tolist() == [0]
+
+
+def lower_of(M: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Of a matrix the blocks whose column's place is not after the row's."""
+    return np.where(places[:, None] >= places, M, 0.0)
+
+
+@pytest.mark.parametrize("sides", [(5.0, 1.0, 0.5), (6.0, 5.0, 1.0)])
+def test_sweeps_are_those_of_the_block_matrix(sides: tuple[float, float, float]) -> None:
+    A, *_ = plate(sides, n=4)
     smoother = LineSmoother(A)
     order = smoother.order
     assert order is not None
     M = A.toarray()[np.ix_(order, order)]
-    _, starts = find_lines(A)
-    line = np.repeat(np.arange(len(starts) - 1), 3 * np.diff(starts))
-    lower = np.where(line[:, None] >= line, M, 0.0)
+    nodes, starts = find_lines(A)
+    lower = lower_of(M, np.repeat(np.arange(len(starts) - 1), 3 * np.diff(starts)))
+    cross, begins = find_cross_lines(A, nodes, starts)
+    assert len(cross) > 0
+    on = np.concatenate([3 * np.flatnonzero(nodes == node)[0] + np.arange(3) for node in cross])
+    across = lower_of(M[np.ix_(on, on)], np.repeat(np.arange(len(begins) - 1), 3 * np.diff(begins)))
     rng = np.random.default_rng(0)
     B = rng.standard_normal((len(M), WIDTH)).astype(np.float32)
     x = np.linalg.solve(lower, B)
+    x[on] += np.linalg.solve(across, (B - M @ x)[on])
     for b, wanted in ((B, x), (np.ascontiguousarray(B[:, 0]), x[:, 0])):
         found, rest = smoother.first(b)
         assert np.abs(found - wanted).max() < 1e-4 * np.abs(wanted).max()
         assert np.abs(rest - (b - M @ wanted)).max() < 1e-4 * np.abs(b).max()
         smoother.last(b, found)
-        back = wanted + np.linalg.solve(lower.T, b - M @ wanted)
+        back = wanted.copy()
+        back[on] += np.linalg.solve(across.T, (b - M @ back)[on])
+        back += np.linalg.solve(lower.T, b - M @ back)
         assert np.abs(found - back).max() < 1e-4 * np.abs(back).max()
         left = b - M @ back
         assert np.abs(smoother.residual(b, found) - left).max() < 1e-4 * np.abs(b).max()
+
+
+def test_sweeps_node_by_node_are_those_of_the_block_matrix() -> None:
+    rng = np.random.default_rng(2)
+    half = rng.standard_normal((60, 60))
+    M = half @ half.T + 60.0 * np.eye(60)
+    M[:12, 30:] = M[30:, :12] = 0.0
+    smoother = BlockSmoother(bsr_array(csr_array(M).tobsr(blocksize=(6, 6))))
+    lower = lower_of(M, np.repeat(np.arange(10), 6))
+    B = rng.standard_normal((60, WIDTH)).astype(np.float32)
+    x = np.linalg.solve(lower, B)
+    for b, wanted in ((B, x), (np.ascontiguousarray(B[:, 0]), x[:, 0])):
+        found, rest = smoother.first(b)
+        np.testing.assert_allclose(found, wanted, atol=1e-5 * np.abs(wanted).max())
+        np.testing.assert_allclose(rest, b - M @ wanted, atol=1e-5 * np.abs(b).max())
+        smoother.last(b, found)
+        back = wanted + np.linalg.solve(lower.T, b - M @ wanted)
+        np.testing.assert_allclose(found, back, atol=1e-5 * np.abs(back).max())
+        np.testing.assert_allclose(smoother.residual(b, found), b - M @ back, atol=1e-4)
 
 
 def test_stretched_elements_take_few_iterations(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -123,3 +175,16 @@ def test_stretched_elements_take_few_iterations(monkeypatch: pytest.MonkeyPatch)
     without = amg_solve(K, load, modes, layout=free, points=points)
     assert np.abs(with_lines.x - without.x).max() < 1e-7 * np.abs(without.x).max()
     assert with_lines.iterations < 0.8 * without.iterations
+
+
+def test_plates_take_fewer_iterations_by_cross_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Elements that are long two ways."""
+    _, K, free, points = plate((6.0, 5.0, 1.0), n=12)
+    modes = rigid_body_modes(points)[free]
+    load = np.random.default_rng(4).standard_normal(K.shape[0])
+    with_them = amg_solve(K, load, modes, layout=free, points=points)
+    none = np.zeros(0, int), np.zeros(1, int)
+    monkeypatch.setattr("upd.linalg.smoothers.find_cross_lines", lambda *_: none)
+    without = amg_solve(K, load, modes, layout=free, points=points)
+    assert np.abs(with_them.x - without.x).max() < 1e-7 * np.abs(without.x).max()
+    assert with_them.iterations < 0.9 * without.iterations

@@ -1,5 +1,5 @@
-"""Compiled loops over matrices of small dense blocks, in single precision, and the product with a
-symmetric matrix of which the upper triangle is stored.
+"""Compiled loops that gather a matrix in small dense blocks, and the product with a symmetric
+matrix of which the upper triangle is stored.
 """
 
 from __future__ import annotations
@@ -125,30 +125,6 @@ def fill_blocks(
                 blocks[lower[other], b, a] = data[k]
 
 
-@compiled
-def sweep(
-    indptr: Index, indices: Index, data: Single, inverse: Single, b: Single, x: Single, step: int
-) -> None:
-    """One sweep of block Gauss-Seidel with blocks of any size."""
-    n, m = len(indptr) - 1, inverse.shape[1]
-    r = np.empty(m, np.float32)
-    for count in range(n):
-        i = count if step > 0 else n - 1 - count
-        for a in range(m):
-            r[a] = b[m * i + a]
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            if j != i:
-                for a in range(m):
-                    for c in range(m):
-                        r[a] -= data[k, a, c] * x[m * j + c]
-        for a in range(m):
-            total = np.float32(0.0)
-            for c in range(m):
-                total += inverse[i, a, c] * r[c]
-            x[m * i + a] = total
-
-
 #: right-hand sides that are worked on at once, as many single-precision numbers as a register has
 WIDTH = 8
 
@@ -184,30 +160,3 @@ def symmetric_product_many(
         for c in range(WIDTH):
             y[i, c] += total[c]
     return y
-
-
-@compiled
-def sweep_many(
-    indptr: Index, indices: Index, data: Single, inverse: Single, b: Single, x: Single, step: int
-) -> None:
-    """As `sweep` with `WIDTH` vectors, (n, WIDTH)."""
-    n, m = len(indptr) - 1, inverse.shape[1]
-    r = np.empty((m, WIDTH), np.float32)
-    for count in range(n):
-        i = count if step > 0 else n - 1 - count
-        for a in range(m):
-            for c in range(WIDTH):
-                r[a, c] = b[m * i + a, c]
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            if j != i:
-                for a in range(m):
-                    for e in range(m):
-                        for c in range(WIDTH):
-                            r[a, c] -= data[k, a, e] * x[m * j + e, c]
-        for a in range(m):
-            for c in range(WIDTH):
-                x[m * i + a, c] = 0.0
-            for e in range(m):
-                for c in range(WIDTH):
-                    x[m * i + a, c] += inverse[i, a, e] * r[e, c]

@@ -9,6 +9,10 @@ them has it. Along the long edges such blocks are positive, half the diagonal; t
 negative. Nodes that couple so are put on one line and solved for at once, which leaves nothing of
 that displacement, as the lines beside see none of it.
 
+An element that is short one way only is long two ways, and a node is on one line. What changes its
+sign along the other long edges is left by these lines. So nodes that still couple so, across the
+lines, are put on cross lines and solved for once more.
+
 References
 ----------
 .. [1] D. J. Mavriplis, J. Comput. Phys. 145 (1998) 141 (lines found in the couplings).
@@ -49,6 +53,38 @@ def find_lines(A: bsr_array) -> tuple[IntArray, IntArray]:
     starts : (m + 1,) ndarray of int
         Where each line begins there; most nodes of a mesh that is not stretched are lines of one.
     """
+    return _on_lines(A, *_links(A))
+
+
+def find_cross_lines(A: bsr_array, order: IntArray, starts: IntArray) -> tuple[IntArray, IntArray]:
+    """Lines as of `find_lines` across the first ones, of the couplings between these.
+
+    Parameters
+    ----------
+    A : (3 n, 3 n) bsr_array
+        As for `find_lines`.
+    order, starts : (n,), (m + 1,) ndarray of int
+        The first lines.
+
+    Returns
+    -------
+    nodes : (k,) ndarray of int
+        The nodes of lines of two and more, line by line.
+    starts : (l + 1,) ndarray of int
+        Where each line begins there.
+    """
+    line = np.empty(len(order), np.int64)
+    line[order] = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    rows, columns = _links(A)
+    across = line[rows] != line[columns]
+    order, starts = _on_lines(A, rows[across], columns[across])
+    lengths = np.diff(starts)
+    long = lengths > 1
+    return order[np.repeat(long, lengths)], np.concatenate([[0], np.cumsum(lengths[long])])
+
+
+def _links(A: bsr_array) -> tuple[Index, Index]:
+    """Nodes that are coupled strongly by positive blocks, each pair once, the strongest first."""
     n = len(A.indptr) - 1
     rows = np.repeat(np.arange(n), np.diff(A.indptr))
     traces = np.einsum("kii->k", A.data)
@@ -59,7 +95,12 @@ def find_lines(A: bsr_array) -> tuple[IntArray, IntArray]:
         shares = traces / np.sqrt(diagonal[rows] * diagonal[A.indices])
     links = np.flatnonzero((rows < A.indices) & (shares > STRONG))
     links = links[np.argsort(-shares[links], kind="stable")]
-    beside = _linked(rows[links], A.indices[links], A.indptr, A.indices)
+    return rows[links], A.indices[links]
+
+
+def _on_lines(A: bsr_array, rows: Index, columns: Index) -> tuple[IntArray, IntArray]:
+    """All nodes line by line, and where lines begin, from links in their order."""
+    beside = _linked(rows, columns, A.indptr, A.indices)
     order, starts = _in_order(beside, A.indptr, A.indices)
     return order, starts
 
@@ -284,3 +325,67 @@ def last_lines(
                     r0, r1, r2 = r0 - d0, r1 - d1, r2 - d2
             x[3 * i], x[3 * i + 1], x[3 * i + 2] = r0, r1, r2
         _solve_line(inverse, down, x, first, end)
+
+
+@compiled
+def first_cross(
+    indptr: Index,
+    indices: Index,
+    data: Single,
+    inverse: Single,
+    down: Single,
+    nodes: Index,
+    starts: Index,
+    x: Single,
+    r: Single,
+) -> None:
+    """A forward sweep of x along cross lines; its residual r is kept up by symmetric columns."""
+    y = np.empty(3 * len(nodes), np.float32)
+    for line in range(len(starts) - 1):
+        first, end = starts[line], starts[line + 1]
+        for at in range(first, end):
+            i = nodes[at]
+            y[3 * at], y[3 * at + 1], y[3 * at + 2] = r[3 * i], r[3 * i + 1], r[3 * i + 2]
+        _solve_line(inverse, down, y, first, end)
+        for at in range(first, end):
+            i = nodes[at]
+            y0, y1, y2 = y[3 * at], y[3 * at + 1], y[3 * at + 2]
+            x[3 * i] += y0
+            x[3 * i + 1] += y1
+            x[3 * i + 2] += y2
+            for k in range(indptr[i], indptr[i + 1]):
+                j = indices[k]
+                r[3 * j] -= data[k, 0, 0] * y0 + data[k, 1, 0] * y1 + data[k, 2, 0] * y2
+                r[3 * j + 1] -= data[k, 0, 1] * y0 + data[k, 1, 1] * y1 + data[k, 2, 1] * y2
+                r[3 * j + 2] -= data[k, 0, 2] * y0 + data[k, 1, 2] * y1 + data[k, 2, 2] * y2
+
+
+@compiled
+def last_cross(
+    indptr: Index,
+    indices: Index,
+    data: Single,
+    inverse: Single,
+    down: Single,
+    nodes: Index,
+    starts: Index,
+    b: Single,
+    x: Single,
+) -> None:
+    """A backward sweep along cross lines."""
+    y = np.empty(3 * len(nodes), np.float32)
+    for line in range(len(starts) - 2, -1, -1):
+        first, end = starts[line], starts[line + 1]
+        for at in range(first, end):
+            i = nodes[at]
+            r0, r1, r2 = b[3 * i], b[3 * i + 1], b[3 * i + 2]
+            for k in range(indptr[i], indptr[i + 1]):
+                d0, d1, d2 = _times_3(data, k, x, indices[k])
+                r0, r1, r2 = r0 - d0, r1 - d1, r2 - d2
+            y[3 * at], y[3 * at + 1], y[3 * at + 2] = r0, r1, r2
+        _solve_line(inverse, down, y, first, end)
+        for at in range(first, end):
+            i = nodes[at]
+            x[3 * i] += y[3 * at]
+            x[3 * i + 1] += y[3 * at + 1]
+            x[3 * i + 2] += y[3 * at + 2]

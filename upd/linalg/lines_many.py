@@ -123,3 +123,69 @@ def last_lines_many(
         first, end = starts[line], starts[line + 1]
         _outside_many(indptr, indices, data, b, x, x, (first, end, first, end))
         _solve_line_many(inverse, down, x, first, end)
+
+
+@compiled
+def first_cross_many(
+    indptr: Index,
+    indices: Index,
+    data: Single,
+    inverse: Single,
+    down: Single,
+    nodes: Index,
+    starts: Index,
+    x: Single,
+    r: Single,
+) -> None:
+    """As `upd.linalg.lines.first_cross`."""
+    y = np.empty((3 * len(nodes), WIDTH), np.float32)
+    for line in range(len(starts) - 1):
+        first, end = starts[line], starts[line + 1]
+        for at in range(first, end):
+            for a in range(3):
+                for c in range(WIDTH):
+                    y[3 * at + a, c] = r[3 * nodes[at] + a, c]
+        _solve_line_many(inverse, down, y, first, end)
+        for at in range(first, end):
+            i = nodes[at]
+            for a in range(3):
+                for c in range(WIDTH):
+                    x[3 * i + a, c] += y[3 * at + a, c]
+            for k in range(indptr[i], indptr[i + 1]):
+                j = indices[k]
+                for a in range(3):
+                    d0, d1, d2 = data[k, 0, a], data[k, 1, a], data[k, 2, a]
+                    for c in range(WIDTH):
+                        r[3 * j + a, c] -= (
+                            d0 * y[3 * at, c] + d1 * y[3 * at + 1, c] + d2 * y[3 * at + 2, c]
+                        )
+
+
+@compiled
+def last_cross_many(
+    indptr: Index,
+    indices: Index,
+    data: Single,
+    inverse: Single,
+    down: Single,
+    nodes: Index,
+    starts: Index,
+    b: Single,
+    x: Single,
+) -> None:
+    """As `upd.linalg.lines.last_cross`."""
+    y, n = np.empty((3 * len(nodes), WIDTH), np.float32), len(indptr) - 1
+    rest = np.empty(x.shape, np.float32)
+    for line in range(len(starts) - 2, -1, -1):
+        first, end = starts[line], starts[line + 1]
+        for at in range(first, end):
+            i = nodes[at]
+            _outside_many(indptr, indices, data, b, x, rest, (i, i + 1, n, n))
+            for a in range(3):
+                for c in range(WIDTH):
+                    y[3 * at + a, c] = rest[3 * i + a, c]
+        _solve_line_many(inverse, down, y, first, end)
+        for at in range(first, end):
+            for a in range(3):
+                for c in range(WIDTH):
+                    x[3 * nodes[at] + a, c] += y[3 * at + a, c]

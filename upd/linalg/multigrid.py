@@ -43,9 +43,8 @@ from upd.linalg.symmetric import Matrix, Symmetric
 COARSEST = 100
 MAX_ITERATIONS = 3000
 MOST_LEVELS = 10
-#: levels from this one on, counted from 0, are visited twice from the one above. On stretched
-#: meshes it has 1 % of the dofs, so that is nearly free; the level before has a fifth
-TWICE = 2
+#: levels from this one on, counted from 0, are visited twice from the one above: all but the finest
+TWICE = 1
 
 
 @dataclass(frozen=True)

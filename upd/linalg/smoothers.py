@@ -6,16 +6,33 @@ import numpy as np
 from scipy.sparse import bsr_array
 
 from upd.errors import ConvergenceError
-from upd.linalg.blocks import Single, sweep, sweep_many
+from upd.linalg.block_sweeps import (
+    first_blocks,
+    first_blocks_many,
+    last_blocks,
+    last_blocks_many,
+    residual_blocks,
+    residual_blocks_many,
+)
+from upd.linalg.blocks import Single
 from upd.linalg.common import EPS, FloatArray, IntArray
 from upd.linalg.lines import (
+    find_cross_lines,
     find_lines,
+    first_cross,
     first_lines,
     in_line_order,
+    last_cross,
     last_lines,
     residual_lines,
 )
-from upd.linalg.lines_many import first_lines_many, last_lines_many, residual_lines_many
+from upd.linalg.lines_many import (
+    first_cross_many,
+    first_lines_many,
+    last_cross_many,
+    last_lines_many,
+    residual_lines_many,
+)
 
 
 class BlockSmoother:
@@ -44,27 +61,28 @@ class BlockSmoother:
 
     def first(self, b: Single) -> tuple[Single, Single]:
         """A forward sweep from zero: x and b - A x, for (n,) or (n, WIDTH)."""
-        x = np.zeros_like(b)
-        self._sweep(b, x, 1)
-        return x, self.residual(b, x)
+        forward, rest = (
+            (first_blocks, residual_blocks)
+            if b.ndim == 1
+            else (first_blocks_many, residual_blocks_many)
+        )
+        A = self._A
+        x = forward(A.indptr, A.indices, A.data, self._inverse, b)
+        return x, rest(A.indptr, A.indices, A.data, x)
 
     def last(self, b: Single, x: Single) -> None:
         """A backward sweep of x."""
-        self._sweep(b, x, -1)
+        A, back = self._A, last_blocks if b.ndim == 1 else last_blocks_many
+        back(A.indptr, A.indices, A.data, self._inverse, b, x)
 
     def residual(self, b: Single, x: Single) -> Single:
         """b - A x."""
         found: Single = b - self._A @ x
         return found
 
-    def _sweep(self, b: Single, x: Single, step: int) -> None:
-        A = self._A
-        run = sweep if b.ndim == 1 else sweep_many
-        run(A.indptr, A.indices, A.data, self._inverse, b, x, step)
-
 
 class LineSmoother:
-    """Line by line with blocks of 3, see `upd.linalg.lines`.
+    """Line by line with blocks of 3, then along the lines across these, see `upd.linalg.lines`.
 
     Attributes
     ----------
@@ -79,28 +97,36 @@ class LineSmoother:
         nodes, self._starts = find_lines(A)
         self.order = (3 * nodes[:, None] + np.arange(3)).ravel()
         self._A = in_line_order(A.indptr, A.indices, A.data, nodes)
-        pivots, down = _factors(A, nodes, self._starts)
-        self._inverse, self._down = pivots.astype(np.float32), down.astype(np.float32)
+        self._inverse, self._down = _factors(A, nodes, self._starts)
+        across, starts = find_cross_lines(A, nodes, self._starts)
+        place = np.empty(len(nodes), np.int64)
+        place[nodes] = np.arange(len(nodes))
+        self._cross = (*_factors(A, across, starts), place[across], starts)
 
     @property
     def nbytes(self) -> int:
         """Memory."""
         own = (self._inverse, self._down, self._starts, self.order)
-        return int(sum(v.nbytes for v in (*self._A, *own) if v is not None))
+        return int(sum(v.nbytes for v in (*self._A, *own, *self._cross) if v is not None))
 
     def first(self, b: Single) -> tuple[Single, Single]:
         """A forward sweep from zero: x and b - A x, for (n,) or (n, WIDTH)."""
-        forward, rest = (
-            (first_lines, residual_lines)
+        forward, rest, across = (
+            (first_lines, residual_lines, first_cross)
             if b.ndim == 1
-            else (first_lines_many, residual_lines_many)
+            else (first_lines_many, residual_lines_many, first_cross_many)
         )
         x = forward(*self._A, self._inverse, self._down, self._starts, b)
-        return x, rest(*self._A, self._starts, x)
+        r = rest(*self._A, self._starts, x)
+        across(*self._A, *self._cross, x, r)
+        return x, r
 
     def last(self, b: Single, x: Single) -> None:
         """A backward sweep of x."""
-        back = last_lines if b.ndim == 1 else last_lines_many
+        back, across = (
+            (last_lines, last_cross) if b.ndim == 1 else (last_lines_many, last_cross_many)
+        )
+        across(*self._A, *self._cross, b, x)
         back(*self._A, self._inverse, self._down, self._starts, b, x)
 
     def residual(self, b: Single, x: Single) -> Single:
@@ -110,13 +136,13 @@ class LineSmoother:
         return found
 
 
-def _factors(A: bsr_array, nodes: IntArray, starts: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Inverses of the pivots S_i and W_i = A_i(i-1) S_(i-1)^-1 (n, 3, 3) of all lines, node after
+def _factors(A: bsr_array, nodes: IntArray, starts: IntArray) -> tuple[Single, Single]:
+    """Inverses of the pivots S_i and W_i = A_i(i-1) S_(i-1)^-1 (k, 3, 3) of all lines, node after
     node of each.
     """
-    n = len(nodes)
-    rank = np.arange(n) - np.repeat(starts[:-1], np.diff(starts))
-    inverse, down = np.empty((n, 3, 3)), np.zeros((n, 3, 3))
+    n, k = len(A.indptr) - 1, len(nodes)
+    rank = np.arange(k) - np.repeat(starts[:-1], np.diff(starts))
+    inverse, down = np.empty((k, 3, 3)), np.zeros((k, 3, 3))
     diagonal = _blocks_at(A, np.arange(n))[nodes]
     before = np.full(n, -1)
     later = np.flatnonzero(rank)
@@ -125,11 +151,11 @@ def _factors(A: bsr_array, nodes: IntArray, starts: IntArray) -> tuple[FloatArra
     by_rank = np.argsort(rank, kind="stable")
     for some in np.split(by_rank, np.cumsum(np.bincount(rank))[:-1]):
         pivots = diagonal[some]
-        if rank[some[0]]:
+        if len(some) and rank[some[0]]:
             down[some] = beside[some] @ inverse[some - 1]
             pivots = pivots - down[some] @ beside[some].transpose(0, 2, 1)
         inverse[some] = _inverses(pivots)
-    return inverse, down
+    return inverse.astype(np.float32), down.astype(np.float32)
 
 
 def _blocks_at(A: bsr_array, columns: IntArray) -> FloatArray:
