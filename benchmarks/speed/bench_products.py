@@ -112,6 +112,12 @@ def measured(divisions: int, route: str, cycle: str = "") -> dict[str, Any]:
     return found
 
 
+def _stages(found: Mapping[str, Any]) -> str:
+    """Seconds by the clock before the contact (by products: set-up) and in it."""
+    names = ("condensation", "normal contact")
+    return ", ".join(f"{name} {found['stages'][name]:.3g} s" for name in names)
+
+
 def exponent(points: Mapping[float, float]) -> float:
     """Slope of log seconds over log dofs."""
     n, t = np.array(sorted(points.items())).T
@@ -149,6 +155,8 @@ def rows(largest: int = 400_000, smallest: int = 0, figure: Path | None = None) 
     from upd.linalg.select import predict
 
     runs: dict[str, list[dict[str, Any]]] = {route: [] for route in ROUTES}
+    # compiles what no earlier run has
+    measured(min(MESHES), "products, multigrid")
     for divisions, (_, about) in MESHES.items():
         if not smallest <= about <= largest:
             continue
@@ -175,7 +183,7 @@ def rows(largest: int = 400_000, smallest: int = 0, figure: Path | None = None) 
                 case,
                 found["cpu"],
                 "processor s",
-                "; ".join(filter(None, (found.get("says"), note))),
+                "; ".join(filter(None, (_stages(found), found.get("says"), note))),
             )
             yield row("memory", case, found["GB"], "GB", "largest resident set")
             if route != "condensed" and "condensed" in forces:

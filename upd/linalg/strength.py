@@ -28,8 +28,8 @@ from scipy.sparse import bsr_matrix, csr_matrix
 
 from upd.linalg.common import FloatArray, IntArray
 
-#: entries above this share of the root of the product of the diagonals are strong, on the finest
-#: level
+#: entries above this share of the root of the product of the diagonals are strong, on the first
+#: level that this decides: the one below near neighbours
 STRONG = 0.08
 #: neighbours that are farther than so many times the nearest one are not joined: couplings fall
 #: with the square of the stretch, to `STRONG` there
