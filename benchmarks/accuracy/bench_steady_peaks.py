@@ -3,7 +3,8 @@
 Both ready rigs at F_C/F_E 194 on twelve rows of Gauss points. Of every highest maximum of a mode:
 its height, where the run's march goes from there, and what another march keeps of it (HHT, all
 modes implicit, other steps); the peak that is told. Beside it the peaks of sweeps up and down, with
-more and more steps. A name or two (``asymmetric``) runs these alone.
+more and more steps. A name or two (``asymmetric``) runs these alone, ``own`` behind with that
+contact stiffness of the scene.
 """
 
 from __future__ import annotations
@@ -39,12 +40,12 @@ AT: Mapping[str, Any] = {
     "left_out.solve": "no",
     "accuracy": "unknown",
     "balance.method": "balance",
-    "contact.stiffness": ["thesis"],
     "contact.rule": "gauss",
     "contact.rows": ROWS,
     "contact.columns": 2,
     "excitation.centrifugal_to_force": [RATIO],
 }
+STIFFNESSES = ("thesis", "own")
 #: highest harmonics, steps in a period of the sweeps, and where these begin and end
 HARMONICS = {"symmetric": (1, 3, 5, 7), "asymmetric": (1, 3, 5, 7, 9)}
 STEPS, SWEPT = (128, 256), (280.0, 460.0)
@@ -58,24 +59,26 @@ def run() -> Iterator[Row]:
         yield from _rig(name)
 
 
-def _rig(name: str) -> Iterator[Row]:
+def _rig(name: str, stiffness: str = STIFFNESSES[0]) -> Iterator[Row]:
     stages = Stages()
-    plan = make_plan(load_scene(f"{name}-response", AT))
-    laws = {key: face_laws(one, stages) for key, one in plan.scene.stiffnesses.items()}
+    plan = make_plan(load_scene(f"{name}-response", {**AT, "contact.stiffness": [stiffness]}))
+    laws = face_laws(plan.scene.stiffnesses[stiffness], stages)
     bodies = make_bodies(plan)
-    model = make_model(plan, bodies, laws["thesis"], static_state(plan, bodies, stages=stages))
+    model = make_model(plan, bodies, laws, static_state(plan, bodies, stages=stages))
     for highest in HARMONICS[name]:
-        yield from _curve(name, plan, model, highest)
+        yield from _curve(name, plan, model, stiffness, highest)
     for steps in STEPS:
-        yield from _sweeps(name, plan, model, steps)
+        yield from _sweeps(name, plan, model, stiffness, steps)
 
 
-def _curve(name: str, plan: ForcedPlan, model: Model, highest: int) -> Iterator[Row]:
+def _curve(
+    name: str, plan: ForcedPlan, model: Model, stiffness: str, highest: int
+) -> Iterator[Row]:
     begin, force = time.process_time(), plan.scene.damper.centrifugal / RATIO
     answer = respond(plan, model, force, grid(plan), harmonics=range(highest + 1))
     blades = {side: measures.accelerance(answer, model.row(side), force) for side in SIDES}
     followed = time.process_time() - begin
-    curve = ForcedCurve("thesis", RATIO, force, answer, blades, followed)
+    curve = ForcedCurve(stiffness, RATIO, force, answer, blades, followed)
     curve = with_steady_peaks(plan, model, curve)
     marched = time.process_time() - begin - followed
     size, stop = np.abs(blades["right"]), plan.scene.excitation.stop
@@ -110,11 +113,11 @@ def _other_march(model: Model, curve: ForcedCurve, top: ModePeak) -> float:
     return height / curve.force / float(np.abs(curve.accelerance["right"][i]))
 
 
-def _sweeps(name: str, plan: ForcedPlan, model: Model, steps: int) -> Iterator[Row]:
+def _sweeps(name: str, plan: ForcedPlan, model: Model, stiffness: str, steps: int) -> Iterator[Row]:
     balance = replace(plan.scene.balance, samples=steps)
     plan = replace(plan, scene=replace(plan.scene, balance=balance))
     springs = make_springs(plan, model)
-    job = SweepJob("thesis", RATIO, springs.march, spread(*SWEPT), springs.at_rest())
+    job = SweepJob(stiffness, RATIO, springs.march, spread(*SWEPT), springs.at_rest())
     begin = time.process_time()
     found = both_ways(plan, job)
     took = time.process_time() - begin
@@ -132,6 +135,8 @@ def _sweeps(name: str, plan: ForcedPlan, model: Model, steps: int) -> Iterator[R
 
 
 if __name__ == "__main__":
-    for word in sys.argv[1:] or HARMONICS:
-        for row in _rig(word):
+    names = [word for word in sys.argv[1:] if word in HARMONICS]
+    own = next((word for word in sys.argv[1:] if word in STIFFNESSES), STIFFNESSES[0])
+    for name in names or HARMONICS:
+        for row in _rig(name, own):
             print(row, flush=True)

@@ -6,7 +6,7 @@ one level for all sources over those of the choice. A response is then solved ag
 raised by one and 13 harmonics, as far as the memory goes, for the true error, of numbers that were
 given up too. ``python benchmarks/accuracy/bench_wanted_accuracy.py asymmetric`` runs the last
 accuracy of these responses alone, ``... asymmetric 3,2,1,2,1,0`` one trial of these levels, in the
-order that the plan tells them.
+order that the plan tells them, and ``own`` behind either with that contact stiffness of the scene.
 """
 
 from __future__ import annotations
@@ -26,14 +26,13 @@ from upd.analyses.forced.solve import solve
 from upd.analyses.levels_choice import Levels, shares_of
 from upd.errors import ConvergenceError, UpdError
 from upd.progress import Stages
-from upd.scene import load_scene
+from upd.scene import AnyScene, load_scene
 
 Row = dict[str, Any]
 #: at this F_C/F_E most slips
 AT_194: Mapping[str, Any] = {
     "want": ["response"],
     "left_out.solve": "no",
-    "contact.stiffness": ["thesis"],
     "excitation.centrifugal_to_force": [194],
     "balance.method": "balance",
     "solver.memory": "11 GB",
@@ -46,6 +45,7 @@ RUNS: tuple[tuple[str, Mapping[str, Any], tuple[Any, ...]], ...] = (
     ("asymmetric", {}, ({"K_N_per_pad": "1 %"},)),
 )
 RESPONSES = ("symmetric", "asymmetric")
+STIFFNESSES = ("thesis", "own")
 WANTED = ({"peak_frequency": "5 %", "peak": "30 %"}, {"peak_frequency": "0.2 %", "peak": "5 %"})
 
 
@@ -76,8 +76,15 @@ def _run(name: str, changes: Mapping[str, Any]) -> Row:
     return {**row, "value": time.process_time() - begin, "note": f"reached: {why}"}
 
 
-def _response(name: str, wanted: Mapping[str, str]) -> Iterator[Row]:
-    asked = load_scene(f"{name}-response", {**AT_194, "accuracy": dict(wanted)})
+def _asked(name: str, wanted: Mapping[str, str], stiffness: str) -> AnyScene:
+    changes = {**AT_194, "contact.stiffness": [stiffness], "accuracy": dict(wanted)}
+    return load_scene(f"{name}-response", changes)
+
+
+def _response(
+    name: str, wanted: Mapping[str, str], stiffness: str = STIFFNESSES[0]
+) -> Iterator[Row]:
+    asked = _asked(name, wanted, stiffness)
     chooser, begin = Chooser(forced.ROUNDS, asked), time.process_time()
     row: Row = {"name": f"accuracy of {name}-response", "case": _told(wanted), "unit": "s"}
     try:
@@ -117,9 +124,9 @@ def _response(name: str, wanted: Mapping[str, str]) -> Iterator[Row]:
             }
 
 
-def _trial(name: str, levels: Levels) -> Iterator[Row]:
+def _trial(name: str, levels: Levels, stiffness: str) -> Iterator[Row]:
     """Numbers of one choice of levels, with what they leave in shares of what is wanted."""
-    asked = load_scene(f"{name}-response", {**AT_194, "accuracy": dict(WANTED[-1])})
+    asked = _asked(name, WANTED[-1], stiffness)
     chooser, begin = Chooser(forced.ROUNDS, asked), time.process_time()
     if len(levels) != len(chooser.settings):
         names = ", ".join(one.knob.name for one in chooser.settings)
@@ -198,12 +205,13 @@ def _finer(chooser: Chooser, levels: Levels) -> Levels | None:
 
 if __name__ == "__main__":
     words = [word for word in sys.argv[1:] if word in RESPONSES]
-    chosen = [word for word in sys.argv[1:] if word not in RESPONSES]
+    stiffness = next((word for word in sys.argv[1:] if word in STIFFNESSES), STIFFNESSES[0])
+    chosen = [word for word in sys.argv[1:] if word not in (*RESPONSES, *STIFFNESSES)]
     for one in words:
         rows = (
-            _trial(one, tuple(int(k) for k in chosen[0].split(",")))
+            _trial(one, tuple(int(k) for k in chosen[0].split(",")), stiffness)
             if chosen
-            else _response(one, WANTED[-1])
+            else _response(one, WANTED[-1], stiffness)
         )
         for row in rows:
             print(row, flush=True)

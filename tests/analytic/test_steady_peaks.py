@@ -145,6 +145,14 @@ def test_the_reduction_is_that_of_the_steady_peak(out_of_phase: ForcedSolution) 
     bare = replace(solution, curves=[replace(curve, left=())])
     (other,) = (r for r in make_results(bare) if r.name == "reduction_of_free_peak")
     assert other.value < told.value
+    # a path from the other end without a peak takes none from this one
+    none = tuple(
+        replace(curve.left[0], blade="right", peak=curve.left[0].peak._replace(sample=i))
+        for i in range(len(curve.frequency))
+    )
+    both = replace(solution, curves=[curve, replace(curve, reversed=True, left=none)])
+    (again,) = (r for r in make_results(both) if r.name == "reduction_of_free_peak")
+    assert again.value == told.value
 
 
 def test_a_peak_that_is_steady_with_more_harmonics_is_kept(

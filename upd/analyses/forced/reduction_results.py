@@ -65,7 +65,7 @@ def reduction_results(
         )
         return [withheld(name, curve.case, "%", reason)]
     heights = [_height(solution, c, blade) for c in mine]
-    if not all(heights):
+    if not any(heights):
         reason = (
             "a march leaves the maxima of the path, not steady or with too few harmonics: "
             'balance.method = "auto" sweeps as a test does'
@@ -108,7 +108,7 @@ def _highest_at_end(curve: ForcedCurve | FacesCurve, blade: Side) -> bool:
 
 def _height(solution: ForcedSolution, curve: ForcedCurve | FacesCurve, blade: Side) -> float:
     """Highest of a path, between its points as the free peak is; where a march leaves maxima the
-    highest of the peaks, 0 without one.
+    highest of its peaks, 0 without one.
     """
     size = np.abs(curve.accelerance[blade])
     if isinstance(curve, ForcedCurve) and curve.left:
