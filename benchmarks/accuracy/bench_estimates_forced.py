@@ -199,7 +199,8 @@ def _marched(name: str) -> Told:
             sweep = next(
                 s for s in sweeps_of(solution, stiffness, RATIO) if top in s.peaks["right"]
             )
-            fine = SweptPeakAt(solution.plan, sweep, "right", top).with_steps(STEPS)
+            at = SweptPeakAt(solution.plan, sweep, "right", top)
+            fine = at.read(at.with_steps(STEPS))
             truths = {"steps": (abs(fine.frequency - 1.0), abs(fine.height - 1.0))}
             case = replace(sweep.case, choice="")
             yield from _compared(numbers, parts, case, number, truths)

@@ -180,7 +180,7 @@ def test_the_optimum_is_marched_again_at_its_own_ratio(
     with MarchQueue(1) as queue:
         for take in _OfStiffness(solution, "thesis", [], out)._optimum(at, {}, queue):
             take()
-    fine = at.with_steps(2)
+    fine = at.read(at.with_steps(2))
     for (key, _), ratio in zip(optimum_keys("thesis"), (fine.frequency, fine.height), strict=True):
         (value,) = out.values[key]
         assert (value.source, value.ratio) == ("steps", pytest.approx(ratio, rel=1e-9))

@@ -13,15 +13,18 @@ import numpy as np
 import pytest
 
 from upd.analyses import forced, make_plan
-from upd.analyses.forced import levels, peaks_again
+from upd.analyses.forced import levels, marches_again, peaks_again
 from upd.analyses.forced.companions import AXES, ModelMaker, OtherModel
 from upd.analyses.forced.effects import HARMONICS, MODES, SAMPLES
 from upd.analyses.forced.estimates import bound, estimate
 from upd.analyses.forced.level_values import ForcedLevels, LevelValue
+from upd.analyses.forced.marches_again import SweptPeakAt
 from upd.analyses.forced.merged_points import Axis, merged, transfer
 from upd.analyses.forced.peaks_again import ClimbedPeak, PathPeakAt, maxima_about
 from upd.analyses.forced.solution import ForcedSolution
 from upd.hbm import climb, contacts, frequency_response
+from upd.hbm.interface_march import InterfaceMarch
+from upd.hbm.interface_settle import SteadyPoint
 from upd.progress import Stages, silent
 from upd.results import ErrorPart, Estimates, Result
 from upd.results.number import with_estimates
@@ -241,8 +244,8 @@ def test_steps_of_a_march_tell_what_they_miss(few_points: Sequence[str]) -> None
     assert {r.name for r in told} == {"peak_2_accelerance", "left_peak_2_accelerance"}
     sweep = max(solution.sweeps, key=lambda s: max(p.height for p in s.peaks["right"]))
     top = max(sweep.peaks["right"], key=lambda p: p.height)
-    at = levels.SweptPeakAt(solution.plan, sweep, "right", top)
-    fine = at.with_steps(8)
+    at = SweptPeakAt(solution.plan, sweep, "right", top)
+    fine = at.read(at.with_steps(8))
     assert fine.settled
     parts = parts_of(found, "peak_2_accelerance")
     assert set(parts) == {"mesh", "modes kept", "contact points", "steps", "continuation"}
@@ -251,6 +254,35 @@ def test_steps_of_a_march_tell_what_they_miss(few_points: Sequence[str]) -> None
     assert parts["steps"].error < 0.2
     frequency = parts_of(found, "peak_2_frequency")
     assert abs(fine.frequency - 1.0) <= frequency["steps"].error + 1e-5
+
+
+@pytest.mark.parametrize("left_branch", [0.25, -1.0])
+def test_peaks_of_both_blades_are_read_from_one_march(
+    few_points: Sequence[str], monkeypatch: pytest.MonkeyPatch, left_branch: float
+) -> None:
+    """At the point itself, and, where the motion left its branch, along the short sweep."""
+    solution, _, _ = solved([*few_points, *MARCH])
+    sweep = max(solution.sweeps, key=lambda s: max(p.height for p in s.peaks["right"]))
+    top = max(sweep.peaks["right"], key=lambda p: p.height)
+    right = SweptPeakAt(solution.plan, sweep, "right", top)
+    height = float(np.abs(sweep.accelerance["left"][top.sample]))
+    left = replace(right, side="left", peak=top._replace(height=height))
+    monkeypatch.setattr(marches_again, "_LEFT_BRANCH", left_branch)
+    alone = [at.read(at.with_steps(2)) for at in (right, left)]
+    marches, settle = list[float](), marches_again.settle
+
+    def counted(march: InterfaceMarch, *args: Any, **named: Any) -> SteadyPoint:
+        marches.append(march.frequency)
+        return settle(march, *args, **named)
+
+    monkeypatch.setattr(marches_again, "settle", counted)
+    again = right.with_steps(2)
+    both = [at.read(again) for at in (right, left)]
+    for one, other in zip(both, alone, strict=True):
+        assert (one.frequency, one.height) == (other.frequency, other.height)
+    # the short sweep goes over the frequency of the point once more
+    assert len(set(marches[1:])) == len(marches[1:])
+    assert (len(marches) > 1) == (left_branch < 0.0)
 
 
 def level(size: float, ratio: float, order: float = 1.0) -> LevelValue:

@@ -25,7 +25,7 @@ from upd.analyses.forced.companions import (
 from upd.analyses.forced.curves import LinearCurves, SweptCurve
 from upd.analyses.forced.level_values import ForcedLevels, Key, LevelValue
 from upd.analyses.forced.march_queue import MarchQueue
-from upd.analyses.forced.marches_again import MarchedAgain, SweptPeakAt
+from upd.analyses.forced.marches_again import MarchedAgain, MotionAgain, SweptPeakAt
 from upd.analyses.forced.mode_peaks import ModePeak, unmoved
 from upd.analyses.forced.optimum_levels import between_ratios, optimum_at, optimum_keys
 from upd.analyses.forced.peak_results import LEFT
@@ -48,6 +48,8 @@ FINER = 2
 #: what a peak tells: word of the result's name, and attribute of a level's peak
 KINDS = (("frequency", "frequency"), ("accelerance", "height"))
 Laws = Mapping[str, Mapping[Side, FaceLaw]]
+#: a peak of a sweep with its numbers' keys and what tells them
+SweptKeys = tuple[SweptPeakAt, Sequence[tuple[Key, str]]]
 
 
 def solve_levels(solution: ForcedSolution, laws: Laws, stages: Stages) -> ForcedLevels:
@@ -192,20 +194,24 @@ class _OfStiffness:
         ratios = [c.ratio for c in self.solution.curves if c.stiffness == self.name]
         climbed = []
         for ratio in dict.fromkeys(ratios):
+            case = Case(stiffness=self.name, force_ratio=ratio)
+            sweeps = sweeps_of(self.solution, self.name, ratio)
+            marched: dict[tuple[str, int, int], list[SweptKeys]] = {}
             for side in SIDES:
                 told = peak_ranges(self.solution, self.name, ratio, side)
                 for one in told.values():
                     if not one.agrees:
                         at = self._swept(ratio, side, one.found[0])
-                        case = Case(stiffness=self.name, force_ratio=ratio)
+                        where = at.sweep.way, at.peak.sample, at.peak.number
                         keys = self._keys(case, side, at.peak)
-                        sweeps = sweeps_of(self.solution, self.name, ratio)
-                        waiting += self._march(at, keys, sweeps, springs, queue)
+                        marched.setdefault(where, []).append((at, keys))
                 climbed += [
                     at
                     for at in self._paths(ratio, side)
                     if at.peak.number not in told or told[at.peak.number].agrees
                 ]
+            for peaks in marched.values():
+                waiting += self._march(peaks, sweeps, springs, queue)
         optimum = optimum_at(self.solution, self.name)
         if optimum is not None:
             waiting += self._optimum(optimum, springs, queue)
@@ -235,11 +241,11 @@ class _OfStiffness:
             for word, attribute in KINDS
         ]
 
-    def _expected(self, one: OtherModel, peak: ModePeak) -> float:
-        """Ratio of a peak's frequency on a companion to that of the run, between those of the free
-        and of the stuck mode by where the peak lies.
+    def _expected(self, one: OtherModel, number: int, frequency: float) -> float:
+        """Ratio of the frequency of a mode's peak on a companion to that of the run, between those
+        of the free and of the stuck mode by where the peak lies.
         """
-        own, in_phase = self.solution.linear[self.name], peak.number % 2 == 1
+        own, in_phase = self.solution.linear[self.name], number % 2 == 1
         stuck, other = _frequency(own, in_phase), _frequency(one.linear, in_phase)
         free = [
             linear.free_peaks["right"] or linear.free_peaks["left"] for linear in (own, one.linear)
@@ -252,7 +258,7 @@ class _OfStiffness:
         )
         if stuck == start:
             return ends[1]
-        share = min(max((peak.frequency - start) / (stuck - start), 0.0), 1.0)
+        share = min(max((frequency - start) / (stuck - start), 0.0), 1.0)
         return ends[0] + share * (ends[1] - ends[0])
 
     def _climb(self, at: PathPeakAt) -> None:
@@ -283,7 +289,7 @@ class _OfStiffness:
             count = FINER * at.curve.answer.balance.samples
             add(SAMPLES, f"{count} samples", 1.0 / FINER, at.with_samples(FINER))
         for one in self.companions:
-            found = at.on(one, self._expected(one, at.peak))
+            found = at.on(one, self._expected(one, at.peak.number, at.peak.frequency))
             for key, attribute in keys:
                 self._add(key, one, getattr(found, attribute) / getattr(base, attribute))
 
@@ -295,7 +301,7 @@ class _OfStiffness:
         """
         performance, keys = self.solution.performances[self.name], optimum_keys(self.name)
         sweeps = [one for one in performance.sweeps if one.ratio == at.sweep.ratio]
-        waiting = self._march(at, keys, sweeps, springs, queue)
+        waiting = self._march([(at, keys)], sweeps, springs, queue)
         left, why = between_ratios(performance), "no lower between the F_C/F_E if convex there"
         if not math.isfinite(left):
             why = "not estimated: the curve over F_C/F_E is not convex beside the optimum"
@@ -304,36 +310,38 @@ class _OfStiffness:
 
     def _march(
         self,
-        at: SweptPeakAt,
-        keys: Sequence[tuple[Key, str]],
+        peaks: Sequence[SweptKeys],
         sweeps: Sequence[SweptCurve],
         springs: Mapping[str, SpringMarch],
         queue: MarchQueue,
     ) -> list[Callable[[], None]]:
-        """Begin the levels of a peak that a sweep tells; what adds them when they are ready.
+        """Begin the levels of peaks at one point of a sweep; what adds them when they are ready.
 
         Parameters
         ----------
-        keys
-            Its frequency and its height.
+        peaks
+            Of one mode, of either blade or both, each with its frequency's and its height's key.
         sweeps
-            That it took.
+            That they took.
         """
-        left = at.interpolation()
         seconds = sum(one.found.seconds for one in sweeps)
-        for (key, _), error in zip(keys, left, strict=True):
-            self.out.curve_seconds[key] = seconds
-            self._tell_missing(key)
-            why = "steps of the sweep beside the peak, and the tolerance of a steady motion"
-            self.out.tell(key, PATH, error, why)
+        for at, keys in peaks:
+            for (key, _), error in zip(keys, at.interpolation(), strict=True):
+                self.out.curve_seconds[key] = seconds
+                self._tell_missing(key)
+                why = "steps of the sweep beside the peak, and the tolerance of a steady motion"
+                self.out.tell(key, PATH, error, why)
+        first, _ = peaks[0]
 
-        def add(make: Callable[[MarchedAgain, str], LevelValue], one: Future[MarchedAgain]) -> None:
-            found = one.result()
-            for key, attribute in keys:
-                self.out.add(key, make(found, attribute))
+        def add(
+            make: Callable[[MarchedAgain, str], LevelValue], told: Future[list[MarchedAgain]]
+        ) -> None:
+            for found, (_, keys) in zip(told.result(), peaks, strict=True):
+                for key, attribute in keys:
+                    self.out.add(key, make(found, attribute))
 
         def steps(found: MarchedAgain, attribute: str) -> LevelValue:
-            ratio, label = getattr(found, attribute), f"{FINER * at.sweep.found.samples} steps"
+            ratio, label = getattr(found, attribute), f"{FINER * first.sweep.found.samples} steps"
             return LevelValue(
                 STEPS, STEPS, label, 1.0 / FINER, ratio, found.seconds, times=float(FINER)
             )
@@ -342,13 +350,17 @@ class _OfStiffness:
             ratio, took = getattr(found, attribute), one.seconds + found.seconds
             return LevelValue(one.source, one.ladder, one.label, one.size, ratio, took, one.order)
 
-        jobs: list[Callable[[], None]] = [
-            partial(add, steps, queue.add(lambda told: at.with_steps(FINER)))
-        ]
+        def read(again: MotionAgain, told: object) -> list[MarchedAgain]:
+            del told
+            return [at.read(again) for at, _ in peaks]
+
+        finer = first.with_steps(FINER)
+        jobs: list[Callable[[], None]] = [partial(add, steps, queue.add(partial(read, finer)))]
+        frequency = float(first.sweep.frequency[first.peak.sample])
         for one in self.companions:
-            expected = self._expected(one, at.peak)
-            march = partial(_on, at, one, springs[one.label], expected)
-            jobs.append(partial(add, partial(other, one), queue.add(march)))
+            expected = self._expected(one, first.peak.number, frequency)
+            again = first.on(one, springs[one.label], expected)
+            jobs.append(partial(add, partial(other, one), queue.add(partial(read, again))))
         return jobs
 
     def checks(self, at: PathPeakAt) -> list[Resolved]:
@@ -368,7 +380,7 @@ class _OfStiffness:
             *(
                 (
                     checks.MODES,
-                    at.on(one, self._expected(one, at.peak)),
+                    at.on(one, self._expected(one, at.peak.number, at.peak.frequency)),
                     f"set reduction.modes = {count} or more",
                 )
                 for one in self.companions
@@ -380,13 +392,6 @@ class _OfStiffness:
             for check, peak, remedy in found
             for one in peak_changes(check, at.curve, at.peak, base, peak, remedy)
         ]
-
-
-def _on(
-    at: SweptPeakAt, one: OtherModel, springs: SpringMarch, expected: float, told: object
-) -> MarchedAgain:
-    del told
-    return at.on(one, springs, expected)
 
 
 def _frequency(linear: LinearCurves, in_phase: bool) -> float | None:

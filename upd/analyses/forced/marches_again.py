@@ -2,13 +2,16 @@
 
 Only at the frequency of the peak, from where its last period began. What the height changes is
 read there; what the frequency of the peak changes from the phase, by its slope along the sweep.
+Peaks of both blades at one point of a sweep are read from the same march.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import tee
 
 import numpy as np
 
@@ -23,7 +26,7 @@ from upd.analyses.forced.spring_march import SpringMarch, carried_over
 from upd.analyses.forced.sweeps import MOST_PERIODS, TOLERANCE
 from upd.errors import ConvergenceError
 from upd.hbm.interface_march import InterfaceMarch
-from upd.hbm.interface_settle import settle
+from upd.hbm.interface_settle import SteadyPoint, settle
 from upd.hbm.interface_state import InterfaceModel, InterfaceState
 from upd.hbm.peaks import is_near
 from upd.scene.forced_contact import SIDES, Side
@@ -50,16 +53,77 @@ class MarchedAgain:
     seconds: float
 
 
-@dataclass(frozen=True)
-class _Again:
-    """What is marched, its steps in a period, where it begins at points of the sweep, and the ratio
-    of its frequencies to those of the run.
+class MotionAgain:
+    """The motion at a point of a sweep, marched again with one choice changed: there, and as far as
+    a reader wants along a short sweep over it.
+
+    Parameters
+    ----------
+    sweep, sample
+        The sweep, and its point.
+    model
+        What is marched.
+    samples
+        Its steps in a period.
+    starts
+        Where it begins at points of the sweep: at ``sample``, and at the one before from which the
+        short sweep begins.
+    ratio
+        Of its frequencies to those of the run.
+
+    Attributes
+    ----------
+    seconds : float
+        Marched so far.
     """
 
-    model: InterfaceModel
-    samples: int
-    starts: Mapping[int, InterfaceState]
-    ratio: float
+    def __init__(
+        self,
+        sweep: SweptCurve,
+        sample: int,
+        model: InterfaceModel,
+        samples: int,
+        starts: Mapping[int, InterfaceState],
+        ratio: float,
+    ) -> None:
+        self.sweep, self.sample, self.ratio, self.seconds = sweep, sample, ratio, 0.0
+        self._model, self._samples, self._starts = model, samples, starts
+        self._walk = self._walking()
+
+    @cached_property
+    def near(self) -> SteadyPoint | None:
+        """At the frequency of the point; None where the march ends."""
+        f = self.ratio * float(self.sweep.found.frequency[self.sample])
+        return self._settled(f, self._starts[self.sample].copy(), MOST_PERIODS)
+
+    def walk(self) -> Iterator[tuple[float, SteadyPoint]]:
+        """Frequency and motion along the short sweep, the same way, until a march ends."""
+        self._walk, mine = tee(self._walk)
+        return mine
+
+    def _walking(self) -> Iterator[tuple[float, SteadyPoint]]:
+        f = self.sweep.found.frequency
+        first = min(self._starts)
+        way = 1.0 if self.sweep.way == "up" else -1.0
+        start = self.ratio * float(f[first])
+        end = self.ratio * float(f[self.sample]) * (1.0 + way * _REACH)
+        count = max(int(np.ceil(abs(end / start - 1.0) / _WALK)), 1) + 1
+        at = self._starts[first].copy()
+        for one in np.linspace(start, end, count):
+            steady = self._settled(float(one), at, _WALK_PERIODS)
+            if steady is None:
+                return
+            yield float(one), steady
+
+    def _settled(self, f: float, at: InterfaceState, periods: int) -> SteadyPoint | None:
+        begin = time.thread_time()
+        march = InterfaceMarch(self._model, f, self.sweep.found.drive, self._samples, by_coulomb)
+        try:
+            return settle(march, at, TOLERANCE, periods, accelerate=True)
+        except ConvergenceError:
+            return None
+        finally:
+            self.seconds += time.thread_time() - begin
 
 
 @dataclass(frozen=True)
@@ -71,13 +135,13 @@ class SweptPeakAt:
     side: Side
     peak: ModePeak
 
-    def with_steps(self, times: int) -> MarchedAgain:
+    def with_steps(self, times: int) -> MotionAgain:
         """With so many times the steps in a period."""
         found = self.sweep.found
         starts = {i: found.starts[i] for i in (self.first, self.peak.sample)}
-        return self._found(_Again(found.model, times * found.samples, starts, 1.0))
+        return self._again(found.model, times * found.samples, starts, 1.0)
 
-    def on(self, companion: OtherModel, springs: SpringMarch, ratio: float) -> MarchedAgain:
+    def on(self, companion: OtherModel, springs: SpringMarch, ratio: float) -> MotionAgain:
         """On another model.
 
         Parameters
@@ -94,7 +158,16 @@ class SweptPeakAt:
             i: carried_over(springs, found.starts[i], found.model, move, share, drive)
             for i in (self.first, self.peak.sample)
         }
-        return self._found(_Again(springs.march, found.samples, starts, ratio))
+        return self._again(springs.march, found.samples, starts, ratio)
+
+    def _again(
+        self,
+        model: InterfaceModel,
+        samples: int,
+        starts: Mapping[int, InterfaceState],
+        ratio: float,
+    ) -> MotionAgain:
+        return MotionAgain(self.sweep, self.peak.sample, model, samples, starts, ratio)
 
     @property
     def first(self) -> int:
@@ -104,72 +177,60 @@ class SweptPeakAt:
         share = np.abs(found.frequency / found.frequency[i] - 1.0)
         return next(k for k in range(low, i + 1) if share[k] <= _REACH)
 
-    def _found(self, again: _Again) -> MarchedAgain:
+    def read(self, again: MotionAgain) -> MarchedAgain:
         """At the frequency of the peak, and where the motion left its branch there, along a short
         sweep over it.
+
+        Parameters
+        ----------
+        again
+            Of this peak, or of the other blade's at the same point of the sweep.
         """
-        near = self._marched(again)
+        near = self._near(again)
         if abs(near.height - 1.0) <= _LEFT_BRANCH:
             return near
         wide = self._walked(again)
-        took = near.seconds + wide.seconds
         if is_near(wide.frequency / again.ratio, wide.height):
-            return replace(wide, seconds=took)
+            return wide
         # another motion: that of the peak is lost there
-        return MarchedAgain(float("nan"), float("nan"), False, took)
+        return MarchedAgain(float("nan"), float("nan"), False, again.seconds)
 
-    def _walked(self, again: _Again) -> MarchedAgain:
-        """The highest point of a short sweep the same way, begun before the peak on its stretch."""
-        begin, found, i = time.thread_time(), self.sweep.found, self.peak.sample
-        first, ratio = self.first, again.ratio
-        way = 1.0 if self.sweep.way == "up" else -1.0
-        start = ratio * float(found.frequency[first])
-        end = ratio * float(found.frequency[i]) * (1.0 + way * _REACH)
-        count = max(int(np.ceil(abs(end / start - 1.0) / _WALK)), 1) + 1
-        at, blade = again.starts[first].copy(), SIDES.index(self.side)
-        f, size = np.linspace(start, end, count), []
-        try:
-            for one in f:
-                march = InterfaceMarch(again.model, one, found.drive, again.samples, by_coulomb)
-                steady = settle(march, at, TOLERANCE, _WALK_PERIODS, accelerate=True)
-                size.append(one**2 * abs(steady.first_harmonic[blade]))
-                if size[-1] < _PASSED * max(size):
-                    break
-        except ConvergenceError:
-            pass
-        took = time.thread_time() - begin
+    def _walked(self, again: MotionAgain) -> MarchedAgain:
+        """The highest point of the short sweep."""
+        found, i = self.sweep.found, self.peak.sample
+        blade = SIDES.index(self.side)
+        f, size = list[float](), list[float]()
+        for one, steady in again.walk():
+            f.append(one)
+            size.append(one**2 * abs(steady.first_harmonic[blade]))
+            if size[-1] < _PASSED * max(size):
+                break
         if not size:
-            return MarchedAgain(float("nan"), float("nan"), False, took)
-        k, y = int(np.argmax(size)), np.array(size)
-        top, height = float(f[k]), float(y[k])
+            return MarchedAgain(float("nan"), float("nan"), False, again.seconds)
+        k, x, y = int(np.argmax(size)), np.array(f), np.array(size)
+        top, height = float(x[k]), float(y[k])
         if 0 < k < len(y) - 1:
             moved, inverse = _vertex(
-                f[k - 1 : k + 2] / f[k] - 1.0, (y[k - 1 : k + 2] / y[k]) ** -2.0
+                x[k - 1 : k + 2] / x[k] - 1.0, (y[k - 1 : k + 2] / y[k]) ** -2.0
             )
             top, height = top * (1.0 + moved), height / float(np.sqrt(max(inverse, 0.5)))
         run = found.frequency[i] ** 2 * abs(found.amplitude[i, blade])
         # heights of both are those of their peaks
         run *= self.peak.height / abs(self.sweep.accelerance[self.side][i])
-        return MarchedAgain(top / self.peak.frequency, height / float(run), True, took)
+        return MarchedAgain(top / self.peak.frequency, height / float(run), True, again.seconds)
 
-    def _marched(self, again: _Again) -> MarchedAgain:
-        begin, found, i = time.thread_time(), self.sweep.found, self.peak.sample
-        ratio, at = again.ratio, again.starts[i].copy()
-        f = ratio * float(found.frequency[i])
-        march = InterfaceMarch(again.model, f, found.drive, again.samples, by_coulomb)
-        try:
-            one = settle(march, at, TOLERANCE, MOST_PERIODS, accelerate=True)
-        except ConvergenceError:
-            nan = float("nan")
-            return MarchedAgain(nan, nan, False, time.thread_time() - begin)
+    def _near(self, again: MotionAgain) -> MarchedAgain:
+        one, ratio = again.near, again.ratio
+        if one is None:
+            return MarchedAgain(float("nan"), float("nan"), False, again.seconds)
         blade = SIDES.index(self.side)
-        z, run = one.first_harmonic[blade], found.amplitude[i, blade]
+        z, run = one.first_harmonic[blade], self.sweep.found.amplitude[self.peak.sample, blade]
         turned = float(np.angle(z / run))
         return MarchedAgain(
             ratio * (1.0 + turned / self.turn_per_share),
             float(ratio**2 * abs(z) / abs(run)),
             one.settled,
-            time.thread_time() - begin,
+            again.seconds,
         )
 
     @property
