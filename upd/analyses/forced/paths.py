@@ -153,6 +153,26 @@ def balance_with(
     numbers, given = range(highest + 1), plan.scene.balance.samples
     carry = given == "auto" or int(given) > 2 * highest
     samples = None if carry else sample_count(harmonics(numbers))
+    return balance_like(plan, model, force, old, numbers, samples)
+
+
+def balance_like(
+    plan: ForcedPlan,
+    model: Model,
+    force: float,
+    old: Balance,
+    numbers: Sequence[int],
+    samples: int | None,
+) -> Balance:
+    """The run's own problem with other harmonics or samples.
+
+    Parameters
+    ----------
+    old
+        The problem of the run, from whose static state sliders start where the scene says so.
+    force, numbers, samples
+        As of `balance_of`.
+    """
     b = balance_of(plan, model, force, numbers, samples)
     return b.with_sliders("static", old.slider) if old.start == "static" else b
 

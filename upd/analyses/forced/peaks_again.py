@@ -14,7 +14,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
@@ -27,7 +27,14 @@ from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.measures import accelerance, path_maxima
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.paths import BAND, BAND_POINTS, balance_of, balance_with, respond
+from upd.analyses.forced.paths import (
+    BAND,
+    BAND_POINTS,
+    balance_like,
+    balance_of,
+    balance_with,
+    respond,
+)
 from upd.analyses.forced.plan import ForcedPlan
 from upd.errors import ConvergenceError, one_line
 from upd.hbm import climb
@@ -188,7 +195,10 @@ class PathPeakAt:
     def with_samples(self, times: int) -> ClimbedPeak:
         """With so many times the samples."""
         old = self.curve.answer.balance
-        b = self._balance(self.model, old.harmonics.numbers, times * old.samples)
+        samples = times * old.samples
+        b = balance_like(
+            self.plan, self.model, self.curve.force, old, old.harmonics.numbers, samples
+        )
         starts = chain(self._all_starts(old), self._band(b, self.model))
         return self._climbed(b, self.model, starts)
 
@@ -205,7 +215,9 @@ class PathPeakAt:
             Of its frequencies to those of the run, as far as the linear limits tell.
         """
         old = self.curve.answer.balance
-        b = self._balance(companion.model, old.harmonics.numbers, old.samples)
+        b = balance_of(
+            self.plan, companion.model, self.curve.force, old.harmonics.numbers, old.samples
+        )
         everywhere = companion.ladder == AXES[0]
         # from where the linear limits expect the peak; points that slip may leave it where it was
         starts = (
@@ -216,13 +228,6 @@ class PathPeakAt:
         return self._climbed(
             b, companion.model, chain(starts, self._band(b, companion.model, ratio))
         )
-
-    def _balance(self, model: Model, numbers: Sequence[int], samples: int | None) -> Balance:
-        b = balance_of(self.plan, model, self.curve.force, numbers, samples)
-        old = self.curve.answer.balance
-        if old.start == "static" and model is self.model:
-            return b.with_sliders("static", old.slider)
-        return b
 
     def _all_starts(self, b: Balance, everywhere: bool = False) -> Iterator[ClimbStart]:
         """The top; other maxima about it, the highest first, while what is climbed to is lower than
