@@ -116,9 +116,9 @@ class MotionAgain:
             yield float(one), steady
 
     def _settled(self, f: float, at: InterfaceState, periods: int) -> SteadyPoint | None:
-        begin = time.thread_time()
-        march = InterfaceMarch(self._model, f, self.sweep.found.drive, self._samples, by_coulomb)
+        begin, drive = time.thread_time(), self.sweep.found.drive
         try:
+            march = InterfaceMarch(self._model, f, drive, self._samples, by_coulomb)
             return settle(march, at, TOLERANCE, periods, accelerate=True)
         except ConvergenceError:
             return None
