@@ -17,6 +17,7 @@ from upd.linalg.routes import Route
 from upd.plot.chart import Arrays, Chart, Entry
 from upd.progress import Stages
 from upd.results import ArrayGroup, Case, Check, Estimates, Result, left_out_check
+from upd.results.answer_table import AnswerTable
 from upd.scene import AnyScene
 from upd.scene.base import LeftOut
 from upd.scene.quantities import Uncertainty
@@ -252,6 +253,9 @@ class Analysis:
         important first.
     headline
         results as in summary.json -> the 5 to 8 an engineer asks for first.
+    answer
+        results as in summary.json -> the tables that are the answer, the most important first;
+        None where the terminal lists ``headline`` instead.
     verdict_names
         Names of the number that stands beside the outcome, the first that was reached; the first of
         ``headline`` when none.
@@ -282,6 +286,7 @@ class Analysis:
     write_files: Callable[[Any, Path], None]
     charts: Callable[[Arrays, Mapping[str, Any]], list[Chart]]
     headline: Callable[[Sequence[Entry]], list[Entry]]
+    answer: Callable[[Sequence[Entry]], list[AnswerTable]] | None = None
     verdict_names: tuple[str, ...] = ()
     estimate: Callable[[Any, Sequence[Result], Stages], Estimates] | None = None
     input_changes: ChangesByInputs | None = None

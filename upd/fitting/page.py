@@ -17,7 +17,8 @@ from upd.fitting.words import (
     target_difference,
     unknown_words,
 )
-from upd.report.answer_page import AnswerPage, AnswerTable
+from upd.report.answer_page import AnswerPage
+from upd.results.answer_table import AnswerTable
 
 #: further measurements on the page; fit.json has all that tell something
 _FURTHER = 12

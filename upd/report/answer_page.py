@@ -9,28 +9,7 @@ from upd.cache.sources import versions
 from upd.plot.chart import Chart
 from upd.report.page import render
 from upd.report.panels import make_panels
-
-
-@dataclass(frozen=True)
-class AnswerTable:
-    """A table of a page.
-
-    Attributes
-    ----------
-    heading : str
-        Above it.
-    columns : tuple of str
-        Heads; those that begin with # hold numbers, to the right.
-    rows : tuple of tuple of str
-        One cell for every column.
-    note : str
-        Below it.
-    """
-
-    heading: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    note: str = ""
+from upd.results.answer_table import AnswerTable
 
 
 @dataclass(frozen=True)

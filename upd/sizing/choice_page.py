@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from upd.report.answer_page import AnswerPage, AnswerTable
+from upd.report.answer_page import AnswerPage
+from upd.results.answer_table import AnswerTable
 from upd.scene.written import scene_as_run
 from upd.sizing.choice import GROWTHS, UNITS_OF, ChosenDamper
 from upd.sizing.choice_words import (
