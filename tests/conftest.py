@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import settings
+from rigs import SET_LINES
 
 if TYPE_CHECKING:
     from upd.report.notebook import RunResult
@@ -134,6 +135,7 @@ SMALL: Mapping[str, Mapping[str, Any]] = {
 
 #: "symmetric-response" with a few points and one tangent a point
 FEW_POINTS = (
+    *SET_LINES,
     "mesh.element=hex8i",
     "contact.static=frictionless",
     'contact.stiffness=["thesis"]',

@@ -60,11 +60,6 @@ _LABELS = {
     "K_Ty_damper_alone": "K_T along y, platform rigid",
     "K_Tx_platform_alone": "K_T along x, damper rigid",
     "K_Ty_platform_alone": "K_T along y, damper rigid",
-    **{
-        f"f{k}_{kind}": f"frequency {k}, {kind}"
-        for k in range(1, 21)
-        for kind in ("free", "glued", "reduced")
-    },
     "reduction_modes": "fixed-interface modes, both blades",
     "reduction_boundary": "boundary dofs, both blades",
     "response_below": "accelerance at 0.5 f1, reduced",
@@ -97,9 +92,17 @@ _LABELS = {
     "law_lumping_y": "contact points, spread along y lost by lumping",
     "law_tilt_x": "contact points, tilt stiffness along x",
     "law_tilt_y": "contact points, tilt stiffness along y",
-    "lowest_peak": "lowest height of the peak",
-    "lowest_peak_at_ratio": "F_C/F_E there",
-    "lowest_peak_of_free": "of the free peak",
+    "best_ratio": "best F_C/F_E",
+    "best_peak": "worst peak at the best F_C/F_E",
+    "best_frequency": "frequency of that peak",
+    "best_reduction": "of the free peak",
+    "best_inside": "best F_C/F_E lies within the curve",
+    "half_of_best_ratio": "worst peak at half of the best F_C/F_E",
+    "twice_the_best_ratio": "worst peak at twice the best F_C/F_E",
+    "highest_ratio_reached": "highest F_C/F_E reached",
+    "lowest_ratio_reached": "lowest F_C/F_E reached",
+    "contact_slip": "slipping share of the contact",
+    "contact_lift": "open share of the contact",
     "reduction_of_free_peak": "reduction of the free peak",
     "stuck_in_phase": "stuck, blades in phase",
     "stuck_out_of_phase": "stuck, blades out of phase",
@@ -126,8 +129,6 @@ _LABELS = {
     "curve_seconds": "time for the curve",
     "static_N": "static normal force of a face",
     "static_T": "static friction of a face",
-    "band_curves": "curves of the band",
-    "band_curves_not_complete": "of them not complete",
     **{
         f"{end}_peak_{k}_{kind}": f"peak {k}, {end} {kind}"
         for k in range(1, 6)
@@ -140,30 +141,22 @@ _LABELS = {
     "share_lift": "lifted share of the cycle",
     "points_always_stuck": "points that always stick",
     "time_march_accelerance": "accelerance by time march",
-    "harmonics_peak": "peak with more harmonics",
-    "harmonics_frequency": "its frequency",
-    "harmonics_truncation": "motion by harmonics left out",
-    "spread_of_peak": "spread over slider starts",
-    "spread_of_peak_frequency": "spread of the frequency",
-    "spread_starts_not_solved": "slider starts not solved",
     "damper_mass": "mass of the damper",
     "contact_points": "contact points",
-    "peak_1_frequency": "peak 1, frequency",
-    "peak_1_accelerance": "peak 1, accelerance",
-    "peak_2_frequency": "peak 2, frequency",
-    "peak_2_accelerance": "peak 2, accelerance",
-    "peak_3_frequency": "peak 3, frequency",
-    "peak_3_accelerance": "peak 3, accelerance",
-    "peak_4_frequency": "peak 4, frequency",
-    "peak_4_accelerance": "peak 4, accelerance",
-    "peak_5_frequency": "peak 5, frequency",
-    "peak_5_accelerance": "peak 5, accelerance",
-    "peak_1_mac": "peak 1, MAC with its stuck mode",
-    "peak_2_mac": "peak 2, MAC with its stuck mode",
-    "left_peak_1_frequency": "left blade, peak 1, frequency",
-    "left_peak_1_accelerance": "left blade, peak 1, accelerance",
-    "left_peak_2_frequency": "left blade, peak 2, frequency",
-    "left_peak_2_accelerance": "left blade, peak 2, accelerance",
+    **{
+        f"{blade}peak_{k}_{name}": f"{words}peak {k}, {said}"
+        for blade, words in (("", ""), ("left_", "left blade, "))
+        for k in range(1, 6)
+        for name, said in (
+            ("frequency", "frequency"),
+            ("accelerance", "accelerance"),
+            ("frequency_change", "change of the frequency by an input"),
+            ("accelerance_change", "change of the accelerance by an input"),
+            ("sweep_up_frequency", "frequency that a sweep up reaches"),
+            ("sweep_up_accelerance", "accelerance that a sweep up reaches"),
+            ("mac", "MAC with its stuck mode"),
+        )
+    },
     "left_reduction_of_free_peak": "left blade, reduction of the free peak",
     "damper_ux": "damper, ux",
     "damper_rx": "damper, rotation about x",

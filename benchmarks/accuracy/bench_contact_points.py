@@ -23,7 +23,6 @@ from rig_response import rig
 
 from upd.analyses.forced.linear_limits import linear_limits_of
 from upd.analyses.forced.measures import Unsolved, accelerance, path_maxima
-from upd.analyses.forced.merged_points import fewer_gauss
 from upd.analyses.forced.mesh_counts import OFF_CONTACT, count_of, times
 from upd.analyses.forced.mesh_counts import graded as graded_mesh
 from upd.analyses.forced.paths import balance_of, respond
@@ -164,8 +163,7 @@ def maxima() -> Iterator[Row]:
     grid = np.linspace(low, high, round(high - low) + 1)
     for rows in MANY_ROWS:
         begin = time.process_time()
-        found = fewer_gauss(made.model, rows / max(MANY_ROWS))
-        model = made.model if found is None else found.model
+        model = rig("symmetric-response", **{**scenes, **_gauss(rows)}).model
         given = {"harmonics": range(MANY_HIGHEST + 1), "samples": MANY_SAMPLES}
         answer = respond(made.plan, model, force, grid, **given)
         size = np.abs(accelerance(answer, model.row("right"), force))

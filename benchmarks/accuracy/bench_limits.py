@@ -29,9 +29,8 @@ from upd.analyses.forced.measures import PathPeak
 from upd.analyses.forced.model import preloaded
 from upd.analyses.forced.paths import respond
 from upd.analyses.forced.plan import MARCH_SAMPLES
-from upd.analyses.forced.spring_march import state_of
+from upd.analyses.forced.spring_march import make_springs, state_at
 from upd.analyses.forced.statics import static_state
-from upd.analyses.forced.sweeps import make_springs
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
 from upd.hbm import FrequencyResponse
@@ -135,7 +134,7 @@ def stays(built: Rig, answer: FrequencyResponse, peak: PathPeak, ratio: float) -
     """Whether a march from the balance's motion at a peak stays there, in words."""
     force, i = built.plan.scene.damper.centrifugal / ratio, peak.sample
     springs, f = make_springs(built.plan, built.model), float(answer.frequency[peak.sample])
-    at = state_of(springs, built.model, answer, i, force)
+    at = state_at(springs, built.model, answer.balance, answer.x[i], f, force)
     one = settled(springs.march, f, force, at)
     here = float(answer.amplitude(built.model.row("right"))[i])
     off = 100.0 * (abs(one.first_harmonic[RIGHT]) / here - 1.0)

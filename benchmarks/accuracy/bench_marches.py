@@ -25,13 +25,15 @@ sys.path.append(str(Path(__file__).parents[1]))
 from explicit_march import STEP, ExplicitMarch, explicit_march
 from rig_response import Rig, rig
 
-from upd.analyses.forced.estimates import bound
 from upd.analyses.forced.interface_model import by_coulomb
-from upd.analyses.forced.level_values import LevelValue
 from upd.analyses.forced.paths import respond
 from upd.analyses.forced.plan import MARCH_SAMPLES
-from upd.analyses.forced.spring_march import SpringMarch, spring_march, state_of
-from upd.analyses.forced.sweeps import make_springs
+from upd.analyses.forced.spring_march import (
+    SpringMarch,
+    make_springs,
+    spring_march,
+    state_at,
+)
 from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_settle import SteadyPoint, settle
 from upd.hbm.interface_state import InterfaceState
@@ -121,10 +123,9 @@ def explicitly(name: str, built: Rig, full: ExplicitMarch, ratio: float, f: floa
     if missed:
         found, *_ = full.steady(f, force, full.at(springs, state, force), step=0.5 * STEP)
         change = (1.0 + finer[0][2] / 100.0) / (1.0 + off / 100.0)
-        left = bound([LevelValue("", "", "", MARCH_SAMPLES / steps[0], change, 0.0)])[0]
         closer = (
             f"explicit with half its step {100 * (abs(found[RIGHT]) / truth - 1):+.4f}, "
-            f"a run tells {100 * left:.2f} % from {steps[0]} steps; "
+            f"{steps[0]} steps change it by {100 * (change - 1):+.2f} %; "
         )
     more = spring_march(built.model, built.plan.scene.excitation.damping, MODES, 1)
     same = with_more_modes(full, springs, more, state, force)
@@ -203,7 +204,8 @@ def balanced(name: str, built: Rig, ratio: float) -> Iterator[Row]:
                 continue
             i = int(at[0])
             here = float(answer.amplitude(model.row("right"))[i])
-            one = settled(springs, f, force, state_of(springs, model, answer, i, force))
+            state = state_at(springs, model, answer.balance, answer.x[i], f, force)
+            one = settled(springs, f, force, state)
             there = abs(one.first_harmonic[RIGHT])
             off[h] = float(100.0 * (here / there - 1.0))
             rest[h] = float(100.0 * (there / fresh - 1.0))

@@ -7,22 +7,21 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs import SET_LINES, state_of
 
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.excitation import Excitation, excitation_of
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
 from upd.analyses.forced.linear_peaks import linear_peaks
 from upd.analyses.forced.march_modes import linear_curves
 from upd.analyses.forced.measures import Array, ComplexArray
+from upd.analyses.forced.mode_peaks import tell_stuck_peaks
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import respond
-from upd.analyses.forced.performance import follow_peaks
+from upd.analyses.forced.performance import peaks_at
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import tell_stuck_peaks
-from upd.analyses.forced.solve import linear_limits_of
-from upd.analyses.forced.spring_march import spring_march, state_of
+from upd.analyses.forced.spring_march import spring_march
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
@@ -37,6 +36,7 @@ from upd.scene.forced import ExcitationChoice, HarmonicForce
 from upd.scene.forced_contact import SIDES
 
 SCENE = [
+    *SET_LINES,
     "mesh.element=hex8i",
     "contact.static=frictionless",
     'contact.stiffness=["thesis"]',
@@ -149,23 +149,17 @@ def test_the_second_harmonic_is_the_first_of_twice_the_frequency() -> None:
     assert tops[1] == pytest.approx(tops[0], rel=1e-6)
 
 
-def curve_of(model: Model, found: FrequencyResponse, force: float) -> ForcedCurve:
-    H = {side: measures.accelerance(found, model.row(side), force) for side in SIDES}
-    return ForcedCurve("thesis", 350.0 / force, force, found, H, 0.0)
-
-
-def test_a_followed_peak_is_in_the_harmonic_that_is_read() -> None:
+def test_a_peak_of_a_whole_curve_is_in_the_harmonic_that_is_read() -> None:
     plan, tops = rig()[0], []
-    ratios = replace(plan.scene.performance, lowest=1e5, highest=1e6, points=3)
     for k in (1, 2):
         swept = replace(plan.scene.excitation, start=380.0 / k, stop=480.0 / k)
-        mine = replace(plan, scene=replace(plan.scene, performance=ratios, excitation=swept))
+        mine = replace(plan, scene=replace(plan.scene, excitation=swept))
         model = excited(*(replace(one, harmonic=k) for one in (ONE, OTHER)))
-        found = answer(model, F / k)
-        limits = linear_limits_of(mine, model, found, STUCK)
-        (branch,) = follow_peaks(mine, model, curve_of(model, found, STUCK), limits).branches
-        assert branch.complete
-        tops.append([*branch.height, *(k * branch.frequency)])
+        found = peaks_at(mine, model, 1e5, 3)
+        assert found.arrived
+        right = [one for one in found.peaks if one.blade == "right"]
+        tops.append([v for one in right for v in (one.height, k * one.frequency)])
+    assert len(tops[0]) == 2
     assert tops[1] == pytest.approx(tops[0], rel=1e-7)
 
 

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from rigs import LINES
 from scipy.linalg import eigh
 
 from upd.analyses import make_plan
 from upd.analyses.forced.gauss_points import GaussRule, fewer_points, gauss_points
 from upd.analyses.forced.measures import stuck_modes
-from upd.analyses.forced.merged_points import fewer_gauss
-from upd.analyses.forced.model import Model, make_model
+from upd.analyses.forced.model import Model, make_model, preloaded
+from upd.analyses.forced.moved_points import moved
 from upd.analyses.forced.points import FacePoints
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import make_bodies
@@ -146,6 +146,7 @@ def test_a_mirror_image_makes_the_whole_body() -> None:
 
 
 SMALL = {
+    **LINES,
     "want": ["response"],
     "mesh.element": "hex8i",
     "geometry.refine": 0.5,
@@ -182,20 +183,36 @@ def test_half_a_rig_is_the_even_part_of_the_whole(arrangement: str) -> None:
     assert full.contacts.n_point == 2 * half.contacts.n_point
 
 
-def test_a_model_with_fewer_points_is_the_model_of_their_rule() -> None:
-    model, _ = _model("asymmetric", **{"left_out.solve": "no"})
-    direct, mine = _model("asymmetric", **{"left_out.solve": "no", "contact.rows": 2})
-    found = fewer_gauss(model, 2.0 / 3.0)
-    assert found is not None
-    assert found.size == pytest.approx(1.5)
-    assert [m.frequency for m in stuck_modes(found.model, 1500.0)] == pytest.approx(mine, rel=1e-6)
-    assert found.model.contacts.law.k_n.sum() == pytest.approx(direct.contacts.law.k_n.sum())
+def test_points_on_half_of_each_face_are_the_model_of_a_smaller_patch() -> None:
+    """The same stiffness and forces nearer to the middle: it stays, and what is uneven halves."""
+    model, own = _model("symmetric", **{"left_out.solve": "no"})
+    same, half = moved(model, 1.0), moved(model, 0.5)
+    assert same is not None and half is not None and model.state is not None
+    assert same.contacts.rows == pytest.approx(model.contacts.rows, abs=1e-12)
+    assert half.contacts.law.k_t == pytest.approx(model.contacts.law.k_t)
+    for k, side in enumerate(("left", "right")):
+        on, up = model.face == k, model.faces[side].frame[2]
+        was, now = (m.faces[side].position @ up for m in (model, half))
+        middle = model.faces[side].weight @ was
+        assert now - middle == pytest.approx(0.5 * (was - middle))
+        # a rigid motion of the damper moves each point as its own place moves
+        middle = model.faces[side].weight @ model.damper_rows[on].reshape(on.sum(), -1)
+        uneven = [m.damper_rows[on].reshape(on.sum(), -1) - middle for m in (model, half)]
+        along = model.faces[side].position @ model.faces[side].frame[1]
+        pairs = [np.flatnonzero(np.isclose(along, one)) for one in np.unique(np.round(along, 6))]
+        for mine in pairs:
+            ends = [u[mine] - u[mine].mean(axis=0) for u in uneven]
+            assert ends[1] == pytest.approx(0.5 * ends[0], abs=1e-12 * np.abs(ends[0]).max())
     # the static forces still hold the damper
-    law = found.model.contacts.law
-    N, T = law.preload, found.model.traction[:, -1]
-    held = found.model.damper_rows[:, 0].T @ N + found.model.damper_rows[:, -1].T @ T
+    found = preloaded(half, model.state)
+    N, T = found.contacts.law.preload, found.traction[:, -1]
+    held = found.damper_rows[:, 0].T @ N + found.damper_rows[:, -1].T @ T
     assert held == pytest.approx(model.damper.force, abs=1e-6 * np.abs(model.damper.force).max())
-    assert fewer_gauss(replace(direct), 0.5) is None
+    # less tilt stiffness: the stuck modes are lower
+    lower = [m.frequency for m in stuck_modes(half, 1500.0)]
+    assert all(a < b for a, b in zip(lower[:2], own[:2], strict=True))
+    one_row, _ = _model("symmetric", **{"left_out.solve": "no", "contact.rows": 1})
+    assert moved(one_row, 0.5) is None
 
 
 @pytest.mark.parametrize(

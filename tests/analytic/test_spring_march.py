@@ -1,4 +1,4 @@
-"""Sweeps of the spring model by time march, against linear answers, the balance, another march."""
+"""The spring model by time integration: linear answers, the balance, another integration."""
 
 import importlib.util
 import sys
@@ -9,48 +9,38 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs import LINES, state_of
 
 from upd.analyses import forced, make_plan
-from upd.analyses.forced import sweeps
+from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.march_modes import stuck_modes_of
-from upd.analyses.forced.mode_peaks import ModePeak, stuck_motion
-from upd.analyses.forced.ranges import alike, peak_ranges
-from upd.analyses.forced.read_points import ends, read_points, settle_read, wanders
+from upd.analyses.forced.mode_peaks import stuck_motion
 from upd.analyses.forced.solution import ForcedSolution
-from upd.analyses.forced.spring_march import spring_march, state_of
-from upd.analyses.forced.sweeps import (
-    SweepJob,
-    both_ways,
-    make_springs,
-    march_sweep,
-    sweep_maxima,
-)
-from upd.errors import ConvergenceError, InputError
-from upd.hbm import refined_sweep as refined_sweep_module
+from upd.analyses.forced.spring_march import make_springs, spring_march
+from upd.analyses.forced.sweeps import both_ways, sweep_maxima
+from upd.errors import InputError
 from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_settle import settle
+from upd.hbm.interface_sweep import stepped_sine
 from upd.hbm.march import steady_state
-from upd.hbm.refined_sweep import LOOK, WATCHED, march_on, refined_sweep
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 from upd.scene.forced_contact import SIDES
 
 #: the pads' response at F_C/F_E 194 around its out-of-phase peak, which bends back
-SCENE = [
-    "mesh.element=hex8i",
-    "contact.static=frictionless",
-    'contact.stiffness=["thesis"]',
-    "contact.columns=1",
-    "reduction.modes=4",
-    "balance.harmonics=3",
-    "balance.method=auto",
-    "excitation.points=30",
-    "excitation.start=415 Hz",
-    "excitation.stop=445 Hz",
-    "excitation.centrifugal_to_force=[194.0]",
-    'want=["response"]',
-    "left_out.solve=no",
-]
+SCENE = LINES | {
+    "mesh.element": "hex8i",
+    "contact.stiffness": ["thesis"],
+    "contact.columns": 1,
+    "reduction.modes": 4,
+    "balance.harmonics": 3,
+    "excitation.points": 30,
+    "excitation.start": "415 Hz",
+    "excitation.stop": "445 Hz",
+    "excitation.centrifugal_to_force": [194.0],
+    "want": ["response"],
+    "left_out.solve": "no",
+}
 RIGHT = SIDES.index("right")
 
 
@@ -113,19 +103,28 @@ def test_a_period_from_the_balances_motion_repeats_it(solution: ForcedSolution) 
         assert off < max(1e-3, curve.answer.truncation[i])
 
 
-def test_sweeps_jump_where_the_curve_folds(solution: ForcedSolution) -> None:
-    up, down = solution.sweeps
+@pytest.fixture(scope="module")
+def swept() -> ForcedSolution:
+    """The same by sweeps."""
+    plan = make_plan(load_scene("asymmetric-response", SCENE | {"balance.method": "march"}))
+    found: Any = forced.ANALYSIS.solve(plan, Stages(silent))
+    return found  # type: ignore[no-any-return]
+
+
+def test_sweeps_jump_where_the_curve_folds(solution: ForcedSolution, swept: ForcedSolution) -> None:
+    up, down = swept.sweeps
     assert (up.way, down.way) == ("up", "down")
     assert up.found.status != "stopped" != down.found.status
     # the peak bends back: falling, the high motion lasts to lower frequencies
     tops = [s.peaks["right"][-1] for s in (up, down)]
     assert tops[1].height > 1.1 * tops[0].height
     assert tops[1].frequency < tops[0].frequency - 1.0
-    fold = down.found.frequency[list(down.found.jumps)]
-    assert (np.abs(fold - tops[1].frequency) < 1.0).any()
-    told = peak_ranges(solution, "thesis", 194.0)[2]
-    assert not told.single
-    assert told.ends("height") == pytest.approx((tops[0].height, tops[1].height))
+    size = np.abs(down.accelerance["right"])
+    fold = down.frequency[np.flatnonzero(size[1:] < 0.5 * size[:-1])]
+    assert (np.abs(fold - tops[1].frequency) < 1.1).any()
+    # the balance tells where, and a sweep of 1 Hz steps stops short of it
+    (curve,) = solution.curves
+    assert min(abs(f.frequency - fold[0]) for f in curve.folds if not f.up) < 1.1
 
 
 def test_another_march_settles_at_the_same_motion(solution: ForcedSolution) -> None:
@@ -139,12 +138,13 @@ def test_another_march_settles_at_the_same_motion(solution: ForcedSolution) -> N
     f = float(a.frequency[i])
     other = steady_state(a.balance, f, a.x[i], steps=512, tolerance=1e-5)
     assert other.status == "periodic"
-    start = state_of(springs, model, a, i, curve.force)
-    mine = march_sweep(springs.march, np.array([f]), curve.force, start)
-    assert abs(mine.amplitude[0, RIGHT]) == pytest.approx(
+    at = state_of(springs, model, a, i, curve.force)
+    march = InterfaceMarch(springs.march, f, [curve.force], 128, by_coulomb)
+    mine = settle(march, at, 1e-3, 700)
+    assert abs(mine.first_harmonic[RIGHT]) == pytest.approx(
         other.amplitude(model.row("right")), rel=2e-3
     )
-    assert mine.share[0, 1] < 1.0
+    assert mine.last.counts[1] < 1.0
 
 
 @pytest.fixture(scope="module")
@@ -176,108 +176,21 @@ def test_an_explicit_march_of_all_modes_stays_at_the_motion(
     assert abs(mine.first_harmonic[RIGHT]) == pytest.approx(abs(found[RIGHT]), rel=2e-3)
 
 
-def test_a_sweep_looks_closer_only_where_it_changes(solution: ForcedSolution) -> None:
+def test_a_sweep_without_slip_is_the_linear_answer(solution: ForcedSolution) -> None:
     springs = make_springs(solution.plan, solution.models["thesis"])
     f = np.linspace(415.0, 425.0, 4)
-    flat = refined_sweep(
-        springs.march, f, [1e-3], springs.at_rest(), watched=[RIGHT], least_step=0.2
-    )
-    # nothing slips at so small a force: the linear answer, at what was asked for and between
+    flat = stepped_sine(springs.march, f, [1e-3], springs.at_rest(), tolerance=1e-4)
     assert flat.status == "settled"
-    assert set(f) <= set(flat.frequency)
     wanted = springs.march.linear_response(flat.frequency, [1e-3], stuck=True)
     assert np.abs(flat.amplitude[:, :2]) == pytest.approx(np.abs(wanted[:, :2]), rel=2e-3)
-    change = np.abs(np.diff(flat.amplitude[:, RIGHT]))
-    assert (change <= 0.15 * np.abs(flat.amplitude[:, RIGHT]).max()).all()
-    assert flat.jumps == ()
-
-
-def test_a_point_marched_on_is_the_steady_one(solution: ForcedSolution) -> None:
-    springs = make_springs(solution.plan, solution.models["thesis"])
-    f, watched = np.linspace(425.0, 435.0, 3), {"watched": [RIGHT], "least_step": 1.0}
-    short = refined_sweep(springs.march, f, [1e-3], springs.at_rest(), most_periods=24, **watched)
-    at = int(np.abs(short.amplitude[:, RIGHT]).argmax())
-    assert not short.settled[at]
-    found = march_on(short, at, **watched)
-    wanted = springs.march.linear_response(short.frequency[[at]], [1e-3], stuck=True)
-    assert found.settled[at]
-    assert np.abs(found.amplitude[at, :2]) == pytest.approx(np.abs(wanted[0, :2]), rel=2e-3)
-    assert np.abs(short.amplitude[at, RIGHT]) < 0.9 * np.abs(wanted[0, RIGHT])
-    others = np.arange(len(short.frequency)) != at
-    assert (found.amplitude[others] == short.amplitude[others]).all()
-    missed = (~short.settled).sum() - 1
-    assert found.message == f"{missed} of {len(short.frequency)} frequencies did not settle"
-
-
-def test_a_motion_that_does_not_settle_is_told_by_its_range(
-    solution: ForcedSolution, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    springs = make_springs(solution.plan, solution.models["thesis"])
-    watched = {"watched": [RIGHT], "least_step": 1.0}
-    short = refined_sweep(
-        springs.march, [430.0], [1e-3], springs.at_rest(), most_periods=24, **watched
-    )
-    # so short that the motion still beats, which is the range it is seen to wander in
-    found = march_on(short, 0, most_periods=24, accelerate=False, **watched)
-    assert not found.settled[0]
-    assert found.periods[0] == short.periods[0] + 24 + WATCHED // LOOK * LOOK
-    monkeypatch.setattr(refined_sweep_module, "WATCHED", 2 * LOOK)
-    first = march_on(short, 0, most_periods=24, accelerate=False, **watched)
-    # of every one of its periods
-    march = InterfaceMarch(springs.march, 430.0, [1e-3], short.samples)
-    state = short.starts[0].copy()
-    settle(march, state, 1e-3, 24)
-    heights = [abs(settle(march, state, 1e-3, 1).first_harmonic[RIGHT]) for _ in range(2 * LOOK)]
-    assert first.lowest[0, RIGHT] == pytest.approx(min(heights), rel=1e-9)
-    assert first.highest[0, RIGHT] == pytest.approx(max(heights), rel=1e-9)
-    assert found.lowest[0, RIGHT] <= first.lowest[0, RIGHT]
-    assert found.highest[0, RIGHT] >= first.highest[0, RIGHT]
-    assert found.lowest[0, RIGHT] < 0.9 * found.highest[0, RIGHT]
-    assert found.lowest[0, RIGHT] <= abs(found.amplitude[0, RIGHT]) <= found.highest[0, RIGHT]
-
-
-def test_what_is_read_from_a_sweep_settles(solution: ForcedSolution) -> None:
-    """Of a sweep that goes on after too few periods, its highest point is one that lasts."""
-    springs, plan = make_springs(solution.plan, solution.models["thesis"]), solution.plan
-    f = np.linspace(420.0, 440.0, 5)
-    job = SweepJob("thesis", 194.0, springs.march, f, springs.at_rest(), least=0.1, most_periods=24)
-    short, _ = both_ways(plan, job)
-    assert wanders(short)
-    found = settle_read(plan, job, short)
-    assert not wanders(found)
-    for at in read_points(found):
-        assert found.found.settled[at]
-        truth = march_sweep(
-            springs.march, found.frequency[[at]], found.force, short.found.starts[at]
-        )
-        height = abs(found.accelerance["right"][at])
-        assert abs(found.found.amplitude[at, RIGHT]) == pytest.approx(
-            abs(truth.amplitude[0, RIGHT]), rel=2e-3
-        )
-        assert ends(found, at, height) == (height, height)
-    lost = [abs(one.accelerance["right"]).max() for one in (short, found)]
-    assert lost[0] != pytest.approx(lost[1], rel=1e-2)
-
-
-@pytest.mark.parametrize("f", [[], [430.0, 420.0, 440.0], [-1.0, 2.0]])
-def test_frequencies_have_one_direction(solution: ForcedSolution, f: list[float]) -> None:
-    springs = make_springs(solution.plan, solution.models["thesis"])
-    with pytest.raises(InputError, match="rise, or fall"):
-        refined_sweep(springs.march, f, [1.0], springs.at_rest(), watched=[0], least_step=0.2)
-
-
-def test_a_peak_whose_march_fails_is_not_confirmed(
-    solution: ForcedSolution, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fail(*args: Any, **named: Any) -> Any:
-        raise ConvergenceError("no answer")
-
-    monkeypatch.setattr(sweeps, "settle", fail)
-    model, curve = solution.models["thesis"], solution.curves[0]
-    springs, peak = make_springs(solution.plan, model), solution.numbered_peaks(curve)[0]
-    one = sweeps.confirm(springs, model, curve, peak)
-    assert not one.settled
-    assert one.difference == float("inf")
+    # what a period is marched again from
+    assert flat.harmonics.shape == (4, 1, flat.amplitude.shape[1])
+    assert flat.harmonics[:, 0] == pytest.approx(flat.amplitude)
+    again = flat.starts[2].copy()
+    out = InterfaceMarch(flat.model, f[2], flat.drive, flat.samples).period(again).output
+    n = flat.samples
+    z = 2.0 / n * np.exp(-2j * np.pi * np.arange(1, n + 1) / n) @ out
+    assert z[:2] == pytest.approx(flat.amplitude[2, :2], rel=1e-3)
 
 
 def test_samples_of_the_scene_are_the_steps_of_its_marches(
@@ -294,34 +207,27 @@ def test_samples_of_the_scene_are_the_steps_of_its_marches(
     curve = solution.curves[0]
     for given, steps in (("auto", 128), (64, 64), (200, 200)):
         scene = solution.plan.scene
-        plan = replace(
-            solution.plan, scene=replace(scene, balance=replace(scene.balance, samples=given))
-        )
+        balance = replace(scene.balance, samples=given)
+        excitation = replace(scene.excitation, points=10, stop=416.0)
+        plan = replace(solution.plan, scene=replace(scene, balance=balance, excitation=excitation))
         springs = make_springs(plan, solution.models["thesis"])
         # a step in a period of the fastest mode that swings
         assert springs.march.frequency.max() < steps * scene.excitation.start
-        job = sweeps.SweepJob(
-            "thesis", curve.ratio, springs.march, np.array([415.0]), springs.at_rest()
-        )
         counted.clear()
-        up, _ = sweeps.both_ways(plan, job)
+        up, _ = both_ways(plan, "thesis", curve.ratio, springs.march, springs.at_rest())
         assert set(counted) == {steps}
         assert up.found.settled.all()
 
 
-def test_no_maximum_is_read_across_a_jump() -> None:
+def test_maxima_of_a_sweep_are_its_own_points() -> None:
+    """Beside a jump from 3 to 10 the motion at the jump's far end is one, without a parabola."""
     f = np.arange(8.0)
     size = np.array([1.0, 2.0, 3.0, 10.0, 8.0, 7.0, 9.0, 4.0])
-    found = sweep_maxima(f, size, [2])
-    # the ends of the jump, the one below with what it leaves; the other by a parabola
-    assert [round(one.sample) for one in found] == [2, 6, 3]
-    assert found[0].height == 3.0
-    assert found[2].height == 10.0
-    assert 9.0 < found[1].height < 10.1
-
-
-def test_peaks_are_one_within_the_stated_differences() -> None:
-    one = ModePeak(1, 400.0, 100.0, 3, "in phase", 0.9)
-    assert alike(one, one._replace(frequency=400.3, height=100.9))
-    assert not alike(one, one._replace(frequency=400.5))
-    assert not alike(one, one._replace(height=102.0))
+    for way in (1, -1):
+        found = sweep_maxima(f[::way], size[::way])
+        told = [(one.frequency, one.height) for one in found]
+        assert told == [(3.0, 10.0), (6.0, 9.0)][::way]
+        assert [f[::way][one.sample] for one in found] == [one.frequency for one in found]
+    # small ones beside the highest are none
+    assert len(sweep_maxima(f, np.array([1e-9, 2e-9, 1e-9, 3.0, 9.0, 7.0, 5.0, 4.0]))) == 1
+    assert sweep_maxima(f[:2], size[:2]) == []

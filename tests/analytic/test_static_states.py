@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs import LINES
 from scipy.optimize import minimize
 
 from upd.analyses.forced import statics
@@ -33,6 +34,7 @@ from upd.progress import Stages
 from upd.scene import load_scene
 
 CHEAP: dict[str, Any] = {
+    **LINES,
     "contact.stiffness": ["thesis"],
     "mesh.element": "hex8i",
     "contact.rows": 3,

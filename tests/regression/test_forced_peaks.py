@@ -7,10 +7,11 @@ seven or nine harmonics; the tolerance is twice the largest difference between f
 
 import numpy as np
 import pytest
+from rigs import LINES
 
 from upd.analyses.forced.model import Model, make_model
+from upd.analyses.forced.paths import respond
 from upd.analyses.forced.plan import ForcedPlan, make_plan
-from upd.analyses.forced.solve import respond
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import make_bodies
 from upd.progress import Stages
@@ -30,6 +31,7 @@ PEAKS = {
 }
 #: of the model, so that a curve takes a second
 CHEAP = {
+    **LINES,
     "contact.stiffness": ["thesis"],
     "mesh.element": "hex8i",
     "contact.rows": 3,

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs import LINES
 
 import upd
 from upd.analyses import make_plan
@@ -20,6 +21,7 @@ FORCES: list[dict[str, Any]] = [
     {"blade": "left", "amplitude": 0.2, "harmonic": 2},
 ]
 CHEAP: dict[str, Any] = {
+    **LINES,
     "mesh.element": "hex8i",
     "contact.stiffness": ["thesis"],
     "contact.columns": 1,

@@ -10,11 +10,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from rigs import LINES
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.model import Model, make_model
+from upd.analyses.forced.paths import respond
 from upd.analyses.forced.plan import ForcedPlan, make_plan
-from upd.analyses.forced.solve import respond
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.hbm import FrequencyResponse
@@ -29,6 +30,7 @@ BANDS = {
 OPENS = "symmetric-response"
 RATIO = 60.0
 CHEAP = {
+    **LINES,
     "mesh.element": "hex8i",
     "contact.stiffness": ["thesis"],
     "contact.columns": 2,

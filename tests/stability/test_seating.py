@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs import SET_LINES
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
@@ -28,7 +29,7 @@ F_C = 350.0
 
 @cache
 def rig(scene: str, element: str = "hex8i") -> tuple[ForcedPlan, Bodies]:
-    plan: Any = make_plan(load_scene(f"{scene}-response", [f"mesh.element={element}"]))
+    plan: Any = make_plan(load_scene(f"{scene}-response", [*SET_LINES, f"mesh.element={element}"]))
     return plan, make_bodies(plan)
 
 

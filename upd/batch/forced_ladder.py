@@ -137,7 +137,12 @@ def forced_points(scene: ForcedScene, vary: str, levels: Levels = None) -> list[
             StudyPoint(
                 "contacts",
                 label,
-                (*base, ("contact.rows", rows), ("contact.columns", columns)),
+                (
+                    *base,
+                    ("contact.rule", "lines"),
+                    ("contact.rows", rows),
+                    ("contact.columns", columns),
+                ),
             )
             for label, rows, columns in choices
         ]

@@ -29,7 +29,7 @@ from upd.batch.ladder import (
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import ForcedScene
-from upd.scene.forced_contact import SIDES
+from upd.scene.forced_contact import GAUSS, SIDES
 
 #: element -> refinements beside each other: one more of linear elements, which cost less
 _REFINE: Mapping[str, tuple[float, ...]] = {
@@ -81,7 +81,9 @@ def response_mesh_points(scene: ForcedScene, vary: str, levels: Levels = None) -
     known = _NODE_BY_NODE if whole_faces else tuple(_REFINE)
     elements = (scene.mesh.element,) if vary == "mesh" else known
     asked = refinements(levels)
-    base = (*base_settings(scene), *(() if whole_faces else _same_areas(scene)))
+    # Gauss points do not hang on the mesh
+    keeps = whole_faces or scene.contact.rule == GAUSS
+    base = (*base_settings(scene), *(() if keeps else _same_areas(scene)))
     return [
         StudyPoint(
             element,
@@ -154,7 +156,7 @@ def _multiple(count: int, step: int) -> int:
 
 def _notes(scene: ForcedScene) -> Iterator[str]:
     """What the levels set in the scene."""
-    if scene.contact.model != "springs":
+    if scene.contact.model != "springs" or scene.contact.rule == GAUSS:
         return
     told = ", ".join(f"{key} = {value}" for key, value in _same_areas(scene))
     yield (

@@ -41,10 +41,10 @@ def print_result(console: Console, result: RunResult, *, full: bool = False) -> 
     """Print the answer of a run; everything between its verdict and its end when ``full``."""
     told = answer(result, console.width)
     _print_lines(console, told.verdict)
+    if told.has_tables or not full:
+        _print_lines(console, told.numbers)
     if full:
         _print_all(console, result)
-    else:
-        _print_lines(console, told.numbers)
     _print_lines(console, told.end)
 
 

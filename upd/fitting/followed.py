@@ -21,10 +21,9 @@ from numpy.typing import NDArray
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.input_data import DataChange
-from upd.analyses.forced.levels import quiet
 from upd.analyses.forced.mode_peaks import ModePeak, numbered_peaks
 from upd.analyses.forced.model import Model
-from upd.analyses.forced.paths import balance_of, fine_grid, respond
+from upd.analyses.forced.paths import balance_of, fine_grid, quiet, respond
 from upd.analyses.forced.plan import ForcedPlan
 from upd.errors import ConvergenceError
 from upd.hbm import FrequencyResponse, climb

@@ -20,11 +20,10 @@ from upd.analyses.forced.linear_sensitivity import (
     stuck_frequencies,
 )
 from upd.analyses.forced.measures import Unsolved
-from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, unmoved
+from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, tell_stuck_peaks, unmoved
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.paths import balance_of, grid
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import tell_stuck_peaks
 from upd.errors import ConvergenceError
 from upd.fitting.targets import PEAK_NUMBERS, STUCK_MODES, FitTarget
 from upd.hbm.parameter_change import ParameterChange

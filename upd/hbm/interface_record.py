@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from upd.hbm.interface_march import Fallback, InterfaceMarch
 from upd.hbm.interface_state import FloatArray, InterfaceModel, InterfaceState
 from upd.hbm.interface_step import OPEN, SLIP, STICK
-from upd.hbm.refined_sweep import RefinedSweep
+from upd.hbm.interface_sweep import SteppedSine
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def _motion(
     return np.array(out)
 
 
-def period_of_sweep(found: RefinedSweep, point: int, fallback: Fallback | None) -> RecordedPeriod:
+def period_of_sweep(found: SteppedSine, point: int, fallback: Fallback | None) -> RecordedPeriod:
     """The last period at a point of a sweep, marched again.
 
     Twice: the steps then start from the samples of a period before, as those of the sweep did, and
@@ -118,7 +118,7 @@ def period_of_sweep(found: RefinedSweep, point: int, fallback: Fallback | None) 
 
     Parameters
     ----------
-    found : RefinedSweep
+    found : SteppedSine
     point : int
         Its number, from 0.
     fallback : callable or None

@@ -54,6 +54,16 @@ class SteppedSine:
         Steps that the solver behind Newton's had to finish.
     accepted, rejected : (k,) ndarray of int
         Jumps ahead that were kept, and that were taken back.
+    harmonics : (k, h, K) ndarray
+        As `amplitude`, in all harmonics that are excited.
+    model : InterfaceModel
+        What was integrated.
+    drive : (L,) or (L, H) ndarray
+        Its excitation [N].
+    samples : int
+        Steps in a period.
+    starts : tuple of InterfaceState
+        Where the last period at each frequency began; see `upd.hbm.interface_record`.
     seconds : (k,) ndarray
         Wall time.
     state : InterfaceState
@@ -81,6 +91,11 @@ class SteppedSine:
     message: str
     accepted: NDArray[np.int64]
     rejected: NDArray[np.int64]
+    harmonics: ComplexArray
+    model: InterfaceModel
+    drive: ComplexArray
+    samples: int
+    starts: tuple[InterfaceState, ...]
 
 
 def stepped_sine(
@@ -168,4 +183,9 @@ def stepped_sine(
         message or (told if missed else "All frequencies settled."),
         np.array([p.accepted for p in points], int),
         np.array([p.rejected for p in points], int),
+        np.array([p.harmonics for p in points]).reshape((k, -1, K) if k else (0, 1, K)),
+        model,
+        np.asarray(drive, complex),
+        samples,
+        tuple(p.start for p in points),
     )

@@ -1,131 +1,79 @@
-"""Words beside marks: which marks have them, and where they stand so that none covers another.
-
-The page does the same in the browser, where alone the width of a chart is known (``placed`` in
-page.js).
-"""
+"""Words beside marks: which marks have them, and room for them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.plot.chart import Array, Mark
+from upd.plot.chart import Array, Chart
+from upd.plot.style import coordinates, is_log
 
-#: part of the abscissa within which marks are close to each other: of those with the same words
-#: only the highest has them, of the others the highest three
-CLOSE, MOST_CLOSE = 0.03, 3
-
-
-@dataclass(frozen=True)
-class Box:
-    """A rectangle that text covers: its ends along x and y, y upwards."""
-
-    left: float
-    bottom: float
-    right: float
-    top: float
-
-    def covers(self, other: Box) -> bool:
-        """Whether the two have an area in common."""
-        return (
-            self.left < other.right
-            and other.left < self.right
-            and self.bottom < other.top
-            and other.bottom < self.top
-        )
+#: part of the width of a drawing that the words of a mark cover, and of its height that a line of
+#: them takes with its air: "397.4 Hz" in small letters on a phone
+_WIDE, _LINE = 0.19, 0.09
 
 
-def labelled(marks: Sequence[Mark]) -> NDArray[np.bool_]:
+def labelled(chart: Chart) -> NDArray[np.bool_]:
     """Which marks have words beside them, (n,).
 
-    From the highest down: not again the words of a higher mark close by, and not more than three
-    close to each other, for more are not read.
+    From the highest down, those whose words have room beside the words of the higher ones; the
+    page tells the others at the pointer.
     """
-    out = np.zeros(len(marks), bool)
-    taken: list[Mark] = []
-    for k in sorted(range(len(marks)), key=lambda k: -marks[k].y):
-        mark = marks[k]
-        near = [other for other in taken if abs(mark.x - other.x) <= CLOSE * abs(other.x)]
-        words = {other.text for other in near}
-        if mark.text and mark.text not in words and len(near) < MOST_CLOSE:
-            taken.append(mark)
-            out[k] = True
+    x, y, tall = _parts(chart, "x"), _parts(chart, "y"), _heights(chart)
+    shift = {"right": _WIDE / 2, "center": 0.0, "left": -_WIDE / 2}
+    middle = x + [shift[side] for side in sides(chart)]
+    out = np.zeros(len(chart.marks), bool)
+    for k in sorted(range(len(out)), key=lambda k: -y[k] if np.isfinite(y[k]) else np.inf):
+        near = out & (np.abs(middle - middle[k]) < _WIDE) & (np.abs(y - y[k]) < tall[k])
+        out[k] = bool(chart.marks[k].text) and 0.0 <= x[k] <= 1.0 and y[k] >= 0.0 and not near.any()
     return out
 
 
-def placed(at: Array, size: Array, dots: Array, width: float, gap: float) -> list[Box]:
-    """Places of labels that cover neither each other nor a dot.
-
-    Parameters
-    ----------
-    at
-        Points they belong to, (n, 2), from the lower left corner of the drawing.
-    size
-        Width and height of each label, (n, 2).
-    dots
-        Points of all marks, (m, 2), which stay free within half of ``gap``.
-    width
-        Of the drawing: labels stay between its sides where they are not wider than it.
-    gap
-        Between a label and its point.
-
-    Returns
-    -------
-    list of Box
-        One per label. The highest point is served first: above its point, else with an end there,
-        else beside the labels that are in the way, else above them. Labels may reach beyond the
-        upper end of the drawing.
-    """
-    points = [Box(x - gap / 2, y - gap / 2, x + gap / 2, y + gap / 2) for x, y in dots]
-    found: dict[int, Box] = {}
-    for k in sorted(range(len(at)), key=lambda k: -at[k][1]):
-        taken = [*found.values(), *points]
-        found[k] = next(
-            box
-            for box in _places(at[k], size[k], width, gap, list(found.values()), taken)
-            if not any(box.covers(other) for other in taken)
-        )
-    return [found[k] for k in range(len(at))]
+def sides(chart: Chart) -> list[Literal["left", "center", "right"]]:
+    """Where the words of each mark stand above it, (n,): away from the ends of x."""
+    x = _parts(chart, "x")
+    return ["right" if at < _WIDE / 2 else "left" if at > 1.0 - _WIDE / 2 else "center" for at in x]
 
 
-def _places(
-    point: Array,
-    size: Array,
-    width: float,
-    gap: float,
-    labels: Sequence[Box],
-    taken: Sequence[Box],
-) -> Iterator[Box]:
-    """Above a point, with an end of the label at it, beside what is there, then ever higher.
-
-    The last one is free.
-    """
-    (x, y), (wide, tall) = point, size
-    for left in (x - wide / 2, x - wide + gap / 2, x - gap / 2):
-        yield _box(left, y + gap, wide, tall, width)
-    box = _box(x - wide / 2, y + gap, wide, tall, width)
-    for other in sorted(labels, key=lambda o: abs(o.left + o.right - 2.0 * x)):
-        # On the side where the point lies; within the width of a label a line to it is short.
-        is_left = 2.0 * x < other.left + other.right
-        left = other.left - wide - gap / 4 if is_left else other.right + gap / 4
-        if other.covers(box) and x - 2.0 * wide <= left <= x + wide:
-            yield _box(left, y + gap, wide, tall, width)
-    while in_way := [other for other in taken if other.covers(box)]:
-        box = _box(x - wide / 2, max(other.top for other in in_way), wide, tall, width)
-        yield box
+def with_room(chart: Chart) -> Chart:
+    """The chart with room for words above its highest mark, where the end of y is free."""
+    told = labelled(chart)
+    if chart.y.high is not None or not told.any():
+        return chart
+    low, high = _ends(chart, "y")
+    # where the part of the height above a mark is that of its words
+    ends = _parts(chart, "y")[told] / (1.0 - _heights(chart)[told])
+    end = low + (high - low) * max(1.0, float(ends.max()))
+    return replace(chart, y=replace(chart.y, high=10.0**end if _is_log(chart, "y") else end))
 
 
-def is_far(box: Box, point: Array, gap: float) -> bool:
-    """Whether a label needs a line to its point: it stands higher, or beside it."""
-    return bool(
-        box.bottom > point[1] + 1.5 * gap or not box.left - gap <= point[0] <= box.right + gap
-    )
+def _heights(chart: Chart) -> Array:
+    """Parts of the height that the words of the marks take, (n,)."""
+    return np.array([_LINE * (1 + mark.text.count("\n")) for mark in chart.marks])
 
 
-def _box(left: float, bottom: float, wide: float, tall: float, width: float) -> Box:
-    """The box between the sides of the drawing."""
-    left = max(min(left, width - wide), 0.0)
-    return Box(float(left), float(bottom), float(left + wide), float(bottom + tall))
+def _is_log(chart: Chart, name: Literal["x", "y"]) -> bool:
+    return is_log(getattr(chart, name), coordinates(chart, name))
+
+
+def _ends(chart: Chart, name: Literal["x", "y"]) -> tuple[float, float]:
+    """Ends of an axis: those it is given, else those of the data; logarithms on such an axis."""
+    axis, values, log = getattr(chart, name), coordinates(chart, name), _is_log(chart, name)
+    values = values[values > 0.0] if log else values
+    low = values.min() if axis.low is None else axis.low
+    high = values.max() if axis.high is None else axis.high
+    return (float(np.log10(low)), float(np.log10(high))) if log else (float(low), float(high))
+
+
+def _parts(chart: Chart, name: Literal["x", "y"]) -> Array:
+    """Places of the marks along an axis, (n,), from 0 to 1 between its ends; nan for none."""
+    at = np.array([getattr(mark, name) for mark in chart.marks], float)
+    if not at.size:
+        return at
+    low, high = _ends(chart, name)
+    if _is_log(chart, name):
+        at = np.log10(at, out=np.full(len(at), np.nan), where=at > 0.0)
+    return np.asarray((at - low) / (high - low or 1.0))

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Literal
 
 from upd.cache.files import whole_file
 from upd.plot.chart import Array, Axis, Chart
+from upd.plot.labels import with_room
 from upd.plot.style import (
     coordinates,
     is_log,
@@ -64,8 +65,7 @@ def draw(chart: Chart, ax: Axes | None = None) -> Axes:
     from upd.plot import matplotlib_parts as parts
     from upd.plot.sheet import own_axes
 
-    ax = own_axes(ax)
-    others = set(ax.figure.axes)
+    ax, chart = own_axes(ax), with_room(chart)
     _grid(chart, ax)
     parts.draw_maps(chart, ax)
     for area in chart.areas:
@@ -84,8 +84,7 @@ def draw(chart: Chart, ax: Axes | None = None) -> Axes:
     parts.draw_marks(chart.marks, ax)
     if chart.equal:
         ax.set_aspect("equal")
-    bars = [found for found in ax.figure.axes if found not in others]
-    around.draw_legend(chart, legend_names(chart), ax, bars)
+    around.draw_legend(chart, legend_names(chart), ax)
     _titles(chart, ax)
     around.draw_labels(chart, ax)
     return ax
@@ -161,7 +160,12 @@ def _sheet(charts: Sequence[Chart], dpi: int) -> Figure:
         # Wide maps leave no empty place above each other.
         tall = min(tall, max(proportion(chart) for chart in charts) * (wide - _BESIDE) + _ABOVE)
     return draw_sheet(
-        [partial(draw, chart) for chart in charts[:MOST_PANELS]], first.columns, (wide, tall), dpi
+        [partial(draw, chart) for chart in charts[:MOST_PANELS]],
+        first.columns,
+        (wide, tall),
+        dpi,
+        # beside a map stands its colour bar, in a room of its own
+        fixed=any(chart.maps for chart in charts),
     )
 
 

@@ -15,12 +15,15 @@ import numpy as np
 from upd.plot import plotly_parts as parts
 from upd.plot import plotly_places as places
 from upd.plot.chart import Array, Axis, Chart
+from upd.plot.labels import with_room
 from upd.plot.plotly_values import pack
 from upd.plot.style import coordinates, is_log, legend_names, log_ticks, log_view, tick_text
 
 __all__ = ["figure", "pack"]
 
 _GRID = "#e6e6e6"
+#: part of an axis beyond the data, as plotly leaves it
+_AIR = 0.05
 #: letters of an upright axis' name that have room
 _LETTERS = 42
 
@@ -36,9 +39,9 @@ def figure(chart: Chart) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``data`` and ``layout`` of a plotly figure; ``wide``, width over height of the drawing;
-        ``labels``, the marks with their words, for the page to place.
+        ``data`` and ``layout`` of a plotly figure; ``wide``, width over height of the drawing.
     """
+    chart = with_room(chart)
     names = {escape(name) for name in legend_names(chart)}
     data = [
         *places.maps(chart),
@@ -73,7 +76,7 @@ def figure(chart: Chart) -> dict[str, Any]:
     shapes = [shape for band in chart.bands for shape in parts.band(band)] + places.sectors(chart)
     if shapes:
         layout["shapes"] = shapes
-    return {"data": data, "layout": layout, "wide": _wide(chart), "labels": parts.labels(chart)}
+    return {"data": data, "layout": layout, "wide": _wide(chart)}
 
 
 def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[str, Any]:
@@ -100,7 +103,7 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
         # The last word may reach beyond the axis.
         out |= at | {"ticklabeloverflow": "allow"}
     if axis.low is not None or axis.high is not None:
-        out["range"] = [_end(axis.low, log), _end(axis.high, log)]
+        out["range"] = _range(axis, values, log)
     return out | {
         "linecolor": "#999999",
         "ticks": "outside",
@@ -111,14 +114,25 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
     }
 
 
-def _end(value: float | None, log: bool) -> float | None:
-    """End of an axis as plotly takes it.
+def _range(axis: Axis, values: Array, log: bool) -> list[float | None]:
+    """Ends of an axis as plotly takes them: logarithms on a logarithmic one.
 
-    Its logarithm on a logarithmic one, nothing where the data end.
+    Those of the data with their air where none is given, for plotly forgets one that stands alone;
+    nothing without data.
     """
-    if value is None or (log and value <= 0.0):
-        return None
-    return math.log10(value) if log else value
+    seen = np.log10(values[values > 0.0]) if log else values
+    ends: list[float | None] = [
+        None if value is None or (log and value <= 0.0) else math.log10(value) if log else value
+        for value in (axis.low, axis.high)
+    ]
+    if seen.size:
+        known = [
+            end if end is not None else float(f(seen))
+            for end, f in zip(ends, (np.min, np.max), strict=True)
+        ]
+        air = _AIR * (known[1] - known[0])
+        ends = [known[0] - air * (ends[0] is None), known[1] + air * (ends[1] is None)]
+    return ends
 
 
 def _wide(chart: Chart) -> float:

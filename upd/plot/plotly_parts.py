@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from upd.plot.chart import Area, Band, Chart, Mark, Trace
-from upd.plot.labels import labelled
+from upd.plot.labels import labelled, sides
 from upd.plot.plotly_values import hover, numbers, template, unit
 from upd.plot.style import (
     PART_COLOURS,
@@ -33,6 +33,8 @@ _MARKER: dict[str, dict[str, Any]] = {
 }
 #: letters of a line beside a bar
 _WORDS = 20
+#: pixels of the letters beside a mark
+_LETTERS = 11
 
 
 def trace(chart: Chart, t: Trace) -> dict[str, Any]:
@@ -60,41 +62,30 @@ def trace(chart: Chart, t: Trace) -> dict[str, Any]:
 
 
 def marks(chart: Chart) -> list[dict[str, Any]]:
-    """Dots, one trace per colour, with their words at the pointer."""
-    groups: dict[str, list[Mark]] = {}
-    for mark in chart.marks:
-        groups.setdefault(colour_of(mark), []).append(mark)
+    """Dots, one trace per colour, with their words at the pointer and, where there is room, above.
+
+    A mark without a place on its axes is left out by plotly itself.
+    """
+    groups: dict[str, list[tuple[Mark, bool, str]]] = {}
+    for mark, told, side in zip(chart.marks, labelled(chart), sides(chart), strict=True):
+        groups.setdefault(colour_of(mark), []).append((mark, bool(told), side))
     return [
         {
             "type": "scatter",
-            "mode": "markers",
+            "mode": "markers+text",
             "name": "",
             "showlegend": False,
-            "x": numbers([m.x for m in found]),
-            "y": numbers([m.y for m in found]),
-            "customdata": [_lines(m.text) for m in found],
+            "x": numbers([m.x for m, *_ in found]),
+            "y": numbers([m.y for m, *_ in found]),
+            "customdata": [_lines(m.text) for m, *_ in found],
+            "text": [_lines(m.text) if told else "" for m, told, _ in found],
+            "textposition": [f"top {side}" for *_, side in found],
+            "textfont": {"color": colour, "size": _LETTERS},
             "hovertemplate": hover(chart, value="<br>%{customdata}"),
             "marker": {"color": colour, "size": 6},
             "zorder": 2,
         }
         for colour, found in groups.items()
-    ]
-
-
-def labels(chart: Chart) -> list[dict[str, Any]]:
-    """Every mark with its words, none where it has no label.
-
-    The page places them when it knows its width.
-    """
-    return [
-        {
-            "x": float(mark.x),
-            "y": float(mark.y),
-            "text": _lines(mark.text) if told else "",
-            "color": colour_of(mark),
-        }
-        for mark, told in zip(chart.marks, labelled(chart.marks), strict=True)
-        if np.isfinite([mark.x, mark.y]).all()
     ]
 
 

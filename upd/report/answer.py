@@ -1,6 +1,7 @@
-"""The answer of a run in at most 40 lines, the same in the terminal and in `print(result)`.
+"""The answer of a run, the same in the terminal and in `print(result)`.
 
-Verdict, main numbers, checks, cost, files, warnings.
+Verdict, main numbers, checks, cost, files, warnings: the tables of its analysis whole, or at most
+40 lines where that gives none.
 """
 
 from __future__ import annotations
@@ -17,9 +18,18 @@ from upd.analyses.base import CHOSEN_BY_ACCURACY
 from upd.labels import check_number, number, number_label, percent, plus_minus, shown, unit_label
 from upd.plot.chart import Entry
 from upd.report import generic
-from upd.report.columns import TextColumn, fitted, folded_head, text_lines, text_width
+from upd.report.columns import (
+    TextColumn,
+    fitted,
+    folded_head,
+    text_lines,
+    text_width,
+    whole_table,
+)
 from upd.report.error_budget import budget_line
+from upd.report.notes import MOST_NOTES, short_notes
 from upd.results import FAILED, WARNED, Check, Result, warning_details, worst_check
+from upd.results.answer_table import AnswerTable
 
 #: lines that fit on a screen
 LINES = 40
@@ -93,11 +103,14 @@ class RunAnswer:
         Main numbers.
     end
         Checks, cost, files, and at last what warns.
+    has_tables
+        Whether the numbers are tables of the analysis.
     """
 
     verdict: tuple[AnswerLine, ...]
     numbers: tuple[AnswerLine, ...]
     end: tuple[AnswerLine, ...]
+    has_tables: bool = False
 
     @property
     def lines(self) -> tuple[AnswerLine, ...]:
@@ -111,9 +124,13 @@ def as_text(result: Told) -> str:
 
 
 def answer(result: Told, width: int) -> RunAnswer:
-    """The answer of a run, at most 40 lines of ``width`` characters (paths may be longer)."""
+    """The answer of a run in lines of ``width`` characters (paths may be longer)."""
     entries: list[Entry] = [r.as_dict() for r in result.results]
     first = _verdict(result, entries, width)
+    tables = answer_tables(result.size, entries)
+    if tables:
+        numbers = tuple(line for table in tables for line in _whole(table, width))
+        return RunAnswer(first, numbers, _end_of_tables(result, entries, width), has_tables=True)
     end = _end(result, width)
     # what warns must not take the place of the numbers
     left = LINES - len(first) - len(end) - 1
@@ -125,6 +142,23 @@ def answer(result: Told, width: int) -> RunAnswer:
         # below the line between, where there is room; the page has it always
         end = (*end[:1], *budget, *end[1:])
     return RunAnswer(first, numbers, (*end, *warns))
+
+
+def answer_tables(size: Mapping[str, Any], entries: Sequence[Entry]) -> list[AnswerTable]:
+    """The tables that are the answer, as the analysis of a run gives them; none where it gives none
+    or they have no rows.
+
+    Parameters
+    ----------
+    size
+        Of the run: it names the analysis.
+    entries
+        Numbers as summary.json has them.
+    """
+    analysis = analysis_named(str(size.get("analysis", "")))
+    if analysis is None or analysis.answer is None:
+        return []
+    return [table for table in analysis.answer(entries) if table.rows]
 
 
 def headline(result: Told, entries: Sequence[Entry]) -> list[Entry]:
@@ -167,6 +201,30 @@ def _most_important(result: Told, entries: Sequence[Entry]) -> Entry | None:
             if entry["name"] == name:
                 return entry
     return next((e for e in headline(result, entries) if not e.get("withheld")), None)
+
+
+def _whole(table: AnswerTable, width: int) -> list[AnswerLine]:
+    """A table with its heading and its note."""
+    lines = [AnswerLine(""), AnswerLine(table.heading, TITLE)]
+    lines += map(AnswerLine, whole_table(table, width))
+    return [*lines, *map(AnswerLine, _wrapped(table.note, width, None))]
+
+
+def _end_of_tables(result: Told, entries: Sequence[Entry], width: int) -> tuple[AnswerLine, ...]:
+    """Checks, cost, files and the first notes: what warns does not displace a table."""
+    good = sum(check.passed for check in result.checks)
+    lines = [AnswerLine(""), AnswerLine(f"Checks: {good} of {len(result.checks)} passed.")]
+    lines += _cost_and_files(result, width)
+    if result.outcome == FAILED:
+        return tuple(lines)
+    notes = [*result.faults, *short_notes((c.as_dict() for c in result.checks), entries)]
+    for note in notes[:MOST_NOTES]:
+        lines += (AnswerLine(line, WARNED) for line in _wrapped(f"Warning: {note}", width, None))
+    if (left := len(notes) - MOST_NOTES) > 0:
+        told = "1 more note is" if left == 1 else f"{left} more notes are"
+        where = "on the page" if _page(result) else "told by --full"
+        lines.append(AnswerLine(f"{told} {where}.", WARNED))
+    return tuple(lines)
 
 
 def _numbers(
@@ -280,14 +338,23 @@ def _end(result: Told, width: int) -> tuple[AnswerLine, ...]:
     """Levels that were chosen, checks, cost and files."""
     lines = [AnswerLine(""), *map(AnswerLine, _wrapped(_accuracy(result), width))]
     lines += map(AnswerLine, _wrapped(_checked(result), width, 2))
-    if result.cost:
-        lines += map(AnswerLine, _wrapped(_cost(result), width))
+    return (*lines, *_cost_and_files(result, width))
+
+
+def _cost_and_files(result: Told, width: int) -> list[AnswerLine]:
+    """Seconds and sizes, the run folder, its page."""
+    lines = [AnswerLine(line) for line in _wrapped(_cost(result) if result.cost else "", width)]
     if result.folder is not None:
         lines.append(AnswerLine(f"Run folder: {result.folder}"))
-        page = result.folder / "report.html"
-        if page.is_file():
-            lines.append(AnswerLine(f"Report: {page}"))
-    return tuple(lines)
+    if page := _page(result):
+        lines.append(AnswerLine(f"Report: {page}"))
+    return lines
+
+
+def _page(result: Told) -> Path | None:
+    """The page of the run, where there is one."""
+    page = result.folder / "report.html" if result.folder is not None else None
+    return page if page is not None and page.is_file() else None
 
 
 def _accuracy(result: Told) -> str:
@@ -332,8 +399,8 @@ def _shared(wanted: Sequence[int], room: int) -> list[int]:
     return [min(lines, most) for lines in wanted]
 
 
-def _wrapped(text: str, width: int, most: int = _TEXT_LINES) -> list[str]:
-    """A text on at most so many lines; the page has the rest."""
+def _wrapped(text: str, width: int, most: int | None = _TEXT_LINES) -> list[str]:
+    """A text on at most so many lines, all it needs where None; the page has the rest."""
     wrapper = textwrap.TextWrapper(
         width,
         subsequent_indent=_INDENT,

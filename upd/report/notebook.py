@@ -6,7 +6,7 @@ Text, table, figure of the main curves, xarray.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
 from importlib import import_module
@@ -19,10 +19,11 @@ from upd.analyses import analysis_named
 from upd.errors import ConvergenceError, InputError
 from upd.labels import number, number_label, percent, plus_minus, shown, unit_label
 from upd.report import generic
-from upd.report.answer import as_text
+from upd.report.answer import answer_tables, as_text
 from upd.report.answer import headline as main_numbers
 from upd.report.error_budget import budget_charts
 from upd.results import FAILED, OK, WARNED, Case, Check, Result, outcome_of
+from upd.results.answer_table import AnswerTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -150,6 +151,21 @@ class RunResult:
 def as_html(result: RunResult) -> str:
     """The same as a table; every text is escaped."""
     colour = {OK: "#1a7f37", FAILED: "#b42318"}.get(result.outcome, "#9a6700")
+    tables = answer_tables(result.size, [r.as_dict() for r in result.results])
+    told = "".join(map(_table_html, tables)) or _headline_html(result)
+    if tables and result.outcome == WARNED:
+        # What warns is no part of the answer.
+        result = replace(result, status=WARNED)
+    return (
+        f"<div><b>{escape(result.title or result.scene)}</b><br><span "
+        f"style='color:{colour}'>{escape(verdict(result))}</span>{told}"
+        f"<small>{len(result.results)} numbers, {len(result.arrays)} groups of "
+        f"arrays{escape(_place(result))}</small></div>"
+    )
+
+
+def _headline_html(result: RunResult) -> str:
+    """The main numbers as a table."""
     lines = [
         f"<tr><td style='text-align:left'>{escape(number_label(r['name']))}</td><td "
         f"style='text-align:left'>{escape(r['case'])}</td>"
@@ -159,12 +175,24 @@ def as_html(result: RunResult) -> str:
         for r in headline(result)
     ]
     head = "".join(f"<th>{h}</th>" for h in ("number", "case", "value", "reference", "difference"))
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+
+
+def _table_html(table: AnswerTable) -> str:
+    """A table of the answer with its heading and its note."""
+    sides = ["right" if head.startswith("#") else "left" for head in table.columns]
+
+    def row(kind: str, cells: Sequence[str]) -> str:
+        found = zip(sides, cells, strict=True)
+        made = (f"<{kind} style='text-align:{side}'>{escape(c)}</{kind}>" for side, c in found)
+        return f"<tr>{''.join(made)}</tr>"
+
+    head = row("th", [head.lstrip("# ") for head in table.columns])
+    rows = "".join(row("td", cells) for cells in table.rows)
+    note = f"<small>{escape(table.note)}</small><br>" if table.note else ""
     return (
-        f"<div><b>{escape(result.title or result.scene)}</b><br><span "
-        f"style='color:{colour}'>{escape(verdict(result))}</span>"
-        f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
-        f"<small>{len(result.results)} numbers, {len(result.arrays)} groups of "
-        f"arrays{escape(_place(result))}</small></div>"
+        f"<p><b>{escape(table.heading)}</b></p><table><thead>{head}</thead>"
+        f"<tbody>{rows}</tbody></table>{note}"
     )
 
 

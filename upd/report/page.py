@@ -31,8 +31,10 @@ from upd.labels import (
 from upd.plot.chart import Entry
 from upd.plot.png import png_uri
 from upd.report import generic
+from upd.report.answer import answer_tables
 from upd.report.error_budget import budget_rows
 from upd.report.folder import RunFolder, read_run
+from upd.report.notes import MOST_NOTES, short_notes
 from upd.report.panels import Panel, charts_of, data, run_panels
 from upd.report.scene_sentences import sentences
 from upd.report.study import study_panels
@@ -43,6 +45,8 @@ from upd.results import FAILED, outcome_of, worst_checks
 if TYPE_CHECKING:
     from jinja2 import Environment
 
+#: figures beside the tables of an answer; the others are folded
+_OPENED = 2
 #: a page stays below this
 LIMIT_BYTES = 6_000_000
 #: markup, tables and rounding of the estimate of what is packed
@@ -186,6 +190,10 @@ def run_context(run: RunFolder) -> dict[str, Any]:
         "title": run.summary["title"] or run.summary["scene"],
         "verdict": verdict(run),
         "sentences": sentences(run.summary),
+        "answer": answer_tables(run.summary["size"], rows),
+        "opened": _OPENED,
+        "notes": [*short_notes(run.summary["checks"], rows), *run.missing],
+        "most_notes": MOST_NOTES,
         "headline": main,
         "budget": budget_rows(main),
         "cases": _by_case(rows),

@@ -70,9 +70,8 @@ FORCED_WANTS = {
     "contact_state": "which points stick, slip or lift off, over frequency and at the peak",
     "hysteresis": "loops of the points that dissipate most, energy and power of every point",
     "damper_motion": "the damper's translations and rotations at the peak, static part included",
-    "performance": "peak and its frequency against F_C/F_E, the optimum marked",
-    "spread": "the answer at the peak over the start positions of the sliders",
-    "harmonics": "the peak with 1, 3 and 5 harmonics",
+    "performance": "peaks of both blades against F_C/F_E, the best one marked",
+    "inputs": "what the peaks depend on most: stiffness, patch, friction, static state, fit",
     "band": "every peak over the static states and the start positions of the sliders",
 }
 #: the analysis these scenes ask for
@@ -198,15 +197,14 @@ class ExcitationChoice:
 
 @dataclass(frozen=True)
 class BalanceChoice:
-    """Harmonic balance, and time marches beside it.
+    """Harmonic balance, or time integration in its place.
 
     Attributes
     ----------
     method
-        "balance": harmonic balance along the curve, marches from its maxima, those that they leave
-        told as none; "march": stepped sine by time march, up and down; "auto": the balance, and
-        where points slip or open the sweeps too: peaks that both tell alike are the balance's,
-        others a range. Cost: a sweep takes about a second for every three frequencies.
+        "balance": harmonic balance along the curve, each peak confirmed by time integration;
+        "march": sweeps up and down by time integration, as in an experiment. Cost: a sweep takes
+        about a second for every three frequencies.
     harmonics
         The highest, or "adaptive": as many as every point of a curve needs, 3 of the blades with
         whole faces. Cost: unknowns grow with 2 harmonics + 1, seconds faster.
@@ -221,10 +219,10 @@ class BalanceChoice:
     """
 
     __pydantic_config__ = STRICT
-    method: Literal["balance", "march", "auto"] = "balance"
+    method: Literal["balance", "march"] = "balance"
     harmonics: Annotated[
         Any, BeforeValidator(checked_harmonics), Noted(bounds="1 to 31, or adaptive")
-    ] = 1
+    ] = 7
     samples: Annotated[Any, BeforeValidator(checked_samples), Noted(bounds=">= 8, or auto")] = (
         "auto"
     )
@@ -241,13 +239,17 @@ class PerformanceChoice:
     lowest, highest
         First and last F_C/F_E.
     points
-        F_C/F_E of the curve. Cost: every one is followed about its peak.
+        F_C/F_E of the curve; two more are solved beside the best. Cost: a whole curve each.
+    harmonics
+        The highest of its curves; that of the balance when none. Cost: fewer save most where much
+        slips.
     """
 
     __pydantic_config__ = STRICT
     lowest: Ratio = 5.0
     highest: Ratio = 1000.0
-    points: Annotated[int, at_least(3)] = 15
+    points: Annotated[int, at_least(3)] = 12
+    harmonics: Annotated[int, harmonic_number] | None = None
 
 
 @dataclass(frozen=True)

@@ -81,13 +81,11 @@ def _force_problems(scene: ForcedScene) -> list[str]:
 
 
 def _gauss_problems(scene: ForcedScene) -> list[str]:
-    """What Gauss points are not: lines of a lattice, or points of whole faces or of a law."""
+    """What Gauss points are not: lines of a lattice, or points of a law. Whole faces have none."""
     c = scene.contact
-    if c.rule != GAUSS:
+    if c.rule != GAUSS or c.model != "springs":
         return []
     problems = []
-    if c.model != "springs":
-        problems.append('contact.rule: whole faces have no points; write "lines"')
     if c.share != "area":
         problems.append('contact.share: Gauss points have their own shares; write "area"')
     if not all(isinstance(one, int) for side in SIDES for one in c.lines(side)):
@@ -96,8 +94,8 @@ def _gauss_problems(scene: ForcedScene) -> list[str]:
         )
     problems += [
         f'stiffness.{name}.points: Gauss points are not those of a law; write "lattice"'
-        for name, s in scene.stiffnesses.items()
-        if s.points == "law"
+        for name, s in scene.stiffness.items()
+        if name in c.stiffness and s.points == "law"
     ]
     return problems
 

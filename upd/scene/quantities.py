@@ -109,7 +109,7 @@ class Rule:
         if not self.holds(value):
             raise ValueError(
                 f"{value:g} {self.message}"
-                if isinstance(value, (int, float))
+                if isinstance(value, float) or (isinstance(value, int) and abs(value) < 10**15)
                 else f"{value!r} {self.message}"
             )
         return value

@@ -87,18 +87,6 @@ class Reaches:
 
 
 @dataclass(frozen=True)
-class Verified:
-    """A deciding peak by sweeps up and down: F_C/F_E, its height by the balance, and the heights of
-    the lower and of the higher sweep.
-    """
-
-    ratio: float
-    height: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
 class GridCheck:
     """Worst peaks by a grid of runs.
 
@@ -146,8 +134,6 @@ class ChosenDamper:
         All places of what is chosen beside F_C, in their order.
     robust, nominal : int
         Numbers of the best of them over all ranges, and with the scene's own values.
-    verified : tuple of Verified
-        Deciding peaks swept again.
     refused : tuple of str
         Values that were not solved, with the reason.
     seconds : float
@@ -171,7 +157,6 @@ class ChosenDamper:
     tried: tuple[Tried, ...]
     robust: int
     nominal: int
-    verified: tuple[Verified, ...]
     refused: tuple[str, ...]
     seconds: float
     reaches: Reaches
@@ -223,11 +208,6 @@ class ChosenDamper:
         return math.exp(self.plain.nominal.log_worst)
 
     @property
-    def elsewhere(self) -> int:
-        """F_C/F_E that were swept, those kept of earlier calls too."""
-        return sum(len(rig.swept) for one in self.tried for _, rig in one.rigs)
-
-    @property
     def curves(self) -> int:
         """Whole curves that were solved in this call."""
         return sum(rig.curves for one in self.tried for _, rig in one.rigs)
@@ -251,5 +231,5 @@ class ChosenDamper:
     @property
     def unreached(self) -> tuple[float, ...]:
         """F_C/F_E whose highest peak was sought in vain, rising."""
-        lost = {math.exp(s) for one in self.best.worst.peaks for s in one.unknown}
+        lost = {math.exp(s) for one in self.best.worst.peaks for s in one.failed}
         return tuple(sorted(lost))

@@ -105,12 +105,10 @@ def _over_ratio(found: ChosenDamper) -> Chart:
             heights.append(np.exp(y[np.isfinite(y)]))
             values = np.where(np.isfinite(y), np.exp(y), math.nan)
             colour = len({t.colour for t in traces})
-            label = f"{name or 'sweeps by time march'}{word}"
+            label = f"{name}{word}"
             traces.append(Trace(label, np.exp(s), values, "line", colour))
-            solved = (
-                sorted((t, p[name].log_height) for t, p in rig.found.points.items() if name in p)
-                if name
-                else sorted((t, p.log_height) for t, p in rig.swept.items())
+            solved = sorted(
+                (t, p[name].log_height) for t, p in rig.found.points.items() if name in p
             )
             x, v = np.exp(np.array(solved)).T
             inside = (np.log(x) >= rig.peaks.low - SAME) & (np.log(x) <= rig.peaks.high + SAME)

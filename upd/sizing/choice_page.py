@@ -10,7 +10,6 @@ from upd.scene.written import scene_as_run
 from upd.sizing.choice import GROWTHS, UNITS_OF, ChosenDamper
 from upd.sizing.choice_words import (
     described,
-    differs,
     grid_words,
     headline,
     kind,
@@ -34,7 +33,7 @@ def choice_page(found: ChosenDamper) -> AnswerPage:
         Of the search.
     """
     scene, best = found.ranges.scene, found.best.best
-    sure = best.status == _FOUND and not any(differs(one) for one in found.verified)
+    sure = best.status == _FOUND
     word = best.status.capitalize() if best.status != _FOUND or sure else "Found, not unique"
     deciding = tuple(
         (

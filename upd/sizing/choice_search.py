@@ -24,16 +24,16 @@ from typing import get_args
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from upd.analyses.forced.levels import quiet
+from upd.analyses.forced.paths import quiet
 from upd.analyses.seated.bodies import Bodies
 from upd.errors import ConvergenceError, InputError, one_line
 from upd.linalg.parallel import threads_for
 from upd.progress import Listener, Stages
 from upd.scene import ForcedScene
-from upd.sizing.choice import GROWTHS, ChosenDamper, Objective, Reaches, Tried, Verified, is_along
+from upd.sizing.choice import GROWTHS, ChosenDamper, Objective, Reaches, Tried, is_along
 from upd.sizing.least_worst import LowestWorst, has_moved, lowest_worst
 from upd.sizing.ranges import FORCE, InputRange, Ranges, with_values
-from upd.sizing.ratio_curves import AGREES, SCAN_STEP, Deciding, SweptPeak
+from upd.sizing.ratio_curves import AGREES, SCAN_STEP
 from upd.sizing.reach import Reach, how_far, how_far_force
 from upd.sizing.rig_peaks import RigPeaks, bare
 from upd.sizing.worst_peak import COMPARED_STEP, WorstPeak
@@ -103,7 +103,6 @@ def _choose(ranges: Ranges, objective: Objective, progress: Listener, begin: flo
         robust, nominal = _lowest(tried)
         reaches = _withheld(reaches)
         here, there, settled = search.compared(tried[robust], tried[nominal])
-    verified = search.verified(tried[robust])
     return ChosenDamper(
         ranges,
         objective,
@@ -111,7 +110,6 @@ def _choose(ranges: Ranges, objective: Objective, progress: Listener, begin: flo
         tried,
         robust,
         nominal,
-        verified,
         tuple(search.refused),
         time.perf_counter() - begin,
         reaches,
@@ -419,30 +417,3 @@ class _Search:
         known = {one.path: one for one in (*self.ranges.over, *self.ranges.during)}
         told = [f"{known[path].path} = {value}" for path, value in values.items()]
         return ", ".join([self.ranges.scene.name, *told])
-
-    def verified(self, best: Tried) -> tuple[Verified, ...]:
-        """Deciding peaks of whole curves, by sweeps where the scene asks for them."""
-        out: list[Verified] = []
-        if self.scene.balance.method == "balance":
-            return ()
-        rigs = dict(enumerate(rig for _, rig in best.rigs))
-        for point in best.best.deciding:
-            if point.share <= 0.0:
-                continue
-            for rig in rigs.values():
-                if not _is_of(rig, point):
-                    continue
-                with self.stages("sweeps", f"up and down at F_C/F_E {math.exp(point.s):.4g}"):
-                    found: SweptPeak | None = rig.by_sweeps(point.s)
-                if found is not None:
-                    height = math.exp(point.y)
-                    low, high = math.exp(found.log_low), math.exp(found.log_height)
-                    out.append(Verified(math.exp(point.s), height, low, high))
-                break
-        return tuple(out)
-
-
-def _is_of(rig: RigPeaks, point: Deciding) -> bool:
-    """Whether a peak is of a rig."""
-    one = rig.found.points.get(point.node, {}).get(point.name)
-    return one is not None and one.frequency == point.frequency

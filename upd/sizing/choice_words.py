@@ -7,13 +7,11 @@ from typing import Any
 
 from upd.report.answer_folder import wrapped
 from upd.scene.rotation import damper_mass
-from upd.sizing.choice import GROWTHS, UNITS_OF, ChosenDamper, Verified
+from upd.sizing.choice import GROWTHS, UNITS_OF, ChosenDamper
 from upd.sizing.ranges import InputRange
-from upd.sizing.ratio_curves import SWEEPS
 from upd.sizing.sensitivity import Sensitivity, sensitivities
 
-#: difference of sweeps from the balance and from each other up to which they tell one motion: their
-#: steps are felt by a hundredth
+#: relative difference of F_C up to which two are one
 ALIKE = 0.03
 _MEANS = {
     "peak": "highest accelerance of the right blade, (m/s2) per N of F_E: all levels count alike",
@@ -183,64 +181,29 @@ def grid_words(found: ChosenDamper) -> list[str]:
     ]
 
 
-def differs(one: Verified) -> bool:
-    """Whether sweeps tell other motions than the balance, or two."""
-    return max(abs(one.low / one.height - 1.0), abs(one.high / one.height - 1.0)) > ALIKE
-
-
 def notes(found: ChosenDamper) -> list[str]:
     """What limits the answer."""
     out = [f"not solved: {why}" for why in found.refused]
     for one in sensitivities(found):
         out += [f"how far {one.path} may move is withheld: {why}" for why in one.untold]
-    for swept_again in found.verified:
-        at = f"F_C/F_E {swept_again.ratio:.4g}"
-        if differs(swept_again):
-            out.append(
-                f"not unique: at {at} the balance has {_height(found, swept_again.height)}, "
-                f"sweeps by time march {swept_again.low:.4g} to {swept_again.high:.4g}: the "
-                "optimum is of that branch"
-            )
-        else:
-            out.append(
-                f"verified: at {at} sweeps by time march tell the same ({swept_again.high:.4g})"
-            )
-    swept = found.ranges.scene.balance.method != "balance"
     for low, high in found.gaps:
         between = f"between F_C/F_E {low:.4g} and {high:.4g}"
-        out.append(
-            f"whole curves not followed through {between}: swept by time march there"
-            if swept
-            else f"not told {between}: whole curves are not followed through there; "
-            'balance.method="auto" sweeps'
-        )
+        out.append(f"not known {between}: no whole curve reaches its end there")
     if found.best.best.at_jump and found.best.ends[0] < found.best.ends[1]:
         out.append("at a jump of the worst peak over F_C: beyond it another peak decides, higher")
-    if any(p.name == SWEEPS for p in found.best.best.deciding):
-        out.append(
-            "decided by sweeps by time march where no whole curve went through: a hundredth "
-            "uncertain"
-        )
     low = math.exp(found.best.best.reached[0])
     if low > found.best.ends[0] * (1.0 + ALIKE):
         out.append(
             f"F_C below {low:.4g} N is not told: whole curves were not followed through at F_C/F_E "
-            f"{', '.join(f'{r:.4g}' for r in found.unreached)}; to fix it: "
-            'balance.method="auto" sweeps there'
+            f"{', '.join(f'{r:.4g}' for r in found.unreached)}"
         )
-    if not swept:
-        out.append(
-            "of whole curves by the balance, from the lowest to the highest frequency; "
-            'balance.method="auto" marches at the optimum'
-        )
+    out.append("of whole curves by harmonic balance, from the lowest to the highest frequency")
     return out
 
 
 def _cost(found: ChosenDamper) -> str:
     kept = f"; {found.resumed} curves kept of earlier calls" if found.resumed else ""
-    return (
-        f"{found.seconds:.1f} s: {found.curves} whole curves, {found.elsewhere} F_C/F_E swept{kept}"
-    )
+    return f"{found.seconds:.1f} s: {found.curves} whole curves{kept}"
 
 
 def plain_numbers(found: ChosenDamper) -> dict[str, Any]:
@@ -301,10 +264,6 @@ def plain_numbers(found: ChosenDamper) -> dict[str, Any]:
             }
             for one in found.tried
         ],
-        "sweeps": [
-            {"centrifugal_to_force": v.ratio, "balance": v.height, "low": v.low, "high": v.high}
-            for v in found.verified
-        ],
         "not_followed_between_ratios": [list(pair) for pair in found.gaps],
         "notes": notes(found),
         "grid": None
@@ -316,7 +275,6 @@ def plain_numbers(found: ChosenDamper) -> dict[str, Any]:
             "processor_seconds": found.grid.processor_seconds,
         },
         "whole_curves": found.curves,
-        "ratios_swept": found.elsewhere,
         "curves_kept": found.resumed,
         "seconds": found.seconds,
     }

@@ -89,11 +89,7 @@ def predicted(ranges: Ranges) -> str:
     shapes = _SHAPES * len(ranges.shapes) if ranges.shapes else 1
     rigs = shapes * (2 ** len(ranges.unsure) + 1 if ranges.unsure else 1)
     one = plan.seconds + curves * _STEPS * newton_seconds(plan)
-    swept = "" if scene.balance.method == "balance" else "; sweeps come on top where one is lost"
-    return (
-        f"about {rigs} rig{'s' * (rigs > 1)} of {curves:.0f} whole curves: "
-        f"{rigs * one:.0f} s{swept}"
-    )
+    return f"about {rigs} rig{'s' * (rigs > 1)} of {curves:.0f} whole curves: {rigs * one:.0f} s"
 
 
 def best_damper(

@@ -25,13 +25,11 @@ from scipy.optimize import minimize_scalar
 
 from upd.errors import ConvergenceError
 from upd.sizing.branch_cubics import SAME
-from upd.sizing.ratio_curves import AGREES, JUMP_STEP, SWEEPS, Deciding
+from upd.sizing.ratio_curves import AGREES, JUMP_STEP, Deciding
 from upd.sizing.worst_peak import WorstPeak
 
 #: how closely F_C is found, as its logarithm
 STILL = 5e-4
-#: agreement of deciding points and F_C where sweeps decide: their steps are felt by a hundredth
-SWEPT_AGREES, SWEPT_STILL = 1e-2, 2e-2
 #: rounds of the search
 ROUNDS = 25
 #: slope of the one deciding point of an optimum beyond which it is none by itself
@@ -96,12 +94,11 @@ def lowest_worst(worst: WorstPeak, low: float, high: float, jump: float = JUMP_S
     while rounds < ROUNDS:
         known = max(ends[0], worst.known_from())
         if known > ends[1] + SAME:
-            lost = sorted({math.exp(s) for one in worst.peaks for s in one.unknown})
+            lost = sorted({math.exp(s) for one in worst.peaks for s in one.failed})
             raise ConvergenceError(
                 f"the worst peak is known at no F_C between {low:g} and {high:g} N: whole curves "
                 f"were not followed through at F_C/F_E {', '.join(f'{r:.4g}' for r in lost)}; to "
-                'fix it: larger F_C, smaller F_E, or balance.method="auto", which sweeps by time '
-                "march there"
+                "fix it: larger F_C, or smaller F_E"
             )
         c = _least(worst, known, ends[1])
         rounds += 1
@@ -113,9 +110,8 @@ def lowest_worst(worst: WorstPeak, low: float, high: float, jump: float = JUMP_S
         off = abs(worst.value(c, deciding[0]) - float(worst.at(np.array([c]))[0]))
         off = max(off, abs(guessed - worst.value(c, deciding[0])))
         told.append((worst.value(c, deciding[0]), c))
-        swept = deciding[0].name == SWEEPS
-        near = abs(c - before) <= (SWEPT_STILL if swept else STILL) or c in (known, ends[1])
-        if off <= (SWEPT_AGREES if swept else AGREES) and near:
+        near = abs(c - before) <= STILL or c in (known, ends[1])
+        if off <= AGREES and near:
             # whole curves between may have higher peaks, and others hide lower ones
             if worst.settle((c, c), told[-1][0], jump=jump) or worst.explore(
                 (known, ends[1]), told[-1][0]
@@ -151,7 +147,7 @@ def has_moved(worst: WorstPeak, found: LowestWorst, low: float, high: float) -> 
     here = float(worst.at(np.array([found.log_centrifugal]))[0])
     c = _least(worst, max(math.log(low), worst.known_from()), math.log(high))
     least = float(worst.at(np.array([c]))[0])
-    off = 2.0 * (SWEPT_AGREES if any(p.name == SWEEPS for p in found.deciding) else AGREES)
+    off = 2.0 * AGREES
     return here > found.log_worst + off or least < found.log_worst - off
 
 
@@ -189,11 +185,7 @@ def _shared(worst: WorstPeak, c: float, deciding: Sequence[Deciding]) -> tuple[D
     """
     top = worst.value(c, deciding[0])
     # as near as heights are known
-    near = [
-        p
-        for p in deciding
-        if top - worst.value(c, p) <= (2.0 * SWEPT_AGREES if p.name == SWEEPS else 10.0 * AGREES)
-    ]
+    near = [p for p in deciding if top - worst.value(c, p) <= 10.0 * AGREES]
     rising = [p for p in near if p.slope > _FLAT]
     falling = [p for p in near if p.slope < -_FLAT]
     if not (rising and falling):

@@ -20,8 +20,6 @@ Array = NDArray[np.float64]
 #: ln(F_C/F_E) between the whole curves of the first scan, between those that something told rests
 #: on, and how closely a jump is told
 SCAN_STEP, TOLD_STEP, JUMP_STEP = 0.7, 0.5, 0.02
-#: how a peak was found where the whole curve was not followed through
-SWEEPS = "sweeps"
 #: how closely heights are known, as logarithms: tops have ripples of a thousandth, by the samples
 #: of a period
 AGREES = 2e-3
@@ -31,21 +29,6 @@ BESIDE = 1e-3
 ASIDE = 0.01
 #: below the highest peak of a curve beyond which another one does not count, as a logarithm
 _FAR = 0.1
-
-
-class SweptPeak(NamedTuple):
-    """The highest peak where no whole curve is known: logarithms of its height and of that on the
-    lower of two sweeps, frequency [Hz], how it was found.
-    """
-
-    log_height: float
-    log_low: float
-    frequency: float
-    how: str
-
-
-#: ln(F_C/F_E) -> the highest peak there, None where it is not known
-Elsewhere = Callable[[float], SweptPeak | None]
 
 
 class Deciding(NamedTuple):
@@ -73,10 +56,6 @@ class PeaksOverRatio:
         Peaks of the whole curve at one F_C/F_E.
     low, high
         ln(F_C/F_E) that may be asked for.
-    elsewhere
-        The highest peak where a curve is not followed through; None: nothing is known there.
-    swept
-        Such that are known, by ln(F_C/F_E).
     step
         ln(F_C/F_E) between the first curves.
     """
@@ -86,36 +65,27 @@ class PeaksOverRatio:
         found: CurvePeaks,
         low: float,
         high: float,
-        elsewhere: Elsewhere | None = None,
-        swept: dict[float, SweptPeak] | None = None,
         step: float = SCAN_STEP,
     ) -> None:
         self.found, self.low, self.high = found, low, high
-        self._elsewhere = elsewhere
-        self.swept = {} if swept is None else swept
         self._curves: dict[str, Callable[[Array], Array]] = {}
         #: nodes with what is known there, slopes that are not from the nodes beside
         self._told: dict[float, dict[str, PeakPoint]] = {}
-        self._curves_of: tuple[int, int] = (-1, -1)
+        self._curves_of = -1
         for s in np.linspace(high, low, math.ceil((high - low) / step) + 1):
             self.look(float(s))
 
     # -- places ------------------------------------------------------------------------------------
 
     def look(self, s: float, near: float = SAME) -> bool:
-        """Solve the whole curve at ln(F_C/F_E), or sweep there, unless one so near is known;
-        whether that is new.
-        """
+        """Solve the whole curve at ln(F_C/F_E) unless one so near is known; whether that is new."""
         known = [*self.found.points, *self.found.failed]
         if any(abs(t - s) <= near for t in known):
             return False
         for at in (s, s + ASIDE, s - ASIDE):
             self.found.at(at)
             if at in self.found.points:
-                return True
-        swept = None if self._elsewhere is None else self._elsewhere(s)
-        if swept is not None:
-            self.swept[s] = swept
+                break
         return True
 
     def tell(self, s: float, near: float) -> bool:
@@ -134,12 +104,7 @@ class PeaksOverRatio:
     @property
     def nodes(self) -> list[float]:
         """ln(F_C/F_E) at which the highest peak is known, rising."""
-        return sorted({*(s for s, told in self.found.points.items() if told), *self.swept})
-
-    @property
-    def unknown(self) -> list[float]:
-        """ln(F_C/F_E) at which it was sought in vain."""
-        return [s for s in self.failed if s not in self.swept]
+        return sorted(s for s, told in self.found.points.items() if told)
 
     @property
     def gaps(self) -> list[tuple[float, float]]:
@@ -154,9 +119,9 @@ class PeaksOverRatio:
 
     @property
     def holes(self) -> list[tuple[float, float]]:
-        """ln(F_C/F_E) between which nothing is known, rising: neither curve nor sweep."""
+        """ln(F_C/F_E) between which nothing is known, rising."""
         known = [-math.inf, *self.nodes, math.inf]
-        return [(a, b) for a, b in pairwise(known) if any(a < s < b for s in self.unknown)]
+        return [(a, b) for a, b in pairwise(known) if any(a < s < b for s in self.failed)]
 
     @property
     def known_from(self) -> float:
@@ -285,16 +250,11 @@ class PeaksOverRatio:
 
     def _at(self, s: float) -> dict[str, PeakPoint]:
         """What is known at a node."""
-        told = self.found.points.get(s)
-        if told:
-            return told
-        one = self.swept[s]
-        none = np.full(len(self.found.changes), math.nan)
-        return {"": PeakPoint(one.frequency, one.log_height, math.nan, none)}
+        return self.found.points[s]
 
     def curves(self) -> dict[str, Callable[[Array], Array]]:
         """Name -> ln height over ln r; -inf where the curve says nothing."""
-        count = len(self.found.points), len(self.swept)
+        count = len(self.found.points)
         if self._curves_of != count:
             self._curves, self._curves_of = self._all_curves(), count
         return self._curves
@@ -302,12 +262,6 @@ class PeaksOverRatio:
     def _all_curves(self) -> dict[str, Callable[[Array], Array]]:
         nodes = self.nodes
         told = {s: dict(self._at(s)) for s in nodes}
-        for a, b in pairwise(nodes):
-            # sweeps go on to the highest peaks of the whole curves beside them
-            for s, other in ((a, b), (b, a)):
-                if other in self.swept and s not in self.swept:
-                    high = max(told[s].values(), key=lambda p: p.log_height)
-                    told[s][""] = PeakPoint(high.frequency, high.log_height, math.nan, high.by)
         out = {}
         for name in dict.fromkeys(name for s in nodes for name in told[s]):
             here = [s for s in nodes if name in told[s]]
@@ -381,10 +335,10 @@ class PeaksOverRatio:
         self.look(s, BESIDE)
         lost = any(abs(t - s) <= BESIDE for t in self.found.failed)
         at = self.node(s, 1.5 * ASIDE if lost else BESIDE)
-        if at not in self.found.points and at not in self.swept:
+        if at not in self.found.points:
             raise ConvergenceError(
-                f"no whole curve was followed at F_C/F_E {math.exp(s):.4g}; to fix it: "
-                'balance.method="auto", which sweeps by time march there'
+                f"no whole curve was followed at F_C/F_E {math.exp(s):.4g}; to fix it: other ranges"
+                " of F_C and F_E"
             )
         told = self._at(at)
         name = max(told, key=lambda one: told[one].log_height)
@@ -392,4 +346,4 @@ class PeaksOverRatio:
         if math.isnan(slope):
             slope = slope_of(self.curves()[name], at, self.nodes[0], self.nodes[-1])
         y = p.log_height + (0.0 if math.isnan(slope) else slope * (s - at))
-        return Deciding(s, y, slope, p.by, p.frequency, name or SWEEPS, node=at)
+        return Deciding(s, y, slope, p.by, p.frequency, name, node=at)

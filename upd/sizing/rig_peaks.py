@@ -1,4 +1,4 @@
-"""Peaks of a rig over F_C/F_E: of whole curves by harmonic balance, elsewhere by sweeps.
+"""Peaks of a rig over F_C/F_E, of whole curves by harmonic balance.
 
 They are kept on disk as they are solved: called again, a choice goes on where it was.
 """
@@ -19,15 +19,12 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.input_data import data_change, is_known
 from upd.analyses.forced.linear_peaks import QUARTER, linear_modes, linear_peaks
 from upd.analyses.forced.measures import Unsolved
-from upd.analyses.forced.mode_peaks import ModePeak, numbered_peaks
+from upd.analyses.forced.mode_peaks import ModePeak, numbered_peaks, tell_stuck_peaks
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import balance_of, grid, path_settings, respond
-from upd.analyses.forced.performance import sweep_peak
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import tell_stuck_peaks
 from upd.analyses.forced.statics import static_state
 from upd.analyses.forced.stiffness import face_laws
-from upd.analyses.forced.sweeps import make_springs
 from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
 from upd.cache.arrays import cache_folder, load_arrays, save_arrays
 from upd.cache.sources import key_of, source_digest
@@ -40,7 +37,7 @@ from upd.progress import Stages
 from upd.scene import ForcedScene
 from upd.scene.quantities import UNKNOWN, Uncertainty
 from upd.sizing.ranges import InputRange, with_values
-from upd.sizing.ratio_curves import SWEEPS, PeaksOverRatio, SweptPeak
+from upd.sizing.ratio_curves import PeaksOverRatio
 
 log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
@@ -73,7 +70,7 @@ def bare(scene: ForcedScene, stiffness: str) -> ForcedScene:
     if scene.balance.harmonics == "adaptive":
         problems.append("balance.harmonics: a followed peak keeps its harmonics; give a number")
     if scene.balance.method == "march":
-        problems.append('balance.method: peaks are followed by the balance; set "auto"')
+        problems.append('balance.method: peaks are those of harmonic balance; set "balance"')
     if scene.wanted_accuracy is not None:
         problems.append(
             f'accuracy: a choice keeps one mesh; leave it out or set it to "{UNKNOWN}", and choose '
@@ -197,13 +194,9 @@ class RigPeaks:
             changes=known,
             kept=self._save,
         )
-        self.swept = dict[float, SweptPeak]()
         self._load()
-        self._springs = (
-            None if scene.balance.method == "balance" else make_springs(self.plan, model)
-        )
         low, high = map(math.log, ends)
-        return PeaksOverRatio(self.found, low, high, self._elsewhere, self.swept, step)
+        return PeaksOverRatio(self.found, low, high, step)
 
     def _change(self, one: InputRange, value: float, stages: Stages) -> ParameterChange | None:
         """What the logarithm of an input changes at the same F_C/F_E; None where it is not known in
@@ -231,14 +224,7 @@ class RigPeaks:
             int(e.points), math.ceil((e.stop - e.start) / (QUARTER * float(inside.min()))) + 1
         )
 
-    # -- curves and sweeps -------------------------------------------------------------------------
-
-    def _elsewhere(self, s: float) -> SweptPeak | None:
-        found = self.by_sweeps(s)
-        if found is not None:
-            self.swept[s] = found
-            self._save()
-        return found
+    # -- curves ------------------------------------------------------------------------------------
 
     def _whole_curve(self, ratio: float) -> list[SeenPeak] | None:
         """Peaks of the whole curve by harmonic balance, up or down; None where neither arrives."""
@@ -261,24 +247,6 @@ class RigPeaks:
             return [_seen(answer, one) for one in numbered_peaks(self.model, answer, height, stop)]
         return None
 
-    def by_sweeps(self, s: float) -> SweptPeak | None:
-        """The highest point of sweeps up and down by time march.
-
-        Parameters
-        ----------
-        s
-            ln(F_C/F_E).
-        """
-        if self._springs is None:
-            return None
-        ratio = math.exp(s)
-        self._told(f"sweeps up and down, F_C/F_E {ratio:.4g}")
-        found = sweep_peak(self.plan, self._springs, self.stiffness, ratio)
-        if found is None:
-            return None
-        f, height, low = found
-        return SweptPeak(math.log(height), math.log(low), f, SWEEPS)
-
     # -- what is kept ------------------------------------------------------------------------------
 
     def _save(self) -> None:
@@ -290,22 +258,19 @@ class RigPeaks:
         arrays["peaks"] = np.array(
             [(s, p.frequency, p.log_height, p.slope, *p.by) for s, _, p in each]
         ).reshape(len(each), 4 + len(found.changes))
-        arrays["swept"] = np.array([(s, *one[:3]) for s, one in self.swept.items()])
         save_arrays(self._file, arrays)
 
     def _load(self) -> None:
         """What an earlier call solved."""
         kept = load_arrays(self._file) or {}
-        if not {"curves", "failed", "names", "peaks", "swept"} <= set(kept):
+        if not {"curves", "failed", "names", "peaks"} <= set(kept):
             return
         points = self.found.points
         points |= {float(s): {} for s in kept["curves"]}
         for name, (s, f, y, slope, *by) in zip(kept["names"], kept["peaks"], strict=True):
             points[float(s)][str(name)] = PeakPoint(f, y, slope, np.array(by))
         self.found.failed.update(map(float, kept["failed"]))
-        for s, y, low, f in kept["swept"]:
-            self.swept[float(s)] = SweptPeak(y, low, f, SWEEPS)
-        self.resumed = len(points) + len(self.swept)
+        self.resumed = len(points)
 
 
 def _seen(answer: FrequencyResponse, peak: ModePeak) -> SeenPeak:

@@ -133,22 +133,40 @@ def test_responses_show_limits_curves_peaks_and_measurements(arrays: dict[str, G
     assert right.y.label == "accelerance, (m/s²)/N" and right.y.log
 
 
-def test_a_path_from_the_top_is_dotted_in_the_colour_of_its_ratio(arrays: dict[str, Group]) -> None:
-    down = friction(np.linspace(300.0, 290.0, 4))
-    down.attributes = CURVE | {"reversed": 1}
+def test_what_is_unstable_is_dotted_in_the_colour_of_its_ratio(arrays: dict[str, Group]) -> None:
+    """Parts touch: each goes on to its neighbour of the other."""
+    stable = values([1, 1, 0, 0], "frequency")
+    turned = friction([290.0, 300.0, 295.0, 292.0], stable=stable)
     first = friction(np.linspace(290.0, 300.0, 4))
     first.attributes = CURVE | {"force_ratio": 600.0}
-    charts = made({"first": first} | arrays | {"down": down})
+    arrays["friction own, F_C per F_E 194"] = turned
+    charts = made({"first": first} | arrays)
     found = {
-        t.label: (t.style, t.colour)
+        t.label: (t.style, t.colour, np.isfinite(t.y).tolist(), t.entry)
         for t in charts["Frequency response", "right blade, stiffness own"].traces
         if not t.closed
     }
     assert found == {
-        "F_C/F_E 600": ("line", 0),
-        "F_C/F_E 194": ("line", 1),
-        "F_C/F_E 194, downwards": ("dotted", 1),
+        "F_C/F_E 600": ("line", 0, [True] * 4, "F_C/F_E 600"),
+        "F_C/F_E 194": ("line", 1, [True, True, True, False], "F_C/F_E 194"),
+        "F_C/F_E 194, unstable": ("dotted", 1, [False, True, True, True], "F_C/F_E 194"),
     }
+
+
+def test_a_fold_tells_what_a_sweep_up_reaches(arrays: dict[str, Group]) -> None:
+    at = ("fold",)
+    folds = {
+        "fold_frequency": values([297.0, 295.0, 292.0], *at),
+        "fold_up": values([1, 0, 1], *at),
+        "fold_before": values([3.0, 3.0, 4.5], *at),
+        "fold_reached": values([5.0, 5.0, 5.0], *at),
+    }
+    arrays["friction own, F_C per F_E 194"] |= folds
+    right = made(arrays)["Frequency response", "right blade, stiffness own"]
+    # down, and by a tenth, are none
+    assert [(m.x, m.y, m.text) for m in right.marks[1:]] == [
+        (297.0, 3.0, "a sweep up jumps and reaches 5")
+    ]
 
 
 def test_shares_are_stacked_to_the_whole(arrays: dict[str, Group]) -> None:
@@ -216,8 +234,7 @@ def test_loops_are_closed_and_say_where_they_are(arrays: dict[str, Group]) -> No
 
 
 def test_a_peak_of_the_sweeps_is_drawn_from_the_march_alone(arrays: dict[str, Group]) -> None:
-    curve = arrays["friction own, F_C per F_E 194"]
-    curve["state"].data[0, 2] = [0.9, 0.1, 0.0]
+    del arrays["friction own, F_C per F_E 194"]
     f = [297.2]
     motion = np.zeros((1, 6, 8))
     motion[0, 0] = 4e-3 + 2e-3 * np.sin(np.pi / 4.0 * np.arange(1, 9))
@@ -233,23 +250,20 @@ def test_a_peak_of_the_sweeps_is_drawn_from_the_march_alone(arrays: dict[str, Gr
     }
     march.attributes = CURVE | {"content": "marched peaks", "choice": "sweep up"}
     drawn = forced.ANALYSIS.charts(arrays | {"march": march}, {})
-    at = "time march, sweep up, 297.2 Hz"
+    at = "time integration, sweep up, 297.2 Hz"
     peak = "own, F_C/F_E 194, at peak"
     told = {(c.figure, c.case): c.detail for c in drawn if c.detail and c.figure != "response"}
     assert told == {
         ("contact_map", f"{peak} 1, in phase, right face"): at,
         ("hysteresis", f"{peak} 1, in phase"): at,
         ("damper_period", f"{peak} 1, in phase"): at,
-        # the balance's own peak
-        ("contact_map", f"{peak} 2, right face"): "290.0 Hz",
-        ("hysteresis", f"{peak} 2"): "290.0 Hz",
     }
     turn = next(c for c in drawn if c.figure == "damper_period")
     assert [(t.label, t.y[1], t.x[-1]) for t in turn.traces] == [
         ("x, across the blades", pytest.approx(2.0), 1.0)
     ]
-    # over frequency the balance has the whole curve
-    assert {"contact_state", "damper_motion"} <= {c.figure for c in drawn}
+    # over frequency a sweep has no states of points
+    assert not {"contact_state", "damper_motion"} & {c.figure for c in drawn}
 
 
 def test_the_page_opens_on_a_curve_on_which_something_slips(arrays: dict[str, Group]) -> None:
@@ -260,8 +274,7 @@ def test_the_page_opens_on_a_curve_on_which_something_slips(arrays: dict[str, Gr
     stuck.attributes = CURVE | {"force_ratio": 2000.0}
     found = forced.ANALYSIS.charts({"stuck": stuck} | arrays, {})
     first = {c.title: c for c in reversed(found)}
-    for title in ("Contact state", "Damper motion: translation"):
-        assert first[title].case.startswith("own, F_C/F_E 194"), title
+    assert first["Contact state"].case.startswith("own, F_C/F_E 194")
     # colours stay those of the order in the scene
     traces = {t.label: t for t in first["Frequency response"].traces}
     assert [traces[f"F_C/F_E {r}"].colour for r in (2000, 194)] == [0, 1]
@@ -271,7 +284,7 @@ def test_the_page_opens_on_a_curve_on_which_something_slips(arrays: dict[str, Gr
             for ratio, slip in ((2000.0, 0.0), (194.0, 3.0))
             for name, value, more in (
                 ("peak_1_frequency", 300.0, {}),
-                ("share_slip", slip, {"peak": 1, "side": "left"}),
+                ("contact_slip", slip, {"peak": 1}),
             )
         ]
     )
@@ -307,84 +320,41 @@ def test_loss_and_motion_carry_their_units_over(arrays: dict[str, Group]) -> Non
     assert rotation.y.label == "rotation, first harmonic, mrad"
 
 
-def test_performance_marks_lift_off_limits_and_optimum() -> None:
-    point = ("point",)
-    branch = group(
-        {"content": "performance", "stiffness": "own", "branch": "peak 1"},
+def test_performance_shows_the_highest_peak_single_modes_limits_and_the_best() -> None:
+    point = ("ratio",)
+    heights = {"1_accelerance_right": ("in phase", [9.0, np.nan, 7.0])}
+    heights["2_accelerance_right"] = ("out of phase", [np.nan, 5.0, 8.0])
+    heights["3_accelerance_right"] = ("in phase 2", [1.0, np.nan, np.nan])
+    heights["1_accelerance_left"] = ("in phase", [10.0, 6.0, 6.0])
+    scalars = {"free_peak": 300.0, "stuck_peak": 180.0}
+    scalars |= {"best_ratio": 20.0, "best_accelerance": 6.0}
+    group_ = group(
+        {"content": "performance", "stiffness": "own"},
         ratio=values([2.0, 20.0, 200.0], *point),
-        peak_accelerance=values([9.0, 5.0, 8.0], *point),
-        lift=values([0.1, 0.2, 0.0], *point),
-    )
-    scalars = {
-        "free_peak": 300.0,
-        "stuck_peak": 180.0,
-        "optimum_ratio": 20.0,
-        "optimum_frequency": 330.0,
-        "optimum_accelerance": 5.0,
-    }
-    limits = group(
-        {"content": "highest peak", "stiffness": "own"},
+        highest_accelerance=values([10.0, 6.0, 8.0], *point),
+        **{f"peak_{k}": values(v, *point, mode=mode) for k, (mode, v) in heights.items()},
         **{k: values(v) for k, v in scalars.items()},
     )
-    (chart,) = forced.ANALYSIS.charts({"a": branch, "b": limits}, {})
+    (chart,) = forced.ANALYSIS.charts({"a": group_}, {})
     found = {(t.label, t.style): (t.x.tolist(), t.y.tolist()) for t in chart.traces}
     assert found == {
-        ("peak 1", "line"): ([2.0, 20.0, 200.0], [9.0, 5.0, 8.0]),
-        ("peak 1", "points"): ([200.0], [8.0]),
-        ("peak 1, points lift off", "open points"): ([2.0, 20.0], [9.0, 5.0]),
+        ("highest of all", "line"): ([2.0, 20.0, 200.0], [10.0, 6.0, 8.0]),
+        ("right blade, in phase", "both"): ([2.0, 200.0], [9.0, 7.0]),
+        ("right blade, out of phase", "both"): ([20.0, 200.0], [5.0, 8.0]),
         ("free", "dashed"): ([2.0, 200.0], [300.0, 300.0]),
         ("stuck", "dashdot"): ([2.0, 200.0], [180.0, 180.0]),
-        ("optimum 20, 330.0 Hz", "star"): ([20.0], [5.0]),
+        ("best, F_C/F_E 20", "star"): ([20.0], [6.0]),
     }
     assert (chart.x.log, chart.y.log, chart.figure) == (True, True, "performance")
 
 
-def test_performance_has_the_measured_peaks_of_the_same_blade() -> None:
-    """Of curves with friction alone: a linear limit has no F_C/F_E."""
-    f = np.array([300.0, 301.0, 302.0, 303.0, 304.0])
-    like = {"content": "measured curve", "blade": "right"}
-    axis = values(f, "frequency", units="Hz")
-    peak = values([1.0, 2.0, 7.0, 2.0, 1.0], "frequency", units="(m/s2)/N")
+def test_a_performance_curve_of_an_older_run_is_left_out() -> None:
     branch = group(
         {"content": "performance", "stiffness": "own", "branch": "peak 1"},
         ratio=values([2.0, 20.0], "point"),
         peak_accelerance=values([9.0, 5.0], "point"),
-        lift=values([0.0, 0.0], "point"),
     )
-    arrays = {
-        "a": branch,
-        "m": group(like | {"force_ratio": 194.0}, frequency=axis, accelerance_right=peak),
-        "free": group(like | {"kind": "free"}, frequency=axis, accelerance_right=peak),
-        "left": group(
-            {"content": "measured curve", "blade": "left", "force_ratio": 60.0},
-            frequency=axis,
-            accelerance_left=peak,
-        ),
-    }
-    (chart,) = [c for c in forced.ANALYSIS.charts(arrays, {}) if c.figure == "performance"]
-    (trace,) = [t for t in chart.traces if t.label.startswith("measured")]
-    assert (trace.x.tolist(), trace.style) == ([194.0], "open points")
-    assert trace.y == pytest.approx([7.0], rel=0.05)
-
-
-def test_choices_without_a_peak_have_no_point() -> None:
-    found = {
-        "peak_frequency": values([300.0, np.nan, 301.0], "choice", units="Hz"),
-        "peak_accelerance": values([5.0, np.nan, 6.0], "choice"),
-    }
-    start = values([0, 1, 2], "choice", flag_meanings="zero static mid")
-    spread = group({"content": "spread", "stiffness": "own"}, start=start, **found)
-    harmonics = group(
-        {"content": "harmonics", "stiffness": "own"},
-        highest_harmonic=values([1, 3, 5], "choice"),
-        **found,
-    )
-    first, second = forced.ANALYSIS.charts({"a": spread, "b": harmonics}, {})
-    assert [text for _, text in first.x.ticks] == ["start zero", "start mid"]
-    assert [text for _, text in second.x.ticks] == ["1", "5"]
-    for chart, name in ((first, "spread"), (second, "harmonics")):
-        assert (chart.figure, chart.case, chart.traces[0].y.tolist()) == (name, "own", [5.0, 6.0])
-        assert [m.text for m in chart.marks] == ["300.00 Hz", "301.00 Hz"]
+    assert forced.ANALYSIS.charts({"a": branch}, {}) == []
 
 
 # ---------------------------------------------------------------- modal analysis

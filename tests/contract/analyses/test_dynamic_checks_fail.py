@@ -12,42 +12,39 @@ import pytest
 
 from upd.analyses import forced, make_plan, modal
 from upd.analyses.base import Resolved
-from upd.analyses.forced.curves import ForcedCurve, LeftMaximum
-from upd.analyses.forced.march_modes import stuck_modes_of
+from upd.analyses.forced.levels import HARMONICS, SAMPLES
 from upd.analyses.forced.marched_peaks import marched_peak
 from upd.analyses.forced.measures import accelerance, residual_error
-from upd.analyses.forced.performance import beside_branches
-from upd.analyses.forced.performance_curve import Branch, Performance
-from upd.analyses.forced.reduction_results import meet
-from upd.analyses.forced.solution import AS_RUN, BandCurve, CurveBand, ForcedSolution, TimeMarch
-from upd.analyses.forced.sweeps import (
-    confirm,
-    make_springs,
-    march_sweep,
-    swept,
-)
+from upd.analyses.forced.performance import Performance, RatioPoint, of_curve
+from upd.analyses.forced.solution import ForcedSolution, TimeMarch
+from upd.analyses.forced.spring_march import make_springs
+from upd.analyses.forced.statics import StaticState
+from upd.analyses.forced.sweeps import both_ways
 from upd.analyses.modal.solve import ModalSolution, modal_error
-from upd.hbm.checks import aliasing, truncation
 from upd.hbm.march import steady_state
 from upd.progress import Stages, silent
 from upd.results import Check
 from upd.scene import load_scene
 
+pytestmark = pytest.mark.estimated
+
 FORCED = [
-    "balance.harmonics=1",
+    "balance.harmonics=3",
     "excitation.points=40",
     "excitation.start=430 Hz",
     "excitation.stop=460 Hz",
-    "excitation.centrifugal_to_force=[1000.0]",
+    "excitation.centrifugal_to_force=[250.0]",
     'want=["response"]',
     # what the answer may change by is the scene's to say
     "left_out.frequency=5 %",
+    "left_out.peak=20 %",
 ]
 MODAL = [
     "mesh.element=hex8",
     'modes.arrangements=["symmetric"]',
     'want=["free", "reduction", "response"]',
     "response.points=200",
+    "accuracy=unknown",
 ]
 
 
@@ -72,30 +69,19 @@ def response(forced_scene: list[str]) -> ForcedSolution:
     height = float(abs(curve.accelerance["right"][i]))
     steady = steady_state(curve.answer.balance, f, curve.answer.x[i])
     solution.marches = [TimeMarch(curve, f, height, steady)]
-    solution.bands = [CurveBand(curve, (BandCurve(AS_RUN, curve, ()),))]
     _add_sweeps(solution, f)
-    ratio = np.array([500.0, 1000.0])
-    branch = Branch("peak 1", ratio, np.full(2, f), np.full(2, height), np.zeros(2), True, "")
-    solution.performances = {
-        "thesis": Performance((branch,), 2 * height, height, sweeps=tuple(solution.sweeps))
-    }
+    solution.performances = {"thesis": Performance((of_curve(curve),), 300.0, 190.0, 3)}
     return solution
 
 
 def _add_sweeps(solution: ForcedSolution, f: float) -> None:
-    """A few frequencies up and down beside the peak, and the peak marched on."""
-    model, curve = solution.models["thesis"], solution.curves[0]
-    springs = make_springs(solution.plan, model)
-    modes = stuck_modes_of(springs.march, 1000.0)
-    near = np.linspace(f - 4.0, f + 4.0, 5)
-    state = springs.at_rest()
-    for way, order in (("up", near), ("down", near[::-1])):
-        found = march_sweep(springs.march, order, curve.force, state)
-        one = swept("thesis", curve.ratio, curve.force, way, found, modes)  # type: ignore[arg-type]
-        solution.sweeps.append(one)
-        state = found.state
-    peak = solution.numbered_peaks(curve)[0]
-    solution.confirmations = [confirm(springs, model, curve, peak)]
+    """A few frequencies up and down beside the peak."""
+    plan, model, curve = solution.plan, solution.models["thesis"], solution.curves[0]
+    springs = make_springs(plan, model)
+    near = replace(plan.scene.excitation, start=f - 6.0, stop=f + 6.0, points=10)
+    beside = replace(plan, scene=replace(plan.scene, excitation=near))
+    start = springs.at_rest()
+    solution.sweeps = both_ways(beside, "thesis", curve.ratio, springs.march, start)
     top = solution.sweeps[0].peaks["right"][0]
     solution.marched = [marched_peak(solution, solution.sweeps[0], top)]
 
@@ -127,21 +113,7 @@ def _forces(s: ForcedSolution, factor: float, which: slice) -> ForcedSolution:
     return with_answer(s, contact_force=force)
 
 
-def _again(s: ForcedSolution, measure: Callable[..., Any], name: str) -> ForcedSolution:
-    """The measure of an answer thirty times as large: everything slips and lifts off."""
-    a = s.curves[0].answer
-    x = 30.0 * a.x
-    given = (a.frequency, x) if measure is truncation else (x, a.contact_force)
-    return with_answer(s, **{name: measure(a.balance, *given)})
-
-
-def _open(s: ForcedSolution) -> ForcedSolution:
-    state = np.zeros_like(s.curves[0].answer.state)
-    state[..., 2] = 1.0
-    return with_answer(s, state=state)
-
-
-def _points(s: ForcedSolution, kept: slice) -> ForcedSolution:
+def _points(s: ForcedSolution, kept: Any) -> ForcedSolution:
     """Some of the points of the path alone."""
     a = s.curves[0].answer
     names = ("frequency", "x", "contact_displacement", "contact_force", "state", "energy", "linear")
@@ -149,46 +121,40 @@ def _points(s: ForcedSolution, kept: slice) -> ForcedSolution:
     return with_answer(s, **{name: getattr(a, name)[kept] for name in names})
 
 
-def _wide_steps(s: ForcedSolution) -> ForcedSolution:
-    """Every fourth point, the peak among them."""
-    peak = s.numbered_peaks(s.curves[0])[0].sample
-    return _points(s, slice(peak % 4, None, 4))
-
-
-def _stopped_branch(s: ForcedSolution) -> ForcedSolution:
+def _cut_performance(s: ForcedSolution) -> ForcedSolution:
     one = s.performances["thesis"]
-    short = tuple(replace(b, complete=False, message="lost") for b in one.branches)
-    return replace(s, performances={"thesis": replace(one, branches=short)})
+    cut = tuple(p._replace(arrived=False) for p in one.points)
+    return replace(s, performances={"thesis": replace(one, points=cut)})
 
 
-def _unsettled_branch(s: ForcedSolution) -> ForcedSolution:
-    one = s.performances["thesis"]
-    lost = tuple(
-        replace(b, found=replace(b.found, settled=b.found.settled & False)) for b in one.sweeps
-    )
-    return replace(s, performances={"thesis": replace(one, sweeps=lost)})
+def _checked(s: ForcedSolution, **values: Any) -> ForcedSolution:
+    """A peak's time integration, spoiled."""
+    curve = s.curves[0]
+    first, *others = curve.checked
+    return replace(s, curves=[replace(curve, checked=(replace(first, **values), *others))])
 
 
-def _followed_at(s: ForcedSolution, share: float) -> ForcedSolution:
-    """Every peak followed at a share of the curve's height, without sweeps."""
-    one = replace(s.performances["thesis"], swept=np.zeros((4, 0)), sweeps=())
-    ratios = np.array([0.5, 2.0]) * s.curves[0].ratio
-    tops = share * np.abs(s.curves[0].accelerance["right"]).max() * np.ones(2)
-    low = tuple(
-        replace(b, ratio=ratios, frequency=400.0 * np.ones(2), height=tops, lift=0.0 * tops)
-        for b in one.branches
-    )
-    found = beside_branches(replace(one, branches=low), s.curves)
-    return replace(s, performances={"thesis": found})
+def _level(source: str, factor: float) -> Callable[[ForcedSolution], ForcedSolution]:
+    """Peaks on a level so many times as high."""
+
+    def spoil(s: ForcedSolution) -> ForcedSolution:
+        levels = [
+            one._replace(
+                peaks={at: p._replace(height=factor * p.height) for at, p in one.peaks.items()}
+            )
+            if one.source == source
+            else one
+            for one in s.levels["thesis"]
+        ]
+        return replace(s, levels={"thesis": levels})
+
+    return spoil
 
 
-def _other_modes(s: ForcedSolution) -> ForcedSolution:
-    """A right blade so stiff that the stuck modes move the left one, which moves less, alone."""
+def _at_rest(s: ForcedSolution, N: Sequence[float], T: Sequence[float]) -> ForcedSolution:
     model = s.models["thesis"]
-    right = np.abs(model.contacts.rows[model.face == 1]).max(axis=(0, 1))
-    K, n_left = model.K.copy(), np.flatnonzero(right)[0]
-    K[n_left:, n_left:] *= 1e4
-    return replace(s, models={"thesis": replace(model, K=K)})
+    state = StaticState("given", np.array(N), np.array(T))
+    return replace(s, models={"thesis": replace(model, state=state)})
 
 
 def _unbalanced(s: ForcedSolution) -> ForcedSolution:
@@ -198,29 +164,16 @@ def _unbalanced(s: ForcedSolution) -> ForcedSolution:
     return replace(s, models={"thesis": replace(model, traction=traction)})
 
 
-def _stopped_band(s: ForcedSolution) -> ForcedSolution:
-    short = with_answer(s, status="stopped").curves[0]
-    return replace(s, bands=[CurveBand(short, (BandCurve("static opposing", short, ()),))])
-
-
-def _anisotropic(s: ForcedSolution) -> ForcedSolution:
-    model = s.models["thesis"]
-    laws = {side: replace(law, anisotropy=0.5) for side, law in model.laws.items()}
-    return replace(s, models={"thesis": replace(model, laws=laws)})
-
-
 def _omitted(name: str) -> Callable[[ForcedSolution], ForcedSolution]:
     def spoil(s: ForcedSolution) -> ForcedSolution:
         def wrong(found: list[Resolved]) -> list[Resolved]:
             return [
-                replace(one, included=1.2 * one.without) if one.effect == name else one
+                replace(one, included=1.3 * one.without) if one.effect == name else one
                 for one in found
             ]
 
-        checked = s.levels.checked
-        assert any(one.effect == name for one in (*s.omissions, *checked))
-        levels = replace(s.levels, checked=wrong(checked))
-        return replace(s, omissions=wrong(s.omissions), levels=levels)
+        assert any(one.effect == name for one in s.omissions)
+        return replace(s, omissions=wrong(s.omissions))
 
     return spoil
 
@@ -230,36 +183,25 @@ def _swept(s: ForcedSolution, **values: Any) -> ForcedSolution:
     return replace(s, sweeps=[replace(one, found=replace(one.found, **values)), *s.sweeps[1:]])
 
 
-def _lower_down(s: ForcedSolution) -> ForcedSolution:
-    """The sweep down two hundredths lower than the one up."""
-    one = s.sweeps[1]
-    peaks = {
-        side: tuple(p._replace(height=0.98 * p.height) for p in found)
-        for side, found in one.peaks.items()
-    }
-    return replace(s, sweeps=[s.sweeps[0], replace(one, peaks=peaks)])
-
-
-def _unsteady(s: ForcedSolution) -> ForcedSolution:
-    """The peak as one that a march leaves; `test_steady_peaks` has peaks that marches do leave."""
-    curve = s.curves[0]
-    left = LeftMaximum("right", s.numbered_peaks(curve)[0], 1.0)
-    return replace(s, curves=[replace(curve, left=(left,))])
-
-
 SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
-    "path complete": lambda s: with_answer(replace(s, sweeps=[]), status="stopped"),
-    "contact forces periodic": lambda s: with_answer(
+    "path complete": lambda s: with_answer(s, status="stopped"),
+    "path complete, periodic": lambda s: with_answer(
         s, periodic=np.zeros_like(s.curves[0].answer.periodic)
     ),
     "balance residual": lambda s: _forces(s, 1.0 + 1e-4, slice(None)),
     "energy balance": lambda s: with_answer(s, energy=s.curves[0].answer.energy + 1e-3),
     "damper at rest": lambda s: _forces(s, 1.01, slice(0, 1)),
-    "truncation": lambda s: _again(s, truncation, "truncation"),
-    "aliasing": lambda s: _again(s, aliasing, "aliasing"),
-    "both faces carry": _open,
-    "frequency step": _wide_steps,
-    "peaks told apart by mode": _other_modes,
+    "static balance": _unbalanced,
+    "preloaded contact": lambda s: _at_rest(s, (0.0, 350.0), (0.0, 100.0)),
+    "preloaded contact, mobilised": lambda s: _at_rest(s, (200.0, 200.0), (120.0, -120.0)),
+    "more harmonics": _level(HARMONICS, 1.2),
+    "more harmonics, lost": _level(HARMONICS, np.nan),
+    "twice the samples": _level(SAMPLES, 1.03),
+    "confirmed by time integration": lambda s: _checked(
+        s, integrated=1.06 * s.curves[0].checked[0].balance
+    ),
+    "confirmed by time integration, none stays": lambda s: _checked(s, stays=False),
+    "performance complete": _cut_performance,
     "time march": lambda s: replace(
         s, marches=[replace(s.marches[0], height=1.01 * s.marches[0].height)]
     ),
@@ -273,37 +215,21 @@ SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
             for one in s.marched
         ],
     ),
-    "one steady motion": _lower_down,
-    "maxima steady": _unsteady,
-    "steady at the peak": lambda s: replace(
-        s, confirmations=[replace(s.confirmations[0], marched=1.01 * s.confirmations[0].marched)]
-    ),
-    "performance complete": _stopped_branch,
-    "performance settled": _unsettled_branch,
-    "performance highest": lambda s: _followed_at(s, 0.92),
-    "k_t anisotropy": _anisotropic,
-    "static balance": _unbalanced,
-    "band complete": _stopped_band,
-    **{
-        name: _omitted(name)
-        for name in (
-            "sliding along y",
-            "odd motion",
-            "faces that fit without load",
-            "more harmonics",
-            "twice the samples",
-            "other slider starts",
-            "other static states",
-            "more modes",
-            "elastic damper",
-        )
-    },
+    "sliding along y": _omitted("sliding along y"),
+    "elastic damper": _omitted("elastic damper"),
 }
 
 
+def name_of(spoiled: str) -> str:
+    return spoiled.partition(",")[0]
+
+
 def test_a_motion_off_by_a_little_is_off_balance(response: ForcedSolution) -> None:
-    """1e-5 of the motion leaves about as much of the largest terms, and the check fails."""
-    a = response.curves[0].answer
+    """1e-5 of the motion leaves about as much of the largest terms where all stick, and the check
+    fails.
+    """
+    stuck = _points(response, response.curves[0].answer.linear)
+    a = stuck.curves[0].answer
     assert residual_error(a) < 1e-9
     x = a.x * (1.0 + 1e-5)
     force = np.array([a.balance.force(one).force for one in x])
@@ -358,34 +284,25 @@ SPOIL_MODAL: dict[str, Callable[[ModalSolution], ModalSolution]] = {
 }
 
 
-#: effects that move the peak of this scene beyond its limits as it is
-SHIFTS = {"faces that fit without load", "other slider starts", "other static states"}
-
-
-@pytest.mark.parametrize("name", SPOIL_FORCED)
-def test_spoiled_response_fails(response: ForcedSolution, name: str) -> None:
-    whole = {c.name for c in forced.ANALYSIS.check_solution(response)}
-    # of stiffnesses from a table, and of peaks followed without sweeps
-    assert name in whole or name in ("k_t anisotropy", "performance highest")
-    before = failing(forced.ANALYSIS.check_solution(response))
-    assert name not in before or name in SHIFTS
-    assert name in failing(forced.ANALYSIS.check_solution(SPOIL_FORCED[name](response)))
-
-
-def test_a_curve_with_a_higher_peak_than_any_followed_withholds_the_optimum(
-    response: ForcedSolution,
-) -> None:
-    """A share of 0.92 of it; the peak itself is on its branch."""
-    fine, off = _followed_at(response, 1.0), _followed_at(response, 0.92)
-    assert not fine.performances["thesis"].missed
-    assert "performance highest" not in failing(forced.ANALYSIS.check_solution(fine))
-    told = {r.name: r for r in forced.ANALYSIS.make_results(off)}
-
-    assert "higher peak is not followed" in told["optimum_ratio"].withheld
+@pytest.mark.parametrize("spoiled", SPOIL_FORCED)
+def test_spoiled_response_fails(response: ForcedSolution, spoiled: str) -> None:
+    name = name_of(spoiled)
+    assert name not in failing(forced.ANALYSIS.check_solution(response))
+    assert name in failing(forced.ANALYSIS.check_solution(SPOIL_FORCED[spoiled](response)))
 
 
 def test_every_check_of_a_response_is_spoiled(response: ForcedSolution) -> None:
-    assert {c.name for c in forced.ANALYSIS.check_solution(response)} <= set(SPOIL_FORCED)
+    checks = forced.ANALYSIS.check_solution(response)
+    assert {c.name for c in checks} == {name_of(one) for one in SPOIL_FORCED}
+
+
+def test_a_height_of_time_integration_needs_no_more_harmonics(response: ForcedSolution) -> None:
+    """Found by bisection down the path it holds all of them: the level is not asked."""
+    spoiled = _level(HARMONICS, 1.2)(response)
+    curve = spoiled.curves[0]
+    lower = tuple(replace(one, sample=3) for one in curve.checked)
+    found = replace(spoiled, curves=[replace(curve, checked=lower)])
+    assert "more harmonics" not in {c.name for c in forced.ANALYSIS.check_solution(found)}
 
 
 @pytest.mark.parametrize("name", SPOIL_MODAL)
@@ -408,52 +325,30 @@ def test_every_effect_left_out_has_a_number(response: ForcedSolution, rig: Modal
             if effect.on or not effect.applies:
                 continue
             mine = [c for c in checks if c.name == effect.check]
-            assert mine, effect
+            # of a response the error of modes is estimated beside the others
+            assert mine or (effect.name == "modes above" and solution is response), effect
             for check in mine:
                 assert (check.quantity, check.case) in results, check
                 assert check.without is not None
 
 
 def test_no_smaller_number_stands_for_one_not_reached(response: ForcedSolution) -> None:
-    """A path that stopped between the peaks, and a peak that was lost: the rest has a reason."""
-    peaks = response.numbered_peaks(response.curves[0])
-    assert peaks
-    end = peaks[0].sample - 3
-    part = _points(_stopped_branch(replace(response, sweeps=[])), slice(end))
+    """A path that stopped before the peak, and curves without one: numbers with a reason."""
+    curve = response.curves[0]
+    (peak,) = curve.peaks["right"]
+    part = _points(response, slice(peak.sample - 3))
+    none = RatioPoint(250.0, (), True, 0.0)
+    performance = replace(response.performances["thesis"], points=(none,))
+    bare = replace(part.curves[0], peaks={"left": (), "right": ()}, tops={}, checked=(), folds=())
+    part = replace(part, curves=[bare], sweeps=[], marched=[])
+    part = replace(part, performances={"thesis": performance})
     cut = with_answer(part, status="stopped", message="lost")
-    results = {(r.name, str(r.case)): r for r in forced.ANALYSIS.make_results(cut)}
-    peak = f"peak_{peaks[0].number}"
-    missing = {name for (name, _), r in results.items() if r.withheld}
-    assert {f"{peak}_frequency", f"{peak}_accelerance", "optimum_ratio", "lowest_peak"} <= missing
-    assert all(
-        np.isnan(r.value) and r.as_dict()["value"] is None for r in results.values() if r.withheld
-    )
-    curve = [
-        r
-        for r in results.values()
-        if r.name == f"{peak}_accelerance" and r.case.matches(cut.curves[0].case)
-    ]
-    assert [r.withheld.partition(":")[0] for r in curve] == [cut.curves[0].where]
-
-
-def test_paths_that_pass_each_other_on_two_branches_give_no_reduction(
-    response: ForcedSolution,
-) -> None:
-    """They overlap in frequency; the highest point may lie on the part neither has."""
-    whole = response.curves[0]
-
-    def part(at: slice, shift: float, reverse: bool) -> ForcedCurve:
-        a = whole.answer
-        cut = replace(a, frequency=a.frequency[at], status="stopped", message="lost")
-        blades = {side: shift * H[at] for side, H in whole.accelerance.items()}
-        return replace(whole, answer=cut, accelerance=blades, reversed=reverse)
-
-    n = len(whole.answer.frequency)
-    up, down = slice(0, 2 * n // 3), slice(None, n // 3, -1)
-    for shift, withheld in ((1.0, False), (0.5, True)):
-        curves = [part(up, 1.0, False), part(down, shift, True)]
-        assert curves[0].answer.frequency[-1] > curves[1].answer.frequency[-1]
-        assert meet(curves) is not withheld
+    results = [r for r in forced.ANALYSIS.make_results(cut) if r.withheld]
+    missing = {r.name for r in results}
+    assert {"peak_2_frequency", "peak_2_accelerance", "best_ratio", "best_peak"} <= missing
+    assert all(np.isnan(r.value) and r.as_dict()["value"] is None for r in results)
+    mine = [r for r in results if r.name == "peak_2_accelerance"]
+    assert [r.withheld for r in mine] == [cut.curves[0].where]
 
 
 def _switched(scene: str, overrides: list[str], effect: str, solution: Any) -> None:
@@ -472,34 +367,16 @@ def _switched(scene: str, overrides: list[str], effect: str, solution: Any) -> N
         assert abs(with_it[key] / numbers[key] - 1.0) <= check.value + 5e-3, check
 
 
-SWITCHED = ("sliding along the damper", "harmonics above")
-COSTLIER = (
-    "motion odd about y = 0",
-    "modes above",
-    "other slider starts",
-    "other static states",
-    "blades spread by F_C",
-)
-
-
-@pytest.mark.parametrize("effect", SWITCHED)
-def test_switched_on_it_changes_a_peak_as_printed(
-    response: ForcedSolution, forced_scene: list[str], effect: str
+def test_sliding_along_the_damper_changes_a_peak_as_printed(
+    response: ForcedSolution, forced_scene: list[str]
 ) -> None:
-    _switched("symmetric-response", forced_scene, effect, response)
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("effect", COSTLIER)
-def test_costlier_effect_changes_a_peak_as_printed(
-    response: ForcedSolution, forced_scene: list[str], effect: str
-) -> None:
-    _switched("symmetric-response", forced_scene, effect, response)
+    scene = [*forced_scene, "accuracy=unknown"]
+    _switched("symmetric-response", scene, "sliding along the damper", response)
 
 
 def test_every_switch_of_a_response_is_tried(response: ForcedSolution) -> None:
     declared = {e.name for e in response.plan.effects if e.switch and not e.on and e.applies}
-    assert declared == {*SWITCHED, *COSTLIER}
+    assert declared == {"sliding along the damper"}
 
 
 def test_more_modes_change_the_linear_peak_as_printed(rig: ModalSolution) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from upd.analyses.forced import checks
+from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution, TimeMarch
 from upd.hbm import SteadyState
@@ -35,13 +36,11 @@ def solution(march: TimeMarch) -> Any:
         faces={},
         sweeps=[],
         balanced=[],
-        confirmations=[],
+        band=[],
+        effects={},
         linear={},
         curves=[],
-        spreads={},
-        harmonics={},
         performances={},
-        bands=[],
         plan=SimpleNamespace(
             scene=SimpleNamespace(measured={}, excitation=SimpleNamespace(damping=0.005))
         ),
@@ -71,9 +70,11 @@ def import_results(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 def test_points_that_are_not_periodic_are_counted() -> None:
-    answer = SimpleNamespace(periodic=np.array([True, False, True, False]))
-    curve: Any = SimpleNamespace(answer=answer, case=CASE)
-    check = checks._periodic(curve)
+    answer: Any = SimpleNamespace(
+        periodic=np.array([True, False, True, False]), frequency=np.arange(4.0), arrived=True
+    )
+    curve = ForcedCurve("own", 60.0, 1.0, answer, {}, 0.0)
+    check = checks._path(curve)
     assert check.value == 2
     assert not check.passed
-    assert "of 4 points" in check.says
+    assert "at 2 points" in check.remedy

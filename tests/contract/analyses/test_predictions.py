@@ -287,7 +287,8 @@ def test_samples_frequencies_and_modes_of_a_balance_cost() -> None:
     modes for ten.
     """
     base = {
-        "balance.method": "balance",
+        "want": ["response"],
+        "excitation.points": 400,
         "balance.harmonics": 7,
         "contact.rule": "gauss",
         "contact.rows": 24,

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs import LINES
 
 import upd
 from upd.analyses.forced.sweeps import TOLERANCE
@@ -13,6 +14,7 @@ from upd.report.notebook import RunResult, charts
 from upd.scene import load_scene
 
 TOY: Mapping[str, Any] = {
+    **LINES,
     "contact.model": "interface",
     "contact.static": "frictionless",
     "mesh.element": "hex8i",
@@ -36,22 +38,22 @@ def data(variable: Any) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def stuck() -> RunResult:
-    return run(**{"excitation.centrifugal_to_force": [1e6]})
+    near = {"excitation.start": "450 Hz", "excitation.stop": "456 Hz"}
+    return run(**near, **{"excitation.centrifugal_to_force": [1e6]})
 
 
 def test_a_small_force_finds_the_stuck_response(stuck: RunResult) -> None:
     """Without slip the sweeps are the linear response: worn faces that stick are glued."""
-    case = "interface, F_C/F_E 1e+06, in phase"
-    wanted = "interface, stuck, in phase"
-    assert stuck.value("peak_1_frequency", case) == pytest.approx(
-        stuck.value("peak_1_frequency", wanted), rel=5e-4
-    )
-    assert stuck.value("peak_1_accelerance", case) == pytest.approx(
-        stuck.value("peak_1_accelerance", wanted), rel=1e-2
-    )
-    told = next(r for r in stuck.results if r.name == "peak_1_frequency" and r.case == case)
-    assert told.low is None
-    assert "alike" in told.why
+    for way in ("up", "down"):
+        case = f"interface, F_C/F_E 1e+06, in phase, sweep {way}"
+        wanted = "interface, stuck, in phase"
+        # points of a sweep 0.15 Hz apart
+        assert stuck.value("peak_1_frequency", case) == pytest.approx(
+            stuck.value("peak_1_frequency", wanted), rel=5e-4
+        )
+        assert stuck.value("peak_1_accelerance", case) == pytest.approx(
+            stuck.value("peak_1_accelerance", wanted), rel=1e-2
+        )
     states = stuck.arrays["sweep interface, F_C/F_E 1e+06, sweep up"]["share"]
     assert data(states)[:, 0] == pytest.approx(1.0)
 
@@ -88,8 +90,9 @@ def test_a_large_force_slips_and_the_energy_closes() -> None:
             "contact.fit": "new",
             "contact.static": "seated",
             "excitation.centrifugal_to_force": [300.0],
-            "excitation.start": "440 Hz",
+            "excitation.start": "425 Hz",
             "excitation.stop": "450 Hz",
+            "excitation.points": 26,
         }
     )
     T, N = (found.value(f"static_{k}", "interface, seated, right") for k in "TN")
@@ -105,12 +108,16 @@ def test_a_large_force_slips_and_the_energy_closes() -> None:
     peaks = found.arrays["marched peaks interface, F_C/F_E 300, sweep down"]
     nodes = data(found.arrays["points interface"]["face"])
     assert data(peaks["state"]).shape == (1, len(nodes), 3)
-    case = checks["loss by nodes"].case
+    case = next(
+        c.case for c in found.checks if c.name == "loss by nodes" and "down" in c.case.choice
+    )
     told = found.value("friction_energy", case)
     assert data(peaks["energy"]).sum() == pytest.approx(told, rel=1e-9)
     assert 1e3 * data(peaks["power"]).sum() == pytest.approx(found.value("friction_power", case))
     maps = [c for c in charts(found) if c.figure == "contact_map"]
-    assert {c.detail for c in maps} == {"time march, sweep down, 440.0 Hz"}
+    for way in ("up", "down"):
+        f = found.value("peak_2_frequency", f"interface, F_C/F_E 300, out of phase, sweep {way}")
+        assert f"time integration, sweep {way}, {f:.1f} Hz" in {c.detail for c in maps}
 
 
 def test_the_balance_of_a_small_force_is_the_stuck_response() -> None:
@@ -131,31 +138,28 @@ def test_the_balance_of_a_small_force_is_the_stuck_response() -> None:
     assert all(checks[k].passed for k in ("path complete", "balance residual", "energy balance"))
 
 
-def test_balance_and_sweeps_that_agree_are_one_number() -> None:
-    """Where nodes slip and open: the balance's peak, which the sweeps and a march from it tell."""
-    found = run(
-        **{
-            "balance.method": "auto",
-            "balance.harmonics": 3,
-            "excitation.centrifugal_to_force": [800.0],
-            "excitation.start": "449.5 Hz",
-            "excitation.stop": "455 Hz",
-            "excitation.points": 16,
-        }
+def test_balance_and_sweeps_agree_where_nodes_slip_and_open() -> None:
+    balanced, marched = (
+        run(
+            **{
+                "balance.method": method,
+                "balance.harmonics": 3,
+                "want": ["response", "contact_state"],
+                "excitation.centrifugal_to_force": [800.0],
+                "excitation.start": "449.5 Hz",
+                "excitation.stop": "455 Hz",
+                "excitation.points": 16,
+            }
+        )
+        for method in ("balance", "march")
     )
-    case = "interface, F_C/F_E 800, in phase"
-    assert found.value("share_slip", "interface, F_C/F_E 800, at peak 1, in phase") > 3.0
-    told = next(r for r in found.results if r.name == "peak_1_accelerance" and r.case == case)
-    assert told.low is None
-    assert told.why == ""
-    checks = {c.name: c for c in found.checks}
-    for name in ("balance residual", "energy balance", "path complete", "frequency step"):
-        assert checks[name].passed, name
-    assert checks["one steady motion"].passed
-    assert checks["steady at the peak"].passed
-    assert checks["steady at the peak"].value > 0.0
-    path = found.arrays["friction interface, F_C/F_E 800"]
-    swept = found.arrays["sweep interface, F_C/F_E 800, sweep up"]
+    assert balanced.value("share_slip", "interface, F_C/F_E 800, at peak 1, in phase") > 3.0
+    failed = {c.name for c in (*balanced.checks, *marched.checks) if not c.passed}
+    # three harmonics are few
+    assert not failed - {"truncation"}
+    assert {c.name for c in balanced.checks} >= {"balance residual", "energy balance"}
+    path = balanced.arrays["friction interface, F_C/F_E 800"]
+    swept = marched.arrays["sweep interface, F_C/F_E 800, sweep up"]
     here, there = (
         (data(one["frequency"]), np.linalg.norm(data(one["accelerance_right"]), axis=1))
         for one in (path, swept)
@@ -163,14 +167,12 @@ def test_balance_and_sweeps_that_agree_are_one_number() -> None:
     np.testing.assert_allclose(np.interp(there[0], *here), there[1], rtol=2e-2)
     states = data(path["state"])
     assert states.shape == (len(here[0]), 18, 3)
+    np.testing.assert_allclose(states.sum(axis=2), 1.0)
     # the balance's states of both faces over frequency, and the march's at the peak
     np.testing.assert_allclose(data(path["share"]).sum(axis=2), 1.0)
-    assert checks["loss by nodes"].passed
-    drawn = {c.figure: c.detail for c in charts(found) if c.detail and c.figure != "response"}
-    assert drawn.keys() == {"contact_map", "hysteresis", "damper_period"}
-    assert all(detail.startswith("time march, sweep ") for detail in drawn.values())
-    np.testing.assert_allclose(states.sum(axis=2), 1.0)
-    lines = [t for c in charts(found) for t in c.traces if t.label == "F_C/F_E 800"]
+    drawn = [{c.figure for c in charts(one) if c.detail} for one in (balanced, marched)]
+    assert all("contact_map" in one for one in drawn)
+    lines = [t for c in charts(balanced) for t in c.traces if t.label == "F_C/F_E 800"]
     assert {len(t.x) for t in lines} == {len(here[0])}
 
 

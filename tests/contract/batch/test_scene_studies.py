@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from rich.console import Console
+from rigs import LINES
 
 from upd import load_scene, make_plan, run
 from upd.analyses.forced.points import lattice_points
@@ -37,6 +38,7 @@ pytestmark = pytest.mark.estimated
 
 #: at this F_C/F_E every point sticks: a response takes seconds
 STUCK: Mapping[str, Any] = {
+    **LINES,
     "mesh.element": "hex8i",
     "contact.stiffness": ["thesis"],
     "contact.columns": 1,
@@ -167,11 +169,11 @@ def test_levels_that_are_none() -> None:
 @pytest.mark.parametrize("name", ["symmetric-response", "asymmetric-response"])
 def test_contact_points_are_the_same_areas_on_every_mesh(name: str) -> None:
     """Their places and shares are, so that the ladder shows the mesh alone."""
-    scene = load_scene(name)
+    scene = load_scene(name, LINES)
     found: dict[str, list[Any]] = {"left": [], "right": []}
     points = response_mesh_points(scene, "mesh", (0.5, 1, 2))
     for point in points:
-        level = load_scene(name, {**dict(point.settings), "mesh.element": "hex8"})
+        level = load_scene(name, {**LINES, **dict(point.settings), "mesh.element": "hex8"})
         parameters = {k: v for k, v in level.geometry.items() if k != "recipe"}
         meshes, _ = build_mesh(
             level.recipe, {**parameters, "damper": "free", "element_nodes": 8, "symmetry": "full"}
@@ -191,9 +193,11 @@ def test_contact_points_are_the_same_areas_on_every_mesh(name: str) -> None:
 
 
 def test_what_the_mesh_ladder_of_a_response_sets() -> None:
-    scene = load_scene("symmetric-response", {"contact.left.rows": [1, 2], "contact.columns": 1})
+    scene = load_scene(
+        "symmetric-response", {**LINES, "contact.left.rows": [1, 2], "contact.columns": 1}
+    )
     made = [
-        load_scene("symmetric-response", dict(p.settings))
+        load_scene("symmetric-response", {**LINES, **dict(p.settings)})
         for p in response_mesh_points(scene, "element")
     ]
     assert {one.mesh.element for one in made} == {"hex8", "hex8i", "hex20", "hex27"}

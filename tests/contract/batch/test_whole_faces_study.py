@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from rich.console import Console
+from rigs import LINES
 
 from upd import load_scene, make_plan
 from upd.batch import point
@@ -24,6 +25,7 @@ from upd.errors import InputError
 from upd.results import Case, Result
 
 STUCK: Mapping[str, Any] = {
+    **LINES,
     "mesh.element": "hex8i",
     "geometry.patch_along_y": 4,
     "geometry.patch_along_slope": 2,
@@ -52,7 +54,8 @@ ASKED = {"symmetric-response": (4, 8, 12), "asymmetric-response": (3, 6, 9)}
 def test_levels_are_springs_of_every_stiffness_then_finer_faces(
     name: str, nodes: list[int]
 ) -> None:
-    scene = load_scene(name, {"balance.time_march": ["330 Hz"]})
+    both = {"contact.stiffness": ["thesis", "own"]}
+    scene = load_scene(name, both | {"balance.time_march": ["330 Hz"]})
     usual = whole_faces_points(scene, "contact")
     assert [p.label for p in usual[2:]] == USUAL[name]
     points = whole_faces_points(scene, "contact", ASKED[name])
@@ -199,7 +202,8 @@ def test_without_whole_faces_nothing_is_compared(tmp_path: Path) -> None:
 
 def test_a_toy_ladder_finds_the_stuck_peaks_of_both_models(tmp_path: Path) -> None:
     """At a tiny force all sticks: each level's peak is that of its own linear limit."""
-    scene = load_scene("symmetric-response", STUCK)
+    # points of a sweep 0.2 Hz apart
+    scene = load_scene("symmetric-response", {**STUCK, "excitation.points": 101})
     planned = plan_study(scene, "contact", (2,))
     found = run_study(scene, planned, tmp_path, workers=Workers(0, 1))
     assert [one.outcome.failure for one in found.solved] == ["", ""]
@@ -208,7 +212,8 @@ def test_a_toy_ladder_finds_the_stuck_peaks_of_both_models(tmp_path: Path) -> No
     ]
     stuck = [values["peak_2_frequency", f"{name}, stuck, out of phase"] for values, name in cases]
     found_at = [
-        values["peak_2_frequency", f"{name}, F_C/F_E 1e+06, out of phase"] for values, name in cases
+        values["peak_2_frequency", f"{name}, F_C/F_E 1e+06, out of phase{way}"]
+        for (values, name), way in zip(cases, ("", ", sweep up"), strict=True)
     ]
     assert found_at == pytest.approx(stuck, rel=5e-4)
     cost, *_, second = found.report.tables

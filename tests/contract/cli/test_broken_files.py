@@ -363,6 +363,8 @@ def test_contact_scene_that_gives_no_stiffness() -> None:
             "plan",
             "symmetric-response",
             "--set",
+            'contact.stiffness=["own"]',
+            "--set",
             f"stiffness.own.scene={source}",
             says=says,
         )

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from rigs import LINES
 
 _SMALL = {
+    **LINES,
     "mesh.element": "hex8i",
     "geometry.refine": 0.5,
     "contact.stiffness": ["thesis"],

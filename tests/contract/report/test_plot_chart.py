@@ -38,7 +38,7 @@ from upd.plot.chart import (
     Style,
     Trace,
 )
-from upd.plot.labels import Box, is_far, labelled, placed
+from upd.plot.labels import labelled, sides, with_room
 from upd.plot.matplotlib import draw, write_sheet, write_sheets
 from upd.plot.plotly import figure
 from upd.plot.png import png_size
@@ -139,49 +139,40 @@ def test_outlines_are_black_and_closed_forms_grey() -> None:
 # ---------------------------------------------------------------- marks
 
 
-def test_marks_close_to_each_other_have_at_most_three_labels() -> None:
-    told = [Mark(x, y, f"{x} Hz") for x, y in ((100.0, 5.0), (102.0, 4.0), (98.0, 6.0))]
-    assert labelled(told).all()
-    # Lower than three others within 3 %; one beyond that.
-    more = [Mark(100.5, 3.0, "100.5 Hz"), Mark(104.0, 2.0, "104 Hz")]
-    assert labelled([*told, *more]).tolist() == [True, True, True, False, True]
-    assert labelled([Mark(1.0, 0.0, "")]).tolist() == [False]
+def test_words_stand_beside_marks_that_have_room() -> None:
+    def told(*marks: Mark, log: bool = False) -> list[bool]:
+        axes = Axis("f", low=100.0, high=200.0), Axis("y", low=1.0, high=1e4, log=log)
+        return labelled(Chart("t", *axes, marks=marks)).tolist()
 
-
-def test_the_same_words_close_by_stand_once() -> None:
-    marks = [Mark(441.68, 1.0, "441.7 Hz"), Mark(441.72, 2.0, "441.7 Hz"), Mark(9.0, 3.0, "a")]
-    assert labelled(marks).tolist() == [False, True, True]
-    assert labelled([Mark(1.0, 1.0, "a"), Mark(2.0, 1.0, "a")]).all(), "far from each other"
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_labels_cover_neither_each_other_nor_a_dot(seed: int) -> None:
-    random = np.random.default_rng(seed)
-    n, width = int(random.integers(1, 12)), 300.0
-    at = random.uniform([0.0, 0.0], [width, 60.0], (n, 2))
-    dots = np.vstack([at, random.uniform([0.0, 0.0], [width, 60.0], (5, 2))])
-    size = random.uniform([20.0, 8.0], [60.0, 24.0], (n, 2))
-    boxes = placed(at, size, dots, width, 4.0)
-    assert not any(a.covers(b) for k, a in enumerate(boxes) for b in boxes[:k])
-    assert not any(b.left < x < b.right and b.bottom < y < b.top for b in boxes for x, y in dots)
-    assert all(b.left >= 0.0 and b.right <= width + 1e-9 for b in boxes)
-    np.testing.assert_allclose([[b.right - b.left, b.top - b.bottom] for b in boxes], size)
-
-
-def test_a_label_stands_above_its_mark_where_there_is_room() -> None:
-    wide, tall = size = np.array([40.0, 10.0])
-    (alone,) = placed(np.array([[100.0, 50.0]]), size[None], np.array([[100.0, 50.0]]), 300.0, 4.0)
-    assert alone == Box(80.0, 54.0, 120.0, 64.0)
-    # Near neighbours stand beside it, with lines to their marks; a third one above it.
-    at = np.array([[100.0, 50.0], [112.0, 49.0], [88.0, 48.0], [101.0, 40.0]])
-    first, right, left, above = placed(at, np.tile(size, (4, 1)), at, 300.0, 4.0)
-    assert first == alone and right == Box(121.0, 53.0, 121.0 + wide, 53.0 + tall)
-    assert left == Box(79.0 - wide, 52.0, 79.0, 52.0 + tall) and above.bottom >= 64.0
-    assert [is_far(b, p, 4.0) for b, p in zip((first, right, above), at, strict=False)] == [
+    # The higher of two neighbours has them; one far along either axis has its own.
+    near = (Mark(150.0, 9000.0, "a"), Mark(155.0, 9100.0, "b"))
+    assert told(*near) == [False, True]
+    assert told(*near, Mark(180.0, 9000.0, "c"), Mark(150.0, 5000.0, "d")) == [
         False,
         True,
         True,
+        True,
     ]
+    # On a logarithmic axis 5000 is as near as 8000 on a linear one.
+    assert told(*near, Mark(150.0, 5000.0, "d"), log=True) == [False, True, False]
+    # Not without words, nor outside the axes.
+    assert told(Mark(150.0, 5.0, ""), Mark(99.0, 5.0, "a"), Mark(150.0, -1.0, "b")) == [False] * 3
+
+
+def test_words_at_the_ends_of_x_stand_inwards() -> None:
+    marks = tuple(Mark(x, 1.0, "a") for x in (100.0, 150.0, 199.0))
+    chart = Chart("t", Axis("f", low=100.0, high=200.0), Y, marks=marks)
+    assert sides(chart) == ["right", "center", "left"]
+
+
+@pytest.mark.parametrize("log", [False, True])
+def test_the_highest_words_have_room(log: bool) -> None:
+    chart = Chart("t", X, replace(Y, log=log), (CURVE,), marks=(Mark(1.0, 4.0, "a"),))
+    end = with_room(chart).y.high
+    assert end is not None and 4.0 < end < (8.0 if log else 5.0)
+    # An end that is asked for stays, and nothing is done without words.
+    for same in (replace(chart, y=replace(Y, high=4.5)), replace(chart, marks=())):
+        assert with_room(same) is same
 
 
 def _crowd() -> Chart:
@@ -219,14 +210,12 @@ def test_labels_and_legends_of_a_sheet_cover_nothing(log: bool) -> None:
     assert len(axes) == len(charts)
     for chart, ax in zip(charts, axes, strict=True):
         labels = [t for t in ax.texts if t.get_text() in {m.text for m in chart.marks}]
-        assert len(labels) == len(chart.marks)
+        assert len(labels) == int(labelled(chart).sum())
         boxes = [Text.get_window_extent(label) for label in labels]
         frame = ax.get_window_extent()
         assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k]), "labels"
         assert all(frame.x0 - 1 <= b.x0 and b.x1 <= frame.x1 + 1 for b in boxes), "beside"
         assert all(b.y1 <= frame.y1 for b in boxes), "above"
-        dots = ax.transData.transform([(m.x, m.y) for m in chart.marks]).reshape(-1, 2)
-        assert not any(b.x0 < x < b.x1 and b.y0 < y < b.y1 for b in boxes for x, y in dots)
         if (legend := ax.get_legend()) is not None:
             told = legend.get_window_extent()
             around = [ax.xaxis.label.get_window_extent(), ax.title.get_window_extent(), frame]
@@ -236,12 +225,22 @@ def test_labels_and_legends_of_a_sheet_cover_nothing(log: bool) -> None:
             assert not any(told.overlaps(box) for box in around), "the legend covers something"
             assert sheet.bbox.x0 <= told.x0 and told.x1 <= sheet.bbox.x1, "the legend is cut"
             assert sheet.bbox.y0 <= told.y0
+            place = sheet.bbox.width * sheet.bbox.height / len(charts)
+            assert told.width * told.height <= 0.25 * place, "the legend takes the drawing"
+
+
+def test_a_long_legend_says_how_many_entries_are_left_out() -> None:
+    names = [f"F_C/F_E 2000, static reversed, sweep {k}" for k in range(60)]
+    chart = Chart("t", X, Y, tuple(replace(CURVE, label=name) for name in names))
+    told = entries(drawn(chart))
+    assert told[:-1] == names[: len(told) - 1]
+    assert told[-1] == f"and {61 - len(told)} more"
 
 
 def test_marks_are_points_with_words() -> None:
     marks = (
         Mark(1.0, 4.0, "1.0 Hz", 1),
-        Mark(1.01, 3.0, "1.0 Hz", 1),
+        Mark(1.01, 3.8, "1.0 Hz", 1),
         Mark(0.0, 1.0, "0 < 1", closed=True),
     )
     chart = Chart("t", X, Y, (CURVE,), marks=marks)
@@ -260,18 +259,14 @@ def test_marks_are_points_with_words() -> None:
             "a label reaches out of the drawing"
         )
     made = figure(chart)
-    first, second = (t for t in made["data"] if t["mode"] == "markers")
+    first, second = (t for t in made["data"] if t["mode"] == "markers+text")
     assert (first["customdata"], first["marker"]["color"]) == (["1.0 Hz", "1.0 Hz"], COLOURS[1])
-    assert numbers(first["x"]) == pytest.approx([1.0, 1.01]) and numbers(first["y"]).tolist() == [
-        4.0,
-        3.0,
-    ]
-    assert second["customdata"] == ["0 &lt; 1"]
-    assert made["labels"] == [
-        {"x": 1.0, "y": 4.0, "text": "1.0 Hz", "color": COLOURS[1]},
-        {"x": 1.01, "y": 3.0, "text": "", "color": COLOURS[1]},
-        {"x": 0.0, "y": 1.0, "text": "0 &lt; 1", "color": CLOSED},
-    ]
+    assert numbers(first["x"]) == pytest.approx([1.0, 1.01]) and numbers(
+        first["y"]
+    ) == pytest.approx([4.0, 3.8])
+    assert first["text"] == ["1.0 Hz", ""] and first["textposition"] == ["top center"] * 2
+    assert second["customdata"] == second["text"] == ["0 &lt; 1"]
+    assert second["textposition"] == ["top right"]
 
 
 # ---------------------------------------------------------------- bands and areas
@@ -622,7 +617,10 @@ def test_ends_and_words_of_axes() -> None:
         "no",
     ] and ax.get_xticks().tolist() == [0.0, 1.0, 2.0]
     layout = figure(chart)["layout"]
-    assert (layout["xaxis"]["range"], layout["yaxis"]["range"]) == ([0.5, None], [-1.0, 9.0])
+    assert (layout["xaxis"]["range"], layout["yaxis"]["range"]) == (
+        [0.5, pytest.approx(2.075)],
+        [-1.0, 9.0],
+    )
     assert (layout["xaxis"]["tickvals"], layout["xaxis"]["ticktext"]) == (
         [0.0, 1.0, 2.0],
         ["no", "yes", "no"],

@@ -1,6 +1,7 @@
 """The page of a run in a real browser.
 
-No errors, figures at both widths, a tooltip, no sideways scrolling, pictures without script.
+No errors, figures at both widths, a tooltip, no sideways scrolling, pictures without script; the
+answer and its chart on the first screen, legends that leave the charts their place.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +22,18 @@ import numpy as np
 import pytest
 
 from upd import run
+from upd.analyses import hertz
 from upd.plot.chart import Axis, Chart, Mark, Trace
 from upd.report import write_report
 from upd.report.page import render, save
 from upd.report.panels import make_panels
+from upd.results.answer_table import AnswerTable
 
-PHONE, DESK = 390, 1280
+PHONE, DESK, SCREEN = 390, 1280, 800
+#: pixels of a page that opens on its answer, where all else is folded
+HIGHEST = 6000
+#: part of a chart that its legend may take
+LEGEND = 0.25
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 _BROWSER = next((found for name in _NAMES if (found := shutil.which(name))), None)
 pytestmark = [
@@ -86,7 +94,7 @@ class Tab:
         await self.call(
             "Emulation.setDeviceMetricsOverride",
             width=width,
-            height=900,
+            height=SCREEN,
             deviceScaleFactor=1,
             mobile=width < 600,
         )
@@ -193,32 +201,65 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     yield write_report(folder)
 
 
-def _crowd() -> Chart:
+#: as many numbers as the answer of a forced response has
+ANSWER = [
+    AnswerTable("Static state", ("state", "# normal N", "# ±"), (("rest", "212.4", "±1 %"),) * 2),
+    AnswerTable(
+        "Peaks",
+        ("# F_C/F_E", "mode", *(f"# number {k}" for k in range(8)), "fold"),
+        (("194", "out of phase", *("427.72",) * 8, "397.1 to 398.2 Hz"),) * 8,
+        "What the columns mean, in a sentence that needs more than one line beside the chart.",
+    ),
+    AnswerTable("Best F_C/F_E", ("mode", "# F_C/F_E"), (("in phase", "58.2"),) * 2),
+    AnswerTable("What it depends on", ("what", "# moves it"), (("friction", "±21 %"),) * 4),
+]
+
+
+@pytest.fixture(scope="module")
+def answered(page: Path) -> Path:
+    """The page of the same run, opened on tables of an answer."""
+    before, path = page.read_bytes(), page.with_name("answered.html")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(hertz, "ANALYSIS", replace(hertz.ANALYSIS, answer=lambda _: ANSWER))
+        write_report(page.parent).rename(path)
+    page.write_bytes(before)
+    return path
+
+
+def _crowd(entries: int) -> Chart:
     """A response with a long legend and peaks close to each other, at both ends too."""
     f = np.linspace(280.0, 500.0, 300)
-    peaks = ((281.0, 300.0), (335.0, 180.0), (337.7, 185.0), (340.0, 170.0), (499.0, 150.0))
+    peaks = ((281.0, 300.0), (345.0, 180.0), (347.7, 185.0), (350.0, 170.0), (499.0, 150.0))
     traces = tuple(
-        Trace(f"centrifugal over exciting force {k}", f, 1.0 + y / (1.0 + (f - x) ** 2), colour=k)
-        for k, (x, y) in enumerate(peaks)
+        Trace(
+            f"centrifugal over exciting force {k}",
+            f,
+            1.0 + peaks[k % 5][1] / (1.0 + (f - peaks[k % 5][0]) ** 2),
+            colour=k,
+        )
+        for k in range(entries)
     )
     marks = tuple(Mark(x, y, f"{x:.1f} Hz\n{y:.0f}", k) for k, (x, y) in enumerate(peaks))
     axes = Axis("frequency", "Hz", low=280.0, high=500.0), Axis("accelerance", log=True)
-    return Chart("Response", *axes, traces, marks=marks, figure="response")
+    return Chart("Response", *axes, traces, marks=marks, figure=f"response_{entries}")
 
 
-#: rectangles of what must not lie on each other: left, top, right, bottom
-_BOXES = """(function () {
+#: of every drawn chart: rectangles of its legend, its drawing and the words in it, and its own:
+#: left, top, right, bottom
+_BOXES = """[...document.querySelectorAll('.plot')].filter((p) => p._fullLayout).map(function (p) {
   const box = (e) => { const b = e.getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; };
-  const one = (name) => box(document.querySelector('.plot ' + name));
-  return {labels: [...document.querySelectorAll('.plot .annotation-text-g text')].map(box),
-    dots: [...document.querySelectorAll('.plot .scatterlayer .trace .points path')].map(box),
-    legend: one('.legend'), frame: one('.nsewdrag'), buttons: one('.modebar'), all: one('.main-svg')};
-})()"""
-#: zoomed into the three close peaks
-_ZOOM = (
-    "Plotly.relayout(document.querySelector('.plot'), {'xaxis.range': [330, 345]})"
-    ".then(() => new Promise((done) => setTimeout(done, 300))).then(() => true)"
-)
+  const one = (name) => { const e = p.querySelector(name); return e && box(e); };
+  return {legend: one('.legend .bg'), frame: one('.nsewdrag'), all: one('.main-svg'),
+    words: [...p.querySelectorAll('.textpoint text')].map(box)};
+})"""
+#: opens what is folded
+_UNFOLD = "document.querySelectorAll('details.fold').forEach((d) => { d.open = true; })"
+_ALL_DRAWN = "[...document.querySelectorAll('.panel:not(.image)')].every((p) => p.classList.contains('drawn'))"
+#: lower ends of the tables of the answer and of the first chart, in the window
+_OPENING = """({tables: [...document.querySelectorAll('.opening .grid')].map((e) => e.getBoundingClientRect().bottom),
+  chart: document.querySelector('.opening .plot .main-svg').getBoundingClientRect().bottom,
+  live: document.querySelectorAll('.plot .main-svg').length,
+  height: document.documentElement.scrollHeight, width: document.documentElement.scrollWidth})"""
 
 
 def _lie_on_each_other(a: list[float], b: list[float]) -> bool:
@@ -226,18 +267,31 @@ def _lie_on_each_other(a: list[float], b: list[float]) -> bool:
     return min(a[2], b[2]) - max(a[0], b[0]) > 0.5 and min(a[3], b[3]) - max(a[1], b[1]) > 0.5
 
 
-async def _boxes(tab: Tab, page: Path) -> dict[str, Any]:
-    """Rectangles of the crowded chart at both widths, as a whole and zoomed into."""
+def _area(box: list[float]) -> float:
+    return (box[2] - box[0]) * (box[3] - box[1])
+
+
+async def _crowded(tab: Tab, page: Path) -> dict[str, Any]:
+    """Rectangles of crowded charts at both widths."""
     nothing: dict[str, Any] = {"title": "t", "names": [], "numbers": [], "parameters": []}
-    save(page, render("compare_sweeps.html.j2", make_panels([_crowd()], {}), [], nothing))
+    panels = make_panels([_crowd(5), _crowd(30)], {})
+    save(page, render("compare_sweeps.html.j2", panels, [], nothing))
     out = {}
     for width in (PHONE, DESK):
         await tab.open(page, width)
         out[f"{width}"] = await tab.value(_BOXES)
-        assert await tab.value(_ZOOM)
-        out[f"{width}, zoomed"] = await tab.value(_BOXES)
-    assert tab.faults() == []
-    return out
+    return out | {"faults": tab.faults()}
+
+
+async def _opened(tab: Tab, page: Path, width: int) -> dict[str, Any]:
+    """A page that opens on its answer: as it comes, and with all that is folded opened."""
+    await tab.open(page, width)
+    found = {"opening": await tab.value(_OPENING)}
+    await tab.value(_UNFOLD)
+    await tab.until(_ALL_DRAWN)
+    found["boxes"] = await tab.value(_BOXES)
+    found["unfolded_width"] = await tab.value("document.documentElement.scrollWidth")
+    return found | {"faults": tab.faults(), "requests": tab.requests()}
 
 
 #: drawn figures and their widths; a chart is an SVG with curves or a map in it, the view in three
@@ -308,6 +362,7 @@ async def _looked_at(tab: Tab, page: Path, width: int) -> dict[str, Any]:
     found = {
         "figures": await tab.value(_FIGURES),
         "page_width": await tab.value("document.documentElement.scrollWidth"),
+        "boxes": await tab.value(_BOXES),
     }
     found["title"] = await tab.value("document.title")
     point = await tab.value(_POINT)
@@ -330,12 +385,13 @@ async def _looked_at(tab: Tab, page: Path, width: int) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def seen(page: Path) -> dict[str, Any]:
+def seen(page: Path, answered: Path) -> dict[str, Any]:
     """What the browser shows: at both widths, and without script."""
 
     async def look(tab: Tab) -> dict[str, Any]:
         widths = {str(width): await _looked_at(tab, page, width) for width in (PHONE, DESK)}
-        widths["boxes"] = await _boxes(tab, page.parent.parent / "crowd.html")
+        widths["answered"] = {str(w): await _opened(tab, answered, w) for w in (PHONE, DESK)}
+        widths["crowded"] = await _crowded(tab, page.parent.parent / "crowd.html")
         await tab.open(page, PHONE, script=False)
         images = (
             "[...document.images].map((i) => ({width: i.getBoundingClientRect().width, "
@@ -405,15 +461,32 @@ def test_figures_remain_without_script(seen: dict[str, Any]) -> None:
     assert still["page_width"] == PHONE
 
 
-def test_labels_and_legends_cover_nothing(seen: dict[str, Any]) -> None:
-    for name, found in seen["boxes"].items():
-        labels, legend = found["labels"], found["legend"]
-        assert len(labels) == (3 if "zoomed" in name else 5), name
-        for k, box in enumerate(labels):
-            others = [*labels[:k], legend, found["buttons"]]
-            others += [] if "zoomed" in name else found["dots"]
-            hit = [other for other in others if _lie_on_each_other(box, other)]
-            assert not hit, (name, box, hit)
-            assert found["all"][0] <= box[0] and box[2] <= found["all"][2], "a label is cut"
-        assert not any(_lie_on_each_other(legend, found[key]) for key in ("frame", "buttons"))
-        assert found["all"][1] <= legend[1] and legend[2] <= found["all"][2], "the legend is cut"
+@pytest.mark.parametrize("width", [PHONE, DESK])
+def test_words_and_legends_cover_nothing(seen: dict[str, Any], width: int) -> None:
+    few, many = seen["crowded"][str(width)]
+    assert seen["crowded"]["faults"] == []
+    for chart in (few, many, *seen[str(width)]["boxes"], *seen["answered"][str(width)]["boxes"]):
+        if chart["legend"]:
+            assert not _lie_on_each_other(chart["legend"], chart["frame"])
+            assert _area(chart["legend"]) <= LEGEND * _area(chart["all"])
+            assert _area(chart["frame"]) >= LEGEND * _area(chart["all"]), "the drawing is lost"
+    for chart in (few, many):
+        # Of three peaks close to each other the highest has words.
+        assert len(chart["words"]) == 3
+        for box in chart["words"]:
+            assert chart["frame"][0] <= box[0] and box[2] <= chart["frame"][2], "words are cut"
+            assert chart["frame"][1] <= box[1], "words stand above the drawing"
+            assert not any(_lie_on_each_other(box, b) for b in chart["words"] if b is not box)
+
+
+@pytest.mark.parametrize("width", [PHONE, DESK])
+def test_a_page_opens_on_its_answer(seen: dict[str, Any], width: int) -> None:
+    found = seen["answered"][str(width)]
+    assert found["faults"] == found["requests"] == []
+    opening = found["opening"]
+    assert opening["width"] == found["unfolded_width"] == width, "it scrolls sideways"
+    assert opening["height"] < HIGHEST
+    assert len(opening["tables"]) == len(ANSWER)
+    assert opening["live"] < len(found["boxes"]), "what is folded waits until it is opened"
+    if width == DESK:
+        assert max(*opening["tables"], opening["chart"]) <= SCREEN

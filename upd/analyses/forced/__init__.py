@@ -13,10 +13,10 @@ from upd.analyses.base import Analysis
 from upd.analyses.coarser_rig import coarsened_rig
 from upd.analyses.forced import (
     accuracy,
+    answer,
     charts,
     checks,
     estimates,
-    headline,
     input_cost,
     input_uncertainty,
     output,
@@ -42,7 +42,7 @@ def _on_one_thread(make: Callable[[ForcedSolution], Made]) -> Callable[[ForcedSo
 
 ANALYSIS = Analysis(
     name="forced",
-    headline_names=headline.HEADLINE,
+    headline_names=answer.MAIN,
     input_checks=(),
     make_plan=accuracy.plan_to_accuracy,
     needs=plan.needs,
@@ -53,8 +53,9 @@ ANALYSIS = Analysis(
     sizes=output.sizes,
     write_files=output.write_files,
     charts=charts.charts,
-    headline=headline.headline,
-    verdict_names=("lowest_peak", "reduction_of_free_peak"),
+    headline=answer.headline,
+    answer=answer.answer,
+    verdict_names=("best_peak", "reduction_of_free_peak"),
     input_changes=input_uncertainty.input_changes,
     known_inputs=input_cost.known_inputs,
     coarsened=lambda plan: coarsened_rig(plan, ("response",), {"balance": {"method": "balance"}}),

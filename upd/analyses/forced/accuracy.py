@@ -1,7 +1,7 @@
 """Levels of a forced response that reach a wanted accuracy at the least cost.
 
-Mesh, modes kept, contact points, harmonics, samples or steps of a period, points of
-the sweep: rounds solve the peaks, estimate what every source leaves in them, and raise what pays.
+Mesh, modes kept, contact points, harmonics, samples of a period: rounds solve the peaks, estimate
+what every source leaves in them, and raise what pays.
 """
 
 from __future__ import annotations
@@ -11,11 +11,10 @@ from dataclasses import replace
 
 from upd.analyses import accuracy_rounds
 from upd.analyses.accuracy_rounds import AT_BEST, Rounds, Setting, mesh_falls
-from upd.analyses.forced.companions import MESH, MODES, POINTS
 from upd.analyses.forced.estimates import estimate
-from upd.analyses.forced.levels import HARMONICS, PATH, SAMPLES, STEPS
+from upd.analyses.forced.levels import HARMONICS, MESH, MODES, POINTS, SAMPLES
 from upd.analyses.forced.mesh_counts import RECIPE, graded
-from upd.analyses.forced.plan import CoarserMesh, ForcedPlan, make_plan, time_steps
+from upd.analyses.forced.plan import ForcedPlan, make_plan, time_steps
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.solve import solve
@@ -30,10 +29,8 @@ ASKED = {"peak_frequency": "peak_?_frequency", "peak": "peak_?_accelerance"}
 #: times the elements of the coarsest graded mesh; of the first level, the scene's own mesh, at best
 #: so much is left by that one
 _FINER, _GRADED = (1, 1.5, 2, 2.5, 3), 0.5
-#: levels that are compared are so far apart: nearer ones differ by the rounding of counts as well
-_APART = 1.25
-#: times the samples and the points of a sweep
-_MORE_SAMPLES, _MORE_STEPS = (1, 2, 4, 8), (1, 2, 4)
+#: times the samples
+_MORE_SAMPLES = (1, 2, 4, 8)
 #: Gauss points up the slope in place of the scene's lines, and those along the damper
 _GAUSS, _COLUMNS = (3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 2
 _MODES = (5, 10, 20, 40)
@@ -43,20 +40,18 @@ _HARMONICS = (1, 3, 5, 7, 9, 11, 13)
 def settings_of(scene: ForcedScene) -> list[Setting]:
     """What may be chosen of a scene, by source.
 
-    The scene's own mesh and frequencies, and its own contact points, are the lowest levels, finer
+    The scene's own mesh and contact points are the lowest levels, finer
     meshes are graded (`mesh_counts.graded`); numbers of modes and harmonics may fall below its own.
     Gauss points stand for a face whatever its mesh, so that both errors fall, each by its own knob.
     """
     found = [
         _setting((MODES,), "modes kept", _MODES, _with_modes, "{} a blade"),
         _setting((HARMONICS,), "harmonics", _HARMONICS, _with_harmonics, "to {}"),
-        _setting((SAMPLES, STEPS), "samples and steps", _MORE_SAMPLES, _with_samples, "x {}"),
-        _setting((PATH,), "points of the sweep", _MORE_STEPS, _with_steps, "x {}"),
+        _setting((SAMPLES,), "samples", _MORE_SAMPLES, _with_samples, "x {}"),
     ]
     if scene.recipe == RECIPE:
         labels = ("of the scene", *(f"graded x {n:g}" for n in _FINER[1:]))
-        falls = tuple(_GRADED * mesh_falls(_compared(n))[-1] for n in _FINER[1:])
-        falls = (1.0, *falls)
+        falls = (1.0, *(_GRADED * mesh_falls((1.0, n))[-1] for n in _FINER[1:]))
         knob = Knob((MESH,), "mesh", labels, falls)
         found.insert(0, Setting(knob, _with_mesh))
     if _raisable(scene):
@@ -129,42 +124,11 @@ def _with_samples(scene: ForcedScene, factor: int) -> ForcedScene:
     return replace(scene, balance=replace(scene.balance, samples=count))
 
 
-def _with_steps(scene: ForcedScene, factor: int) -> ForcedScene:
-    points = factor * (scene.excitation.points - 1) + 1
-    return replace(scene, excitation=replace(scene.excitation, points=points))
-
-
-def _coarser(
-    asked: ForcedScene, settings: Sequence[Setting], levels: Levels
-) -> tuple[CoarserMesh, ...]:
-    """Graded meshes of the levels before, the finest first; usual ones of the scene's own."""
-    place = next((k for k, s in enumerate(settings) if s.knob.sources == (MESH,)), None)
-    if place is None or levels[place] == 0:
-        return ()
-    scene = replace(asked, accuracy=None)
-    for setting, level in zip(settings[:place], levels, strict=False):
-        scene = setting.at(scene, level)
-    compared = _compared(_FINER[levels[place]])[:-1]
-    return tuple(
-        # counts are rounded: their meshes tell the sizes
-        CoarserMesh(graded(scene, n), 0.0, f"graded x {n:g}")
-        for n in reversed(compared)
-    )
-
-
-def _compared(finest: float) -> tuple[float, ...]:
-    """Levels that tell what the finest of them leaves, rising."""
-    out = [finest]
-    for n in reversed(_FINER):
-        if _APART * n <= out[0]:
-            out.insert(0, n)
-    return tuple(out)
-
-
 def _planned(
     asked: ForcedScene, settings: Sequence[Setting], levels: Levels, scene: ForcedScene
 ) -> ForcedPlan:
-    return replace(make_plan(scene), coarser=_coarser(asked, settings, levels))
+    del asked, settings, levels
+    return make_plan(scene)
 
 
 def _trial(scene: ForcedScene) -> ForcedScene:

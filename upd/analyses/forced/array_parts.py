@@ -19,8 +19,7 @@ from upd.scene.forced_contact import SIDES
 Variables = dict[str, Any]
 #: what the groups of result.nc hold, their attribute ``content``
 POINTS, LINEAR, FRICTION, MEASURED = "points", "linear", "friction", "measured"
-PERFORMANCE, HIGHEST, SPREAD, HARMONICS = "performance", "highest peak", "spread", "harmonics"
-BAND, SWEEP, MARCHED = "band", "sweep", "marched peaks"
+PERFORMANCE, SWEEP, MARCHED = "performance", "sweep", "marched peaks"
 #: loops kept of a peak
 N_LOOPS = 4
 HZ, PER_N = {"units": "Hz"}, {"units": "(m/s2)/N"}

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from upd.analyses.forced.effects import MORE_MODES
 from upd.analyses.forced.gauss_points import fewer_points, gauss_points
 from upd.analyses.forced.points import FacePoints
 from upd.analyses.forced.symmetry import MirrorPairs, even_modes
@@ -50,7 +49,6 @@ def nodal_part(
     face: FacePoints,
     names: tuple[str, ...],
     count: int,
-    again: bool,
     solver: str,
 ) -> BladePart:
     """By Craig-Bampton on the nodes of the points and the probes' x.
@@ -65,8 +63,6 @@ def nodal_part(
         Of the probes.
     count
         Modes kept.
-    again
-        Whether companions with more modes follow.
     solver
         As in the scene.
     """
@@ -79,7 +75,7 @@ def nodal_part(
             blade.K,
             blade.M,
             boundary,
-            n_modes=count + MORE_MODES * again,
+            n_modes=count,
             rows=boundary,
             solver=solver,
         )
@@ -103,31 +99,49 @@ def attached_part(
     """By its lowest modes and the static shapes of its points' and probes' forces.
 
     A half blade has half of the energy, and its points stand for themselves and their mirror
-    images: K and M of the whole are twice its own. Where companions follow, of twice the points
-    along the damper, of which its own are a part (`gauss_points.fewer_points`).
+    images: K and M of the whole are twice its own. Fewer points are a part of those that a body was
+    reduced to before (`gauss_points.fewer_points`): where models with more points follow, to twice
+    the rows at once.
 
     Parameters
     ----------
     lines
         Gauss points up the slope and along the damper. Others as of `nodal_part`.
+    again
+        Whether models with more points follow.
     """
     blade, most = bodies.blades[side], max(count, 1) + _BESIDE
     rows, columns = lines
-    keys = [(side, rows, times * columns) for times in (1, 2)]
-    key = next((one for one in keys if one in bodies.attached), keys[again])
+    known_keys = (key for key, one in bodies.attached.items() if len(one.frequency) >= most)
+    key = next(
+        (k for k in known_keys if k[0] == side and k[1] >= rows and k[2] in (columns, 2 * columns)),
+        (side, 2 * rows if again else rows, columns),
+    )
     face = gauss_points(blade.mesh, *key[1:], side)
-    known = bodies.attached.get(key)
-    if known is None or len(known.frequency) < most:
+    if key not in bodies.attached or len(bodies.attached[key].frequency) < most:
         loads = _loads(blade, face, names)
-        known = attachment_modes(blade.K, blade.M, loads, most + MORE_MODES * again, solver=solver)
-        bodies.attached[key] = known
-    times = 2.0 if bodies.half else 1.0
+        found = attachment_modes(blade.K, blade.M, loads, most, solver=solver)
+        bodies.attached[key] = found
+    known = bodies.attached[key]
+    twice = 2.0 if bodies.half else 1.0
     seen, probes = np.split(known.rows, [3 * face.n_point])
     seen = seen.reshape(face.n_point, 3, -1)
-    if key[2] != columns:
-        fewer = fewer_points(face, 1, face.per_part // 2)
-        seen = np.einsum("mn,ncr->mcr", fewer.at, seen)
-    return BladePart(times * known.K, times * known.M, seen, probes, most)
+    for axis, wanted, now in (
+        (0, rows, key[1]),
+        (1, face.per_part * columns // key[2], face.per_part),
+    ):
+        if wanted < now:
+            fewer = fewer_points(face, axis, wanted)
+            seen = np.einsum("mn,ncr->mcr", fewer.at, seen)
+            face = replace(
+                face,
+                position=fewer.at @ face.position,
+                weight=fewer.share @ face.weight,
+                values=fewer.at @ face.values,
+                line=fewer.line,
+                per_part=fewer.per_part,
+            )
+    return BladePart(twice * known.K, twice * known.M, seen, probes, most)
 
 
 def _loads(blade: Blade, face: FacePoints, names: tuple[str, ...]) -> Array:

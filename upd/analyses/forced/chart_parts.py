@@ -88,7 +88,7 @@ class ChartedPeak:
         """Where it lies, and the sweep that tells it where that is no balance."""
         words = [f"{self.curve.frequency[self.index]:.1f} Hz"]
         if self.curve.case.choice:
-            words = ["time march", self.curve.case.choice, *words]
+            words = ["time integration", self.curve.case.choice, *words]
         return ", ".join(words)
 
 

@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from upd.analyses.forced.array_parts import (
-    BAND,
-    FRICTION,
-    HARMONICS,
-    LINEAR,
-    MARCHED,
-    MEASURED,
-    POINTS,
-    SPREAD,
-    SWEEP,
-)
+from upd.analyses.forced.array_parts import FRICTION, LINEAR, MARCHED, MEASURED, POINTS, SWEEP
 from upd.analyses.forced.chart_parts import (
     BLADES,
     MOTIONS,
@@ -26,7 +16,6 @@ from upd.analyses.forced.chart_parts import (
     SHEET,
     SLIP_SHARE,
     ChartedCurve,
-    ChartedPeak,
     charted_peaks,
 )
 from upd.analyses.forced.contact_charts import (
@@ -37,41 +26,36 @@ from upd.analyses.forced.contact_charts import (
     shares_chart,
     turn_chart,
 )
-from upd.analyses.forced.performance_charts import again_chart, performance_charts
+from upd.analyses.forced.performance_chart import performance_charts
 from upd.analyses.measured.charts import damping_charts, measured_traces
-from upd.plot.chart import Area, Array, Arrays, Axis, Band, Chart, Group, Mark, Style, Trace
+from upd.plot.chart import Array, Arrays, Axis, Band, Chart, Group, Mark, Style, Trace
 from upd.plot.common import case_of, frequency_of, magnitude, scalar, with_content
 from upd.results import Case
 from upd.scene.forced_contact import SIDES
 
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
-    """Responses free, stuck and with friction.
-
-    Contact states and loops at the peaks, loss, damper motion, performance, convergence.
+    """Responses free, stuck and with friction, and the peaks over F_C/F_E; what was asked for of
+    the contact and the damper behind them.
     """
     del summary
     groups, others = with_content(arrays, FRICTION), with_content(arrays, MARCHED)
-    ratios = list(dict.fromkeys(g.attributes["force_ratio"] for g in groups + others))
+    swept = with_content(arrays, SWEEP)
+    ratios = list(dict.fromkeys(g.attributes["force_ratio"] for g in [*groups, *swept, *others]))
     curves, marched = (
         [ChartedCurve(g, case_of(g), ratios.index(g.attributes["force_ratio"])) for g in some]
         for some in (groups, others)
     )
-    # The page opens on a curve on which something slips.
-    curves.sort(key=lambda c: not c.slips)
-    peaks = [one for c in marched for one in charted_peaks(c)]
-    at = [*_left_to_balance(curves, peaks), *peaks]
-    # Where only the sweeps have a curve, the balance has one point of it.
-    swept = {c.told for c in marched}
-    paths = [c for c in curves if len(c.frequency) > 1 or c.told not in swept]
-    # Where every point sticks over the whole cycle there is nothing to see.
-    moving = [c for c in paths if c.moves] or paths[:1]
+    peaks = [one for c in (*curves, *marched) if "peak" in c.group for one in charted_peaks(c)]
+    moving = [c for c in curves if c.moves] or curves[:1]
     sliding = [
-        one for one in at if one.curve.data("state")[one.index, :, SLIP_SHARE].max() > 0.0
-    ] or at[:1]
+        one for one in peaks if one.curve.data("state")[one.index, :, SLIP_SHARE].max() > 0.0
+    ] or peaks[:1]
     points = {g.attributes["stiffness"]: g for g in with_content(arrays, POINTS)}
+    rubbed = [c for c in curves if "loop_peak" in c.group]
     return [
-        *_responses(arrays, curves),
+        *_responses(arrays, curves, {r: k for k, r in enumerate(ratios)}),
+        *performance_charts(arrays),
         *damping_charts(arrays),
         *_more_harmonics(arrays, curves),
         *(shares_chart(c, k) for c in moving if "share" in c.group for k in range(len(SIDES))),
@@ -87,10 +71,10 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
             for one in sliding
             if "loop_peak" in one.curve.group and one.number in one.curve.data("loop_peak")
         ),
-        *([loss_chart(paths)] if paths else []),
+        *([loss_chart(rubbed)] if rubbed else []),
         *(
             motion_chart(c, k)
-            for c in paths
+            for c in curves
             if "damper_amplitude" in c.group
             for k in range(len(MOTIONS))
         ),
@@ -100,46 +84,14 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
             if "damper_motion" in one.curve.group
             for k in range(len(MOTIONS))
         ),
-        *performance_charts(arrays),
-        *(
-            again_chart(g, "Slider starts", "start of the sliders", "spread")
-            for g in with_content(arrays, SPREAD)
-        ),
-        *(
-            again_chart(g, "Harmonics kept", "highest harmonic", "harmonics")
-            for g in with_content(arrays, HARMONICS)
-        ),
     ]
 
 
-def _left_to_balance(
-    curves: Sequence[ChartedCurve], peaks: Sequence[ChartedPeak]
-) -> list[ChartedPeak]:
-    """The peaks of the balance that the sweeps tell alike; no highest point without a peak where
-    the sweeps have peaks.
-    """
-    told = {(*one.curve.told, one.number) for one in peaks}
-    told |= {(*one.curve.told, 0) for one in peaks}
-    return [
-        one
-        for c in curves
-        if "peak" in c.group
-        for one in charted_peaks(c)
-        if (*c.told, one.number) not in told
-    ]
-
-
-def _responses(arrays: Arrays, curves: Sequence[ChartedCurve]) -> list[Chart]:
-    """Both blades for every stiffness.
-
-    Free, stuck, every curve with friction, the measured peaks.
-    """
+def _responses(
+    arrays: Arrays, curves: Sequence[ChartedCurve], colours: Mapping[float | None, int]
+) -> list[Chart]:
+    """Both blades for every stiffness: free, stuck, every curve with friction, measured peaks."""
     out = []
-    bands = tuple(
-        Band(f"measured ({group['frequency'].attributes['source']})", "x", float(f), float(f))
-        for group in with_content(arrays, MEASURED)
-        for f in group["frequency"].data
-    )
     for linear in with_content(arrays, LINEAR):
         name = str(linear.attributes["stiffness"])
         f = frequency_of(linear)
@@ -149,59 +101,91 @@ def _responses(arrays: Arrays, curves: Sequence[ChartedCurve]) -> list[Chart]:
         excited = str(linear["frequency"].attributes.get("excitation", ""))
         detail = ", ".join(part for part in (excited, detail) if part)
         mine = [c for c in curves if c.case.stiffness == name]
-        colours = {c.case.force_ratio: c.colour for c in mine}
+        sweeps = [g for g in with_content(arrays, SWEEP) if g.attributes["stiffness"] == name]
         for blade in BLADES:
-            found = [
-                *_curve("free", linear, f"free_{blade}", "dashed", 0, closed=True),
-                *_curve("stuck", linear, f"stuck_{blade}", "dashdot", 0, closed=True),
-                *(
-                    one
-                    for c in mine
-                    for one in _curve(
-                        _words(c.case),
-                        c.group,
-                        blade,
-                        "dotted" if c.case.reversed else "line",
-                        c.colour,
-                    )
-                ),
+            traces = [
+                *measured_traces(arrays, blade, colours),
+                *_limit("free", linear, blade, "dashed"),
+                *_limit("stuck", linear, blade, "dashdot"),
+                *(one for c in mine for one in _curve(c, blade)),
+                *(one for group in sweeps for one in _sweep(group, blade, colours)),
             ]
-            for group in with_content(arrays, SWEEP):
-                if group.attributes["stiffness"] == name:
-                    found += _sweep(group, blade, colours)
-            areas = tuple(
-                Area(
-                    f"{_words(c.case)}, band of static states",
-                    frequency_of(group),
-                    np.asarray(group[f"lowest_{blade}"].data, float),
-                    np.asarray(group[f"highest_{blade}"].data, float),
-                    c.colour,
-                )
-                for group in with_content(arrays, BAND)
-                for c in mine
-                if c.case == case_of(group) and np.nanmax(group[f"lowest_{blade}"].data) > 0.0
-            )
-            # lines lie over the measured points
-            traces = measured_traces(arrays, blade, colours) + tuple(trace for trace, _ in found)
-            marks = tuple(mark for _, some in found for mark in some)
-            y, case = Axis("accelerance", PER_N, log=True), f"{blade} blade, stiffness {name}"
+            marks = [one for c in mine for one in _marks(c, blade)]
             out.append(
                 Chart(
                     "Frequency response",
                     x,
-                    y,
-                    traces,
+                    Axis("accelerance", PER_N, log=True),
+                    tuple(traces),
                     (),
-                    case,
+                    f"{blade} blade, stiffness {name}",
                     "response",
-                    areas=areas,
-                    marks=marks,
-                    bands=bands,
+                    marks=tuple(marks),
+                    bands=tuple(_measured(arrays)),
                     detail=detail,
                     **SHEET,
                 )
             )
     return out
+
+
+def _measured(arrays: Arrays) -> Iterator[Band]:
+    """Measured frequencies, under one name."""
+    for group in with_content(arrays, MEASURED):
+        label = f"measured ({group['frequency'].attributes['source']})"
+        for f in group["frequency"].data:
+            yield Band(label, "x", float(f), float(f))
+
+
+def _limit(label: str, group: Group, blade: str, style: Style) -> Iterator[Trace]:
+    """A linear limit; none for a blade at rest."""
+    H = magnitude(group[f"accelerance_{label}_{blade}"])
+    if H.max() > 0.0:
+        shown = np.where(H > 0.0, H, np.nan)
+        yield Trace(label, frequency_of(group), shown, style, closed=True)
+
+
+def _curve(curve: ChartedCurve, blade: str) -> Iterator[Trace]:
+    """A curve with friction: unstable parts dashed, under the same name."""
+    H, f = magnitude(curve.group[f"accelerance_{blade}"]), curve.frequency
+    if not H.max() > 0.0:
+        return
+    label = _words(curve.case)
+    stable = np.ones(len(f), bool)
+    if "stable" in curve.group:
+        stable = curve.data("stable") > 0
+    yield Trace(label, f, _only(H, stable), "line", curve.colour, entry=label)
+    if not stable.all():
+        yield Trace(f"{label}, unstable", f, _only(H, ~stable), "dotted", curve.colour, entry=label)
+
+
+def _only(H: Array, on: Any) -> Array:
+    """Values of some points and of their neighbours, so that parts of a curve touch; else nan."""
+    wide = on.copy()
+    wide[1:] |= on[:-1] & ~on[1:]
+    wide[:-1] |= on[1:] & ~on[:-1]
+    return np.where(wide, H, np.nan)
+
+
+def _marks(curve: ChartedCurve, blade: str) -> Iterator[Mark]:
+    """The frequency at every peak, and what a slow sweep reaches at a fold."""
+    names = (f"peak_frequency_{blade}", f"peak_accelerance_{blade}")
+    if set(names) <= set(curve.group) and curve.moves:
+        for f, height in zip(*(curve.data(name) for name in names), strict=True):
+            yield Mark(float(f), float(height), f"{f:.1f} Hz", curve.colour)
+    if blade != BLADES[0] or "fold_frequency" not in curve.group:
+        return
+    up = curve.data("fold_up") > 0
+    rise = curve.data("fold_reached") - curve.data("fold_before")
+    for k in np.flatnonzero(up & (rise > _SEEN * curve.data("fold_reached"))):
+        f, before, reached = (
+            float(curve.data(f"fold_{name}")[k]) for name in ("frequency", "before", "reached")
+        )
+        yield Mark(f, before, f"a sweep up jumps and reaches {reached:.0f}", curve.colour)
+
+
+#: least jump that is marked, over the height it reaches
+_SEEN = 0.2
 
 
 def _more_harmonics(arrays: Arrays, curves: Sequence[ChartedCurve]) -> list[Chart]:
@@ -233,60 +217,15 @@ def _more_harmonics(arrays: Arrays, curves: Sequence[ChartedCurve]) -> list[Char
     ]
 
 
-def _sweep(
-    group: Group, blade: str, colours: Mapping[float | None, int]
-) -> list[tuple[Trace, list[Mark]]]:
-    """The steady motions of a sweep, and where they jump to another: words beside the point before,
-    an arrow the way the sweep goes.
-    """
+def _sweep(group: Group, blade: str, colours: Mapping[float | None, int]) -> Iterator[Trace]:
+    """The steady motions of a sweep."""
     case, f, H = case_of(group), frequency_of(group), magnitude(group[f"accelerance_{blade}"])
-    if not H.max() > 0.0:
-        return []
-    falling = f[-1] < f[0]
-    colour = colours.get(case.force_ratio, 0)
-    label = Case(force_ratio=case.force_ratio, choice=case.choice).label
-    trace = Trace(label, f, H, "crosses" if falling else "points", colour)
-    return [(trace, _jumps(group, H, colour))]
-
-
-def _jumps(group: Group, H: Array, colour: int) -> list[Mark]:
-    """Where the motions along a curve jump, marked at the point before."""
-    if "jump" not in group:
-        return []
-    f = frequency_of(group)
-    words = "← jump" if f[-1] < f[0] else "jump →"
-    jumps = np.flatnonzero(np.asarray(group["jump"].data))
-    return [Mark(float(f[i]), float(H[i]), words, colour) for i in jumps]
+    if H.max() > 0.0:
+        label = Case(force_ratio=case.force_ratio, choice=case.choice).label
+        style: Style = "crosses" if f[-1] < f[0] else "points"
+        yield Trace(label, f, H, style, colours.get(case.force_ratio, 0))
 
 
 def _words(case: Case) -> str:
     """A curve within its stiffness."""
     return Case(force_ratio=case.force_ratio, reversed=case.reversed).label
-
-
-def _curve(
-    label: str, group: Group, name: str, style: Style, colour: int, *, closed: bool = False
-) -> list[tuple[Trace, list[Mark]]]:
-    """A curve with a mark on each of its peaks; none for a blade at rest."""
-    H = magnitude(group[f"accelerance_{name}"])
-    if not H.max() > 0.0:
-        return []
-    trace = Trace(
-        label, frequency_of(group), np.where(H > 0.0, H, np.nan), style, colour, closed=closed
-    )
-    names = (f"peak_frequency_{name}", f"peak_accelerance_{name}")
-    pairs = (
-        zip(*(group[key].data for key in names), strict=True) if set(names) <= set(group) else ()
-    )
-    return [
-        (
-            trace,
-            [
-                *(
-                    Mark(float(f), float(height), f"{f:.1f} Hz", colour, closed)
-                    for f, height in pairs
-                ),
-                *_jumps(group, H, colour),
-            ],
-        )
-    ]

@@ -9,11 +9,12 @@ import numpy as np
 
 from upd.analyses import measured
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import FrictionCurve, SweptCurve
+from upd.analyses.forced.curves import FrictionCurve
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.march_modes import linear_curves
 from upd.analyses.forced.mode_peaks import unmoved
 from upd.analyses.forced.model import Array, ComplexArray
+from upd.analyses.forced.paths import balance_of
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.measured import FREE, STUCK, Computed
 from upd.measured.compare import on_path
@@ -67,7 +68,7 @@ def _computed(solution: ForcedSolution, choice: MeasuredChoice) -> Iterator[Comp
     wanted = f"{choice.centrifugal_to_force:.6g}"
     for c in curves:
         if f"{c.ratio:.6g}" == wanted and len(c.frequency) >= LEAST_POINTS:
-            yield _with_friction(solution, c, side)
+            yield _with_friction(c, side)
 
 
 def _linear_at(
@@ -78,20 +79,19 @@ def _linear_at(
         excitation = excitation_of(solution.plan.scene.excitation)
         march = solution.faces[name].march
         return lambda f: np.asarray(linear_curves(march, f, excitation, stuck=stuck)[0][side])
-    model = solution.models[name]
-    one = next(c for c in solution.curves if c.stiffness == name)
-    row = model.row(side)
-    return lambda f: measures.linear_accelerance(one.answer, row, one.force, f, stuck)
+    model, plan = solution.models[name], solution.plan
+    force = plan.scene.damper.centrifugal
+    numbers = (0, *model.excitation.harmonics)
+    problem, row = measures.Unsolved(balance_of(plan, model, force, numbers)), model.row(side)
+    return lambda f: measures.linear_accelerance(problem, row, force, f, stuck)
 
 
-def _with_friction(solution: ForcedSolution, c: FrictionCurve, side: Side) -> Computed:
+def _with_friction(c: FrictionCurve, side: Side) -> Computed:
     """A curve with friction, between its points by straight lines."""
     f, H = c.frequency, c.accelerance[side]  # type: ignore[attr-defined]
     way = slice(None) if f[-1] > f[0] else slice(None, None, -1)
     f, H = f[way], H[way]
-    peaks = (
-        c.peaks[side] if isinstance(c, SweptCurve) else solution.numbered_peaks(c, side)  # type: ignore[arg-type]
-    )
+    peaks = c.peaks.get(side, ())  # type: ignore[attr-defined]
     return Computed(
         replace(c.case, blade=side),  # type: ignore[attr-defined]
         (float(f.min()), float(f.max())),

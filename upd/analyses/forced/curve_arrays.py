@@ -1,4 +1,4 @@
-"""Arrays of curves by harmonic balance, of their linear limits and of bands of them."""
+"""Arrays of curves by harmonic balance, of their linear limits and of peaks over F_C/F_E."""
 
 from __future__ import annotations
 
@@ -19,11 +19,10 @@ from upd.analyses.forced.array_parts import (
     peak_arrays,
     share_array,
 )
-from upd.analyses.forced.bands import envelope
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves
 from upd.analyses.forced.excitation import Excitation, excitation_of
-from upd.analyses.forced.paths import grid
-from upd.analyses.forced.solution import CurveBand, ForcedSolution
+from upd.analyses.forced.performance import Performance
+from upd.analyses.forced.solution import ForcedSolution
 from upd.scene.forced_contact import SIDES
 
 
@@ -62,6 +61,12 @@ def friction_arrays(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
             HZ | {"status": answer.status, "message": answer.message},
         ),
         "excitation_force": ((), np.array(curve.force), {"units": "N"}),
+        "stable": (
+            ("frequency",),
+            curve.rising.astype(np.int8),
+            {"units": "1", "long_name": "0 between two folds, where the frequency falls"},
+        ),
+        **_fold_arrays(curve),
         **{f"accelerance_{side}": complex_array(curve.accelerance[side]) for side in SIDES},
         **{
             f"accelerance_{side}_harmonic_{k}": complex_array(
@@ -94,7 +99,7 @@ def friction_arrays(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
         **{
             key: value
             for side in SIDES
-            for key, value in peak_arrays(side, solution.numbered_peaks(curve, side)).items()
+            for key, value in peak_arrays(side, curve.peaks[side]).items()
         },
         **marked_peaks(at),
     }
@@ -116,6 +121,19 @@ def friction_arrays(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
         for one in measures.loops(answer, i, N_LOOPS)
     ]
     return out | loop_arrays(loops, model.face, *measures.place(model))
+
+
+def _fold_arrays(curve: ForcedCurve) -> Variables:
+    """Where slow sweeps jump, and the heights of the right blade before and after."""
+    if not curve.folds:
+        return {}
+    at, folds = ("fold",), curve.folds
+    return {
+        "fold_frequency": (at, np.array([one.frequency for one in folds]), HZ),
+        "fold_up": (at, np.array([one.up for one in folds], np.int8), {"units": "1"}),
+        "fold_before": (at, np.array([one.before for one in folds]), PER_N),
+        "fold_reached": (at, np.array([one.reached for one in folds]), PER_N),
+    }
 
 
 def faces_friction(
@@ -167,30 +185,34 @@ def faces_friction(
     return out
 
 
-def band_arrays(solution: ForcedSolution, band: CurveBand) -> Variables:
-    """Lowest and highest of all curves of a band over frequency; peaks of every choice, nan where
-    it has none.
-    """
-    f = grid(solution.plan)
-    out: Variables = {"frequency": (("frequency",), f, HZ)}
-    for side in SIDES:
-        low, high = envelope(band, f, side)
+def performance_arrays(found: Performance) -> Variables:
+    """Peaks of both blades over F_C/F_E, nan where a mode has none; the highest, and the limits."""
+    points, at = found.known, ("point",)
+    ratio = np.array([one.ratio for one in points])
+    modes = {(p.blade, p.number): p.mode for one in points for p in one.peaks}
+    out: Variables = {
+        "ratio": (at, ratio, {"units": "1", "long_name": "F_C/F_E"}),
+        "highest_accelerance": (
+            at,
+            np.array([one.worst.height for one in points if one.worst is not None]),
+            PER_N | {"long_name": "highest peak of both blades and all modes"},
+        ),
+        "free_peak": ((), np.array(found.free), PER_N),
+        "stuck_peak": ((), np.array(found.stuck), PER_N),
+    }
+    for (blade, number), mode in sorted(modes.items()):
+        rows = np.full((2, len(points)), np.nan)
+        for k, one in enumerate(points):
+            for p in one.peaks:
+                if (p.blade, p.number) == (blade, number):
+                    rows[:, k] = p.frequency, p.height
+        about = {"mode": mode, "blade": blade}
+        out[f"peak_{number}_frequency_{blade}"] = (at, rows[0], HZ | about)
+        out[f"peak_{number}_accelerance_{blade}"] = (at, rows[1], PER_N | about)
+    best = found.best
+    if best is not None and best.worst is not None:
         out |= {
-            f"lowest_{side}": (("frequency",), low, PER_N),
-            f"highest_{side}": (("frequency",), high, PER_N),
+            "best_ratio": ((), np.array(best.ratio), {"units": "1", "long_name": "F_C/F_E"}),
+            "best_accelerance": ((), np.array(best.worst.height), PER_N),
         }
-    choices = ", ".join(one.choice for one in band.curves)
-    found = [band.peaks(number) for number in band.numbers]
-    for name, attribute, unit in (
-        ("peak_frequency", "frequency", HZ),
-        ("peak_accelerance", "height", PER_N),
-    ):
-        values = [
-            [getattr(one.get(c.choice), attribute, np.nan) for c in band.curves] for one in found
-        ]
-        out[name] = (
-            ("peak", "choice"),
-            np.array(values, float).reshape(len(found), len(band.curves)),
-            unit | {"choices": choices},
-        )
-    return out | {"peak": (("peak",), np.array(band.numbers, np.int64), {})}
+    return out

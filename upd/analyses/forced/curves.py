@@ -1,12 +1,13 @@
-"""Curves of a forced response: linear limits, with friction by harmonic balance, by time march."""
+"""Curves of a forced response: linear limits, with friction by harmonic balance or by sweeps."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar, Literal
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from upd.analyses.forced.measures import ComplexArray, PathPeak, StuckMode
 from upd.analyses.forced.mode_peaks import ModePeak
@@ -16,7 +17,7 @@ from upd.analyses.seated.interface import Interface
 from upd.hbm import FrequencyResponse
 from upd.hbm.interface_balance import InterfaceResponse
 from upd.hbm.interface_state import InterfaceModel, InterfaceState
-from upd.hbm.refined_sweep import RefinedSweep
+from upd.hbm.interface_sweep import SteppedSine
 from upd.results import Case
 from upd.scene.forced_contact import SIDES, Side
 
@@ -80,34 +81,103 @@ class FrictionCurve:
         return np.asarray(scale * moved)
 
 
-@dataclass(frozen=True)
-class LeftMaximum:
-    """A maximum of a path by harmonic balance that is no steady motion.
+class Top(NamedTuple):
+    """The very top of a peak on the path by harmonic balance, between its points.
 
     Attributes
     ----------
-    blade
-        Whose maximum it is.
-    peak
-        What it would be.
-    marched
-        Where a march from it goes, (m/s2)/N of the blade.
+    frequency, height
+        Hz and (m/s2)/N.
+    x
+        (n_unknown,) unknowns there.
+    slips
+        Whether a contact point slips or opens.
+    crowded
+        Whether the path has other maxima about it that are nearly as high: points begin to slip or
+        open one after another there.
+    """
+
+    frequency: float
+    height: float
+    x: Array
+    slips: bool
+    crowded: bool = False
+
+
+#: in place of a sample: the top between the samples of a path
+AT_TOP = -1
+
+
+@dataclass(frozen=True)
+class TimeCheck:
+    """What time integration makes of a peak: it starts from the motion by harmonic balance.
+
+    Attributes
+    ----------
+    blade, number, mode
+        Of the peak.
+    frequency, balance, integrated
+        Of the highest motion that stays: Hz, and its height by harmonic balance and by time
+        integration, (m/s2)/N.
+    stays
+        Whether one was found.
+    sample
+        Its place on the path; `AT_TOP` where it is the top of the peak itself.
+    step, apart
+        Relative change of height and of frequency between it and the next motion towards the top,
+        which leaves; 0 at the top.
+    starts
+        Time integrations.
     """
 
     blade: Side
-    peak: ModePeak
-    marched: float
+    number: int
+    mode: str
+    frequency: float
+    balance: float
+    integrated: float
+    stays: bool
+    sample: int
+    step: float
+    apart: float
+    starts: int
 
     @property
-    def words(self) -> str:
-        """It, and where the march goes."""
-        one = self.peak
-        return f"{one.height:.4g} (m/s2)/N at {one.frequency:.5g} Hz for {self.marched:.4g}"
+    def at_top(self) -> bool:
+        """Whether the top of the peak itself stays."""
+        return self.sample == AT_TOP
+
+    @property
+    def difference(self) -> float:
+        """Of the time integration from harmonic balance, relative; infinite where nothing stays."""
+        return abs(self.integrated / self.balance - 1.0) if self.stays else float("inf")
+
+
+class Fold(NamedTuple):
+    """Where a slow sweep jumps: the end of a branch, and the highest it reaches after the jump.
+
+    Attributes
+    ----------
+    frequency
+        Hz.
+    up
+        Whether the frequency rises.
+    before, reached
+        Heights of the right blade at the end of the branch and after the jump, (m/s2)/N.
+    at
+        Hz, where that is.
+    """
+
+    frequency: float
+    up: bool
+    before: float
+    reached: float
+    at: float
 
 
 @dataclass(frozen=True)
 class ForcedCurve(FrictionCurve):
-    """One curve with friction.
+    """One curve with friction by harmonic balance.
 
     Attributes
     ----------
@@ -117,27 +187,28 @@ class ForcedCurve(FrictionCurve):
         Side -> (n,) of the blade along the path, (m/s2)/N.
     seconds
         It took.
-    reversed
-        Followed from the highest frequency downwards.
-    left
-        Maxima that a march leaves, which are no peaks.
+    peaks
+        Side -> peaks by the numbers of their modes: what is reported.
+    tops
+        Blade and number of a peak -> its top by harmonic balance.
+    checked
+        Peaks on which a point slips or opens, by time integration.
+    folds
+        Along the path.
     """
 
     answer: FrequencyResponse
     accelerance: Mapping[Side, ComplexArray]
     seconds: float
-    reversed: bool = False
-    left: tuple[LeftMaximum, ...] = ()
-
-    @property
-    def left_points(self) -> frozenset[int]:
-        """Points of the path at maxima that a march leaves."""
-        return frozenset(one.peak.sample for one in self.left)
+    peaks: Mapping[Side, tuple[ModePeak, ...]] = field(default_factory=dict)
+    tops: Mapping[tuple[Side, int], Top] = field(default_factory=dict)
+    checked: tuple[TimeCheck, ...] = ()
+    folds: tuple[Fold, ...] = ()
 
     @property
     def case(self) -> Case:
         """What its numbers and arrays belong to."""
-        return Case(stiffness=self.stiffness, force_ratio=self.ratio, reversed=self.reversed)
+        return Case(stiffness=self.stiffness, force_ratio=self.ratio)
 
     @property
     def frequency(self) -> Array:
@@ -154,9 +225,34 @@ class ForcedCurve(FrictionCurve):
         """How far a path that stopped came, in words."""
         if self.empty:
             return "the path found no point"
-        f = self.answer.frequency
-        end = f.min() if self.reversed else f.max()
-        return f"the path {'downwards ' * self.reversed}stopped at {end:.4g} Hz"
+        return f"the path stopped at {self.answer.frequency.max():.4g} Hz"
+
+    @property
+    def rising(self) -> NDArray[np.bool_]:
+        """(n,) whether the frequency rises along the path: between two folds, where it falls, the
+        motion is unstable.
+        """
+        return rising(self.frequency)
+
+
+def rising(frequency: Array) -> NDArray[np.bool_]:
+    """(n,) whether the frequency rises along a path.
+
+    The sign of the step is that of the Jacobian's determinant, which changes at a fold.
+
+    Parameters
+    ----------
+    frequency
+        (n,) along the path.
+
+    References
+    ----------
+    R. Seydel, Practical Bifurcation and Stability Analysis (2010), ch. 4.
+    """
+    if len(frequency) < 2:
+        return np.ones(len(frequency), bool)
+    steps = np.diff(frequency) > 0.0
+    return np.concatenate([steps[:1], steps[1:] & steps[:-1], steps[-1:]])
 
 
 @dataclass(frozen=True)
@@ -199,7 +295,7 @@ class FacesCurve(FrictionCurve):
     answer: InterfaceResponse
     accelerance: Mapping[Side, ComplexArray]
     peaks: Mapping[Side, tuple[ModePeak, ...]]
-    reversed: ClassVar[bool] = False
+    folds: ClassVar[tuple[Fold, ...]] = ()
 
     @property
     def case(self) -> Case:
@@ -236,44 +332,47 @@ class FacesCurve(FrictionCurve):
         return f"the path stopped at {self.answer.frequency[-1]:.4g} Hz"
 
 
-#: ways along which a curve is marched
+#: ways along which a curve is swept
 Way = Literal["up", "down"]
 
 
 @dataclass(frozen=True)
 class SweptCurve(FrictionCurve):
-    """Steady motions by time march, at one frequency after the other.
+    """Steady motions by time integration, at one frequency after the other.
 
     Attributes
     ----------
     way
         Rising or falling frequency.
     found
-        The motions in the order marched.
+        The motions in their order.
     accelerance
         Side -> (k,) of the blade, (m/s2)/N.
     peaks
         Side -> peaks by the numbers of their modes.
-    choice
-        The static state it began from where it is not the run's.
     """
 
     way: Way
-    found: RefinedSweep
+    found: SteppedSine
     accelerance: Mapping[Side, ComplexArray]
     peaks: Mapping[Side, tuple[ModePeak, ...]]
-    choice: str = ""
+    folds: ClassVar[tuple[Fold, ...]] = ()
 
     @property
     def case(self) -> Case:
         """What its numbers and arrays belong to."""
-        words = f"{self.choice}{', ' * bool(self.choice)}sweep {self.way}"
-        return Case(stiffness=self.stiffness, force_ratio=self.ratio, choice=words)
+        choice = f"sweep {self.way}"
+        return Case(stiffness=self.stiffness, force_ratio=self.ratio, choice=choice)
 
     @property
     def frequency(self) -> Array:
-        """(k,) Hz in the order marched."""
+        """(k,) Hz in the order of the sweep."""
         return self.found.frequency
+
+    @property
+    def seconds(self) -> float:
+        """It took."""
+        return float(self.found.seconds.sum())
 
     def accelerance_in(self, harmonic: int, place: int, blade: int) -> ComplexArray:
         """(k,) of a blade in another harmonic that is excited, (m/s2)/N of F_E.

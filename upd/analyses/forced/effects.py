@@ -10,29 +10,15 @@ from upd.scene import ForcedScene
 
 #: checks of what is left out; each solves a number again with the effect
 ALONG = "sliding along y"
-ODD = "odd motion"
-FIT = "faces that fit without load"
-HARMONICS = "more harmonics"
-SAMPLES = "twice the samples"
-START = "other slider starts"
-STATIC = "other static states"
-TWO_K_T = "the softer k_t"
-MODES = "more modes"
 ELASTIC = "elastic damper"
-#: harmonics and fixed-interface modes added to see what those left out would change
-MORE_HARMONICS, MORE_MODES = 2, 10
 
 
 def effects_of_points(scene: ForcedScene) -> list[Effect]:
     """Of contact by springs at points."""
     mu, b, c = scene.contact.friction, scene.balance, scene.contact
-    adaptive = b.harmonics == "adaptive"
+    adaptive, swept = b.harmonics == "adaptive", b.method == "march"
     samples = "power of two by rule" if b.samples == "auto" else f"{b.samples} a period"
-    measured = any(s.from_contact for s in scene.stiffnesses.values())
-    loaded, band = c.loaded, scene.wants("band")
-    spread, other = band or scene.wants("spread"), "frictionless"
-    if c.static == other:
-        other = "opposing"
+    whole = scene.mesh.symmetry == "full"
     return [
         Effect(
             "friction",
@@ -45,78 +31,39 @@ def effects_of_points(scene: ForcedScene) -> list[Effect]:
         _along(scene),
         Effect(
             "motion odd about y = 0",
-            scene.mesh.symmetry == "full",
-            'mesh.symmetry = "full"'
-            if scene.mesh.symmetry == "full"
-            else "points and their mirror images move as one, where they come in pairs",
-            ODD,
-            ("mesh.symmetry=full",),
+            whole,
+            "the full model"
+            if whole
+            else "rig, load and contact are even about y = 0: an even motion excites no odd one",
+            applies=whole,
         ),
         _excited(scene),
         Effect("lift-off", True, "every point may open: N = max(0, k_n w)"),
-        Effect(
-            "static balance",
-            True,
-            "mean positions are unknowns beside the vibration",
-            "damper at rest",
-        ),
+        Effect("static balance", True, f"mean positions are unknowns; {_static_words(scene)}"),
         Effect(
             "blades spread by F_C",
-            not loaded,
-            f"the faces fit each other {'under F_C, worn in' if loaded else 'without load'}",
-            FIT if loaded else "",
-            ("contact.fit=unloaded",) if loaded else (),
+            not c.loaded,
+            f"the faces fit each other {'under F_C, worn in' if c.loaded else 'without load'}",
+            applies=not c.loaded,
         ),
         Effect("damper inertia", True, "rigid body; mass and inertia from its mesh"),
         Effect(
             "harmonics",
             True,
-            "as many as matter, up to 31" if adaptive else f"0 to {b.harmonics}",
-            "energy balance",
-        ),
-        Effect(
-            "harmonics above",
-            False,
-            "added only where they matter" if adaptive else "not asked for",
-            HARMONICS,
-            () if adaptive else (f"balance.harmonics={b.harmonics + MORE_HARMONICS}",),
-        ),
-        Effect("signal between samples", False, samples, SAMPLES),
-        Effect(
-            "other slider starts",
-            spread,
-            f"sliders start at {b.slider}; points that always stick remember it",
-            "" if spread else START,
-            () if spread else ("balance.slider=mid",),
-        ),
-        Effect(
-            "two tangential stiffnesses",
-            False,
-            "one k_t a point, the mean of both directions" if measured else "one K_T is given",
-            TWO_K_T if measured else "",
-            applies=measured,
-        ),
-        Effect(
-            "other static states",
-            band,
-            _static_words(scene),
-            "" if band else STATIC,
-            () if band else (f"contact.static={other}",),
-            applies=loaded and mu > 0.0,
+            "all: time integration"
+            if swept
+            else "as many as matter, up to 31"
+            if adaptive
+            else f"0 to {b.harmonics}; {samples} samples",
+            "" if swept else "more harmonics",
         ),
         Effect(
             "damper elasticity",
             False,
             "in the contact stiffness; the body moves rigidly",
-            ELASTIC,
+            ELASTIC if scene.left_out.solves else "",
         ),
-        Effect(
-            "modes above",
-            False,
-            f"{scene.reduction.modes} fixed-interface modes a blade",
-            MODES,
-            (f"reduction.modes={scene.reduction.modes + MORE_MODES}",),
-        ),
+        Effect("modes above", False, f"{scene.reduction.modes} modes a blade, static remainder"),
         *centrifugal_effects(scene),
     ]
 
@@ -169,7 +116,7 @@ def _static_words(scene: ForcedScene) -> str:
         return "N and T of both faces are given"
     return {
         "seated": "F_C raised from nothing on both faces, coupled contact",
-        "frictionless": "no friction before vibration",
+        "frictionless": "no mean friction before vibration, near what vibration leaves",
         "opposing": "friction fully mobilised against F_C",
         "reversed": "friction fully mobilised along F_C",
     }[static]
@@ -185,4 +132,5 @@ def _along(scene: ForcedScene) -> Effect:
         if c.directions == "auto"
         else "asked for"
     )
-    return Effect(name, False, why, ALONG, ("contact.directions=two",), applies=c.friction > 0.0)
+    check = ALONG if scene.left_out.solves and scene.balance.method == "balance" else ""
+    return Effect(name, False, why, check, ("contact.directions=two",), applies=c.friction > 0.0)

@@ -1,48 +1,54 @@
-"""Errors of a response's numbers by source, from the levels that were solved beside the run."""
+"""Errors of a response's numbers by source, from the levels that were solved beside the run.
+
+Coarser levels that show an order give Richardson's error with the factor 1.25 of three grids, of
+the order that re-entrant edges leave on fine meshes: a higher one is an accident of coarse levels.
+Levels without an order (heights that the mesh hardly changes, contact points and harmonics where
+contacts open and close) have their range as the scale of the error.
+
+References
+----------
+P. J. Roache, Verification and Validation in Computational Science and Engineering (1998), ch. 5;
+L. Eca, M. Hoekstra, J. Comput. Phys. 262 (2014) 104: the range of data as the scale of an error.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
-from upd.analyses.convergence import (
-    ASSUMED,
-    UNCONFIRMED,
-    estimate_error,
-    finer_level_error,
-    two_level_error,
+from upd.analyses.convergence import observed_order, two_level_error
+from upd.analyses.forced.curves import TimeCheck
+from upd.analyses.forced.levels import (
+    HARMONICS,
+    MESH,
+    MODES,
+    POINTS,
+    SAMPLES,
+    TIME,
+    Level,
+    Place,
+    at_place,
+    linear_numbers,
 )
-from upd.analyses.forced import plan as costs
-from upd.analyses.forced.companions import MESH, MODES, POINTS
-from upd.analyses.forced.estimates_cost import reduction_seconds
-from upd.analyses.forced.level_values import ForcedLevels, Key, LevelValue, Untold
-from upd.analyses.forced.levels import HARMONICS, PATH, SAMPLES, STEPS
-from upd.analyses.forced.peak_results import LEFT
-from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.reduction_results import reduction_name
+from upd.analyses.forced.mode_peaks import ModePeak
+from upd.analyses.forced.peak_results import LEFT, reduction_name
 from upd.analyses.forced.solution import ForcedSolution
 from upd.progress import Stages
 from upd.results import Case, ErrorPart, Estimates, Result
 from upd.scene.forced_contact import SIDES, Side
 
-#: sources in the order they are told
-_ORDER = (MESH, MODES, POINTS, HARMONICS, SAMPLES, STEPS, PATH)
-#: numbers of the performance curve, and why they have no error where no level tells them
-_RANGE = "a range tells it: the F_C/F_E of the curve beside it, and all at which a sweep is as low"
-_AGAIN = "the curve over F_C/F_E is not solved again on other levels"
-_UNTOLD = {
-    "optimum_ratio": _RANGE,
-    "optimum_peak": _AGAIN,
-    "optimum_frequency": _AGAIN,
-    "optimum_reduction": _AGAIN,
-    "lowest_peak": _AGAIN,
-    "lowest_peak_at_ratio": _AGAIN,
-    "lowest_peak_of_free": _AGAIN,
-}
-#: points of a path or sweep for half of what it leaves between them: their error falls with the
-#: square of the steps
-_POINTS_FOR_HALF = math.sqrt(2.0)
+Key = tuple[str, Case]
+#: factor of safety of three levels that show an order
+_SAFETY = 1.25
+#: order of frequencies on fine meshes: twice the exponent of displacements at a re-entrant edge of
+#: 270 degrees (M. L. Williams, J. Appl. Mech. 19, 1952, 526)
+_ORDER = 2.0 * 0.5445
+#: order below which levels show none
+_LEAST = 0.5
+#: numbers of the performance curve: their error is that of the peaks beside
+_BEST = ("best_ratio", "best_peak", "best_frequency", "best_reduction")
 
 
 def estimate(solution: ForcedSolution, numbers: Sequence[Result], stages: Stages) -> Estimates:
@@ -58,128 +64,174 @@ def estimate(solution: ForcedSolution, numbers: Sequence[Result], stages: Stages
         Of the run.
     """
     del stages
-    levels, cost = solution.levels, _Costs(solution.plan)
-    keys = dict.fromkeys((*levels.values, *levels.told))
-    out = {key: _parts(levels, key, cost) for key in keys}
+    out: dict[Key, tuple[ErrorPart, ...]] = {}
+    for name, levels in solution.levels.items():
+        out |= _linear_numbers(solution, name, levels)
+        for curve in (c for c in solution.curves if c.stiffness == name):
+            for side in SIDES:
+                for peak in curve.peaks[side]:
+                    out |= _of_peak(solution, levels, curve.case, curve.ratio, side, peak)
     wanted = {(one.name, one.case): one for one in numbers if not one.withheld}
     for side in SIDES:
         out |= _reductions(wanted, out, side)
-    out |= _optimum_reductions(wanted, out)
     for key, one in wanted.items():
-        if one.name in _UNTOLD and key not in out:
-            out[key] = (ErrorPart(PATH, math.nan, f"not estimated: {_UNTOLD[one.name]}"),)
+        if one.name in _BEST:
+            out[key] = _of_best(solution, one, out)
+    return {key: parts for key, parts in out.items() if parts}
+
+
+def _linear_numbers(
+    solution: ForcedSolution, name: str, levels: Sequence[Level]
+) -> dict[Key, tuple[ErrorPart, ...]]:
+    """Peaks of both limits, and the stuck frequencies."""
+    out: dict[Key, tuple[ErrorPart, ...]] = {}
+    linear, peaks = solution.linear[name], solution.searched[name]
+    for kind in ("free", "stuck"):
+        for side in SIDES:
+            own = sorted(getattr(linear, f"{kind}_peaks")[side], key=lambda p: p.frequency)
+            told = solution.stuck_peaks(name, side) if kind == "stuck" else []
+            modes = {one.number: one.mode for one in told}
+            for number, peak in zip(linear_numbers(peaks, kind, side), own, strict=False):
+                case = Case(stiffness=name, kind=kind, mode=modes.get(number, ""))
+                mine = ModePeak(number, peak.frequency, peak.height, peak.sample)
+                out |= _of_peak(solution, levels, case, kind, side, mine)
+    for k, word in enumerate(("in_phase", "out_of_phase")):
+        in_phase = word == "in_phase"
+        own_f = [m.frequency for m in linear.modes if m.axis == "x" and m.in_phase == in_phase]
+        if own_f:
+            key, first = (f"stuck_{word}", Case(stiffness=name)), own_f[0]
+            out[key] = _parts(levels, partial(_stuck_ratio, k, first))
     return out
 
 
-def _parts(levels: ForcedLevels, key: Key, cost: _Costs) -> tuple[ErrorPart, ...]:
-    values, told = levels.values.get(key, []), levels.told.get(key, [])
-    seconds, parts = levels.curve_seconds.get(key, 0.0), []
-    for source in _ORDER:
-        mine = [one for one in values if one.source == source]
-        known = [one for one in told if one.source == source]
-        if mine or known:
-            parts.append(_part(source, mine, known, cost.half(source, seconds, mine)))
-    return tuple(parts)
+def _stuck_ratio(k: int, own: float, level: Level) -> float:
+    return level.stuck[k] / own
 
 
-def _part(
-    source: str, values: Sequence[LevelValue], told: Sequence[Untold], half_cost: float | None
-) -> ErrorPart:
-    """The part of one source: the sum of its ladders' and of what is told without."""
-    errors, words = [one.error for one in told], [one.why for one in told]
-    for ladder in dict.fromkeys(one.ladder for one in values):
-        error, basis = bound([one for one in values if one.ladder == ladder])
-        errors.append(error)
-        words.append(basis)
-    seconds = math.fsum(one.seconds for one in values)
-    return ErrorPart(source, math.fsum(errors), "; ".join(words), half_cost, seconds)
+def _peak_ratio(place: Place, k: int, own: float, level: Level) -> float:
+    return level.peaks[place][k] / own
 
 
-def bound(ladder: Sequence[LevelValue]) -> tuple[float, str]:
-    """Bound of a number's relative error from its other levels, and how it was found.
+def _of_peak(
+    solution: ForcedSolution,
+    levels: Sequence[Level],
+    case: Case,
+    at: float | str,
+    side: Side,
+    peak: ModePeak,
+) -> dict[Key, tuple[ErrorPart, ...]]:
+    """Errors of a peak's frequency and height."""
+    name = f"{LEFT * (side == 'left')}peak_{peak.number}"
+    place: Place = (at, side, peak.number)
+    case = replace(case, mode=peak.mode or case.mode)
+    own = peak.frequency, peak.height
+    check = None
+    if not isinstance(at, str):
+        curve = next(c for c in solution.curves if c.case == replace(case, mode=""))
+        top = curve.tops.get((side, peak.number))
+        # levels are compared with the top of the path, whatever is reported of it
+        own = (top.frequency, top.height) if top is not None else own
+        mine = [one for one in curve.checked if (one.blade, one.number) == (side, peak.number)]
+        check = mine[0] if mine else None
+    out = {}
+    for k, word in enumerate(("frequency", "accelerance")):
+        parts = list(_parts(levels, partial(_peak_ratio, place, k, own[k]), place))
+        if check is not None:
+            parts = _with_time(parts, check, word)
+        out[f"{name}_{word}", case] = tuple(parts)
+    return out
 
-    Of coarser levels, that of `upd.analyses.convergence.estimate_error`. Of one finer level the
-    change to it, and the bound of what that level itself leaves by the same rule. Of several finer
-    ones three times the range of all: harmonics come in no order of convergence where contacts
-    open, and the range of the levels is then the scale of the error.
+
+def _with_time(parts: Sequence[ErrorPart], check: TimeCheck, word: str) -> list[ErrorPart]:
+    """The parts with what time integration shows: it holds all harmonics, so that where it gives
+    the reported motion no more are missing.
+    """
+    if check.at_top:
+        return list(parts)
+    kept = [one for one in parts if one.source not in (HARMONICS, SAMPLES)]
+    error = check.step if word == "accelerance" else check.apart
+    if not math.isfinite(check.difference):
+        error = math.nan
+    why = "the highest motion that stays, and the next towards the top, which leaves"
+    return [*kept, ErrorPart(TIME, error, why)]
+
+
+def _parts(
+    levels: Sequence[Level], ratio: Callable[[Level], float], place: Place | None = None
+) -> tuple[ErrorPart, ...]:
+    """Parts of one number's error.
 
     Parameters
     ----------
-    ladder
-        Levels of one number.
-
-    Returns
-    -------
-    float, str
-        NaN where a level was not found.
-
-    References
-    ----------
-    L. Eca, M. Hoekstra, J. Comput. Phys. 262 (2014) 104: the range of the data as the scale of an
-    error where levels scatter.
+    ratio
+        Level -> the number there over that of the run.
+    place
+        Where the number is, for peaks.
     """
-    found = [one for one in ladder if math.isfinite(one.ratio)]
-    names = ", ".join(one.label for one in found)
-    if not found:
-        lost = ", ".join(one.label for one in ladder)
-        return math.nan, f"not estimated: not found again with {lost}"
-    finer = sorted((one for one in found if one.size < 1.0), key=lambda one: -one.size)
-    if len(found) == 1 and not finer:
-        one = found[0]
-        error = UNCONFIRMED * two_level_error(one.ratio, 1.0, one.size, one.order)
-        return error, f"against {names}: {_order_words(one)}"
-    if not finer:
-        sizes = [1.0, *(one.size for one in found)]
-        told = estimate_error(sizes, [1.0, *(one.ratio for one in found)])
-        return told.error, f"against {names}: {told.basis}"
-    if len(finer) > 1:
-        ratios = [1.0, *(one.ratio for one in finer)]
-        error = UNCONFIRMED * (max(ratios) - min(ratios))
-        return error, f"against {names}: {UNCONFIRMED:g} times the range, in no order"
-    last = finer[0]
-    error, words = finer_level_error(last.ratio, last.size, last.order), _order_words(last)
-    return error, f"change with {names}, and what that leaves: {words}"
+    out = []
+    for source in (MESH, MODES, POINTS, HARMONICS, SAMPLES):
+        mine = [one for one in levels if one.source == source]
+        if place is not None and source in (HARMONICS, SAMPLES):
+            mine = [one for one, _ in at_place(levels, source, place)]
+        elif place is None:
+            mine = [one for one in mine if source not in (HARMONICS, SAMPLES)]
+        if place is not None and place[0] == "free":
+            mine = [one for one in mine if source != POINTS]
+        if not mine:
+            continue
+        found = [
+            (one, ratio(one))
+            for one in mine
+            if not one.why and (place is None or place in one.peaks)
+        ]
+        good = [(one, r) for one, r in found if math.isfinite(r)]
+        seconds = math.fsum(one.seconds for one in mine)
+        if not good:
+            why = next((one.why for one in mine if one.why), "not found on the level")
+            out.append(ErrorPart(source, math.nan, f"not estimated: {why}", None, seconds))
+            continue
+        error, words = bound(source, good)
+        out.append(ErrorPart(source, error, words, None, seconds))
+    return tuple(out)
 
 
-def _order_words(one: LevelValue) -> str:
-    shown = "of the rule" if one.order != ASSUMED else "assumed"
-    return f"two levels, order {one.order:.2g} {shown}, factor {UNCONFIRMED:g}"
+def bound(source: str, found: Sequence[tuple[Level, float]]) -> tuple[float, str]:
+    """Bound of a number's relative error from its other levels, and how it was found.
+
+    Parameters
+    ----------
+    found
+        Levels with the number over that of the run.
+    """
+    names = ", ".join(one.label for one, _ in found)
+    ratios = [1.0, *(r for _, r in found)]
+    spread = max(ratios) - min(ratios)
+    if source == MESH:
+        error, words = _of_meshes(found)
+        return error, f"against {names}: {words}"
+    if source == SAMPLES:
+        # the rule is of second order: a quarter of the change is left
+        return spread / (1.0 - 0.25), f"change with {names}, order 2"
+    if source == MODES:
+        return spread, f"change from {names}: what more modes change is less"
+    return _SAFETY * spread, f"range with {names}, factor {_SAFETY:g}"
 
 
-class _Costs:
-    """Seconds that half of an error adds to a run."""
-
-    def __init__(self, plan: ForcedPlan) -> None:
-        self.plan = plan
-        self._bodies: float | None = None
-
-    def half(self, source: str, seconds: float, values: Sequence[LevelValue]) -> float | None:
-        """Of one source.
-
-        Parameters
-        ----------
-        seconds
-            Of the number's curve or sweeps.
-        values
-            Levels of the source.
-        """
-        makers: Mapping[str, Callable[[], float]] = {
-            MESH: self._mesh,
-            MODES: lambda: max((one.seconds for one in values), default=0.0),
-            POINTS: lambda: seconds * max(costs.points_growth(self.plan) - 1.0, 0.0),
-            PATH: lambda: seconds * (_POINTS_FOR_HALF - 1.0),
-        }
-        if source in makers:
-            return makers[source]()
-        times = [one.times for one in values if one.times is not None]
-        return seconds * max(max(times, default=1.0) - 1.0, 0.0)
-
-    def _mesh(self) -> float:
-        if self._bodies is None:
-            scene, size, workers = self.plan.scene, self.plan.size, self.plan.workers
-            fine, own = (reduction_seconds(scene, size, workers, r) for r in (2.0, 1.0))
-            self._bodies = fine - own
-        return self._bodies
+def _of_meshes(found: Sequence[tuple[Level, float]]) -> tuple[float, str]:
+    """Richardson's error of the run from coarser meshes; their range where they show no order."""
+    near = sorted(found, key=lambda one: one[0].size)
+    ratios = [1.0, *(r for _, r in near[:2])]
+    if len(near) < 2:
+        return _SAFETY * two_level_error(ratios[1], 1.0, near[0][0].size, _ORDER), (
+            f"order {_ORDER:.2g} of re-entrant edges, two levels, factor {_SAFETY:g}"
+        )
+    shown = observed_order([1.0, *(one.size for one, _ in near[:2])], ratios)
+    if not shown >= _LEAST:
+        return _SAFETY * (max(ratios) - min(ratios)), f"range, in no order, factor {_SAFETY:g}"
+    error = _SAFETY * two_level_error(ratios[1], 1.0, near[0][0].size, _ORDER)
+    return error, (
+        f"order {shown:.1f}, taken as {_ORDER:.2g} of re-entrant edges, factor {_SAFETY:g}"
+    )
 
 
 def _reductions(
@@ -190,59 +242,87 @@ def _reductions(
     """
     out, prefix = {}, LEFT * (side == "left")
     for key, one in wanted.items():
-        if one.name != reduction_name(side):
+        if one.name != reduction_name(side) or not one.value:
             continue
-        case = one.case
         heights = [
             other
             for (name, at), other in wanted.items()
             if name.startswith(f"{prefix}peak_")
             and name.endswith("_accelerance")
-            and replace(at, mode="") == replace(case, mode="")
+            and replace(at, mode="") == one.case
         ]
-        frees = [
-            other
-            for (name, at), other in wanted.items()
-            if name.startswith(f"{prefix}peak_")
-            and name.endswith("_accelerance")
-            and at == Case(stiffness=case.stiffness, kind="free")
-        ]
-        if not heights or not frees or not one.value:
-            continue
-        top = max(heights, key=lambda r: r.value)
-        free = max(frees, key=lambda r: r.value)
-        both = (parts.get((r.name, r.case), ()) for r in (top, free))
-        out[key] = _reduction(one, *both)
+        free = _free(wanted, one.case.stiffness, prefix)
+        if heights and free is not None:
+            top = max(heights, key=lambda r: r.value)
+            both = (parts.get((r.name, r.case), ()) for r in (top, free))
+            out[key] = _reduction(one, *both)
     return out
 
 
-def _optimum_reductions(
-    wanted: Mapping[Key, Result], parts: Mapping[Key, tuple[ErrorPart, ...]]
-) -> dict[Key, tuple[ErrorPart, ...]]:
-    """As `_reductions`, of the optimum of a performance curve; empty without its peak's."""
-    out = {}
-    for key, one in wanted.items():
-        top = parts.get(("optimum_peak", one.case))
-        if one.name != "optimum_reduction" or top is None or not one.value:
-            continue
-        case = Case(stiffness=one.case.stiffness, kind="free")
-        frees = [r for k, r in wanted.items() if k[1] == case and k[0].endswith("_accelerance")]
-        if frees:
-            free = max(frees, key=lambda r: r.value)
-            out[key] = _reduction(one, top, parts.get((free.name, free.case), ()))
-    return out
+def _free(wanted: Mapping[Key, Result], stiffness: str, prefix: str = "") -> Result | None:
+    found = [
+        one
+        for (name, at), one in wanted.items()
+        if name.startswith(f"{prefix}peak_")
+        and name.endswith("_accelerance")
+        and at == Case(stiffness=stiffness, kind="free")
+    ]
+    return max(found, key=lambda r: r.value, default=None)
 
 
 def _reduction(
     one: Result, top: Sequence[ErrorPart], free: Sequence[ErrorPart]
 ) -> tuple[ErrorPart, ...]:
     """Parts of a reduction's error from those of the highest peak and of the free one."""
-    factor, told = abs((100.0 - one.value) / one.value), []
-    for source in _ORDER:
+    factor, out = abs((100.0 - one.value) / one.value), []
+    for source in dict.fromkeys(p.source for p in (*top, *free)):
         mine = [p for p in (*top, *free) if p.source == source]
-        if mine:
-            error = factor * math.fsum(p.error for p in mine)
-            words = f"of the highest peak and of the free one: {mine[0].basis}"
-            seconds = mine[0].companion_s
-            told.append(ErrorPart(source, error, words, mine[0].half_cost_s, seconds))
-    return tuple(told)
+        error = factor * math.fsum(p.error for p in mine)
+        words = f"of the highest peak and of the free one: {mine[0].basis}"
+        out.append(ErrorPart(source, error, words, None, mine[0].companion_s))
+    return tuple(out)
+
+
+def _of_best(
+    solution: ForcedSolution, one: Result, parts: Mapping[Key, tuple[ErrorPart, ...]]
+) -> tuple[ErrorPart, ...]:
+    """The best F_C/F_E lies between its neighbours on the curve; its peak is as well known as the
+    worst known one of the run's curves, beside what more harmonics change there.
+    """
+    name = one.case.stiffness
+    performance = solution.performances[name]
+    best = performance.best
+    if best is None:
+        return ()
+    if one.name == "best_ratio":
+        known = [p.ratio for p in performance.known]
+        k = known.index(best.ratio)
+        beside = [known[i] for i in (k - 1, k + 1) if 0 <= i < len(known)]
+        if not beside:
+            return ()
+        error = max(max(r / best.ratio, best.ratio / r) for r in beside) - 1.0
+        return (ErrorPart("points of the curve", error, "the next F_C/F_E on either side"),)
+    kind = "frequency" if one.name == "best_frequency" else "accelerance"
+    mine = {
+        key: told
+        for key, told in parts.items()
+        if key[0].endswith(kind) and key[1].stiffness == name and key[1].force_ratio is not None
+    }
+    if not mine:
+        return ()
+    worst = max(mine.values(), key=lambda told: math.fsum(p.error for p in told if p.known))
+    again, own = solution.best_again.get(name), best.worst
+    out = [replace(p, basis=f"as of the run's peaks: {p.basis}") for p in worst]
+    same = [] if again is None or own is None else again.peaks
+    for p in same:
+        if own is not None and (p.blade, p.number) == (own.blade, own.number):
+            here, there = (own.frequency, p.frequency)
+            if kind == "accelerance":
+                here, there = own.height, p.height
+            out = [part for part in out if part.source != HARMONICS]
+            change = abs(there / here - 1.0)
+            out.append(ErrorPart(HARMONICS, change, "change with the harmonics of the run"))
+    if one.name == "best_reduction" and one.value:
+        factor = abs((100.0 - one.value) / one.value)
+        out = [replace(p, error=factor * p.error) for p in out]
+    return tuple(out)

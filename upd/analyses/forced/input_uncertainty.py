@@ -18,8 +18,7 @@ from upd.analyses.forced.input_data import DataChange, data_change, is_known
 from upd.analyses.forced.linear_sensitivity import limit_peak, stuck_frequencies
 from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, unmoved
 from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.peak_results import LEFT
-from upd.analyses.forced.reduction_results import reduction_name
+from upd.analyses.forced.peak_results import LEFT, reduction_name
 from upd.analyses.forced.solution import ForcedSolution
 from upd.errors import ConvergenceError, UpdError, one_line
 from upd.hbm import climb
@@ -175,7 +174,7 @@ def _of_curve(
     """Peaks of both blades of one curve, and how far the highest is below the free one."""
     for side in SIDES:
         highest: PeakChange | None = None
-        for peak in solution.numbered_peaks(curve, side):
+        for peak in curve.peaks[side]:
             try:
                 change = _followed(solution, curve, data, side, peak)
             except UpdError as error:

@@ -6,9 +6,9 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import LinearCurves
-from upd.analyses.forced.linear_peaks import linear_peaks
+from upd.analyses.forced.linear_peaks import finer, linear_modes, linear_peaks
 from upd.analyses.forced.mode_peaks import CANDIDATES
-from upd.analyses.forced.model import Model
+from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.paths import grid
 from upd.analyses.forced.plan import ForcedPlan
 from upd.scene.forced_contact import SIDES
@@ -24,7 +24,7 @@ def linear_limits_of(
     answer
         Any of the model, with ``force``: its problem counts.
     """
-    f = grid(plan)
+    f = _frequencies(plan, answer)
     rows = {side: model.row(side) for side in SIDES}
     moving = {False: model.excitation.free_blades, True: SIDES}
     free, stuck = (
@@ -47,3 +47,12 @@ def linear_limits_of(
     )
     modes = measures.stuck_modes(model, CANDIDATES * plan.scene.excitation.stop)
     return LinearCurves(f, free, stuck, modes, free_peaks, stuck_peaks)
+
+
+def _frequencies(plan: ForcedPlan, answer: measures.Balanced) -> Array:
+    """The sweep's, and finer ones around every free and stuck mode: a drawn curve has its tops."""
+    f, k = grid(plan), measures.read_harmonic(answer)
+    for stuck in (False, True):
+        modes, width = linear_modes(answer.balance, stuck)
+        f = finer(f, modes / k, width / k)
+    return f

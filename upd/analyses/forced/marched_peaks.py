@@ -1,8 +1,4 @@
-"""Contact states, loops and the damper's motion at peaks that the sweeps tell and no balance.
-
-A peak that sweeps and balance do not tell alike is the sweeps'; what the contact does there is read
-from the last period of the higher sweep, node by node.
-"""
+"""Contact states, loops and the damper's motion at the peaks of sweeps, from their last period."""
 
 from __future__ import annotations
 
@@ -14,7 +10,6 @@ from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.measures import MOTIONS, Loop, loop_along_main, losing_most, place
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array
-from upd.analyses.forced.ranges import peak_ranges, sweeps_of
 from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
 from upd.hbm.interface_record import period_of_sweep
 from upd.progress import Stages
@@ -25,8 +20,7 @@ WANTS = ("contact_state", "hysteresis", "damper_motion")
 
 
 def march_peaks(solution: ForcedSolution, stages: Stages) -> None:
-    """Add the period of the higher sweep at every peak of the right blade that is the sweeps', and
-    with whole faces at all they have: the balance keeps no loops of nodes.
+    """Add the last period of every sweep at every peak of the right blade.
 
     Parameters
     ----------
@@ -37,16 +31,10 @@ def march_peaks(solution: ForcedSolution, stages: Stages) -> None:
     """
     if not any(solution.plan.scene.wants(one) for one in WANTS):
         return
-    for name, ratio in dict.fromkeys((s.stiffness, s.ratio) for s in solution.sweeps):
-        ranges = peak_ranges(solution, name, ratio)
-        tops = [one.found[0] for one in ranges.values() if not one.agrees or name in solution.faces]
-        if not tops:
-            continue
-        sweeps = sweeps_of(solution, name, ratio)
-        for top in tops:
-            one = next(s for s in sweeps if top in s.peaks["right"])
-            with stages("time march", f"{one.case}, peak {top.number}: its last period"):
-                solution.marched.append(marched_peak(solution, one, top))
+    for sweep in solution.sweeps:
+        for top in sweep.peaks["right"]:
+            with stages("time march", f"{sweep.case}, peak {top.number}: its last period"):
+                solution.marched.append(marched_peak(solution, sweep, top))
 
 
 def marched_peak(solution: ForcedSolution, sweep: SweptCurve, peak: ModePeak) -> MarchedPeak:

@@ -7,7 +7,7 @@ mode's own where two peaks cross as a parameter changes.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -143,11 +143,7 @@ def tell_apart(share: Array, height: Array) -> dict[int, int]:
 
 
 def numbered_peaks(
-    model: Model,
-    answer: FrequencyResponse,
-    height: Array,
-    stop: float,
-    without: Collection[int] = (),
+    model: Model, answer: FrequencyResponse, height: Array, stop: float
 ) -> list[ModePeak]:
     """Peaks of a path by the numbers of their modes.
 
@@ -161,11 +157,8 @@ def numbered_peaks(
         (n,) what has peaks along it.
     stop
         End of the sweep, Hz.
-    without
-        Points of the path whose maxima are no peaks.
     """
-    found = measures.path_maxima(answer.frequency, height)
-    maxima = [one for one in found if one.sample not in without]
+    maxima = measures.path_maxima(answer.frequency, height)
     if not maxima:
         return []
     motion = first_harmonic(answer, np.array([one.sample for one in maxima]))
@@ -245,3 +238,17 @@ def stuck_motion(model: Model, frequency: Array) -> ComplexArray:
 def unmoved(peaks: Sequence[PathPeak]) -> list[ModePeak]:
     """Peaks of a curve of no stuck mode, numbered by frequency."""
     return [ModePeak(k, *peak) for k, peak in enumerate(peaks, 1)]
+
+
+def tell_stuck_peaks(model: Model, peaks: Sequence[PathPeak], stop: float) -> list[ModePeak]:
+    """Peaks of a stuck curve by the numbers of their modes.
+
+    Parameters
+    ----------
+    stop
+        End of the sweep, Hz.
+    """
+    if not peaks:
+        return []
+    motion = stuck_motion(model, np.array([one.frequency for one in peaks]))
+    return numbered(mode_shapes(model, CANDIDATES * stop), peaks, motion)

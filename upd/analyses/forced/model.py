@@ -350,15 +350,14 @@ def _points(face: FacePoints, law: FaceLaw) -> tuple[Array, Array]:
 
 
 def _reduced(plan: ForcedPlan, bodies: Bodies, side: Side, face: FacePoints) -> BladePart:
-    """One blade on what its points and probes see, with the modes that a companion has more."""
+    """One blade on what its points and probes see."""
     scene = plan.scene
-    count, again = scene.reduction.modes, scene.estimates or scene.left_out.solves
-    names = _probes(scene, side)
+    count, names, solver = scene.reduction.modes, _probes(scene, side), scene.solver.name
     if scene.contact.rule == GAUSS:
-        return attached_part(
-            bodies, side, scene.contact.lines(side), names, count, again, scene.solver.name
-        )
-    return nodal_part(bodies, side, face, names, count, again, scene.solver.name)
+        lines = scene.contact.lines(side)
+        again = scene.estimates
+        return attached_part(bodies, side, lines, names, count, again, solver)
+    return nodal_part(bodies, side, face, names, count, solver)
 
 
 def _probes(scene: ForcedScene, side: Side) -> tuple[str, ...]:

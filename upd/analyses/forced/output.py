@@ -1,42 +1,36 @@
 """What a forced response leaves behind.
 
-Curves, linear limits, contact points, states, energies, loops, peaks followed over F_C/F_E.
+Curves, linear limits, contact points, states, energies, loops, peaks over F_C/F_E.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.array_parts import (
-    BAND,
     FRICTION,
-    HARMONICS,
-    HIGHEST,
     HZ,
     LINEAR,
     MARCHED,
     MEASURED,
     PERFORMANCE,
     POINTS,
-    SPREAD,
     SWEEP,
     Variables,
     shares_by_face,
 )
 from upd.analyses.forced.curve_arrays import (
-    band_arrays,
     faces_friction,
     friction_arrays,
     linear_arrays,
+    performance_arrays,
 )
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.marched_peaks import faces_places
 from upd.analyses.forced.model import Model
-from upd.analyses.forced.performance_arrays import again_arrays, branch_arrays, highest_arrays
 from upd.analyses.forced.printed import measured_peaks
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.swept_arrays import marched_arrays, peaks_by_sweep, swept_arrays
@@ -58,9 +52,8 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
     dict
         Group -> variable -> (dimensions, array, attributes). Contents: "points" and "linear" of
         every stiffness, "friction" of every curve, "sweep" and "marched peaks" of every sweep (the
-        latter what the contact does at peaks that are the sweeps'), "performance" of every followed
-        peak and the "highest peak" of them, "band" of every curve, "spread", "harmonics", the
-        "measured" peaks, and every "measured curve".
+        latter what the contact does at its peaks), "performance", the "measured" peaks, and every
+        "measured curve".
     """
     out: dict[str, ArrayGroup] = {}
     excited = excitation_of(solution.plan.scene.excitation)
@@ -97,24 +90,9 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
             marched_arrays(solution, marched), content=MARCHED, case=one.case
         )
     for name, performance in solution.performances.items():
-        case = Case(stiffness=name)
-        for branch in performance.branches:
-            at = replace(case, branch=branch.name, mode=branch.mode)
-            out[f"performance {at}"] = ArrayGroup(
-                branch_arrays(branch), content=PERFORMANCE, case=at
-            )
-        out[f"highest peak {name}"] = ArrayGroup(
-            highest_arrays(performance), content=HIGHEST, case=case
+        out[f"performance {name}"] = ArrayGroup(
+            performance_arrays(performance), content=PERFORMANCE, case=Case(stiffness=name)
         )
-    for band in solution.bands:
-        out[f"band {band.curve.case}"] = ArrayGroup(
-            band_arrays(solution, band), content=BAND, case=band.curve.case
-        )
-    for content, followed in ((SPREAD, solution.spreads), (HARMONICS, solution.harmonics)):
-        for name, found in followed.items():
-            out[f"{content} {name}"] = ArrayGroup(
-                again_arrays(content, found), content=content, case=Case(stiffness=name)
-            )
     out |= measured_arrays(solution.plan.scene.measured) if out else {}
     measured = measured_peaks(solution.plan)
     if measured and out:

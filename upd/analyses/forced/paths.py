@@ -2,32 +2,32 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Sequence
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from upd.analyses.forced import measures
 from upd.analyses.forced.linear_peaks import finer, linear_modes
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import PeakAgain
 from upd.hbm import FrequencyResponse, Settings, frequency_response, harmonics
 from upd.hbm.assembled import assembled
 from upd.hbm.balance import Balance
-from upd.hbm.fourier import sample_count
 
-#: half width of the band around a peak in which it is followed again, as a share of its frequency,
-#: and the points in it
+#: half width of the band around a peak in which it is looked for, as a share of its frequency, and
+#: the points in it
 BAND, BAND_POINTS = 0.02, 15
 #: points in which it is looked for in the whole sweep
 SWEEP_POINTS = 60
 #: points a path may have: so many where points slip and stick, however few frequencies are asked
 #: for, or so many per frequency
 LEAST_POINTS, MOST_POINTS = 1800, 4
-#: start positions of the sliders
-STARTS = ("zero", "static", "mid", "upper", "lower")
+#: steps of a path whose tops are climbed to afterwards: half the points of the usual ones, and tops
+#: between them that differ by 0.2 % in height
+LONG_STEPS = Settings(angle=0.7, kink_step=0.1, wanted_iterations=8)
 
 
 def grid(plan: ForcedPlan) -> Array:
@@ -38,7 +38,9 @@ def grid(plan: ForcedPlan) -> Array:
     )
 
 
-def fine_grid(plan: ForcedPlan, model: Model, force: float) -> Array:
+def fine_grid(
+    plan: ForcedPlan, model: Model, force: float, frequencies: Array | None = None
+) -> Array:
     """Frequencies of the sweep in Hz, and finer ones around stuck modes where they are too coarse
     for these.
 
@@ -48,16 +50,18 @@ def fine_grid(plan: ForcedPlan, model: Model, force: float) -> Array:
         Of the rig.
     force
         F_E, N.
+    frequencies
+        (n,) Hz in place of those of the sweep.
     """
     k = model.excitation.lowest
     problem = balance_of(plan, model, force, (0, *model.excitation.harmonics))
     modes, width = linear_modes(problem, True)
-    return finer(grid(plan), modes / k, width / k)
+    return finer(grid(plan) if frequencies is None else frequencies, modes / k, width / k)
 
 
 def path_settings(points: int) -> Settings:
     """How far a path along so many frequencies may go."""
-    return Settings(most_points=max(LEAST_POINTS, MOST_POINTS * points))
+    return replace(LONG_STEPS, most_points=max(LEAST_POINTS, MOST_POINTS * points))
 
 
 def respond(
@@ -135,27 +139,6 @@ def balance_of(
     return problem(harmonics(numbers))
 
 
-def balance_with(
-    plan: ForcedPlan, model: Model, force: float, old: Balance, highest: int
-) -> Balance:
-    """The run's own problem with more harmonics: on the scene's samples, or on as many as these
-    need where those cannot carry them.
-
-    Parameters
-    ----------
-    force
-        Excitation, N.
-    old
-        The problem of the run.
-    highest
-        The highest harmonic.
-    """
-    numbers, given = range(highest + 1), plan.scene.balance.samples
-    carry = given == "auto" or int(given) > 2 * highest
-    samples = None if carry else sample_count(harmonics(numbers))
-    return balance_like(plan, model, force, old, numbers, samples)
-
-
 def balance_like(
     plan: ForcedPlan,
     model: Model,
@@ -177,33 +160,13 @@ def balance_like(
     return b.with_sliders("static", old.slider) if old.start == "static" else b
 
 
-def peak_again(
-    plan: ForcedPlan, model: Model, force: float, at: float | None, choice: str, **changes: Any
-) -> PeakAgain:
-    """The right blade's highest peak near a frequency, followed with one choice changed.
-
-    Parameters
-    ----------
-    force
-        Excitation, N.
-    at
-        Hz, the middle of the band; None for the whole sweep.
-    choice
-        In words.
-    **changes
-        As `respond` takes them.
-    """
-    begin = time.perf_counter()
-    e = plan.scene.excitation
-    band = (
-        np.linspace(e.start, e.stop, SWEEP_POINTS)
-        if at is None
-        else np.linspace((1 - BAND) * at, (1 + BAND) * at, BAND_POINTS)
-    )
-    found = respond(plan, model, force, band, **changes)
-    took = time.perf_counter() - begin
-    H = np.abs(measures.accelerance(found, model.row("right"), force))
-    peaks = measures.path_peaks(found.frequency, H)
-    f, height = max(peaks, key=lambda p: p.height)[:2] if peaks else (float("nan"), float("nan"))
-    left_out = float(found.truncation.max(initial=0.0))
-    return PeakAgain(choice, f, height, left_out, found.status, took)
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Warnings of single paths are not the run's: its checks measure the peaks."""
+    solver = logging.getLogger("upd.hbm")
+    level = solver.level
+    solver.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        solver.setLevel(level)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,6 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.printed import MEASURED_PEAK, printed_of
-from upd.analyses.forced.ranges import NO_RANGES, PeakRange
 from upd.analyses.forced.solution import ForcedSolution
 from upd.results import Case, Result
 from upd.scene.forced_contact import Side
@@ -21,16 +20,8 @@ LEFT = "left_"
 _DAMPER = ("x", "y", "z")
 
 
-def peak_results(
-    solution: ForcedSolution,
-    case: Case,
-    peaks: Sequence[ModePeak],
-    ranges: Mapping[int, PeakRange] = NO_RANGES,
-) -> list[Result]:
-    """Numbered peaks of the right blade; measured frequencies go to the nearest, each once.
-
-    Those that the sweeps tell otherwise are theirs.
-    """
+def peak_results(solution: ForcedSolution, case: Case, peaks: Sequence[ModePeak]) -> list[Result]:
+    """Numbered peaks of the right blade; measured frequencies go to the nearest, each once."""
     found = printed_of(solution.plan)(MEASURED_PEAK, case.given())
     nearest = (
         {int(np.argmin([abs(peak.frequency - p.value) for peak in peaks])): p for p in found}
@@ -41,42 +32,30 @@ def peak_results(
     for k, peak in enumerate(peaks):
         one, name, mine = nearest.get(k), f"peak_{peak.number}", replace(case, mode=peak.mode)
         reference, source = (one.value, one.source) if one is not None else (None, "")
-        pair = [
+        results += [
             Result(f"{name}_frequency", mine, peak.frequency, "Hz", reference, source, exact=False),
             Result(f"{name}_accelerance", mine, peak.height, "(m/s2)/N"),
         ]
-        results += _spread_out(pair, ranges.get(peak.number))
         if not case.kind:
             results.append(Result(f"{name}_mac", mine, peak.mac, ""))
     return results
 
 
-def _spread_out(pair: Sequence[Result], told: PeakRange | None) -> list[Result]:
-    """Frequency and height of a peak with the ends of what the sweeps tell, and why."""
-    if told is None or told.agrees:
-        return list(pair)
-    ends = [told.ends(kind) for kind in ("frequency", "height")]
-    if told.single:
-        return [replace(one, why=told.why) for one in pair]
-    return [
-        replace(one, low=low, high=high, why=told.why)
-        for one, (low, high) in zip(pair, ends, strict=True)
-    ]
-
-
-def left_peak_results(
-    case: Case, peaks: Sequence[ModePeak], ranges: Mapping[int, PeakRange] = NO_RANGES
-) -> list[Result]:
+def left_peak_results(case: Case, peaks: Sequence[ModePeak]) -> list[Result]:
     """Numbered peaks of the left blade, which without a force of its own only the damper moves."""
     results = []
     for peak in peaks:
         name, mine = f"left_peak_{peak.number}", replace(case, mode=peak.mode)
-        pair = [
+        results += [
             Result(f"{name}_frequency", mine, peak.frequency, "Hz"),
             Result(f"{name}_accelerance", mine, peak.height, "(m/s2)/N"),
         ]
-        results += _spread_out(pair, ranges.get(peak.number))
     return results
+
+
+def reduction_name(blade: Side) -> str:
+    """Name of the number that tells how far a blade's highest peak is below its free one."""
+    return f"{LEFT * (blade == 'left')}reduction_of_free_peak"
 
 
 def highest_in_harmonic(case: Case, f: Array, size: Array, k: int, blade: Side) -> list[Result]:

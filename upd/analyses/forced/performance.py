@@ -1,310 +1,242 @@
-"""Performance curve: peak accelerance of the right blade and its frequency against F_C/F_E.
+"""Performance curve: the peaks of both blades over F_C/F_E, from whole curves.
 
-While every point sticks a peak is followed by itself. Below the F_C/F_E at which a point moves at a
-peak, harmonic balance alone follows it on, through folds and until it is lost; a scene that asks
-for time marches is swept there, up and down over the whole range, each F_C/F_E from its static
-state: at some of the curve, and at all beside the lowest highest point.
+One whole curve by harmonic balance at every F_C/F_E, from those at which every point sticks down to
+those at which the damper hardly matters; a few more beside the best one. Nothing is followed, so
+nothing is lost: a curve shows all its peaks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from concurrent.futures import Future
-from dataclasses import replace
-from functools import partial
+import math
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from upd.analyses.forced.curves import ForcedCurve, LinearCurves, SweptCurve
-from upd.analyses.forced.march_queue import MarchQueue
-from upd.analyses.forced.measures import ComplexArray, PathPeak
-from upd.analyses.forced.mode_peaks import ModePeak
+from upd.analyses.forced import measures
+from upd.analyses.forced.curves import ForcedCurve, LinearCurves
+from upd.analyses.forced.mode_peaks import ModePeak, numbered_peaks
 from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.performance_curve import Branch, Performance
-from upd.analyses.forced.plan import EVERY, ForcedPlan
-from upd.analyses.forced.read_points import ends, settle_read
-from upd.analyses.forced.solution import ForcedSolution, tell_stuck_peaks
-from upd.analyses.forced.spring_march import SpringMarch
-from upd.analyses.forced.sweeps import SweepJob, both_ways, make_springs, spread
-from upd.hbm.checks import stuck_points
-from upd.hbm.coulomb import LIFT
-from upd.hbm.peaks import performance_curve
-from upd.hbm.refined_sweep import Told
-from upd.progress import Stages
+from upd.analyses.forced.paths import LONG_STEPS, SWEEP_POINTS, fine_grid, respond
+from upd.analyses.forced.plan import ForcedPlan
+from upd.errors import UpdError
+from upd.linalg.parallel import threads_for
+from upd.linalg.processes import SideProcesses
+from upd.scene.forced_contact import SIDES, Side
 
-#: steps of the sweeps and the smallest beside peaks, as shares of the frequency, and the periods
-#: after which they go on: coarser than the sweeps of a curve, which the peaks' heights feel by
-#: about a hundredth; what is read from them is marched on, see `upd.analyses.forced.read_points`
-STEP, LEAST, MOST_PERIODS = 0.02, 2e-3, 220
-#: difference of a whole curve's highest point from the highest followed peak, between whose points
-#: it is read, beyond which it is another peak
-OTHER = 0.05
+#: points of a path from one end, before that from the other is taken
+MOST_POINTS = 600
 
 
-def follow_peaks(
-    plan: ForcedPlan, model: Model, curve: ForcedCurve, linear: LinearCurves
-) -> Performance:
-    """Follow every stuck peak from the highest F_C/F_E to the lowest by harmonic balance.
+class RatioPeak(NamedTuple):
+    """A peak at one F_C/F_E: blade, number and words of its mode, Hz, (m/s2)/N, shares of the cycle
+    in which points slip and are open.
+    """
 
-    Parameters
+    blade: Side
+    number: int
+    mode: str
+    frequency: float
+    height: float
+    slip: float
+    lift: float
+
+
+class RatioPoint(NamedTuple):
+    """The peaks at one F_C/F_E; whether the curve reached its end, and seconds."""
+
+    ratio: float
+    peaks: tuple[RatioPeak, ...]
+    arrived: bool
+    seconds: float
+
+    @property
+    def worst(self) -> RatioPeak | None:
+        """The highest of both blades and all modes."""
+        return max(self.peaks, key=lambda one: one.height, default=None)
+
+
+@dataclass(frozen=True)
+class Performance:
+    """Peaks over F_C/F_E.
+
+    Attributes
     ----------
-    curve
-        Any solved curve of the model: its harmonic balance is scaled.
-    linear
-        Of the model: its stuck peaks are where every branch begins.
-    """
-    told = _named_peaks(plan, model, linear)
-    branches = tuple(_branch(plan, model, curve, peak, name) for name, peak in told.items())
-    return _between_limits(model, linear, branches)
-
-
-def stuck_peaks(
-    plan: ForcedPlan, model: Model, curve: ForcedCurve, linear: LinearCurves
-) -> Performance:
-    """The stuck peaks, down to the last F_C/F_E at which every point sticks.
-
-    Parameters
-    ----------
-    curve, linear
-        As `follow_peaks`.
-    """
-    told = _named_peaks(plan, model, linear)
-    branches = tuple(_stuck_branch(plan, curve, peak, name) for name, peak in told.items())
-    return _between_limits(model, linear, branches)
-
-
-def beside_branches(found: Performance, curves: Sequence[ForcedCurve]) -> Performance:
-    """The peaks followed, with what whole curves of the same model have beside them.
-
-    Where points move even at the highest F_C/F_E, a stuck peak may lead to a branch that is not the
-    highest: only a whole curve tells.
-
-    Parameters
-    ----------
-    curves
-        Of the same model; those that stopped early say nothing.
-    """
-    ratio, _, height, _ = found.highest
-    beside = []
-    for one in (c for c in curves if not c.stopped):
-        if not len(ratio) or not ratio[0] <= one.ratio <= ratio[-1]:
-            continue
-        size = np.abs(one.accelerance["right"])
-        at = int(size.argmax())
-        followed = float(np.exp(np.interp(np.log(one.ratio), np.log(ratio), np.log(height))))
-        if abs(float(size[at]) / followed - 1.0) > OTHER:
-            beside.append((one.ratio, float(one.frequency[at]), float(size[at]), followed))
-    return replace(found, beside=tuple(beside))
-
-
-def _named_peaks(plan: ForcedPlan, model: Model, linear: LinearCurves) -> dict[str, ModePeak]:
-    told = tell_stuck_peaks(model, linear.stuck_peaks["right"], plan.scene.excitation.stop)
-    return {f"peak {one.number}" if len(told) > 1 else "peak": one for one in told}
-
-
-def _between_limits(
-    model: Model, linear: LinearCurves, branches: tuple[Branch, ...]
-) -> Performance:
-    # the right blade's own, or where it is not excited that of the left one
-    free = model.excitation.free_blades[-1]
-    return Performance(
-        branches,
-        _highest(linear.free[free], linear.free_peaks[free]),
-        _highest(linear.stuck["right"], linear.stuck_peaks["right"]),
-    )
-
-
-def _stuck_branch(plan: ForcedPlan, curve: ForcedCurve, peak: ModePeak, name: str) -> Branch:
-    omega = np.array([2.0 * np.pi * peak.frequency])
-    kept = []
-    for ratio in _ratios(plan):
-        b = curve.answer.balance.with_loads(1.0, float(curve.ratio / ratio))
-        if not stuck_points(b, omega)[0]:
-            break
-        kept.append(ratio)
-    ratio = np.array(kept[::-1])
-    every = np.ones(len(ratio))
-    f, height = peak.frequency * every, peak.height * every
-    return Branch(name, ratio, f, height, 0.0 * every, complete=True, message="", mode=peak.mode)
-
-
-class PerformanceSweeps:
-    """As `follow_peaks` while every point sticks, and by sweeps up and down below.
-
-    Those that are known to be wanted begin at once.
-
-    Parameters
-    ----------
-    curve, linear
-        As `follow_peaks`.
-    queue
-        Where they run.
+    points
+        The curves, F_C/F_E rising.
+    free, stuck
+        Highest peaks of both limits, (m/s2)/N.
+    harmonics
+        The highest of the balance.
     """
 
-    def __init__(
-        self, solution: ForcedSolution, curve: ForcedCurve, linear: LinearCurves, queue: MarchQueue
-    ) -> None:
-        self.plan, self.name, self.queue = solution.plan, curve.stiffness, queue
-        model = solution.models[self.name]
-        self.stuck = stuck_peaks(self.plan, model, curve, linear)
-        ratio = _ratios(self.plan)
-        least = [one.ratio.min(initial=np.inf) for one in self.stuck.branches]
-        # every branch sticks above; the swept ones fall
-        self.swept = ratio[ratio < max(least, default=np.inf)]
-        self._begun: dict[int, Future[list[SweptCurve]]] = {}
-        if len(self.swept):
-            self.springs = make_springs(self.plan, model)
-            self._begin(sorted({*range(0, len(self.swept), EVERY), len(self.swept) - 1}))
+    points: tuple[RatioPoint, ...]
+    free: float
+    stuck: float
+    harmonics: int
 
-    def _begin(self, wanted: Sequence[int]) -> None:
-        for k in wanted:
-            job = _job(self.plan, self.springs, self.name, self.swept[k])
-            self._begun[k] = self.queue.add(partial(_settled_ways, self.plan, job))
+    @property
+    def known(self) -> list[RatioPoint]:
+        """The points with a peak."""
+        return [one for one in self.points if one.peaks and one.arrived]
 
-    def finish(self, stages: Stages) -> Performance:
-        """Wait for them, and sweep beside the lowest highest point."""
-        known, found = self.stuck, dict[int, list[SweptCurve]]()
-        while len(found) < len(self._begun):
-            count = len(self._begun) - len(found)
-            with stages("performance", f"{self.name}: sweeps up and down at {count} F_C/F_E"):
-                found = {k: one.result() for k, one in self._begun.items()}
-            known = _joined(self.stuck, found, self.swept)
-            self._begin(_beside(known, self.swept, found))
-        return known
+    @property
+    def best(self) -> RatioPoint | None:
+        """The point whose highest peak is lowest; None without points."""
+        heights = [one.worst.height for one in self.known if one.worst is not None]
+        return self.known[int(np.argmin(heights))] if heights else None
 
+    @property
+    def inside(self) -> bool:
+        """Whether the best is no end of the curve."""
+        return self.best is not None and self.best not in (self.known[0], self.known[-1])
 
-def _ratios(plan: ForcedPlan) -> Array:
-    """(n,) F_C/F_E of the curve, falling."""
-    choice = plan.scene.performance
-    return np.asarray(np.geomspace(choice.highest, choice.lowest, choice.points))
+    def worst_at(self, ratio: float) -> float:
+        """Height of the highest peak at an F_C/F_E, between those of the curve on logarithmic axes;
+        nan beyond its ends.
+        """
+        known = self.known
+        x = np.log([one.ratio for one in known])
+        y = np.log([one.worst.height for one in known if one.worst is not None])
+        at = math.log(ratio)
+        return float(np.exp(np.interp(at, x, y, left=np.nan, right=np.nan)))
 
+    def factor_two(self) -> tuple[float, float] | None:
+        """The highest peak at half and at twice the best F_C/F_E, over that at the best."""
+        best = self.best
+        if best is None or best.worst is None:
+            return None
+        low, high = (self.worst_at(best.ratio * factor) for factor in (0.5, 2.0))
+        return low / best.worst.height, high / best.worst.height
 
-def _job(plan: ForcedPlan, springs: SpringMarch, name: str, ratio: float) -> SweepJob:
-    e = plan.scene.excitation
-    return SweepJob(
-        name,
-        float(ratio),
-        springs.march,
-        spread(e.start, e.stop, STEP),
-        springs.at_rest(),
-        least=LEAST,
-        most_periods=MOST_PERIODS,
-    )
-
-
-def _settled_ways(plan: ForcedPlan, job: SweepJob, told: Told | None = None) -> list[SweptCurve]:
-    """Sweeps up and down, settled where they are read."""
-    return [settle_read(plan, job, one, told) for one in both_ways(plan, job, told)]
-
-
-def _beside(known: Performance, swept: Array, found: dict[int, list[SweptCurve]]) -> list[int]:
-    """The F_C/F_E next to the lowest highest point that are not swept yet."""
-    ratio, _, height, _ = known.highest
-    at = int(np.abs(swept - ratio[height.argmin()]).argmin())
-    return [k for k in (at - 1, at + 1) if 0 <= k < len(swept) and k not in found]
-
-
-def _joined(stuck: Performance, found: dict[int, list[SweptCurve]], swept: Array) -> Performance:
-    """The branches that stick, and the peaks of the sweeps below them."""
-    tops, rising = [], sorted(found, reverse=True)
-    for k in rising:
-        top = highest_of(found[k])
-        if top is not None:
-            tops.append((float(swept[k]), *top))
-    sweeps = tuple(one for k in rising for one in found[k])
-    return replace(
-        stuck,
-        branches=tuple(_with_sweeps(one, sweeps) for one in stuck.branches),
-        swept=np.array(tops).reshape(len(tops), 4).T,
-        sweeps=sweeps,
-    )
-
-
-def highest_of(sweeps: Sequence[SweptCurve]) -> tuple[float, float, float] | None:
-    """Frequency of the highest point of some sweeps, its height, and the least of their highest;
-    None where nothing was swept.
-    """
-    tops = [_top(one) for one in sweeps if len(one.frequency)]
-    if not tops:
-        return None
-    f, _, height = max(tops, key=lambda one: one[2])
-    return f, height, min(one[1] for one in tops)
-
-
-def sweep_peak(
-    plan: ForcedPlan, springs: SpringMarch, name: str, ratio: float
-) -> tuple[float, float, float] | None:
-    """As `highest_of` the sweeps up and down of a performance curve at one F_C/F_E.
-
-    Parameters
-    ----------
-    springs
-        Of the model.
-    name
-        Of its stiffness.
-    """
-    return highest_of(_settled_ways(plan, _job(plan, springs, name, ratio)))
-
-
-def _top(one: SweptCurve) -> tuple[float, float, float]:
-    """Frequency of the highest point of a sweep, and its least and largest height."""
-    size = np.abs(one.accelerance["right"])
-    at = int(size.argmax())
-    points = [(float(one.frequency[at]), *ends(one, at, float(size[at])))]
-    points += [
-        (peak.frequency, *ends(one, peak.sample, peak.height)) for peak in one.peaks["right"]
-    ]
-    return max(points, key=lambda point: point[2])
-
-
-def _with_sweeps(branch: Branch, sweeps: Sequence[SweptCurve]) -> Branch:
-    """A branch that sticks, with the peaks of its mode in the sweeps below."""
-    rows: list[tuple[float, ...]] = []
-    for at in dict.fromkeys(one.ratio for one in sweeps):
-        mine = [
-            (peak, one.found, ends(one, peak.sample, peak.height))
-            for one in sweeps
-            for peak in one.peaks["right"]
-            if one.ratio == at and peak.mode == branch.mode
+    def of_mode(self, blade: Side, number: int) -> Array:
+        """(3, n) F_C/F_E, Hz and height of a peak where it was found."""
+        rows = [
+            (one.ratio, p.frequency, p.height)
+            for one in self.known
+            for p in one.peaks
+            if (p.blade, p.number) == (blade, number)
         ]
-        if mine:
-            peak, found, (_, height) = max(mine, key=lambda row: row[2][1])
-            low = min(ends[0] for _, _, ends in mine)
-            rows.append((at, peak.frequency, height, float(found.share[peak.sample, 0]), low))
-    told = np.array(rows).reshape(len(rows), 5).T
-    own = (branch.ratio, branch.frequency, branch.height, branch.lift, branch.height)
-    above = branch.ratio > max((one.ratio for one in sweeps), default=0.0)
-    columns = [np.append(part, one[above]) for part, one in zip(told, own, strict=True)]
-    ratio, frequency, high, lift, least = columns
-    ended = next((one for one in sweeps if one.stopped), None)
-    message = "" if ended is None else f"{ended.where}, at F_C/F_E {ended.ratio:.4g}"
-    return Branch(
-        branch.name, ratio, frequency, high, lift, ended is None, message, branch.mode, least
+        return np.array(rows).reshape(len(rows), 3).T
+
+
+def peaks_at(
+    plan: ForcedPlan,
+    model: Model,
+    ratio: float,
+    harmonics: int,
+    changes: Mapping[str, Any] | None = None,
+) -> RatioPoint:
+    """The peaks of the whole curve at one F_C/F_E.
+
+    Parameters
+    ----------
+    harmonics
+        The highest of the balance.
+    changes
+        Other choices of it, as `respond` takes them.
+    """
+    begin, force, e = time.perf_counter(), plan.scene.damper.centrifugal / ratio, plan.scene
+    span = np.linspace(e.excitation.start, e.excitation.stop, SWEEP_POINTS)
+    sweep = fine_grid(plan, model, force, span)
+    settings = replace(LONG_STEPS, most_points=MOST_POINTS)
+    given = {"harmonics": range(harmonics + 1), "settings": settings} | dict(changes or {})
+    found: dict[tuple[Side, int], RatioPeak] = {}
+    up_to = -math.inf
+    with threads_for(len(model.M)):
+        for down in (False, True):
+            answer = respond(plan, model, force, sweep, sweep_down=down, **given)
+            f = answer.frequency
+            for side in SIDES if len(f) else ():
+                size = np.abs(measures.accelerance(answer, model.row(side), force))
+                for peak in numbered_peaks(model, answer, size, e.excitation.stop):
+                    one = _of(side, peak, answer.state[peak.sample].mean(axis=0))
+                    known = found.get((side, peak.number))
+                    if known is None or one.height > known.height:
+                        found[side, peak.number] = one
+            whole = answer.arrived or (down and float(f.min(initial=math.inf)) <= up_to)
+            up_to = float(f.max(initial=-math.inf))
+            if whole:
+                break
+    # what one path does not reach the one from the other end does
+    return RatioPoint(ratio, tuple(found.values()), whole, time.perf_counter() - begin)
+
+
+def _of(side: Side, peak: ModePeak, state: Array) -> RatioPeak:
+    return RatioPeak(
+        side, peak.number, peak.mode, peak.frequency, peak.height, float(state[1]), float(state[2])
     )
 
 
-def _highest(curve: ComplexArray, peaks: Sequence[PathPeak]) -> float:
-    """Of a curve within the sweep, an end of it among them."""
-    return max([float(np.abs(curve).max()), *(one.height for one in peaks)])
+def of_curve(curve: ForcedCurve) -> RatioPoint:
+    """The peaks of a curve of the run."""
+    state = curve.answer.state
+    found = [_of(s, p, state[p.sample].mean(axis=0)) for s in SIDES for p in curve.peaks[s]]
+    return RatioPoint(curve.ratio, tuple(found), not curve.stopped, curve.seconds)
 
 
-def _branch(
-    plan: ForcedPlan, model: Model, curve: ForcedCurve, peak: ModePeak, name: str
-) -> Branch:
-    k = model.excitation.lowest
-    # With every gap closed at rest a factor on F_E is its inverse on F_C.
-    found = performance_curve(
-        curve.answer.balance,
-        model.row("right"),
-        curve.ratio / _ratios(plan),
-        peak.frequency,
-        harmonic=k,
+def ratios_of(plan: ForcedPlan) -> list[float]:
+    """F_C/F_E of the curve, rising."""
+    choice = plan.scene.performance
+    return [float(one) for one in np.geomspace(choice.lowest, choice.highest, choice.points)]
+
+
+def harmonics_of(plan: ForcedPlan) -> int:
+    """The highest harmonic of the curve: its own choice, or that of the balance."""
+    scene = plan.scene
+    given, run = scene.performance.harmonics, scene.balance.harmonics
+    highest = max(scene.excitation.highest_harmonic, 1)
+    if given is not None:
+        return max(given, highest)
+    return max(highest, 3) if run == "adaptive" else int(run)
+
+
+def beside_best(points: Sequence[RatioPoint]) -> list[float]:
+    """F_C/F_E between the best one and its neighbours."""
+    known = sorted((one for one in points if one.peaks and one.arrived), key=lambda one: one.ratio)
+    heights = [one.worst.height for one in known if one.worst is not None]
+    if len(heights) < 3:
+        return []
+    k = int(np.argmin(heights))
+    pairs = [(known[i].ratio, known[i + 1].ratio) for i in (k - 1, k) if 0 <= i < len(known) - 1]
+    return [math.sqrt(a * b) for a, b in pairs]
+
+
+def performance_of(
+    plan: ForcedPlan,
+    model: Model,
+    linear: LinearCurves,
+    points: Iterable[RatioPoint],
+    curves: Iterable[ForcedCurve],
+    beside: SideProcesses,
+) -> Performance:
+    """The performance curve of solved points, with more beside the best of them.
+
+    Parameters
+    ----------
+    points
+        Solved by `peaks_at`.
+    curves
+        Of the run, the same contact stiffness: more points.
+    beside
+        Where the points beside the best are solved.
+    """
+    highest = harmonics_of(plan)
+    own = [of_curve(one) for one in curves if not one.empty]
+    # of two of the same F_C/F_E the one that arrived
+    own = [o for o in own if o.arrived or not any(_same(o.ratio, p.ratio) for p in points)]
+    mine = [one for one in points if not any(_same(one.ratio, o.ratio) for o in own)]
+    found = [*mine, *own]
+    jobs = [(peaks_at, (plan, model, ratio, highest)) for ratio in beside_best(found)]
+    found += [one for one in beside.run(jobs) if not isinstance(one, UpdError)]
+    free, stuck = (
+        max((p.height for s in SIDES for p in peaks[s]), default=float("nan"))
+        for peaks in (linear.free_peaks, linear.stuck_peaks)
     )
-    omega = 2 * np.pi * k * found.frequency
-    height = 1e-3 * omega**2 * found.amplitude / (curve.force * found.factor)
-    lift = found.state[..., LIFT].mean(axis=1)
-    ratios, frequency, height, lift = (
-        part[::-1] for part in (curve.ratio / found.factor, found.frequency, height, lift)
-    )
-    message = "" if found.status == "complete" else found.message
-    return Branch(name, ratios, frequency, height, lift, not message, message, peak.mode)
+    return Performance(tuple(sorted(found, key=lambda one: one.ratio)), free, stuck, highest)
+
+
+def _same(a: float, b: float) -> bool:
+    return math.isclose(a, b, rel_tol=1e-6)

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from upd.analyses.base import Needs, Plan
 from upd.analyses.cost import NODES, CostModel, arrays_s, calls_s, dense_s
 from upd.analyses.forced.effects import effects_of_faces, effects_of_points
-from upd.analyses.forced.estimates_cost import estimate_seconds, reduced
 from upd.analyses.forced.faces_cost import balance_seconds
 from upd.analyses.forced.stiffness import check_sources, plans_to_solve
 from upd.cache.sources import key_of
@@ -45,16 +44,6 @@ _MOST, _LEAST = 12.0, 800.0
 # Of these steps, the share that goes with the frequencies asked for in a unit of the logarithm, and
 # how many of them that was counted with (1.3 points of the path for each, 1196 in all).
 _ASKED_SHARE, _ASKED = 0.43, 400.0 / math.log(500.0 / 280.0)
-# Newton steps of a peak at one ratio of the performance curve, for each of two peaks.
-_PEAK, _PEAKS = 50.0, 2
-# Curves of a band over the static states and the starts of the sliders.
-_CHOICES = 6
-# Newton steps of the band in which a peak is followed again.
-_BAND = 260.0
-# Bands of the run's own unknowns: the peak as it is, four slider starts that often end early, faces
-# that fit without load, where the whole sweep may be searched; for each law of a contact the peak
-# again as it is and with the softer k_t.
-_BANDS, _BANDS_LAW = 1.0 + 3.0 + 3.0, 2.0
 # Lines of contact points up the slope of a patch whose rows are all taken, at refine 1.
 _ROWS = {"symmetric": 5.0, "asymmetric": 4.0}
 # Whole faces: sweeps of each F_C/F_E; frequencies of one for each unit of the logarithm, with those
@@ -62,28 +51,14 @@ _ROWS = {"symmetric": 5.0, "asymmetric": 4.0}
 # dense products and factors of one frequency; matrices of all dofs at a time.
 _WAYS, _CLOSER, _MARCHED = 2.0, 130.0, 3.2e4
 _AT_ONCE_S, _DOF_S, _FACTORS, _MATRICES = 4e-6, 1.5e-7, 4.0, 10.0
-# Sweeps of contact points: F_C/F_E below which some move; periods of a sweep up and one down, where
-# faces rattle many of them without settling, and of a performance curve's coarser ones; of a time
-# step what it always takes, and what each point does. Other static states of a band.
-_MOVING = {"symmetric": 1.0e3, "asymmetric": 3.0e3}
-_PERIODS = {"symmetric": 2.0e4, "asymmetric": 4.5e4}
-_COARSER, _SPRING_S, _POINT_S = 0.4, 1.2e-6, 4e-8
-_STATES = {"symmetric": 2.0, "asymmetric": 1.0}
-# F_C/F_E of a performance curve swept beside the optimum.
-_BESIDE = 2.0
+# Sweeps of contact points: periods at each frequency until it settles; of a time step what it
+# always takes, and what each point does.
+_PERIODS, _SPRING_S, _POINT_S = 150.0, 1.2e-6, 4e-8
+# Seconds of a curve that each F_C/F_E of a performance curve takes; of the curves those of what is
+# solved again around the peaks: levels, inputs, effects left out.
+_RATIO, _AROUND, _PEAK_STEPS, _MESHES = 2.0, 4.0, 300.0, 0.3
 # Figures, files and page, and those of a curve.
 _FILES_S, _CURVE_S = 4.0, 1.0
-
-
-@dataclass(frozen=True)
-class CoarserMesh:
-    """A level before that of the run: its counts and growths, its size over that of the run or 0
-    where only the meshes tell it, in words.
-    """
-
-    counts: Mapping[str, float]
-    size: float
-    label: str
 
 
 @dataclass(frozen=True)
@@ -94,19 +69,13 @@ class ForcedPlan(Plan[ForcedScene]):
     ----------
     asked
         The scene as asked for, where that leaves the levels to an accuracy.
-    coarser
-        Meshes that the error of the mesh is estimated with, the finest first; the usual ones when
-        empty.
     """
 
     asked: ForcedScene | None = None
-    coarser: tuple[CoarserMesh, ...] = ()
 
 
-#: time steps in a period of every march where the scene names none
+#: time steps in a period of a time integration where the scene names none
 MARCH_SAMPLES = 128
-#: every so many F_C/F_E of a performance curve are swept before it is known where the optimum lies
-EVERY = 3
 
 
 def make_plan(scene: ForcedScene) -> ForcedPlan:
@@ -119,7 +88,7 @@ def make_plan(scene: ForcedScene) -> ForcedPlan:
         body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()
     }
     cost, memory, workers = _whole_faces_cost(scene, size) if whole else _cost(scene, size)
-    again = 0.0 if whole or not scene.estimates else _estimate_seconds(scene, size, workers)
+    again = 0.0 if whole else _around_seconds(scene, size, cost.seconds)
     return ForcedPlan(
         scene,
         parameters,
@@ -145,7 +114,7 @@ def _whole_faces_cost(
         cost.condensed(f"{body}, compliance", count["hexes"], count["nodes"], 3 * count["contact"])
     m = 3.0 * (size["left"]["contact"] + size["right"]["contact"])
     e = scene.excitation
-    ways = _WAYS * (scene.balance.method != "balance")
+    ways = _WAYS * (scene.balance.method == "march")
     marched = ways * len(e.centrifugal_to_force) * _CLOSER * math.log(e.stop / e.start)
     cost.seconds += balance_seconds(scene, m)
     cost.seconds += arrays_s(marched * _MARCHED * (_AT_ONCE_S + _DOF_S * m))
@@ -164,8 +133,8 @@ def _files_seconds(scene: ForcedScene) -> float:
 
 
 def _parameters(scene: ForcedScene) -> dict[str, Any]:
-    # points on lines pair themselves; what is left out is solved on whole blades
-    apart = scene.contact.rule == GAUSS and not scene.left_out.solves
+    # points on lattice lines pair themselves
+    apart = scene.contact.rule == GAUSS
     half = (scene.contact.model == "interface" or apart) and scene.mesh.symmetry != "full"
     return rig_parameters(scene, "half" if half else "full", NODES[scene.mesh.element])
 
@@ -185,67 +154,66 @@ def _cost(
         cost.dynamic_body(damper["hexes"], damper["nodes"], len(scene.stiffnesses))
     sources = plans_to_solve(scene)
     cost.seconds += sum(plan.solve_seconds for plan in sources)
-    cost.seconds += _path_seconds(scene, size)
-    if scene.balance.method != "balance":
-        cost.shared += _sweep_seconds(scene, size)
+    cost.seconds += _curves_seconds(scene, size)
     cost.seconds += _files_seconds(scene)
     memory, workers = cost.side_by_side(min(2, cost.threads), 2)
     return cost, max([memory, *(plan.memory_bytes for plan in sources)]), workers
 
 
-def _path_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
-    """All curves, the performance curve, and what is left out."""
+def reduced(
+    cost: CostModel, scene: ForcedScene, body: str, task: str, size: tuple[int, int, int]
+) -> None:
+    """A blade reduced to its contact points, 2 probes and some modes.
+
+    Parameters
+    ----------
+    size
+        Hexahedra, nodes, and contact nodes.
+    """
+    hexes, nodes, contact = size
+    modes = scene.reduction.modes
+    if scene.contact.rule == GAUSS:
+        rows, columns = scene.contact.lines("left" if body == "left" else "right")
+        cost.attached(task, hexes, nodes, 3 * rows * columns + 2, modes)
+    else:
+        cost.reduction(task, hexes, nodes, 3 * (contact + 2), modes)
+
+
+def _curves_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
+    """All curves of the run, and those of the performance curve."""
+    if scene.balance.method == "march":
+        return _sweep_seconds(scene, size)
     asked, e = scene.excitation.points, scene.excitation
     points, step = _points(scene, size), _step_seconds(scene, size)
     stuck = arrays_s(_STUCK_S * points) * asked * len(e.centrifugal_to_force)
     dense = asked / math.log(e.stop / e.start) / _ASKED
     kinks = _KINKS[scene.arrangement] * (1.0 - _ASKED_SHARE + _ASKED_SHARE * dense)
-    steps = sum(min(kinks / ratio, _LEAST + _MOST * asked) for ratio in e.centrifugal_to_force)
-    seconds = len(scene.stiffnesses) * (stuck + steps * step * (scene.contact.friction > 0.0))
-    marched = scene.balance.method != "balance"
-    if scene.wants("performance") and not marched:
-        seconds += _PEAKS * _PEAK * scene.performance.points * step
-    if scene.wants("band") and not marched:
-        # every curve again from other states, in fewer points
-        seconds += _CHOICES * steps * step * (scene.contact.friction > 0.0)
-    if scene.left_out.solves:
-        seconds += _again_seconds(scene, size)
+    rubs = scene.contact.friction > 0.0
+
+    def steps(ratio: float) -> float:
+        return min(kinks / ratio, _LEAST + _MOST * asked) * rubs
+
+    seconds = len(scene.stiffnesses) * (stuck + step * sum(map(steps, e.centrifugal_to_force)))
+    if scene.wants("performance"):
+        c = scene.performance
+        seconds += _RATIO * c.points * step * steps(math.sqrt(c.lowest * c.highest))
     return seconds
 
 
-def _estimate_seconds(
-    scene: ForcedScene, size: Mapping[str, Mapping[str, int]], workers: int
-) -> float:
-    """Companions that errors are estimated from, and peaks on them."""
-    steps = 0.0 if not scene.contact.friction else _step_seconds(scene, size)
-    marched = scene.balance.method != "balance" and scene.contact.friction > 0.0
-    swept = len(scene.stiffnesses) * _swept_curves(scene) if marched else 0.0
-    period = time_steps(scene) * (_SPRING_S + _POINT_S * _points(scene, size))
-    return estimate_seconds(scene, size, workers, steps, period, swept)
-
-
-def _swept_curves(scene: ForcedScene) -> float:
-    """F_C/F_E at which points move."""
-    limit, moving = _MOVING[scene.arrangement], scene.balance.method == "march"
-    return float(sum(moving or ratio < limit for ratio in scene.excitation.centrifugal_to_force))
+def _around_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]], run: float) -> float:
+    """What is solved again around the peaks: a part of the run, and the coarser meshes."""
+    if scene.balance.method == "march" or not (scene.estimates or scene.left_out.solves):
+        return 0.0
+    steps = _AROUND * _PEAK_STEPS * _step_seconds(scene, size) * len(scene.stiffnesses)
+    return (scene.contact.friction > 0.0) * steps + _MESHES * run * scene.estimates
 
 
 def _sweep_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
-    """Sweeps up and down of every curve on which points move, from the other static states where a
-    band is asked for, and those of the performance curve.
-    """
-    if not scene.contact.friction:
-        return 0.0
-    limit = _MOVING[scene.arrangement]
-    pairs = len(scene.stiffnesses) * _swept_curves(scene)
-    if scene.wants("band"):
-        pairs += _STATES[scene.arrangement] * len(scene.excitation.centrifugal_to_force)
-    if scene.wants("performance"):
-        c = scene.performance
-        part = math.log(min(limit, c.highest) / c.lowest) / math.log(c.highest / c.lowest)
-        pairs += _COARSER * (max(part, 0.0) * c.points / EVERY + _BESIDE)
+    """Sweeps up and down of every curve."""
+    e = scene.excitation
+    marched = 2.0 * e.points * len(scene.stiffnesses) * len(e.centrifugal_to_force)
     step = arrays_s(_SPRING_S + _POINT_S * _points(scene, size))
-    return pairs * _PERIODS[scene.arrangement] * time_steps(scene) * step
+    return marched * _PERIODS * time_steps(scene) * step
 
 
 def time_steps(scene: ForcedScene) -> int:
@@ -258,18 +226,6 @@ def _balance_samples(scene: ForcedScene) -> int:
     """Samples of a period of the balance."""
     given = scene.balance.samples
     return sample_count(harmonics(range(_highest(scene) + 1)), None if given == "auto" else given)
-
-
-def _again_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
-    """A peak followed again for every effect left out, each with the unknowns it takes."""
-    laws = sum(choice.from_contact for choice in scene.stiffnesses.values())
-    others = []
-    if scene.mesh.symmetry != "full":
-        others.append(replace(scene, mesh=replace(scene.mesh, symmetry="full")))
-        if scene.contact.directions != "two" and scene.contact.friction > 0.0:
-            others.append(replace(scene, contact=replace(scene.contact, directions="two")))
-    steps = (_BANDS + _BANDS_LAW * laws) * _step_seconds(scene, size)
-    return _BAND * (steps + sum(_step_seconds(one, size) for one in others))
 
 
 def _step_seconds(
@@ -304,12 +260,6 @@ def _unknowns(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> floa
 def newton_seconds(plan: ForcedPlan) -> float:
     """Of a Newton step of the run, with its factors."""
     return _step_seconds(plan.scene, plan.size)
-
-
-def points_growth(plan: ForcedPlan) -> float:
-    """Of the seconds of a curve with twice the contact points."""
-    size = {body: dict(count) for body, count in plan.size.items()}
-    return _step_seconds(plan.scene, size, 2.0) / _step_seconds(plan.scene, size)
 
 
 def _point_count(scene: ForcedScene, nodes: int, side: Any) -> float:

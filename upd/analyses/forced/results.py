@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from upd.analyses.forced.compared import measured_results
-from upd.analyses.forced.curve_results import balanced_results, curve_results
+from upd.analyses.forced.curve_results import balanced_results, curve_results, swept_results
 from upd.analyses.forced.curves import LinearCurves, WholeFaces
+from upd.analyses.forced.inputs import InputEffect
 from upd.analyses.forced.mode_peaks import unmoved
 from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.peak_results import left_peak_results, peak_results
-from upd.analyses.forced.performance_results import performance_results
-from upd.analyses.forced.solution import AS_RUN, CurveBand, ForcedSolution, PeakAgain
+from upd.analyses.forced.peak_results import LEFT, left_peak_results, peak_results
+from upd.analyses.forced.performance import Performance
+from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import StaticState
-from upd.analyses.forced.swept_results import swept_results
-from upd.results import Case, Result
+from upd.results import Case, Result, withheld
 from upd.scene.forced_contact import SIDES
 
 #: a rigid damper in the same static state; of the seated one, as far as friction can oppose F_C
@@ -42,8 +42,8 @@ def make_results(solution: ForcedSolution) -> list[Result]:
         results += curve_results(solution, curve)
     for one in solution.balanced:
         results += balanced_results(solution, one)
-    for name, ratio in dict.fromkeys((s.stiffness, s.ratio) for s in solution.sweeps):
-        results += swept_results(solution, name, ratio)
+    for sweep in solution.sweeps:
+        results += swept_results(solution, sweep)
     for march in (march for march in solution.marches if march.verifies):
         value = march.accelerance(solution.models[march.curve.stiffness])
         case = replace(march.curve.case, frequency=march.frequency)
@@ -58,14 +58,11 @@ def make_results(solution: ForcedSolution) -> list[Result]:
                 exact=False,
             )
         )
-    for band in solution.bands:
-        results += _band_results(band)
-    for name, spread in solution.spreads.items():
-        results += _spread_results(name, spread)
-    for name, found in solution.harmonics.items():
-        results += _harmonics_results(name, found)
+    results += _band_results(solution)
     for name, performance in solution.performances.items():
-        results += performance_results(name, performance)
+        results += _performance_results(name, performance)
+    for name, effects in solution.effects.items():
+        results += _input_results(solution, name, effects)
     return results + measured_results(solution)
 
 
@@ -125,30 +122,25 @@ def _static_forces(case: Case, state: StaticState, N: Array, T: Array) -> list[R
     return results
 
 
-def _band_results(band: CurveBand) -> list[Result]:
-    """Between which every peak lies, and what each choice gives."""
-    results = []
-    for number in band.numbers:
-        found = band.peaks(number)
-        one = found.get(AS_RUN) or next(iter(found.values()))
-        case = replace(band.curve.case, mode=one.mode)
-        for kind, unit, values in (
-            ("frequency", "Hz", {name: p.frequency for name, p in found.items()}),
-            ("accelerance", "(m/s2)/N", {name: p.height for name, p in found.items()}),
-        ):
-            results += [
-                Result(f"{end}_peak_{number}_{kind}", case, of(values.values()), unit)
-                for end, of in (("lowest", min), ("highest", max))
-            ]
-            results += [
-                Result(f"band_peak_{number}_{kind}", replace(case, choice=name), value, unit)
-                for name, value in values.items()
-            ]
-    lost = sum(one.curve.stopped for one in band.curves)
+def _band_results(solution: ForcedSolution) -> list[Result]:
+    """Peaks of the right blade from other static states and slider starts."""
     return [
-        *results,
-        Result("band_curves", band.curve.case, float(len(band.curves)), ""),
-        Result("band_curves_not_complete", band.curve.case, float(lost), ""),
+        Result(f"band_peak_{p.number}_{kind}", case, value, unit)
+        for one in solution.band
+        for p in one.point.peaks
+        if p.blade == "right"
+        for case in (
+            Case(
+                stiffness=one.stiffness,
+                force_ratio=one.point.ratio,
+                mode=p.mode,
+                choice=one.choice,
+            ),
+        )
+        for kind, value, unit in (
+            ("frequency", p.frequency, "Hz"),
+            ("accelerance", p.height, "(m/s2)/N"),
+        )
     ]
 
 
@@ -171,52 +163,60 @@ def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -
     )
 
 
-def _spread_results(name: str, found: Sequence[PeakAgain]) -> list[Result]:
-    good, case = [one for one in found if one.found], Case(stiffness=name)
-    results = [
-        Result("spread_peak", replace(case, choice=f"start {one.choice}"), one.height, "(m/s2)/N")
-        for one in good
-    ]
-    results += [Result("spread_starts_not_solved", case, float(len(found) - len(good)), "")]
-    if len(good) > 1:
-        heights = np.array([one.height for one in good])
-        results.append(
-            Result("spread_of_peak", case, 100.0 * float(np.ptp(heights) / heights.mean()), "%")
-        )
-        results.append(
-            Result(
-                "spread_of_peak_frequency",
-                case,
-                float(np.ptp([one.frequency for one in good])),
-                "Hz",
-            )
-        )
-    return results
-
-
-def _harmonics_results(name: str, found: Sequence[PeakAgain]) -> list[Result]:
-    best = next((one for one in reversed(found) if one.found), None)
+def _performance_results(name: str, found: Performance) -> list[Result]:
+    """F_C/F_E reached, the best one with its highest peak, and what a factor 2 costs."""
+    case, known = Case(stiffness=name, name="performance"), found.known
     results = []
-    for one in found:
-        case = Case(stiffness=name, choice=f"{one.choice} harmonic{'s' * (one.choice != '1')}")
-        if best is not None and one.found:
-            source = f"{best.choice} harmonics"
-            results.append(
-                Result(
-                    "harmonics_peak", case, one.height, "(m/s2)/N", best.height, source, exact=False
-                )
-            )
-            results.append(
-                Result(
-                    "harmonics_frequency",
-                    case,
-                    one.frequency,
-                    "Hz",
-                    best.frequency,
-                    source,
-                    exact=False,
-                )
-            )
-        results.append(Result("harmonics_truncation", case, 100.0 * one.truncation, "%"))
-        results.append(Result("harmonics_seconds", case, one.seconds, "s"))
-    return results
+    if known:
+        results = [
+            Result("lowest_ratio_reached", case, known[0].ratio, ""),
+            Result("highest_ratio_reached", case, known[-1].ratio, ""),
+        ]
+    best, twice = found.best, found.factor_two()
+    names = (
+        ("best_ratio", ""),
+        ("best_peak", "(m/s2)/N"),
+        ("best_frequency", "Hz"),
+        ("best_reduction", "%"),
+        ("half_of_best_ratio", "%"),
+        ("twice_the_best_ratio", "%"),
+    )
+    if best is None or best.worst is None or twice is None:
+        reason = "no curve has a peak: widen excitation.start and stop"
+        return results + [withheld(number, case, unit, reason) for number, unit in names]
+    results.append(Result("best_inside", case, float(found.inside), ""))
+    worst = best.worst
+    at = replace(case, mode=worst.mode, blade=worst.blade)
+    values = (
+        best.ratio,
+        worst.height,
+        worst.frequency,
+        100.0 * (1.0 - worst.height / found.free),
+        *(100.0 * (one - 1.0) for one in twice),
+    )
+    return results + [
+        Result(number, at, value, unit)
+        for (number, unit), value in zip(names, values, strict=True)
+        if np.isfinite(value)
+    ]
+
+
+def _input_results(
+    solution: ForcedSolution, name: str, effects: Sequence[InputEffect]
+) -> list[Result]:
+    """Change of a peak by each end of each input."""
+    curves = [c for c in solution.curves if c.stiffness == name and not c.empty]
+    if not curves:
+        return []
+    ratio, out = min(c.ratio for c in curves), []
+    for one in effects:
+        case = Case(
+            stiffness=name, force_ratio=ratio, mode=one.mode, choice=f"{one.name}: {one.label}"
+        )
+        peak = f"{LEFT * (one.blade == 'left')}peak_{one.number}"
+        for kind, value in (("frequency", one.frequency), ("accelerance", one.height)):
+            number = f"{peak}_{kind}_change"
+            # without such a peak near there is no change to tell
+            if np.isfinite(value):
+                out.append(Result(number, case, 100.0 * value, "%"))
+    return out

@@ -1,7 +1,4 @@
-"""What a forced response is made of once it is solved.
-
-Marched peaks, peaks confirmed and followed again, bands, and all of it together.
-"""
+"""What a forced response is made of once it is solved."""
 
 from __future__ import annotations
 
@@ -13,19 +10,12 @@ import numpy as np
 from upd.analyses.base import Resolved
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, SweptCurve, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
-from upd.analyses.forced.level_values import ForcedLevels
+from upd.analyses.forced.inputs import InputEffect
+from upd.analyses.forced.levels import Level, Peaks
 from upd.analyses.forced.march_modes import stuck_peaks_of
-from upd.analyses.forced.measures import PathPeak
-from upd.analyses.forced.mode_peaks import (
-    CANDIDATES,
-    ModePeak,
-    mode_shapes,
-    numbered,
-    numbered_peaks,
-    stuck_motion,
-)
+from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, tell_stuck_peaks
 from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.performance_curve import Performance
+from upd.analyses.forced.performance import Performance, RatioPoint
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.seated.bodies import Bodies
 from upd.hbm.interface_record import RecordedPeriod
@@ -80,9 +70,8 @@ class MarchedPeak:
 
     @property
     def case(self) -> Case:
-        """What its numbers belong to: the curve's peak."""
-        peak, mode = self.peak.number, self.peak.mode
-        return replace(self.sweep.case, peak=peak, mode=mode, choice="")
+        """What its numbers belong to."""
+        return replace(self.sweep.case, peak=self.peak.number, mode=self.peak.mode)
 
     @property
     def off(self) -> float:
@@ -91,26 +80,6 @@ class MarchedPeak:
         """
         told = self.sweep.found.energy[self.peak.sample]
         return abs(self.period.energy - float(told[2])) / max(float(np.abs(told).sum()), _TINY)
-
-
-@dataclass(frozen=True)
-class Confirmation:
-    """A peak of a curve marched on from its own motion, residual slips included.
-
-    The curve and its peak; accelerance of the right blade at the point of the path next to it by
-    the balance, and where the march settles, (m/s2)/N; whether it settled.
-    """
-
-    curve: ForcedCurve | FacesCurve
-    peak: ModePeak
-    height: float
-    marched: float
-    settled: bool
-
-    @property
-    def difference(self) -> float:
-        """Of the march from the balance, relative; infinite where it did not settle."""
-        return abs(self.marched / self.height - 1.0) if self.settled else float("inf")
 
 
 @dataclass(frozen=True)
@@ -127,7 +96,7 @@ class TimeMarch:
 
     @property
     def verifies(self) -> bool:
-        """Whether the march found a period: nothing else can be compared with an answer."""
+        """Whether a period was found: nothing else can be compared with an answer."""
         return self.steady.status == "periodic"
 
     def accelerance(self, model: Model) -> float:
@@ -138,63 +107,12 @@ class TimeMarch:
 
 
 @dataclass(frozen=True)
-class PeakAgain:
-    """A peak followed again with one choice changed.
+class BandPoint:
+    """The peaks of a curve from another static state or start of the sliders, in words."""
 
-    Attributes
-    ----------
-    choice
-        Start of the sliders, or the highest harmonic.
-    frequency, height
-        Hz and (m/s2)/N; NaN when not found.
-    truncation
-        Largest contact motion by harmonics left out, relative.
-    """
-
+    stiffness: str
     choice: str
-    frequency: float
-    height: float
-    truncation: float
-    status: str
-    seconds: float
-
-    @property
-    def found(self) -> bool:
-        """Whether the peak lies in the band around it."""
-        return bool(np.isfinite(self.height))
-
-
-#: the choice of a band that is the run itself
-AS_RUN = "as run"
-
-
-@dataclass(frozen=True)
-class BandCurve:
-    """A curve followed or swept with another static state or start of the sliders.
-
-    The choice in words, the curve, and the right blade's peaks by the numbers of their modes.
-    """
-
-    choice: str
-    curve: ForcedCurve | SweptCurve
-    peaks: tuple[ModePeak, ...]
-
-
-@dataclass(frozen=True)
-class CurveBand:
-    """A curve as run and with every other static state and start, the first as run."""
-
-    curve: ForcedCurve
-    curves: tuple[BandCurve, ...]
-
-    def peaks(self, number: int) -> dict[str, ModePeak]:
-        """A peak by its number, of every choice that has it."""
-        return {one.choice: p for one in self.curves for p in one.peaks if p.number == number}
-
-    @property
-    def numbers(self) -> list[int]:
-        """Numbers of all peaks, rising."""
-        return sorted({p.number for one in self.curves for p in one.peaks})
+    point: RatioPoint
 
 
 @dataclass
@@ -214,13 +132,13 @@ class ForcedSolution:
     balanced: list[FacesCurve] = field(default_factory=list)
     sweeps: list[SweptCurve] = field(default_factory=list)
     marched: list[MarchedPeak] = field(default_factory=list)
-    confirmations: list[Confirmation] = field(default_factory=list)
-    spreads: dict[str, list[PeakAgain]] = field(default_factory=dict)
-    harmonics: dict[str, list[PeakAgain]] = field(default_factory=dict)
-    bands: list[CurveBand] = field(default_factory=list)
+    band: list[BandPoint] = field(default_factory=list)
     performances: dict[str, Performance] = field(default_factory=dict)
+    best_again: dict[str, RatioPoint] = field(default_factory=dict)
     omissions: list[Resolved] = field(default_factory=list)
-    levels: ForcedLevels = field(default_factory=ForcedLevels)
+    levels: dict[str, list[Level]] = field(default_factory=dict)
+    searched: dict[str, Peaks] = field(default_factory=dict)
+    effects: dict[str, list[InputEffect]] = field(default_factory=dict)
 
     @property
     def order(self) -> int:
@@ -238,51 +156,19 @@ class ForcedSolution:
         linear = self.linear.get(stiffness)
         if linear is None:
             return []
+        stop = self.plan.scene.excitation.stop
         if stiffness in self.faces:
-            return stuck_peaks_of(
-                self.faces[stiffness].march,
-                linear.stuck_peaks[blade],
-                CANDIDATES * self.plan.scene.excitation.stop,
-                excitation_of(self.plan.scene.excitation),
-            )
-        return tell_stuck_peaks(
-            self.models[stiffness], linear.stuck_peaks[blade], self.plan.scene.excitation.stop
-        )
-
-    def numbered_peaks(
-        self, curve: ForcedCurve | FacesCurve, blade: Side = "right"
-    ) -> list[ModePeak]:
-        """A blade's peaks of a path, by the numbers of their modes."""
-        if isinstance(curve, FacesCurve):
-            return list(curve.peaks[blade])
-        return numbered_peaks(
-            self.models[curve.stiffness],
-            curve.answer,
-            np.abs(curve.accelerance[blade]),
-            self.plan.scene.excitation.stop,
-            curve.left_points,
-        )
+            excitation = excitation_of(self.plan.scene.excitation)
+            march, peaks = self.faces[stiffness].march, linear.stuck_peaks[blade]
+            return stuck_peaks_of(march, peaks, CANDIDATES * stop, excitation)
+        return tell_stuck_peaks(self.models[stiffness], linear.stuck_peaks[blade], stop)
 
     def marked_points(self, curve: ForcedCurve | FacesCurve) -> list[tuple[int, str, int]]:
         """Number, mode and point of the path of the right blade's peaks.
 
         Number 0 and the highest point of a curve without a peak.
         """
-        peaks = self.numbered_peaks(curve)
+        peaks: Sequence[ModePeak] = curve.peaks["right"]
         if peaks:
             return [(peak.number, peak.mode, peak.sample) for peak in peaks]
         return [(0, "", int(np.abs(curve.accelerance["right"]).argmax()))]
-
-
-def tell_stuck_peaks(model: Model, peaks: Sequence[PathPeak], stop: float) -> list[ModePeak]:
-    """Peaks of a stuck curve by the numbers of their modes.
-
-    Parameters
-    ----------
-    stop
-        End of the sweep, Hz.
-    """
-    if not peaks:
-        return []
-    motion = stuck_motion(model, np.array([one.frequency for one in peaks]))
-    return numbered(mode_shapes(model, CANDIDATES * stop), peaks, motion)

@@ -1,42 +1,63 @@
 """Forced responses: for every contact stiffness the reduced model, for every F_C/F_E the curve with
-friction; what was asked for beside.
+friction; around the peaks what levels, inputs and effects left out change.
 """
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterable
+import logging
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from upd.analyses.forced import measures
-from upd.analyses.forced.bands import solve_band
 from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.faces_curve import solve_faces
-from upd.analyses.forced.left_out import solve_again
-from upd.analyses.forced.levels import solve_levels
-from upd.analyses.forced.linear_limits import linear_limits_of
-from upd.analyses.forced.march_queue import MarchQueue
+from upd.analyses.forced.inputs import INPUTS, few_harmonics, input_effects
+from upd.analyses.forced.left_out import AlongModel, along_changes, elastic_changes, with_along
+from upd.analyses.forced.levels import (
+    COARSER,
+    HARMONICS,
+    MORE_HARMONICS,
+    SAMPLES,
+    Laws,
+    MadeModel,
+    Peaks,
+    balance_level,
+    coarse_model,
+    linear_of,
+    model_level,
+    other_models,
+)
 from upd.analyses.forced.marched_peaks import march_peaks
-from upd.analyses.forced.marching import Marching
-from upd.analyses.forced.model import make_model
-from upd.analyses.forced.paths import STARTS, grid, peak_again, respond
-from upd.analyses.forced.performance import beside_branches, follow_peaks
+from upd.analyses.forced.model import Model, make_model, preloaded
+from upd.analyses.forced.paths import grid, quiet
+from upd.analyses.forced.peaks import solve_curve
+from upd.analyses.forced.performance import (
+    RatioPoint,
+    harmonics_of,
+    peaks_at,
+    performance_of,
+    ratios_of,
+)
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import ForcedSolution, PeakAgain, TimeMarch
-from upd.analyses.forced.statics import StaticState, static_state
-from upd.analyses.forced.steady_peaks import with_steady_peaks
+from upd.analyses.forced.solution import BandPoint, ForcedSolution, TimeMarch
+from upd.analyses.forced.spring_march import make_springs
+from upd.analyses.forced.statics import StaticState, admissible, same, static_state
 from upd.analyses.forced.stiffness import face_laws
-from upd.analyses.forced.sweeps import run_sweeps
+from upd.analyses.forced.sweeps import both_ways
 from upd.analyses.forced.whole_faces import INTERFACE, linear_limits, make_whole_faces
 from upd.analyses.seated.bodies import Bodies, make_bodies
+from upd.errors import InputError, UpdError, one_line
 from upd.hbm.march import steady_state
 from upd.linalg.parallel import threads_for
+from upd.linalg.processes import Job, SideProcesses
 from upd.progress import Stages
-from upd.scene.forced_contact import SIDES
 
-HARMONICS = (1, 3, 5)
+log = logging.getLogger(__name__)
+#: what a process beside this one imports at once
+_MODULES = ("upd.analyses.forced.inputs", "upd.analyses.forced.performance")
+#: other starts of the sliders of a band
+STARTS = ("mid", "upper", "lower")
 
 
 def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
@@ -49,28 +70,11 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
         scene = plan.scene
         if scene.contact.model == INTERFACE:
             _whole_faces(solution, stages)
-            return solution
-        laws = {name: face_laws(choice, stages) for name, choice in scene.stiffnesses.items()}
-        with stages("mesh and assembly", f"both blades and the {scene.arrangement} damper"):
-            solution.bodies = make_bodies(plan)
-        for name, law in laws.items():
-            with stages("reduction", f"{name}: {scene.reduction.modes} modes a blade"):
-                state = _static(plan, solution.bodies, stages)
-                solution.models[name] = make_model(plan, solution.bodies, law, state)
-        nodes = max(one.contacts.n_point for one in solution.models.values())
-        with MarchQueue(nodes) as queue:
-            marching = Marching(solution, queue)
-            for name in laws:
-                for ratio in scene.excitation.centrifugal_to_force:
-                    _curve(solution, name, ratio, stages)
-                    if scene.balance.method != "balance":
-                        _begin_marches(marching, name, ratio, stages)
-            if scene.left_out.solves:
-                solution.omissions = solve_again(solution, laws, stages)
-            marching.finish(stages)
-            # What is asked for beside the curves: for the first stiffness.
-            _more(solution, next(iter(laws)), marching, stages)
-        solution.levels = solve_levels(solution, laws, stages)
+        elif scene.balance.method == "march":
+            _swept_points(solution, stages)
+        else:
+            with SideProcesses(*_MODULES) as beside:
+                _balanced_points(solution, beside, stages)
     except BaseException as error:
         error.partial = solution  # type: ignore[attr-defined]
         raise
@@ -78,7 +82,7 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
 
 
 def _whole_faces(solution: ForcedSolution, stages: Stages) -> None:
-    """Free and stuck curves, balance and sweeps of both faces node by node."""
+    """Free and stuck curves, and the curves of both faces node by node."""
     plan = solution.plan
     with stages("mesh and assembly", f"both blades and the {plan.scene.arrangement} damper"):
         solution.bodies = make_bodies(plan)
@@ -86,29 +90,24 @@ def _whole_faces(solution: ForcedSolution, stages: Stages) -> None:
     solution.faces[INTERFACE] = faces
     with stages("free and stuck", f"{faces.of.n} nodes"):
         solution.linear[INTERFACE] = linear_limits(plan, faces, grid(plan))
-    run_sweeps(solution, solve_faces(solution, INTERFACE, stages), stages)
+    solve_faces(solution, INTERFACE, stages)
     march_peaks(solution, stages)
 
 
-def _begin_marches(marching: Marching, name: str, ratio: float, stages: Stages) -> None:
-    """Sweeps of the curves where points move, and of the first stiffness those from every other
-    static state and those of the performance curve where they are asked for.
-    """
-    solution = marching.solution
-    scene, first = solution.plan.scene, next(iter(solution.models))
-    marching.begin(name, ratio, stages, band=name == first and scene.wants("band"))
-    curve = _first_curve(solution, first)
-    begun = marching.performance is not None or curve is None
-    if not begun and scene.wants("performance") and _swept_performance(solution.plan):
-        assert curve is not None
-        marching.begin_performance(curve)
-
-
-def _first_curve(solution: ForcedSolution, name: str) -> ForcedCurve | None:
-    """The longest of a stiffness at the first F_C/F_E, where one has a point."""
-    ratio = solution.plan.scene.excitation.centrifugal_to_force[0]
-    first = [c for c in solution.curves if (c.stiffness, c.ratio) == (name, ratio) and not c.empty]
-    return max(first, key=lambda c: float(np.ptp(c.answer.frequency)), default=None)
+def _models(solution: ForcedSolution, stages: Stages) -> Mapping[str, Laws]:
+    """Bodies, models and linear limits of every stiffness; laws of their faces."""
+    plan = solution.plan
+    scene = plan.scene
+    laws = {name: face_laws(choice, stages) for name, choice in scene.stiffnesses.items()}
+    with stages("mesh and assembly", f"both blades and the {scene.arrangement} damper"):
+        solution.bodies = make_bodies(plan)
+    for name, law in laws.items():
+        with stages("reduction", f"{name}: {scene.reduction.modes} modes a blade"):
+            state = _static(plan, solution.bodies, stages)
+            solution.models[name] = model = make_model(plan, solution.bodies, law, state)
+        with stages("free and stuck", name), threads_for(len(model.M)):
+            solution.linear[name] = linear_of(plan, model)
+    return laws
 
 
 def _static(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> StaticState | None:
@@ -118,72 +117,165 @@ def _static(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> StaticState | N
     return static_state(plan, bodies, stages=stages)
 
 
-def _curve(solution: ForcedSolution, name: str, ratio: float, stages: Stages) -> None:
-    plan, model = solution.plan, solution.models[name]
-    force = plan.scene.damper.centrifugal / ratio
-    frequencies = grid(plan)
-    if plan.scene.balance.method == "march":
-        # the sweeps begin from it; the linear limits need no more
-        frequencies = frequencies[:1]
-    detail = (
-        f"{name}, F_C/F_E {ratio:g}: {model.contacts.n_point} points, "
-        f"{len(frequencies)} frequencies"
-    )
-    for down in (False, True):
-        with stages("friction", f"{detail}{', downwards' * down}"):
-            begin = time.perf_counter()
-            answer = respond(plan, model, force, frequencies, sweep_down=down)
-            took = time.perf_counter() - begin
-            blades = {side: measures.accelerance(answer, model.row(side), force) for side in SIDES}
-        curve = ForcedCurve(name, ratio, force, answer, blades, took, down)
-        if (answer.state[:, :, 1:] > 0.0).any():
-            with stages("steady peaks", f"{name}, F_C/F_E {ratio:g}: marches from the maxima"):
-                curve = with_steady_peaks(plan, model, curve)
-        solution.curves.append(curve)
-        # What a path that stopped leaves unknown is swept, or may be reached from the other end.
-        if answer.arrived or plan.scene.balance.method != "balance":
-            break
-    if name not in solution.linear:
-        with stages("free and stuck", name), threads_for(len(model.M)):
-            solution.linear[name] = linear_limits_of(plan, model, answer, force)
+def _swept_points(solution: ForcedSolution, stages: Stages) -> None:
+    """Sweeps up and down of contact points."""
+    _models(solution, stages)
+    plan = solution.plan
+    for name, model in solution.models.items():
+        springs = make_springs(plan, model)
+        for ratio in plan.scene.excitation.centrifugal_to_force:
+            with stages("sweeps", f"{name}, F_C/F_E {ratio:g}: up and down"):
+                start = springs.at_rest()
+                solution.sweeps += both_ways(plan, name, ratio, springs.march, start)
+    march_peaks(solution, stages)
 
 
-def _more(solution: ForcedSolution, name: str, marching: Marching, stages: Stages) -> None:
-    """Time march, spread over slider starts, convergence in harmonics, performance.
+# -- harmonic balance ------------------------------------------------------------------------------
 
-    What was asked for, at the first F_C/F_E; the band of every curve.
-    """
-    plan, curve = solution.plan, _first_curve(solution, name)
-    if curve is None:
-        return
-    for f in plan.scene.balance.time_march:
+
+def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: Stages) -> None:
+    laws = _models(solution, stages)
+    plan, bodies = solution.plan, solution.bodies
+    assert bodies is not None
+    scene, first = plan.scene, next(iter(laws))
+    made: dict[str, list[MadeModel]] = {name: [] for name in laws}
+    jobs: list[Job] = []
+    if scene.estimates:
+        for name in laws:
+            model = solution.models[name]
+            jobs += [(coarse_model, (plan, model, laws[name], factor)) for factor in COARSER]
+            made[name] += other_models(plan, model, bodies, laws[name])
+    meshes, jobs = len(jobs), jobs + _curve_jobs(solution)
+    curves = len(jobs) - meshes
+    if scene.wants("performance"):
+        model, highest = solution.models[first], harmonics_of(plan)
+        jobs += [(peaks_at, (plan, model, r, highest)) for r in ratios_of(plan)]
+    with stages("friction", f"{curves} curves, {len(jobs) - meshes - curves} F_C/F_E"), quiet():
+        found = beside.run(jobs)
+    for name in laws if scene.estimates else ():
+        made[name] += _checked(found[: len(COARSER)])
+        found = found[len(COARSER) :]
+    solution.curves += _checked(found[:curves])
+    points: list[RatioPoint] = [p for p in found[curves:] if not isinstance(p, UpdError)]
+    with stages("around the peaks", "levels, inputs, effects left out"), quiet():
+        _around(solution, laws, made, points, beside)
+    curve = next((c for c in solution.curves if not c.empty), None)
+    for f in scene.balance.time_march if curve is not None else ():
+        assert curve is not None
         with stages("time march", f"{curve.case}, {f:g} Hz"):
             solution.marches += _march(curve, f)
-    if plan.scene.wants("band"):
-        for one in (c for c in solution.curves if c.stiffness == name and not c.reversed):
-            with stages("band", one.case.label):
-                solution.bands.append(solve_band(solution, one, stages))
-    if plan.scene.wants("spread"):
-        with stages("spread", curve.case.label):
-            solution.spreads[name] = _followed(solution, curve, ((s, {"start": s}) for s in STARTS))
-    if plan.scene.wants("harmonics"):
-        with stages("harmonics", curve.case.label):
-            solution.harmonics[name] = _followed(
-                solution, curve, ((f"{h}", {"harmonics": range(h + 1)}) for h in HARMONICS)
-            )
-    if marching.performance is not None:
-        solution.performances[name] = marching.performance.finish(stages)
-    elif plan.scene.wants("performance"):
-        linear = solution.linear[name]
-        with stages("performance", curve.stiffness):
-            found = follow_peaks(plan, solution.models[name], curve, linear)
-        mine = [one for one in solution.curves if one.stiffness == name]
-        solution.performances[name] = beside_branches(found, mine)
 
 
-def _swept_performance(plan: ForcedPlan) -> bool:
-    """Whether points that move are marched; faces that fit without load are not at rest before."""
-    return plan.scene.balance.method != "balance" and plan.scene.contact.loaded
+def _curve_jobs(solution: ForcedSolution) -> list[Job]:
+    """The curves, those with most slip first."""
+    ratios = sorted(solution.plan.scene.excitation.centrifugal_to_force)
+    return [
+        (solve_curve, (solution.plan, model, solution.linear[name], name, ratio))
+        for name, model in solution.models.items()
+        for ratio in ratios
+    ]
+
+
+def _checked(found: Sequence[Any]) -> list[Any]:
+    for one in found:
+        if isinstance(one, UpdError):
+            raise one
+    return list(found)
+
+
+def _around(
+    solution: ForcedSolution,
+    laws: Mapping[str, Laws],
+    made: Mapping[str, Sequence[MadeModel]],
+    points: Sequence[RatioPoint],
+    beside: SideProcesses,
+) -> None:
+    """What is solved again around the peaks: once, on the reduced models."""
+    plan, bodies, first = solution.plan, solution.bodies, next(iter(laws))
+    assert bodies is not None
+    scene, jobs, into = plan.scene, list[Job](), list[tuple[str, str]]()
+    order = list(scene.excitation.centrifugal_to_force)
+    solution.curves.sort(key=lambda c: (list(laws).index(c.stiffness), order.index(c.ratio)))
+
+    def add(kind: str, name: str, *job: Any) -> None:
+        jobs.append((job[0], job[1:]))
+        into.append((kind, name))
+
+    along: AlongModel | None = None
+    for name, model in solution.models.items():
+        mine = tuple(c for c in solution.curves if c.stiffness == name and not c.empty)
+        peaks = Peaks(plan, model, solution.linear[name], mine)
+        solution.searched[name], bare = peaks, peaks.bare
+        if scene.estimates:
+            for one in made[name]:
+                add("level", name, model_level, bare, one)
+            for more in MORE_HARMONICS:
+                add("level", name, balance_level, bare, HARMONICS, more, 1)
+            add("level", name, balance_level, bare, SAMPLES, 0, 2)
+        asked = scene.wants("inputs") or scene.left_out.solves
+        tops = few_harmonics(peaks) if name == first and asked else {}
+        if name == first and scene.wants("inputs"):
+            for one_input in INPUTS:
+                add("input", name, input_effects, bare, tops, one_input.name)
+        if name == first and scene.wants("band"):
+            for job in _band_jobs(solution, name):
+                add("band", job[0], *job[1:])
+        if scene.left_out.solves:
+            solution.omissions += elastic_changes(solution, name)
+            along = with_along(solution, name, laws[name]) if name == first else None
+            if along is not None:
+                add("along", name, along_changes, bare, tops, along)
+    found = beside.run(jobs)
+    for place, one in zip(into, found, strict=True):
+        if isinstance(one, UpdError) and place[0] in ("input", "along"):
+            # beside the answer: it stands without
+            log.info("%s of %s: %s", *place, one_line(one))
+    kept = [k for k, (kind, _) in enumerate(into) if kind not in ("input", "along")]
+    _checked([found[k] for k in kept])
+    for (kind, name), one in zip(into, found, strict=True):
+        if isinstance(one, UpdError):
+            continue
+        if kind == "level":
+            solution.levels.setdefault(name, []).append(one)
+        elif kind == "input":
+            solution.effects.setdefault(name, []).extend(one)
+        elif kind == "band":
+            solution.band.append(BandPoint(first, name, one))
+        else:
+            solution.omissions += one
+    if scene.wants("performance"):
+        _performance(solution, first, points, beside)
+
+
+def _performance(
+    solution: ForcedSolution, name: str, points: Sequence[RatioPoint], beside: SideProcesses
+) -> None:
+    plan, model = solution.plan, solution.models[name]
+    mine = [c for c in solution.curves if c.stiffness == name]
+    found = performance_of(plan, model, solution.linear[name], points, mine, beside)
+    solution.performances[name] = found
+    run = plan.scene.balance.harmonics
+    if found.best is not None and run != "adaptive" and found.harmonics < int(run):
+        solution.best_again[name] = peaks_at(plan, model, found.best.ratio, int(run))
+
+
+def _band_jobs(solution: ForcedSolution, name: str) -> Iterator[tuple[Any, ...]]:
+    """Curves from every other named static state, and other starts of the sliders."""
+    plan, model, bodies = solution.plan, solution.models[name], solution.bodies
+    assert bodies is not None
+    scene, highest = plan.scene, harmonics_of(plan)
+    choices: list[tuple[str, Model, dict[str, Any]]] = []
+    if model.state is not None:
+        for state in admissible(plan, bodies, Stages()):
+            if not same(state, model.state, scene.damper.centrifugal):
+                try:
+                    choices.append((f"static {state.name}", preloaded(model, state), {}))
+                except InputError as error:
+                    log.info("static state %s: %s", state.name, one_line(error))
+    choices += [(f"start {s}", model, {"start": s}) for s in STARTS if s != scene.balance.slider]
+    for ratio in scene.excitation.centrifugal_to_force:
+        for choice, other, changes in choices:
+            yield choice, peaks_at, plan, other, ratio, highest, changes
 
 
 def _march(curve: ForcedCurve, f: float) -> list[TimeMarch]:
@@ -192,20 +284,5 @@ def _march(curve: ForcedCurve, f: float) -> list[TimeMarch]:
     i = int(np.argmin(np.abs(a.frequency - f)))
     if abs(a.frequency[i] - f) > np.sqrt(np.finfo(float).eps) * f:
         return []
-    return [
-        TimeMarch(
-            curve, f, float(abs(curve.accelerance["right"][i])), steady_state(a.balance, f, a.x[i])
-        )
-    ]
-
-
-def _followed(
-    solution: ForcedSolution, curve: ForcedCurve, choices: Iterable[tuple[str, dict[str, Any]]]
-) -> list[PeakAgain]:
-    """The right blade's peak again in a band around it, with each choice."""
-    model = solution.models[curve.stiffness]
-    at = curve.answer.frequency[measures.peak_index(curve.answer, model.row("right"))]
-    return [
-        peak_again(solution.plan, model, curve.force, at, choice, **change)
-        for choice, change in choices
-    ]
+    height = float(abs(curve.accelerance["right"][i]))
+    return [TimeMarch(curve, f, height, steady_state(a.balance, f, a.x[i]))]

@@ -17,10 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eigh
-from scipy.optimize import linear_sum_assignment
 
 from upd.analyses.forced.model import Array, Model
-from upd.hbm import FrequencyResponse
+from upd.analyses.forced.plan import ForcedPlan, time_steps
 from upd.hbm.balance import Balance
 from upd.hbm.fourier import to_complex
 from upd.hbm.interface_state import InterfaceModel, InterfaceState, resting
@@ -29,6 +28,10 @@ from upd.scene.forced_contact import SIDES
 
 #: place of the normal and of the tangents a point has among normal, along, up
 _PLACES = {0: [0], 1: [0, 2], 2: [0, 1, 2]}
+#: steps in a period of the fastest mode that swings; what swings faster follows statically
+LEAST_STEPS = 1
+#: modes below so many times the highest frequency of the sweep tell which mode a motion is
+SEEN = 8.0
 
 
 @dataclass(frozen=True)
@@ -123,27 +126,21 @@ def _wide(rows: Array) -> Array:
     return out.reshape(-1, rows.shape[2])
 
 
-def state_of(
-    springs: SpringMarch, model: Model, answer: FrequencyResponse, i: int, force: float
-) -> InterfaceState:
-    """Where a steady motion by harmonic balance stands at t = 0, residual slips included.
-
-    Parameters
-    ----------
-    model
-        Of the answer.
-    i
-        Point of the path.
-    force
-        F_E, N.
+def make_springs(plan: ForcedPlan, model: Model) -> SpringMarch:
+    """The model as time integration takes it: modes with `LEAST_STEPS` or more in a period swing
+    (those that the steps do not resolve implicitly), the rest of the blades follows statically.
     """
-    return state_at(springs, model, answer.balance, answer.x[i], float(answer.frequency[i]), force)
+    e = plan.scene.excitation
+    fastest = time_steps(plan.scene) / LEAST_STEPS * e.start
+    modes = int((model.frequency < fastest).sum())
+    seen = int((model.frequency < SEEN * e.stop).sum())
+    return spring_march(model, model.damping, modes, seen)
 
 
 def state_at(
     springs: SpringMarch, model: Model, b: Balance, x: Array, frequency: float, force: float
 ) -> InterfaceState:
-    """As `state_of`, of one motion.
+    """Where a steady motion by harmonic balance stands at t = 0, residual slips included.
 
     Parameters
     ----------
@@ -151,6 +148,8 @@ def state_at(
         The problem, and its unknowns there.
     frequency
         Hz.
+    force
+        F_E, N.
     """
     drive = force * model.excitation.at_start
     march, h, contact = springs.march, b.harmonics, b.force(x)
@@ -166,7 +165,9 @@ def state_at(
     q = springs.modes @ moved[:n_blade]
     q += (march.shapes.T @ springs.rest.T.ravel()) / march.omega**2
     carried = np.zeros((march.n, 3))
-    carried[:, _PLACES[model.contacts.tangents]] = contact.march.force[:, :, 0]
+    # without friction there is no force along a face
+    now = contact.march.force[:, :, 0]
+    carried[:, _PLACES[now.shape[1] - 1]] = now
     f = np.ascontiguousarray(carried.T).ravel()
     v = springs.modes @ speed[:n_blade]
     return _standing(springs, q, v, moved[n_blade:], speed[n_blade:], pull[n_blade:], f, drive)
@@ -201,50 +202,3 @@ def _standing(
         np.where(open_, OPEN, STICK).astype(np.int64),
         march.shapes.T @ springs.rest.T.ravel(),
     )
-
-
-def carried_over(
-    springs: SpringMarch,
-    state: InterfaceState,
-    old: InterfaceModel,
-    move: Array,
-    share: Array,
-    drive: Array,
-) -> InterfaceState:
-    """Where the march of another model stands, near a state of this one: blades and damper move
-    alike, its points carry what theirs do.
-
-    Parameters
-    ----------
-    springs
-        The other model.
-    state, old
-        The state, and the model it is of.
-    move, share
-        (n, n_old) displacements and forces of points from those of the old ones.
-    drive
-        (L,) N at that instant.
-    """
-    new = springs.march
-    turn = _same_modes(new, old, move)
-    f = (share @ state.f.reshape(3, -1).T).T.ravel()
-    q, v = turn @ state.q, turn @ state.v
-    return _standing(springs, q, v, state.s.copy(), state.sv.copy(), state.sa.copy(), f, drive)
-
-
-def _same_modes(new: InterfaceModel, old: InterfaceModel, move: Array) -> Array:
-    """(m, m_old) signs of the modes that are the same, told by how points and tips move."""
-    seen = len(SIDES)
-    n, tips = move.shape[0], np.abs(old.seen_modes[:seen]).max()
-    size = np.abs(old.shapes).max() / tips
-    at = old.shapes.reshape(3, -1, old.shapes.shape[1])
-    moved = np.einsum("pq,dqm->dpm", move, at).reshape(3 * n, -1)
-    a = np.vstack([new.shapes, size * new.seen_modes[:seen]])
-    b = np.vstack([moved, size * old.seen_modes[:seen]])
-    a = a / np.maximum(np.linalg.norm(a, axis=0), np.finfo(float).tiny)
-    b = b / np.maximum(np.linalg.norm(b, axis=0), np.finfo(float).tiny)
-    alike = a.T @ b
-    rows, columns = linear_sum_assignment(np.abs(alike), maximize=True)
-    out = np.zeros(alike.shape)
-    out[rows, columns] = np.sign(alike[rows, columns])
-    return out

@@ -25,11 +25,9 @@ from upd.scene.forced_contact import SIDES
 
 
 def swept_arrays(one: SweptCurve, excited: Excitation) -> Variables:
-    """Accelerance of both blades along a sweep, its states, losses, cost and jumps."""
+    """Accelerance of both blades along a sweep, its states, losses and cost."""
     found, at = one.found, ("frequency",)
     scale = (2.0 * np.pi * excited.lowest * found.frequency) ** 2 * 1e-3 / one.force
-    jumped = np.zeros(len(found.frequency), np.int8)
-    jumped[list(found.jumps)] = 1
     out: Variables = {
         "frequency": (at, found.frequency, HZ | {"status": found.status}),
         "excitation_force": ((), np.array(one.force), {"units": "N"}),
@@ -51,11 +49,6 @@ def swept_arrays(one: SweptCurve, excited: Excitation) -> Variables:
         ),
         "settled": (at, found.settled.astype(np.int8), {"units": "1"}),
         "periods": (at, found.periods, {"units": "1"}),
-        "jump": (
-            at,
-            jumped,
-            {"units": "1", "long_name": "whether the motion jumps to another after this point"},
-        ),
     }
     for k, side in enumerate(SIDES):
         out[f"lowest_{side}"] = (at, scale * found.lowest[:, k], PER_N)

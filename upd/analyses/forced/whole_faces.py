@@ -19,8 +19,8 @@ from upd.analyses.forced.march_modes import linear_curves, stuck_modes_list
 from upd.analyses.forced.mode_peaks import CANDIDATES
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.spring_march import SEEN
 from upd.analyses.forced.statics import GIVEN, SEATED, StaticState
-from upd.analyses.forced.sweeps import SEEN
 from upd.analyses.seated.bodies import Bodies
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.errors import ConvergenceError, InputError

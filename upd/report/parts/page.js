@@ -29,27 +29,27 @@
     return figure.data.some((t) => t.colorbar || (t.marker && t.marker.colorbar));
   }
 
-  // Above the drawing the buttons have their own line, then the legend.
-  const buttons = 34, belowLegend = 8;
+  // A legend takes at most this part of a chart's height, beyond it scrolls; room for two lines of it.
+  const share = 0.2, twoLines = 44;
 
   function heightOf(figure, width) {
     const inner = Math.max(width - 90, 200) / figure.wide;
-    const bar = hasBar(figure) ? 75 : 0;
-    return Math.round(Math.min(Math.max(inner, bar ? 110 : 230), 440) + 90 + bar);
+    const bar = hasBar(figure) ? 75 : 0, legend = figure.layout.showlegend ? twoLines : 0;
+    return Math.round(Math.min(Math.max(inner, bar ? 110 : 230), 440) + 90 + bar + legend);
   }
 
   function layoutOf(figure, width) {
-    const height = heightOf(figure, width);
-    const layout = Object.assign({
-      height: height, font: font, paper_bgcolor: "#fff", plot_bgcolor: "#fff", dragmode: touch ? false : "zoom",
-      margin: { l: 60, r: 16, t: buttons, b: hasBar(figure) ? 125 : 52 },
-      legend: { orientation: "h", x: 0, xanchor: "left", yref: "container", y: 1 - buttons / height, yanchor: "top", maxheight: 1, font: { size: 11 } },
+    // Below the drawing, where no bar of colours stands.
+    const bar = hasBar(figure), at = bar ? { y: 1, yanchor: "top" } : { y: 0, yanchor: "bottom" };
+    return Object.assign({
+      height: heightOf(figure, width), font: font, paper_bgcolor: "#fff", plot_bgcolor: "#fff", dragmode: touch ? false : "zoom",
+      margin: { l: 60, r: 16, t: 34, b: bar ? 125 : 52 },
+      legend: Object.assign({ orientation: "h", x: 0, xanchor: "left", yref: "container", maxheight: share, tracegroupgap: 0, font: { size: 11 } }, at),
       hoverlabel: { font: { family: font.family, size: 12 } },
     }, JSON.parse(JSON.stringify(figure.layout)));
-    return layout;
   }
 
-  function dataOf(figure, height) {
+  function dataOf(figure) {
     const placed = (bar) => Object.assign({}, bar, { yref: "container", y: 0.02, yanchor: "bottom", lenmode: "fraction", len: 0.9, outlinewidth: 0 });
     return figure.data.map(function (trace) {
       if (trace.colorbar) return Object.assign({}, trace, { colorbar: placed(trace.colorbar) });
@@ -58,118 +58,8 @@
     });
   }
 
-  // ------------------------------------------------------------------ words beside marks
-  const letters = 11, gap = 7;
-
-  // Width and height of a text as it is drawn.
-  function sizeOf(text) {
-    const probe = element("span");
-    probe.style.cssText = "position:absolute;visibility:hidden;white-space:nowrap;font:" + letters + "px/1.3 " + font.family;
-    // The text comes escaped, with line breaks.
-    probe.innerHTML = text;
-    document.body.append(probe);
-    const box = probe.getBoundingClientRect();
-    probe.remove();
-    return [box.width + 4, box.height + 2];
-  }
-
-  function covers(a, b) { return a.left < b.right && b.left < a.right && a.bottom < b.top && b.bottom < a.top; }
-
-  // As upd.plot.labels.placed: the highest first, above its mark, else with an end at it, else beside what is there, else ever higher; y upwards.
-  function placed(at, size, dots, width) {
-    const points = dots.map((p) => ({ left: p[0] - gap / 2, right: p[0] + gap / 2, bottom: p[1] - gap / 2, top: p[1] + gap / 2 }));
-    const found = [];
-    at.map((p, k) => k).sort((a, b) => at[b][1] - at[a][1]).forEach(function (k) {
-      const x = at[k][0], y = at[k][1], wide = size[k][0], tall = size[k][1];
-      const taken = found.filter(Boolean).concat(points);
-      const box = function (left, bottom) {
-        const from = Math.max(Math.min(left, width - wide), 0);
-        return { left: from, right: from + wide, bottom: bottom, top: bottom + tall };
-      };
-      const inWay = (b) => taken.filter((other) => covers(other, b));
-      const middle = box(x - wide / 2, y + gap);
-      const beside = found.filter(Boolean).filter((o) => covers(o, middle)).sort((a, b) => Math.abs(a.left + a.right - 2 * x) - Math.abs(b.left + b.right - 2 * x))
-        .map((o) => (2 * x < o.left + o.right ? o.left - wide - gap / 4 : o.right + gap / 4)).filter((left) => x - 2 * wide <= left && left <= x + wide);
-      let mine = [x - wide / 2, x - wide + gap / 2, x - gap / 2, ...beside].map((left) => box(left, y + gap)).find((b) => inWay(b).length === 0);
-      if (!mine) {
-        mine = middle;
-        while (inWay(mine).length) mine = box(x - wide / 2, Math.max(...inWay(mine).map((b) => b.top)));
-      }
-      found[k] = mine;
-    });
-    return found;
-  }
-
-  // The end of the ordinate that leaves room for the labels, and the labels as plotly's annotations. Without ends of
-  // the ordinate to begin with it stays as it is.
-  function labelsOf(place, figure, begin) {
-    const x = place._fullLayout.xaxis, y = place._fullLayout.yaxis, wide = x._length, tall = y._length;
-    const along = (axis, value) => (axis.type === "log" ? Math.log10(value) : value);
-    const part = (axis, value, ends) => (along(axis, value) - ends[0]) / (ends[1] - ends[0]);
-    const marks = figure.labels.filter((m) => x.type !== "log" || m.x > 0).filter((m) => y.type !== "log" || m.y > 0)
-      .filter((m) => 0 <= part(x, m.x, x.range) && part(x, m.x, x.range) <= 1);
-    let ends = begin || y.range, boxes = [], at = [];
-    const shown = marks.filter((m) => m.text && part(y, m.y, ends) <= 1), size = shown.map((m) => sizeOf(m.text));
-    const where = (m) => [wide * part(x, m.x, x.range), tall * part(y, m.y, ends)];
-    // The least part of the height with which they all find room.
-    for (let more = 1; more <= 2; more += 0.04) {
-      ends = begin ? [begin[0], begin[0] + (begin[1] - begin[0]) * more] : y.range;
-      at = shown.map(where);
-      boxes = placed(at, size, marks.map(where), wide);
-      if (!begin || boxes.every((b) => b.top <= tall)) break;
-    }
-    const texts = shown.map(function (m, k) {
-      const box = boxes[k], dot = at[k];
-      const far = box.bottom > dot[1] + 1.5 * gap || dot[0] < box.left - gap || box.right + gap < dot[0];
-      // The line begins at the corner next to the mark.
-      const anchor = dot[0] < box.left ? "left" : box.right < dot[0] ? "right" : "center";
-      const from = { left: box.left, right: box.right, center: (box.left + box.right) / 2 }[anchor];
-      return {
-        x: along(x, m.x), y: along(y, m.y), xref: "x", yref: "y", text: m.text, font: { color: m.color, size: letters }, borderpad: 0,
-        xanchor: anchor, yanchor: "bottom", ax: Math.round(from - dot[0]), ay: Math.round(dot[1] - box.bottom),
-        showarrow: true, arrowhead: 0, arrowwidth: 0.7, standoff: 3, arrowcolor: far ? m.color : "rgba(0,0,0,0)",
-      };
-    });
-    return { annotations: texts, ends: ends };
-  }
-
-  // What depends on the drawing itself: room for the legend, as high as it came out, and the labels. Wider ticks leave
-  // less room along x, so it is looked at again.
-  function settled(place, figure, turn, begin) {
-    const full = place._fullLayout, change = {};
-    const legend = figure.layout.showlegend && full.legend ? Math.ceil(full.legend._height || 0) + belowLegend : 0;
-    if (Math.abs(buttons + legend - full.margin.t) > 1) {
-      change["margin.t"] = buttons + legend;
-      change.height = full.height + buttons + legend - full.margin.t;
-      change["legend.y"] = 1 - buttons / change.height;
-    }
-    if (figure.labels.length) {
-      const told = labelsOf(place, figure, begin);
-      const same = JSON.stringify(told.annotations) === JSON.stringify(place.labels);
-      if (!same || turn === 0) change.annotations = place.labels = told.annotations;
-      if (told.ends[1] !== full.yaxis.range[1]) change["yaxis.range"] = told.ends;
-    }
-    if (!Object.keys(change).length || turn === 3) return place;
-    place.settling = true;
-    return Plotly.relayout(place, change).then(function () { place.settling = false; return settled(place, figure, turn + 1, begin); });
-  }
-
-  // From the ends plotly found; ends a reader chose, or the chart asks for, stay.
-  function settle(place, figure) {
-    const y = place._fullLayout.yaxis;
-    return settled(place, figure, 0, y && y.autorange ? y.range.slice() : null);
-  }
-
   function drawChart(place, figure) {
-    const layout = layoutOf(figure, place.clientWidth);
-    place.settling = true;
-    return Plotly.react(place, dataOf(figure, layout.height), layout, config).then(function () {
-      place.settling = false;
-      place.removeAllListeners("plotly_relayout");
-      // Another part of the drawing has other places for the labels.
-      place.on("plotly_relayout", () => { if (!place.settling) settle(place, figure); });
-      return settle(place, figure);
-    });
+    return Plotly.react(place, dataOf(figure), layoutOf(figure, place.clientWidth), config);
   }
 
   function element(tag, name, text) {
@@ -203,20 +93,27 @@
     return () => show(0);
   }
 
+  // What is folded is drawn when it is opened, for then it has a width.
+  function whenSeen(panel, draw) {
+    const fold = panel.closest("details.fold");
+    if (!fold || fold.open) return draw();
+    fold.addEventListener("toggle", draw, { once: true });
+    return Promise.resolve();
+  }
+
+  function addPanel(panel) {
+    const groups = page.panels[panel.dataset.panel], live = panel.querySelector(".live");
+    // The place must have its final width before anything is drawn in it.
+    panel.classList.add("drawn");
+    if (groups.length > 1) panel.classList.add("wide");
+    panel.querySelector("details.static").open = false;
+    const draws = groups.map((group) => addChart(live, group, panel.querySelector("h3").textContent));
+    return Promise.all(draws.map((draw) => draw()));
+  }
+
   function addPanels() {
-    const work = [];
-    document.querySelectorAll(".panel[data-panel]").forEach(function (panel) {
-      const groups = page.panels[panel.dataset.panel];
-      if (!groups) return;
-      const live = panel.querySelector(".live");
-      // The place must have its final width before anything is drawn in it.
-      panel.classList.add("drawn");
-      if (groups.length > 1) panel.classList.add("wide");
-      panel.querySelector("details.static").open = false;
-      const draws = groups.map((group) => addChart(live, group, panel.querySelector("h3").textContent));
-      draws.forEach((draw) => work.push(draw()));
-    });
-    return Promise.all(work);
+    const panels = Array.from(document.querySelectorAll(".panel[data-panel]")).filter((panel) => page.panels[panel.dataset.panel]);
+    return Promise.all(panels.map((panel) => whenSeen(panel, () => addPanel(panel))));
   }
 
   // ------------------------------------------------------------------ three dimensions
@@ -344,10 +241,10 @@
       return Plotly.react(place, traces, layout, config3d);
     }
     [choice, range, apart, near].forEach((control) => control.addEventListener("input", show));
-    return show().then(function () {
+    return whenSeen(panel, () => show().then(function () {
       panel.classList.add("drawn");
       panel.querySelector("details.static").open = false;
-    });
+    }));
   }
 
   // ------------------------------------------------------------------ the rest of the page
@@ -372,7 +269,7 @@
   let waiting = 0;
   window.addEventListener("resize", function () {
     clearTimeout(waiting);
-    waiting = setTimeout(() => drawn.forEach((state) => drawChart(state.place, state.figure)), 150);
+    waiting = setTimeout(() => drawn.filter((state) => state.place.clientWidth).forEach((state) => drawChart(state.place, state.figure)), 150);
   });
 
   addCopy();

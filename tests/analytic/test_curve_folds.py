@@ -1,0 +1,138 @@
+"""Folds of a path: in closed form, on paths by hand, and against time integration."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from upd.analyses.forced.curves import ForcedCurve, rising
+from upd.analyses.forced.peaks import _folds
+from upd.hbm import FrequencyResponse, contacts, frequency_response
+from upd.hbm.march import steady_state
+
+
+def path(frequency: Any, height: Any) -> ForcedCurve:
+    answer: Any = SimpleNamespace(frequency=np.asarray(frequency, float))
+    return ForcedCurve("own", 1.0, 1.0, answer, {"right": np.asarray(height, complex)}, 0.0)
+
+
+def duffing(beta: float, n: int = 4001) -> tuple[np.ndarray, np.ndarray]:
+    """Frequency and height along the path of u'' + 2 z u' + u + beta u^3 = F cos(w t), first
+    harmonic.
+
+    (1 + 3/4 beta A^2 - w^2)^2 + (2 z w)^2 = (F / A)^2 solved for w^2, below the top and beyond.
+    """
+    z, F = 0.02, 0.05
+    top = F / (2.0 * z) / np.sqrt(1.0 + 0.75 * beta * (F / (2.0 * z)) ** 2)
+    for _ in range(200):
+        top = F / (2.0 * z * np.sqrt(1.0 + 0.75 * beta * top**2 - 2.0 * z**2 + z**2))
+    A = np.linspace(0.05 * top, top, n)
+    k = 1.0 + 0.75 * beta * A**2
+    root = np.sqrt(np.maximum((F / A) ** 2 - 4.0 * z**2 * (k - z**2), 0.0))
+    low, high = k - 2.0 * z**2 - root, k - 2.0 * z**2 + root
+    on = low > 0.0
+    # both meet at the top
+    w2 = np.concatenate([low[on], high[-2::-1]])
+    return np.sqrt(w2), np.concatenate([A[on], A[-2::-1]])
+
+
+def test_a_linear_peak_has_no_fold() -> None:
+    w, A = duffing(0.0)
+    assert w[A.argmax()] == pytest.approx(np.sqrt(1.0 - 2.0 * 0.02**2), rel=1e-4)
+    assert rising(w).all()
+    assert not list(_folds(path(w, A)))
+
+
+@pytest.mark.parametrize("beta", [-0.08, 0.08])
+def test_folds_of_a_duffing_oscillator(beta: float) -> None:
+    """Between them the motion is unstable; a sweep lands on the other branch."""
+    w, A = duffing(beta)
+    one, other = _folds(path(w, A))
+    assert one.up and not other.up
+    assert other.frequency < one.frequency
+    between = ~rising(w)
+    at = [int(np.argmin(np.hypot(w - f.frequency, A - f.before))) for f in (one, other)]
+    assert between[at[0] + 1 : at[1]].all()
+    # the points at which it turns back belong to neither part
+    assert between.sum() == at[1] - at[0] + 1
+
+    def others(f: float) -> list[float]:
+        """Heights at a frequency, from neighbours on the path."""
+        k = np.flatnonzero((np.minimum(w[:-1], w[1:]) <= f) & (f <= np.maximum(w[:-1], w[1:])))
+        return [float(A[i] + (f - w[i]) / (w[i + 1] - w[i]) * (A[i + 1] - A[i])) for i in k]
+
+    for fold, lands in ((one, max), (other, min)) if beta < 0.0 else ((one, min), (other, max)):
+        assert fold.reached == pytest.approx(lands(others(fold.frequency)), rel=1e-3)
+    if beta < 0.0:
+        # a sweep up meets the resonance behind its top
+        assert (one.at, one.before < one.reached < A.max()) == (one.frequency, True)
+        assert other.before > 0.9 * A.max()
+    else:
+        assert one.before > 0.9 * A.max()
+
+
+def test_a_sweep_that_lands_below_a_peak_goes_on_to_it() -> None:
+    """Up from 4 Hz: it lands at 5.5 and climbs to 8 at 6 Hz; a later rise is another peak's."""
+    f = [1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]
+    height = [1.0, 1.2, 1.5, 2.0, 3.0, 3.5, 4.5, 5.5, 7.0, 8.0, 2.0, 9.0]
+    up, down = _folds(path(f, height))
+    assert (up.frequency, up.up, up.before, up.reached, up.at) == (4.0, True, 2.0, 8.0, 6.0)
+    assert (down.frequency, down.up, down.before) == (2.0, False, 3.5)
+    # down the lower branch falls: what it lands on is what it reaches
+    assert (down.reached, down.at) == (1.2, 2.0)
+
+
+def test_where_no_other_motion_is_known_there_is_no_landing() -> None:
+    """A path that ended before it came back."""
+    assert not list(_folds(path([1.0, 2.0, 3.0, 2.5, 2.2], [1.0, 2.0, 3.0, 4.0, 5.0])))
+    assert rising(np.array([5.0])).tolist() == [True]
+    assert rising(np.zeros(0)).tolist() == []
+
+
+@pytest.fixture(scope="module")
+def softening() -> FrequencyResponse:
+    """m = k = 1 on a contact that opens, k_n = 1 under 0.5 N, and a Jenkins element."""
+    points = contacts(
+        [[1.0], [0.0]],
+        [[0.0], [1.0]],
+        k_n=[1.0, 0.0],
+        k_t=[1.0, 0.1],
+        mu=[0.0, 1.0],
+        preload=[0.5, 0.02],
+    )
+    return frequency_response(
+        [[1.0]],
+        [[0.02]],
+        [[1.0]],
+        points,
+        harmonic_force=[0.15],
+        static_force=[0.5],
+        frequencies=np.linspace(1.2, 1.5, 40) / (2.0 * np.pi),
+        harmonics=range(8),
+        samples=512,
+    )
+
+
+def test_a_sweep_up_jumps_at_the_fold_of_a_contact_that_opens(
+    softening: FrequencyResponse,
+) -> None:
+    """Time integration from the end of the branch: below the fold it stays, beyond it ends where
+    the fold says.
+    """
+    size = softening.amplitude([1.0])
+    curve = ForcedCurve("own", 1.0, 0.15, softening, {"right": size.astype(complex)}, 0.0)
+    up, down = _folds(curve)
+    assert up.up and not down.up
+    assert up.reached > 2.5 * up.before
+    i = int(np.argmin(np.abs(curve.frequency - up.frequency)))
+    for beside, height in ((0.999, up.before), (1.001, up.reached)):
+        march = steady_state(
+            softening.balance, beside * up.frequency, softening.x[i], steps=512, tolerance=1e-5
+        )
+        assert march.status == "periodic"
+        found = march.amplitude(np.array([1.0]))
+        # the branch ends with a vertical tangent: a thousandth in frequency is much in height
+        assert found == pytest.approx(height, rel=0.07 if beside < 1.0 else 0.015)

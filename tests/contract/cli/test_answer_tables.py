@@ -1,0 +1,174 @@
+"""An answer that an analysis gives as tables: whole at every width, what warns behind it."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from html import unescape
+
+import pytest
+from rich.console import Console
+
+from upd.analyses import hertz
+from upd.cli.tables import print_result
+from upd.report.answer import answer_tables
+from upd.report.columns import whole_table
+from upd.report.notebook import RunResult
+from upd.report.notes import short_notes
+from upd.results import NO_CASE, Case, Check, Result, status_of, withheld
+from upd.results.answer_table import AnswerTable
+
+PEAKS = AnswerTable(
+    "Peaks",
+    (
+        *("# F_C/F_E", "mode", "# frequency Hz", "# ±", "# height (m/s²)/N", "# ±"),
+        *("# against free", "# slips", "# opens", "# measured", "fold"),
+    ),
+    tuple(
+        (
+            *(f"{ratio}", mode, f"{400 + ratio / 7:.2f}", "±1.2 %", f"{ratio / 3:.4g}", "±3.9 %"),
+            *("-43.2 %", "15 %", "6 %", "440 Hz", "397.1 to 398.2 Hz" * (ratio == 194)),
+        )
+        for ratio in (2000, 600, 194, 60)
+        for mode in ("in phase", "out of phase")
+    ),
+    "± bounds what mesh, modes, harmonics and points leave; slips and opens are shares of the "
+    "contact that do so at the peak.",
+)
+DEPENDS = AnswerTable(
+    "What the answer depends on most",
+    ("what", "# moves height", "to make it smaller"),
+    (
+        ("static state, friction at rest", "±55 %", "measure the normal forces " * 5 + "at rest"),
+        ("contact.friction", "±21 %", "measure the friction coefficient of the pair in use"),
+    ),
+)
+BEST = AnswerTable("Best F_C/F_E", ("mode", "# F_C/F_E"), (("in phase", "58.2"),))
+EMPTY = AnswerTable("Nothing", ("a",), ())
+
+
+@pytest.fixture
+def told(
+    small_run: Callable[[str], RunResult], monkeypatch: pytest.MonkeyPatch
+) -> Iterator[RunResult]:
+    """A run whose analysis answers with tables."""
+    tables = [PEAKS, BEST, DEPENDS, EMPTY]
+    monkeypatch.setattr(
+        hertz, "ANALYSIS", replace(hertz.ANALYSIS, answer=lambda entries: tables if entries else [])
+    )
+    yield small_run("hertz")
+
+
+def printed(result: RunResult, width: int, *, full: bool = False) -> list[str]:
+    """The lines the terminal shows."""
+    sheet = io.StringIO()
+    print_result(Console(file=sheet, width=width, highlight=False), result, full=full)
+    return sheet.getvalue().splitlines()
+
+
+def words(lines: list[str]) -> list[str]:
+    return " ".join(lines).split()
+
+
+@pytest.mark.parametrize("width", [50, 80, 120, 200])
+@pytest.mark.parametrize("table", [PEAKS, DEPENDS, BEST])
+def test_a_table_is_whole_at_every_width(table: AnswerTable, width: int) -> None:
+    lines = whole_table(table, width)
+    assert max(map(len, lines)) <= width
+    found = words(lines)
+    for text in (
+        *(head.lstrip("# ") for head in table.columns),
+        *(c for r in table.rows for c in r),
+    ):
+        for word in text.split():
+            assert found.count(word) >= 1, word
+    for row in table.rows:
+        # A row is told as often as there are blocks, its other cells once.
+        assert all(sum(cell in line for line in lines) >= 1 for cell in row if len(cell) < 10)
+
+
+def test_columns_without_room_stand_below_beside_the_first() -> None:
+    lines = whole_table(PEAKS, 80)
+    heads = [k for k, line in enumerate(lines) if line.split()[:2] == ["F_C/F_E", "mode"]]
+    assert len(heads) == 2
+    below = lines[heads[1] + 1 :]
+    assert [line.split()[:2] for line in below[:2]] == [["2000", "in"], ["2000", "out"]]
+    assert sum("397.1 to 398.2 Hz" in line for line in below) == 2
+    # An error stands beside its number.
+    assert all(line.count("±") in (0, 2) for line in lines[heads[0] :])
+    assert len(whole_table(PEAKS, 120)) == len(PEAKS.rows) + 2
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_the_terminal_shows_the_tables_and_then_what_warns(told: RunResult, width: int) -> None:
+    checks = [
+        Check(f"check {k}", Case(force_ratio=r), r, 1.0, "motion left out", "take more", False)
+        for k in range(5)
+        for r in (2.0, 3.0)
+    ]
+    lost = [withheld(f"number_{k}", NO_CASE, "Hz", "the path ended") for k in range(3)]
+    results = (*told.results, *lost)
+    bad = replace(
+        told,
+        checks=tuple(checks),
+        results=results,
+        status=status_of(checks, results),
+        faults=("x",),
+    )
+    lines = printed(bad, width)
+    assert max(len(x) for x in lines if not x.startswith(("Run folder", "Report"))) <= width
+    text = " ".join(words(lines))
+    assert lines[0].startswith("hertz: ok with warnings - maximum pressure")
+    for table in (PEAKS, BEST, DEPENDS):
+        at = lines.index(table.heading)
+        assert lines[at + 1 :][: len(shown := whole_table(table, width))] == shown
+        assert table.note in text
+    assert "Nothing" not in lines
+    assert "Checks: 0 of 10 passed." in lines
+    assert text.count("Warning: ") == 3
+    assert "Warning: Check 0 (F_C/F_E 3): motion left out = 3 (limit 1); take more." in text
+    assert lines[-1] == "4 more notes are told by --full."
+    assert "2 more" not in text
+    # All numbers beside the tables when asked.
+    assert "Peaks" in printed(bad, width, full=True)
+    assert "Self-checks" in map(str.strip, printed(bad, width, full=True))
+
+
+def test_a_run_without_warnings_ends_with_its_files(told: RunResult) -> None:
+    good = replace(told, checks=(), status="ok")
+    assert printed(good, 80)[-1].startswith("Run folder: ")
+    assert "more note" not in " ".join(printed(good, 80))
+
+
+def test_without_tables_nothing_changes(told: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert answer_tables({"analysis": "another"}, []) == []
+    assert answer_tables(told.size, []) == []
+    with_tables = printed(told, 80)
+    monkeypatch.undo()
+    assert printed(told, 80) != with_tables
+    assert any(line.startswith("Self-checks: ") for line in printed(told, 80))
+
+
+def test_a_note_is_one_sentence() -> None:
+    bad = Check(
+        "truncation", Case(force_ratio=9.0), 2.0, 1.0, "motion", "It ends. Take 9. K_N", False
+    )
+    lost = Result("f", NO_CASE, float("nan"), "Hz", withheld="the path ended")
+    entries = [lost.as_dict(), lost.as_dict()]
+    assert short_notes([bad.as_dict()], entries) == [
+        "Truncation (F_C/F_E 9): motion = 2 (limit 1); It ends; take 9. K_N.",
+        "F and 1 more not reached: the path ended.",
+    ]
+
+
+def test_a_notebook_shows_the_tables(told: RunResult) -> None:
+    evil = replace(BEST, heading="<b>", rows=(("<i>", "1"),))
+    html = told._repr_html_()
+    for table in (PEAKS, BEST, DEPENDS):
+        assert table.heading in html and table.note in unescape(html)
+        assert all(cell in unescape(html) for row in table.rows for cell in row)
+    assert "maximum pressure" not in html
+    from upd.report.notebook import _table_html
+
+    assert "<i>" not in _table_html(evil) and "<b><b>" not in _table_html(evil)

@@ -1,0 +1,380 @@
+"""Peaks of a curve by harmonic balance: their tops, folds, and whether the motion stays.
+
+A path by harmonic balance runs through motions that a rig never shows: between two folds they are
+unstable, and beside a fold the last few may leave for want of harmonics. Each reported peak is
+therefore confirmed by time integration that starts from its own motion. Where that leaves, the
+highest motion along the path that stays is the peak, found by bisection down from the top.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import takewhile
+
+import numpy as np
+
+from upd.analyses.forced import measures
+from upd.analyses.forced.curves import (
+    AT_TOP,
+    Fold,
+    ForcedCurve,
+    LinearCurves,
+    TimeCheck,
+    Top,
+    rising,
+)
+from upd.analyses.forced.interface_model import by_coulomb
+from upd.analyses.forced.mode_peaks import (
+    ModePeak,
+    numbered_peaks,
+)
+from upd.analyses.forced.model import Array, Model
+from upd.analyses.forced.paths import fine_grid, respond
+from upd.analyses.forced.plan import ForcedPlan, time_steps
+from upd.analyses.forced.spring_march import SpringMarch, make_springs, state_at
+from upd.errors import ConvergenceError, one_line
+from upd.hbm import climb
+from upd.hbm.balance import Balance
+from upd.hbm.coulomb import STICK
+from upd.hbm.fourier import to_complex
+from upd.hbm.interface_march import InterfaceMarch
+from upd.hbm.interface_settle import settle
+from upd.hbm.peaks import FIRST_REACH, is_near
+from upd.hbm.starts import newton
+from upd.scene.forced_contact import SIDES, Side
+
+log = logging.getLogger(__name__)
+#: periods of a time integration from a peak, and how steady it has to be: modal damping of 0.5 %
+#: leaves 1e-4 of a disturbance after 300
+PERIODS, TOLERANCE = 300, 1e-3
+#: change of height up to which a motion stays where it began: one that leaves ends on another
+#: branch, and what the harmonics left out change is a part of it
+STAYS = 0.05
+#: of a top's height, how far down the path a motion that stays is looked for: half the power
+LEAST = 0.5**0.5
+#: how far from a peak, as a share of its frequency, other maxima are about it
+NEAR = 0.02
+#: steps in a period of the time integration at least
+STEPS = 256
+#: bisections of a stretch of a path
+_MOST_BISECTIONS = 8
+
+
+def solve_curve(
+    plan: ForcedPlan, model: Model, linear: LinearCurves, name: str, ratio: float
+) -> ForcedCurve:
+    """One curve with its peaks, each confirmed where a point slips or opens.
+
+    Parameters
+    ----------
+    linear
+        Linear limits of the model: where every point sticks they are the answer.
+    name, ratio
+        Of the contact stiffness; F_C/F_E.
+    """
+    begin, force = time.perf_counter(), plan.scene.damper.centrifugal / ratio
+    answer = respond(plan, model, force, fine_grid(plan, model, force))
+    blades = {side: measures.accelerance(answer, model.row(side), force) for side in SIDES}
+    curve = ForcedCurve(name, ratio, force, answer, blades, time.perf_counter() - begin)
+    if curve.empty:
+        return curve
+    curve = with_tops(plan, model, linear, curve)
+    curve = replace(curve, folds=tuple(_folds(curve)))
+    return confirmed(plan, model, curve)
+
+
+# -- tops ------------------------------------------------------------------------------------------
+
+
+def with_tops(
+    plan: ForcedPlan, model: Model, linear: LinearCurves, curve: ForcedCurve
+) -> ForcedCurve:
+    """The curve with its peaks between the points of the path."""
+    stop, answer = plan.scene.excitation.stop, curve.answer
+    peaks: dict[Side, tuple[ModePeak, ...]] = {}
+    tops: dict[tuple[Side, int], Top] = {}
+    for side in SIDES:
+        size, mine = np.abs(curve.accelerance[side]), []
+        for peak in numbered_peaks(model, answer, size, stop):
+            top = _top(model, linear, curve, side, peak)
+            if top is not None:
+                peak = peak._replace(frequency=top.frequency, height=top.height)
+                tops[side, peak.number] = top._replace(crowded=_crowded(curve, size, peak))
+            mine.append(peak)
+        peaks[side] = tuple(mine)
+    return replace(curve, peaks=peaks, tops=tops)
+
+
+def _crowded(curve: ForcedCurve, size: Array, peak: ModePeak) -> bool:
+    """Whether the path has more maxima about a peak that are nearly as high."""
+    f = curve.frequency
+    maxima = measures.path_maxima(f, size)
+    near = [
+        one
+        for one in maxima
+        if abs(one.frequency / peak.frequency - 1.0) <= NEAR and one.height >= LEAST * peak.height
+    ]
+    return len(near) > 1
+
+
+def _top(
+    model: Model, linear: LinearCurves, curve: ForcedCurve, side: Side, peak: ModePeak
+) -> Top | None:
+    a, i = curve.answer, peak.sample
+    if a.linear[max(i - 1, 0) : i + 2].all():
+        near = min(linear.stuck_peaks[side], key=lambda p: abs(p.frequency - peak.frequency))
+        return Top(near.frequency, near.height, a.x[i], False)
+    x: Array | None = a.x[i]
+    if a.highest_harmonic[i] < a.harmonics.highest:
+        x = newton(a.balance, a.x[i], float(a.frequency[i]))
+    if x is None:
+        return None
+    return climbed(model, a.balance, x, float(a.frequency[i]), side, curve.force, peak)
+
+
+def climbed(
+    model: Model,
+    b: Balance,
+    x: Array,
+    frequency: float,
+    side: Side,
+    force: float,
+    about: ModePeak | Top,
+    reach: float = FIRST_REACH,
+) -> Top | None:
+    """The top of the accelerance of a blade uphill from a solved point; None where none is near.
+
+    Parameters
+    ----------
+    b, x, frequency
+        The problem, its unknowns there, Hz.
+    about
+        The peak that is looked for.
+    reach
+        First step along the path.
+    """
+    k = model.excitation.lowest
+    top = climb(b, model.row(side), x, frequency, reach, harmonic=k, power=2)
+    height = 1e-3 * (2.0 * np.pi * k * top.frequency) ** 2 * top.amplitude / force
+    if not top.found or not is_near(top.frequency / about.frequency, height / about.height):
+        return None
+    slips = bool((b.force(top.x, False).march.state != STICK).any())
+    return Top(top.frequency, float(height), top.x, slips)
+
+
+# -- folds -----------------------------------------------------------------------------------------
+
+
+def _folds(curve: ForcedCurve) -> Iterator[Fold]:
+    """Where the path turns back, with the height that a slow sweep jumps to."""
+    f, size = curve.frequency, np.abs(curve.accelerance["right"])
+    up = rising(f)
+    steps = np.sign(np.diff(f))
+    for i in np.flatnonzero(steps[1:] * steps[:-1] < 0.0) + 1:
+        turns_back = steps[i - 1] > 0.0
+        # a stable motion at the same frequency, on the part of the path that is reached next
+        low, high = np.minimum(f[:-1], f[1:]), np.maximum(f[:-1], f[1:])
+        on = np.flatnonzero((low <= f[i]) & (f[i] <= high) & up[:-1] & up[1:])
+        on = on[on > i] if turns_back else on[on < i - 1]
+        if not len(on):
+            continue
+        j = on[0] if turns_back else on[-1]
+        share = (f[i] - f[j]) / (f[j + 1] - f[j]) if f[j + 1] != f[j] else 0.0
+        landing = float(size[j] + share * (size[j + 1] - size[j]))
+        # and the peak that the sweep reaches from there on
+        way = range(j + 1, len(f)) if turns_back else range(j, -1, -1)
+        at, reached = float(f[i]), landing
+        for k in takewhile(lambda k: up[k], way):
+            if size[k] < reached:
+                break
+            at, reached = float(f[k]), float(size[k])
+        yield Fold(float(f[i]), bool(turns_back), float(size[i]), reached, at)
+
+
+# -- time integration ------------------------------------------------------------------------------
+
+
+def confirmed(plan: ForcedPlan, model: Model, curve: ForcedCurve) -> ForcedCurve:
+    """The curve with its peaks where a point slips or opens as time integration confirms them."""
+    loose = [(key, top) for key, top in curve.tops.items() if top.slips]
+    if not loose:
+        return curve
+    springs = make_springs(plan, model)
+    steps = max(STEPS, time_steps(plan.scene))
+    peaks = {side: list(curve.peaks[side]) for side in SIDES}
+    checked = []
+    for (side, number), top in loose:
+        place = next(k for k, p in enumerate(peaks[side]) if p.number == number)
+        peak = peaks[side][place]
+        found = _confirmed(springs, model, curve, side, peak, top, steps)
+        checked.append(found)
+        if found.stays and not found.at_top:
+            told = peak._replace(
+                frequency=found.frequency, height=found.integrated, sample=found.sample
+            )
+            peaks[side][place] = told
+    told_peaks = {side: tuple(mine) for side, mine in peaks.items()}
+    return replace(curve, peaks=told_peaks, checked=tuple(checked))
+
+
+def _confirmed(
+    springs: SpringMarch,
+    model: Model,
+    curve: ForcedCurve,
+    side: Side,
+    peak: ModePeak,
+    top: Top,
+    steps: int,
+) -> TimeCheck:
+    """The top where it stays, else the highest motion down the path that does."""
+    b, starts = curve.answer.balance, 0
+
+    def stays(x: Array, f: float) -> Array | None:
+        nonlocal starts
+        starts += 1
+        return _stays(springs, model, b, x, f, curve.force, steps)
+
+    def told(f: float, both: Array, sample: int, step: float, apart: float) -> TimeCheck:
+        k = SIDES.index(side)
+        balance, integrated = float(both[0, k]), float(both[1, k])
+        return TimeCheck(
+            blade=side,
+            number=peak.number,
+            mode=peak.mode,
+            frequency=f,
+            balance=balance,
+            integrated=integrated,
+            stays=True,
+            sample=sample,
+            step=step,
+            apart=apart,
+            starts=starts,
+        )
+
+    both = stays(top.x, top.frequency)
+    if both is not None:
+        return told(top.frequency, both, AT_TOP, 0.0, 0.0)
+    size, f = np.abs(curve.accelerance[side]), curve.frequency
+    best: TimeCheck | None = None
+    for way in _downhill(curve, size, peak.sample):
+        low, kept = 0, None
+        high = len(way) - 1
+        # bisection: `low` leaves, `high` stays
+        end = stays(curve.answer.x[way[high]], float(f[way[high]]))
+        if end is None:
+            continue
+        kept = end
+        while high - low > 1 and starts < 2 * _MOST_BISECTIONS:
+            middle = (low + high) // 2
+            both = stays(curve.answer.x[way[middle]], float(f[way[middle]]))
+            if both is None:
+                low = middle
+            else:
+                high, kept = middle, both
+        i, beyond = way[high], way[low]
+        step = abs(float(size[beyond] / size[i]) - 1.0)
+        found = told(float(f[i]), kept, i, step, abs(float(f[beyond] / f[i]) - 1.0))
+        if best is None or found.integrated > best.integrated:
+            best = found
+    if best is not None:
+        return replace(best, starts=starts)
+    return TimeCheck(
+        blade=side,
+        number=peak.number,
+        mode=peak.mode,
+        frequency=top.frequency,
+        balance=top.height,
+        integrated=float("nan"),
+        stays=False,
+        sample=peak.sample,
+        step=0.0,
+        apart=0.0,
+        starts=starts,
+    )
+
+
+def _downhill(curve: ForcedCurve, size: Array, top: int) -> Iterator[list[int]]:
+    """Points of the path from a top down to half its power on either side, the side first on which
+    the frequency rises along the path.
+    """
+    ways, up = [], curve.rising
+    for step in (1, -1):
+        way = [top]
+        while 0 <= way[-1] + step < len(size) and size[way[-1]] > LEAST * size[top]:
+            way.append(way[-1] + step)
+        if len(way) > 1:
+            ways.append((float(np.mean(up[way])), way))
+    return iter([way for _, way in sorted(ways, key=lambda one: -one[0])])
+
+
+def _stays(
+    springs: SpringMarch,
+    model: Model,
+    b: Balance,
+    x: Array,
+    f: float,
+    force: float,
+    steps: int,
+) -> Array | None:
+    """Heights (2, 2) of the blades by harmonic balance and by time integration that starts there,
+    (m/s2)/N; None where the integration leaves.
+    """
+    k = model.excitation.lowest
+    scale = 1e-3 * (2.0 * np.pi * k * f) ** 2 / force
+    march = InterfaceMarch(springs.march, f, force * model.excitation.drive, steps, by_coulomb)
+    at = state_at(springs, model, b, x, f, force)
+    try:
+        found = settle(march, at, TOLERANCE, PERIODS)
+    except ConvergenceError as error:
+        log.info("time integration at %.6g Hz: %s", f, one_line(error))
+        return None
+    integrated = scale * np.abs(found.first_harmonic[: len(SIDES)])
+    balance = scale * np.array([_amplitude(model, b, x, f, side) for side in SIDES])
+    change = float(np.linalg.norm(integrated) / np.linalg.norm(balance)) - 1.0
+    if abs(change) > STAYS or not found.remaining <= STAYS:
+        return None
+    return np.array([balance, integrated])
+
+
+def _amplitude(model: Model, b: Balance, x: Array, f: float, side: Side) -> float:
+    """Of a blade in the lowest harmonic excited, mm."""
+    j = b.harmonics.place(model.excitation.lowest)
+    omega = np.array([2.0 * np.pi * f])
+    force = b.force(x, False).force.reshape(1, len(b.Psi), b.harmonics.size)
+    moving = to_complex(b.displacement(omega, force, b.split(x)[1][None])[0], b.harmonics)
+    return float(abs(model.row(side) @ moving[:, j]))
+
+
+# -- a band about a peak ---------------------------------------------------------------------------
+
+
+def peak_of_mode(
+    plan: ForcedPlan,
+    model: Model,
+    force: float,
+    side: Side,
+    number: int,
+    frequency: Array,
+    **changes: object,
+) -> tuple[float, float] | None:
+    """Frequency and height of a mode's peak on a path along some frequencies; None without.
+
+    Parameters
+    ----------
+    number
+        Of the mode.
+    frequency
+        (n,) Hz.
+    **changes
+        As `respond` takes them.
+    """
+    answer = respond(plan, model, force, frequency, **changes)
+    if not len(answer.frequency):
+        return None
+    size = np.abs(measures.accelerance(answer, model.row(side), force))
+    found = numbered_peaks(model, answer, size, plan.scene.excitation.stop)
+    mine = [p for p in found if p.number == number]
+    return (mine[0].frequency, mine[0].height) if mine else None
