@@ -92,6 +92,25 @@ def rig(name: str, bodies: Bodies | None = None, **changes: Any) -> Rig:
     )
 
 
+#: contact points on all lines of nodes, on the coarse mesh of the recipe
+LINES: dict[str, Any] = {
+    "geometry.across": 2,
+    "geometry.base_columns": 3,
+    "geometry.shank_layers": 3,
+    "geometry.platform_layers": 3,
+    "geometry.core_layers": 4,
+    "contact.rule": "lines",
+    "contact.rows": "all",
+    "excitation.points": 400,
+}
+
+
+def on_lines(name: str, bodies: Bodies | None = None, **changes: Any) -> Rig:
+    """As `rig`, with its contact points on lines of nodes."""
+    columns = 3 if name.startswith("symmetric") else 2
+    return rig(name, bodies, **{**LINES, "contact.columns": columns, **changes})
+
+
 def curve(rig: Rig, ratio: float, highest: int, frequencies: Any = None, **changes: Any) -> Curve:
     """The right blade's curve under F_E = F_C / ratio with the harmonics 0 to `highest`."""
     force = rig.plan.scene.damper.centrifugal / ratio

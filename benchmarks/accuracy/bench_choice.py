@@ -39,6 +39,8 @@ COARSE: dict[str, Any] = {
     "mesh.element": "hex8i",
     "geometry.refine": 0.5,
     "contact.stiffness": ["thesis"],
+    "contact.rule": "lines",
+    "contact.rows": "all",
     "contact.columns": 1,
     "contact.static": "frictionless",
     "reduction.modes": 4,

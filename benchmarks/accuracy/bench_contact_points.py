@@ -31,10 +31,11 @@ from upd.scene import load_scene
 Row = dict[str, Any]
 #: the mesh that points are compared on
 _ELEMENT = "hex8i"
+_LINES: Mapping[str, Any] = {"contact.rule": "lines"}
 #: rule of the points, groups up the slope and along the damper
 POINTS: Mapping[str, Mapping[str, Any]] = {
-    "lines of the lattice, 5 rows": {},
-    "4 equal strips": {"contact.rows": 4, "contact.columns": 2},
+    "lines of the lattice, 5 rows": {"contact.columns": 3, **_LINES, "contact.rows": "all"},
+    "4 equal strips": {"contact.columns": 2, **_LINES, "contact.rows": 4},
     **{
         f"Gauss, {n} rows": {"contact.rule": "gauss", "contact.rows": n, "contact.columns": m}
         for n, m in ((2, 2), (3, 2), (4, 4), (6, 6))
@@ -68,9 +69,12 @@ def _row(name: str, case: str, value: float, unit: str, begin: float, note: str 
 
 def points() -> Iterator[Row]:
     """Stuck frequencies."""
-    bodies = None
+    bodies, halved = None, False
     for case, changes in POINTS.items():
         begin = time.process_time()
+        # those of Gauss points are of half the rig
+        if changes.get("contact.rule") == "gauss" and not halved:
+            bodies, halved = None, True
         made = rig("symmetric-response", bodies, **{"mesh.element": _ELEMENT, **changes})
         bodies = made.bodies
         force = made.plan.scene.damper.centrifugal

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.solve import grid
+from upd.analyses.forced.paths import grid
 from upd.hbm import FrequencyResponse, contacts, frequency_response
 from upd.hbm.fourier import analysis, harmonics, synthesis
 from upd.hbm.friction import harmonic_force
@@ -31,7 +31,7 @@ from upd.reference.friction import (
 # The benchmarks are no package: what they share is found by its folder.
 sys.path.append(str(Path(__file__).parents[1]))
 import blade_damper_blade as public
-from rig_response import Rig, accelerance, curve, rig
+from rig_response import Rig, accelerance, curve, on_lines, rig
 
 Row = dict[str, Any]
 F, K_T = 0.2, 0.6
@@ -229,7 +229,7 @@ def time_march() -> Iterator[Row]:
     """Harmonic balance against the same law integrated in time from its answer, on the asymmetric
     rig, every lattice node with the same spring.
     """
-    built = rig("asymmetric-response", contact__share="equal")
+    built = on_lines("asymmetric-response", contact__share="equal")
     ends: dict[float, list[float]] = {f: [] for f in MARCHED}
     for highest in HIGHEST:
         one = curve(built, RATIO, highest, np.unique(np.concatenate([grid(built.plan), MARCHED])))
@@ -297,27 +297,26 @@ def stuck_frequencies() -> Iterator[Row]:
     """
     bodies = None
     for name, (rows, *exact) in SYMMETRIC.items():
-        built = rig("symmetric-response", bodies, contact__rows=rows)
+        built = on_lines("symmetric-response", bodies, contact__rows=rows)
         bodies = built.bodies
         yield from stuck(built, f"symmetric rig, {name}", exact)
     for line in range(ROWS):
-        built = rig("symmetric-response", bodies, contact__rows=[line])
+        built = on_lines("symmetric-response", bodies, contact__rows=[line])
         yield from stuck(
             built,
             f"symmetric rig, one row, number {line} from below",
             ONE_ROW,
             "Hz; the reference does not say which row",
         )
-    built = rig("asymmetric-response", contact__share="equal")
+    built = on_lines("asymmetric-response", contact__share="equal")
     yield from stuck(built, "asymmetric rig", ASYMMETRIC)
-    yield from shipped("asymmetric rig, as shipped", built.bodies, "asymmetric-response")
-    yield from shipped("symmetric rig, as shipped", bodies, "symmetric-response")
+    yield from shipped("asymmetric rig, as shipped", "asymmetric-response")
+    yield from shipped("symmetric rig, as shipped", "symmetric-response")
     for length, offset, width in PATCHES:
         across = {} if width is None else {"geometry__patch_width": f"{width} mm"}
         case = f"symmetric rig, patch {42.5 if width is None else width:g} x {length:g} mm"
         yield from shipped(
             f"{case}, {offset:g} mm below the tip",
-            None,
             "symmetric-response",
             geometry__patch_length=f"{length} mm",
             geometry__patch_offset=f"{offset} mm",
@@ -325,9 +324,9 @@ def stuck_frequencies() -> Iterator[Row]:
         )
 
 
-def shipped(case: str, bodies: Any, name: str, **changes: Any) -> Iterator[Row]:
-    """Both modes of a ready scene, whole faces shared by area."""
-    found = stuck_pair(rig(name, bodies, **changes))
+def shipped(case: str, name: str, **changes: Any) -> Iterator[Row]:
+    """Both modes of a ready scene."""
+    found = stuck_pair(rig(name, **changes))
     for in_phase, words in ((True, "in phase"), (False, "out of phase")):
         yield {
             "name": "track_stuck_frequency",

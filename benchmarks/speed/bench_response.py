@@ -24,7 +24,7 @@ from upd.hbm.friction import Law, harmonic_force
 # The benchmarks are no package: what they share is found by its folder.
 sys.path.append(str(Path(__file__).parents[1]))
 import blade_damper_blade as public
-from rig_response import Curve, Rig, curve, rig
+from rig_response import Curve, Rig, curve, on_lines, rig
 
 Row = dict[str, Any]
 Array = public.Array
@@ -186,8 +186,8 @@ def rig_curves() -> Iterator[Row]:
     The whole curve, mirror images as one and every point by itself.
     """
     changes: dict[str, Any] = {"contact__rows": [0, 2, 4], "contact__columns": 3}
-    half = rig("symmetric-response", **changes)
-    full = rig("symmetric-response", half.bodies, mesh__symmetry="full", **changes)
+    half = on_lines("symmetric-response", **changes)
+    full = on_lines("symmetric-response", half.bodies, mesh__symmetry="full", **changes)
     for built in (half, full):
         warm(built)
     for ratio in (STRONG, MEDIUM):
@@ -256,9 +256,9 @@ def saving(
 
 def savings() -> Iterator[Row]:
     """The asymmetric rig: each effect left out alone."""
-    usual = rig("asymmetric-response")
-    full = rig("asymmetric-response", usual.bodies, mesh__symmetry="full")
-    two = rig("asymmetric-response", usual.bodies, contact__directions="two")
+    usual = on_lines("asymmetric-response")
+    full = on_lines("asymmetric-response", usual.bodies, mesh__symmetry="full")
+    two = on_lines("asymmetric-response", usual.bodies, contact__directions="two")
     for built in (usual, full, two):
         warm(built)
     for ratio in (WEAK, STRONG):

@@ -14,6 +14,7 @@ from rigs import LINES
 from upd.analyses.forced import checks
 from upd.analyses.forced.linear_limits import linear_limits_of
 from upd.analyses.forced.measures import Unsolved, accelerance
+from upd.analyses.forced.mode_peaks import stuck_motion
 from upd.analyses.forced.model import Model, make_model, preloaded
 from upd.analyses.forced.paths import balance_of, respond
 from upd.analyses.forced.plan import ForcedPlan, make_plan
@@ -94,8 +95,6 @@ def far_from_stuck(plan: ForcedPlan, model: Model) -> float:
 
 def _stuck(plan: ForcedPlan, model: Model, f: float) -> complex:
     """Accelerance with all points closed and sticking, by the whole matrices."""
-    from upd.analyses.forced.mode_peaks import stuck_motion
-
     (motion,) = stuck_motion(model, np.array([f]))
     return complex(-1e-3 * (2.0 * np.pi * f) ** 2 * (model.row("right") @ motion))
 

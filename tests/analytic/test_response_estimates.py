@@ -121,11 +121,13 @@ def test_levels_that_show_an_order_bound_the_error(order: float, C: float) -> No
     assert f"order {order:.1f}" in words
 
 
-def test_an_order_above_the_formal_one_is_taken_as_that() -> None:
-    """Three elements in place of two: of h^4 they leave less than h^2 would."""
+def test_an_order_of_coarse_meshes_is_taken_as_that_of_edges() -> None:
+    """Of h^4 a change says less than of h^1.09."""
     error, words = meshes(lambda h: 1.0 + 0.01 * h**4)
-    assert "taken as 2" in words
+    assert "taken as 1.1 of re-entrant edges" in words
     assert error > 1.25 * 0.01 / 1.01
+    change = 0.01 * ((4.0 / 3.0) ** 4 - 1.0) / 1.01
+    assert error == pytest.approx(1.25 * change / ((4.0 / 3.0) ** 1.089 - 1.0), rel=1e-9)
 
 
 def test_levels_in_no_order_tell_their_range() -> None:
@@ -135,10 +137,10 @@ def test_levels_in_no_order_tell_their_range() -> None:
     assert "range" in words
 
 
-def test_two_meshes_are_taken_as_of_first_order() -> None:
+def test_two_meshes_are_taken_as_of_the_order_of_edges() -> None:
     error, words = bound(MESH, [(level(MESH, 2.0), 1.03)])
-    assert error == pytest.approx(1.25 * 0.03)
-    assert "order 1 of two levels" in words
+    assert error == pytest.approx(1.25 * 0.03 / (2.0**1.089 - 1.0))
+    assert "order 1.1 of re-entrant edges, two levels" in words
 
 
 def test_other_sources_tell_the_change_of_their_levels() -> None:

@@ -164,8 +164,10 @@ def _sheet(charts: Sequence[Chart], dpi: int) -> Figure:
         first.columns,
         (wide, tall),
         dpi,
-        # beside a map stands its colour bar, in a room of its own
-        fixed=any(chart.maps for chart in charts),
+        # only legends need a room that nobody knows before
+        fixed=not any(
+            legend_names(one) or any(m.states for m in one.maps) for one in charts[:MOST_PANELS]
+        ),
     )
 
 

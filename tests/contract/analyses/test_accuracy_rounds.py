@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import pytest
+from rigs import LINES
 
 import upd
 from upd.analyses import make_plan
@@ -248,6 +249,7 @@ def test_meshes_are_expected_to_gain_what_second_order_gives() -> None:
 
 #: a response that takes seconds: at this F_C/F_E every point sticks
 STUCK: dict[str, Any] = {
+    **LINES,
     "want": ["response"],
     "mesh.element": "hex8i",
     "contact.stiffness": ["thesis"],

@@ -93,7 +93,7 @@ def _model_checks(name: str, model: Model) -> list[Check]:
 
 
 def _preloaded(name: str, state: StaticState, mu: float) -> Check:
-    """A face that carries nothing, or friction that is mobilised everywhere, before vibration.
+    """A face that carries nothing, or whose friction is all mobilised, before vibration.
 
     A stiff unilateral spring without preload, or a slider at its limit, has no amplitude scale: the
     response then does not tend to the stuck one as F_C/F_E grows, and motions are not unique.
