@@ -10,7 +10,7 @@ from rigs import LINES
 
 from upd.analyses import forced, make_plan
 from upd.analyses.forced.inputs import INPUTS, InputEffect, few_harmonics, input_effects
-from upd.analyses.forced.levels import Peaks, linear_of
+from upd.analyses.forced.levels import FoundPeaks, linear_of
 from upd.analyses.forced.solution import ForcedSolution
 from upd.progress import Stages, silent
 from upd.scene import load_scene
@@ -49,7 +49,7 @@ def solved(ratio: float, **more: Any) -> ForcedSolution:
 def effects(ratio: float, name: str, **more: Any) -> dict[tuple[str, int], InputEffect]:
     """End and number of the mode -> what it does."""
     s = solved(ratio, **more)
-    peaks = Peaks(s.plan, s.models["thesis"], s.linear["thesis"], tuple(s.curves))
+    peaks = FoundPeaks(s.plan, s.models["thesis"], s.linear["thesis"], tuple(s.curves))
     found = input_effects(peaks.bare, few_harmonics(peaks), name)
     assert {one.name for one in found} <= {name}
     return {(one.label, one.number): one for one in found}

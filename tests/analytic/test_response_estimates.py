@@ -21,7 +21,7 @@ from upd.analyses.forced.levels import (
     MODES,
     POINTS,
     SAMPLES,
-    Level,
+    PeakLevel,
     carried,
     moved_points,
 )
@@ -102,8 +102,8 @@ def bounded(part: ErrorPart, true: float, most: float) -> bool:
 # -- bounds ----------------------------------------------------------------------------------------
 
 
-def level(source: str, size: float) -> Level:
-    return Level(source, f"size {size:g}", size, {}, (math.nan, math.nan), 0.0)
+def level(source: str, size: float) -> PeakLevel:
+    return PeakLevel(source, f"size {size:g}", size, {}, (math.nan, math.nan), 0.0)
 
 
 def meshes(q: Any) -> tuple[float, str]:

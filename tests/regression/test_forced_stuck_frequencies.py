@@ -7,6 +7,7 @@ springs; nobody has published them, so this is no test of literature.
 """
 
 import pytest
+from rigs import LINES
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.model import make_model
@@ -25,7 +26,7 @@ SHARE = {"symmetric-response": "area", "asymmetric-response": "equal"}
 @pytest.mark.full
 @pytest.mark.parametrize("name", list(INDEPENDENT))
 def test_stuck_frequencies_within_one_per_cent(name: str) -> None:
-    settings = {"contact.stiffness": ["thesis"], "contact.share": SHARE[name]}
+    settings = LINES | {"contact.columns": 2, "contact.share": SHARE[name]}
     scene = load_scene(name, settings)
     plan = make_plan(scene)
     model = make_model(plan, make_bodies(plan), face_laws(scene.stiffnesses["thesis"], Stages()))

@@ -95,7 +95,7 @@ def _gauss_problems(scene: ForcedScene) -> list[str]:
     problems += [
         f'stiffness.{name}.points: Gauss points are not those of a law; write "lattice"'
         for name, s in scene.stiffness.items()
-        if name in c.stiffness and s.points == "law"
+        if name in (c.stiffness or scene.stiffness) and s.points == "law"
     ]
     return problems
 
@@ -125,7 +125,7 @@ def _model_problems(scene: ForcedScene) -> list[str]:
     if marched and scene.balance.method == "balance":
         problems.append(
             f"want: {', '.join(marched)} of whole faces {'is' if len(marched) == 1 else 'are'} "
-            'read from the sweeps: write balance.method = "auto" or "march"'
+            'read from the sweeps: write balance.method = "march"'
         )
     if scene.balance.time_march:
         problems.append(

@@ -14,7 +14,7 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, SweptCurve, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.faces_checks import check_faces_curve
-from upd.analyses.forced.levels import HARMONICS, SAMPLES, Level
+from upd.analyses.forced.levels import HARMONICS, SAMPLES, PeakLevel
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.performance import Performance
 from upd.analyses.forced.solution import ForcedSolution, MarchedPeak, TimeMarch
@@ -188,7 +188,7 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
     ]
 
 
-def _by_level(curve: ForcedCurve, levels: list[Level]) -> list[Check]:
+def _by_level(curve: ForcedCurve, levels: list[PeakLevel]) -> list[Check]:
     """Reported heights with more harmonics and with twice the samples."""
     highest = curve.answer.harmonics.highest
     bisected = {(c.blade, c.number) for c in curve.checked if c.stays and not c.at_top}

@@ -27,7 +27,7 @@ from upd.analyses.forced.levels import (
     POINTS,
     SAMPLES,
     TIME,
-    Level,
+    PeakLevel,
     Place,
     at_place,
     linear_numbers,
@@ -81,7 +81,7 @@ def estimate(solution: ForcedSolution, numbers: Sequence[Result], stages: Stages
 
 
 def _linear_numbers(
-    solution: ForcedSolution, name: str, levels: Sequence[Level]
+    solution: ForcedSolution, name: str, levels: Sequence[PeakLevel]
 ) -> dict[Key, tuple[ErrorPart, ...]]:
     """Peaks of both limits, and the stuck frequencies."""
     out: dict[Key, tuple[ErrorPart, ...]] = {}
@@ -104,17 +104,17 @@ def _linear_numbers(
     return out
 
 
-def _stuck_ratio(k: int, own: float, level: Level) -> float:
+def _stuck_ratio(k: int, own: float, level: PeakLevel) -> float:
     return level.stuck[k] / own
 
 
-def _peak_ratio(place: Place, k: int, own: float, level: Level) -> float:
+def _peak_ratio(place: Place, k: int, own: float, level: PeakLevel) -> float:
     return level.peaks[place][k] / own
 
 
 def _of_peak(
     solution: ForcedSolution,
-    levels: Sequence[Level],
+    levels: Sequence[PeakLevel],
     case: Case,
     at: float | str,
     side: Side,
@@ -157,7 +157,7 @@ def _with_time(parts: Sequence[ErrorPart], check: TimeCheck, word: str) -> list[
 
 
 def _parts(
-    levels: Sequence[Level], ratio: Callable[[Level], float], place: Place | None = None
+    levels: Sequence[PeakLevel], ratio: Callable[[PeakLevel], float], place: Place | None = None
 ) -> tuple[ErrorPart, ...]:
     """Parts of one number's error.
 
@@ -195,7 +195,7 @@ def _parts(
     return tuple(out)
 
 
-def bound(source: str, found: Sequence[tuple[Level, float]]) -> tuple[float, str]:
+def bound(source: str, found: Sequence[tuple[PeakLevel, float]]) -> tuple[float, str]:
     """Bound of a number's relative error from its other levels, and how it was found.
 
     Parameters
@@ -217,7 +217,7 @@ def bound(source: str, found: Sequence[tuple[Level, float]]) -> tuple[float, str
     return _SAFETY * spread, f"range with {names}, factor {_SAFETY:g}"
 
 
-def _of_meshes(found: Sequence[tuple[Level, float]]) -> tuple[float, str]:
+def _of_meshes(found: Sequence[tuple[PeakLevel, float]]) -> tuple[float, str]:
     """Richardson's error of the run from coarser meshes; their range where they show no order."""
     near = sorted(found, key=lambda one: one[0].size)
     ratios = [1.0, *(r for _, r in near[:2])]

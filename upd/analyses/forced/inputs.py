@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from upd.analyses.forced.curves import ForcedCurve, Top
-from upd.analyses.forced.levels import Peaks, found_again
+from upd.analyses.forced.levels import FoundPeaks, found_again
 from upd.analyses.forced.measures import stuck_modes
 from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak
 from upd.analyses.forced.model import Model, preloaded
@@ -77,7 +77,7 @@ class InputEffect:
     height: float
 
 
-def _stiffness(side: Side | None, of: str, plan: Peaks) -> Iterator[Changed]:
+def _stiffness(side: Side | None, of: str, plan: FoundPeaks) -> Iterator[Changed]:
     model = plan.model
     law = model.contacts.law
     on = np.ones(len(model.face), bool) if side is None else model.face == SIDES.index(side)
@@ -87,7 +87,7 @@ def _stiffness(side: Side | None, of: str, plan: Peaks) -> Iterator[Changed]:
         yield Changed(f"x {factor:g}", made, {})
 
 
-def _patch(peaks: Peaks) -> Iterator[Changed]:
+def _patch(peaks: FoundPeaks) -> Iterator[Changed]:
     """The same stiffness and forces on the middle of each face."""
     made = moved(peaks.model, _PATCH)
     if made is None or made.state is None:
@@ -100,7 +100,7 @@ def _patch(peaks: Peaks) -> Iterator[Changed]:
     yield Changed(f"{_PATCH:g} of its height", made, {})
 
 
-def _friction(peaks: Peaks) -> Iterator[Changed]:
+def _friction(peaks: FoundPeaks) -> Iterator[Changed]:
     law = peaks.model.contacts.law
     for factor in _FRICTION:
         mu = factor * law.mu
@@ -108,7 +108,7 @@ def _friction(peaks: Peaks) -> Iterator[Changed]:
         yield Changed(f"mu {float(mu.max()):g}", replace(peaks.model, contacts=made), {})
 
 
-def _static(peaks: Peaks) -> Iterator[Changed]:
+def _static(peaks: FoundPeaks) -> Iterator[Changed]:
     model, scene = peaks.model, peaks.plan.scene
     mu, F = scene.contact.friction, scene.damper.centrifugal
     if model.state is None or not mu:
@@ -125,7 +125,7 @@ def _static(peaks: Peaks) -> Iterator[Changed]:
         yield Changed(f"T/N {ratio:g} on both faces", made, {})
 
 
-def _fit(peaks: Peaks) -> Iterator[Changed]:
+def _fit(peaks: FoundPeaks) -> Iterator[Changed]:
     """Faces that fit without load: F_C spreads the blades."""
     model = peaks.model
     if model.state is None:
@@ -141,12 +141,12 @@ def _fit(peaks: Peaks) -> Iterator[Changed]:
     yield Changed("new, not worn in", made, {})
 
 
-def _start(peaks: Peaks) -> Iterator[Changed]:
+def _start(peaks: FoundPeaks) -> Iterator[Changed]:
     for start in ("lower", "upper"):
         yield Changed(start, peaks.model, {"start": start})
 
 
-def _damping(peaks: Peaks) -> Iterator[Changed]:
+def _damping(peaks: FoundPeaks) -> Iterator[Changed]:
     for factor in _DAMPING:
         model = peaks.model
         made = replace(model, C=factor * model.C, damping=factor * model.damping)
@@ -158,7 +158,7 @@ class Input(NamedTuple):
 
     name: str
     applies: Callable[[ForcedScene], bool]
-    ends: Callable[[Peaks], Iterator[Changed]]
+    ends: Callable[[FoundPeaks], Iterator[Changed]]
 
 
 def _always(scene: ForcedScene) -> bool:
@@ -182,7 +182,7 @@ INPUTS = (
 )
 
 
-def input_effects(peaks: Peaks, tops: Mapping[ModePeak, Top], name: str) -> list[InputEffect]:
+def input_effects(peaks: FoundPeaks, tops: Mapping[ModePeak, Top], name: str) -> list[InputEffect]:
     """What one input does to the peaks of the curve with the lowest F_C/F_E.
 
     Parameters
@@ -204,7 +204,7 @@ def input_effects(peaks: Peaks, tops: Mapping[ModePeak, Top], name: str) -> list
     return out
 
 
-def few(peaks: Peaks, highest: int) -> range:
+def few(peaks: FoundPeaks, highest: int) -> range:
     """Few harmonics, those excited among them.
 
     Parameters
@@ -215,7 +215,7 @@ def few(peaks: Peaks, highest: int) -> range:
     return range(min(max(FEW_HARMONICS, *peaks.model.excitation.harmonics), highest) + 1)
 
 
-def few_harmonics(peaks: Peaks) -> dict[ModePeak, Top]:
+def few_harmonics(peaks: FoundPeaks) -> dict[ModePeak, Top]:
     """The right blade's peaks of the curve with the lowest F_C/F_E, with few harmonics."""
     if not peaks.curves:
         return {}
@@ -223,7 +223,7 @@ def few_harmonics(peaks: Peaks) -> dict[ModePeak, Top]:
         return dict(_few_harmonics(peaks, min(peaks.curves, key=lambda c: c.ratio)))
 
 
-def _few_harmonics(peaks: Peaks, curve: ForcedCurve) -> Iterator[tuple[ModePeak, Top]]:
+def _few_harmonics(peaks: FoundPeaks, curve: ForcedCurve) -> Iterator[tuple[ModePeak, Top]]:
     old, model = curve.answer.balance, peaks.model
     numbers = few(peaks, old.harmonics.highest)
     b = balance_of(peaks.plan, model, curve.force, numbers)
@@ -239,7 +239,7 @@ def _few_harmonics(peaks: Peaks, curve: ForcedCurve) -> Iterator[tuple[ModePeak,
             yield peak, top._replace(frequency=found.frequency, height=found.height, x=x)
 
 
-def _expected(peaks: Peaks, model: Model, number: int, frequency: float) -> float:
+def _expected(peaks: FoundPeaks, model: Model, number: int, frequency: float) -> float:
     """Ratio of a peak's frequency with an input to that of the run: the blades are the same, so
     that the stuck mode tells it, by where the peak lies between it and the free one.
     """
@@ -256,7 +256,7 @@ def _expected(peaks: Peaks, model: Model, number: int, frequency: float) -> floa
 
 
 def _effects(
-    peaks: Peaks,
+    peaks: FoundPeaks,
     curve: ForcedCurve,
     name: str,
     end: Changed,

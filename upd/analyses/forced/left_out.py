@@ -16,7 +16,7 @@ from upd.analyses.forced import effects as checks
 from upd.analyses.forced.curves import Top
 from upd.analyses.forced.elastic_damper import elastic_stuck
 from upd.analyses.forced.inputs import few
-from upd.analyses.forced.levels import Peaks, found_again
+from upd.analyses.forced.levels import FoundPeaks, found_again
 from upd.analyses.forced.mode_peaks import ModePeak
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import balance_of
@@ -47,7 +47,9 @@ def with_along(
     return AlongModel(make_model(plan, solution.bodies, laws, model.state))
 
 
-def along_changes(peaks: Peaks, tops: Mapping[ModePeak, Top], along: AlongModel) -> list[Resolved]:
+def along_changes(
+    peaks: FoundPeaks, tops: Mapping[ModePeak, Top], along: AlongModel
+) -> list[Resolved]:
     """Change of the highest peak of the curve with the lowest F_C/F_E, with few harmonics.
 
     Parameters

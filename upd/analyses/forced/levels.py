@@ -77,7 +77,7 @@ class Found(NamedTuple):
     height: float
 
 
-class Level(NamedTuple):
+class PeakLevel(NamedTuple):
     """One level.
 
     Attributes
@@ -106,7 +106,7 @@ class Level(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Peaks:
+class FoundPeaks:
     """What is looked for on every level, by one contact stiffness.
 
     Attributes
@@ -125,7 +125,7 @@ class Peaks:
     curves: tuple[ForcedCurve, ...]
 
     @property
-    def bare(self) -> Peaks:
+    def bare(self) -> FoundPeaks:
         """Without what a level does not need of the curves: less to send."""
         return replace(self, curves=tuple(_bare(one) for one in self.curves))
 
@@ -160,7 +160,7 @@ class MadeModel(NamedTuple):
     Attributes
     ----------
     source, label, size
-        As of `Level`.
+        As of `PeakLevel`.
     model
         Or why there is none.
     seconds
@@ -279,7 +279,7 @@ def _contact_levels(contact: FrictionChoice, laws: Laws) -> list[tuple[str, floa
     ]
 
 
-def model_level(peaks: Peaks, made: MadeModel) -> Level:
+def model_level(peaks: FoundPeaks, made: MadeModel) -> PeakLevel:
     """The peaks on another model."""
     begin = time.perf_counter() - made.seconds
     if isinstance(made.model, str):
@@ -287,7 +287,9 @@ def model_level(peaks: Peaks, made: MadeModel) -> Level:
     return _level(peaks, made.model, made.source, made.label, made.size, begin)
 
 
-def _level(peaks: Peaks, model: Model, source: str, label: str, size: float, begin: float) -> Level:
+def _level(
+    peaks: FoundPeaks, model: Model, source: str, label: str, size: float, begin: float
+) -> PeakLevel:
     base, plan = peaks.model, peaks.plan
     if (model.halved, model.contacts.tangents) != (base.halved, base.contacts.tangents):
         return _none(source, label, "another kind of contact points")
@@ -305,7 +307,7 @@ def _level(peaks: Peaks, model: Model, source: str, label: str, size: float, beg
                 found[place] = again
                 found |= _other_blade(curve, side, number, top, again)
     stuck = _stuck(linear, True), _stuck(linear, False)
-    return Level(source, label, size, found, stuck, time.perf_counter() - begin)
+    return PeakLevel(source, label, size, found, stuck, time.perf_counter() - begin)
 
 
 def _first_blades(curve: ForcedCurve) -> Iterator[tuple[Side, int, Top]]:
@@ -327,9 +329,9 @@ def _other_blade(
     return {(curve.ratio, other, number): Found(f * own.frequency, height * own.height)}
 
 
-def _none(source: str, label: str, why: str) -> Level:
+def _none(source: str, label: str, why: str) -> PeakLevel:
     log.info("%s, %s: %s", source, label, why)
-    return Level(source, label, 1.0, {}, (math.nan, math.nan), 0.0, why)
+    return PeakLevel(source, label, 1.0, {}, (math.nan, math.nan), 0.0, why)
 
 
 def linear_of(plan: ForcedPlan, model: Model) -> LinearCurves:
@@ -351,7 +353,7 @@ def _stuck(linear: LinearCurves, in_phase: bool) -> float:
     return next(found, math.nan)
 
 
-def _linear_peaks(peaks: Peaks, linear: LinearCurves) -> Iterator[tuple[Place, Found]]:
+def _linear_peaks(peaks: FoundPeaks, linear: LinearCurves) -> Iterator[tuple[Place, Found]]:
     """Peaks of the limits by rising frequency, with the numbers they have in the run."""
     for kind in ("free", "stuck"):
         for side in SIDES:
@@ -365,7 +367,7 @@ def _linear_peaks(peaks: Peaks, linear: LinearCurves) -> Iterator[tuple[Place, F
                     yield (kind, side, number), Found(peak.frequency, peak.height)
 
 
-def linear_numbers(peaks: Peaks, kind: str, side: Side) -> list[int]:
+def linear_numbers(peaks: FoundPeaks, kind: str, side: Side) -> list[int]:
     """Numbers of a limit's peaks, by rising frequency."""
     own = sorted(getattr(peaks.linear, f"{kind}_peaks")[side], key=lambda p: p.frequency)
     if kind == "free":
@@ -378,7 +380,7 @@ def linear_numbers(peaks: Peaks, kind: str, side: Side) -> list[int]:
 
 
 def peak_on(
-    peaks: Peaks,
+    peaks: FoundPeaks,
     model: Model,
     linear: LinearCurves,
     curve: ForcedCurve,
@@ -524,7 +526,7 @@ def carried(b: Balance, old: Balance, x: Array, move: Array) -> Array:
 # -- harmonics and samples -------------------------------------------------------------------------
 
 
-def balance_level(peaks: Peaks, source: str, more: int, factor: int) -> Level:
+def balance_level(peaks: FoundPeaks, source: str, more: int, factor: int) -> PeakLevel:
     """The peaks with friction with more harmonics, or more samples in a period.
 
     Parameters
@@ -551,10 +553,12 @@ def balance_level(peaks: Peaks, source: str, more: int, factor: int) -> Level:
                     again = found_again(plan, model, curve, side, number, top, b, x)
                     found[curve.ratio, side, number] = again
                     found |= _other_blade(curve, side, number, top, again)
-    return Level(source, label, size, found, (math.nan, math.nan), time.perf_counter() - begin)
+    return PeakLevel(source, label, size, found, (math.nan, math.nan), time.perf_counter() - begin)
 
 
-def at_place(levels: Sequence[Level], source: str, place: Place) -> list[tuple[Level, Found]]:
+def at_place(
+    levels: Sequence[PeakLevel], source: str, place: Place
+) -> list[tuple[PeakLevel, Found]]:
     """What the levels of a source have at a place."""
     return [
         (one, one.peaks[place]) for one in levels if one.source == source and place in one.peaks

@@ -11,7 +11,7 @@ from upd.analyses.base import Resolved
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, SweptCurve, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.inputs import InputEffect
-from upd.analyses.forced.levels import Level, Peaks
+from upd.analyses.forced.levels import FoundPeaks, PeakLevel
 from upd.analyses.forced.march_modes import stuck_peaks_of
 from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, tell_stuck_peaks
 from upd.analyses.forced.model import Array, Model
@@ -136,8 +136,8 @@ class ForcedSolution:
     performances: dict[str, Performance] = field(default_factory=dict)
     best_again: dict[str, RatioPoint] = field(default_factory=dict)
     omissions: list[Resolved] = field(default_factory=list)
-    levels: dict[str, list[Level]] = field(default_factory=dict)
-    searched: dict[str, Peaks] = field(default_factory=dict)
+    levels: dict[str, list[PeakLevel]] = field(default_factory=dict)
+    searched: dict[str, FoundPeaks] = field(default_factory=dict)
     effects: dict[str, list[InputEffect]] = field(default_factory=dict)
 
     @property

@@ -19,9 +19,9 @@ from upd.analyses.forced.levels import (
     HARMONICS,
     MORE_HARMONICS,
     SAMPLES,
+    FoundPeaks,
     Laws,
     MadeModel,
-    Peaks,
     balance_level,
     coarse_model,
     linear_of,
@@ -204,7 +204,7 @@ def _around(
     along: AlongModel | None = None
     for name, model in solution.models.items():
         mine = tuple(c for c in solution.curves if c.stiffness == name and not c.empty)
-        peaks = Peaks(plan, model, solution.linear[name], mine)
+        peaks = FoundPeaks(plan, model, solution.linear[name], mine)
         solution.searched[name], bare = peaks, peaks.bare
         if scene.estimates:
             for one in made[name]:
