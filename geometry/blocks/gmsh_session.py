@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import logging
 import math
+import signal
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -58,6 +60,25 @@ def import_gmsh() -> ModuleType:
 
 
 @contextmanager
+def _broken_pipes_stay_errors() -> Iterator[None]:
+    """gmsh gives SIGPIPE its default action: a closed pipe would then end the process silently,
+    where Python ignores the signal and raises BrokenPipeError. Through the C API, as Python's own
+    function works in the main thread only.
+    """
+    if not hasattr(signal, "SIGPIPE"):
+        yield
+        return
+    get, put = ctypes.pythonapi.PyOS_getsig, ctypes.pythonapi.PyOS_setsig
+    get.restype = ctypes.c_void_p
+    put.restype, put.argtypes = ctypes.c_void_p, (ctypes.c_int, ctypes.c_void_p)
+    action = get(int(signal.SIGPIPE))
+    try:
+        yield
+    finally:
+        put(int(signal.SIGPIPE), action)
+
+
+@contextmanager
 def session(name: str) -> Iterator[ModuleType]:
     """A fresh gmsh model.
 
@@ -79,7 +100,8 @@ def session(name: str) -> Iterator[ModuleType]:
         if not running:
             # no user's ~/.gmshrc, no signal handler: Ctrl-C stays Python's, and other threads may
             # mesh
-            gmsh.initialize(argv=["upd"], readConfigFiles=False, interruptible=False)
+            with _broken_pipes_stay_errors():
+                gmsh.initialize(argv=["upd"], readConfigFiles=False, interruptible=False)
         before = {option: gmsh.option.getNumber(option) for option in _OPTIONS}
         current = gmsh.model.getCurrent() if running else ""
         try:
