@@ -20,15 +20,15 @@ from upd.analyses.forced.performance import (
     RatioPeak,
     RatioPoint,
     beside_best,
+    further_points,
     harmonics_of,
     of_curve,
     peaks_at,
     performance_of,
     ratios_of,
+    with_curves,
 )
 from upd.analyses.forced.solution import ForcedSolution
-from upd.errors import ConvergenceError
-from upd.linalg.processes import SideProcesses
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 
@@ -190,33 +190,26 @@ def test_two_more_lie_between_the_best_and_its_neighbours() -> None:
     assert beside_best([*V_SHAPE, lost]) == beside_best(V_SHAPE)
 
 
-def test_the_curve_has_the_runs_own_points_once_and_two_beside_the_best(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_curve_has_the_runs_own_points_once_and_two_beside_the_best() -> None:
     solution = solved(250.0)
     (curve,) = solution.curves
-    asked: list[float] = []
-
-    def solve(plan: Any, model: Any, ratio: float, highest: int) -> RatioPoint:
-        asked.append(ratio)
-        if ratio > 250.0:
-            raise ConvergenceError("lost")
-        return point(ratio, 99.0)
-
-    monkeypatch.setattr(performance, "peaks_at", solve)
     before = [point(25.0, 300.0), point(250.0 * (1.0 + 1e-9), 1.0), point(2500.0, 310.0)]
-    with SideProcesses(count=0) as beside:
-        found = performance_of(
-            solution.plan,
-            solution.models["thesis"],
-            solution.linear["thesis"],
-            before,
-            [curve],
-            beside,
-        )
-    assert asked == pytest.approx([math.sqrt(25.0 * 250.0), math.sqrt(250.0 * 2500.0)])
+    plan, model = solution.plan, solution.models["thesis"]
+    first = with_curves(before, [curve])
+    balance = replace(plan.scene.balance, harmonics=9)
+    choice = replace(plan.scene.performance, harmonics=3)
+    more = replace(plan, scene=replace(plan.scene, balance=balance, performance=choice))
+    jobs = further_points(more, model, first, before)
+    assert all(function is peaks_at for function, _ in jobs)
+    assert [arguments[3] for _, arguments in jobs] == [3, 3, 9], "the run's harmonics at the best"
+    asked = [arguments[2] for _, arguments in jobs]
+    middle = math.sqrt(25.0 * 250.0)
+    assert asked == pytest.approx([middle, math.sqrt(250.0 * 2500.0), 250.0])
+    further = [point(middle, 99.0), point(250.0, 1.01)]
+    found = performance_of(plan, solution.linear["thesis"], first, further)
+    assert found.again == (first[-1], further[1])
     ratios = [one.ratio for one in found.points]
-    assert ratios == pytest.approx([25.0, asked[0], 250.0, 2500.0])
+    assert ratios == pytest.approx([25.0, middle, 250.0, 2500.0])
     assert found.points[2].peaks == of_curve(curve).peaks, "its own point stands"
     assert found.best is found.points[1]
     assert found.stuck == max(p.height for s in solution.linear["thesis"].stuck_peaks.values()

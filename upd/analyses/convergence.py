@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
-from scipy.stats import f as f_distribution
-from scipy.stats import t as t_distribution
+from scipy.special import fdtri, stdtrit
 
 from upd.errors import InputError
 
@@ -402,11 +401,11 @@ def fitted_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
     best, n = min(found, key=lambda p: found[p].squares), len(q)
     least = found[best].squares / (n - 3)
     gain = found[_FORMAL].squares - found[best].squares
-    free = best < _FORMAL and gain > f_distribution.ppf(CONFIDENCE, 1, n - 3) * least
+    free = best < _FORMAL and gain > fdtri(1, n - 3, CONFIDENCE) * least
     p, dof = (best, n - 3) if free else (_FORMAL, n - 2)
     fit = found[p]
     scatter = math.sqrt(fit.squares / dof * fit.variance)
-    half_width = float(t_distribution.ppf(0.5 + 0.5 * CONFIDENCE, dof)) * scatter
+    half_width = float(stdtrit(dof, 0.5 + 0.5 * CONFIDENCE)) * scatter
     away = _CONFIRMED * abs(fine - fit.limit)
     order = float(p) if away > half_width else float("nan")
     shown = f"order {p:.1f}" if away > half_width else "scatter above convergence"

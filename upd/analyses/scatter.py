@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import t as student
+from scipy.special import stdtr, stdtrit
 
 from upd.analyses.convergence import CONFIDENCE, SCATTER, ErrorEstimate
 from upd.results.case import Case
@@ -92,7 +92,7 @@ def sampled_error(sizes: Sequence[float], samples: Sequence[FloatArray]) -> Erro
     bound = _exceeded(away, spread, weight, freedom)
     k = int(weight.argmax())
     share = ", ".join(f"{100 * w:.0f} % order {p:g}" for p, w in zip(ORDERS, weight, strict=True))
-    clear = abs(away[k]) > student.ppf(0.5 + 0.5 * CONFIDENCE, freedom) * spread[k]
+    clear = abs(away[k]) > stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE) * spread[k]
     return ErrorEstimate(
         float(np.expm1(bound)) if logarithmic else bound,
         ORDERS[k] if clear else float("nan"),
@@ -118,13 +118,13 @@ def _exceeded(away: FloatArray, spread: FloatArray, weight: FloatArray, freedom:
     """
     likely = weight > 0.0
     away, spread, weight = np.abs(away[likely]), spread[likely], weight[likely]
-    highest = float(np.max(away + student.ppf(0.5 + 0.5 * CONFIDENCE, freedom) * spread))
+    highest = float(np.max(away + stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE) * spread))
     if not np.all(spread > 0.0):
         return highest
 
     def excess(bound: float) -> float:
-        beyond = student.sf((bound - away) / spread, freedom)
-        beyond = beyond + student.sf((bound + away) / spread, freedom)
+        beyond = stdtr(freedom, -(bound - away) / spread)
+        beyond = beyond + stdtr(freedom, -(bound + away) / spread)
         return float(weight @ beyond) - (1.0 - CONFIDENCE)
 
     return float(brentq(excess, 0.0, highest)) if excess(highest) < 0.0 else highest

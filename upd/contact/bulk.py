@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import fftconvolve
 
 from upd.contact.model import Body
 from upd.contact.patch import Patch
@@ -151,6 +150,9 @@ def half_space_mean(patch: Patch, forces: Array, E: float, nu: float) -> float:
     ----------
     K. L. Johnson, Contact Mechanics (1985), eq. (3.25).
     """
+    # slow to import: only where it is called
+    from scipy.signal import fftconvolve
+
     nx, ny = forces.shape
     dx, dy = (float(np.diff(lines).mean()) for lines in (patch.X, patch.Y))
     x, y = np.meshgrid(np.arange(1 - nx, nx) * dx, np.arange(1 - ny, ny) * dy, indexing="ij")

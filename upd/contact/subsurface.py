@@ -21,7 +21,6 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
-from scipy.signal import fftconvolve
 
 from upd.reference import cerruti_rectangle_stress, love_rectangle_stress, von_mises
 
@@ -184,6 +183,9 @@ def _stress(
     offsets: Sequence[Array], depth: float, half: Array, cells: Sequence[Array], nu: float
 ) -> Array:
     """Stress tensors (n, m, 3, 3) in MPa at the middles of the cells, at one depth."""
+    # slow to import: only where it is called
+    from scipy.signal import fftconvolve
+
     X, Y = offsets
     kernels = [love_rectangle_stress(X, Y, depth, half[0], half[1], 1.0, nu)]
     if len(cells) > 1:

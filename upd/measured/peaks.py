@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import find_peaks, peak_prominences
 from scipy.special import ndtri
 
 from upd.mesh import FloatArray
@@ -85,6 +84,9 @@ def noisy_peaks(
     >>> round(peak.frequency, 1), round(peak.zeta, 3)
     (340.0, 0.005)
     """
+    # slow to import: only where it is called
+    from scipy.signal import find_peaks, peak_prominences
+
     f, a = np.asarray(frequency, dtype=np.float64), np.asarray(magnitude, dtype=np.float64)
     level = np.log(np.maximum(a, np.finfo(float).tiny))
     top, _ = find_peaks(level, prominence=np.log(PROMINENCE))

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import find_peaks, peak_widths
 
 from upd.analyses.contact.plan import NORMAL
 from upd.analyses.flat.solution import FlatNormalCase, FlatSolution
@@ -116,6 +115,9 @@ def pressure_peaks(solution: FlatSolution, case: FlatNormalCase) -> list[tuple[f
     The outermost columns are left out: the edge of a flat punch has a peak of its own on any mesh.
     A peak stands out by a tenth of the largest value.
     """
+    # slow to import: only where it is called
+    from scipy.signal import find_peaks, peak_widths
+
     found, origin = [], corner(solution)
     for lattice in lattices(solution):
         force = lattice.field(case.solution.force, extensive=True)[1:-1]

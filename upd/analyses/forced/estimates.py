@@ -311,17 +311,21 @@ def _of_best(
     if not mine:
         return ()
     worst = max(mine.values(), key=lambda told: math.fsum(p.error for p in told if p.known))
-    again, own = solution.best_again.get(name), best.worst
     out = [replace(p, basis=f"as of the run's peaks: {p.basis}") for p in worst]
-    same = [] if again is None or own is None else again.peaks
-    for p in same:
-        if own is not None and (p.blade, p.number) == (own.blade, own.number):
-            here, there = (own.frequency, p.frequency)
+    again, top = performance.again, best.worst
+    if again is not None and top is not None:
+        few, more = (
+            next((p for p in one.peaks if (p.blade, p.number) == (top.blade, top.number)), None)
+            for one in again
+        )
+        if few is not None and more is not None:
+            here, there = (few.frequency, more.frequency)
             if kind == "accelerance":
-                here, there = own.height, p.height
+                here, there = few.height, more.height
             out = [part for part in out if part.source != HARMONICS]
             change = abs(there / here - 1.0)
-            out.append(ErrorPart(HARMONICS, change, "change with the harmonics of the run"))
+            basis = f"change with the harmonics of the run, at F_C/F_E {again[0].ratio:.3g}"
+            out.append(ErrorPart(HARMONICS, change, basis))
     if one.name == "best_reduction" and one.value:
         factor = abs((100.0 - one.value) / one.value)
         out = [replace(p, error=factor * p.error) for p in out]

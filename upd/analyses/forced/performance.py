@@ -21,9 +21,8 @@ from upd.analyses.forced.mode_peaks import ModePeak, numbered_peaks
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.paths import LONG_STEPS, SWEEP_POINTS, fine_grid, respond
 from upd.analyses.forced.plan import ForcedPlan
-from upd.errors import UpdError
 from upd.linalg.parallel import threads_for
-from upd.linalg.processes import SideProcesses
+from upd.linalg.processes import Job
 from upd.scene.forced_contact import SIDES, Side
 
 #: points of a path from one end, before that from the other is taken
@@ -70,23 +69,26 @@ class Performance:
         Highest peaks of both limits, (m/s2)/N.
     harmonics
         The highest of the balance.
+    again
+        A point near the best one, and the same with the harmonics of the run; None where these are
+        no more.
     """
 
     points: tuple[RatioPoint, ...]
     free: float
     stuck: float
     harmonics: int
+    again: tuple[RatioPoint, RatioPoint] | None = None
 
     @property
     def known(self) -> list[RatioPoint]:
         """The points with a peak."""
-        return [one for one in self.points if one.peaks and one.arrived]
+        return _known(self.points)
 
     @property
     def best(self) -> RatioPoint | None:
         """The point whose highest peak is lowest; None without points."""
-        heights = [one.worst.height for one in self.known if one.worst is not None]
-        return self.known[int(np.argmin(heights))] if heights else None
+        return _best(self.points)
 
     @property
     def inside(self) -> bool:
@@ -195,7 +197,7 @@ def harmonics_of(plan: ForcedPlan) -> int:
 
 def beside_best(points: Sequence[RatioPoint]) -> list[float]:
     """F_C/F_E between the best one and its neighbours."""
-    known = sorted((one for one in points if one.peaks and one.arrived), key=lambda one: one.ratio)
+    known = sorted(_known(points), key=lambda one: one.ratio)
     heights = [one.worst.height for one in known if one.worst is not None]
     if len(heights) < 3:
         return []
@@ -204,38 +206,72 @@ def beside_best(points: Sequence[RatioPoint]) -> list[float]:
     return [math.sqrt(a * b) for a, b in pairs]
 
 
-def performance_of(
-    plan: ForcedPlan,
-    model: Model,
-    linear: LinearCurves,
-    points: Iterable[RatioPoint],
-    curves: Iterable[ForcedCurve],
-    beside: SideProcesses,
-) -> Performance:
-    """The performance curve of solved points, with more beside the best of them.
+def with_curves(points: Sequence[RatioPoint], curves: Iterable[ForcedCurve]) -> list[RatioPoint]:
+    """Points solved by `peaks_at` and those of the run's curves, of the same contact stiffness."""
+    own = [of_curve(one) for one in curves if not one.empty]
+    # of two of the same F_C/F_E the one that arrived
+    own = [o for o in own if o.arrived or not any(_same(o.ratio, p.ratio) for p in points)]
+    return [*(one for one in points if not any(_same(one.ratio, o.ratio) for o in own)), *own]
+
+
+def further_points(
+    plan: ForcedPlan, model: Model, points: Sequence[RatioPoint], first: Sequence[RatioPoint]
+) -> list[Job]:
+    """What is solved once the first points are known: curves beside the best of all, and the best
+    of the first again with the harmonics of the run, where it has more.
 
     Parameters
     ----------
     points
-        Solved by `peaks_at`.
-    curves
-        Of the run, the same contact stiffness: more points.
-    beside
-        Where the points beside the best are solved.
+        Those of `with_curves`.
+    first
+        Those solved by `peaks_at`.
     """
-    highest = harmonics_of(plan)
-    own = [of_curve(one) for one in curves if not one.empty]
-    # of two of the same F_C/F_E the one that arrived
-    own = [o for o in own if o.arrived or not any(_same(o.ratio, p.ratio) for p in points)]
-    mine = [one for one in points if not any(_same(one.ratio, o.ratio) for o in own)]
-    found = [*mine, *own]
-    jobs = [(peaks_at, (plan, model, ratio, highest)) for ratio in beside_best(found)]
-    found += [one for one in beside.run(jobs) if not isinstance(one, UpdError)]
+    highest, run = harmonics_of(plan), plan.scene.balance.harmonics
+    jobs: list[Job] = [(peaks_at, (plan, model, r, highest)) for r in beside_best(points)]
+    best = _best(first)
+    if best is not None and run != "adaptive" and highest < int(run):
+        jobs.append((peaks_at, (plan, model, best.ratio, int(run))))
+    return jobs
+
+
+def performance_of(
+    plan: ForcedPlan,
+    linear: LinearCurves,
+    points: Iterable[RatioPoint],
+    further: Iterable[RatioPoint],
+) -> Performance:
+    """The performance curve of solved points.
+
+    Parameters
+    ----------
+    points
+        Those of `with_curves`.
+    further
+        Those of `further_points`.
+    """
+    found, again = list(points), None
+    for one in further:
+        base = next((p for p in found if _same(p.ratio, one.ratio)), None)
+        if base is None:
+            found.append(one)
+        else:
+            again = (base, one)
     free, stuck = (
         max((p.height for s in SIDES for p in peaks[s]), default=float("nan"))
         for peaks in (linear.free_peaks, linear.stuck_peaks)
     )
-    return Performance(tuple(sorted(found, key=lambda one: one.ratio)), free, stuck, highest)
+    ordered = tuple(sorted(found, key=lambda one: one.ratio))
+    return Performance(ordered, free, stuck, harmonics_of(plan), again)
+
+
+def _known(points: Iterable[RatioPoint]) -> list[RatioPoint]:
+    return [one for one in points if one.peaks and one.arrived]
+
+
+def _best(points: Iterable[RatioPoint]) -> RatioPoint | None:
+    """The point whose highest peak is lowest; None without points."""
+    return min(_known(points), key=lambda one: max(p.height for p in one.peaks), default=None)
 
 
 def _same(a: float, b: float) -> bool:

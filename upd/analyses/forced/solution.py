@@ -134,7 +134,6 @@ class ForcedSolution:
     marched: list[MarchedPeak] = field(default_factory=list)
     band: list[BandPoint] = field(default_factory=list)
     performances: dict[str, Performance] = field(default_factory=dict)
-    best_again: dict[str, RatioPoint] = field(default_factory=dict)
     omissions: list[Resolved] = field(default_factory=list)
     levels: dict[str, list[PeakLevel]] = field(default_factory=dict)
     searched: dict[str, FoundPeaks] = field(default_factory=dict)

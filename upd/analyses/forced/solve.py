@@ -34,10 +34,12 @@ from upd.analyses.forced.paths import grid, quiet
 from upd.analyses.forced.peaks import solve_curve
 from upd.analyses.forced.performance import (
     RatioPoint,
+    further_points,
     harmonics_of,
     peaks_at,
     performance_of,
     ratios_of,
+    with_curves,
 )
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import BandPoint, ForcedSolution, TimeMarch
@@ -56,6 +58,8 @@ from upd.progress import Stages
 log = logging.getLogger(__name__)
 #: what a process beside this one imports at once
 _MODULES = ("upd.analyses.forced.inputs", "upd.analyses.forced.performance")
+#: kinds of jobs without which the answer stands
+_BESIDE_THE_ANSWER = ("input", "along", "performance")
 #: other starts of the sliders of a band
 STARTS = ("mid", "upper", "lower")
 
@@ -202,6 +206,7 @@ def _around(
         into.append((kind, name))
 
     along: AlongModel | None = None
+    further: list[RatioPoint] = []
     for name, model in solution.models.items():
         mine = tuple(c for c in solution.curves if c.stiffness == name and not c.empty)
         peaks = FoundPeaks(plan, model, solution.linear[name], mine)
@@ -214,6 +219,9 @@ def _around(
             add("level", name, balance_level, bare, SAMPLES, 0, 2)
         asked = scene.wants("inputs") or scene.left_out.solves
         tops = few_harmonics(peaks) if name == first and asked else {}
+        if name == first and scene.wants("performance"):
+            for function, given in further_points(plan, model, with_curves(points, mine), points):
+                add("performance", name, function, *given)
         if name == first and scene.wants("inputs"):
             for one_input in INPUTS:
                 add("input", name, input_effects, bare, tops, one_input.name)
@@ -227,10 +235,10 @@ def _around(
                 add("along", name, along_changes, bare, tops, along)
     found = beside.run(jobs)
     for place, one in zip(into, found, strict=True):
-        if isinstance(one, UpdError) and place[0] in ("input", "along"):
+        if isinstance(one, UpdError) and place[0] in _BESIDE_THE_ANSWER:
             # beside the answer: it stands without
             log.info("%s of %s: %s", *place, one_line(one))
-    kept = [k for k, (kind, _) in enumerate(into) if kind not in ("input", "along")]
+    kept = [k for k, (kind, _) in enumerate(into) if kind not in _BESIDE_THE_ANSWER]
     _checked([found[k] for k in kept])
     for (kind, name), one in zip(into, found, strict=True):
         if isinstance(one, UpdError):
@@ -239,24 +247,17 @@ def _around(
             solution.levels.setdefault(name, []).append(one)
         elif kind == "input":
             solution.effects.setdefault(name, []).extend(one)
+        elif kind == "performance":
+            further.append(one)
         elif kind == "band":
             solution.band.append(BandPoint(first, name, one))
         else:
             solution.omissions += one
     if scene.wants("performance"):
-        _performance(solution, first, points, beside)
-
-
-def _performance(
-    solution: ForcedSolution, name: str, points: Sequence[RatioPoint], beside: SideProcesses
-) -> None:
-    plan, model = solution.plan, solution.models[name]
-    mine = [c for c in solution.curves if c.stiffness == name]
-    found = performance_of(plan, model, solution.linear[name], points, mine, beside)
-    solution.performances[name] = found
-    run = plan.scene.balance.harmonics
-    if found.best is not None and run != "adaptive" and found.harmonics < int(run):
-        solution.best_again[name] = peaks_at(plan, model, found.best.ratio, int(run))
+        mine = tuple(c for c in solution.curves if c.stiffness == first)
+        solution.performances[first] = performance_of(
+            plan, solution.linear[first], with_curves(points, mine), further
+        )
 
 
 def _band_jobs(solution: ForcedSolution, name: str) -> Iterator[tuple[Any, ...]]:

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from upd.dynamics import find_peaks
 from upd.errors import InputError
@@ -229,7 +229,7 @@ def _damping(
 def _within(result: Result, standard_error: float) -> Result:
     """A fitted number with what the noise leaves of it, by its relative standard error."""
     basis = "95 % interval of the fit: 1.96 standard errors"
-    bound = float(norm.ppf(0.975)) * standard_error
+    bound = float(ndtri(0.975)) * standard_error
     return with_parts(result, [ErrorPart("measurement noise", bound, basis)])
 
 
