@@ -57,8 +57,8 @@ PATCHES = [
     for offset in (1.5, 5.0, 8.0)
 ]
 #: F_C/F_E -> peaks of the right blade in phase and out of phase, Hz and (m/s2)/N, frictionless
-#: static state, an independent program on the reconstructed rig; at 194 in phase asymmetric its time
-#: integration; without the one that folds
+#: static state, an independent program on the reconstructed rig (asymmetric at 194 in phase: its
+#: time integration); without the one that folds
 FRICTION: dict[str, dict[float, tuple[tuple[float, float] | None, ...]]] = {
     "asymmetric": {
         2000.0: ((404.2, 179.0), (432.8, 220.0)),
