@@ -221,7 +221,7 @@ def store(every: Iterable[Judged]) -> None:
 
 
 def responses() -> list[Judged]:
-    """Peaks of responses: their bounds, and the errors with which their notes begin, in per cent."""
+    """Peaks of responses: their bounds, and the errors with which notes begin, in per cent."""
     if not FORCED.is_file():
         return []
     with FORCED.open(newline="", encoding="utf-8") as file:
