@@ -1,21 +1,21 @@
-"""Every benchmark as one Markdown table with the machine's description.
+"""Every benchmark's rows, printed as CSV.
 
 - ``./run.sh python benchmarks/run.py``: all of them;
 - ``./run.sh python benchmarks/run.py hertz assembly``: those whose name (accuracy/hertz) contains
   one of the words; a whole name is that benchmark alone;
-- ``./run.sh python benchmarks/run.py hertz --write``: the same, and put their rows into
-  benchmarks/README.md.
+- ``./run.sh python benchmarks/run.py hertz --write``: the same, kept as
+  benchmarks/results/accuracy-hertz.csv.
 
-``--write`` replaces what stands between two comments of that file: one section per benchmark, with
-the machine it ran on. Sections of benchmarks that were not run, failed or were skipped stay as they
-are.
+A file holds the rows of one benchmark with the machine that it ran on. Files of benchmarks that
+were not run, failed or were skipped stay as they are.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import importlib.util
-import re
+import io
 import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
@@ -27,10 +27,7 @@ from upd.cli.doctor import machine
 from upd.errors import UpdError
 
 HERE = Path(__file__).parent
-COLUMNS = ("name", "case", "value", "unit", "target", "note")
-HEAD = ("| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS))
-#: the table lies between these two lines of README.md
-BEGIN, END = "<!-- table:begin -->", "<!-- table:end -->"
+COLUMNS = ("name", "case", "value", "unit", "target", "note", "machine")
 
 Row = Mapping[str, Any]
 
@@ -50,6 +47,11 @@ def title(path: Path) -> str:
     return f"{path.parent.name}/{path.stem.removeprefix('bench_')}"
 
 
+def kept_in(folder: Path, name: str) -> Path:
+    """The file of a benchmark's rows: accuracy/hertz is results/accuracy-hertz.csv."""
+    return folder / "results" / f"{name.replace('/', '-')}.csv"
+
+
 def chosen_by(words: Sequence[str], names: Sequence[str]) -> list[str]:
     """The names that contain one of the words, all without any; a whole name is that one alone."""
     return [
@@ -60,88 +62,54 @@ def chosen_by(words: Sequence[str], names: Sequence[str]) -> list[str]:
 
 
 def cell(value: Any) -> str:
-    """A table cell: four digits for numbers, one line for texts."""
-    return (
-        f"{value:.4g}"
-        if isinstance(value, float)
-        else " ".join(str(value if value is not None else "").replace("|", r"\|").split())
-    )
+    """Four digits of a number, one line of a text."""
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return " ".join(str("" if value is None else value).split())
 
 
-def line(row: Row) -> str:
-    """A row of the table. Rows name their bound "target" or "reference"."""
-    filled = {**row, "target": row.get("target", row.get("reference"))}
-    return "| " + " | ".join(cell(filled.get(c)) for c in COLUMNS) + " |"
-
-
-def section(rows: Iterable[Row], where: str) -> str:
-    """What stands below a benchmark's heading: the machine and the table."""
-    return "\n".join([f"{where}:", "", *HEAD, *map(line, rows)])
-
-
-def sections(table: str) -> dict[str, str]:
-    """Name of a benchmark -> what stands below its heading in the text between the comments."""
-    parts = re.split(r"^### (.+)$", table, flags=re.MULTILINE)
-    return {name.strip(): text.strip() for name, text in zip(parts[1::2], parts[2::2], strict=True)}
-
-
-def replaced(text: str, new: Mapping[str, str]) -> str:
-    """The text of README.md with the sections ``new`` put in.
-
-    Raises ValueError when the two comments are not there.
-    """
-    found = re.fullmatch(f"(.*?{BEGIN}\n)(.*?)({END}.*)", text, flags=re.DOTALL)
-    if found is None:
-        raise ValueError(f"the lines {BEGIN} and {END} are not there; put them around the table")
-    before, table, after = found.groups()
-    kept = {**sections(table), **new}
-    return (
-        before + "".join(f"\n### {name}\n\n{kept[name]}\n" for name in sorted(kept)) + "\n" + after
-    )
-
-
-def write(path: Path, new: Mapping[str, str]) -> None:
-    """Put sections into the file at ``path``, whole or not at all."""
-    write_text(path, replaced(path.read_text(encoding="utf-8"), new))
+def lines(rows: Iterable[Row], columns: Sequence[str] = COLUMNS) -> str:
+    """Rows as CSV. They name their bound "target" or "reference"."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    for row in rows:
+        filled = {**row, "target": row.get("target", row.get("reference"))}
+        writer.writerow([cell(filled.get(column)) for column in columns])
+    return text.getvalue()
 
 
 def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> None:
     """Run the chosen benchmarks below ``folder`` and print their rows."""
-    parser = argparse.ArgumentParser(
-        description="Run benchmarks and print their rows as a Markdown table."
-    )
+    parser = argparse.ArgumentParser(description="Run benchmarks and print their rows as CSV.")
     parser.add_argument(
         "words",
         nargs="*",
-        help="parts of names like accuracy/hertz, or whole ones; all benchmarks when there are "
-        "none",
+        help="parts of names like accuracy/hertz, or whole ones; without any, all benchmarks",
     )
     parser.add_argument(
-        "--write", action="store_true", help="put the rows into README.md beside the benchmarks"
+        "--write", action="store_true", help="keep the rows in results/ beside the benchmarks"
     )
     chosen = parser.parse_args(arguments)
-    if chosen.write:
-        write(
-            folder / "README.md", {}
-        )  # whether it can be written is known before the first benchmark
-    print(f"Machine: {machine()}\n")
-    print("\n".join(HEAD))
+    here = machine()
+    print(f"Machine: {here}\n")
+    print(",".join(COLUMNS[:-1]))
     paths = {title(path): path for path in sorted(folder.glob("*/bench_*.py"))}
     words = [word.removeprefix("bench_") for word in chosen.words]
     for name in chosen_by(words, list(paths)):
-        path = paths[name]
         begin = time.perf_counter()
         try:
-            rows = list(load(path).run())
+            rows = list(load(paths[name]).run())
         except UpdError as error:
-            rows = [{"name": path.stem, "note": f"failed: {error}"}]
-        for row in rows:
-            print(line(row), flush=True)
+            rows = [{"name": name, "note": f"failed: {error}"}]
+        print(lines(rows, COLUMNS[:-1]), end="", flush=True)
         if chosen.write and any(row.get("value") is not None for row in rows):
-            write(folder / "README.md", {name: section(rows, machine())})
+            file = kept_in(folder, name)
+            file.parent.mkdir(exist_ok=True)
+            head = dict(zip(COLUMNS, COLUMNS, strict=True))
+            write_text(file, lines([head, *({**row, "machine": here} for row in rows)]))
         elif chosen.write:
-            print(f"{name}: nothing was measured, its rows in README.md stay", file=sys.stderr)
-        print(f"{path.stem}: {time.perf_counter() - begin:.0f} s", file=sys.stderr)
+            print(f"{name}: nothing was measured, its file in results/ stays", file=sys.stderr)
+        print(f"{name}: {time.perf_counter() - begin:.0f} s", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -3,15 +3,14 @@
 Every static and modal scene at two settings, with the estimates a run makes by default, against the
 closed form or a far finer mesh. The numbers of a setting stay in estimates.csv until it is run
 again; ``python benchmarks/accuracy/bench_estimates_runs.py hertz rig`` runs these scenes alone. The
-figure estimates.png shows all of them, and the parts of responses' errors that ``estimates_forced``
-left in README.md.
+figure estimates.png shows all of them, and the peaks of responses that ``estimates_forced`` left in
+results/.
 """
 
 from __future__ import annotations
 
 import csv
 import math
-import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,7 +26,7 @@ from upd.plot.matplotlib import write_sheet
 
 PICTURE = Path(__file__).parent / "estimates.png"
 POINTS = PICTURE.with_suffix(".csv")
-TABLES = Path(__file__).parents[1] / "README.md"
+FORCED = Path(__file__).parents[1] / "results" / "accuracy-estimates_forced.csv"
 #: shares in per cent that are wanted, and how many times the true error an estimate may be
 BOUNDED, NEAR, TIMES = 95.0, 66.7, 5.0
 Row = dict[str, Any]
@@ -221,19 +220,16 @@ def store(every: Iterable[Judged]) -> None:
             writer.writerow((one.scene, one.setting, one.name, *errors))
 
 
-#: a row of a part of a response's error: source, case, estimated and true in per cent
-_PART = re.compile(r"\| ([^|]+) \| ([^|]+) \| ([\d.e+-]+) \| % \| true ([\d.e+-]+) \| ratio (?!no)")
-
-
 def responses() -> list[Judged]:
-    """The parts of responses' errors above rounding, from the table of ``estimates_forced``."""
-    text = TABLES.read_text(encoding="utf-8")
-    _, _, text = text.partition("### accuracy/estimates_forced")
-    text, _, _ = text.partition("\n### ")
-    return [
-        Judged("responses, by source", case, source, float(said) / 100.0, float(true) / 100.0)
-        for source, case, said, true in _PART.findall(text)
-    ]
+    """Peaks of responses: their bounds, and the errors with which notes begin, in per cent."""
+    if not FORCED.is_file():
+        return []
+    with FORCED.open(newline="", encoding="utf-8") as file:
+        return [
+            Judged("responses", row["case"], row["name"], said / 100.0, true / 100.0)
+            for row in csv.DictReader(file)
+            for said, true in [(float(row["value"]), float(row["note"].split()[1]))]
+        ]
 
 
 def rows(case: str, mine: list[Judged]) -> Iterator[Row]:

@@ -58,7 +58,7 @@ def test_without_the_other_code_one_row_says_what_to_install(
     (row,) = module.run()
     assert row["case"] == "skipped"
     assert install in row["note"]
-    assert "value" not in row, "a skipped benchmark leaves its rows in the README"
+    assert "value" not in row, "a skipped benchmark leaves its earlier rows"
 
 
 def test_the_other_code_gets_our_problem(monkeypatch: pytest.MonkeyPatch) -> None:
