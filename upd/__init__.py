@@ -8,25 +8,31 @@
 
 Units everywhere inside: mm, N, MPa, tonne, s.
 
-The rooms, from what a user calls down to what everything stands on; each imports only from rooms
-below it, and none in a circle (held by the contracts in pyproject.toml):
+The rooms, from what a user calls down to what everything rests on. Each imports only from rooms
+below it, none in a circle; contracts in pyproject.toml hold this.
 
-    cli         the commands: thin, each is a call a Python user can make sizing      which damper,
-    told before any dynamics fitting     which inputs give wanted numbers
-    batch       everything that runs many times: grids, ladders, parameter
-    studies, sensitivities; one engine runner
-    one run: plan, solve, check, leave the run folder report      the run folder read back: page,
-    comparison, notebook, the PNG figures analyses    hertz, flat, modal, forced: each plans,
-    solves, lists its results, checks and describes its charts plot        a Chart of arrays, and
-    how it is drawn: matplotlib, plotly; pictures of modes and surfaces scene       scene.toml ->
-    frozen dataclasses                 matrices   K and M of other programs measured   measured
-    curves: files, comparison, damping contact     normal,
-    tilt, tangential, contact points         hbm        harmonic balance with friction dynamics
-    linear response, peaks, damping reduction   Guyan, Craig-Bampton                             fem
-    mesh -> K, M linalg      factorisation, Schur complement, modes           reference  closed
-    forms, usable by themselves mesh        Mesh, its checks and quality, recipes (the one door to
-    geometry), export results     cases, numbers, checks, arrays in netCDF cache       what is kept
-    on disk: keys, files written whole or not at all, locks units, labels, progress, errors
+    cli         the commands; each is a thin call that Python users can make
+    sizing      which damper: closed forms before any dynamics, the lowest worst peak
+    fitting     which inputs give wanted numbers
+    batch       many runs: sweeps, samples, studies
+    runner      one run: plan, solve, check, write the run folder
+    report      the run folder read back: page, comparison, notebook, figures
+    analyses    contact, modal, seated, forced: each plans, solves, checks and describes its charts
+    plot        a Chart of arrays drawn by matplotlib or plotly; pictures of modes and surfaces
+    scene       scene.toml -> frozen dataclasses
+    matrices    K and M of other programs
+    measured    measured curves: files, comparison, damping
+    contact     normal and tangential contact, tilt, contact points
+    hbm         harmonic balance with friction
+    dynamics    linear response, peaks, damping
+    reduction   Guyan, Craig-Bampton
+    fem         mesh -> K, M
+    linalg      factorisation, Schur complement, modes
+    reference   closed forms, usable by themselves
+    mesh        Mesh, checks and quality, recipes (the one door to geometry), export
+    results     cases, numbers, checks, arrays in netCDF
+    cache       files kept on disk: keys, locks, written whole or not at all
+    units, labels, progress, errors
 
 Beside the package: geometry/ (gmsh recipes, no physics), tests/ (by why a test can be trusted),
 benchmarks/.
@@ -60,7 +66,7 @@ if TYPE_CHECKING:
     from upd.scene import Scene, load_scene
     from upd.sizing import design
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 # Loaded on first use: `import upd` stays fast.
 _HOME = {

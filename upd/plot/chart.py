@@ -4,11 +4,12 @@ overlays.
 Each analysis package may have a module ``charts`` with two functions, both from the run folder's
 content alone:
 
-    charts(arrays, summary) -> list[Chart] headline(rows) -> list[dict]     the 5 to 8 rows of
-    summary["results"] an engineer asks for, most important first
+    charts(arrays, summary) -> list[Chart]
+    headline(rows) -> list[dict]    the 5 to 8 rows of summary["results"] that engineers ask for,
+                                    most important first
 
-arrays  : group -> name -> `Variable`, as they stand in result.nc.
-summary : summary.json, with the scene file's tables under "scene_file".
+    arrays     group -> name -> `Variable`, as in result.nc
+    summary    summary.json, with the scene file's tables under "scene_file"
 """
 
 from __future__ import annotations
