@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from upd.hbm import condensed, contacts, harmonics
 from upd.hbm.balance import Balance
+from upd.hbm.coulomb import LIFT, STICK
 from upd.hbm.modal import modal
 
 MOVES, STICKS, OPEN = 0, 1, 2
@@ -41,6 +42,12 @@ def problem(
     return b, rng.normal(size=b.size)
 
 
+def seen_state(samples: np.ndarray) -> int:
+    """Whether a point moves, sticks or is open, from its states over the cycle."""
+    kept = frozenset(samples.tolist())
+    return {frozenset({STICK}): STICKS, frozenset({LIFT}): OPEN}.get(kept, MOVES)
+
+
 @pytest.mark.parametrize(
     ("n", "kinds", "worth", "how"),
     [
@@ -59,6 +66,9 @@ def problem(
     static=st.booleans(),
     proportional=st.booleans(),
 )
+# its mean motion presses a point so hard that it never slips
+@example(seed=1309, omega=1.0, tangents=2, static=True, proportional=True)
+@example(seed=1391, omega=1.0, tangents=2, static=True, proportional=True)
 def test_condensed_correction_is_that_of_the_whole_matrix(
     n: int,
     kinds: list[int],
@@ -75,7 +85,8 @@ def test_condensed_correction_is_that_of_the_whole_matrix(
     residual, parts, slope = b.linearised(x, omega)
     assert parts is not None
     assert whole.jacobian is not None
-    assert [int(s) for s in parts.state] == kinds
+    assert list(parts.state) == [seen_state(one) for one in whole.contact.march.state]
+    assume([int(s) for s in parts.state] == kinds)
     size = np.abs(whole.residual).max()
     np.testing.assert_allclose(residual, whole.residual, atol=1e-11 * size)
     np.testing.assert_allclose(
