@@ -38,17 +38,18 @@ CONFIRMED = "confirmed by time integration"
 _SWEEP_ENERGY = 10.0 * TOLERANCE
 #: difference of the sum of the nodes' losses from that of the sweep: the rounding of its steps
 _NODES = 1e-9
-#: share of mu N that every point of a face carries before vibration: all is about to slip
-_MOBILISED = 1.0 - 1e-6
 
 
 def check_solution(solution: ForcedSolution) -> list[Check]:
     """All self-checks. None ends the run: a curve that stopped early is kept, with a warning."""
     checks: list[Check] = []
+    scene = solution.plan.scene
+    least = scene.damper.centrifugal / max(scene.excitation.centrifugal_to_force, default=np.inf)
     for name, model in solution.models.items():
-        checks += _model_checks(name, model)
+        checks += _model_checks(name, model, least)
     for name, faces in solution.faces.items():
-        checks += [_faces_balance(name, faces), _preloaded(name, faces.state, faces_mu(faces))]
+        checks.append(_faces_balance(name, faces))
+        checks.append(_preloaded(name, faces.state, faces_mu(faces), least))
     for curve in solution.curves:
         checks.append(_path(curve))
         if not curve.empty:
@@ -73,7 +74,7 @@ def faces_mu(faces: WholeFaces) -> float:
     return float(faces.march.friction.max(initial=0.0))
 
 
-def _model_checks(name: str, model: Model) -> list[Check]:
+def _model_checks(name: str, model: Model, least: float) -> list[Check]:
     """Static forces of the points in balance, and away from the limits of contact."""
     if model.state is None:
         return []
@@ -88,20 +89,20 @@ def _model_checks(name: str, model: Model) -> list[Check]:
             "report this scene",
             fatal=False,
         ),
-        _preloaded(name, model.state, mu),
+        _preloaded(name, model.state, mu, least),
     ]
 
 
-def _preloaded(name: str, state: StaticState, mu: float) -> Check:
-    """A face that carries nothing, or whose friction is all mobilised, before vibration.
+def _preloaded(name: str, state: StaticState, mu: float, least: float) -> Check:
+    """A face that carries nothing, or whose friction is all mobilised, before vibration: what is
+    left of it is below the least F_E of the run, in N.
 
     A stiff unilateral spring without preload, or a slider at its limit, has no amplitude scale: the
     response then does not tend to the stuck one as F_C/F_E grows, and motions are not unique.
     """
     empty = " and the ".join(state.empty)
-    with np.errstate(invalid="ignore"):
-        share = np.abs(state.T) / np.where(state.N > 0.0, mu * state.N, np.inf)
-    mobilised = mu > 0.0 and bool((share[state.N > 0.0] >= _MOBILISED).any())
+    left = (mu * state.N - np.abs(state.T))[state.N > 0.0]
+    mobilised = mu > 0.0 and bool((left < least).any())
     worst = 1.0 if state.empty or mobilised else 0.0
     what = (
         f"the {empty} face carries nothing before vibration"
