@@ -462,7 +462,7 @@ def found_again(
         np.linspace((1.0 - k * BAND) * f, (1.0 + k * BAND) * f, k * BAND_POINTS) for k in (1, 3)
     ]
     if any_height:
-        bands.append(np.linspace(e.start, e.stop, SWEEP_POINTS))
+        bands[1] = np.linspace(e.start, e.stop, SWEEP_POINTS)
     for band in bands:
         given: dict[str, Any] = {"harmonics": b.harmonics.numbers, "samples": b.samples}
         given["settings"] = replace(LONG_STEPS, most_points=_MOST_POINTS)
