@@ -434,8 +434,8 @@ def found_again(
     any_height: bool = False,
     **changes: Any,
 ) -> Found:
-    """A peak of another problem: climbed to from the run's top; in a band about it, as the highest
-    of several maxima, where the run has these or the climb fails.
+    """A peak of another problem: climbed to from the run's top; in a band about it, then in the
+    whole sweep, as the highest of several maxima, where the run has these or the climb fails.
 
     Parameters
     ----------
@@ -459,10 +459,10 @@ def found_again(
     f = ratio * top.frequency
     e = plan.scene.excitation
     bands = [
-        np.linspace((1.0 - k * BAND) * f, (1.0 + k * BAND) * f, k * BAND_POINTS) for k in (1, 3)
+        np.linspace((1.0 - BAND) * f, (1.0 + BAND) * f, BAND_POINTS),
+        # the loop of a fold may be longer than any band
+        np.linspace(e.start, e.stop, SWEEP_POINTS),
     ]
-    if any_height:
-        bands[1] = np.linspace(e.start, e.stop, SWEEP_POINTS)
     for band in bands:
         given: dict[str, Any] = {"harmonics": b.harmonics.numbers, "samples": b.samples}
         given["settings"] = replace(LONG_STEPS, most_points=_MOST_POINTS)
