@@ -204,11 +204,6 @@ class Result:
             else self.value / self.reference - 1.0
         )
 
-    @property
-    def thesis_error(self) -> float | None:
-        """`printed_error` under its former name."""
-        return self.printed_error
-
     def as_dict(self) -> dict[str, Any]:
         """The number as it stands in summary.json.
 

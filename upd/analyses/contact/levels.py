@@ -112,7 +112,6 @@ def companion_scene(scene: Scene, geometry: Mapping[str, Any]) -> Scene:
         loads=replace(scene.loads, cycle_steps=steps),
         geometry={**scene.geometry, **geometry},
         want=tuple(w for w in scene.want if w not in _SPARED) or scene.want,
-        mesh=replace(scene.mesh, accuracy=None),
         left_out=replace(scene.left_out, solve="no"),
         accuracy=UNKNOWN,
     )
