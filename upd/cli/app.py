@@ -396,12 +396,12 @@ def report(
 ) -> None:
     """Make the page of a run or a sweep again from its folder.
 
-    Of several runs, or several sweeps, one page that compares them.
+    Of several runs, one page that compares them.
 
     Parameters
     ----------
     runs
-        Run folders or sweep folders.
+        Folders of runs, or one folder of a sweep.
     out
         File of the comparison; by default comparison.html beside the first run folder.
     study
