@@ -474,24 +474,10 @@ def new(scene: str, file: Path) -> None:
 
 
 @app.command
-def doctor(*, calibrate: Annotated[bool, Parameter(negative=())] = False) -> int:
-    """Show versions, BLAS, threads, the linear solver found and the libraries gmsh needs.
-
-    Parameters
-    ----------
-    calibrate
-        Measure how fast this machine is, in about ten seconds when it has nothing else to do, and
-        remember it: predicted seconds are then its own.
-    """
-    from upd.cli.doctor import calibrate as measure
+def doctor() -> int:
+    """Show versions, BLAS, threads, the linear solver found and the libraries gmsh needs."""
     from upd.cli.doctor import examine
 
-    if calibrate:
-        table = Table("speed", "measured")
-        for what, found in measure():
-            table.add_row(what, found)
-        terminal.console.print(table)
-        return 0
     table = Table("what", "found")
     rows = examine()
     for what, found, fine in rows:
