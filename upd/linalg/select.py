@@ -98,10 +98,6 @@ class Prediction:
     factor_seconds: float = 0.0
     factor_nnz: float = 0.0
 
-    def threaded(self, speedup: float) -> float:
-        """Seconds where a factorisation is so many times faster than on one thread."""
-        return self.seconds - self.factor_seconds * (1.0 - 1.0 / speedup)
-
     def substitution(self) -> float:
         """Seconds of one right-hand side, forward and backward."""
         return 16.0 * self.factor_nnz / USUAL.solve_bytes

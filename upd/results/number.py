@@ -112,8 +112,8 @@ class InputPart:
 
 
 def read_input_part(data: Mapping[str, Any]) -> InputPart:
-    """The part that `InputPart.as_dict` wrote; older ones have the size of the change alone."""
-    half, change = data["half_width"], data.get("change", data["share"])
+    """The part that `InputPart.as_dict` wrote."""
+    half, change = data["half_width"], data["change"]
     return InputPart(
         str(data["path"]),
         math.inf if half is None else float(half),

@@ -346,15 +346,6 @@ def test_performance_shows_the_highest_peak_single_modes_limits_and_the_best() -
     assert (chart.x.log, chart.y.log, chart.figure) == (True, True, "performance")
 
 
-def test_a_performance_curve_of_an_older_run_is_left_out() -> None:
-    branch = group(
-        {"content": "performance", "stiffness": "own", "branch": "peak 1"},
-        ratio=values([2.0, 20.0], "point"),
-        peak_accelerance=values([9.0, 5.0], "point"),
-    )
-    assert forced.ANALYSIS.charts({"a": branch}, {}) == []
-
-
 # ---------------------------------------------------------------- modal analysis
 
 
