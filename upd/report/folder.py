@@ -51,7 +51,6 @@ RUN_FILES = (
     "modes_*.vtu",
     "reduced_*.nc",
     "matrices/reduced_*",
-    "animation_*/mode_*",
     "curves/*.csv",
     *(f"{name}.png" for name in FIGURES),
 )
