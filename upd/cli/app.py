@@ -379,12 +379,23 @@ def fit(
     out
         Folder; by default runs/fit-NAME.
     """
-    from upd.cli.fit import fit_on_terminal
+    from upd.fitting import fit as fit_inputs
+    from upd.scene import load_scene
 
     with Live() as live:
-        asked = {"to": to, "vary": vary, "starts": starts, "profiles": profiles}
-        reached = fit_on_terminal(terminal.console, live, scene, set or [], out, **asked)
-    return OK if reached else FAILED
+        loaded = load_scene(scene, set or [])
+        folder = out or Path("runs") / f"fit-{loaded.name}"
+        found = fit_inputs(
+            loaded, to, vary, starts=starts, profiles=profiles, out=folder, progress=live
+        )
+        for line in (
+            str(found),
+            f"Scene: {folder / found.scene.name}.toml",
+            f"Figure: {folder / 'fit.png'}",
+            f"Report: {folder / 'report.html'}",
+        ):
+            terminal.console.print(plain(line), soft_wrap=True)
+    return OK if found.status != "not reached" else FAILED
 
 
 @app.command

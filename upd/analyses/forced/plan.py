@@ -228,11 +228,9 @@ def _balance_samples(scene: ForcedScene) -> int:
     return sample_count(harmonics(range(_highest(scene) + 1)), None if given == "auto" else given)
 
 
-def _step_seconds(
-    scene: ForcedScene, size: Mapping[str, Mapping[str, int]], times: float = 1.0
-) -> float:
-    """Seconds of a Newton step with its factors, with so many times the contact points."""
-    points, n = times * _points(scene, size), times * _unknowns(scene, size)
+def _step_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
+    """Seconds of a Newton step with its factors."""
+    points, n = _points(scene, size), _unknowns(scene, size)
     factor = dense_s(_STEP_LU * 2.0 / 3.0 * n**3)
     factors = _ENTRY_S * n**2 + factor
     if n > WORTH_KEEPING:

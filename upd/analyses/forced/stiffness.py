@@ -47,15 +47,12 @@ class FaceLaw:
         Contact law in the axes of its patch, when its own points are used.
     source
         Where the totals come from.
-    anisotropy
-        Difference of a law's two tangential stiffnesses relative to their mean, which is K_T.
     """
 
     K_N: float
     K_T: float
     law: ContactLaw | None = None
     source: str = "given"
-    anisotropy: float | None = None
 
 
 def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceLaw]:
@@ -73,14 +70,8 @@ def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceLaw]:
         else:
             assert law is not None
             own = law if choice.points == "law" else None
-            both = law.k_t.sum(axis=0)
-            out[side] = FaceLaw(
-                float(law.k_n.sum()),
-                float(both.mean()),
-                own,
-                source,
-                float(np.ptp(both) / both.mean()),
-            )
+            K_T = float(law.k_t.sum(axis=0).mean())
+            out[side] = FaceLaw(float(law.k_n.sum()), K_T, own, source)
     return out
 
 
