@@ -1,9 +1,8 @@
 """Predicted seconds and memory of the ready scenes, of their elements and sizes, and what they use.
 
 Every run is a process of its own on one thread: seconds are those of its processor, which other
-work on the machine disturbs less than those of the clock, memory is its largest resident set. Run
-`upd doctor --calibrate` before. The finest hertz takes 9 GB and is left out where there are less
-than 14.
+work on the machine disturbs less than those of the clock, memory is its largest resident set. The
+finest hertz takes 9 GB and is left out where there are less than 14.
 """
 
 from __future__ import annotations

@@ -15,7 +15,6 @@ from upd.linalg import (
     compliance_amg,
     factorise,
     predict,
-    predict_pardiso,
     schur_complement,
 )
 from upd.linalg import select as select_module
@@ -232,16 +231,6 @@ def test_condensed_mass():
     )  # linear shape over length 2, mass 2: a third of it
     with pytest.raises(InputError, match="same dofs"):
         guyan_mass(M[:3][:, :3], K, kept)
-
-
-@pytest.mark.skipif(not has_pardiso(), reason="MKL is not installed")
-def test_analysis_predicts_the_factor():
-    K, _, _, top = body()
-    found = predict_pardiso(K, top)
-    assert found.factor_nnz == schur_complement(K, top, solver="pardiso").factor_nnz
-    assert found.flops > 0
-    assert found.peak_bytes > 8 * found.factor_nnz
-    assert predict_pardiso(K).factor_nnz < found.factor_nnz
 
 
 def test_model_of_cost():

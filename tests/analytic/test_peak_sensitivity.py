@@ -18,7 +18,7 @@ from upd.hbm.coulomb import LIFT, SLIP, STICK
 from upd.hbm.fourier import harmonics
 from upd.hbm.modal import modal
 from upd.hbm.parameter_change import ParameterChange
-from upd.hbm.peak_sensitivity import _slopes, peak_derivatives, point_derivatives
+from upd.hbm.peak_sensitivity import _slopes, peak_derivatives
 from upd.hbm.pieces import loop_area
 from upd.hbm.starts import first_point, newton
 from upd.reference.friction import jenkins_peak, jenkins_peak_frequency
@@ -188,13 +188,13 @@ def test_loss_at_fixed_frequency(name: str, state: str) -> None:
 def test_height_at_fixed_frequency(name: str, state: str) -> None:
     """Central differences converge to the derivative with order 2."""
     p, f, x = solved(state)
-    _, (exact,) = point_derivatives(balance(p), ROW, x, f, [change(p, name)])
+    (exact,) = _slopes(balance(p), ROW, x, f, [change(p, name)], None, 0.0).by_parameter
 
     def height(value: float) -> float:
         b = balance(p | {name: p[name] * value})
         again = newton(b, x, f)
         assert again is not None
-        return point_derivatives(b, ROW, again, f, [])[0]
+        return _slopes(b, ROW, again, f, [], None, 0.0).height
 
     found = errors(lambda h: (height(1 + h) - height(1 - h)) / (2 * h), float(exact))
     second_order(found, abs(float(exact)), 1e-9)
@@ -269,14 +269,14 @@ def test_other_starts_of_the_sliders(start: str) -> None:
         b = balance(p | {name: p[name] * value for name in ("mu", "k_t")}, start)
         again = newton(b, x, f)
         assert again is not None
-        return point_derivatives(b, ROW, again, f, [])[0]
+        return _slopes(b, ROW, again, f, [], None, 0.0).height
 
     b = balance(p, start)
     at = newton(b, x, f)
     assert at is not None
     law = b.contacts.law
     both = ParameterChange(mu=law.mu) + ParameterChange(k_t=law.k_t)
-    _, (exact,) = point_derivatives(b, ROW, at, f, [both])
+    (exact,) = _slopes(b, ROW, at, f, [both], None, 0.0).by_parameter
     found = errors(lambda h: (height(1 + h) - height(1 - h)) / (2 * h), float(exact))
     second_order(found, abs(float(exact)), 1e-9)
 
@@ -288,4 +288,4 @@ def test_no_derivative_where_there_is_none() -> None:
     law = replace(b.contacts.law, mu=np.zeros(2))
     none = Balance(b.modal, replace(b.contacts, law=law), HARMONICS, 64, b.static, b.dynamic)
     with pytest.raises(InputError, match="mu is 0 at a point"):
-        point_derivatives(none, ROW, x, f, [ParameterChange(mu=np.ones(2))])
+        _slopes(none, ROW, x, f, [ParameterChange(mu=np.ones(2))], None, 0.0)

@@ -175,13 +175,6 @@ def test_a_factor_of_two_is_read_on_logarithmic_axes() -> None:
     assert alone is not None and all(map(math.isnan, alone))
 
 
-def test_a_mode_over_the_ratios_where_it_has_a_peak() -> None:
-    points = (point(1.0, 5.0, 2.0), point(2.0, 3.0), point(4.0, 1.0, 6.0))
-    found = Performance(points, 300.0, 190.0, 3)
-    assert found.of_mode("right", 2).tolist() == [[1.0, 4.0], [402.0, 402.0], [2.0, 6.0]]
-    assert found.of_mode("left", 1).shape == (3, 0)
-
-
 def test_two_more_lie_between_the_best_and_its_neighbours() -> None:
     assert beside_best(V_SHAPE[::-1]) == pytest.approx([math.sqrt(1000.0), math.sqrt(1e5)])
     assert beside_best(V_SHAPE[:3]) == pytest.approx([math.sqrt(1000.0)])

@@ -16,7 +16,6 @@ from upd.hbm import (
     contacts,
     frequency_response,
     harmonics,
-    load_curve,
     rigid_damper,
 )
 
@@ -61,11 +60,6 @@ def test_centrifugal_force_needs_harmonic_0() -> None:
     assert oscillator(harmonics=(0, 1), **changes).status == "complete"
 
 
-def test_static_load_curve_needs_harmonic_0() -> None:
-    with pytest.raises(InputError, match="harmonic 0"):
-        load_curve(oscillator(harmonics=(1,)).balance, 0.18, [1.0, 2.0], static=True)
-
-
 def test_a_missing_harmonic_is_told() -> None:
     answer = oscillator(harmonics=(1, 3))
     for ask in (answer.amplitude, answer.peak):
@@ -106,9 +100,6 @@ def test_excitation_of_a_higher_harmonic_alone() -> None:
     np.testing.assert_allclose(second.stuck([1.0], w / 2), usual.stuck([1.0], w), rtol=1e-12)
     f, height = usual.peak([1.0])
     assert second.peak([1.0]) == pytest.approx((f / 2, height), rel=1e-5)
-    curves = [load_curve(a.balance, f, [0.5, 1.0, 2.0]) for a, f in ((usual, 0.18), (second, 0.09))]
-    ends = [curve.amplitude([1.0])[-1] for curve in curves]
-    assert ends[1] == pytest.approx(ends[0], rel=1e-6)
     assert second.amplitude([1.0], 2) == pytest.approx(second.amplitude([1.0]))
 
 

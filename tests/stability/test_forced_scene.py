@@ -316,7 +316,6 @@ def test_faults_are_told_together() -> None:
         ({"excitation.start": "600 Hz"}, "not below"),
         ({"balance.time_march": ["900 Hz"]}, "outside the sweep"),
         ({"damper.centrifugal": "0 N"}, "loose"),
-        ({"mesh.accuracy": "1 %"}, "mesh.accuracy"),
         ({"geometry.arrangement": "asymmetric"}, "left face needs"),
     ],
 )

@@ -5,8 +5,6 @@ Rocking, lift-off, limits of little and much load.
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 import pytest
 from scipy.linalg import block_diag, eigh
@@ -18,10 +16,8 @@ from upd.hbm import (
     contact_rows,
     contacts,
     frequency_response,
-    performance_curve,
     rigid_damper,
 )
-from upd.hbm.damper import attach
 from upd.hbm.march import steady_state
 from upd.hbm.modal import modal
 from upd.hbm.starts import from_stuck, newton, static_point
@@ -192,48 +188,6 @@ def test_static_sliders_are_where_the_static_loads_left_them() -> None:
     assert answer.status == "complete"
     lifted = answer.state[0, :, 2] == 1.0
     assert answer.state[1:, ~lifted, 0].min() >= 1 - 1 / answer.balance.samples
-
-
-@cache
-def curve() -> object:
-    little = wedge(0.02, frequencies=BAND[:2])
-    stuck = little.balance
-    M, _, K, points = attach(
-        block_diag(BLADE_M, BLADE_M),
-        np.zeros((6, 6)),
-        block_diag(BLADE_K, BLADE_K),
-        _blades(),
-        *_damper(),
-    )
-    k = np.concatenate(
-        [[v, t] for v, t in zip(stuck.contacts.law.k_n, stuck.contacts.law.k_t, strict=True)]
-    )
-    first = np.sqrt(eigh(K + points.B.T @ (k[:, None] * points.B), M)[0][:2]) / (2 * np.pi)
-    row = np.append(OUT, np.zeros(3))
-    return first, [performance_curve(stuck, row, np.geomspace(1, 150, 9), float(f)) for f in first]
-
-
-def _blades() -> Contacts:
-    b = wedge(0.02, frequencies=BAND[:1]).balance
-    return Contacts(np.ascontiguousarray(b.contacts.rows[:, :, :6]), b.contacts.law)
-
-
-def _damper() -> tuple[object, np.ndarray]:
-    b = wedge(0.02, frequencies=BAND[:1]).balance
-    return rigid_damper(
-        7.2e-5, [1.1e-2, 3.5e-3, 1.3e-2], [0, 0, -1.0], [0, 0, CF], kept=(0, 2, 4)
-    ), b.contacts.rows[:, :, 6:]
-
-
-def test_peaks_run_from_the_stuck_to_the_free_resonance() -> None:
-    first, (along, _) = curve()  # type: ignore[misc]
-    free = np.sqrt(eigh(BLADE_K, BLADE_M)[0][0]) / (2 * np.pi)
-    assert along.status == "complete", along.message
-    assert along.frequency[0] == pytest.approx(first[0], rel=1e-3)
-    assert along.state[0, :, 0].min() == 1.0
-    assert np.all(np.diff(along.frequency) < 1e-6 * free)
-    assert free < along.frequency[-1] < first[0] - 0.2 * (first[0] - free)
-    assert along.state[-1, :, 2].max() > 0.3
 
 
 def test_a_path_cut_short_is_the_beginning_of_the_whole() -> None:

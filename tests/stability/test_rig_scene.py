@@ -14,13 +14,11 @@ import upd
 from upd.analyses import modal
 from upd.analyses.modal.sensitivity import STEP, frequency_changes
 from upd.batch.engine import Workers, run_points
-from upd.batch.ladder import SolvedPoint
-from upd.batch.modal_ladder import modal_points
+from upd.batch.ladder import SolvedPoint, StudyPoint
+from upd.batch.modal_ladder import MODES_ONLY, modal_points
 from upd.batch.sensitivity import (
     DIMENSIONS,
     SensitivityStudy,
-    sensitivity_points,
-    sensitivity_table,
 )
 from upd.batch.store import PointStore
 from upd.batch.studies import plan_study, run_study
@@ -221,12 +219,16 @@ def test_sensitivity_of_a_cantilever(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert -2.2 < max(table["core_length"].values()) < -1.0
     assert 0.85 < table["shank_tx"]["f1_free"] < 1.05
     assert table["shank_tx"]["f1_glued"] < 0.3
-    chosen = [p for p in sensitivity_points(scene) if p.curve == "core_length"]
+    core = float(scene.geometry["core_length"])
+    chosen = [
+        StudyPoint("core_length", label, (*MODES_ONLY, ("geometry.core_length", f"{length!r} mm")))
+        for label, length in (("shorter", 0.99 * core), ("longer", 1.01 * core))
+    ]
     store = PointStore(tmp_path, "study")
     with store.sole():
         outcomes = run_points([p.task(scene, 0, "") for p in chosen], store, Workers(0, 0))
-    solved = [SolvedPoint(p, o) for p, o in zip(chosen, outcomes, strict=True)]
-    ((_, whole),) = sensitivity_table(solved)
+    low, up = (SolvedPoint(p, o).values for p, o in zip(chosen, outcomes, strict=True))
+    whole = {key[0]: np.log(up[key] / low[key]) / np.log(1.01 / 0.99) for key in low}
     assert table["core_length"] == pytest.approx(whole, abs=2e-3)
 
 

@@ -20,8 +20,6 @@ _PACKAGES = {
     "forced response": "forced",
     "seated damper": "seated",
 }
-#: packages by the names that older run folders have
-_FORMER_NAMES = {"curved": "hertz", "rig": "modal"}
 
 
 def analysis_of(scene: AnyScene) -> Analysis:
@@ -34,7 +32,7 @@ def analysis_named(name: str) -> Analysis | None:
 
     None for another name.
     """
-    package = _PACKAGES.get(name, _FORMER_NAMES.get(name, name))
+    package = _PACKAGES.get(name, name)
     return _package(package) if package in _PACKAGES.values() else None
 
 

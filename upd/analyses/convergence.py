@@ -66,12 +66,10 @@ class Extrapolation:
     scatter: float
 
 
-def extrapolate(
-    h: ArrayLike, values: ArrayLike, *, orders: tuple[float, float] = (0.5, 4.0)
-) -> Extrapolation:
+def extrapolate(h: ArrayLike, values: ArrayLike) -> Extrapolation:
     """Fit q(h) = limit + C h^p over three or more meshes.
 
-    p is the best of a fine grid within ``orders``, limit and C are linear.
+    p is the best of a fine grid from 0.5 to 4, limit and C are linear.
 
     For exactly three meshes with a constant ratio of sizes this is Richardson's extrapolation (P.
     J. Roache, Verification and Validation in Computational Science and Engineering, 1998, chapter
@@ -90,7 +88,7 @@ def extrapolate(
         solution, *_ = np.linalg.lstsq(A * weight[:, None], q * weight, rcond=None)
         return float(np.sum((weight * (A @ solution - q)) ** 2)), solution
 
-    grid = np.linspace(*orders, 141)
+    grid = np.linspace(0.5, 4.0, 141)
     best = min(grid, key=lambda p: fit(p)[0])
     solution = fit(best)[1]
     model = solution[0] + solution[1] * (size / size.max()) ** best
@@ -134,7 +132,7 @@ def two_level_error(coarse: float, fine: float, ratio: float, order: float = 1.0
     return float(abs(fine - coarse) / (ratio**order - 1.0) / abs(fine))
 
 
-def finer_level_error(ratio: float, size: float, order: float = ASSUMED) -> float:
+def finer_level_error(ratio: float, size: float) -> float:
     """Bound of a level's relative error from one finer level.
 
     The change to the finer level, and what that level leaves itself by Richardson's error with the
@@ -146,20 +144,18 @@ def finer_level_error(ratio: float, size: float, order: float = ASSUMED) -> floa
         The number on the finer level over that on the level.
     size
         Of the finer level over that of the level, below 1.
-    order
-        The order the error is taken to have.
 
     Returns
     -------
     float
-        abs(ratio - 1) (1 + 3 / (size^-p - 1)).
+        abs(ratio - 1) (1 + 3 / (size^-p - 1)), p the order the error is taken to have.
 
     References
     ----------
     P. J. Roache, Verification and Validation in Computational Science and Engineering (1998), eq.
     (5.4.2), and 5.6 on the factor of two grids.
     """
-    rest = UNCONFIRMED * two_level_error(1.0, ratio, 1.0 / size, order)
+    rest = UNCONFIRMED * two_level_error(1.0, ratio, 1.0 / size, ASSUMED)
     return abs(ratio - 1.0) + rest * abs(ratio)
 
 

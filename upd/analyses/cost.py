@@ -1,8 +1,8 @@
 """What a run costs: one model of seconds and bytes, added up piece by piece.
 
 Every piece is work that can be counted before it is done (entries and operations of a factor, right
-sides, dense algebra, Newton steps times points) over the machine's rates (`upd.linalg.rates`). The
-work of a piece was counted or timed on the ready scenes with one thread.
+sides, dense algebra, Newton steps times points) over the rates of a usual machine
+(`upd.linalg.rates`). The work of a piece was counted or timed on the ready scenes with one thread.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from upd.errors import InputError
 from upd.linalg import select
-from upd.linalg.rates import REFERENCE, rates
+from upd.linalg.rates import USUAL
 from upd.linalg.routes import Route, choose_route, contact_routes
 from upd.linalg.select import Prediction, Solid
 from upd.scene import AnyScene
@@ -29,19 +29,9 @@ _ENTRY, _COPIES = 6.0, 10.0
 START_BYTES = 2.5e8
 
 
-def arrays_s(seconds: float) -> float:
-    """Seconds of numpy on large arrays here, from those on the reference machine."""
-    return seconds * REFERENCE.elements / rates().elements
-
-
-def calls_s(seconds: float) -> float:
-    """Seconds of many small calls here, from those on the reference machine."""
-    return seconds * REFERENCE.calls / rates().calls
-
-
 def dense_s(flops: float) -> float:
-    """Seconds of dense algebra here."""
-    return flops / rates().dense_flops
+    """Seconds of dense algebra."""
+    return flops / USUAL.dense_flops
 
 
 @dataclass
@@ -74,12 +64,12 @@ class CostModel:
 
     def contact_body(self, hexes: int, nodes: int) -> None:
         """A body meshed, with its K."""
-        self.seconds += arrays_s(0.2) + hexes * _K[self.element] / rates().elements
+        self.seconds += 0.2 + hexes * _K[self.element] / USUAL.elements
         self.kept_bytes += 3.0 * nodes * self.solid(hexes, nodes).entries * _ENTRY
 
     def dynamic_body(self, hexes: int, nodes: int, times: float = 1.0) -> None:
         """A body with its K and M."""
-        self.seconds += times * (arrays_s(0.1) + hexes * _K_AND_M[self.element] / rates().elements)
+        self.seconds += times * (0.1 + hexes * _K_AND_M[self.element] / USUAL.elements)
         # M has no entries between components.
         self.kept_bytes += 4.0 * nodes * self.solid(hexes, nodes).entries * _ENTRY
 
@@ -164,7 +154,7 @@ class CostModel:
         solid = self.solid(hexes, nodes)
         found = self.choice(task, 3 * nodes, 0, solid, direct=True)
         # The second matrix is ordered again, but checked no more.
-        one = calls_s(0.15) + 1.5 * found.seconds + 1.5 * found.factor_seconds
+        one = 0.15 + 1.5 * found.seconds + 1.5 * found.factor_seconds
         one += 30.0 * found.substitution()
         self.shared += times * one
         self.jobs += times * [2.0 * found.bytes + 3.0 * nodes * solid.entries * _COPIES]
@@ -177,7 +167,7 @@ class CostModel:
         found = self.choice(task, 3 * nodes, n_kept, solid, direct=True)
         columns = 0.5 * n_kept * found.substitution()
         columns += dense_s(2.0 * 3.0 * nodes * float(n_kept) ** 2)
-        lanczos = calls_s(0.15) + 1.5 * found.seconds + _lanczos(modes) * found.substitution()
+        lanczos = 0.15 + 1.5 * found.seconds + _lanczos(modes) * found.substitution()
         self.shared += found.seconds + columns + lanczos
         self.jobs.append(
             3.0 * found.bytes
@@ -194,7 +184,7 @@ class CostModel:
         columns = 0.5 * loads * found.substitution()
         columns += dense_s(4.0 * 3.0 * nodes * float(loads) ** 2)
         columns += _lanczos(modes) * found.substitution()
-        self.shared += calls_s(0.15) + 3.0 * found.seconds + columns
+        self.shared += 0.15 + 3.0 * found.seconds + columns
         self.jobs.append(
             found.bytes + 4.0 * 24.0 * nodes * loads + 2.0 * 3.0 * nodes * solid.entries * _COPIES
         )
@@ -244,7 +234,7 @@ class CostModel:
         """Seconds by the clock, with so many workers on the jobs that may run side by side."""
         # Alone, a factorisation itself takes all threads; the gain is about the same.
         many = max(workers, 1) if workers > 1 else 2
-        gain = rates().speedup if min(many, select.threads_used()) > 1 else 1.0
+        gain = USUAL.speedup if min(many, select.threads_used()) > 1 else 1.0
         return self.seconds + self.shared / gain
 
 

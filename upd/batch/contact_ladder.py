@@ -97,7 +97,7 @@ def contact_points(scene: Scene, vary: str, levels: Levels = None) -> list[Study
     """Points of `contact_study`."""
     if vary == "steps":
         return _steps(levels)
-    plan = fixed_plan(scene)
+    plan = analysis_of(scene).make_plan(scene)
     usual = _flat_levels(plan) if scene.analysis == "flat contact" else _DIVISIONS
     return list(dict.fromkeys(_MAKERS[vary](plan, _divisions(levels) or usual)))
 
@@ -126,18 +126,6 @@ def _steps(levels: Levels) -> list[StudyPoint]:
         )
         for n in sorted(whole_levels(levels, 8) or _STEPS)
     ]
-
-
-def fixed_plan(scene: Scene) -> Plan[Any]:
-    """The plan of a scene that gives its mesh.
-
-    Raises InputError when it leaves that to an accuracy.
-    """
-    if scene.mesh.accuracy is not None:
-        raise InputError(
-            "study: the scene chooses its mesh by mesh.accuracy; give geometry.divisions instead"
-        )
-    return analysis_of(scene).make_plan(scene)
 
 
 def _flat_levels(plan: Plan[Any]) -> tuple[int, ...]:

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from upd.analyses import analysis_of
 from upd.analyses.base import Plan
 from upd.analyses.flat.printed import printed_of
-from upd.batch.contact_ladder import fixed_plan
 from upd.batch.ladder import (
     Levels,
     Settings,
@@ -63,7 +63,7 @@ def parameter_points(scene: Scene) -> list[StudyPoint]:
     """
     return [
         StudyPoint("parameters", label, settings)
-        for label, settings in _setups(scene, fixed_plan(scene))
+        for label, settings in _setups(scene, analysis_of(scene).make_plan(scene))
     ]
 
 

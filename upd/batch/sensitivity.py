@@ -1,22 +1,18 @@
 """How natural frequencies depend on dimensions.
 
-d ln f / d ln p from the modes of the rig as given and the matrices of slightly changed ones; by
-differences of whole runs for a check of these.
+d ln f / d ln p from the modes of the rig as given and the matrices of slightly changed ones.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
-
 from upd.analyses.modal.sensitivity import free_and_glued, log_derivatives
 from upd.batch.ladder import (
     Levels,
-    Settings,
     SolvedPoint,
     Study,
     StudyMaker,
@@ -26,7 +22,6 @@ from upd.batch.ladder import (
     markdown_table,
     no_levels,
 )
-from upd.batch.modal_ladder import MODES_ONLY
 from upd.cache.files import write_text
 from upd.errors import InputError, UpdError
 from upd.scene import ModalScene
@@ -46,25 +41,8 @@ DIMENSIONS = {
     },
     "width of shank and platform": ("shank_wy", "platform_wy"),
 }
-#: relative step of whole runs to both sides: far above the rounding of a frequency, far below its
-#: curvature
-STEP = 0.01
-
 #: dimension, frequency -> d ln f / d ln p
 Table = list[tuple[str, dict[str, float]]]
-
-
-def sensitivity_points(scene: ModalScene) -> list[StudyPoint]:
-    """Two whole runs per dimension, ``STEP`` below and above, for `sensitivity_table`.
-
-    Raises InputError when the recipe has other dimensions.
-    """
-    _has_dimensions(scene)
-    return [
-        StudyPoint(dimension, f"{sign:+.0%}", (*MODES_ONLY, *_settings(scene, names, 1.0 + sign)))
-        for dimension, names in DIMENSIONS.items()
-        for sign in (-STEP, STEP)
-    ]
 
 
 def _has_dimensions(scene: ModalScene) -> None:
@@ -73,34 +51,6 @@ def _has_dimensions(scene: ModalScene) -> None:
     ]
     if missing:
         raise InputError(f"--vary dimensions: the recipe has no parameter {', '.join(missing)}")
-
-
-def _settings(scene: ModalScene, names: tuple[str, ...], factor: float) -> Settings:
-    return tuple(
-        (f"geometry.{name}", f"{factor * float(scene.geometry[name])!r} mm") for name in names
-    )
-
-
-def sensitivity_table(solved: Iterable[SolvedPoint]) -> Table:
-    """(dimension, frequency -> d ln f / d ln p) of every dimension whose two runs succeeded, by
-    their difference.
-    """
-    pairs: dict[str, list[SolvedPoint]] = {}
-    for one in solved:
-        if not one.outcome.failure:
-            pairs.setdefault(one.point.curve, []).append(one)
-    width = float(np.log((1.0 + STEP) / (1.0 - STEP)))
-    return [
-        (
-            dimension,
-            {
-                key[0]: float(np.log(up.values[key] / low.values[key])) / width
-                for key in low.values
-                if key in up.values
-            },
-        )
-        for dimension, (low, up) in ((d, pair) for d, pair in pairs.items() if len(pair) == 2)
-    ]
 
 
 @dataclass(frozen=True)

@@ -379,12 +379,23 @@ def fit(
     out
         Folder; by default runs/fit-NAME.
     """
-    from upd.cli.fit import fit_on_terminal
+    from upd.fitting import fit as fit_inputs
+    from upd.scene import load_scene
 
     with Live() as live:
-        asked = {"to": to, "vary": vary, "starts": starts, "profiles": profiles}
-        reached = fit_on_terminal(terminal.console, live, scene, set or [], out, **asked)
-    return OK if reached else FAILED
+        loaded = load_scene(scene, set or [])
+        folder = out or Path("runs") / f"fit-{loaded.name}"
+        found = fit_inputs(
+            loaded, to, vary, starts=starts, profiles=profiles, out=folder, progress=live
+        )
+        for line in (
+            str(found),
+            f"Scene: {folder / found.scene.name}.toml",
+            f"Figure: {folder / 'fit.png'}",
+            f"Report: {folder / 'report.html'}",
+        ):
+            terminal.console.print(plain(line), soft_wrap=True)
+    return OK if found.status != "not reached" else FAILED
 
 
 @app.command
@@ -396,12 +407,12 @@ def report(
 ) -> None:
     """Make the page of a run or a sweep again from its folder.
 
-    Of several runs, or several sweeps, one page that compares them.
+    Of several runs, one page that compares them.
 
     Parameters
     ----------
     runs
-        Run folders or sweep folders.
+        Folders of runs, or one folder of a sweep.
     out
         File of the comparison; by default comparison.html beside the first run folder.
     study
@@ -474,24 +485,10 @@ def new(scene: str, file: Path) -> None:
 
 
 @app.command
-def doctor(*, calibrate: Annotated[bool, Parameter(negative=())] = False) -> int:
-    """Show versions, BLAS, threads, the linear solver found and the libraries gmsh needs.
-
-    Parameters
-    ----------
-    calibrate
-        Measure how fast this machine is, in about ten seconds when it has nothing else to do, and
-        remember it: predicted seconds are then its own.
-    """
-    from upd.cli.doctor import calibrate as measure
+def doctor() -> int:
+    """Show versions, BLAS, threads, the linear solver found and the libraries gmsh needs."""
     from upd.cli.doctor import examine
 
-    if calibrate:
-        table = Table("speed", "measured")
-        for what, found in measure():
-            table.add_row(what, found)
-        terminal.console.print(table)
-        return 0
     table = Table("what", "found")
     rows = examine()
     for what, found, fine in rows:

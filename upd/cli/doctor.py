@@ -9,7 +9,6 @@ from importlib import metadata
 from upd import __version__
 from upd.errors import UpdError
 from upd.linalg import select
-from upd.linalg.rates import Rates, keep_rates, rates, rates_file
 from upd.mesh import recipes
 
 _PACKAGES = (
@@ -51,48 +50,11 @@ def examine() -> list[tuple[str, str, bool]]:
             )
     found = select.available()
     rows += [(name, str(value), True) for name, value in found.items()]
-    rows.append(("speed", _speed(rates()), True))
     try:
         rows.append(("gmsh libraries", recipes.gmsh_version(), True))
     except UpdError as error:
         rows.append(("gmsh libraries", str(error), False))
     return rows
-
-
-def calibrate() -> list[tuple[str, str]]:
-    """Measure how fast this machine is, and remember it: rows (what, found).
-
-    Raises UpdError when the cache folder cannot be written.
-    """
-    from upd.analyses.calibration import calibrate as measure
-
-    found = measure()
-    try:
-        path = keep_rates(found)
-    except OSError as error:
-        raise UpdError(
-            f"{rates_file()} cannot be written ({error.strerror}): set UPD_CACHE to a folder that "
-            "can"
-        ) from None
-    return [
-        ("sparse factorisation", f"{1e-9 * found.factor_flops:.1f} GFLOP/s on one thread"),
-        ("all threads", f"{found.speedup:.2f} times as fast"),
-        ("ordering", f"{1e-6 * found.analysis_entries:.1f} million entries/s"),
-        ("substitution", f"{1e-9 * found.solve_bytes:.1f} GB/s"),
-        ("dense algebra", f"{1e-9 * found.dense_flops:.1f} GFLOP/s"),
-        ("assembly", f"{1e-3 * found.elements:.0f} thousand hexahedra/s"),
-        ("small calls", f"{1e-6 * found.calls:.2f} million/s"),
-        ("kept in", str(path)),
-    ]
-
-
-def _speed(found: Rates) -> str:
-    if not found.measured:
-        return "not measured: upd doctor --calibrate makes predicted seconds this machine's own"
-    return (
-        f"{1e-9 * found.factor_flops:.1f} GFLOP/s of sparse factorisation on one thread, "
-        f"{found.speedup:.2f} times that on all"
-    )
 
 
 def machine() -> str:

@@ -148,7 +148,7 @@ def _numbers(rows: Sequence[Result]) -> list[TextColumn]:
         TextColumn("error", tuple(map(plus_minus, entries)), right=True, rank=1),
         TextColumn("reference", tuple(number(r.reference) for r in rows), right=True, rank=3),
         TextColumn("difference", tuple(percent(r.error) for r in rows), right=True, rank=2),
-        TextColumn("thesis", tuple(percent(r.thesis_error) for r in rows), right=True, rank=4),
+        TextColumn("thesis", tuple(percent(r.printed_error) for r in rows), right=True, rank=4),
         TextColumn("half of it costs", tuple(costs), right=True, rank=5),
         TextColumn(
             "source", tuple(r.withheld or r.why or r.source for r in rows), rank=6, folds=_WORDS

@@ -334,30 +334,14 @@ class Coulomb(CoulombConditions):
             self._bordered = [*self._bordered, Bordered(system, rows)][-KEPT:]
         return Iterate(*system.refined(rows.rhs.T.ravel(), target), closed)
 
-    def derivative(self, at: Iterate, *, by_load: bool) -> tuple[FloatArray, FloatArray]:
-        """df/dp (m, r) and ds/dp (r, r), or df/ds and the unit matrix, with the states kept.
+    def derivative(self, at: Iterate) -> FloatArray:
+        """df/ds (m, r) with the states kept.
 
         Raises LinAlgError where the states leave no unique answer.
         """
         rows, r = self._rows(at), self.B.shape[1]
-        zero, unit = np.zeros((len(self.C), r)), np.eye(r)
-        f, s, _ = self.systems.system(rows, by_load).solve(
-            zero, Target(zero, unit if by_load else None, None if by_load else unit)
-        )
-        return f, s
-
-    def offset_derivative(self, at: Iterate, *, by_load: bool) -> tuple[FloatArray, FloatArray]:
-        """df/d(offset) (m, m) and ds/d(offset) (r, m), with states and load (or s) kept.
-
-        db = -d(offset). Raises LinAlgError where the states leave no unique answer.
-        """
-        m, r = self.B.shape
-        held = np.zeros((r, m))
-        f, s, _ = self.systems.system(self._rows(at), by_load).solve(
-            np.zeros((m, m)),
-            Target(-np.eye(m), held if by_load else None, None if by_load else held),
-        )
-        return f, s
+        zero = np.zeros((len(self.C), r))
+        return self.systems.system(rows, False).solve(zero, Target(zero, None, np.eye(r)))[0]
 
     # -- fallback ----------------------------------------------------------------------------------
 

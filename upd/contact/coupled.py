@@ -73,7 +73,6 @@ class CoupledContact:
     history: CoupledHistory
     _solver: Coulomb
     _last: Iterate
-    _by_load: bool
     _gap: FloatArray
 
     def go_on(
@@ -117,55 +116,19 @@ class CoupledContact:
         """
         return replace(self, _solver=self._solver.twin())
 
-    def force_derivative(self, by: str = "load") -> FloatArray:
-        """Derivative of the last step's forces, with the states it has.
-
-        Parameters
-        ----------
-        by : {"load", "displacement", "offset"}
-            By B'f, the rigid motion following, by the rigid motion, or by the offset, with load or
-            displacement held, whichever was given.
-
-        Returns
-        -------
-        (n, c, r) or (n, c, c n) ndarray
-            1 by the load, N/mm by the displacement and by the offset.
-
-        Raises
-        ------
-        InputError
-            For another word.
-        ConvergenceError
-            Where these states hold nothing that the load could push.
-        """
-        df, _ = self._derivative(by)
-        n, c = self.force.shape[1:]
-        return np.asarray(df.reshape(c, n, -1).transpose(1, 0, 2))
-
     def stiffness(self) -> FloatArray:
-        """Tangent stiffness dB'f/ds (r, r) of the last step [N/mm]."""
-        df, _ = self._derivative("displacement")
-        return np.asarray(self._solver.B.T @ df)
+        """Tangent stiffness dB'f/ds (r, r) of the last step, with the states it has [N/mm].
 
-    def _derivative(self, by: str) -> tuple[FloatArray, FloatArray]:
-        if by not in ("load", "displacement", "offset"):
-            raise InputError(
-                f'coupled contact: by = {by!r}: write "load", "displacement" or "offset".'
-            )
-        by_load = by == "load" or (by == "offset" and self._by_load)
+        Raises ConvergenceError where the states change with any displacement.
+        """
         try:
-            if by == "offset":
-                return self._solver.offset_derivative(self._last, by_load=by_load)
-            return self._solver.derivative(self._last, by_load=by_load)
+            df = self._solver.derivative(self._last)
         except np.linalg.LinAlgError as error:
-            remedy = (
-                "everything slips or is open; take the derivative by the displacement"
-                if by_load
-                else "the states change with any displacement; step off this state"
-            )
             raise ConvergenceError(
-                f"coupled contact: the forces have no derivative by the {by} here: {remedy}."
+                "coupled contact: the forces have no derivative by the displacement here: the "
+                "states change with any displacement; step off this state."
             ) from error
+        return np.asarray(self._solver.B.T @ df)
 
 
 def coupled_contact(
@@ -464,7 +427,6 @@ def _collected(
         history=after[-1],
         _solver=solver,
         _last=answers[-1].at,
-        _by_load=path.by_load,
         _gap=h,
     )
 

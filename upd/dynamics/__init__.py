@@ -5,13 +5,9 @@ from upd.dynamics.response import QUANTITIES, LinearResponse, converted, frequen
 from upd.dynamics.systems import DirectSystem, ModalSystem, direct_system, modal_system
 from upd.dynamics.tuning import TunedDamping, peak_response, tune_damping
 
-#: name that scripts know
-FrequencyResponse = LinearResponse
-
 __all__ = [
     "QUANTITIES",
     "DirectSystem",
-    "FrequencyResponse",
     "LinearResponse",
     "ModalSystem",
     "Peaks",

@@ -18,8 +18,8 @@ _REACH = 0.05
 
 
 def fit_charts(found: FittedInputs) -> list[Chart]:
-    """The family where there is one, profiles where targets have half-widths, and what each
-    parameter does to the targets.
+    """Measured curves, the family where there is one, and what each parameter does to the
+    targets.
 
     Parameters
     ----------
@@ -31,8 +31,6 @@ def fit_charts(found: FittedInputs) -> list[Chart]:
     if family is not None and len(found.parameters) > 1:
         charts.append(_family(found, family))
     charts = [_over(one, k) for k, one in enumerate(found.measured)] + charts
-    if found.widths:
-        charts += [_rise(found, one) for one in found.profiles]
     if found.targets:
         charts += [_moves(found, k) for k in range(len(found.parameters))]
     return [replace(chart, figure=FIGURE, size=_SIZE) for chart in charts]
@@ -93,18 +91,6 @@ def _family(found: FittedInputs, one: Profile) -> Chart:
             ),
         ),
         note="Along these lines no target changes by more than it is known.",
-    )
-
-
-def _rise(found: FittedInputs, one: Profile) -> Chart:
-    k = one.parameter
-    x = _values(found, k, one.z[:, k])
-    return Chart(
-        f"Profile of {found.parameters[k].name}",
-        _axis(found, k),
-        Axis("rise of the squared residuals, half-widths", low=0.0),
-        traces=(Trace("all other parameters fitted again", x, one.rise, "both"),),
-        bands=(Band("fits as well below", "y", 1.0, 1.0, dashed=True),),
     )
 
 

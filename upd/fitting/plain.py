@@ -89,7 +89,6 @@ def plain_numbers(found: FittedInputs) -> dict[str, Any]:
             {
                 "moved": list(found.parameters[one.parameter].paths),
                 "factors": np.exp(one.z).tolist(),
-                "misfit_rise": one.rise.tolist(),
                 "ends_at_bounds": list(one.bounded),
             }
             for one in found.profiles

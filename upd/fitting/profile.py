@@ -31,8 +31,6 @@ class Profile:
         Which is moved.
     z : ndarray
         (k, n) sets, rising in the parameter moved.
-    rise : ndarray
-        (k,) of |r|^2 above the answer's.
     ends : tuple of float
         Of ln(factor) between which they fit as well.
     bounded : tuple of bool
@@ -43,7 +41,6 @@ class Profile:
 
     parameter: int
     z: Array
-    rise: Array
     ends: tuple[float, float]
     bounded: tuple[bool, bool]
     models: int = 0
@@ -125,7 +122,6 @@ def profile(
     return Profile(
         k,
         z,
-        np.array([rise for _, rise in rows]),
         (ends[0], ends[1]),
         (bounded[0], bounded[1]),
         residuals.responses.evaluations - before,

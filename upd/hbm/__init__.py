@@ -20,11 +20,10 @@ from upd.hbm.continuation import Path, follow
 from upd.hbm.damper import RigidDamper, contact_rows, rigid_damper
 from upd.hbm.fourier import Harmonics, harmonics
 from upd.hbm.friction import Law
-from upd.hbm.loads import LoadCurve, load_curve
 from upd.hbm.march import SteadyState, steady_state
 from upd.hbm.newton import Settings
 from upd.hbm.path_step import State
-from upd.hbm.peaks import Peak, PerformanceCurve, climb, performance_curve
+from upd.hbm.peaks import Peak, climb
 from upd.hbm.response import FrequencyResponse, frequency_response
 
 __all__ = [
@@ -32,10 +31,8 @@ __all__ = [
     "FrequencyResponse",
     "Harmonics",
     "Law",
-    "LoadCurve",
     "Path",
     "Peak",
-    "PerformanceCurve",
     "RigidDamper",
     "Settings",
     "State",
@@ -46,8 +43,6 @@ __all__ = [
     "follow",
     "frequency_response",
     "harmonics",
-    "load_curve",
-    "performance_curve",
     "rigid_damper",
     "steady_state",
 ]

@@ -222,29 +222,6 @@ def to_complex(coefficients: FloatArray, h: Harmonics) -> ComplexArray:
     return np.asarray(coefficients[..., o::2] - 1j * coefficients[..., o + 1 :: 2])
 
 
-def to_real(amplitudes: ComplexArray, static: FloatArray | None, h: Harmonics) -> FloatArray:
-    """Real coefficients from complex amplitudes.
-
-    Parameters
-    ----------
-    amplitudes : (..., n_k) ndarray of complex
-        Of the harmonics above 0.
-    static : (...,) ndarray or None
-        The mean, zero when None.
-    h : Harmonics
-
-    Returns
-    -------
-    (..., h.size) ndarray
-    """
-    out = np.zeros((*amplitudes.shape[:-1], h.size))
-    o = h.offset
-    out[..., o::2], out[..., o + 1 :: 2] = amplitudes.real, -amplitudes.imag
-    if h.static and static is not None:
-        out[..., 0] = static
-    return out
-
-
 def embed(coefficients: FloatArray, old: Harmonics, new: Harmonics) -> FloatArray:
     """The same signal on another set: missing harmonics are zero, surplus ones dropped.
 

@@ -90,45 +90,6 @@ class _Slopes(NamedTuple):
     loss_by: FloatArray
 
 
-def point_derivatives(
-    b: Balance,
-    row: ArrayLike,
-    x: FloatArray,
-    frequency: float,
-    changes: Sequence[ParameterChange],
-    *,
-    harmonic: int | None = None,
-    power: float = 0.0,
-) -> tuple[float, FloatArray]:
-    """Height w^power |row @ q| of a solved point and its derivatives at fixed frequency.
-
-    Parameters
-    ----------
-    b : Balance
-    row : (n_dof,) array_like
-        Weighs the displacements.
-    x : (n_unknown,) ndarray
-        Unknowns of the point.
-    frequency : float
-        [Hz]
-    changes : sequence of ParameterChange
-        One for each parameter.
-    harmonic : int, optional
-        Its number; the lowest above 0 by default.
-    power : float
-        Of the angular frequency of the harmonic: 2 for accelerations.
-
-    Returns
-    -------
-    height : float
-        [mm] without a power.
-    by_parameter : (n,) ndarray
-        Its derivatives.
-    """
-    found = _slopes(b, row, x, frequency, changes, harmonic, power)
-    return found.height, found.by_parameter
-
-
 def displacement_derivatives(
     b: Balance,
     rows: Sequence[ArrayLike],
@@ -182,7 +143,8 @@ def peak_derivatives(
     Parameters
     ----------
     b, row, changes, harmonic, power
-        As `point_derivatives` takes them.
+        Its number; the lowest above 0 by default. The power is of its angular frequency: 2 for
+        accelerations.
     x, frequency : (n_unknown,) ndarray, float
         The peak of that height, as `upd.hbm.peaks.climb` finds it.
 

@@ -1,4 +1,4 @@
-"""Resonance peaks of the nonlinear answer: located on the path, and followed over the load.
+"""Resonance peaks of the nonlinear answer, located on the path.
 
 The path is cut by planes across its tangent; on each the corrector finds the solution, and the
 slope of the amplitude along the path shows the side of the peak. Folds do not matter, since no
@@ -10,20 +10,17 @@ equation and needs second derivatives.
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from upd.hbm.balance import Balance
-from upd.hbm.coulomb import LIFT, SLIP, STICK
 from upd.hbm.fourier import to_complex
 from upd.hbm.newton import Function, Settings, Solution, cross_section
 from upd.hbm.path_step import State, begin, direction_reversed, walk
 from upd.hbm.residuals import FREQUENCY_SHARE, over_frequency, scale_of
-from upd.hbm.starts import first_point
-from upd.linalg.parallel import threads_for
 
 log = logging.getLogger(__name__)
 
@@ -34,8 +31,6 @@ EPS = float(np.finfo(float).eps)
 FIRST_REACH, MOST_STEPS = 0.01, 200
 #: position of a peak on the path, in units of its bracket
 POSITION = 1e-5
-#: halvings of a load step before the curve stops
-MOST_HALVINGS = 6
 #: change of frequency, and factor on the height per load, beyond which the next peak is another one
 JUMP_FREQUENCY, JUMP_HEIGHT = 0.03, 2.0
 
@@ -65,41 +60,6 @@ class Peak:
     def found(self) -> bool:
         """Whether it is a maximum on the path."""
         return self.status == "found"
-
-
-@dataclass(frozen=True)
-class PerformanceCurve:
-    """Peak over the size of the load, n points in order of the factors reached.
-
-    Attributes
-    ----------
-    factor : (n,) ndarray
-        On the dynamic loads.
-    frequency : (n,) ndarray
-        [Hz]
-    amplitude : (n,) ndarray
-        [mm]; divide by the factor to compare.
-    x : (n, n_unknown) ndarray
-        Unknowns.
-    state : (n, n_point, 3) ndarray
-        Shares of the cycle in stick, slip, lift-off.
-    status : {"complete", "stopped"}
-    message : str
-        One sentence.
-    """
-
-    factor: FloatArray
-    frequency: FloatArray
-    amplitude: FloatArray
-    x: FloatArray
-    state: FloatArray
-    status: str
-    message: str
-
-    @property
-    def optimum(self) -> int:
-        """Index of the smallest amplitude per unit load."""
-        return int(np.argmin(self.amplitude / self.factor))
 
 
 @dataclass(frozen=True)
@@ -247,149 +207,6 @@ def _between(
     return Peak(best[0].p, measure.amplitude(best[0].x, best[0].p), best[0].x, "found")
 
 
-def performance_curve(
-    b: Balance,
-    row: ArrayLike,
-    factors: ArrayLike,
-    frequency: float,
-    *,
-    x: FloatArray | None = None,
-    settings: Settings | None = None,
-    harmonic: int | None = None,
-) -> PerformanceCurve:
-    """Peak of |row @ q| over a factor on the dynamic loads: continuation of the peak, no sweeps.
-
-    In homogeneous scenes (no gaps, or gaps that grow with the load) a factor s on the dynamic loads
-    is 1/s on the static ones, so this is the curve over F_C/F_E. Between the factors the steps are
-    chosen by the curve.
-
-    Parameters
-    ----------
-    b : Balance
-        The problem with the factor 1.
-    row : (n_dof,) array_like
-        Weighs the displacements.
-    factors : (n,) array_like
-        Factors on the dynamic loads.
-    frequency : float
-        A frequency near the first peak [Hz].
-    x : (n_unknown,) ndarray, optional
-        An answer at the first factor.
-    settings : Settings, optional
-        Step control of the continuation.
-    harmonic : int, optional
-        Number of the harmonic; the lowest above 0 by default.
-
-    Returns
-    -------
-    PerformanceCurve
-
-    Examples
-    --------
-    The oscillator of `frequency_response`: the peak per unit load is lowest where mu N = pi F/2.
-
-    >>> import numpy as np
-    >>> from upd.hbm import contacts, frequency_response, performance_curve
-    >>> jenkins = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=np.pi / 2)
-    >>> f0 = np.sqrt(1.5) / (2 * np.pi)
-    >>> answer = frequency_response(
-    ...     [[1.0]], [[0.0]], [[1.0]], jenkins,
-    ...     harmonic_force=[1.0], frequencies=[f0], harmonics=(1,), samples=1024,
-    ... )
-    >>> curve = performance_curve(answer.balance, [1.0], [0.6, 0.8, 1.0, 1.2, 1.5], f0)
-    >>> curve.status, float(curve.factor[curve.optimum])
-    ('complete', 1.0)
-    >>> (curve.amplitude / curve.factor).round(2).tolist()
-    [3.74, 3.27, 3.14, 3.27, 4.19]
-    >>> [round(np.pi / 2 / (1 - s / 2) / s, 2) for s in (0.6, 0.8, 1.0, 1.2, 1.5)]
-    [3.74, 3.27, 3.14, 3.27, 4.19]
-    """
-    wanted = np.asarray(factors, dtype=float)
-    first = b.with_loads(1.0, float(wanted[0]))
-    start = first_point(first, frequency, x, settings)
-    if start is None:
-        return _curve(
-            b, [], f"stopped: no solution at {frequency:.6g} Hz with the factor {wanted[0]:.4g}"
-        )
-    peak = climb(first, row, start, frequency, settings=settings, harmonic=harmonic)
-    found, message = [(float(wanted[0]), peak)], ""
-    with threads_for(b.size):
-        for factor in wanted[1:]:
-            message = "" if found[-1][1].found else found.pop()[1].status
-            message = message or follow_to(b, row, found, float(factor), settings, harmonic)
-            if message:
-                break
-    if not message and not found[-1][1].found:
-        message = found.pop()[1].status
-    return _curve(
-        b, [pair for pair in found if pair[0] in wanted], message and f"stopped: {message}"
-    )
-
-
-def follow_to(
-    b: Balance,
-    row: ArrayLike,
-    found: list[tuple[float, Peak]],
-    factor: float,
-    settings: Settings | None = None,
-    harmonic: int | None = None,
-    power: float = 0.0,
-) -> str:
-    """Follow a peak to one more factor on the dynamic loads, with smaller steps where needed.
-
-    Parameters
-    ----------
-    b : Balance
-        The problem with the factor 1.
-    row : (n_dof,) array_like
-        Weighs the displacements.
-    found : list of (float, Peak)
-        Factors and peaks so far, that to begin from last; those on the way are added, and that of
-        the factor where it is reached.
-    factor : float
-        On the dynamic loads.
-    settings, harmonic, power
-        As of `climb`.
-
-    Returns
-    -------
-    str
-        Why it was not reached, or "".
-    """
-    halvings, target = 0, factor
-    while found[-1][0] != factor:
-        before, peak = found[-1]
-        guess, f = _extrapolated(found, target)
-        here = b.with_loads(1.0, target)
-        reach = FIRST_REACH
-        solved = _at(here, guess, f, settings) or _at(
-            here, peak.x * target / before if _lifts(b) else peak.x, peak.frequency, settings
-        )
-        new = None
-        if solved is not None:
-            new = climb(here, row, solved.x, solved.p, reach, settings, harmonic, power)
-        if new is not None and new.found and _next_to(found[-1], (target, new)):
-            found.append((target, new))
-            target = factor
-            continue
-        halvings += 1
-        if halvings > MOST_HALVINGS:
-            return f"no peak beyond the factor {before:.4g}" + (
-                f" ({new.status})" if new is not None else ""
-            )
-        target = float(np.sqrt(before * target)) if before * target > 0 else (before + target) / 2
-    return ""
-
-
-def _next_to(before: tuple[float, Peak], after: tuple[float, Peak]) -> bool:
-    """Whether a peak may be the one before with another load.
-
-    Not when frequency or height per load have jumped.
-    """
-    (p, a), (q, b) = before, after
-    return is_near(b.frequency / a.frequency, b.amplitude * p / (a.amplitude * q))
-
-
 def is_near(frequency: float, height: float) -> bool:
     """Whether a peak may be another one with other data: neither its frequency nor its height has
     jumped.
@@ -400,62 +217,3 @@ def is_near(frequency: float, height: float) -> bool:
         Over those of the other.
     """
     return abs(frequency - 1.0) <= JUMP_FREQUENCY and 1.0 / JUMP_HEIGHT <= height <= JUMP_HEIGHT
-
-
-def _lifts(b: Balance) -> bool:
-    """Nothing static: the answer itself grows with the factor."""
-    return not np.any(b.static) and not np.any(b.contacts.law.preload)
-
-
-def _at(b: Balance, x: FloatArray, frequency: float, settings: Settings | None) -> Solution | None:
-    """A solution near the guess: at its frequency."""
-    s, normal = settings or Settings(), np.zeros(len(x) + 1)
-    normal[-1] = 1.0
-    patient = replace(s, iterations=2 * s.iterations)
-    found = cross_section(
-        over_frequency(b),
-        Solution(x, frequency, None, 0, 0.0),
-        scale_of(b)(x),
-        1.0,
-        normal,
-        0.0,
-        patient,
-    )
-    return found if found.tangent is not None else None
-
-
-def _extrapolated(found: list[tuple[float, Peak]], factor: float) -> tuple[FloatArray, float]:
-    """Unknowns and frequency at another factor, on the secant of the last two peaks."""
-    p1, b = found[-1]
-    if len(found) < 2:
-        return b.x, b.frequency
-    p0, a = found[-2]
-    share = (factor - p1) / (p1 - p0)
-    share = float(np.clip(share, -2.0, 2.0))
-    return b.x + share * (b.x - a.x), b.frequency + share * (b.frequency - a.frequency)
-
-
-def _curve(b: Balance, found: list[tuple[float, Peak]], message: str) -> PerformanceCurve:
-    n = len(found)
-    x = np.array([peak.x for _, peak in found]).reshape(n, b.size)
-    state = np.zeros((n, b.contacts.n_point, 3))
-    if n:
-        marched = b.marched(b.coefficients(x), b.E)
-        for code in (STICK, SLIP, LIFT):
-            state[..., code] = (marched.state == code).mean(axis=-1)
-    factor = np.array([value for value, _ in found])
-    f, a = (
-        np.array([peak.frequency for _, peak in found]),
-        np.array([peak.amplitude for _, peak in found]),
-    )
-    if message:
-        log.warning(message)
-    return PerformanceCurve(
-        factor,
-        f,
-        a,
-        x,
-        state,
-        "stopped" if message else "complete",
-        message or f"{n} peaks followed",
-    )

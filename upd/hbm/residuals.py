@@ -48,16 +48,14 @@ def over_frequency(b: Balance) -> Function:
     return function
 
 
-def over_load(b: Balance, frequency: float, static: bool = False) -> Function:
-    """Residual over a factor on the loads at one frequency; linear in the factor.
+def over_load(b: Balance, frequency: float) -> Function:
+    """Residual over a factor on the dynamic loads at one frequency; linear in the factor.
 
     Parameters
     ----------
     b : Balance
     frequency : float
         [Hz]
-    static : bool
-        Put the factor on the static loads instead of the dynamic ones.
 
     Returns
     -------
@@ -65,7 +63,7 @@ def over_load(b: Balance, frequency: float, static: bool = False) -> Function:
         (x, factor, with Jacobian) -> residual, Jacobian or None, derivative by the factor.
     """
     omega = 2 * np.pi * frequency
-    none = b.with_loads(0.0, 1.0) if static else b.with_loads(1.0, 0.0)
+    none = b.with_loads(1.0, 0.0)
     zero = np.zeros(b.size)
     slope = b.linearised(zero, omega, False)[0] - none.linearised(zero, omega, False)[0]
 

@@ -9,7 +9,7 @@ from upd.linalg.amg import AmgSolution, amg_solve, compliance_amg
 from upd.linalg.common import Condensation, Factor
 from upd.linalg.eigen import Eigenproblem, modes
 from upd.linalg.eigen_checks import Modes
-from upd.linalg.pardiso import factorise_pardiso, predict_pardiso, schur_pardiso
+from upd.linalg.pardiso import factorise_pardiso, schur_pardiso
 from upd.linalg.schur import factorise, schur_complement
 from upd.linalg.select import Choice, Prediction, available, choose, predict
 from upd.linalg.superlu import factorise_superlu, schur_superlu
@@ -31,7 +31,6 @@ __all__ = [
     "factorise_superlu",
     "modes",
     "predict",
-    "predict_pardiso",
     "schur_complement",
     "schur_pardiso",
     "schur_superlu",

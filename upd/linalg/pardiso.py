@@ -25,7 +25,6 @@ import ctypes
 import os
 import weakref
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -63,28 +62,6 @@ _FAULTS = {
     -9: "not enough memory for the out-of-core solver",
 }
 _KIB = 1024
-
-
-@dataclass(frozen=True)
-class PardisoPrediction:
-    """What the analysis phase expects.
-
-    Attributes
-    ----------
-    factor_nnz : int
-        Non-zeros of the factor.
-    flops : float
-        Floating point operations.
-    peak_bytes : int
-        Peak memory.
-    seconds : float
-        Time of the analysis itself.
-    """
-
-    factor_nnz: int
-    flops: float
-    peak_bytes: int
-    seconds: float
 
 
 def _point_to_mkl() -> None:
@@ -164,7 +141,6 @@ class _Pardiso:
         A: Matrix,
         kept: IntArray | None = None,
         *,
-        count_flops: bool = False,
         kind: int = SPD,
     ) -> None:
         self.n, self.kind = A.shape[0], kind
@@ -177,8 +153,6 @@ class _Pardiso:
         # perturbed), in core, and the classic factorisation, which finds every singular matrix (the
         # two-level one, iparm[23] = 1, gains a tenth here but returned garbage before its error).
         self.iparm[[0, 1, 17]] = 1, 3, -1
-        if count_flops:
-            self.iparm[18] = -1
         if kept is not None:
             # Schur complement with its factor, for the recovery.
             self.perm[kept] = 1
@@ -400,36 +374,3 @@ def _ordered(S: FloatArray, kept: IntArray) -> FloatArray:
         return S
     place = np.argsort(np.argsort(kept))
     return S[np.ix_(place, place)]
-
-
-def predict_pardiso(K: Any, kept: ArrayLike | None = None) -> PardisoPrediction:
-    """Memory and operations of a factorisation, from the analysis phase alone.
-
-    Parameters
-    ----------
-    K : (n, n) Symmetric, sparse array or array_like
-        N/mm.
-    kept : (k,) array_like of int, optional
-        With the Schur complement on these dofs.
-
-    Returns
-    -------
-    PardisoPrediction
-
-    Raises
-    ------
-    InputError, ConvergenceError
-        As for `schur_pardiso`.
-    """
-    start = perf_counter()
-    A = checked(K)
-    kept = None if kept is None else checked_dofs(kept, A.shape[0])
-    if kept is not None and uncoupled(A, kept) is not None:
-        return PardisoPrediction(0, 0.0, 8 * len(kept) ** 2, perf_counter() - start)
-    solver = _Pardiso(A, kept, count_flops=True)
-    solver.run(ANALYSE)
-    found = PardisoPrediction(
-        solver.factor_nnz, 1e6 * float(solver.iparm[18]), solver.peak_bytes, perf_counter() - start
-    )
-    solver.close()
-    return found

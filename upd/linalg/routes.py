@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from upd.errors import InputError
-from upd.linalg.rates import REFERENCE
+from upd.linalg.rates import USUAL
 from upd.linalg.select import (
     PRODUCTS,
     Choice,
@@ -44,7 +44,7 @@ class Route:
         A solver that condenses, or "products by " and a solver.
     cost : Prediction
     usual : float
-        s of a usual machine, so that a calibration does not change the way.
+        s of a usual machine with one thread.
     why : str
         Why this solver, or for how many products.
     """
@@ -117,7 +117,7 @@ def contact_routes(
             usual = usual_seconds(n_dof, products, name)
         else:
             usual = usual_seconds(n_dof, 0, name)
-            usual += _SOLUTIONS * products * 16.0 * cost.factor_nnz / REFERENCE.solve_bytes
+            usual += _SOLUTIONS * products * 16.0 * cost.factor_nnz / USUAL.solve_bytes
         found.append(Route(PRODUCTS + name, cost, usual, f"{products} products"))
     return found
 

@@ -15,7 +15,7 @@ import scipy
 
 from upd.errors import InputError
 from upd.linalg.common import EPS
-from upd.linalg.rates import REFERENCE, rates
+from upd.linalg.rates import USUAL
 
 SOLVERS = ("pardiso", "superlu", "amg")
 #: before the name of a solver that serves a contact by products
@@ -33,7 +33,7 @@ _NNZ_20, _FLOPS_20 = 1.36, 1.68
 #: bytes a dense entry of a condensed matrix: itself and its inverse
 DENSE = 16.0
 _BYTES_NNZ, _BYTES_ENTRY, _BYTES_DOF = 8.0, 27.7, 540.0
-# A mesh of scenes is less regular than the cube of the calibration: ordering takes longer. Checks
+# A mesh of scenes is less regular than the cube that was timed: ordering takes longer. Checks
 # and copies of the matrix, s per entry; substitutions that look for free motions.
 _ANALYSIS, _CHECKS, _SOLVES = 2.2, 5e-8, 3
 # SuperLU orders by minimum degree, whose fill-in grows faster; it runs on one thread.
@@ -98,13 +98,9 @@ class Prediction:
     factor_seconds: float = 0.0
     factor_nnz: float = 0.0
 
-    def threaded(self, speedup: float) -> float:
-        """Seconds where a factorisation is so many times faster than on one thread."""
-        return self.seconds - self.factor_seconds * (1.0 - 1.0 / speedup)
-
     def substitution(self) -> float:
         """Seconds of one right-hand side, forward and backward."""
-        return 16.0 * self.factor_nnz / rates().solve_bytes
+        return 16.0 * self.factor_nnz / USUAL.solve_bytes
 
 
 @dataclass(frozen=True)
@@ -135,7 +131,7 @@ def has_pardiso() -> bool:
 
 
 def predict(n_dof: int, n_kept: int, solver: str, solid: Solid | None = None) -> Prediction:
-    """Memory and time of condensing a solid of hexahedra, at this machine's rates.
+    """Memory and time of condensing a solid of hexahedra, at the rates of a usual machine.
 
     Parameters
     ----------
@@ -156,9 +152,8 @@ def predict(n_dof: int, n_kept: int, solver: str, solid: Solid | None = None) ->
     InputError
         For an unknown solver.
     """
-    n, k, r = float(n_dof), float(n_kept), rates()
+    n, k, r = float(n_dof), float(n_kept), USUAL
     body = Solid() if solid is None else solid
-    arrays, flops_rate = r.elements / REFERENCE.elements, r.factor_flops / REFERENCE.factor_flops
     if solver == "pardiso":
         quadratic = body.nodes == 20
         nnz = _NNZ * n ** (4 / 3) * body.compactness**_NNZ_SHAPE * (
@@ -176,7 +171,7 @@ def predict(n_dof: int, n_kept: int, solver: str, solid: Solid | None = None) ->
         entries, factor = body.entries * n, flops / r.factor_flops
         return Prediction(
             _BYTES_NNZ * nnz + _BYTES_ENTRY * entries + _BYTES_DOF * n + DENSE * k**2,
-            entries * (_ANALYSIS / r.analysis_entries + _CHECKS / arrays)
+            entries * (_ANALYSIS / r.analysis_entries + _CHECKS)
             + factor
             + _SOLVES * 16.0 * nnz / r.solve_bytes
             + k**3 / r.dense_flops,
@@ -188,14 +183,14 @@ def predict(n_dof: int, n_kept: int, solver: str, solid: Solid | None = None) ->
         # Operations are the squares of the column counts of L, whose mean is nnz / n.
         return Prediction(
             24 * nnz + DENSE * k**2 + 2**24,
-            (_MMD_FACTOR * nnz**2 / n) / flops_rate + 2 * nnz * k * _MMD_SOLVE / arrays,
+            _MMD_FACTOR * nnz**2 / n + 2 * nnz * k * _MMD_SOLVE,
             0.0,
             nnz,
         )
     if solver == "amg":
         return Prediction(
             _AMG_BYTES_DOF * n + DENSE * k**2,
-            n * (_AMG_SETUP + _AMG_COLUMN * max(k, 1.0)) / arrays,
+            n * (_AMG_SETUP + _AMG_COLUMN * max(k, 1.0)),
         )
     raise InputError(
         f'Unknown solver {solver!r}: choose "auto", '
@@ -205,9 +200,7 @@ def predict(n_dof: int, n_kept: int, solver: str, solid: Solid | None = None) ->
 
 
 def usual_seconds(n_dof: int, n_kept: int, solver: str) -> float:
-    """Seconds that solvers are compared by: of cubes, at rates that are not this machine's own, so
-    that a calibration does not change the solver, and with it the last digits.
-    """
+    """Seconds that solvers are compared by: of cubes, whatever the shape of the body."""
     n, k = float(n_dof), float(n_kept)
     if solver == "pardiso":
         flops = 16.0 * n**2 + 6.0 * k * n ** (4 / 3) + k**3 / 3

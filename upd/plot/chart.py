@@ -305,28 +305,6 @@ class Charts(Protocol):
 STATES = ("open", "slip", "stick")
 
 
-def picked(rows: list[Entry], names: tuple[str, ...], *, last: bool = False) -> list[Entry]:
-    """The first (or last) row of each of ``names``, in their order.
-
-    Names without a row are left out.
-    """
-    out = []
-    for name in names:
-        found = [r for r in rows if r["name"] == name]
-        if found:
-            out.append(found[-1 if last else 0])
-    return out
-
-
-def value_of(summary: Mapping[str, Any], name: str, case: str, key: str = "value") -> float | None:
-    """``key`` ("value", "reference", ...) of the row ``name`` of ``case``, or None."""
-    for row in summary["results"]:
-        if row["name"] == name and row["case"] == case:
-            found = row.get(key)
-            return None if found is None else float(found)
-    return None
-
-
 def label_of(group: str) -> str:
     """The case a group of result.nc stands for: netCDF allows no slash in a name."""
     return group.replace(" per ", "/")

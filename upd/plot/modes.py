@@ -1,24 +1,19 @@
-"""Pictures of vibration: mode shapes as figures and as animations for ParaView."""
+"""Pictures of vibration: mode shapes as figures."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from upd.cache.files import whole_files
 from upd.errors import InputError
 from upd.mesh import FloatArray, IntArray, Mesh
 from upd.mesh.boundary import boundary_quads
-from upd.mesh.export import write_fields
 from upd.plot.sheet import own_axes
 
 #: largest displacement drawn, as a part of the diagonal of the box around all bodies
@@ -78,51 +73,6 @@ def draw_mode(
         shaded_sides(points + SCALE * size / largest * u, faces, colours, axes), autolim=False
     )
     return _framed(ax, points @ axes[:2].T, SCALE * size, title)
-
-
-def write_frames(
-    folder: Path,
-    name: str,
-    mesh: Mesh,
-    shape: ArrayLike,
-    *,
-    frames: int = 12,
-    amplitude: float | None = None,
-    warped: bool = True,
-) -> Path:
-    """One period of a mode as `name`_00.vtu ...
-
-    And the collection `name`.pvd, which ParaView plays. Returns the path of the .pvd.
-
-    is the shape times sin(2 pi t), t = 0, 1/frames, ... the time step. warped: the points move with
-    it, so that the files animate as they are; else they stay, for the filter Warp By Vector. All
-    files are written, or none: what was there before stays on a failure. Raises InputError for bad
-    arguments and a folder that cannot be written; `folder` is made when only itself is missing.
-
-    Parameters
-    ----------
-    shape
-        (n_node, 3), real.
-    amplitude
-        Largest displacement in mm.
-    None
-        8 % of the body's size. The point field "displacement" (mm)
-    """
-    u = _animated(name, mesh, shape, frames, amplitude)
-    digits = max(2, len(str(frames - 1)))
-    files = [f"{name}_{k:0{digits}d}.vtu" for k in range(frames)]
-    try:
-        with whole_files(Path(folder)) as stage:
-            for k, file in enumerate(files):
-                now = math.sin(2.0 * math.pi * k / frames) * u
-                moved = mesh.with_points(mesh.points + now) if warped else mesh
-                write_fields(stage / file, {name: moved}, {name: {"displacement": now}})
-            _write_collection(stage / f"{name}.pvd", files)
-    except OSError as error:
-        raise InputError(
-            f"{folder}: cannot be written ({error.strerror or error}); choose another folder"
-        ) from error
-    return Path(folder) / f"{name}.pvd"
 
 
 def _checked(meshes: Mapping[str, Mesh], shapes: Mapping[str, Any]) -> dict[str, FloatArray]:
@@ -243,35 +193,3 @@ def _framed(ax: Axes, flat: FloatArray, margin: float, title: str) -> Axes:
     ax.set_aspect("equal")
     ax.set_axis_off()
     return ax
-
-
-def _animated(
-    name: str, mesh: Mesh, shape: ArrayLike, frames: int, amplitude: float | None
-) -> FloatArray:
-    """The displacements at the crest, (n_node, 3) mm."""
-    problems = []
-    if not name or Path(name).name != name or "\\" in name:
-        problems.append(f"name = {name!r}: give a file name without folder and ending")
-    if frames < 2:
-        problems.append(f"frames = {frames}: give at least 2")
-    if amplitude is not None and not (amplitude > 0.0 and math.isfinite(amplitude)):
-        problems.append(f"amplitude = {amplitude}: give a positive length in mm")
-    problem = _shape_problem(shape, mesh)
-    if problems or problem:
-        raise InputError(f"Animation: {'; '.join([*problems, *([problem] if problem else [])])}.")
-    u = np.asarray(shape, dtype=np.float64)
-    largest = float(np.linalg.norm(u, axis=1).max())
-    return u * ((amplitude or SCALE * _size(mesh.points)) / largest) if largest > 0.0 else u
-
-
-def _write_collection(path: Path, files: Sequence[str]) -> None:
-    root = ElementTree.Element(
-        "VTKFile", type="Collection", version="0.1", byte_order="LittleEndian"
-    )
-    collection = ElementTree.SubElement(root, "Collection")
-    for k, file in enumerate(files):
-        ElementTree.SubElement(
-            collection, "DataSet", timestep=repr(k / len(files)), group="", part="0", file=file
-        )
-    ElementTree.indent(root)
-    ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)

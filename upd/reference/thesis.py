@@ -26,8 +26,6 @@ THESIS = (
 THESIS_STEEL: Mapping[str, float] = MappingProxyType({"E": 200_000.0, "nu": 0.3, "rho": 7.8e-9})
 #: radius (mm) of the half-sphere: the one that gives the Hertz columns of Tables VII and VIII
 THESIS_RADIUS = 5.0
-#: spacing (mm) of the contact lattice; printed areas are whole numbers of cells
-THESIS_SPACING = 0.025
 
 
 @dataclass(frozen=True)

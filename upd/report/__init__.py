@@ -42,19 +42,13 @@ def write_report(folder: str | Path, *, study: str | Path | None = None) -> Path
 
 
 def write_comparison(folders: Sequence[str | Path], path: str | Path) -> Path:
-    """Write one page that shows several runs, or several sweeps, side by side to ``path`` (.html);
-    returns it.
+    """Write one page that shows several runs side by side to ``path`` (.html); returns it.
 
-    Raises InputError when a folder is neither, runs and sweeps are mixed, there are fewer than two,
-    or the place cannot be written.
+    Raises InputError when a folder is no run, there are fewer than two, or the place cannot be
+    written.
     """
-    are_sweeps = [(Path(folder) / "sweep.json").is_file() for folder in folders]
-    if any(are_sweeps):
-        from upd.report.compare_sweeps import write_sweep_comparison
-
-        if not all(are_sweeps):
-            raise InputError("a comparison is of runs or of sweeps; give folders of one kind")
-        return write_sweep_comparison(folders, path)
+    if any((Path(folder) / "sweep.json").is_file() for folder in folders):
+        raise InputError("a comparison is of runs: give each sweep's folder by itself")
     from upd.report.compare import write_comparison as write
 
     return write(folders, path)

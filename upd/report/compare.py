@@ -55,12 +55,7 @@ def write_comparison(folders: Sequence[str | Path], path: str | Path) -> Path:
 
 def run_names(runs: Sequence[RunFolder]) -> list[str]:
     """Names of the run folders, with as much of their paths as tells them apart."""
-    return distinct_names([run.path for run in runs])
-
-
-def distinct_names(folders: Sequence[Path]) -> list[str]:
-    """Names of folders, with as much of their paths as tells them apart."""
-    paths = [folder.resolve() for folder in folders]
+    paths = [run.path.resolve() for run in runs]
     if len(set(paths)) < len(paths):
         raise InputError("a folder is duplicated; to fix it: give each folder once")
     depth = 1

@@ -18,7 +18,6 @@ from upd.cache.folders import plain_name
 from upd.errors import InputError
 from upd.plot.chart import Arrays, Group, Variable
 from upd.report.figures import FIGURES
-from upd.report.former import add_attributes, with_fields
 
 #: what a summary must have for a page
 _NEEDED = ("scene", "title", "status", "effects", "checks", "size", "cost", "results")
@@ -35,7 +34,7 @@ _KINDS = {
 _ENTRIES = {
     "effects": ("name", "on", "why", "verdict"),
     "checks": ("name", "case", "value", "limit", "says", "verdict"),
-    "results": ("name", "case", "value", "unit", "reference"),
+    "results": ("name", "case", "case_fields", "value", "unit", "reference"),
 }
 _LOG_LINE = re.compile(r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$")
 _VERSIONS = "versions: "
@@ -52,7 +51,6 @@ RUN_FILES = (
     "modes_*.vtu",
     "reduced_*.nc",
     "matrices/reduced_*",
-    "animation_*/mode_*",
     "curves/*.csv",
     *(f"{name}.png" for name in FIGURES),
 )
@@ -183,15 +181,13 @@ def read_run(folder: Path) -> RunFolder:
     if (folder / "result.nc").exists():
         try:
             arrays = read_arrays(folder / "result.nc")
-            add_attributes(arrays)
         except (OSError, ValueError, KeyError) as problem:
             missing.append(f"result.nc: cannot be read ({problem})")
     else:
         missing.append("result.nc: is not there, so there are no curves")
     return RunFolder(
         path=folder,
-        summary=summary
-        | {"scene_file": _tables(scene, missing), "results": with_fields(summary["results"])},
+        summary=summary | {"scene_file": _tables(scene, missing)},
         arrays=arrays,
         figures={f.stem: f for f in sorted(folder.glob("*.png")) if _is_png(f, missing)},
         scene=scene,

@@ -53,8 +53,8 @@ def load(folder: str | Path) -> RunResult:
 
 
 def _case(entry: Entry) -> Case:
-    """The case from its fields; from its words where an older folder has no fields."""
-    given = entry.get("case_fields", {})
+    """The case from its fields; of unknown fields, from its words."""
+    given = entry["case_fields"]
     case = Case(**{key: value for key, value in given.items() if key in _FIELDS})
     return case if case.label == entry["case"] else Case(name=entry["case"])
 

@@ -35,9 +35,8 @@ from upd.report.answer import answer_tables
 from upd.report.error_budget import budget_rows
 from upd.report.folder import RunFolder, read_run
 from upd.report.notes import MOST_NOTES, short_notes
-from upd.report.panels import Panel, charts_of, data, run_panels
+from upd.report.panels import Panel, charts_of, data, run_panels, study_panels
 from upd.report.scene_sentences import sentences
-from upd.report.study import study_panels
 from upd.report.surfaces import Surface, fitting, packed, picture, run_surfaces
 from upd.report.told import warnings
 from upd.results import FAILED, outcome_of, worst_checks

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from upd.labels import number_label, percent_of, unit_label
-from upd.plot.chart import Chart
 from upd.plot.sample_charts import sample_charts
 from upd.plot.sweep_charts import Followed, sheet_name, sweep_charts
 from upd.report.page import render, save, stages
@@ -40,6 +39,8 @@ def write_sweep_report(folder: str | Path) -> Path:
 
 def sweep_panels(sweep: SweepFolder) -> list[Panel]:
     """The sweep's figures with the charts that show the same."""
+    if sweep.is_sample:
+        return make_panels(sample_charts(sweep.sampled, list(sweep.table.T)), sweep.figures)
     numbers = followed(sweep)
     over = (
         "Followed numbers over "
@@ -48,17 +49,8 @@ def sweep_panels(sweep: SweepFolder) -> list[Panel]:
     headings = {"sweep": over} | {
         sheet_name(n): _title(c) for n, c in zip(numbers, sweep.data["followed"], strict=True)
     }
-    panels = make_panels(sweep_folder_charts(sweep), sweep.figures)
-    if sweep.is_sample:
-        return panels
+    panels = make_panels(sweep_charts(sweep.parameters, numbers), sweep.figures)
     return [replace(panel, heading=headings.get(panel.name, over)) for panel in panels]
-
-
-def sweep_folder_charts(sweep: SweepFolder) -> list[Chart]:
-    """The charts of a grid or of a sample."""
-    if sweep.is_sample:
-        return sample_charts(sweep.sampled, list(sweep.table.T))
-    return sweep_charts(sweep.parameters, followed(sweep))
 
 
 def followed(sweep: SweepFolder) -> list[Followed]:

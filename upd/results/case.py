@@ -41,8 +41,6 @@ class Case:
         Which sides of the platforms face each other: "symmetric", "asymmetric".
     peak
         Number of the peak from 1; 0 is the highest point of a curve without a peak.
-    branch
-        Name of a peak that is followed over F_C/F_E.
     mode
         How the blades move at a peak: "in phase", "out of phase".
     frequency
@@ -69,7 +67,6 @@ class Case:
     kind: str = ""
     arrangement: str = ""
     peak: int | None = None
-    branch: str = ""
     mode: str = ""
     frequency: float | None = None
     part: float | None = None
@@ -107,7 +104,6 @@ class Case:
             shown("force_ratio", "F_C/F_E {}"),
             "downwards" * self.reversed,
             "at the highest point" if self.peak == 0 else shown("peak", "at peak {}"),
-            shown("branch"),
             shown("mode"),
             shown("choice"),
             shown("part", "{} f1"),

@@ -112,8 +112,8 @@ class InputPart:
 
 
 def read_input_part(data: Mapping[str, Any]) -> InputPart:
-    """The part that `InputPart.as_dict` wrote; older ones have the size of the change alone."""
-    half, change = data["half_width"], data.get("change", data["share"])
+    """The part that `InputPart.as_dict` wrote."""
+    half, change = data["half_width"], data["change"]
     return InputPart(
         str(data["path"]),
         math.inf if half is None else float(half),
@@ -203,11 +203,6 @@ class Result:
             if self.reference is None or self.reference == 0.0 or self.withheld
             else self.value / self.reference - 1.0
         )
-
-    @property
-    def thesis_error(self) -> float | None:
-        """`printed_error` under its former name."""
-        return self.printed_error
 
     def as_dict(self) -> dict[str, Any]:
         """The number as it stands in summary.json.

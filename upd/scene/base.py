@@ -76,7 +76,7 @@ class MaterialData:
 
 @dataclass(frozen=True)
 class MeshChoice:
-    """Element family, mirror symmetry, and the accuracy wanted instead of a mesh size.
+    """Element family and mirror symmetry.
 
     Attributes
     ----------
@@ -87,14 +87,11 @@ class MeshChoice:
     symmetry
         Part of the model that is solved; "auto" uses the mirror planes that geometry, load and
         effects share. Cost: each mirror plane halves the dofs.
-    accuracy
-        The scene's ``accuracy`` under its former name, of a sphere's contact.
     """
 
     __pydantic_config__ = STRICT
     element: Literal["hex8", "hex8i", "hex20", "hex27"] = "hex8i"
     symmetry: Literal["auto", "full", "half", "quarter"] = "auto"
-    accuracy: Share | None = None
 
 
 @dataclass(frozen=True)
@@ -190,8 +187,7 @@ class SceneBase:
         """Largest estimated error of all main numbers, or of some by their names; None: the scene
         gives its levels itself.
         """
-        wanted = self.accuracy if self.accuracy is not None else self.mesh.accuracy
-        return None if wanted == UNKNOWN else wanted
+        return None if self.accuracy == UNKNOWN else self.accuracy
 
     def wants(self, *names: str) -> bool:
         """True when at least one of the outputs is asked for."""

@@ -115,9 +115,6 @@ class ContactData:
     coupling_limit
         Largest |beta| of Dundurs for which uncoupled normal and tangential contact may stand: the
         materials' part of the coupling, that of the bodies' shape is an effect left out.
-    transverse_limit
-        Accepted from older scene files, without effect: what slip across the load changes is
-        solved, and bounded by left_out.stiffness.
     """
 
     __pydantic_config__ = STRICT
@@ -130,7 +127,6 @@ class ContactData:
         Mapping[str, Annotated[str, Example.of('"wires"')]], Example.of('{ damper = "wires" }')
     ] = field(default_factory=dict)
     coupling_limit: Coefficient = 0.1
-    transverse_limit: Coefficient = 0.25
 
 
 @dataclass(frozen=True)

@@ -19,12 +19,6 @@ def contact_problems(scene: Scene) -> list[str]:
             for label in sorted(x for x, times in Counter(labels).items() if times > 1)
         ]
     problems += _analysis_checks(scene)
-    given = scene.geometry.get("divisions", "auto") != "auto"
-    if scene.mesh.accuracy is not None and given:
-        problems.append(
-            "mesh.accuracy: chooses the mesh, so geometry.divisions cannot be given too: "
-            'remove it or set it to "auto"'
-        )
     if scene.wanted_accuracy is None and scene.geometry.get("divisions") == "auto":
         problems.append('geometry.divisions: "auto" needs an accuracy, for example "1 %"')
     return problems

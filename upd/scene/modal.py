@@ -42,7 +42,6 @@ MODAL_WANTS = {
     "reduction": "Craig-Bampton models of both blades, checked against the full ones",
     "response": "linear frequency response at both accelerometers",
     "pictures": "pictures of the mode shapes, and the shapes as VTU",
-    "animation": "VTU frames of every mode over one period",
     "matrices": "reduced K and M as Matrix Market files with the map of their dofs",
 }
 

@@ -253,8 +253,6 @@ def _validate(data: dict[str, Any], folder: Path) -> tuple[AnyScene | None, list
         for f in fields(cls)
         if f.default is not MISSING and f.name not in CHOSEN_BY_MESH
     }
-    if scene.mesh.accuracy is not None:
-        usual.pop("divisions", None)
     return replace(scene, geometry={"recipe": scene.geometry["recipe"], **usual, **parameters}), []
 
 

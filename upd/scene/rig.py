@@ -42,9 +42,8 @@ def rig_problems(
         What to raise for it.
     """
     problems = []
-    for name, given in (("mesh.accuracy", mesh.accuracy), ("accuracy", accuracy)):
-        if given is not None and given != UNKNOWN:
-            problems.append(f"{name}: {of} does not choose its levels itself; raise {instead}")
+    if accuracy is not None and accuracy != UNKNOWN:
+        problems.append(f"accuracy: {of} does not choose its levels itself; raise {instead}")
     if mesh.symmetry == "quarter":
         problems.append('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
     if solver.name == "amg":

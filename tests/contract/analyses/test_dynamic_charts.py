@@ -12,8 +12,6 @@ import pytest
 
 from upd.analyses import forced, modal
 from upd.plot.chart import Chart, Group, Variable
-from upd.report.former_dynamic import attributes_of, fields_of
-from upd.results import Case
 
 CURVE = {"content": "friction", "stiffness": "own", "force_ratio": 194.0}
 
@@ -348,15 +346,6 @@ def test_performance_shows_the_highest_peak_single_modes_limits_and_the_best() -
     assert (chart.x.log, chart.y.log, chart.figure) == (True, True, "performance")
 
 
-def test_a_performance_curve_of_an_older_run_is_left_out() -> None:
-    branch = group(
-        {"content": "performance", "stiffness": "own", "branch": "peak 1"},
-        ratio=values([2.0, 20.0], "point"),
-        peak_accelerance=values([9.0, 5.0], "point"),
-    )
-    assert forced.ANALYSIS.charts({"a": branch}, {}) == []
-
-
 # ---------------------------------------------------------------- modal analysis
 
 
@@ -392,53 +381,3 @@ def test_modal_charts_show_magnitudes_peaks_and_differences() -> None:
         ("Craig-Bampton, against full model", [2.04]),
     ]
     assert [t.y[0] for t in frequencies.traces] == pytest.approx([1.0, 2.0])
-
-
-# ---------------------------------------------------------------- folders of older runs
-
-
-@pytest.mark.parametrize(
-    ("name", "variable", "content", "case"),
-    [
-        ("modes free symmetric", "frequency", "modes", Case(kind="free", arrangement="symmetric")),
-        ("response glued", "frequency", "response", Case(kind="glued")),
-        ("points thesis", "k_n", "points", Case(stiffness="thesis")),
-        ("linear my own, soft", "stuck_mode", "linear", Case(stiffness="my own, soft")),
-        (
-            "friction thesis, F_C per F_E 194",
-            "energy_balance",
-            "friction",
-            Case(stiffness="thesis", force_ratio=194.0),
-        ),
-        (
-            "friction a, b, F_C per F_E 1e+05, downwards",
-            "energy_balance",
-            "friction",
-            Case(stiffness="a, b", force_ratio=1e5, reversed=True),
-        ),
-        (
-            "performance thesis, peak 1",
-            "ratio",
-            "performance",
-            Case(stiffness="thesis", branch="peak 1"),
-        ),
-        (
-            "performance thesis, peak",
-            "ratio",
-            "performance",
-            Case(stiffness="thesis", branch="peak"),
-        ),
-    ],
-)
-def test_groups_of_older_files_have_the_attributes_of_their_names(
-    name: str, variable: str, content: str, case: Case
-) -> None:
-    filled = group({}, **{variable: values([1.0], "n")})
-    assert attributes_of(name, filled) == {"content": content} | case.given()
-    assert attributes_of(name, group({})) == {}
-    assert attributes_of(f"other {name}", filled) == {}
-
-
-def test_cases_of_older_numbers_have_the_kind_of_their_labels() -> None:
-    assert fields_of("thesis, free") == {"kind": "free"}
-    assert fields_of("thesis, F_C/F_E 194") == {}

@@ -2,7 +2,6 @@
 
 import sys
 import time
-from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,40 +13,10 @@ from upd.batch.engine import time_left
 from upd.cli.app import main
 from upd.errors import InputError
 from upd.linalg import predict
-from upd.linalg.rates import REFERENCE, keep_rates, rates, rates_file
+from upd.linalg.rates import USUAL
 from upd.linalg.select import Solid, threads_used
 from upd.mesh import recipes
 from upd.scene import load_scene
-
-
-@pytest.fixture
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A cache folder of the test's own."""
-    monkeypatch.setenv("UPD_CACHE", str(tmp_path / "cache"))
-    return tmp_path / "cache"
-
-
-def test_rates_are_remembered_and_make_plans_this_machines(cache: Path) -> None:
-    """Twice as fast in everything: half the seconds, the same bytes and the same solver."""
-    scene = load_scene("hertz")
-    usual = make_plan(scene)
-    assert rates() == REFERENCE
-    doubled = {k: 2.0 * v for k, v in asdict(REFERENCE).items() if k not in ("measured", "speedup")}
-    keep_rates(replace(REFERENCE, **doubled, measured=True))
-    assert rates().measured
-    fast = make_plan(scene)
-    assert fast.seconds == pytest.approx(0.5 * usual.seconds, rel=1e-9)
-    assert fast.memory_bytes == usual.memory_bytes
-    assert {k: v.partition(":")[0] for k, v in fast.solver.items()} == {
-        k: v.partition(":")[0] for k, v in usual.solver.items()
-    }
-
-
-@pytest.mark.parametrize("text", ["", "{}", "[1]", '{"factor_flops": -1}', "\x00"])
-def test_damaged_rates_are_not_believed(cache: Path, text: str) -> None:
-    cache.mkdir()
-    rates_file().write_text(text, encoding="utf-8")
-    assert rates() == REFERENCE
 
 
 def test_work_that_grows_is_predicted() -> None:
@@ -257,7 +226,7 @@ def test_plan_counts_the_second_factor_of_a_damper_held_in_the_mean(scene: str, 
     count = mean.size["damper"]
     solid = Solid.of(count["hexes"], count["nodes"], 8)
     again = predict(3 * count["nodes"], 0, "pardiso", solid)
-    gain = {1: 1.0}.get(threads_used(), rates().speedup)
+    gain = {1: 1.0}.get(threads_used(), USUAL.speedup)
     assert gain * (mean.seconds - nodes.seconds) == pytest.approx(
         2.0 * (again.seconds + 5.0 * again.substitution()), rel=1e-6
     )

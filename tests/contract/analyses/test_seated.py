@@ -370,7 +370,7 @@ def test_run_folder_of_a_seating(tmp_path: Path) -> None:
         ({"seating.over": 0.9}, "seating.over.*not above 1"),
         ({"moved.directions": ["x", "x"]}, "moved.directions.*duplicated"),
         ({"mesh.symmetry": "quarter"}, "mesh.symmetry"),
-        ({"mesh.accuracy": "1 %"}, "mesh.accuracy"),
+        ({"accuracy": "1 %"}, "accuracy: a seated damper"),
         ({"solver.name": "amg"}, "solver.name"),
         ({"geometry.recipe": "sphere_block"}, "no rig of two blades"),
         ({"want": ["modes"]}, "want"),

@@ -187,11 +187,6 @@ def test_bad_study_arguments() -> None:
         plan_study(scene, "colour")
     with pytest.raises(InputError, match="even numbers"):
         plan_study(scene, "mesh", (9, 12))
-    with pytest.raises(InputError, match=r"mesh\.accuracy"):
-        plan_study(
-            load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": 0.05}),
-            "mesh",
-        )
     for name, vary in (
         ("symmetric", "parameters"),
         ("rig", "dimensions"),
@@ -247,7 +242,7 @@ def test_accuracy_is_reached_whatever_the_order(
     order: float, target: float, amount: float, more: float
 ) -> None:
     """The solver's order is none the code could assume."""
-    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": target})
+    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "accuracy": target})
     level, estimates = accuracy.choose(UNSAMPLED, scene, synthetic(order, amount, more))
     true = abs(level.results[0].value / 1000.0 - 1.0)
     estimated = estimates["max_pressure", "F=200 N"][0].error
@@ -255,7 +250,7 @@ def test_accuracy_is_reached_whatever_the_order(
 
 
 def test_accuracy_of_an_order_that_levels_confirm_costs_no_more_than_needed() -> None:
-    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": 0.005})
+    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "accuracy": 0.005})
     level, estimates = accuracy.choose(UNSAMPLED, scene, synthetic(1.5, 0.2))
     true = abs(level.results[0].value / 1000.0 - 1.0)
     estimated = estimates["max_pressure", "F=200 N"][0].error
@@ -264,14 +259,14 @@ def test_accuracy_of_an_order_that_levels_confirm_costs_no_more_than_needed() ->
 
 
 def test_accuracy_out_of_reach_is_said() -> None:
-    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": 1e-6})
+    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "accuracy": 1e-6})
     with pytest.raises(ConvergenceError, match="ask for less"):
         accuracy.choose(UNSAMPLED, scene, synthetic(1.0, 0.3))
 
 
 def test_a_level_is_let_go_before_the_next_is_solved() -> None:
     """Its factors are the memory of the next."""
-    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": 0.005})
+    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "accuracy": 0.005})
     made_up, held = synthetic(1.5, 0.2), list[weakref.ref[Any]]()
 
     class Factors:
@@ -289,7 +284,7 @@ def test_a_level_is_let_go_before_the_next_is_solved() -> None:
 
 
 def test_a_refused_later_level_ends_as_out_of_reach() -> None:
-    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": 1e-6})
+    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "accuracy": 1e-6})
     made_up, solved = synthetic(1.0, 0.3), []
 
     def solve(plan: Plan) -> tuple[str, tuple[Result, ...], float]:
@@ -303,7 +298,7 @@ def test_a_refused_later_level_ends_as_out_of_reach() -> None:
 
 
 def test_accuracy_of_the_real_scene() -> None:
-    result = run("hertz", overrides={**LIGHT, "geometry.divisions": "auto", "mesh.accuracy": "4 %"})
+    result = run("hertz", overrides={**LIGHT, "geometry.divisions": "auto", "accuracy": "4 %"})
     rows = {r.name: r for r in result.rows}
     for name in ("radius_moment", "max_pressure", "mean_pressure"):
         row = rows[name]

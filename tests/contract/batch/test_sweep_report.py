@@ -304,7 +304,7 @@ def test_no_json_and_study_and_comparison_are_refused(tmp_path: Path) -> None:
     made = _made(tmp_path / "s", {"a": [1, 2]})
     with pytest.raises(InputError, match="--study"):
         write_report(made, study=tmp_path)
-    with pytest.raises(InputError, match="duplicated"):
+    with pytest.raises(InputError, match="a comparison is of runs"):
         write_comparison([made, made], tmp_path / "c.html")
     (made / "sweep.json").write_text("{")
     with pytest.raises(InputError, match="is not JSON"):

@@ -187,9 +187,7 @@ def test_plan_solves_nothing_and_says_what_is_left_out(
     told = capsys.readouterr().out
     assert "mu = 0" in told
     assert "Predicted" in told
-    assert (
-        call("plan", "hertz", "--set", "geometry.divisions=auto", "--set", "mesh.accuracy=2 %") == 0
-    )
+    assert call("plan", "hertz", "--set", "geometry.divisions=auto", "--set", "accuracy=2 %") == 0
 
 
 def test_predicted_size_is_the_size(folder: Path) -> None:

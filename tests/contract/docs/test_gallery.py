@@ -29,7 +29,7 @@ ROWS = {
 NUMBER = re.compile(r"`(\w+)`(?: \(([^)]+)\))? (-?[\d.]+(?:e[+-]?\d+)?)")
 #: scene -> what makes it small enough for every day
 SMALLER = {
-    "own_sphere.toml": {"mesh.accuracy": "10 %"},
+    "own_sphere.toml": {"accuracy": "10 %"},
 }
 WITHOUT_SECOND_SOLVES = {"left_out.solve": "no"}
 

@@ -69,12 +69,10 @@ def test_withheld_number_stays_withheld(run: RunResult, tmp_path: Path) -> None:
     assert run.folder is not None
     summary = json.loads((run.folder / "summary.json").read_text(encoding="utf-8"))
     summary["results"][0] |= {"value": None, "withheld": "the path stopped"}
-    del summary["results"][1]["case_fields"]
     (tmp_path / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
     again = upd.load(tmp_path)
     assert again.results[0].withheld == "the path stopped"
     assert math.isnan(again.results[0].value)
-    # an older folder: the case is known by its words
     assert again.results[1].case == run.results[1].case
 
 

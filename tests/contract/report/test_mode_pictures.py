@@ -5,12 +5,9 @@ behind.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
-import meshio
 import numpy as np
 import pytest
 from matplotlib import colormaps
@@ -21,9 +18,7 @@ from upd.errors import InputError
 from upd.fem import box_mesh
 from upd.mesh import FloatArray, Mesh
 from upd.mesh.boundary import boundary_quads
-from upd.mesh.export import write_fields
-from upd.plot import modes as mode_pictures
-from upd.plot.modes import draw_mode, write_frames
+from upd.plot.modes import draw_mode
 from upd.plot.sheet import write_sheet
 
 SIDES = (2.0, 3.0, 4.0)
@@ -190,117 +185,3 @@ def test_two_blades_are_drawn_at_once(tmp_path: Path) -> None:
         seconds.append(time.process_time() - begin)
     assert path.stat().st_size > 0
     assert min(seconds) < 0.3
-
-
-def played(path: Path) -> list[tuple[float, meshio.Mesh]]:
-    root = ElementTree.parse(path).getroot()
-    assert root.get("type") == "Collection"
-    return [
-        (float(s.get("timestep", "nan")), meshio.read(path.parent / s.get("file", "")))
-        for s in root.iter("DataSet")
-    ]
-
-
-@pytest.mark.parametrize("nodes", [8, 20, 27])
-@pytest.mark.parametrize("warped", [True, False])
-def test_frames_are_one_period(nodes: int, warped: bool, tmp_path: Path) -> None:
-    mesh = box(nodes, (1, 1, 2))
-    folder = tmp_path / "made"
-    path = write_frames(
-        folder, "mode & 1", mesh, bent(mesh), frames=8, amplitude=0.5, warped=warped
-    )
-    assert path == folder / "mode & 1.pvd"
-    shown = played(path)
-    assert [at for at, _ in shown] == [k / 8 for k in range(8)]
-    crest = bent(mesh) * (0.5 / 16.0)
-    for at, frame in shown:
-        now = np.sin(2.0 * np.pi * at) * crest
-        assert frame.point_data["displacement"] == pytest.approx(now, abs=1e-15)
-        assert frame.points == pytest.approx(
-            mesh.points + now if warped else mesh.points, abs=1e-14
-        )
-    assert len(list(folder.iterdir())) == 9
-
-
-def test_amplitude_by_default_and_names_in_order(tmp_path: Path) -> None:
-    mesh = box(8, (1, 1, 1))
-    shown = played(write_frames(tmp_path, "m", mesh, 7.0 * bent(mesh), frames=104))
-    largest = max(
-        float(np.linalg.norm(frame.point_data["displacement"], axis=1).max()) for _, frame in shown
-    )
-    assert largest == pytest.approx(0.08 * np.linalg.norm(SIDES), rel=1e-12)
-    assert sorted(p.name for p in tmp_path.glob("*.vtu"))[-1] == "m_103.vtu"
-    assert (tmp_path / "m_000.vtu").exists()
-
-
-def fail_in_frame_3(monkeypatch: pytest.MonkeyPatch) -> None:
-    write = write_fields
-
-    def broken(path: Path, *rest: Any) -> None:
-        if path.name.endswith("_03.vtu"):
-            raise OSError(28, "No space left on device")
-        write(path, *rest)
-
-    monkeypatch.setattr(mode_pictures, "write_fields", broken)
-
-
-def fail_in_moving(monkeypatch: pytest.MonkeyPatch) -> None:
-    replace = Path.replace
-
-    def broken(self: Path, target: Path) -> Path:
-        if self.name.endswith("_03.vtu") and "old" not in (
-            self.parent.name,
-            Path(target).parent.name,
-        ):
-            raise OSError(28, "No space left on device")
-        return replace(self, target)
-
-    # the writer of one file moves too; here only what comes after it may fail
-    write = write_fields
-
-    def whole(path: Path, *rest: Any) -> None:
-        write(path.with_name("x.vtu"), *rest)
-        replace(path.with_name("x.vtu"), path)
-
-    monkeypatch.setattr(mode_pictures, "write_fields", whole)
-    monkeypatch.setattr(Path, "replace", broken)
-
-
-@pytest.mark.parametrize("failure", [fail_in_frame_3, fail_in_moving])
-@pytest.mark.parametrize("before", [False, True])
-def test_a_failure_leaves_the_folder_as_it_was(
-    failure: Callable[[pytest.MonkeyPatch], None],
-    before: bool,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    mesh = box(8, (1, 1, 1))
-    folder = tmp_path / "out"
-    if before:
-        write_frames(folder, "m", mesh, bent(mesh), frames=6)
-    kept = {p.name: p.read_bytes() for p in folder.glob("*")}
-    failure(monkeypatch)
-    with pytest.raises(
-        InputError,
-        match=r"out: cannot be written \(No space left on device\); choose another folder",
-    ):
-        write_frames(folder, "m", mesh, bent(mesh), amplitude=1.0)
-    assert folder.exists() == before
-    assert {p.name: p.read_bytes() for p in folder.glob("*")} == kept
-    assert len(kept) == (7 if before else 0)
-
-
-def test_faults_of_an_animation(tmp_path: Path) -> None:
-    mesh = box(8, (1, 1, 1))
-    with pytest.raises(InputError) as fault:
-        write_frames(tmp_path, "a/b", mesh, np.zeros(3), frames=1, amplitude=-1.0)
-    for part in (
-        "name = 'a/b'",
-        "frames = 1",
-        "amplitude = -1.0",
-        "the shape is (3,), give (8, 3)",
-    ):
-        assert part in str(fault.value)
-    with pytest.raises(InputError, match="cannot be written"):
-        write_frames(tmp_path / "none" / "there", "m", mesh, bent(mesh))
-    assert not list(tmp_path.iterdir())

@@ -273,9 +273,10 @@ def _area(box: list[float]) -> float:
 
 async def _crowded(tab: Tab, page: Path) -> dict[str, Any]:
     """Rectangles of crowded charts at both widths."""
-    nothing: dict[str, Any] = {"title": "t", "names": [], "numbers": [], "parameters": []}
+    lists = ("names", "differences", "headline", "costs", "lines", "scenes")
+    nothing: dict[str, Any] = {"title": "t"} | {name: [] for name in lists}
     panels = make_panels([_crowd(5), _crowd(30)], {})
-    save(page, render("compare_sweeps.html.j2", panels, [], nothing))
+    save(page, render("compare.html.j2", panels, [], nothing))
     out = {}
     for width in (PHONE, DESK):
         await tab.open(page, width)

@@ -105,7 +105,6 @@ ODD = (
 #: every analysis: values that each mean something and do not go together
 CONTRADICTORY: dict[str, tuple[dict[str, str], ...]] = {
     "hertz": (
-        {"mesh.accuracy": '"1 %"'},
         {"geometry.divisions": '"auto"'},
         {"geometry.patch": '"9 mm"'},
         {"geometry.symmetry": '"full"'},
@@ -129,7 +128,6 @@ CONTRADICTORY: dict[str, tuple[dict[str, str], ...]] = {
         {"response.start": '"700 Hz"'},
         {"modes.below": '"300 Hz"'},
         {"mesh.symmetry": '"quarter"'},
-        {"mesh.accuracy": '"1 %"'},
         {"solver.name": '"amg"'},
         {"modes.arrangements": '["symmetric", "symmetric"]'},
         {"reduction.modes": "3", "reduction.error": '"1 %"'},

@@ -51,7 +51,7 @@ def test_scene_as_run_reads_back_the_same(tmp_path: Path) -> None:
         [
             "contact.friction=0.3",
             "geometry.patch=auto",
-            "mesh.accuracy=1 %",
+            "accuracy=1 %",
             "geometry.radius=6 mm",
         ][:2],
     )
@@ -101,8 +101,7 @@ def test_all_faults_in_one_message() -> None:
         ("geometry.divisions=40.5", "not a whole number"),
         ("geometry.symmetry=full", "set mesh.symmetry instead"),
         ("geometry.recipe=cube", "geometry.recipe"),
-        ("mesh.accuracy=1 %", "geometry.divisions cannot be given too"),
-        ("mesh.accuracy=2", "outside (0, 1)"),
+        ("accuracy=2", "outside (0, 1)"),
         ("geometry.radius=auto", 'cannot be "auto"'),
         ('loads.normal=["200 N", "200.00001 N"]', "duplicated"),
         ("name=../../x", "is no name"),

@@ -42,7 +42,7 @@ SIZED_BY_LOAD = ("patch", "core_depth")
 
 
 def level_geometry(
-    parameters: Mapping[str, Any], divisions: int, *, quadratic: bool = False, step: int = 2
+    parameters: Mapping[str, Any], divisions: int, *, step: int = 2
 ) -> dict[str, Any]:
     """Parameters of the recipe that change with the divisions of its contact.
 
@@ -52,9 +52,6 @@ def level_geometry(
         Of the plan.
     divisions
         Of the level, even.
-    quadratic
-        Whether its elements have a node between those of the plan's: the far mesh follows the
-        spacing of nodes.
     step
         Of the numbers of elements along the contact: 2 for recipes that take even ones only.
 
@@ -70,8 +67,7 @@ def level_geometry(
         long = divisions * int(parameters["divisions_long"]) / (step * usual)
         out["divisions_long"] = step * max(1, round(long))
     if "growth" in parameters:
-        nodes = 2 * divisions if quadratic else divisions
-        out["growth"] = round(refined_growth(float(parameters["growth"]), usual / nodes), 4)
+        out["growth"] = round(refined_growth(float(parameters["growth"]), usual / divisions), 4)
     return out
 
 
@@ -112,7 +108,6 @@ def companion_scene(scene: Scene, geometry: Mapping[str, Any]) -> Scene:
         loads=replace(scene.loads, cycle_steps=steps),
         geometry={**scene.geometry, **geometry},
         want=tuple(w for w in scene.want if w not in _SPARED) or scene.want,
-        mesh=replace(scene.mesh, accuracy=None),
         left_out=replace(scene.left_out, solve="no"),
         accuracy=UNKNOWN,
     )

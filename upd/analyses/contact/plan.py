@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import Effect, Plan
-from upd.analyses.cost import NODES, START_BYTES, CostModel, arrays_s, calls_s, dense_s
+from upd.analyses.cost import NODES, START_BYTES, CostModel, dense_s
 from upd.errors import InputError, OwnMeshError, UpdError
 from upd.linalg.routes import EACH, FIRST
 from upd.mesh import Mesh, recipes
@@ -248,15 +248,15 @@ def add_loads(
     n_curve = scene.loads.curve_points if "load curve" in on else 0
     # A stiffness is a slope between two more loads.
     forces = n_load * (3 if scene.wants("stiffness") else 1) + n_curve
-    cost.seconds += forces * (calls_s(_LOAD_S) + dense_s(k**3 / 6.0))
+    cost.seconds += forces * (_LOAD_S + dense_s(k**3 / 6.0))
     if "friction" in on:
         curved = scene.analysis == "curved contact"
         lines = 1 if curved else len(scene.loads.directions)
         tangential = ratios if scene.wants("tangential") else 0
-        cost.seconds += n_load * lines * tangential * (calls_s(_TANGENTIAL_S) + dense_s(3.0 * k**3))
+        cost.seconds += n_load * lines * tangential * (_TANGENTIAL_S + dense_s(3.0 * k**3))
         step = _STEP_2_S if scene.slip_directions == 2 else _STEP_S
         steps = scene.loads.cycle_steps if scene.wants("cycle") else 0
-        cost.seconds += n_load * lines * steps * calls_s(step)
+        cost.seconds += n_load * lines * steps * step
         # Four numbers a step and node: traction, also before it is clipped, slip, state. A curved
         # contact's patch reaches to twice its radius at least.
         loaded = np.pi / 16.0 * k if curved else k
@@ -287,7 +287,7 @@ def _add_coupled(cost: CostModel, scene: Scene, k: int, forces: int, *, curved: 
     steps += loads * lines * _CURVE_STEPS * scene.wants("tangential")
     steps += loads * lines * (1.8 * scene.loads.cycle_steps) * scene.wants("cycle")
     one = _STEP_CUBES * closed**3 + _STEP_SQUARES * m * closed
-    cost.seconds += steps * (calls_s(5e-3) + dense_s(one)) + dense_s(m**3 / 3.0)
+    cost.seconds += steps * (5e-3 + dense_s(one)) + dense_s(m**3 / 3.0)
     cost.kept_bytes += _KEPT * 8.0 * m**2
 
 
@@ -297,7 +297,7 @@ def _files_seconds(scene: Scene, size: Mapping[str, Mapping[str, int]]) -> float
     nodes = sum(c["nodes"] for c in size.values()) if scene.wants("fields") else 0
     # A table row, a group of arrays and a curve per load.
     loads = len(scene.loads.normal) * (1 + len(scene.loads.tangential))
-    return calls_s(_FILES_S + flat + 5e-3 * loads) + arrays_s(_NODE_S * nodes)
+    return _FILES_S + flat + 5e-3 * loads + _NODE_S * nodes
 
 
 # Fewest elements along an edge of the contact that a companion is made coarser to, of linear and of

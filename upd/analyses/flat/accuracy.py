@@ -54,7 +54,7 @@ def _scenes(scene: Scene) -> list[Callable[[], Scene]]:
             f"accuracy: the recipe {scene.recipe!r} has no divisions to choose; leave it out"
         )
     element = _ELEMENT if scene.mesh.element in ("hex8", "hex8i") else scene.mesh.element
-    mesh = replace(scene.mesh, element=element, accuracy=None)
+    mesh = replace(scene.mesh, element=element)
     wires = recipes.has_parameter(scene.recipe, "bottom_layer")
     geometry = _for_wires(scene.geometry) if wires else scene.geometry
     plain = replace(scene, mesh=mesh, accuracy=None, geometry=geometry)

@@ -97,11 +97,6 @@ def make_plan(scene: Scene, *, companions: bool = True) -> ContactPlan:
 
 def _fitting(scene: Scene) -> None:
     problems = []
-    if scene.mesh.accuracy is not None:
-        problems.append(
-            "mesh.accuracy: is that of a sphere's contact; write accuracy = "
-            f'"{100.0 * scene.mesh.accuracy:g} %" at the top of the scene, for the stiffnesses'
-        )
     if scene.mesh.symmetry == "quarter":
         problems.append(
             'mesh.symmetry: a damper\'s face has one mirror plane; use "half", "full" or "auto"'

@@ -53,7 +53,7 @@ def marked_peaks(at: Sequence[tuple[int, str, int]]) -> Variables:
             np.array([number for number, *_ in at]),
             {
                 "long_name": "number of the peak's mode; 0 is the highest point of a curve without",
-                # which mode each is, in the same order: older files have peaks by frequency
+                # which mode each is, in the same order
                 "modes": ", ".join(mode for _, mode, _ in at),
             },
         ),

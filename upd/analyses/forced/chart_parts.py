@@ -19,7 +19,6 @@ SHARES = ("stick", "slip", "lift-off")
 STICK_SHARE, SLIP_SHARE = 0, 1
 PER_N = "(m/s²)/N"
 HZ_AXIS = Axis("frequency", "Hz")
-PEAK_AXIS = Axis("peak accelerance", PER_N)
 SHEET: dict[str, Any] = {"columns": 2, "size": (6.4, 4.4)}
 #: name, unit, scale, first degree of freedom and names of the damper's motions
 MOTIONS = (
@@ -93,7 +92,7 @@ class ChartedPeak:
 
 
 def charted_peaks(curve: ChartedCurve) -> list[ChartedPeak]:
-    """The peaks of a curve; older files do not tell their modes."""
+    """The peaks of a curve."""
     numbers, index = curve.data("peak"), curve.data("peak_index")
     told = str(curve.group["peak"].attributes.get("modes", ""))
     modes = told.split(", ") if told else [""] * len(numbers)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from upd.analyses.base import Effect
-from upd.analyses.cost import arrays_s, dense_s
+from upd.analyses.cost import dense_s
 from upd.scene import ForcedScene
 
 #: harmonics of the blades and samples in a period where the scene leaves them to the rule: two
@@ -39,7 +39,7 @@ def balance_seconds(scene: ForcedScene, dofs: float) -> float:
     samples = SAMPLES if b.samples == "auto" else int(b.samples)
     rows = _MOVING * dofs
     evaluations = _ITERATIONS * len(e.centrifugal_to_force) * samples
-    return arrays_s(evaluations * _DOF_S * rows) + dense_s(evaluations * 2.0 * rows**2 * dofs)
+    return evaluations * _DOF_S * rows + dense_s(evaluations * 2.0 * rows**2 * dofs)
 
 
 def harmonics_effect(scene: ForcedScene) -> Effect:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from upd.analyses.base import InputEnds
-from upd.analyses.cost import calls_s
 from upd.analyses.forced.input_data import is_known
 from upd.analyses.forced.plan import ForcedPlan, newton_seconds
 
@@ -32,4 +31,4 @@ def known_inputs(plan: ForcedPlan, ends: Sequence[InputEnds]) -> tuple[set[str],
         return set(), 0.0
     curves = len(scene.stiffnesses) * len(scene.excitation.centrifugal_to_force)
     rubbed = "contact.friction" in known and scene.contact.static == "seated"
-    return known, _PEAKS * _CLIMB * curves * newton_seconds(plan) + calls_s(2 * rubbed * _SEATING_S)
+    return known, _PEAKS * _CLIMB * curves * newton_seconds(plan) + 2 * rubbed * _SEATING_S

@@ -161,24 +161,6 @@ class PathPeak(NamedTuple):
     sample: int
 
 
-def path_peaks(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) -> list[PathPeak]:
-    """The local maxima along a path that may turn back.
-
-    Parameters
-    ----------
-    frequency, magnitude
-        (n,) along the path, Hz and any unit.
-    above
-        Maxima lower than this part of the highest are left out.
-
-    Returns
-    -------
-    list of PathPeak
-        At most the two highest, by rising frequency; a peak that the path passes again is one.
-    """
-    return chosen_peaks(path_maxima(frequency, magnitude, above))
-
-
 def chosen_peaks(maxima: Sequence[PathPeak]) -> list[PathPeak]:
     """The two highest of some maxima by rising frequency; a path that turns round passes the same
     peak again.
@@ -193,7 +175,15 @@ def chosen_peaks(maxima: Sequence[PathPeak]) -> list[PathPeak]:
 
 
 def path_maxima(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) -> list[PathPeak]:
-    """All local maxima along a path, in its order; see `path_peaks`."""
+    """All local maxima along a path that may turn back, in its order.
+
+    Parameters
+    ----------
+    frequency, magnitude
+        (n,) along the path, Hz and any unit.
+    above
+        Maxima lower than this part of the highest are left out.
+    """
     f, a = np.asarray(frequency), np.asarray(magnitude)
     if len(f) < 3:
         return []
@@ -257,11 +247,6 @@ def tell_modes(model: Model, values: Array, shapes: Array, below: float) -> list
         for j, (f, x) in enumerate(zip(frequency, moved, strict=True))
         if f < below
     ]
-
-
-def peak_index(answer: FrequencyResponse, row: Array) -> int:
-    """Point of the path with the largest acceleration along row @ q."""
-    return int(np.argmax(answer.amplitude(row, read_harmonic(answer)) * answer.frequency**2))
 
 
 def loops(answer: FrequencyResponse, i: int, count: int) -> list[Loop]:

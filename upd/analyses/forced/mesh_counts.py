@@ -63,13 +63,6 @@ def count_of(scene: ForcedScene, key: str) -> int:
     return int(scene.geometry.get(key, default))
 
 
-def up_slope(scene: ForcedScene) -> tuple[str, ...]:
-    """Counts up the scene's contact faces that its recipe has."""
-    return tuple(
-        key for key in FACES[scene.arrangement][0] if recipes.has_parameter(scene.recipe, key)
-    )
-
-
 def on_contact(scene: ForcedScene) -> tuple[str, ...]:
     """Counts of the scene's contact faces that its recipe has."""
     slopes, along = FACES[scene.arrangement]

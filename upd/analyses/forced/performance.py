@@ -113,16 +113,6 @@ class Performance:
         low, high = (self.worst_at(best.ratio * factor) for factor in (0.5, 2.0))
         return low / best.worst.height, high / best.worst.height
 
-    def of_mode(self, blade: Side, number: int) -> Array:
-        """(3, n) F_C/F_E, Hz and height of a peak where it was found."""
-        rows = [
-            (one.ratio, p.frequency, p.height)
-            for one in self.known
-            for p in one.peaks
-            if (p.blade, p.number) == (blade, number)
-        ]
-        return np.array(rows).reshape(len(rows), 3).T
-
 
 def peaks_at(
     plan: ForcedPlan,

@@ -16,11 +16,8 @@ _MOST = 3
 
 def performance_charts(arrays: Arrays) -> list[Chart]:
     """Peaks of both blades over F_C/F_E, one chart for every stiffness."""
-    # older files have a group for every mode
     return [
-        _chart(group)
-        for group in with_content(arrays, PERFORMANCE)
-        if "highest_accelerance" in group and group["ratio"].data.size
+        _chart(group) for group in with_content(arrays, PERFORMANCE) if group["ratio"].data.size
     ]
 
 

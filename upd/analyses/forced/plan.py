@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from upd.analyses.base import Needs, Plan
-from upd.analyses.cost import NODES, CostModel, arrays_s, calls_s, dense_s
+from upd.analyses.cost import NODES, CostModel, dense_s
 from upd.analyses.forced.effects import effects_of_faces, effects_of_points
 from upd.analyses.forced.faces_cost import balance_seconds
 from upd.analyses.forced.stiffness import check_sources, plans_to_solve
@@ -117,7 +117,7 @@ def _whole_faces_cost(
     ways = _WAYS * (scene.balance.method == "march")
     marched = ways * len(e.centrifugal_to_force) * _CLOSER * math.log(e.stop / e.start)
     cost.seconds += balance_seconds(scene, m)
-    cost.seconds += arrays_s(marched * _MARCHED * (_AT_ONCE_S + _DOF_S * m))
+    cost.seconds += marched * _MARCHED * (_AT_ONCE_S + _DOF_S * m)
     cost.seconds += marched * dense_s(_FACTORS * m**3)
     cost.seconds += _files_seconds(scene)
     cost.kept_bytes += _MATRICES * 8.0 * m**2
@@ -129,7 +129,7 @@ def _files_seconds(scene: ForcedScene) -> float:
     """Figures, files and page."""
     curves = len(scene.stiffnesses) * len(scene.excitation.centrifugal_to_force)
     whole = scene.contact.model == "interface"
-    return calls_s(_FILES_S + _CURVE_S * curves * (not whole))
+    return _FILES_S + _CURVE_S * curves * (not whole)
 
 
 def _parameters(scene: ForcedScene) -> dict[str, Any]:
@@ -185,7 +185,7 @@ def _curves_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -
         return _sweep_seconds(scene, size)
     asked, e = scene.excitation.points, scene.excitation
     points, step = _points(scene, size), _step_seconds(scene, size)
-    stuck = arrays_s(_STUCK_S * points) * asked * len(e.centrifugal_to_force)
+    stuck = _STUCK_S * points * asked * len(e.centrifugal_to_force)
     dense = asked / math.log(e.stop / e.start) / _ASKED
     kinks = _KINKS[scene.arrangement] * (1.0 - _ASKED_SHARE + _ASKED_SHARE * dense)
     rubs = scene.contact.friction > 0.0
@@ -212,7 +212,7 @@ def _sweep_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) ->
     """Sweeps up and down of every curve."""
     e = scene.excitation
     marched = 2.0 * e.points * len(scene.stiffnesses) * len(e.centrifugal_to_force)
-    step = arrays_s(_SPRING_S + _POINT_S * _points(scene, size))
+    step = _SPRING_S + _POINT_S * _points(scene, size)
     return marched * _PERIODS * time_steps(scene) * step
 
 
@@ -228,17 +228,15 @@ def _balance_samples(scene: ForcedScene) -> int:
     return sample_count(harmonics(range(_highest(scene) + 1)), None if given == "auto" else given)
 
 
-def _step_seconds(
-    scene: ForcedScene, size: Mapping[str, Mapping[str, int]], times: float = 1.0
-) -> float:
-    """Seconds of a Newton step with its factors, with so many times the contact points."""
-    points, n = times * _points(scene, size), times * _unknowns(scene, size)
+def _step_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
+    """Seconds of a Newton step with its factors."""
+    points, n = _points(scene, size), _unknowns(scene, size)
     factor = dense_s(_STEP_LU * 2.0 / 3.0 * n**3)
-    factors = arrays_s(_ENTRY_S * n**2) + factor
+    factors = _ENTRY_S * n**2 + factor
     if n > WORTH_KEEPING:
         factors = min(factors, factors / _STEPS_KEPT + _SOLVED * factor * SOLUTIONS / n)
     samples = _SAMPLE_S * _balance_samples(scene)
-    return calls_s(_STEP_S + (_POINT_STEP_S + samples) * points) + factors
+    return _STEP_S + (_POINT_STEP_S + samples) * points + factors
 
 
 def _points(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:

@@ -47,7 +47,7 @@ log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 #: imbalance of a static state with F_C, relative to it, above which it is none
 BALANCE = 1e-9
-SEATED, FRICTIONLESS, GIVEN = "seated", "frictionless", "given"
+SEATED, GIVEN = "seated", "given"
 #: load steps in which F_C is raised from nothing
 _STEPS = 20
 _X, _Z = 0, 2

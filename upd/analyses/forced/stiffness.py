@@ -33,7 +33,6 @@ from upd.scene.forced_contact import Side, StiffnessChoice
 log = logging.getLogger(__name__)
 #: groups of result.nc with a contact law in the axes of its patch begin so, those in the axes of a
 #: rig with the second name
-_GROUP, _PLACED = "contact law ", "contact law in the rig"
 
 
 @dataclass(frozen=True)
@@ -48,15 +47,12 @@ class FaceLaw:
         Contact law in the axes of its patch, when its own points are used.
     source
         Where the totals come from.
-    anisotropy
-        Difference of a law's two tangential stiffnesses relative to their mean, which is K_T.
     """
 
     K_N: float
     K_T: float
     law: ContactLaw | None = None
     source: str = "given"
-    anisotropy: float | None = None
 
 
 def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceLaw]:
@@ -74,14 +70,8 @@ def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceLaw]:
         else:
             assert law is not None
             own = law if choice.points == "law" else None
-            both = law.k_t.sum(axis=0)
-            out[side] = FaceLaw(
-                float(law.k_n.sum()),
-                float(both.mean()),
-                own,
-                source,
-                float(np.ptp(both) / both.mean()),
-            )
+            K_T = float(law.k_t.sum(axis=0).mean())
+            out[side] = FaceLaw(float(law.k_n.sum()), K_T, own, source)
     return out
 
 
@@ -100,11 +90,9 @@ def mirrored(law: ContactLaw) -> ContactLaw:
     )
 
 
-def _is_law(name: str, group: ArrayGroup) -> bool:
-    """Whether a group holds a contact law; in older files only its name says so."""
-    if "content" in group.attributes:
-        return bool(group.attributes["content"] == "contact law")
-    return name.startswith(_GROUP) and not name.startswith(_PLACED)
+def _is_law(group: ArrayGroup) -> bool:
+    """Whether a group holds a contact law."""
+    return group.attributes.get("content") == "contact law"
 
 
 def check_sources(scene: ForcedScene) -> None:
@@ -185,7 +173,9 @@ def plans_to_solve(scene: ForcedScene) -> list[ContactPlan]:
 
 def _kept_law(scene: Scene) -> Path:
     """Where the law of a contact scene is kept once it is solved."""
-    key = hashlib.sha256(f"{_GROUP}{scene.text}{source_digest(scene.recipe)}".encode()).hexdigest()
+    key = hashlib.sha256(
+        f"contact law {scene.text}{source_digest(scene.recipe)}".encode()
+    ).hexdigest()
     return cache_folder() / f"law-{key[:32]}.nc"
 
 
@@ -205,7 +195,7 @@ def _law(choice: StiffnessChoice, stages: Stages) -> tuple[ContactLaw, str]:
 
 
 def _first(groups: Mapping[str, ArrayGroup], where: str) -> ContactLaw:
-    found = [arrays for name, arrays in groups.items() if _is_law(name, arrays)]
+    found = [arrays for arrays in groups.values() if _is_law(arrays)]
     if not found:
         raise InputError(
             f'stiffness: {where} holds no contact law; run the contact with "contact_law" '
@@ -264,7 +254,7 @@ def _run(scene: Scene) -> dict[str, ArrayGroup]:
                     f"stiffness: the contact analysis {scene.name} failed its check "
                     f"{check.name}; run it alone: upd run {scene.name}"
                 )
-    return {name: group for name, group in FLAT.arrays(solution).items() if _is_law(name, group)}
+    return {name: group for name, group in FLAT.arrays(solution).items() if _is_law(group)}
 
 
 def _keep(path: Path, groups: Mapping[str, ArrayGroup]) -> None:

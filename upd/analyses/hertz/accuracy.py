@@ -64,7 +64,7 @@ def level_scene(scene: Scene, level: int) -> Scene:
             ),
             4,
         )
-    return replace(scene, geometry=geometry, mesh=replace(scene.mesh, accuracy=None), accuracy=None)
+    return replace(scene, geometry=geometry, accuracy=None)
 
 
 def _scenes(scene: Scene) -> list[Callable[[], Scene]]:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.measured.compare import MEASURED_CURVE
-from upd.measured import noisy_peaks
 from upd.plot.chart import Array, Arrays, Axis, Chart, Group, Trace
 from upd.plot.common import case_of, frequency_of, magnitude, with_content
 from upd.results import Case
@@ -41,20 +40,6 @@ def measured_traces(arrays: Arrays, blade: str, colours: Mapping[Any, int]) -> t
             colour, spare = spare, spare + 1
         out.append(_points(group, blade, colour))
     return tuple(out)
-
-
-def measured_peak_traces(arrays: Arrays, blade: str, colour: int) -> tuple[Trace, ...]:
-    """Peaks of the measured curves with friction of a blade, over F_C/F_E."""
-    at: list[tuple[float, float]] = []
-    for group in _of_blade(arrays, blade):
-        ratio = case_of(group).force_ratio
-        if ratio is not None:
-            H = magnitude(group[f"accelerance_{blade}"])
-            at += [(ratio, one.height) for one in noisy_peaks(frequency_of(group), H)]
-    if not at:
-        return ()
-    ratios, heights = np.array(at).T
-    return (Trace("measured", ratios, heights, "open points", colour),)
 
 
 def damping_charts(arrays: Arrays) -> list[Chart]:

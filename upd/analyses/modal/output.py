@@ -125,17 +125,13 @@ def write_files(solution: ModalSolution, folder: Path) -> None:
         from upd.analyses.modal.pictures import write_pictures
 
         write_pictures(solution, folder)
-    if scene.wants("pictures", "animation"):
         _write_shapes(solution, folder)
 
 
 def _write_shapes(solution: ModalSolution, folder: Path) -> None:
-    """Meshes with the mode shapes of every configuration, and their frames when an animation is
-    wanted.
-    """
+    """Meshes with the mode shapes of every configuration."""
     # meshio is slow to import: only when files are wanted.
     from upd.mesh.export import write_fields
-    from upd.plot.modes import write_frames
 
     for found in solution.sets:
         meshes, shapes = whole(solution, found)
@@ -144,9 +140,3 @@ def _write_shapes(solution: ModalSolution, folder: Path) -> None:
             for name, u in shape.items():
                 data[name][f"mode_{k + 1:02d}_{mode.frequency:.1f}Hz"] = u
         write_fields(folder / f"modes_{found.kind}_{found.arrangement}.vtu", meshes, data)
-        if solution.plan.scene.wants("animation"):
-            for k, (mode, shape) in enumerate(shapes):
-                for name, u in shape.items():
-                    place = folder / f"animation_{found.kind}_{found.arrangement}"
-                    place.mkdir(exist_ok=True)
-                    write_frames(place, f"mode_{k + 1:02d}_{mode.frequency:.0f}Hz", meshes[name], u)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from upd.analyses.base import Effect, Needs, Plan
-from upd.analyses.cost import NODES, CostModel, arrays_s, calls_s
+from upd.analyses.cost import NODES, CostModel
 from upd.cache.sources import key_of
 from upd.errors import InputError
 from upd.mesh import recipes
@@ -72,7 +72,7 @@ def make_plan(scene: RigScene) -> ModalPlan:
     _add_more(cost, scene, size, found[0][0])
     memory, workers = cost.side_by_side(cost.threads, families * len(size))
     nodes = sum(count["nodes"] for count in size.values()) if scene.wants("pictures") else 0
-    files = calls_s(_FILES_S + _PICTURES_S * (nodes > 0)) + arrays_s(_NODE_S * nodes)
+    files = _FILES_S + _PICTURES_S * (nodes > 0) + _NODE_S * nodes
     first = parameters(scene, *found[0], symmetry)
     effects = tuple(_effects(scene, symmetry))
     return ModalPlan(
@@ -105,14 +105,14 @@ def _add_more(
                 cost.seconds += _direct_seconds(count["nodes"])
     right = size.get(f"right, {arrangement}")
     if scene.wants("response") and right is not None:
-        cost.seconds += calls_s(0.3) + _direct_seconds(right["nodes"])
+        cost.seconds += 0.3 + _direct_seconds(right["nodes"])
         if scene.left_out.solves:
             cost.modes(f"right, {arrangement}, modes", right["hexes"], right["nodes"])
 
 
 def _direct_seconds(nodes: int) -> float:
     """Two solutions off resonance."""
-    return arrays_s(2.0 * _DIRECT_S * (3.0 * nodes) ** _DIRECT_POWER)
+    return float(2.0 * _DIRECT_S * (3.0 * nodes) ** _DIRECT_POWER)
 
 
 def _sizes(

@@ -7,7 +7,7 @@ from typing import Any
 
 from upd.analyses.base import Effect, Needs, Plan
 from upd.analyses.centrifugal import centrifugal_effects
-from upd.analyses.cost import NODES, CostModel, calls_s, dense_s
+from upd.analyses.cost import NODES, CostModel, dense_s
 from upd.cache.sources import key_of
 from upd.mesh import recipes
 from upd.scene import SeatedScene
@@ -54,7 +54,7 @@ def make_plan(scene: SeatedScene) -> SeatedPlan:
         cost.total(workers),
         memory,
         workers,
-        files_seconds=calls_s(_FILES_S),
+        files_seconds=_FILES_S,
     )
 
 
@@ -91,8 +91,8 @@ def _cost(
     step = _FACTORS[kind] * 2.0 / 3.0 * (_CLOSED[kind] * m) ** 3
     step += _NEWTON[kind] * _PASSES[kind] * m**2
     cost.seconds += dense_s(calls * _CHECKS * m**3)
-    cost.seconds += load_steps(scene) * (calls_s(_STEP_S) + dense_s(step))
-    cost.seconds += calls_s(_FILES_S)
+    cost.seconds += load_steps(scene) * (_STEP_S + dense_s(step))
+    cost.seconds += _FILES_S
     cost.kept_bytes += _MATRICES * 8.0 * m**2
     memory, workers = cost.side_by_side(min(2, cost.threads), 2)
     return cost, memory, workers
@@ -100,7 +100,7 @@ def _cost(
 
 def solve_seconds(plan: SeatedPlan) -> float:
     """Predicted seconds of the plan without its files."""
-    return plan.seconds - calls_s(_FILES_S)
+    return plan.seconds - _FILES_S
 
 
 def needs(plan: SeatedPlan, threads: int) -> Needs:

@@ -103,8 +103,6 @@ class SeatedSolution:
         The contact with the platforms held, for stiffnesses.
     omissions
         Numbers solved again with what is left out.
-    condensation_seconds
-        Of meshes, matrices and condensation.
     """
 
     plan: SeatedPlan
@@ -115,7 +113,6 @@ class SeatedSolution:
     worn: CoupledContact | None = None
     platforms: Interface | None = None
     omissions: list[Resolved] = field(default_factory=list)
-    condensation_seconds: float = 0.0
 
     @property
     def interface(self) -> Interface:
@@ -136,12 +133,10 @@ def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
     solution = SeatedSolution(plan)
     try:
         scene = plan.scene
-        begin = time.perf_counter()
         with stages("mesh and assembly", f"both blades and the {scene.arrangement} damper"):
             solution.bodies = make_bodies(plan)
         with stages("condensation", "both blades and the damper on the nodes of both faces"):
             solution.of = make_interface(plan, solution.bodies, scene.blades.held)
-        solution.condensation_seconds = time.perf_counter() - begin
         solution.gap = _gap(solution, scene.contact.worn)
         with stages("seating", f"{RAISED}, {scene.seating.steps} load steps"):
             _phase(solution, _raised(solution))
