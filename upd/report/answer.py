@@ -213,7 +213,8 @@ def _whole(table: AnswerTable, width: int) -> list[AnswerLine]:
 def _end_of_tables(result: Told, entries: Sequence[Entry], width: int) -> tuple[AnswerLine, ...]:
     """Checks, cost, files and the first notes: what warns does not displace a table."""
     good = sum(check.passed for check in result.checks)
-    lines = [AnswerLine(""), AnswerLine(f"Checks: {good} of {len(result.checks)} passed.")]
+    lines = [AnswerLine(""), *map(AnswerLine, _wrapped(_accuracy(result), width))]
+    lines.append(AnswerLine(f"Checks: {good} of {len(result.checks)} passed."))
     lines += _cost_and_files(result, width)
     if result.outcome == FAILED:
         return tuple(lines)

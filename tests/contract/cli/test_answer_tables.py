@@ -11,6 +11,7 @@ import pytest
 from rich.console import Console
 
 from upd.analyses import hertz
+from upd.analyses.base import CHOSEN_BY_ACCURACY
 from upd.cli.tables import print_result
 from upd.report.answer import answer_tables
 from upd.report.columns import whole_table
@@ -172,3 +173,14 @@ def test_a_notebook_shows_the_tables(told: RunResult) -> None:
     from upd.report.notebook import _table_html
 
     assert "<i>" not in _table_html(evil) and "<b><b>" not in _table_html(evil)
+
+
+def test_the_levels_that_an_accuracy_chose_stand_beside_the_tables(told: RunResult) -> None:
+    chosen = {
+        "name": CHOSEN_BY_ACCURACY[0],
+        "included": True,
+        "why": "modes kept 20 of 10; rounds: two",
+    }
+    lines = printed(replace(told, effects=(chosen,)), 80)
+    assert "Accuracy reached, modes kept 20 of 10" in lines
+    assert not any("Accuracy" in line for line in printed(told, 80))
