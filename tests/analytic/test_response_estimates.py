@@ -145,12 +145,21 @@ def test_two_meshes_are_taken_as_of_the_order_of_edges() -> None:
 
 def test_other_sources_tell_the_change_of_their_levels() -> None:
     points = [(level(POINTS, 2.0 / 3.0), 1.1), (level(POINTS, 0.5), 0.95)]
-    assert bound(POINTS, points)[0] == pytest.approx(1.25 * 0.15)
+    assert bound(POINTS, points)[0] == pytest.approx(2.0 * 0.15)
     assert bound(HARMONICS, [(level(HARMONICS, 0.6), 0.96)])[0] == pytest.approx(1.25 * 0.04)
     assert bound(MODES, [(level(MODES, 2.0), 1.001)])[0] == pytest.approx(0.001)
     # q(h) = 1 + C h^2, of the run h = 1 and of the level 1/2
     error, _ = bound(SAMPLES, [(level(SAMPLES, 0.5), 1.0025 / 1.01)])
     assert error == pytest.approx(0.01 / 1.01)
+
+
+@pytest.mark.parametrize("order", [1.0, 1.3, 2.0, 3.0])
+def test_more_contact_points_bound_an_error_of_any_order(order: float) -> None:
+    """q(h) = 1 + C h^p, of the run h = 1, 8 and 10 rows for 5."""
+    sizes = (5.0 / 8.0, 0.5)
+    found = [(level(POINTS, s), (1.0 + 0.03 * s**order) / 1.03) for s in sizes]
+    error, _ = bound(POINTS, found)
+    assert (1.0 - 1e-12) * 0.03 / 1.03 <= error <= 2.0 * 0.03
 
 
 # -- against far finer levels ----------------------------------------------------------------------

@@ -2,8 +2,8 @@
 
 Coarser levels that show an order give Richardson's error with the factor 1.25 of three grids, of
 the order that re-entrant edges leave on fine meshes: a higher one is an accident of coarse levels.
-Levels without an order (heights that the mesh hardly changes, contact points and harmonics where
-contacts open and close) have their range as the scale of the error.
+Levels without an order (heights that the mesh hardly changes, harmonics where contacts open and
+close) have their range as the scale of the error; more contact points are taken as of first order.
 
 References
 ----------
@@ -214,6 +214,9 @@ def bound(source: str, found: Sequence[tuple[PeakLevel, float]]) -> tuple[float,
         return spread / (1.0 - 0.25), f"change with {names}, order 2"
     if source == MODES:
         return spread, f"change from {names}: what more modes change is less"
+    if source == POINTS:
+        # of an error C h^p, p >= 1, levels to the size s show at least the part 1 - s
+        return spread / (1.0 - min(one.size for one, _ in found)), f"range with {names}, order 1"
     return _SAFETY * spread, f"range with {names}, factor {_SAFETY:g}"
 
 
