@@ -14,8 +14,6 @@ from typing import Any, cast
 
 from upd.analyses import analysis_named
 from upd.errors import InputError
-from upd.mesh import recipes
-from upd.mesh.recipe_modules import READY
 from upd.plot.chart import Chart, Charts
 from upd.plot.matplotlib import chart_png
 from upd.plot.plotly import figure
@@ -73,21 +71,8 @@ class Panel:
 
 
 def charts_of(run: RunFolder) -> Charts:
-    """The analysis that knows the charts of the run; the generic charts when there is none."""
-    return analysis_named(
-        str(run.summary["size"].get("analysis", "")) or _analysis_of(run.summary["scene_file"])
-    ) or cast(Charts, generic)
-
-
-def _analysis_of(scene: Mapping[str, Any]) -> str:
-    """From the scene of older run folders.
-
-    A recipe that is a path would be executed, so it stays unknown.
-    """
-    if "analysis" in scene:
-        return str(scene["analysis"])
-    recipe = scene.get("geometry", {}).get("recipe")
-    return recipes.analysis(recipe) if recipe in READY else ""
+    """The analysis that knows the charts of the run; the generic one when it is not known."""
+    return analysis_named(str(run.summary["size"].get("analysis", ""))) or cast(Charts, generic)
 
 
 def run_panels(run: RunFolder) -> list[Panel]:
