@@ -441,7 +441,6 @@ def test_command_makes_a_page_or_says_what_is_wrong(
     capsys.readouterr()
     for arguments, told in (
         (["report", str(tmp_path)], "no run folder"),
-        (["report", str(copy), "--study", str(copy)], "no study folder"),
         (["report", str(copy), "--out", "x.html"], "--out"),
         (["report", str(copy), str(other), "--out", str(tmp_path / "c.pdf")], "ends in .html"),
     ):
@@ -491,21 +490,6 @@ def test_a_page_that_fails_does_not_hide_the_run(
     told = "resolution (F=50 N; F=200 N); report.html not written (no room)"
     assert result.status == f"ok with warnings: {told}"
     assert "report.html was not written" in (tmp_path / "r" / "run.log").read_text()
-
-
-def test_study_figures_come_onto_the_page(copy: Path, tmp_path: Path) -> None:
-    curve = {
-        "name": "max_pressure",
-        "case": "F=200 N",
-        "curve": "hex8i",
-        "seconds": [1.0, 2.0],
-        "memory_mb": [10.0, 20.0],
-    }
-    curve |= {"error": [0.1, -0.01], "against": "reference"}
-    (tmp_path / "study.json").write_text(json.dumps({"curves": [curve]}))
-    html = write_report(copy, study=tmp_path).read_text("utf-8")
-    assert "What accuracy costs" in html
-    assert "maximum pressure, F=200 N" in unpacked(html, "page-data")
 
 
 def test_scene_in_words(hertz: RunFolder, damper: Path) -> None:
