@@ -28,12 +28,8 @@ def analysis_of(scene: AnyScene) -> Analysis:
 
 
 def analysis_named(name: str) -> Analysis | None:
-    """The analysis of a run folder, by what the folder or its scene calls it.
-
-    None for another name.
-    """
-    package = _PACKAGES.get(name, name)
-    return _package(package) if package in _PACKAGES.values() else None
+    """The analysis of a run folder, by the name that the folder has of it; None for another."""
+    return _package(name) if name in _PACKAGES.values() else None
 
 
 def _package(name: str) -> Analysis:

@@ -403,7 +403,6 @@ def report(
     runs: Annotated[list[Path], Parameter(negative=())],
     *,
     out: Path | None = None,
-    study: Path | None = None,
 ) -> None:
     """Make the page of a run or a sweep again from its folder.
 
@@ -415,8 +414,6 @@ def report(
         Folders of runs, or one folder of a sweep.
     out
         File of the comparison; by default comparison.html beside the first run folder.
-    study
-        Study folder whose work-precision figure belongs on the page of a run.
     """
     from upd.report import write_comparison, write_report
 
@@ -425,10 +422,8 @@ def report(
             raise InputError(
                 "--out is for comparisons: the page of one run is report.html in its folder"
             )
-        terminal.console.print(f"Report: {plain(write_report(runs[0], study=study))}")
+        terminal.console.print(f"Report: {plain(write_report(runs[0]))}")
         return
-    if study is not None:
-        raise InputError("--study belongs to one run: leave it out of a comparison")
     page = write_comparison(runs, out or runs[0].resolve().parent / "comparison.html")
     terminal.console.print(f"Comparison: {plain(page)}")
 

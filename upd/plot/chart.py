@@ -303,8 +303,3 @@ class Charts(Protocol):
 
 #: states of a contact point, in the order of the values 0, 1, 2
 STATES = ("open", "slip", "stick")
-
-
-def label_of(group: str) -> str:
-    """The case a group of result.nc stands for: netCDF allows no slash in a name."""
-    return group.replace(" per ", "/")

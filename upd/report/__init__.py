@@ -16,29 +16,19 @@ if TYPE_CHECKING:
 __all__ = ["write_comparison", "write_report"]
 
 
-def write_report(folder: str | Path, *, study: str | Path | None = None) -> Path:
+def write_report(folder: str | Path) -> Path:
     """Write report.html into a run or sweep folder, from what lies in it; returns its path.
 
-    Parameters
-    ----------
-    study
-        Folder of a study whose work-precision figure belongs to the run.
-
-    Raises
-    ------
-    InputError
-        When ``folder`` is neither, cannot be written, or a sweep is given a study.
+    Raises InputError when ``folder`` is neither or cannot be written.
     """
     # Templates, netCDF and matplotlib are slow to import: only when a page is made.
     if (Path(folder) / "sweep.json").is_file():
         from upd.report.sweep_page import write_sweep_report
 
-        if study is not None:
-            raise InputError("--study belongs to one run: leave it out for a sweep")
         return write_sweep_report(folder)
     from upd.report.page import write_report as write
 
-    return write(folder, study=study)
+    return write(folder)
 
 
 def write_comparison(folders: Sequence[str | Path], path: str | Path) -> Path:

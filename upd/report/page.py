@@ -35,7 +35,7 @@ from upd.report.answer import answer_tables
 from upd.report.error_budget import budget_rows
 from upd.report.folder import RunFolder, read_run
 from upd.report.notes import MOST_NOTES, short_notes
-from upd.report.panels import Panel, charts_of, data, run_panels, study_panels
+from upd.report.panels import Panel, charts_of, data, run_panels
 from upd.report.scene_sentences import sentences
 from upd.report.surfaces import Surface, fitting, packed, picture, run_surfaces
 from upd.report.told import warnings
@@ -55,23 +55,14 @@ _INDEX = re.compile(r"\b([KFTkh])_([A-Za-z]{1,2})\b")
 _PARTS = Path(__file__).parent / "parts"
 
 
-def write_report(folder: str | Path, *, study: str | Path | None = None) -> Path:
+def write_report(folder: str | Path) -> Path:
     """Write report.html into a run folder, from what lies in it. Returns its path.
 
-    Parameters
-    ----------
-    study
-        Folder of a study whose work-precision figure belongs to the run.
-
-    Raises
-    ------
-    InputError
-        When ``folder`` is no run folder or cannot be written.
+    Raises InputError when ``folder`` is no run folder or cannot be written.
     """
     run = read_run(Path(folder))
-    panels = [*run_panels(run), *(study_panels(Path(study)) if study is not None else [])]
     path = run.path / "report.html"
-    save(path, render("run.html.j2", panels, run_surfaces(run), run_context(run)))
+    save(path, render("run.html.j2", run_panels(run), run_surfaces(run), run_context(run)))
     return path
 
 

@@ -4,7 +4,6 @@ that needs no script.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -13,14 +12,10 @@ from pathlib import Path
 from typing import Any, cast
 
 from upd.analyses import analysis_named
-from upd.errors import InputError
-from upd.mesh import recipes
-from upd.mesh.recipe_modules import READY
 from upd.plot.chart import Chart, Charts
 from upd.plot.matplotlib import chart_png
 from upd.plot.plotly import figure
 from upd.plot.png import png_size, png_uri, small_png
-from upd.plot.work_precision import work_precision_charts
 from upd.report import generic
 from upd.report.error_budget import budget_charts
 from upd.report.folder import RunFolder
@@ -73,21 +68,8 @@ class Panel:
 
 
 def charts_of(run: RunFolder) -> Charts:
-    """The analysis that knows the charts of the run; the generic charts when there is none."""
-    return analysis_named(
-        str(run.summary["size"].get("analysis", "")) or _analysis_of(run.summary["scene_file"])
-    ) or cast(Charts, generic)
-
-
-def _analysis_of(scene: Mapping[str, Any]) -> str:
-    """From the scene of older run folders.
-
-    A recipe that is a path would be executed, so it stays unknown.
-    """
-    if "analysis" in scene:
-        return str(scene["analysis"])
-    recipe = scene.get("geometry", {}).get("recipe")
-    return recipes.analysis(recipe) if recipe in READY else ""
+    """The analysis that knows the charts of the run; the generic one when it is not known."""
+    return analysis_named(str(run.summary["size"].get("analysis", ""))) or cast(Charts, generic)
 
 
 def run_panels(run: RunFolder) -> list[Panel]:
@@ -169,25 +151,3 @@ def data(panels: Iterable[Panel]) -> dict[str, Any]:
         for p in panels
         if p.charts
     }
-
-
-def study_panels(folder: Path) -> list[Panel]:
-    """The work-precision figure of a study.
-
-    Raises InputError when ``folder`` is no study folder.
-    """
-    try:
-        charts = work_precision_charts(
-            json.loads((folder / "study.json").read_text("utf-8"))["curves"]
-        )
-    except FileNotFoundError:
-        raise InputError(
-            f"{folder}: is no study folder (it has no study.json); give the folder `upd "
-            "study` wrote"
-        ) from None
-    except (OSError, ValueError, KeyError, TypeError) as problem:
-        raise InputError(
-            f"{folder / 'study.json'}: cannot be read ({problem}); run the study again"
-        ) from None
-    figure = folder / "work_precision.png"
-    return make_panels(charts, {"work_precision": figure} if figure.exists() else {})

@@ -300,10 +300,8 @@ def test_damaged_sweep_is_told(tmp_path: Path, more: dict[str, Any], told: str) 
     assert not (made / "report.html").exists()
 
 
-def test_no_json_and_study_and_comparison_are_refused(tmp_path: Path) -> None:
+def test_no_json_and_comparison_are_refused(tmp_path: Path) -> None:
     made = _made(tmp_path / "s", {"a": [1, 2]})
-    with pytest.raises(InputError, match="--study"):
-        write_report(made, study=tmp_path)
     with pytest.raises(InputError, match="a comparison is of runs"):
         write_comparison([made, made], tmp_path / "c.html")
     (made / "sweep.json").write_text("{")

@@ -273,8 +273,16 @@ def _area(box: list[float]) -> float:
 
 async def _crowded(tab: Tab, page: Path) -> dict[str, Any]:
     """Rectangles of crowded charts at both widths."""
-    lists = ("names", "differences", "headline", "costs", "lines", "scenes")
-    nothing: dict[str, Any] = {"title": "t"} | {name: [] for name in lists}
+    lists = ("differences", "headline", "costs", "lines", "scenes")
+    nothing: dict[str, Any] = {
+        "title": "t",
+        "names": ["a"],
+        "colours": ["#000000"],
+        "titles": ["a"],
+        "sizes": [0],
+        "verdicts": [{"kind": "passed", "word": "ok", "says": ""}],
+        **{name: [] for name in lists},
+    }
     panels = make_panels([_crowd(5), _crowd(30)], {})
     save(page, render("compare.html.j2", panels, [], nothing))
     out = {}
