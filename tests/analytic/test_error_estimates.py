@@ -11,10 +11,10 @@ import pytest
 
 from upd.analyses.companions import SolvedLevel, level_estimates, merged, paired_estimates
 from upd.analyses.contact.levels import half_cost
-from upd.analyses.convergence import estimate_error, finer_level_error, fitted_error
 from upd.analyses.hertz.plan import make_plan
 from upd.results import Case, ErrorPart, Result, with_estimates, with_parts
 from upd.scene import load_scene
+from upd.vary.orders import estimate_error, finer_level_error, fitted_error
 
 #: sizes of a run and its companions, ratio sqrt 2
 SIZES = np.array([1.0, 2.0**0.5, 2.0, 2.0**1.5])

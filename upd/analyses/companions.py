@@ -12,18 +12,18 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from upd.analyses.base import Plan
-from upd.analyses.convergence import (
+from upd.errors import InputError, UpdError, one_line
+from upd.progress import Stages
+from upd.results import ErrorPart, Estimates, Result
+from upd.results.case import Case
+from upd.vary.orders import (
     ASSUMED,
     UNCONFIRMED,
     finer_level_error,
     ladder_error,
     two_level_error,
 )
-from upd.analyses.scatter import Samples, sampled_error
-from upd.errors import InputError, UpdError, one_line
-from upd.progress import Stages
-from upd.results import ErrorPart, Estimates, Result
-from upd.results.case import Case
+from upd.vary.scatter import Samples, sampled_error
 
 log = logging.getLogger(__name__)
 

@@ -17,11 +17,11 @@ from upd.analyses.companions import LevelNumbers, SolvedLevel, level_estimates
 from upd.analyses.contact.levels import half_cost, mesh_estimates, spacing
 from upd.analyses.contact.plan import ContactPlan
 from upd.analyses.levels_choice import require_named
-from upd.analyses.scatter import Samples
 from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages
 from upd.results import Estimates, Result
 from upd.scene import Scene
+from upd.vary.scatter import Samples
 
 log = logging.getLogger(__name__)
 

@@ -20,13 +20,13 @@ from upd.analyses.companions import (
 )
 from upd.analyses.contact.neighbours import has_neighbours, neighbours_seconds
 from upd.analyses.contact.plan import ContactPlan, contact_plan, refined_growth
-from upd.analyses.scatter import Samples
 from upd.mesh import recipes
 from upd.progress import Stages
 from upd.results import Estimates, Result
 from upd.scene import Scene
 from upd.scene.contact import Loads
 from upd.scene.quantities import UNKNOWN
+from upd.vary.scatter import Samples
 
 #: fewest divisions of a level
 FEWEST = 4
