@@ -10,24 +10,25 @@ from typing import Any
 
 from upd.errors import UpdError, one_line
 from upd.progress import Stages
-from upd.vary.variation import RUN, Problem, SolvedVariation, Variation
+from upd.vary.variation import RUN, Overrides, Problem, SolvedVariation, Variation
 
 log = logging.getLogger(__name__)
 
 
-def changed(scene: Any, variation: Variation) -> Any:
-    """The scene with what the variation changes; InputError where the scene does not take it."""
-    for path, value in variation.overrides:
+def changed(scene: Any, overrides: Overrides) -> Any:
+    """The scene with other values; InputError where it does not take them."""
+    for path, value in overrides:
         table, _, name = path.partition(".")
-        old = getattr(scene, table)
-        new = {**old, name: value} if isinstance(old, Mapping) else replace(old, **{name: value})
-        scene = replace(scene, **{table: new})
+        old, new = getattr(scene, table), {name: value}
+        if name:
+            value = {**old, **new} if isinstance(old, Mapping) else replace(old, **new)
+        scene = replace(scene, **{table: value})
     return scene
 
 
 def varied_plan(problem: Problem, scene: Any, variation: Variation) -> Any:
     """The plan of the bare scene with what the variation changes. Raises InputError."""
-    return problem.make_plan(changed(problem.bare(scene), variation))
+    return problem.make_plan(changed(scene, (*problem.bare(scene), *variation.overrides)))
 
 
 def solve(

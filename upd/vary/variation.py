@@ -10,9 +10,14 @@ from typing import Any, NamedTuple
 
 from upd.progress import Stages
 from upd.results import Case, Estimates, Result
+from upd.scene.quantities import UNKNOWN
 from upd.vary.scatter import Samples
 
 Key = tuple[str, Case]
+#: paths of a scene, and their values in the unit inside: ("geometry.divisions", 8)
+Overrides = tuple[tuple[str, Any], ...]
+#: without what is solved again, and without errors and input bands of its own
+ALONE: Overrides = (("left_out.solve", "no"), ("accuracy", UNKNOWN), ("uncertain", {}))
 #: element sizes of coarser levels over those of the run
 COARSER = (2.0**0.5, 2.0, 2.0**1.5)
 
@@ -28,7 +33,7 @@ class Variation:
     label
         What it is, in words: "8 x 22 divisions".
     overrides
-        Paths of the scene, and their values in the unit inside: ("geometry.divisions", 8).
+        What changes in the scene.
     size
         Of its elements or steps over that of its base: above 1 it is coarser, below 1 finer.
     base
@@ -37,7 +42,7 @@ class Variation:
 
     source: str
     label: str
-    overrides: tuple[tuple[str, Any], ...] = ()
+    overrides: Overrides = ()
     size: float = math.nan
     base: Variation | None = None
 
@@ -102,7 +107,7 @@ class Problem:
     solve, make_results
         plan, stages -> solution; its numbers.
     bare
-        scene -> the scene without what costs and shows no number.
+        scene -> what takes off it what costs and shows no number.
     sources
         Of errors that variations show, in the order of their parts.
     levels
@@ -120,7 +125,7 @@ class Problem:
     make_plan: Callable[[Any], Any]
     solve: Callable[[Any, Stages], Any]
     make_results: Callable[[Any], Sequence[Result]]
-    bare: Callable[[Any], Any]
+    bare: Callable[[Any], Overrides]
     sources: tuple[str, ...]
     levels: Callable[[Any], Levels]
     half_cost: Callable[[Any, str, float, float], float]

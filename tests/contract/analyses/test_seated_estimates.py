@@ -20,7 +20,6 @@ from upd.mesh import recipes
 from upd.report.error_budget import budget_line, budget_rows
 from upd.results import Case, Result
 from upd.scene import load_scene
-from upd.vary import solve as vary_solve
 from upd.vary.solve import varied_plan
 from upd.vary.variation import SolvedVariation, Variation
 
@@ -115,14 +114,13 @@ def test_the_plan_counts_a_third_at_most(scene: str) -> None:
 def test_companions_that_fail_leave_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     """A number without an estimate is not given a small one."""
 
-    def broken(scene: Any, one: Variation) -> Any:
+    def broken(problem: Any, scene: Any, one: Variation) -> Any:
         if one.source == MESH:
             raise InputError("cannot be meshed")
-        return changed(scene, one)
+        return varied_plan(problem, scene, one)
 
-    changed = vary_solve.changed
     monkeypatch.setattr(varied, "_seconds", lambda *_: 0.1)
-    monkeypatch.setattr(vary_solve, "changed", broken)
+    monkeypatch.setattr("upd.vary.solve.varied_plan", broken)
     found = upd.run("symmetric-seated", overrides=SMALL)
     row = next(r for r in found.results if r.name == "damper_uz")
     assert row.estimated_error is None

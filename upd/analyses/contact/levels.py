@@ -16,10 +16,9 @@ from upd.progress import Stages
 from upd.results import Result
 from upd.scene import Scene
 from upd.scene.contact import Loads
-from upd.scene.quantities import UNKNOWN
 from upd.vary.scatter import Samples
 from upd.vary.solve import varied_plan
-from upd.vary.variation import COARSER, Levels, Problem, Variation
+from upd.vary.variation import ALONE, COARSER, Levels, Overrides, Problem, Variation
 
 #: fewest divisions of a level
 FEWEST = 4
@@ -94,21 +93,16 @@ def spacing(parameters: Mapping[str, Any]) -> float:
     return float(np.prod(counts) ** (-1.0 / len(counts)))
 
 
-def bare(scene: Scene) -> Scene:
-    """The scene without what costs and shows no number, alone; of a cycle no more steps than usual,
+def bare(scene: Scene) -> Overrides:
+    """What takes off a scene what costs and shows no number; of a cycle no more steps than usual,
     which only its drawing needs.
     """
     steps = min(scene.loads.cycle_steps, Loads.cycle_steps)
-    return replace(
-        scene,
-        loads=replace(scene.loads, cycle_steps=steps),
-        want=tuple(w for w in scene.want if w not in _SPARED) or scene.want,
-        left_out=replace(scene.left_out, solve="no"),
-        accuracy=UNKNOWN,
-    )
+    want = tuple(w for w in scene.want if w not in _SPARED) or scene.want
+    return (("loads.cycle_steps", steps), ("want", want), *ALONE)
 
 
-def coarsened(plan: ContactPlan) -> Callable[[Scene], Scene]:
+def coarsened(plan: ContactPlan) -> Overrides:
     """What makes scenes into the level with half the divisions of the plan.
 
     A patch that the load may size follows the contact from one end of an input to the other, so
@@ -118,9 +112,11 @@ def coarsened(plan: ContactPlan) -> Callable[[Scene], Scene]:
     geometry = level_geometry(plan.parameters, half[0]) if half else {}
     names = SIZED_BY_LOAD if plan.scene.sphere_radius is not None else ()
     sized = {name: "auto" for name in names if name in plan.scene.geometry}
-    return lambda scene: replace(
-        bare(scene), geometry={**scene.geometry, **sized, **geometry}, uncertain={}
-    )
+    return (*bare(plan.scene), *_geometry(sized | geometry))
+
+
+def _geometry(parameters: Mapping[str, Any]) -> Overrides:
+    return tuple((f"geometry.{name}", value) for name, value in parameters.items())
 
 
 def levels(plan: ContactPlan) -> Levels:
@@ -142,8 +138,7 @@ def _coarser(plan: ContactPlan, divisions: int) -> Variation:
     label = " x ".join(
         str(geometry[key]) for key in ("divisions_long", "divisions") if key in geometry
     )
-    overrides = tuple((f"geometry.{name}", value) for name, value in geometry.items())
-    return Variation(MESH, f"{label} divisions", overrides, size)
+    return Variation(MESH, f"{label} divisions", _geometry(geometry), size)
 
 
 def mesh_problem(

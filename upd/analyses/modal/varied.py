@@ -18,7 +18,7 @@ from upd.scene import RigScene
 from upd.scene.quantities import UNKNOWN
 from upd.vary.errors import merged
 from upd.vary.solve import varied_plan
-from upd.vary.variation import Levels, Problem, SolvedVariation, Variation
+from upd.vary.variation import ALONE, Levels, Overrides, Problem, SolvedVariation, Variation
 
 #: sources of error
 MESH, KEPT = "mesh", "modes kept"
@@ -32,14 +32,9 @@ _COARSEST = "the rig cannot be meshed coarser: its recipe has no smaller refinem
 _REDUCED = re.compile(r"f(\d+)_reduced")
 
 
-def bare(scene: RigScene) -> RigScene:
-    """The scene without what costs and shows no number."""
-    return replace(
-        scene,
-        want=tuple(w for w in scene.want if w in _WANTED) or ("free",),
-        left_out=replace(scene.left_out, solve="no"),
-        accuracy=UNKNOWN,
-    )
+def bare(scene: RigScene) -> Overrides:
+    """What takes off a scene what costs and shows no number."""
+    return (("want", tuple(w for w in scene.want if w in _WANTED) or ("free",)), *ALONE)
 
 
 def levels(plan: ModalPlan) -> Levels:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import partial
 
 from upd.analyses.base import Analysis
-from upd.analyses.coarser_rig import coarsened_rig
+from upd.analyses.input_uncertainty import coarsened_rig
 from upd.analyses.seated import charts, checks, output, plan, results, solve, varied
 from upd.vary import errors
 

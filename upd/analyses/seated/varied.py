@@ -20,9 +20,8 @@ from upd.mesh import recipes
 from upd.mesh.fields import Bounds
 from upd.mesh.recipe_modules import is_mesh
 from upd.scene import SeatedScene
-from upd.scene.quantities import UNKNOWN
 from upd.vary.solve import varied_plan
-from upd.vary.variation import COARSER, RUN, Levels, Problem, Variation
+from upd.vary.variation import ALONE, COARSER, RUN, Levels, Overrides, Problem, Variation
 
 #: sources of error beside the nodes of the faces
 MESH, STEPS = "mesh", "load steps"
@@ -36,17 +35,6 @@ _FINER = 2
 #: largest share of the run, variations included, that these take
 _SHARE = 0.35
 _Counts = Mapping[str, int]
-_Overrides = tuple[tuple[str, Any], ...]
-
-
-def bare(scene: SeatedScene) -> SeatedScene:
-    """The scene without what is solved again and without estimates of its own."""
-    return replace(
-        scene,
-        left_out=replace(scene.left_out, solve="no"),
-        accuracy=UNKNOWN,
-        uncertain={},
-    )
 
 
 def plan_with_estimates(scene: SeatedScene) -> SeatedPlan:
@@ -74,9 +62,9 @@ def _chosen(plan: SeatedPlan) -> tuple[dict[Variation, float], dict[str, str]]:
     bodies get half the elements instead, and lattices between are left out.
     """
     made, taken, reasons = (dict[Variation, float](), dict[Variation, float](), dict[str, str]())
-    if not plan.scene.estimates:
+    scene = plan.scene
+    if not scene.estimates:
         return taken, reasons
-    scene = bare(plan.scene)
     own = lattice_counts(scene)
     coarsest, keeps = _coarsest(scene, own)
     base = RUN if coarsest == own else _on_lattice(own, coarsest)
@@ -188,7 +176,7 @@ def _label(counts: _Counts) -> str:
     return f"{along} x {up} elements of a patch"
 
 
-def _geometry(counts: Mapping[str, float]) -> _Overrides:
+def _geometry(counts: Mapping[str, float]) -> Overrides:
     return tuple((f"geometry.{name}", value) for name, value in counts.items())
 
 
@@ -210,12 +198,12 @@ def _shorter_steps(scene: SeatedScene, counts: _Counts, base: Variation) -> Vari
     return Variation(STEPS, label, (*_geometry(counts), *_half_steps(scene)), 1.0 / _FINER, base)
 
 
-def _refined(scene: SeatedScene, factor: float) -> _Overrides:
+def _refined(scene: SeatedScene, factor: float) -> Overrides:
     """So many times the elements along all edges, the faces' included."""
     return (("geometry.refine", factor * _parameter(scene, "refine")),)
 
 
-def _half_steps(scene: SeatedScene) -> _Overrides:
+def _half_steps(scene: SeatedScene) -> Overrides:
     """Every load step in two."""
     return (
         ("seating.steps", _FINER * scene.seating.steps),
@@ -224,7 +212,7 @@ def _half_steps(scene: SeatedScene) -> _Overrides:
     )
 
 
-def _other_lattice(scene: SeatedScene, ratio: float) -> _Overrides:
+def _other_lattice(scene: SeatedScene, ratio: float) -> Overrides:
     """So many times larger elements on the faces."""
     own = lattice_counts(scene)
     return _geometry({name: _allowed(scene, name, n / ratio) for name, n in own.items()})
@@ -245,14 +233,15 @@ def _half_cost(plan: SeatedPlan, source: str, seconds: float, order: float) -> f
         overrides = _half_steps(scene)
     more = varied_plan(PROBLEM, scene, Variation(source, "half the error", overrides))
     require_memory(more.scene, more.memory_bytes)
-    return max(0.0, seconds * (solve_seconds(more) / solve_seconds(plan) - 1.0))
+    own = solve_seconds(plan) - plan.estimate_seconds
+    return max(0.0, seconds * (solve_seconds(more) / own - 1.0))
 
 
 PROBLEM = Problem(
     make_plan,
     solve,
     make_results,
-    bare,
+    lambda _: ALONE,
     (NODES, MESH, STEPS),
     levels,
     _half_cost,
