@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 import upd
 from upd import load_scene
 from upd.analyses.contact.neighbours import PLACES
-from upd.analyses.convergence import estimate_error
-from upd.analyses.scatter import sampled_error
 from upd.batch.studies import plan_study
 from upd.hbm import contacts
 from upd.hbm.fourier import analysis, harmonics, synthesis
 from upd.hbm.friction import harmonic_force
 from upd.reference.friction import jenkins_harmonic
+from upd.vary.orders import estimate_error
+from upd.vary.scatter import sampled_error
 
 Array = NDArray[np.float64]
 

@@ -51,7 +51,7 @@ WAYS = {
 
 def model(way: str, **more: Any) -> ContactModel:
     scene = load_scene("hertz", {**SMALL, "want": ["normal"], **WAYS[way], **more})
-    return prepare(make_plan(scene, companions=False), Stages())
+    return prepare(make_plan(scene), Stages())
 
 
 @lru_cache

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from upd.analyses.convergence import (
+from upd.errors import InputError
+from upd.vary.orders import (
     change_order,
     estimate_error,
     extrapolate,
@@ -11,7 +12,6 @@ from upd.analyses.convergence import (
     observed_order,
     two_level_error,
 )
-from upd.errors import InputError
 
 
 @pytest.mark.parametrize("order", [0.8, 1.0, 1.5, 2.0, 3.0])

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
 
-from upd.analyses.companions import SolvedLevel, level_estimates, merged, paired_estimates
 from upd.analyses.contact.levels import half_cost
-from upd.analyses.convergence import estimate_error, finer_level_error, fitted_error
 from upd.analyses.hertz.plan import make_plan
 from upd.results import Case, ErrorPart, Result, with_estimates, with_parts
 from upd.scene import load_scene
+from upd.vary.errors import merged, source_estimates
+from upd.vary.orders import estimate_error, finer_level_error, fitted_error
+from upd.vary.variation import RUN, SolvedVariation, Variation
 
 #: sizes of a run and its companions, ratio sqrt 2
 SIZES = np.array([1.0, 2.0**0.5, 2.0, 2.0**1.5])
@@ -72,19 +74,21 @@ def test_orders_that_change_too_much_are_not_taken_on() -> None:
 
 
 NUMBER = Result("K_N", Case(load=50.0), 105.0, "N/mm")
+SOLVED = SolvedVariation(RUN, [NUMBER])
 
 
-def solved(*values: float) -> list[SolvedLevel]:
-    key = NUMBER.name, NUMBER.case
+def solved(*values: float) -> list[SolvedVariation]:
     return [
-        SolvedLevel(f"{h:.3g}", float(h), {key: v}, 2.0)
+        SolvedVariation(
+            Variation("mesh", f"{h:.3g}", size=float(h)), [replace(NUMBER, value=v)], 2.0
+        )
         for h, v in zip(SIZES[1:], values, strict=False)
     ]
 
 
 def test_a_number_gets_the_part_of_its_companions() -> None:
     levels = solved(*(100.0 + 5.0 * SIZES[1:] ** 2))
-    found = level_estimates("mesh", [NUMBER], levels, lambda order: 10.0 * order)
+    found = source_estimates("mesh", SOLVED, levels, lambda order: 10.0 * order)
     (part,) = found["K_N", NUMBER.case]
     assert part.source == "mesh"
     assert part.error == pytest.approx(1.25 * 5.0 / 105.0, rel=1e-6)
@@ -97,20 +101,20 @@ def test_a_half_out_of_reach_says_why() -> None:
     """No seconds of a mesh that this machine cannot hold: what it needs."""
     plan = make_plan(load_scene("hertz", {"solver.memory": "6 GB"}))
     levels = solved(*(100.0 + 5.0 * SIZES[1:] ** 0.5))
-    found = level_estimates("mesh", [NUMBER], levels, partial(half_cost, plan, 2.0))
+    found = source_estimates("mesh", SOLVED, levels, partial(half_cost, plan, "mesh", 2.0))
     (part,) = found["K_N", NUMBER.case]
     assert part.half_cost_s is None
     assert re.fullmatch(r"needs \S+ GB, there are 6", part.half_told)
     assert with_parts(NUMBER, (part,)).half_told == part.half_told
-    near = level_estimates(
-        "mesh", [NUMBER], solved(*(100.0 + 5.0 * SIZES[1:] ** 2)), partial(half_cost, plan, 2.0)
-    )
+    levels = solved(*(100.0 + 5.0 * SIZES[1:] ** 2))
+    near = source_estimates("mesh", SOLVED, levels, partial(half_cost, plan, "mesh", 2.0))
     assert re.fullmatch(r"\+\S+ s", near["K_N", NUMBER.case][0].half_told)
 
 
 def test_what_no_companion_shows_is_not_called_small() -> None:
     """Rule: a number whose error was not found has no error, and says why."""
-    found = level_estimates("mesh", [NUMBER], [], lambda order: 1.0, faults=["8 x 8: too coarse"])
+    lost = SolvedVariation(Variation("mesh", "8 x 8"), reason="8 x 8: too coarse")
+    found = source_estimates("mesh", SOLVED, [lost], lambda order: 1.0)
     (part,) = found["K_N", NUMBER.case]
     assert not part.known
     assert part.basis == "8 x 8: too coarse"
@@ -143,16 +147,17 @@ def test_one_finer_level_bounds_what_it_does_not_reach(order: float, times: floa
 def test_a_pair_stands_for_the_run() -> None:
     """A base with another value has the run's error in proportion; a coarser one shows it too."""
     case = Case(name="x")
-    row, base = Result("K", case, 10.0, "N/mm"), {("K", case): 5.0 * 1.04}
+    row = Result("K", case, 10.0, "N/mm")
+    run = SolvedVariation(RUN, [row, Result("F", case, 1.0, "N")])
+    base = SolvedVariation(Variation("mesh", "base", size=2.0), [replace(row, value=5.0 * 1.04)])
     for size, bound in ((0.5, 4.0 * 0.02 / 1.04), (2.0, 3.0 * 0.04 / 1.04)):
-        other = {("K", case): 5.0 * (1.0 + 0.04 * size)}
-        found = paired_estimates(
-            "mesh",
-            [row, Result("F", case, 1.0, "N")],
-            SolvedLevel("base", 2.0, base, 1.0),
-            SolvedLevel("other", size, other, 1.0),
-            lambda _: 7.0,
+        other = SolvedVariation(
+            Variation("mesh", "other", size=size, base=base.variation),
+            [replace(row, value=5.0 * (1.0 + 0.04 * size))],
+            1.0,
+            base=base,
         )
+        found = source_estimates("mesh", run, [other], lambda _: 7.0)
         (part,) = found["K", case]
         assert part.error == pytest.approx(bound, rel=1e-9)
         assert (part.half_cost_s, part.companion_s) == (7.0, 1.0)

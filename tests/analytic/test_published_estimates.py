@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from upd.analyses.convergence import estimate_error
+from upd.vary.orders import estimate_error
 
 FILE = Path(__file__).parents[2] / "benchmarks" / "accuracy" / "bench_estimates.py"
 #: short enough for a test; the benchmark has ten times as many

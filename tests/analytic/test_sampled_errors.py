@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from upd.analyses.contact.neighbours import neighbours
-from upd.analyses.convergence import ladder_error
-from upd.analyses.scatter import sampled_error
+from upd.vary.orders import ladder_error
+from upd.vary.scatter import sampled_error
 
 FloatArray = NDArray[np.float64]
 #: sizes of a run and its companions

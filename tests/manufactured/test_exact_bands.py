@@ -15,13 +15,13 @@ import pytest
 
 from upd.analyses.contact.bodies import pressed
 from upd.analyses.contact.plan import refined_growth
-from upd.analyses.convergence import estimate_error
 from upd.analyses.flat.plan import make_plan
 from upd.analyses.flat.results import band_centres
 from upd.analyses.flat.solution import FlatSolution
 from upd.analyses.flat.solve import load_point, solve_plan
 from upd.progress import Stages
 from upd.scene import load_scene
+from upd.vary.orders import estimate_error
 
 LOAD = 155.0
 #: divisions along the slope and along the damper: 34 to 12 as nearly as even numbers come, 36 to 16

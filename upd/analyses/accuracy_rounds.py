@@ -9,7 +9,6 @@ from functools import cache
 from typing import Any
 
 from upd.analyses.base import CHOSEN_BY_ACCURACY, Effect, Plan, refuse_oversize
-from upd.analyses.convergence import UNCONFIRMED, estimate_error, two_level_error
 from upd.analyses.levels_choice import (
     Key,
     Knob,
@@ -23,6 +22,7 @@ from upd.analyses.levels_choice import (
 from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages
 from upd.results import Estimates, Result
+from upd.vary.orders import UNCONFIRMED, estimate_error, two_level_error
 
 #: name of the effect that tells the levels
 EFFECT = CHOSEN_BY_ACCURACY[0]

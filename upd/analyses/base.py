@@ -21,6 +21,7 @@ from upd.results.answer_table import AnswerTable
 from upd.scene import AnyScene
 from upd.scene.base import LeftOut
 from upd.scene.quantities import Uncertainty
+from upd.vary.variation import Overrides
 
 __all__ = [
     "CHOSEN_BY_ACCURACY",
@@ -269,8 +270,8 @@ class Analysis:
         plan, the ends of the inputs known within limits -> paths of those whose derivatives the
         analysis knows, and seconds that they take. None where it knows none.
     coarsened
-        plan as run -> what makes a scene into its cheap companion: the numbers that inputs change
-        are solved on it again. None where the scene itself is.
+        plan as run -> what makes a scene into its cheap level: the numbers that inputs change are
+        solved on it again. None where the scene itself is.
     """
 
     name: str
@@ -291,7 +292,7 @@ class Analysis:
     estimate: Callable[[Any, Sequence[Result], Stages], Estimates] | None = None
     input_changes: ChangesByInputs | None = None
     known_inputs: Callable[[Any, Sequence[InputEnds]], tuple[set[str], float]] | None = None
-    coarsened: Callable[[Any], Callable[[Any], Any]] | None = None
+    coarsened: Callable[[Any], Overrides] | None = None
 
 
 def memory_limit(scene: AnyScene) -> float:

@@ -12,7 +12,7 @@ import logging
 import math
 import tomllib
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any
@@ -25,11 +25,15 @@ from upd.progress import Stages
 from upd.results import Case, InputPart, InputParts, Result
 from upd.scene import load_scene
 from upd.scene.uncertain import put_back
+from upd.vary.solve import changed
+from upd.vary.variation import ALONE, Overrides
 
 log = logging.getLogger(__name__)
 Key = tuple[str, Case]
 #: parameters of a recipe that say how fine a mesh is
 _LEVELS = ("divisions", "refine")
+#: part of a rig's refinement, and the smallest that the ready rig takes
+_COARSER, _LEAST = 0.7, 0.5
 
 
 def input_parts(
@@ -116,7 +120,7 @@ def with_input_cost(analysis: Analysis, plan: Plan[Any]) -> Plan[Any]:
 
 def _companion_seconds(analysis: Analysis, plan: Plan[Any], one: InputEnds) -> float:
     """Of the cheap companion at one end of an interval; all ends cost about the same."""
-    scene = _coarser(analysis, plan)(one.low)
+    scene = changed(one.low, _coarser(analysis, plan))
     own = plan.seconds - plan.estimate_seconds - plan.files_seconds
     if recipes.counted_by_mesh(scene.recipe):
         # a plan runs a user's recipe once: the run makes the coarser mesh
@@ -135,9 +139,27 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def _coarser(analysis: Analysis, plan: Plan[Any]) -> Callable[[Any], Any]:
-    """What makes a scene into its cheap companion."""
-    return analysis.coarsened(plan) if analysis.coarsened is not None else lambda scene: scene
+def _coarser(analysis: Analysis, plan: Plan[Any]) -> Overrides:
+    """What makes a scene into its cheap level."""
+    return () if analysis.coarsened is None else analysis.coarsened(plan)
+
+
+def coarsened_rig(plan: Plan[Any], wanted: tuple[str, ...], *more: tuple[str, Any]) -> Overrides:
+    """What makes scenes of a rig cheap: a coarser mesh, few outputs, nothing solved twice.
+
+    Parameters
+    ----------
+    wanted
+        Outputs that are kept where the run has them; all when none of them is.
+    *more
+        Overrides.
+    """
+    refine, want = plan.parameters.get("refine"), plan.scene.want
+    kept = tuple(w for w in want if w in wanted) or want
+    alone = (("want", kept), *ALONE, *more)
+    if isinstance(refine, float) and _COARSER * refine >= _LEAST:
+        return (("geometry.refine", _COARSER * refine), *alone)
+    return alone
 
 
 def _part(one: InputEnds, found: InputChange | None, faults: dict[str, str]) -> InputPart:
@@ -153,7 +175,7 @@ def _solved_at_ends(
 ) -> dict[Key, InputChange]:
     """Half of the change between both ends of an interval, each solved again."""
     coarser = _coarser(analysis, plan)
-    plans = [analysis.make_plan(coarser(scene)) for scene in (one.low, one.high)]
+    plans = [analysis.make_plan(changed(scene, coarser)) for scene in (one.low, one.high)]
     sides = [
         [r for r in analysis.make_results(analysis.solve(each, Stages())) if not r.withheld]
         for each in plans

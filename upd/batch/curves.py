@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.convergence import (
+from upd.batch.ladder import Key, SolvedPoint, matching
+from upd.vary.orders import (
     ErrorEstimate,
     Extrapolation,
     change_order,
@@ -20,7 +21,6 @@ from upd.analyses.convergence import (
     extrapolate,
     fit_rate,
 )
-from upd.batch.ladder import Key, SolvedPoint, matching
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class ConvergenceCurve:
     limit
         Where the ladder itself leads.
     change
-        Order at which the number still changes, `upd.analyses.convergence.change_order`.
+        Order at which the number still changes, `upd.vary.orders.change_order`.
     estimate
         Error of the finest level as the levels alone tell it; None for levels that are no sizes and
         where there is no limit.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from functools import partial
 
-from upd.analyses.seated.levels import PATCH
+from upd.analyses.seated.varied import PATCH
 from upd.batch.convergence import ConvergenceStudy
 from upd.batch.curves import make_curves
 from upd.batch.ladder import (

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from upd.analyses.contact.levels import companions
+from upd.analyses.contact.levels import levels
 from upd.analyses.contact.neighbours import neighbours_seconds
 from upd.analyses.hertz.plan import make_plan
 from upd.analyses.hertz.results import make_results
@@ -59,10 +59,10 @@ def test_a_contact_at_the_rim_is_no_sample() -> None:
     assert 2 < len(rows) < 9
 
 
-def test_marched_contacts_have_none_and_keep_the_dearest_companion() -> None:
+def test_marched_contacts_have_none_and_keep_the_dearest_level() -> None:
     scene = load_scene("hertz", SMALL | {"contact.coupling": "coupled"})
     assert scene.coupled
     plan = make_plan(scene)
     assert neighbours_seconds(plan) == 0.0
-    assert len(list(companions(plan, make_plan))) == 3
-    assert len(list(companions(make_plan(load_scene("hertz", SMALL)), make_plan))) == 2
+    assert len(levels(plan).variations) == 3
+    assert len(levels(make_plan(load_scene("hertz", SMALL))).variations) == 2

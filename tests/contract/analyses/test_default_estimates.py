@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
 import upd
 from upd.analyses import analysis_of, make_plan
-from upd.analyses.companions import Companion
-from upd.analyses.contact import levels
 from upd.analyses.flat import accuracy as flat_accuracy
 from upd.errors import InputError
 from upd.plot.chart import Entry
@@ -113,13 +110,11 @@ def test_rig_on_linear_elements_is_judged_by_coarser_ones() -> None:
 def test_companions_that_fail_leave_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     """A number without an estimate is not given a small one."""
 
-    def broken(*_: Any) -> Iterator[Companion]:
-        def refuse() -> Any:
-            raise InputError("cannot be meshed")
+    def refuse(*_: Any) -> Any:
+        raise InputError("cannot be meshed")
 
-        yield Companion("4 divisions", 2.0, refuse, 1.0)
-
-    monkeypatch.setattr(levels, "companions", broken)
+    monkeypatch.setattr("upd.vary.solve.changed", refuse)
+    monkeypatch.setattr("upd.analyses.contact.levels._seconds", lambda *_: 1.0)
     found = upd.run("symmetric", overrides=WEDGE)
     row = next(r for r in found.results if r.name == "K_N_secant_raw")
     assert row.estimated_error is None

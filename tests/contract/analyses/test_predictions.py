@@ -17,6 +17,7 @@ from upd.linalg.rates import USUAL
 from upd.linalg.select import Solid, threads_used
 from upd.mesh import recipes
 from upd.scene import load_scene
+from upd.vary.solve import changed
 
 
 def test_work_that_grows_is_predicted() -> None:
@@ -176,7 +177,7 @@ def test_plan_counts_runs_of_uncertain_inputs(capsys: pytest.CaptureFixture[str]
     assert [plan.input_seconds > 0.0 for plan in plans] == [False, True, True]
     analysis = analysis_of(plans[0].scene)
     assert analysis.coarsened is not None
-    coarse = analysis.make_plan(analysis.coarsened(plans[0])(plans[0].scene))
+    coarse = analysis.make_plan(changed(plans[0].scene, analysis.coarsened(plans[0])))
     companion = coarse.seconds - coarse.files_seconds
     assert 0.0 < coarse.files_seconds < coarse.seconds
     for count, plan in enumerate(plans):

@@ -11,15 +11,17 @@ import pytest
 
 import upd
 from upd.analyses import make_plan
-from upd.analyses.companions import Companion, SolvedLevel
-from upd.analyses.seated import estimates, levels
-from upd.analyses.seated.levels import MESH, NODES, STEPS, companions
+from upd.analyses.seated import estimates, varied
+from upd.analyses.seated.estimates import NODES
 from upd.analyses.seated.plan import make_plan as bare_plan
+from upd.analyses.seated.varied import MESH, PROBLEM, STEPS, levels
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.report.error_budget import budget_line, budget_rows
-from upd.results import Case
+from upd.results import Case, Result
 from upd.scene import load_scene
+from upd.vary.solve import varied_plan
+from upd.vary.variation import SolvedVariation, Variation
 
 pytestmark = pytest.mark.estimated
 
@@ -81,8 +83,10 @@ def test_terminal_and_page_tell_them(wedge: upd.RunResult) -> None:
 def test_finer_bodies_keep_the_nodes_of_the_faces() -> None:
     """In the same places, so that nothing but the bodies differs; with eight times the elements."""
     for scene in ("symmetric-seated", "asymmetric-seated"):
-        found = companions(bare_plan(load_scene(scene)))
-        plans = [one.make_plan() for one in (found.lattices[0], found.others[MESH])]
+        plan = bare_plan(load_scene(scene))
+        finer = next(one for one in levels(plan).variations if one.source == MESH)
+        assert finer.base is not None
+        plans = [varied_plan(PROBLEM, plan.scene, one) for one in (finer.base, finer)]
         meshes = [recipes.build_mesh(p.scene.recipe, p.parameters)[0] for p in plans]
         for side in ("left", "right"):
             places = [m[side].points[m[side].nodes["patch"]] for m in meshes]
@@ -100,21 +104,23 @@ def test_the_plan_counts_a_third_at_most(scene: str) -> None:
     assert without.estimate_seconds == 0.0
     assert plan.seconds == pytest.approx(without.seconds + plan.estimate_seconds)
     assert 0.1 < plan.estimate_seconds / plan.seconds <= 0.35
-    found = companions(without)
-    assert found.seconds == 0.0
-    assert companions(bare_plan(load_scene(scene))).others.keys() == {MESH, STEPS}
+    assert not levels(without).variations
+    found = levels(bare_plan(load_scene(scene))).variations
+    assert {one.source for one in found} == {NODES, MESH, STEPS}
+    # bases first
+    assert found[0] in {one.base for one in found}
 
 
 def test_companions_that_fail_leave_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     """A number without an estimate is not given a small one."""
 
-    def broken(*_: Any) -> Companion:
-        def refuse() -> Any:
+    def broken(problem: Any, scene: Any, one: Variation) -> Any:
+        if one.source == MESH:
             raise InputError("cannot be meshed")
+        return varied_plan(problem, scene, one)
 
-        return Companion("finer bodies", 0.5, refuse, 0.1)
-
-    monkeypatch.setattr(levels, "_other_bodies", broken)
+    monkeypatch.setattr(varied, "_seconds", lambda *_: 0.1)
+    monkeypatch.setattr("upd.vary.solve.varied_plan", broken)
     found = upd.run("symmetric-seated", overrides=SMALL)
     row = next(r for r in found.results if r.name == "damper_uz")
     assert row.estimated_error is None
@@ -127,10 +133,10 @@ def test_faces_that_cannot_be_coarser_say_so() -> None:
     scene = load_scene(
         "symmetric-seated", {"geometry.patch_along_y": 4, "geometry.patch_along_slope": 1}
     )
-    found = companions(bare_plan(scene))
-    assert not found.lattices
-    assert "cannot be made coarser" in found.told[NODES]
-    assert "cannot be refined" in found.told[MESH]
+    found = levels(bare_plan(scene))
+    assert [one.source for one in found.variations] == [STEPS]
+    assert "cannot be made coarser" in found.reasons[NODES]
+    assert "cannot be refined" in found.reasons[MESH]
 
 
 @pytest.mark.parametrize(
@@ -139,12 +145,16 @@ def test_faces_that_cannot_be_coarser_say_so() -> None:
 )
 def test_what_has_no_sign_has_no_relative_error(value: float, other: float, why: str) -> None:
     key = ("face_N", Case(name="raised"))
-    told = estimates.of_one_sign(value, key, [SolvedLevel("coarse", 2.0, {key: other}, 1.0)])
+    told = estimates.of_one_sign(value, key, [coarse(other)])
     assert told is not None
     assert not told[0].known
     assert why in told[0].basis
-    same = [SolvedLevel("coarse", 2.0, {key: 1.0}, 1.0)]
-    assert estimates.of_one_sign(2.0, key, same) is None
+    assert estimates.of_one_sign(2.0, key, [coarse(1.0)]) is None
+
+
+def coarse(value: float) -> SolvedVariation:
+    row = Result("face_N", Case(name="raised"), value, "N")
+    return SolvedVariation(Variation(NODES, "coarse", size=2.0), [row])
 
 
 def test_shares_of_a_face_are_known_to_a_row_of_nodes(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -29,7 +29,7 @@ pytestmark = pytest.mark.estimated
 
 LIGHT = {"want": ["normal"], "loads.normal": ["200 N"], "geometry.patch": "auto"}
 #: levels of made-up numbers, which have no neighbouring loads
-UNSAMPLED = replace(LADDER, sample=lambda _: {})
+UNSAMPLED = replace(LADDER, problem=replace(LADDER.problem, sample=None))
 #: one after the other, in this process, as a single run would
 HERE = Workers(0, 0)
 

@@ -13,15 +13,16 @@ from functools import partial
 from typing import Any, Generic, TypeVar
 
 from upd.analyses.base import CHOSEN_BY_ACCURACY, Effect, refuse_oversize
-from upd.analyses.companions import LevelNumbers, SolvedLevel, level_estimates
-from upd.analyses.contact.levels import half_cost, mesh_estimates, spacing
+from upd.analyses.contact.levels import MESH, half_cost, spacing, with_estimates
 from upd.analyses.contact.plan import ContactPlan
 from upd.analyses.levels_choice import require_named
-from upd.analyses.scatter import Samples
 from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages
 from upd.results import Estimates, Result
 from upd.scene import Scene
+from upd.vary import errors
+from upd.vary.errors import source_estimates
+from upd.vary.variation import Problem, SolvedVariation, Variation
 
 log = logging.getLogger(__name__)
 
@@ -30,39 +31,26 @@ Solved = TypeVar("Solved")
 SolveLevel = Callable[[ContactPlan], tuple[Solved, tuple[Result, ...], float]]
 
 
-def _unsampled(solved: Any) -> Samples:
-    del solved
-    return {}
-
-
 @dataclass(frozen=True)
 class AccuracyLadder:
     """Meshes of a scene from coarse to fine, and the numbers that an accuracy is asked of.
 
     Attributes
     ----------
+    problem
+        How the scene of a level is planned and solved; its errors are those by the levels before.
     scenes
         scene -> the scene of every level, coarse to fine, without its accuracy.
-    make_plan
-        scene -> its plan, with or without the cost of companions: those of a level are the levels
-        before it.
-    solve_plan, make_results
-        plan, stages -> what was solved, and its numbers.
     governing
         Names of the numbers (shell patterns) that one accuracy for all is asked of.
     first
         scene, accuracy -> the level that a plan predicts.
-    sample
-        What was solved -> its numbers at neighbouring loads; none where those show nothing.
     """
 
+    problem: Problem
     scenes: Callable[[Scene], Sequence[Callable[[], Scene]]]
-    make_plan: Callable[..., ContactPlan]
-    solve_plan: Callable[[ContactPlan, Stages], Any]
-    make_results: Callable[[Any], Sequence[Result]]
     governing: tuple[str, ...]
     first: Callable[[Scene, float], int]
-    sample: Callable[[Any], Samples] = _unsampled
 
 
 @dataclass(frozen=True)
@@ -89,14 +77,13 @@ def plan_to_accuracy(ladder: AccuracyLadder, scene: Scene) -> ContactPlan:
     `choose` may end on another level. Nothing is solved. Raises InputError when parts of the scene
     do not fit together.
     """
-    wanted = scene.wanted_accuracy
+    wanted, make_plan = scene.wanted_accuracy, ladder.problem.make_plan
     if wanted is None:
-        return ladder.make_plan(scene)
+        return with_estimates(ladder.problem, make_plan(scene))
     least = min(wanted.values()) if isinstance(wanted, Mapping) else wanted
     levels = ladder.scenes(scene)
-    plans = [
-        ladder.make_plan(make(), companions=False)
-        for make in levels[: ladder.first(scene, least) + 1]
+    plans: list[ContactPlan] = [
+        make_plan(make()) for make in levels[: ladder.first(scene, least) + 1]
     ]
     before = sum(plan.solve_seconds for plan in plans[:-1])
     return replace(
@@ -116,13 +103,14 @@ def solve_to_accuracy(ladder: AccuracyLadder, plan: ContactPlan, stages: Stages)
     `choose`.
     """
     if plan.asked is None:
-        return ladder.solve_plan(plan, stages)
+        return ladder.problem.solve(plan, stages)
 
     def solved(plan: ContactPlan) -> tuple[Any, tuple[Result, ...], float]:
         before = stages.elapsed()
         with stages("accuracy ladder", f"{plan.parameters['divisions']} divisions"):
-            solution = ladder.solve_plan(plan, Stages())
-        return solution, tuple(ladder.make_results(solution)), stages.elapsed() - before
+            solution = ladder.problem.solve(plan, Stages())
+        numbers = tuple(ladder.problem.make_results(solution))
+        return solution, numbers, stages.elapsed() - before
 
     level, estimates = choose(ladder, plan.asked, solved)
     chosen = replace(level.plan, asked=plan.asked)
@@ -132,18 +120,11 @@ def solve_to_accuracy(ladder: AccuracyLadder, plan: ContactPlan, stages: Stages)
 def estimate(
     ladder: AccuracyLadder, solution: Any, numbers: Sequence[Result], stages: Stages
 ) -> Estimates:
-    """The error of every number by the mesh: from the levels of the ladder, or from companions."""
+    """The error of every number by the mesh: by the levels of the ladder, or by coarser ones."""
     if solution.plan.asked is not None:
         found: Estimates = solution.estimates
         return found
-
-    def values(plan: ContactPlan) -> LevelNumbers:
-        level = ladder.solve_plan(plan, Stages())
-        return LevelNumbers(ladder.make_results(level), ladder.sample(level))
-
-    return mesh_estimates(
-        solution.plan, numbers, stages, ladder.make_plan, values, partial(ladder.sample, solution)
-    )
+    return errors.estimate(ladder.problem, solution, numbers, stages)
 
 
 def choose(
@@ -152,7 +133,7 @@ def choose(
     """Find the cheapest level that reaches the scene's accuracy.
 
     Levels are tried from coarse to fine; each is judged by what it and the levels before it show,
-    number by number (`upd.analyses.companions.level_estimates`).
+    number by number (`upd.vary.errors.source_estimates`).
 
     Returns
     -------
@@ -168,13 +149,13 @@ def choose(
     """
     wanted = scene.wanted_accuracy
     assert wanted is not None
-    known: list[tuple[ContactPlan, SolvedLevel]] = []
+    known: list[SolvedVariation] = []
     told: list[str] = []
     miss, level = math.inf, None
     estimates: Estimates | None = None
     for make in ladder.scenes(scene):
         here = make()
-        plan = ladder.make_plan(here, companions=False)
+        plan = ladder.problem.make_plan(here)
         try:
             refuse_oversize(plan)
         except InputError as refused:
@@ -191,9 +172,12 @@ def choose(
             raise _missed(str(refused), told, None, estimates) from None
         if isinstance(wanted, Mapping):
             require_named(wanted, level.results)
-        samples = ladder.sample(level.solved)
+        sample = ladder.problem.sample
+        samples = {} if sample is None else sample(level.solved)
+        own = Variation(MESH, level.divisions, size=_spacing(plan))
+        run = SolvedVariation(own, level.results, level.seconds, samples)
         if known:
-            estimates = _estimates(known, level, samples)
+            estimates = _estimates(known, run, plan)
             name, error, miss = _worst(estimates, wanted, ladder.governing)
             log.info("accuracy: %s, %s estimated at %.3g", level.divisions, name, error)
             told.append(f"{level.divisions}: {name} {100.0 * error:.2g} %")
@@ -201,9 +185,7 @@ def choose(
                 chosen = Effect(CHOSEN_BY_ACCURACY[1], True, "; ".join(told))
                 effects = (*level.plan.effects, chosen)
                 return replace(level, plan=replace(level.plan, effects=effects)), estimates
-        values = {(r.name, r.case): r.value for r in level.results if not r.withheld}
-        size, seconds = _spacing(plan), level.seconds
-        known.append((plan, SolvedLevel(level.divisions, size, values, seconds, samples)))
+        known.append(run)
     why = f"the finest level's largest error is {miss:.2g} times the wanted one"
     raise _missed(why, told, None if level is None else level.solved, estimates)
 
@@ -226,15 +208,14 @@ def _spacing(plan: ContactPlan) -> float:
 
 
 def _estimates(
-    known: Sequence[tuple[ContactPlan, SolvedLevel]], fine: Level[Solved], samples: Samples
+    known: Sequence[SolvedVariation], run: SolvedVariation, plan: ContactPlan
 ) -> Estimates:
-    """Errors of the fine level's numbers by all levels before it."""
-    here = _spacing(fine.plan)
-    levels = [replace(level, size=level.size / here) for _, level in known]
-    # The finest of them first, as companions stand.
-    levels.reverse()
-    half = partial(half_cost, fine.plan, fine.seconds)
-    return level_estimates("mesh", fine.results, levels, half, samples=samples)
+    """Errors of a level's numbers by all levels before it, the finest of them first."""
+    levels = [
+        replace(one, variation=replace(one.variation, size=one.variation.size / run.variation.size))
+        for one in reversed(known)
+    ]
+    return source_estimates(MESH, run, levels, partial(half_cost, plan, MESH, run.seconds))
 
 
 def _worst(

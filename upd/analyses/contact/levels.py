@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from upd.analyses.base import require_memory
-from upd.analyses.companions import (
-    COARSER,
-    Companion,
-    LevelNumbers,
-    SolvedLevel,
-    level_estimates,
-    solve_companions,
-)
 from upd.analyses.contact.neighbours import has_neighbours, neighbours_seconds
 from upd.analyses.contact.plan import ContactPlan, contact_plan, refined_growth
-from upd.analyses.scatter import Samples
 from upd.mesh import recipes
 from upd.progress import Stages
-from upd.results import Estimates, Result
+from upd.results import Result
 from upd.scene import Scene
 from upd.scene.contact import Loads
-from upd.scene.quantities import UNKNOWN
+from upd.vary.scatter import Samples
+from upd.vary.solve import varied_plan
+from upd.vary.variation import ALONE, COARSER, Levels, Overrides, Problem, Variation
 
 #: fewest divisions of a level
 FEWEST = 4
-#: outputs that a companion need not give: no number of them is estimated, and they cost
+#: source of error
+MESH = "mesh"
+_COARSEST = "the mesh cannot be made coarser: its recipe has no divisions to lower"
+#: outputs that a level need not give: no number of them is estimated, and they cost
 _SPARED = ("fields", "curve")
 #: power of the divisions that the seconds of a level grow with where its mesh is not known: a
 #: direct solver's on a solid, n^2 of n = N^3
@@ -98,64 +93,71 @@ def spacing(parameters: Mapping[str, Any]) -> float:
     return float(np.prod(counts) ** (-1.0 / len(counts)))
 
 
-def companion_scene(scene: Scene, geometry: Mapping[str, Any]) -> Scene:
-    """The scene with other divisions, without what costs and shows no number, alone; of a cycle no
-    more steps than usual, which only its drawing needs.
+def bare(scene: Scene) -> Overrides:
+    """What takes off a scene what costs and shows no number; of a cycle no more steps than usual,
+    which only its drawing needs.
     """
     steps = min(scene.loads.cycle_steps, Loads.cycle_steps)
-    return replace(
-        scene,
-        loads=replace(scene.loads, cycle_steps=steps),
-        geometry={**scene.geometry, **geometry},
-        want=tuple(w for w in scene.want if w not in _SPARED) or scene.want,
-        left_out=replace(scene.left_out, solve="no"),
-        accuracy=UNKNOWN,
-    )
+    want = tuple(w for w in scene.want if w not in _SPARED) or scene.want
+    return (("loads.cycle_steps", steps), ("want", want), *ALONE)
 
 
-def coarsened(plan: ContactPlan) -> Callable[[Scene], Scene]:
-    """What makes scenes into the companion with half the divisions of the plan.
+def coarsened(plan: ContactPlan) -> Overrides:
+    """What makes scenes into the level with half the divisions of the plan.
 
     A patch that the load may size follows the contact from one end of an input to the other, so
     that the same nodes touch: a tangent stiffness changes as the contact does, not by whole nodes.
     """
-    levels = coarser_divisions(plan, (2.0,))
-    geometry = level_geometry(plan.parameters, levels[0]) if levels else {}
+    half = coarser_divisions(plan, (2.0,))
+    geometry = level_geometry(plan.parameters, half[0]) if half else {}
     names = SIZED_BY_LOAD if plan.scene.sphere_radius is not None else ()
     sized = {name: "auto" for name in names if name in plan.scene.geometry}
-    return lambda scene: replace(companion_scene(scene, sized | geometry), uncertain={})
+    return (*bare(plan.scene), *_geometry(sized | geometry))
 
 
-def companions(plan: ContactPlan, make_plan: Callable[[Scene], ContactPlan]) -> Iterator[Companion]:
+def _geometry(parameters: Mapping[str, Any]) -> Overrides:
+    return tuple((f"geometry.{name}", value) for name, value in parameters.items())
+
+
+def levels(plan: ContactPlan) -> Levels:
     """The coarser meshes that the errors of the plan's numbers are estimated with.
 
     None where the scene wants none, and for a recipe without divisions.
     """
     scene = plan.scene
     if not scene.estimates or plan.asked is not None:
-        return
-    # Neighbouring loads show on half the divisions what the dearest companion would.
+        return Levels(())
+    # Neighbouring loads show on half the divisions what the dearest level would.
     ratios = COARSER[1:] if has_neighbours(scene) else COARSER
-    for divisions in coarser_divisions(plan, ratios):
-        geometry = level_geometry(plan.parameters, divisions)
-        coarse = companion_scene(scene, geometry)
-        size = spacing({**plan.parameters, **geometry}) / spacing(plan.parameters)
-        if recipes.counted_by_mesh(scene.recipe):
-            # A plan runs a user's recipe once: the run makes these meshes.
-            seconds = plan.solve_seconds * size**-POWER + neighbours_seconds(plan)
-        else:
-            level = make_plan(coarse)
-            seconds = level.solve_seconds + neighbours_seconds(level)
-        label = " x ".join(
-            str(geometry[key]) for key in ("divisions_long", "divisions") if key in geometry
-        )
-        yield Companion(f"{label} divisions", size, partial(make_plan, coarse), seconds)
+    return Levels([_coarser(plan, n) for n in coarser_divisions(plan, ratios)], {MESH: _COARSEST})
 
 
-def with_estimates(plan: ContactPlan, make_plan: Callable[[Scene], ContactPlan]) -> ContactPlan:
-    """The plan with what its companions cost."""
-    made = list(companions(plan, make_plan))
-    again = sum(one.seconds for one in made) + (neighbours_seconds(plan) if made else 0.0)
+def _coarser(plan: ContactPlan, divisions: int) -> Variation:
+    geometry = level_geometry(plan.parameters, divisions)
+    size = spacing({**plan.parameters, **geometry}) / spacing(plan.parameters)
+    label = " x ".join(
+        str(geometry[key]) for key in ("divisions_long", "divisions") if key in geometry
+    )
+    return Variation(MESH, f"{label} divisions", _geometry(geometry), size)
+
+
+def mesh_problem(
+    make_plan: Callable[[Scene], ContactPlan],
+    solve: Callable[[ContactPlan, Stages], Any],
+    make_results: Callable[[Any], Sequence[Result]],
+    sample: Callable[[Any], Samples] | None = None,
+) -> Problem:
+    """A contact whose mesh varies; of plans, what is solved on them, its numbers, and these at
+    neighbouring loads.
+    """
+    return Problem(make_plan, solve, make_results, bare, (MESH,), levels, half_cost, sample)
+
+
+def with_estimates(problem: Problem, plan: ContactPlan) -> ContactPlan:
+    """The plan with what its levels cost."""
+    made = levels(plan).variations
+    again = sum(_seconds(problem, plan, one) for one in made)
+    again += neighbours_seconds(plan) if made else 0.0
     return replace(
         plan,
         seconds=plan.seconds + again,
@@ -164,49 +166,16 @@ def with_estimates(plan: ContactPlan, make_plan: Callable[[Scene], ContactPlan])
     )
 
 
-def mesh_estimates(
-    plan: ContactPlan,
-    numbers: Sequence[Result],
-    stages: Stages,
-    make_plan: Callable[[Scene], ContactPlan],
-    solve: Callable[[ContactPlan], LevelNumbers],
-    sample: Callable[[], Samples],
-) -> Estimates:
-    """What the mesh leaves in every number, from the plan's companions.
-
-    Parameters
-    ----------
-    numbers
-        Of the run.
-    make_plan, solve
-        scene -> plan, plan -> numbers.
-    sample
-        The run's numbers at neighbouring loads.
-
-    Returns
-    -------
-    Estimates
-        Empty where nothing is estimated; a reason in place of the error where the recipe cannot be
-        coarser.
-    """
-    if not plan.scene.estimates or plan.asked is not None:
-        return {}
-    made = list(companions(plan, make_plan))
-    before = stages.elapsed()
-    levels: list[SolvedLevel] = []
-    faults = (
-        [] if made else ["the mesh cannot be made coarser: its recipe has no divisions to lower"]
-    )
-    samples: Samples = {}
-    if made:
-        levels, faults = solve_companions(made, solve, stages)
-        with stages("error estimates", "neighbouring loads"):
-            samples = sample()
-    half = partial(half_cost, plan, before)
-    return level_estimates("mesh", numbers, levels, half, faults=faults, samples=samples)
+def _seconds(problem: Problem, plan: ContactPlan, one: Variation) -> float:
+    """Predicted for a level and its neighbouring loads."""
+    if recipes.counted_by_mesh(plan.scene.recipe):
+        # A plan runs a user's recipe once: the run makes these meshes.
+        return plan.solve_seconds * float(one.size**-POWER) + neighbours_seconds(plan)
+    level: ContactPlan = varied_plan(problem, plan.scene, one)
+    return level.solve_seconds + neighbours_seconds(level)
 
 
-def half_cost(plan: ContactPlan, seconds: float, order: float) -> float:
+def half_cost(plan: ContactPlan, source: str, seconds: float, order: float) -> float:
     """Seconds that a mesh with half of an error of the order adds.
 
     Parameters
@@ -219,6 +188,7 @@ def half_cost(plan: ContactPlan, seconds: float, order: float) -> float:
     InputError
         When the mesh does not fit the memory.
     """
+    del source
     finer = 2.0 ** (1.0 / order)
     if recipes.counted_by_mesh(plan.scene.recipe) or "divisions" not in plan.parameters:
         require_memory(plan.scene, plan.memory_bytes * finer**MEMORY_POWER)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from upd.analyses.contact.plan import ContactPlan, add_loads
 from upd.analyses.cost import CostModel
-from upd.analyses.scatter import RADIUS
 from upd.scene import Scene
+from upd.vary.scatter import RADIUS
 
 #: places of the edge, in spacings from its own. What an edge between nodes leaves is periodic in it
 #: with one spacing (a sphere's deviations correlate by 0.3 to 0.7 one spacing on, by -0.3 to -0.7

@@ -23,7 +23,7 @@ from typing import Any, Final
 
 from upd.analyses.contact import accuracy
 from upd.analyses.contact.accuracy import AccuracyLadder
-from upd.analyses.contact.levels import FEWEST, level_geometry
+from upd.analyses.contact.levels import FEWEST, level_geometry, mesh_problem
 from upd.analyses.flat.plan import make_plan
 from upd.analyses.flat.results import make_results
 from upd.analyses.flat.solve import solve_plan
@@ -86,7 +86,8 @@ def _first(scene: Scene, target: float) -> int:
     return min(_PREDICTED, len(_scenes(scene)) - 1)
 
 
-LADDER = AccuracyLadder(_scenes, make_plan, solve_plan, make_results, GOVERNING, _first)
+PROBLEM = mesh_problem(make_plan, solve_plan, make_results)
+LADDER = AccuracyLadder(PROBLEM, _scenes, GOVERNING, _first)
 plan_to_accuracy = partial(accuracy.plan_to_accuracy, LADDER)
 solve_to_accuracy = partial(accuracy.solve_to_accuracy, LADDER)
 estimate = partial(accuracy.estimate, LADDER)

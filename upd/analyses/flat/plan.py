@@ -16,7 +16,6 @@ from upd.analyses.contact.left_out import (
     coupling_effects,
     omitted,
 )
-from upd.analyses.contact.levels import with_estimates
 from upd.analyses.contact.plan import (
     ACROSS,
     ALONG,
@@ -76,9 +75,10 @@ def normal_loads(scene: Scene) -> tuple[DamperLoad, ...]:
     return tuple(different.values())
 
 
-def make_plan(scene: Scene, *, companions: bool = True) -> ContactPlan:
-    """Derive the plan of ``scene``, with the cost of the ``companions`` that errors are estimated
-    with. Raises InputError when its parts do not fit together.
+def make_plan(scene: Scene) -> ContactPlan:
+    """Derive the plan of ``scene``, without the cost of what its errors are estimated with.
+
+    Raises InputError when its parts do not fit together.
     """
     two_bodies(scene)
     loaded = any(load.force > 0.0 for load in normal_loads(scene))
@@ -91,8 +91,7 @@ def make_plan(scene: Scene, *, companions: bool = True) -> ContactPlan:
         _effects(scene, symmetry, why, loaded),
         mesh_parameters(scene, symmetry),
     )
-    plan = with_companion(plan, mesh_parameters(scene, "full"))
-    return with_estimates(plan, make_plan) if companions else plan
+    return with_companion(plan, mesh_parameters(scene, "full"))
 
 
 def _fitting(scene: Scene) -> None:

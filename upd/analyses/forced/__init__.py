@@ -10,7 +10,6 @@ from functools import wraps
 from typing import TypeVar
 
 from upd.analyses.base import Analysis
-from upd.analyses.coarser_rig import coarsened_rig
 from upd.analyses.forced import (
     accuracy,
     answer,
@@ -24,6 +23,7 @@ from upd.analyses.forced import (
     results,
 )
 from upd.analyses.forced.solution import ForcedSolution
+from upd.analyses.input_uncertainty import coarsened_rig
 from upd.linalg.parallel import threads_for
 
 Made = TypeVar("Made")
@@ -58,7 +58,7 @@ ANALYSIS = Analysis(
     verdict_names=("best_peak", "reduction_of_free_peak"),
     input_changes=input_uncertainty.input_changes,
     known_inputs=input_cost.known_inputs,
-    coarsened=lambda plan: coarsened_rig(plan, ("response",), {"balance": {"method": "balance"}}),
+    coarsened=lambda plan: coarsened_rig(plan, ("response",), ("balance.method", "balance")),
     estimate=estimates.estimate,
 )
 

@@ -18,7 +18,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from upd.analyses.convergence import observed_order, two_level_error
 from upd.analyses.forced.curves import TimeCheck
 from upd.analyses.forced.levels import (
     HARMONICS,
@@ -38,6 +37,7 @@ from upd.analyses.forced.solution import ForcedSolution
 from upd.progress import Stages
 from upd.results import Case, ErrorPart, Estimates, Result
 from upd.scene.forced_contact import SIDES, Side
+from upd.vary.orders import observed_order, two_level_error
 
 Key = tuple[str, Case]
 #: factor of safety of three levels that show an order

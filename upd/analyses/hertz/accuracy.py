@@ -9,6 +9,7 @@ from functools import partial
 
 from upd.analyses.contact import accuracy
 from upd.analyses.contact.accuracy import AccuracyLadder
+from upd.analyses.contact.levels import mesh_problem
 from upd.analyses.contact.plan import refined_growth
 from upd.analyses.hertz.plan import auto_patch, make_plan
 from upd.analyses.hertz.results import make_results
@@ -79,7 +80,8 @@ def _first(scene: Scene, target: float) -> int:
     )
 
 
-LADDER = AccuracyLadder(_scenes, make_plan, solve_plan, make_results, GOVERNING, _first, sample)
+PROBLEM = mesh_problem(make_plan, solve_plan, make_results, sample)
+LADDER = AccuracyLadder(PROBLEM, _scenes, GOVERNING, _first)
 plan_to_accuracy = partial(accuracy.plan_to_accuracy, LADDER)
 solve_to_accuracy = partial(accuracy.solve_to_accuracy, LADDER)
 estimate = partial(accuracy.estimate, LADDER)

@@ -17,7 +17,6 @@ from upd.analyses.contact.left_out import (
     coupling_effects,
     omitted,
 )
-from upd.analyses.contact.levels import with_estimates
 from upd.analyses.contact.plan import (
     ACROSS,
     ALONG,
@@ -35,9 +34,10 @@ from upd.reference import contact_modulus, hertz_sphere, sphere_gap
 from upd.scene import FRICTION_WANTS, Scene, friction_on
 
 
-def make_plan(scene: Scene, *, companions: bool = True) -> ContactPlan:
-    """Derive the plan of ``scene``, with the cost of the ``companions`` that errors are estimated
-    with. Raises InputError when its parts do not fit together.
+def make_plan(scene: Scene) -> ContactPlan:
+    """Derive the plan of ``scene``, without the cost of what its errors are estimated with.
+
+    Raises InputError when its parts do not fit together.
     """
     two_bodies(scene)
     symmetry, why = _symmetry(scene)
@@ -49,8 +49,7 @@ def make_plan(scene: Scene, *, companions: bool = True) -> ContactPlan:
         _effects(scene, symmetry, why),
         recipe_parameters(scene, symmetry),
     )
-    plan = with_companion(plan, _companion_parameters(scene))
-    return with_estimates(plan, make_plan) if companions else plan
+    return with_companion(plan, _companion_parameters(scene))
 
 
 def _companion_parameters(scene: Scene) -> dict[str, Any]:

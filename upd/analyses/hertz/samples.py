@@ -13,10 +13,10 @@ from upd.analyses.contact.neighbours import has_neighbours, neighbours, plan_at
 from upd.analyses.hertz.results import make_results
 from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution
 from upd.analyses.hertz.solve import solve_normal, solve_tangential
-from upd.analyses.scatter import Samples
 from upd.errors import UpdError
 from upd.progress import Stages
 from upd.results import Case
+from upd.vary.scatter import Samples
 
 FloatArray = NDArray[np.float64]
 

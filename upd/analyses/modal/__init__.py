@@ -6,7 +6,7 @@ Modes free and with the damper glued, Craig-Bampton models, linear frequency res
 from __future__ import annotations
 
 from upd.analyses.base import Analysis
-from upd.analyses.coarser_rig import coarsened_rig
+from upd.analyses.input_uncertainty import coarsened_rig
 from upd.analyses.modal import accuracy, charts, checks, output, plan, results
 
 ANALYSIS = Analysis(

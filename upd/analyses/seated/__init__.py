@@ -5,15 +5,18 @@ Coupled contact on every matching node of both faces: forces, stick and slip, st
 
 from __future__ import annotations
 
+from functools import partial
+
 from upd.analyses.base import Analysis
-from upd.analyses.coarser_rig import coarsened_rig
-from upd.analyses.seated import charts, checks, estimates, output, plan, results, solve
+from upd.analyses.input_uncertainty import coarsened_rig
+from upd.analyses.seated import charts, checks, output, plan, results, solve, varied
+from upd.vary import errors
 
 ANALYSIS = Analysis(
     name="seated",
     headline_names=results.HEADLINE,
     input_checks=(),
-    make_plan=estimates.plan_with_estimates,
+    make_plan=varied.plan_with_estimates,
     needs=plan.needs,
     solve=solve.solve,
     make_results=results.make_results,
@@ -24,7 +27,7 @@ ANALYSIS = Analysis(
     charts=charts.charts,
     headline=results.headline,
     verdict_names=("face_N",),
-    estimate=estimates.estimate,
+    estimate=partial(errors.estimate, varied.PROBLEM),
     coarsened=lambda plan: coarsened_rig(plan, ("seating", "stiffness", "moved")),
 )
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import stdtr, stdtrit
 
-from upd.analyses.convergence import CONFIDENCE, SCATTER, ErrorEstimate
 from upd.results.case import Case
+from upd.vary.orders import CONFIDENCE, SCATTER, ErrorEstimate
 
 FloatArray = NDArray[np.float64]
 #: name and case of a number -> (n, 2): logarithms of neighbouring loads over that of the case, in

@@ -1,28 +1,24 @@
-"""Errors of a rig's numbers: its mesh from coarser rigs, the modes kept from the full model."""
+"""What varies in a rig: its mesh, for the errors of its numbers; the modes kept are judged by the
+full model.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 from upd.analyses.base import require_memory
-from upd.analyses.companions import (
-    Companion,
-    LevelNumbers,
-    level_estimates,
-    merged,
-    solve_companions,
-)
 from upd.analyses.modal.plan import ModalPlan, make_plan
 from upd.analyses.modal.results import REDUCED, make_results
 from upd.analyses.modal.solve import ModalSolution, solve
 from upd.errors import InputError
-from upd.progress import Stages
 from upd.results import ErrorPart, Estimates, Result
 from upd.scene import RigScene
 from upd.scene.quantities import UNKNOWN
+from upd.vary.errors import merged
+from upd.vary.solve import varied_plan
+from upd.vary.variation import ALONE, Levels, Overrides, Problem, SolvedVariation, Variation
 
 #: sources of error
 MESH, KEPT = "mesh", "modes kept"
@@ -32,11 +28,17 @@ COARSER = (0.7, 0.5)
 _QUADRATIC, _BETWEEN = ("hex20", "hex27"), 2.0
 #: outputs a companion has, where the run has them: the reduced model has the mesh of the full one
 _WANTED = ("free", "glued", "response")
+_COARSEST = "the rig cannot be meshed coarser: its recipe has no smaller refinement"
 _REDUCED = re.compile(r"f(\d+)_reduced")
 
 
-def companions(plan: ModalPlan) -> Iterator[Companion]:
-    """Companions of the rig's mesh.
+def bare(scene: RigScene) -> Overrides:
+    """What takes off a scene what costs and shows no number."""
+    return (("want", tuple(w for w in scene.want if w in _WANTED) or ("free",)), *ALONE)
+
+
+def levels(plan: ModalPlan) -> Levels:
+    """Variations of the rig's mesh.
 
     The coarser rigs that the plan names. Else of quadratic elements the linear ones with
     incompatible modes on the same hexahedra, with twice the spacing of nodes: corners and clamped
@@ -47,47 +49,39 @@ def companions(plan: ModalPlan) -> Iterator[Companion]:
     scene = plan.scene
     refine = scene.geometry.get("refine")
     if not scene.estimates or not isinstance(refine, (int, float)):
-        return
-    hexes = _hexes(plan)
-    coarse = replace(
-        scene,
-        want=tuple(w for w in scene.want if w in _WANTED) or ("free",),
-        left_out=replace(scene.left_out, solve="no"),
-        accuracy=UNKNOWN,
-    )
-    for part in plan.coarser:
-        one = replace(coarse, geometry={**scene.geometry, "refine": part * refine})
-        label = f"geometry.refine = {part * refine:.2g}"
-        made = partial(make_plan, one)
-        yield Companion(label, 1.0 / part, made, make_plan(one).seconds)
+        return Levels((), {MESH: _COARSEST})
     if plan.coarser:
-        return
+        return Levels([_refined(part * refine, 1.0 / part) for part in plan.coarser])
     if scene.mesh.element in _QUADRATIC:
-        linear = replace(coarse, mesh=replace(scene.mesh, element="hex8i"))
         label = "elements hex8i on the same hexahedra"
-        yield Companion(label, _BETWEEN, partial(make_plan, linear), make_plan(linear).seconds)
-        return
+        return Levels([Variation(MESH, label, (("mesh.element", "hex8i"),), _BETWEEN)])
+    made = []
     for part in COARSER:
-        one = replace(coarse, geometry={**scene.geometry, "refine": part * refine})
+        one = _refined(part * refine)
         try:
-            found = make_plan(one)
+            coarse = varied_plan(PROBLEM, scene, one)
         except InputError:
             # As coarse as it can be.
             continue
-        size = (hexes / _hexes(found)) ** (1.0 / 3.0)
+        size = (_hexes(plan) / _hexes(coarse)) ** (1.0 / 3.0)
         if size > 1.0:
-            label = f"geometry.refine = {part * refine:.2g}"
-            yield Companion(label, size, partial(make_plan, one), found.seconds)
+            made.append(replace(one, size=size))
+    return Levels(made, {MESH: _COARSEST})
+
+
+def _refined(refine: float, size: float = 1.0) -> Variation:
+    label = f"geometry.refine = {refine:.2g}"
+    return Variation(MESH, label, (("geometry.refine", refine),), size)
 
 
 def plan_with_estimates(scene: RigScene) -> ModalPlan:
-    """The plan of ``scene`` with what its companions cost. Raises InputError as `make_plan`."""
-    return with_companions(make_plan(scene))
+    """The plan of ``scene`` with what its variations cost. Raises InputError as `make_plan`."""
+    return with_variations(make_plan(scene))
 
 
-def with_companions(plan: ModalPlan) -> ModalPlan:
-    """The plan with what its companions cost."""
-    again = sum(one.seconds for one in companions(plan))
+def with_variations(plan: ModalPlan) -> ModalPlan:
+    """The plan with what its variations cost."""
+    again = sum(varied_plan(PROBLEM, plan.scene, one).seconds for one in levels(plan).variations)
     return replace(plan, seconds=plan.seconds + again, estimate_seconds=again)
 
 
@@ -95,23 +89,21 @@ def _hexes(plan: ModalPlan) -> int:
     return sum(count["hexes"] for count in plan.size.values())
 
 
-def estimate(solution: ModalSolution, numbers: Sequence[Result], stages: Stages) -> Estimates:
-    """The errors of all numbers by the mesh, and of the reduced model by the modes it keeps."""
-    plan, before = solution.plan, stages.elapsed()
-    made = list(companions(plan))
-    levels, faults = solve_companions(
-        made, lambda one: LevelNumbers(make_results(solve(one, Stages()))), stages
-    )
-    if not made:
-        faults = ["the rig cannot be meshed coarser: its recipe has no smaller refinement"]
-    mesh = level_estimates(MESH, numbers, levels, partial(_half_cost, plan, before), faults=faults)
+def _corrected(
+    solution: ModalSolution,
+    run: SolvedVariation,
+    solved: Sequence[SolvedVariation],
+    found: Estimates,
+) -> Estimates:
+    """The errors by the mesh, and of the reduced model by the modes it keeps."""
+    del solved
     # The reduced model stands on the same mesh as the full one.
     of_full = {
-        (r.name, r.case): mesh[full.name, full.case]
-        for r in numbers
-        if r.case == REDUCED and (full := _full(r, numbers)) is not None
+        (r.name, r.case): found[full.name, full.case]
+        for r in run.numbers
+        if r.case == REDUCED and (full := _full(r, run.numbers)) is not None
     }
-    return merged({**mesh, **of_full}, _by_modes(solution, numbers))
+    return merged({**found, **of_full}, _by_modes(solution, run.numbers))
 
 
 def _full(reduced: Result, numbers: Sequence[Result]) -> Result | None:
@@ -138,13 +130,19 @@ def _by_modes(solution: ModalSolution, numbers: Sequence[Result]) -> Estimates:
     return out
 
 
-def _half_cost(plan: ModalPlan, seconds: float, order: float) -> float:
+def _half_cost(plan: ModalPlan, source: str, seconds: float, order: float) -> float:
     """Seconds that a rig with half of an error of the order adds; ``seconds``: of the run.
 
     InputError where it does not fit the memory.
     """
+    del source
     scene = replace(plan.scene, accuracy=UNKNOWN)
     refine = 2.0 ** (1.0 / order) * float(scene.geometry["refine"])
     finer = make_plan(replace(scene, geometry={**scene.geometry, "refine": refine}))
     require_memory(scene, finer.memory_bytes)
     return max(0.0, seconds * (finer.seconds / make_plan(scene).seconds - 1.0))
+
+
+PROBLEM = Problem(
+    make_plan, solve, make_results, bare, (MESH,), levels, _half_cost, corrected=_corrected
+)

@@ -1,0 +1,180 @@
+"""Errors of a run's numbers from variations of its scene: coarser levels, or a base refined."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from fnmatch import fnmatchcase
+from functools import cache, partial
+from typing import Any
+
+from upd.errors import InputError, one_line
+from upd.progress import Stages
+from upd.results import ErrorPart, Estimates, Result
+from upd.vary.orders import (
+    ASSUMED,
+    UNCONFIRMED,
+    ErrorEstimate,
+    finer_level_error,
+    ladder_error,
+    two_level_error,
+)
+from upd.vary.scatter import sampled_error
+from upd.vary.solve import solve
+from upd.vary.variation import COARSER, RUN, Key, Problem, SolvedVariation
+
+#: numbers that are errors themselves
+_ERRORS = ("*misfit*", "*_error", "*_mac", "*_difference")
+_NONE, _LACKING = "not estimated: ", "no companion has this number"
+
+
+def estimate(
+    problem: Problem, solution: Any, numbers: Sequence[Result], stages: Stages
+) -> Estimates:
+    """What every source adds to the errors of a run's numbers.
+
+    Parameters
+    ----------
+    solution, numbers
+        Of the run, with its plan.
+    stages
+        Of the run.
+    """
+    plan, run = solution.plan, SolvedVariation(RUN, numbers, stages.elapsed())
+    variations, reasons = problem.levels(plan)
+    solved = solve(problem, plan.scene, run, variations, stages)
+    if variations and problem.sample is not None:
+        with stages("error estimates", "neighbouring loads"):
+            run = replace(run, samples=problem.sample(solution))
+    found = merged(
+        *(
+            source_estimates(
+                source,
+                run,
+                [one for one in solved if one.variation.source == source],
+                partial(problem.half_cost, plan, source, run.seconds),
+                reasons.get(source, ""),
+            )
+            for source in problem.sources
+        )
+    )
+    return problem.corrected(solution, run, solved, found)
+
+
+def source_estimates(
+    source: str,
+    run: SolvedVariation,
+    levels: Sequence[SolvedVariation],
+    half_cost: Callable[[float], float],
+    reason: str = "",
+) -> Estimates:
+    """What one source adds to the errors of a run's numbers.
+
+    Parameters
+    ----------
+    source
+        Name of it.
+    levels
+        Its variations, the finest of coarser ones first.
+    half_cost
+        Order of convergence -> seconds that a level with half the error adds. InputError says why
+        there is no such level.
+    reason
+        Why it has no variations.
+
+    Returns
+    -------
+    Estimates
+        A part for every number of the run; NaN with its reason where no variation has the number.
+    """
+    known = [one for one in levels if not one.reason]
+    faults = "; ".join(one.reason for one in levels if one.reason) if levels else reason
+    if faults and levels and levels[0].variation.base is not None:
+        faults = _NONE + faults
+    seconds = math.fsum(one.seconds for one in known)
+    half = cache(partial(_half, half_cost))
+    out: dict[Key, tuple[ErrorPart, ...]] = {}
+    for number in _judged(run.numbers):
+        key = number.name, number.case
+        found = bound(key, run, known)
+        if math.isfinite(found.error):
+            cost, why = half(found.order if 0.0 < found.order < math.inf else found.falls)
+            part = ErrorPart(source, found.error, found.basis, cost, seconds, why)
+        else:
+            part = ErrorPart(source, math.nan, found.basis or faults or _LACKING)
+        out[key] = (part,)
+    return out
+
+
+def bound(key: Key, run: SolvedVariation, levels: Sequence[SolvedVariation]) -> ErrorEstimate:
+    """Bound of a number's error by what the levels of one source are.
+
+    A level with a base stands for the run: the run has the same error in proportion. Where the run
+    and its levels have the number at neighbouring loads, `sampled_error` tells, and `ladder_error`
+    else.
+
+    Returns
+    -------
+    ErrorEstimate
+        Its error is NaN, with the reason, where a level lacks the number or has it zero; without
+        one where no level has it.
+    """
+    if levels and (base := levels[0].base) is not None:
+        return _paired(key, base, levels[0])
+    known = [one for one in levels if key in one.values]
+    if not known:
+        return ErrorEstimate(math.nan, math.nan, "")
+    if key in run.samples and all(key in one.samples for one in known):
+        # Far coarser ones follow no law of the spacing yet.
+        known = known[: len(COARSER)]
+        at_loads = [run.samples[key], *(one.samples[key] for one in known)]
+        found = sampled_error([1.0, *(one.variation.size for one in known)], at_loads)
+    else:
+        values = [run.values[key], *(one.values[key] for one in known)]
+        found = ladder_error([1.0, *(one.variation.size for one in known)], values)
+    if not math.isfinite(found.error):
+        return replace(found, basis="the number is zero: its error is not relative to it")
+    labels = ", ".join(one.variation.label for one in known)
+    return replace(found, basis=f"against {labels}: {found.basis}")
+
+
+def _paired(key: Key, base: SolvedVariation, other: SolvedVariation) -> ErrorEstimate:
+    """From a base that stands for the run, and the base with the source refined, or coarser."""
+    lost = next((one for one in (base, other) if not one.values.get(key)), None)
+    if lost is not None:
+        why = f"{lost.variation.label}: {'zero' if key in lost.values else 'without this number'}"
+        return ErrorEstimate(math.nan, math.nan, _NONE + why)
+    ratio, size = other.values[key] / base.values[key], other.variation.size
+    if size < 1.0:
+        error = finer_level_error(ratio, size)
+        shown = f"change with {other.variation.label}, and what that leaves"
+    else:
+        error = UNCONFIRMED * two_level_error(ratio, 1.0, size, ASSUMED)
+        shown = f"against {other.variation.label}"
+    basis = f"{shown}: two levels, order {ASSUMED:g} assumed, factor {UNCONFIRMED:g}"
+    return ErrorEstimate(error, math.nan, basis)
+
+
+def _half(half_cost: Callable[[float], float], order: float) -> tuple[float | None, str]:
+    """Seconds of half an error, or why there are none."""
+    try:
+        return half_cost(order), ""
+    except InputError as error:
+        return None, one_line(error)
+
+
+def _judged(numbers: Iterable[Result]) -> Iterator[Result]:
+    """Those that were reached and are no errors themselves."""
+    for one in numbers:
+        if not one.withheld and not any(fnmatchcase(one.name, pattern) for pattern in _ERRORS):
+            yield one
+
+
+def merged(*found: Estimates) -> Estimates:
+    """The parts of several sources, number by number."""
+    out: dict[Key, tuple[ErrorPart, ...]] = {}
+    for one in found:
+        for key, parts in one.items():
+            out[key] = (*out.get(key, ()), *parts)
+    return out

@@ -1,0 +1,135 @@
+"""One scene with one thing changed, what was found on it, and what an analysis can vary."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from upd.progress import Stages
+from upd.results import Case, Estimates, Result
+from upd.scene.quantities import UNKNOWN
+from upd.vary.scatter import Samples
+
+Key = tuple[str, Case]
+#: paths of a scene, and their values in the unit inside: ("geometry.divisions", 8)
+Overrides = tuple[tuple[str, Any], ...]
+#: without what is solved again, and without errors and input bands of its own
+ALONE: Overrides = (("left_out.solve", "no"), ("accuracy", UNKNOWN), ("uncertain", {}))
+#: element sizes of coarser levels over those of the run
+COARSER = (2.0**0.5, 2.0, 2.0**1.5)
+
+
+@dataclass(frozen=True)
+class Variation:
+    """One scene with one thing changed.
+
+    Attributes
+    ----------
+    source
+        Of the error that it shows: "mesh".
+    label
+        What it is, in words: "8 x 22 divisions".
+    overrides
+        What changes in the scene.
+    size
+        Of its elements or steps over that of its base: above 1 it is coarser, below 1 finer.
+    base
+        What it is compared with; None: the run, by the rules of a ladder of levels.
+    """
+
+    source: str
+    label: str
+    overrides: Overrides = ()
+    size: float = math.nan
+    base: Variation | None = None
+
+
+#: the run itself, as the base of a variation
+RUN = Variation("", "the run", size=1.0)
+
+
+@dataclass(frozen=True)
+class SolvedVariation:
+    """A variation that was solved, or why it was not.
+
+    Attributes
+    ----------
+    seconds
+        Measured.
+    samples
+        The numbers at neighbouring loads, where it has them.
+    base
+        Its variation's base, solved.
+    reason
+        Why it was not solved, with its label.
+    """
+
+    variation: Variation
+    numbers: Sequence[Result] = ()
+    seconds: float = 0.0
+    samples: Samples = field(default_factory=dict)
+    base: SolvedVariation | None = None
+    reason: str = ""
+
+    @cached_property
+    def values(self) -> dict[Key, float]:
+        """Those of the numbers that were reached."""
+        return {(r.name, r.case): r.value for r in self.numbers if not r.withheld}
+
+
+class Levels(NamedTuple):
+    """What the errors of a run are estimated with: variations, bases before what they carry; why a
+    source has none.
+    """
+
+    variations: Sequence[Variation]
+    reasons: Mapping[str, str] = {}
+
+
+def _as_found(
+    solution: Any, run: SolvedVariation, solved: Sequence[SolvedVariation], found: Estimates
+) -> Estimates:
+    del solution, run, solved
+    return found
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What an analysis gives to have its scenes varied.
+
+    Attributes
+    ----------
+    make_plan
+        scene -> its plan, without the cost of variations.
+    solve, make_results
+        plan, stages -> solution; its numbers.
+    bare
+        scene -> what takes off it what costs and shows no number.
+    sources
+        Of errors that variations show, in the order of their parts.
+    levels
+        plan -> the variations that its errors are estimated with.
+    half_cost
+        plan, source, seconds of the run, order of convergence -> seconds that half of an error
+        adds. InputError says why there is no such level.
+    sample
+        solution -> its numbers at neighbouring loads; None where those show nothing.
+    corrected
+        solution, the run, what was solved, the parts found -> the parts, with those that are known
+        otherwise.
+    """
+
+    make_plan: Callable[[Any], Any]
+    solve: Callable[[Any, Stages], Any]
+    make_results: Callable[[Any], Sequence[Result]]
+    bare: Callable[[Any], Overrides]
+    sources: tuple[str, ...]
+    levels: Callable[[Any], Levels]
+    half_cost: Callable[[Any, str, float, float], float]
+    sample: Callable[[Any], Samples] | None = None
+    corrected: Callable[[Any, SolvedVariation, Sequence[SolvedVariation], Estimates], Estimates] = (
+        _as_found
+    )
