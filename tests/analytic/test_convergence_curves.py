@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from upd.batch.curves import ConvergenceCurve, make_curves
-from upd.batch.ladder import SolvedPoint, StudyPoint
 from upd.batch.point import Outcome, PointResult
+from upd.batch.study_point import SolvedPoint, StudyPoint
 from upd.results import Case
 
 CASE = Case(load=200.0)

@@ -14,10 +14,10 @@ from rigs import LINES
 import upd
 from upd.analyses import forced
 from upd.analyses.forced import paths
-from upd.batch.forced_ladder import forced_curves, forced_points
-from upd.batch.ladder import SolvedPoint, StudyPoint
+from upd.batch.curves import finest_curves
 from upd.batch.point import Outcome, PointResult
 from upd.batch.studies import plan_study
+from upd.batch.study_point import SolvedPoint, StudyPoint
 from upd.errors import ConvergenceError, InputError
 from upd.report.folder import read_arrays
 from upd.report.notebook import RunResult, charts, headline
@@ -353,7 +353,7 @@ def test_scene_as_run_reads_back_the_same(tmp_path: Path) -> None:
 
 def test_ladders_compare_with_their_finest_level() -> None:
     scene = load_scene("symmetric-response")
-    points = forced_points(scene, "harmonics", (3, 1))
+    points = plan_study(scene, "harmonics", (3, 1)).points
     assert [p.label for p in points] == ["to harmonic 1", "to harmonic 3"]
     # at the load under which most slips, one path
     assert scene.excitation.centrifugal_to_force[0] > 194.0
@@ -362,7 +362,7 @@ def test_ladders_compare_with_their_finest_level() -> None:
         assert told["excitation.centrifugal_to_force"] == [194.0]
         assert told["balance.method"] == "balance"
     for vary in ("samples", "modes", "contacts"):
-        for point in forced_points(scene, vary):
+        for point in plan_study(scene, vary).points:
             assert isinstance(load_scene("symmetric-response", dict(point.settings)).name, str)
 
     def solved(label: str, f: float, seconds: float) -> SolvedPoint:
@@ -382,7 +382,7 @@ def test_ladders_compare_with_their_finest_level() -> None:
         )
 
     # Linear curves and what no level moves have nothing to show.
-    (curve,) = forced_curves(
+    (curve,) = finest_curves(
         [solved("1", 303.0, 1.0), solved("3", 300.0, 4.0)], ["peak_?_frequency"]
     )
     assert curve.name == "peak_1_frequency"

@@ -11,7 +11,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from multiprocessing import active_children
 from pathlib import Path
 from typing import Any
@@ -22,9 +22,10 @@ from upd import load_scene
 from upd.batch import store as point_store
 from upd.batch import study
 from upd.batch.engine import Progress, Workers
-from upd.batch.ladder import SolvedPoint, StudyPoint, StudyReport
+from upd.batch.ladder import Study, StudyReport
 from upd.batch.schedule import ATTEMPTS
 from upd.batch.studies import plan_study, run_study
+from upd.batch.study_point import StudyPoint
 from upd.errors import InputError, UpdError
 
 TINY = {"geometry.divisions": 8, "want": ["normal"], "geometry.core_depth": 0.2}
@@ -220,27 +221,23 @@ def test_disk_full_in_mid_study_is_one_clear_error_and_keeps_what_was_there(
     )
 
 
-class Odd:
-    """A study of one's own: points that fail in other ways than an analysis does."""
-
-    points = (
+#: a study of one's own: points that fail in other ways than an analysis does
+ODD = Study(
+    "odd",
+    (
         StudyPoint("odd", "unknown key", (("contact.fricton", 0.3),)),
         StudyPoint("odd", "as given", ()),
-    )
-
-    def present(self, solved: Sequence[SolvedPoint]) -> StudyReport:
-        return StudyReport((), True)
-
-    def write(self, folder: Path, solved: Sequence[SolvedPoint]) -> list[Path]:
-        return []
+    ),
+    lambda solved: StudyReport((), True),
+)
 
 
 def test_a_point_the_scene_does_not_allow_is_a_row_and_not_the_end(tmp_path: Path) -> None:
     scene = load_scene("hertz", TINY)
-    found = run_study(scene, Odd(), tmp_path, workers=Workers(0, 1))
+    found = run_study(scene, ODD, tmp_path, workers=Workers(0, 1))
     assert "did you mean 'friction'" in found.solved[0].outcome.failure
     assert found.solved[1].outcome.failure == ""
-    assert run_study(scene, Odd(), tmp_path, workers=Workers(0, 1)).kept == (0, 1)
+    assert run_study(scene, ODD, tmp_path, workers=Workers(0, 1)).kept == (0, 1)
 
 
 def test_other_code_solves_its_own_points(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

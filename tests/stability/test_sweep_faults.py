@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Future
 from contextlib import contextmanager
 from multiprocessing import active_children
 from pathlib import Path
@@ -23,7 +24,6 @@ from upd import load_scene
 from upd.batch import store as point_store
 from upd.batch import sweep
 from upd.batch.engine import Progress
-from upd.batch.executors import Answer
 from upd.batch.point import OTHER_CODE, Outcome, Task, read_outcome, solve_task
 from upd.batch.schedule import ATTEMPTS, Job, dispatch
 from upd.errors import InputError, UpdError
@@ -427,23 +427,25 @@ def test_two_sweeps_in_one_folder_are_refused(tmp_path: Path) -> None:
 class Script:
     """An executor that answers as written: text, or None for a death."""
 
+    deaths = (BrokenExecutor,)
+
     def __init__(
-        self, answers: dict[int, list[str | None]], names: Sequence[str] = ("a", "b")
+        self, answers: dict[str, list[str | None]], names: Sequence[str] = ("a", "b")
     ) -> None:
-        self.answers, self.names, self.log = answers, names, []
-        self.busy: dict[str, int] = {}
+        self.answers, self.names = answers, names
+        self.log: list[tuple[str, str]] = []
 
-    def free(self) -> Sequence[str]:
-        return [name for name in self.names if name not in self.busy]
+    def workers(self) -> Sequence[str]:
+        return self.names
 
-    def give(self, worker: str, number: int, task: str) -> None:
-        self.busy[worker] = number
+    def submit(self, worker: str, task: str) -> Future[str]:
         self.log.append((worker, task))
-
-    def wait(self, seconds: float) -> list[Answer]:
-        worker, number = next(iter(self.busy.items()))
-        del self.busy[worker]
-        return [Answer(number, self.answers[number].pop(0))]
+        answer, future = self.answers[task].pop(0), Future[str]()
+        if answer is None:
+            future.set_exception(BrokenExecutor())
+        else:
+            future.set_result(answer)
+        return future
 
     def close(self) -> None:
         pass
@@ -452,7 +454,7 @@ class Script:
 def test_workers_stay_with_their_group_then_open_another_then_help() -> None:
     fine = Outcome().text()
     jobs = [Job(k, group, group) for k, group in enumerate("xyxyxyzzz")]
-    executor = Script({job.number: [fine] for job in jobs})
+    executor = Script({group: [fine] * 3 for group in "xyz"})
     dispatch(jobs, executor, lambda number, outcome: None, lambda running: None)
     a, b = ("".join(task for worker, task in executor.log if worker == name) for name in "ab")
     assert len(a + b) == 9
@@ -464,15 +466,46 @@ def test_workers_stay_with_their_group_then_open_another_then_help() -> None:
 def test_each_point_is_recorded_once_whoever_dies() -> None:
     fine = Outcome().text()
     recorded: list[tuple[int, str]] = []
-    executor = Script({0: [None, fine], 1: [None] * ATTEMPTS, 2: [fine]})
+    executor = Script({"0": [None, fine], "1": [None] * ATTEMPTS, "2": [fine]})
     dispatch(
-        [Job(k, "", "g") for k in range(3)],
+        [Job(k, str(k), "g") for k in range(3)],
         executor,
         lambda k, outcome: recorded.append((k, outcome.failure)),
         lambda running: None,
     )
     assert sorted(k for k, _ in recorded) == [0, 1, 2]
     assert {k for k, failure in recorded if failure} == {1}
+
+
+def test_a_worker_that_goes_away_loses_its_point_to_another() -> None:
+    """Its future never ends: nobody is there who could end it."""
+
+    class Leaving(Script):
+        def workers(self) -> Sequence[str]:
+            return self.names if not self.log else self.names[1:]
+
+        def submit(self, worker: str, task: str) -> Future[str]:
+            future = super().submit(worker, task)
+            return Future[str]() if worker == "a" else future
+
+    fine, recorded = Outcome().text(), list[int]()
+    executor = Leaving({"0": [fine, fine], "1": [fine]})
+    jobs = [Job(k, str(k), "g") for k in range(2)]
+    dispatch(jobs, executor, lambda number, _: recorded.append(number), lambda running: None)
+    assert sorted(recorded) == [0, 1]
+    assert ("a", "0") in executor.log
+    assert ("b", "0") in executor.log
+
+
+def test_a_worker_that_cannot_run_points_ends_the_sweep() -> None:
+    class Lacking(Script):
+        def submit(self, worker: str, task: str) -> Future[str]:
+            future = Future[str]()
+            future.set_exception(ModuleNotFoundError("No module named 'upd'"))
+            return future
+
+    with pytest.raises(UpdError, match=r"cannot run points \(ModuleNotFoundError: No module"):
+        dispatch([Job(0, "", "g")], Lacking({}), lambda *_: None, lambda running: None)
 
 
 def test_worker_with_other_sources_ends_the_sweep() -> None:
@@ -483,7 +516,7 @@ def test_worker_with_other_sources_ends_the_sweep() -> None:
     with pytest.raises(InputError, match="different codes"):
         dispatch(
             [Job(0, "", "g")],
-            Script({0: [outcome.text()]}),
+            Script({"": [outcome.text()]}),
             lambda number, found: None,
             lambda running: None,
         )

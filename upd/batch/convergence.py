@@ -1,182 +1,116 @@
-"""Convergence study: what accuracy costs, as tables, study.json and a work-precision figure."""
+"""What accuracy costs, as tables."""
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
-from upd.batch.curves import ConvergenceCurve
-from upd.batch.ladder import SolvedPoint, StudyPoint, StudyReport, TextTable, markdown_table
-from upd.cache.files import write_text
+from upd.batch.curves import ConvergenceCurve, with_friction
+from upd.batch.study_point import SolvedPoint, matching
+from upd.batch.text_table import TableColumn, TextTable, cost_columns, make_table
 from upd.labels import number_label, percent
-from upd.plot.matplotlib import write_sheets
-from upd.plot.work_precision import work_precision_charts
+
+_POINTS: tuple[TableColumn, ...] = (
+    ("curve", "l", lambda one: str(one.point.curve)),
+    ("level", "l", lambda one: str(one.point.label)),
+    *cost_columns(),
+)
 
 
-@dataclass(frozen=True)
-class ConvergenceStudy:
-    """Ladders, and what is shown of them.
+def convergence_tables(
+    solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve]
+) -> tuple[tuple[TextTable, ...], tuple[TextTable, ...]]:
+    """The points and what they cost, then the curves: for a terminal, and for study.md.
 
-    Attributes
-    ----------
-    curves
-        Makes the curves of the solved points.
-    more
-        Makes a table to be shown before the others.
-    notes
-        What the levels set in the scene.
+    A terminal shows the error of every followed number on its finest level, its rate, the error
+    estimated there, and that of the coarsest level; study.md that of each level.
     """
-
-    title: str
-    points: tuple[StudyPoint, ...]
-    curves: Callable[[Sequence[SolvedPoint]], list[ConvergenceCurve]]
-    more: Callable[[Sequence[SolvedPoint]], TextTable] | None = None
-    notes: tuple[str, ...] = ()
-
-    def present(self, solved: Sequence[SolvedPoint]) -> StudyReport:
-        """The points and what they cost.
-
-        The error of every followed number on its finest level, its rate, the error estimated there,
-        and that of the coarsest level.
-        """
-        curves = self.curves(solved)
-        before = () if self.more is None else (self.more(solved),)
-        tables = (*before, _points_table(solved), _error_table(curves))
-        return StudyReport(tables, bool(curves), self.notes)
-
-    def write(self, folder: Path, solved: Sequence[SolvedPoint]) -> list[Path]:
-        """study.md, study.json and work_precision.png."""
-        curves = self.curves(solved)
-        table, data = folder / "study.md", folder / "study.json"
-        content: dict[str, Any] = {
-            "title": self.title,
-            "points": [one.as_dict() for one in solved],
-            "curves": [asdict(c) for c in curves],
-            "notes": list(self.notes),
-        }
-        write_text(data, json.dumps(content, indent=1) + "\n")
-        told = "".join(f"\n- {note}\n" for note in self.notes)
-        write_text(table, markdown(self.title, solved, curves) + told)
-        # A number that no level moves has no error to draw.
-        moved = {(c.name, c.case) for c in curves if any(c.error)}
-        charts = work_precision_charts(
-            [c for c in content["curves"] if (c["name"], c["case"]) in moved]
-        )
-        return [table, data, *write_sheets(charts, folder)]
-
-
-def _points_table(solved: Sequence[SolvedPoint]) -> TextTable:
-    heads = ("curve", "level", "dofs", "seconds", "peak MB", "note")
-    return TextTable("Points", heads, "llrrrl", tuple(map(_point_cells, solved)))
-
-
-def _point_cells(one: SolvedPoint) -> tuple[str, ...]:
-    o = one.outcome
-    return (
-        one.point.curve,
-        one.point.label,
-        f"{o.n_dof}",
-        f"{o.seconds:.2f}",
-        f"{o.memory_mb:.0f}",
-        o.failure,
-    )
-
-
-def _error_table(curves: Sequence[ConvergenceCurve]) -> TextTable:
-    heads = (
-        "number",
-        "case",
-        "curve",
-        "finest",
-        "order",
-        "estimated",
-        "coarsest",
-        "thesis",
-        "against",
-        "verdict",
-    )
-    # what a narrow terminal leaves out first stands last among the numbers
-    rows = tuple(
+    points = make_table("Points", _POINTS, solved)
+    case: TableColumn = ("case", "l", lambda c: str(c.case))
+    curve: TableColumn = ("curve", "l", lambda c: str(c.curve))
+    order: TableColumn = ("order", "r", lambda c: _rate_text(c.order))
+    verdict: TableColumn = ("verdict", "l", lambda c: str(c.verdict))
+    against: TableColumn = ("against", "l", lambda c: str(c.against))
+    short = make_table(
+        "Error",
         (
-            number_label(c.name),
-            c.case,
-            c.curve,
-            percent(c.error[-1]),
-            rate_text(c.order),
-            _estimated(c),
-            percent(c.error[0]),
-            percent(c.thesis_error),
-            c.against,
-            c.verdict,
-        )
-        for c in curves
+            ("number", "l", lambda c: number_label(c.name)),
+            case,
+            curve,
+            ("finest", "r", lambda c: percent(c.error[-1])),
+            order,
+            ("estimated", "r", _estimated),
+            # what a narrow terminal leaves out first stands last among the numbers
+            ("coarsest", "r", lambda c: percent(c.error[0])),
+            ("thesis", "r", lambda c: percent(c.thesis_error)),
+            against,
+            verdict,
+        ),
+        curves,
+        whole=True,
+        spare=("against", "verdict"),
     )
-    # The name of a number is not broken, however narrow the terminal.
-    width = max((len(row[0]) for row in rows), default=0)
-    return TextTable("Error", heads, "lllrrrrrll", rows, width, ("against", "verdict"))
+    whole = make_table(
+        "Error",
+        (
+            ("number", "l", lambda c: str(c.name)),
+            case,
+            curve,
+            order,
+            ("error on each level", "l", _levels_text),
+            ("estimated on the finest", "r", _estimated),
+            against,
+            ("thesis", "r", _thesis),
+            verdict,
+        ),
+        curves,
+    )
+    return (points, short), (points, whole)
 
 
-def rate_text(order: float) -> str:
+def level_table(solved: Sequence[SolvedPoint], names: Sequence[str]) -> TextTable:
+    """The followed numbers of every level: what the choices of contact points are read from."""
+    keys = with_friction(matching(solved, names))
+    named = [name for name, _ in keys]
+    rows = []
+    for name, case in keys:
+        cells = (
+            f"{p.values[name, case]:.5g}"
+            if (name, case) in p.values
+            else "failed" * bool(p.outcome.failure)
+            for p in solved
+        )
+        label = name.replace("_", " ") + (f" ({case.label})" if named.count(name) > 1 else "")
+        rows.append((label, *cells))
+    heads = ("Hz, (m/s2)/N", *(p.point.label for p in solved))
+    return TextTable("Numbers of every level", heads, "l" * len(heads), tuple(rows))
+
+
+def _rate_text(order: float) -> str:
     """The fitted order, or that there is none."""
     return f"{order:.1f}" if np.isfinite(order) else "no clear order"
+
+
+def _thesis(curve: ConvergenceCurve) -> str:
+    return "" if curve.thesis_error is None else f"{100 * curve.thesis_error:+.1f} %"
+
+
+def _levels_text(c: ConvergenceCurve) -> str:
+    return ", ".join(
+        f"{label}: {100 * e:+.2f} %" for label, e in zip(_short(c.labels), c.error, strict=True)
+    )
 
 
 def _short(labels: Sequence[str]) -> list[str]:
     """The first number of every level's label, where that tells them apart; else the labels."""
     numbers = [re.findall(r"(?<!\S)\d[\d.]*(?!\S)", label)[:1] for label in labels]
-    told = [found[0] for found in numbers if found]
-    return told if len(set(told)) == len(labels) else list(labels)
+    firsts = [found[0] for found in numbers if found]
+    return firsts if len(set(firsts)) == len(labels) else list(labels)
 
 
 def _estimated(curve: ConvergenceCurve) -> str:
     """Error of the finest level as the levels alone tell it."""
     found = curve.estimate
     return "" if found is None or not np.isfinite(found.error) else f"{100 * found.error:.2g} %"
-
-
-def markdown(title: str, solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve]) -> str:
-    """The study as Markdown: points, then error and rate of every followed number."""
-    points = markdown_table(
-        ("curve", "level", "dofs", "seconds", "peak MB", "note"),
-        "llrrrl",
-        map(_point_cells, solved),
-    )
-    heads = (
-        "number",
-        "case",
-        "curve",
-        "order",
-        "error on each level",
-        "estimated on the finest",
-        "against",
-        "thesis",
-        "verdict",
-    )
-    rows = []
-    for c in curves:
-        errors = ", ".join(
-            f"{label}: {100 * e:+.2f} %" for label, e in zip(_short(c.labels), c.error, strict=True)
-        )
-        printed = "" if c.thesis_error is None else f"{100 * c.thesis_error:+.1f} %"
-        rows.append(
-            (
-                c.name,
-                c.case,
-                c.curve,
-                rate_text(c.order),
-                errors,
-                _estimated(c),
-                c.against,
-                printed,
-                c.verdict,
-            )
-        )
-    return (
-        "\n".join([f"# {title}", "", *points, "", *markdown_table(heads, "lllrlrlrl", rows)]) + "\n"
-    )

@@ -5,14 +5,14 @@ level.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.batch.ladder import Key, SolvedPoint, matching
+from upd.batch.study_point import Key, SolvedPoint, matching, solved_alone
 from upd.vary.orders import (
     ErrorEstimate,
     Extrapolation,
@@ -32,6 +32,10 @@ _WITHOUT_BODIES = {"approach": "approach_contact"}
 #: order of change below which a number is said not to converge: a logarithm has 0, the edge of a
 #: punch less
 _CONVERGES = 0.2
+#: kinds of the linear curves of a response, whose peaks are the stuck and free frequencies
+_LINEAR = ("free", "stuck")
+#: names of the two curves of a number of `accuracy_curves`
+ESTIMATED, TRUE = "estimated", "against the closed form"
 #: spread in % of the last three levels up to which a number without a clear order counts as settled
 _SETTLED = 5.0
 
@@ -97,7 +101,7 @@ def make_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[Con
 
     Failed points are left out.
     """
-    good = [one for one in solved if not one.outcome.failure]
+    good = solved_alone(solved)
     ladders: dict[str, list[SolvedPoint]] = {}
     for one in good:
         ladders.setdefault(one.point.curve, []).append(one)
@@ -176,12 +180,11 @@ def _curve(key: Key, points: Sequence[SolvedPoint], finer: SolvedPoint | None) -
         against = "finest level" if len(h) < 3 else "finest level, no clear order"
     error = values / reference - 1.0
     printed = next((p.printed_errors[key] for p in points if key in p.printed_errors), None)
-    seconds = tuple(p.outcome.seconds for p in points)
-    return _made(
+    return make_curve(
+        points[0].point.curve,
         key,
         points,
         error,
-        seconds,
         float(reference[-1]),
         against,
         order=float("nan") if no_limit or "no clear" in against else _clear_rate(h, error),
@@ -197,17 +200,16 @@ def _clear_rate(h: Sequence[float], error: Array) -> float:
     return fit_rate(h, error) if len(set(np.sign(error[error != 0.0]))) < 2 else float("nan")
 
 
-def finest_curves(
-    solved: Iterable[SolvedPoint], keys: Iterable[Key], seconds: Callable[[SolvedPoint], float]
-) -> list[ConvergenceCurve]:
+def finest_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[ConvergenceCurve]:
     """Curves of ladders whose levels are no sizes: every number against that of the finest level.
 
     A number the finest level does not have, a second peak for example, has nothing to be compared
-    with; what the variation does not touch has no error to show.
+    with; what the variation does not touch has no error to show. Linear curves of a response have
+    none either. Neither have load steps a closed form: that has no part of the mesh's error.
     """
-    good = [one for one in solved if not one.outcome.failure]
+    good = solved_alone(solved)
     curves = []
-    for key in keys:
+    for key in with_friction(matching(good, names)):
         mine = [p for p in good if np.isfinite(p.values.get(key, np.nan))]
         if len(mine) < 2 or mine[-1] is not good[-1]:
             continue
@@ -218,42 +220,81 @@ def finest_curves(
             h = [p.point.h for p in mine]
             # Choices that are no levels have one size.
             estimate = estimate_error(h, values) if len(set(h)) == len(h) else None
+            order = float("nan") if estimate is None else estimate.order
             curves.append(
-                _made(
+                make_curve(
+                    mine[0].point.curve,
                     key,
                     mine,
                     error,
-                    tuple(map(seconds, mine)),
                     reference,
                     "finest level",
-                    order=float("nan") if estimate is None else estimate.order,
-                    change=float("nan") if estimate is None else estimate.order,
+                    seconds=tuple(map(_friction_seconds, mine)),
+                    order=order,
+                    change=order,
                     estimate=estimate,
                 )
             )
     return curves
 
 
-def _made(
+def with_friction(keys: Iterable[Key]) -> list[Key]:
+    """Numbers of the curve with friction, and what the model gives."""
+    return [(name, case) for name, case in keys if case.kind not in _LINEAR]
+
+
+def _friction_seconds(one: SolvedPoint) -> float:
+    """Of the curve with friction and its sweeps, which the levels change, where there is one."""
+    curve = [value for (name, _), value in one.values.items() if name == "curve_seconds"]
+    return curve[0] + one.outcome.stages.get("sweeps", 0.0) if curve else one.outcome.seconds
+
+
+def accuracy_curves(solved: Sequence[SolvedPoint], keys: Sequence[Key]) -> list[ConvergenceCurve]:
+    """Estimated error of every number over the cost of a level, and the true one beside it."""
+    good = solved_alone(solved)
+    curves = []
+    for key in keys:
+        kinds = {ESTIMATED: [one.estimates for one in good], TRUE: list(map(true_errors, good))}
+        for curve, errors in kinds.items():
+            mine = [(one, at[key]) for one, at in zip(good, errors, strict=True) if key in at]
+            if mine:
+                points = [one for one, _ in mine]
+                reference = points[-1].values.get(key, float("nan"))
+                curves.append(make_curve(curve, key, points, [e for _, e in mine], reference, ""))
+    return curves
+
+
+def true_errors(one: SolvedPoint) -> dict[Key, float]:
+    """Errors against closed forms; of a raw number, on the same finite bodies."""
+    found = {key: closed_form(key, [one]) for key in one.values}
+    return {
+        key: one.values[key] / float(exact[0]) - 1.0
+        for key, exact in found.items()
+        if exact is not None
+    }
+
+
+def make_curve(
+    curve: str,
     key: Key,
     points: Sequence[SolvedPoint],
-    error: Array,
-    seconds: tuple[float, ...],
+    error: Iterable[float],
     reference: float,
     against: str,
     **more: Any,
 ) -> ConvergenceCurve:
+    """The curve of a number over points, with what they cost."""
     name, case = key
-    return ConvergenceCurve(
-        curve=points[0].point.curve,
-        name=name,
-        case=case.label,
-        labels=tuple(p.point.label for p in points),
-        h=tuple(p.point.h for p in points),
-        error=tuple(map(float, error)),
-        seconds=seconds,
-        memory_mb=tuple(p.outcome.memory_mb for p in points),
-        reference=reference,
-        against=against,
-        **more,
-    )
+    found: dict[str, Any] = {
+        "curve": curve,
+        "name": name,
+        "case": case.label,
+        "labels": tuple(p.point.label for p in points),
+        "h": tuple(p.point.h for p in points),
+        "error": tuple(map(float, error)),
+        "seconds": tuple(p.outcome.seconds for p in points),
+        "memory_mb": tuple(p.outcome.memory_mb for p in points),
+        "reference": reference,
+        "against": against,
+    }
+    return ConvergenceCurve(**(found | more))

@@ -8,24 +8,18 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import logging
-import queue
 import re
 import time
 from collections.abc import Sequence
-from concurrent.futures import CancelledError
-from contextlib import suppress
-from functools import partial
+from concurrent.futures import CancelledError, Future
 from typing import Any
 
-from upd.batch.executors import Answer
 from upd.batch.point import forget, solve_task
 from upd.errors import InputError, UpdError
 
 #: Seconds to wait for the first worker, and for one to come back when all are gone.
 PATIENCE_S = 60.0
 _LOOK_S = 1.0
-#: Seconds to wait for results that are finished.
-_FETCH_S = 30.0
 _LOCAL, _SCHEDULER = re.compile(r"local:([1-9]\d*)"), re.compile(r"(tcp|tls)://.+:\d+")
 _MISSING = (
     '--cluster needs Dask: pip install "upd[cluster]", or leave --cluster out to use this machine'
@@ -55,123 +49,70 @@ class DaskCluster:
     def __init__(self, address: str) -> None:
         check_address(address)
         self._dask = importlib.import_module("distributed")
+        self.deaths: tuple[type[BaseException], ...] = (
+            self._dask.KilledWorker,
+            CancelledError,
+            OSError,
+        )
         patience_s = self._patience = PATIENCE_S
         self._levels = _quiet()
         self._local, self._client = _connect(self._dask, address, patience_s)
-        self._running: dict[Any, tuple[int, str]] = {}
-        self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._executors: dict[str, Any] = {}
         self._known: tuple[float, list[str]] = (-_LOOK_S, [])
         self._seen = time.monotonic()
         try:
             self._client.wait_for_workers(1, timeout=patience_s)
-        except (TimeoutError, OSError):
+        except OSError:
             self.close()
             raise InputError(
                 f"--cluster {address}: no worker came within {patience_s:g} s: start some "
                 f"with `dask worker {address} --nthreads 1`"
             ) from None
 
-    def free(self) -> Sequence[str]:
-        busy = {worker for _, worker in self._running.values()}
-        return [name for name in self._workers() if name not in busy]
+    def workers(self) -> Sequence[str]:
+        """Addresses of the workers there are, asked for once a second.
 
-    def give(self, worker: str, number: int, task: str) -> None:
-        # pure=False: Dask must not take two equal texts for one.
-        future = self._client.submit(solve_task, task, workers=[worker], pure=False)
-        self._running[future] = (number, worker)
-        future.add_done_callback(self._done.put)
+        A look costs as much as a point's traffic.
+        """
+        if self._client.status not in ("running", "connecting"):
+            raise UpdError(f"{_LOST}: start it again{_AGAIN}")
+        now = time.monotonic()
+        if now - self._known[0] > _LOOK_S:
+            try:
+                self._known = (now, sorted(self._client.nthreads()))
+            except (OSError, RuntimeError) as error:
+                raise UpdError(
+                    f"{_LOST} ({type(error).__name__}): start it again{_AGAIN}"
+                ) from None
+        if self._known[1]:
+            self._seen = now
+        elif now - self._seen > self._patience:
+            raise UpdError(
+                f"the cluster has had no worker for {self._patience:g} s: start some{_AGAIN}"
+            )
+        return self._known[1]
 
-    def wait(self, seconds: float) -> list[Answer]:
-        self._check()
-        done = []
-        with suppress(queue.Empty):
-            done.append(self._done.get(timeout=seconds))
-            while True:
-                done.append(self._done.get_nowait())
-        # What has been given up may still call back.
-        return [
-            *self._answers([future for future in done if future in self._running]),
-            *self._lost(),
-        ]
+    def submit(self, worker: str, task: str) -> Future[str]:
+        if worker not in self._executors:
+            # pure=False: Dask must not take two equal texts for one.
+            self._executors[worker] = self._client.get_executor(workers=[worker], pure=False)
+        future: Future[str] = self._executors[worker].submit(solve_task, task)
+        return future
 
     def close(self) -> None:
         try:
             if self._local is None and self._client.status == "running":
-                self._client.cancel(list(self._running))
+                for executor in self._executors.values():
+                    executor.shutdown(wait=False)
                 # Other people's workers keep nothing of ours.
                 self._client.run(forget, on_error="ignore")
-        except (OSError, TimeoutError):
+        except OSError:
             pass
         self._client.close(timeout=5)
         if self._local is not None:
             self._local.close(timeout=10)
         for name, level in self._levels.items():
             logging.getLogger(name).setLevel(level)
-
-    def _answers(self, done: Sequence[Any]) -> list[Answer]:
-        """What finished futures hold, fetched in one go; what cannot be had counts as a death."""
-        killed, here = self._dask.KilledWorker, self._workers()
-        fine = [
-            future
-            for future in done
-            if future.status == "finished" and self._running[future][1] in here
-        ]
-        fetch = partial(self._client.gather, fine, asynchronous=True)
-        try:
-            # A worker that dies now takes its results along: Dask would wait for its return.
-            texts = (
-                dict(zip(fine, self._client.sync(fetch, callback_timeout=_FETCH_S), strict=True))
-                if fine
-                else {}
-            )
-        except (killed, CancelledError, OSError, TimeoutError):
-            texts = {}
-        found = [future.exception() for future in done if future.status == "error"]
-        strange = next((error for error in found if not isinstance(error, killed)), None)
-        if strange is not None:
-            raise UpdError(
-                f"a worker of the cluster cannot run points ({type(strange).__name__}: "
-                f"{strange}): install upd[cluster] there"
-            )
-        return [Answer(self._running.pop(future)[0], texts.get(future)) for future in done]
-
-    def _lost(self) -> list[Answer]:
-        """Points of workers that are gone.
-
-        A new one has another address, so Dask would keep them waiting.
-        """
-        here = self._workers()
-        gone = [future for future, (_, worker) in self._running.items() if worker not in here]
-        if gone:
-            self._client.cancel(gone)
-        return [Answer(self._running.pop(future)[0], None) for future in gone]
-
-    def _workers(self) -> list[str]:
-        """Addresses of the workers there are, asked for once a second.
-
-        A look costs as much as a point's traffic.
-        """
-        now = time.monotonic()
-        if now - self._known[0] > _LOOK_S:
-            try:
-                self._known = (now, sorted(self._client.nthreads()))
-            except (OSError, TimeoutError, RuntimeError) as error:
-                raise UpdError(
-                    f"{_LOST} ({type(error).__name__}): start it again{_AGAIN}"
-                ) from None
-        return self._known[1]
-
-    def _check(self) -> None:
-        """Raise UpdError when the scheduler or all workers have been gone for long."""
-        if self._client.status not in ("running", "connecting"):
-            raise UpdError(f"{_LOST}: start it again{_AGAIN}")
-        now = time.monotonic()
-        if self._workers():
-            self._seen = now
-        elif now - self._seen > self._patience:
-            raise UpdError(
-                f"the cluster has had no worker for {self._patience:g} s: start some{_AGAIN}"
-            )
 
 
 def _quiet() -> dict[str, int]:
@@ -214,7 +155,7 @@ def _connect(dask: Any, address: str, patience_s: float) -> tuple[Any, Any]:
         return cluster, dask.Client(cluster)
     try:
         return None, dask.Client(address, timeout=min(patience_s, 15.0))
-    except (OSError, TimeoutError) as error:
+    except OSError as error:
         message = (
             f"no scheduler answers there ({type(error).__name__}): start one with `dask scheduler`"
         )

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from upd.batch.executors import Executor, InProcess
+from upd.batch.executors import Executor, InProcess, Processes
 from upd.batch.point import Outcome, Task
 from upd.batch.schedule import Job, dispatch
 from upd.batch.store import PointStore
@@ -44,9 +44,7 @@ class Workers:
             return DaskCluster(self.cluster)
         if self.count == 0:
             return InProcess()
-        from upd.batch.pool import Pool
-
-        return Pool(self.count, self.threads, fresh=self.fresh)
+        return Processes(self.count, self.threads, fresh=self.fresh)
 
 
 @dataclass(frozen=True)

@@ -1,126 +1,30 @@
-"""What a study is: points that change something in a scene, a report of what they gave, and
-files.
-"""
+"""A study: scenes with one thing changed, and what their numbers are compared with."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from fnmatch import fnmatchcase
-from functools import cached_property
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Literal
 
 from upd.analyses import analysis_of
-from upd.batch.point import Outcome, PointResult, Task
+from upd.batch.convergence import convergence_tables, level_table
+from upd.batch.curves import ConvergenceCurve, finest_curves, make_curves
+from upd.batch.study_point import Settings, SolvedPoint, StudyPoint
+from upd.batch.text_table import TextTable, markdown_table
+from upd.cache.files import write_text
 from upd.errors import InputError
-from upd.results import Case
+from upd.plot.chart import Chart
+from upd.plot.matplotlib import write_sheets
+from upd.plot.work_precision import work_precision_charts
 from upd.scene import AnyScene
-from upd.scene.quantities import UNKNOWN
 
-#: path -> value pairs that a point sets in the scene
-Settings = tuple[tuple[str, Any], ...]
-#: name of a number and the case it belongs to
-Key = tuple[str, Case]
-
-
-@dataclass(frozen=True)
-class StudyPoint:
-    """One run of a study.
-
-    Attributes
-    ----------
-    curve
-        Name of the ladder the point belongs to.
-    label
-        The point in words.
-    settings
-        What it sets in the scene.
-    h
-        Size that a ladder lets go to zero: the node spacing in the patch in mm, one over a
-        refinement or a number of levels.
-    estimates
-        Whether the point estimates its own errors. Others leave that out: the seconds are those of
-        the level alone.
-    """
-
-    curve: str
-    label: str
-    settings: Settings
-    h: float = 1.0
-    estimates: bool = False
-
-    def task(self, scene: AnyScene, threads: int, code: str) -> Task:
-        """The point for a worker, that shares nothing with others.
-
-        Its seconds and memory are shown.
-        """
-        settings = ({} if self.estimates else {"accuracy": UNKNOWN}) | dict(self.settings)
-        return Task(scene.text, settings, threads, recipe=scene.recipe, code=code, alone=True)
-
-
-@dataclass(frozen=True)
-class SolvedPoint:
-    """A point of a study and what it gave."""
-
-    point: StudyPoint
-    outcome: Outcome
-
-    @cached_property
-    def values(self) -> dict[Key, float]:
-        """Its numbers; nan where one is not finite."""
-        return {_key(r): float("nan") if r.value is None else r.value for r in self.outcome.results}
-
-    @cached_property
-    def errors(self) -> dict[Key, float]:
-        """Relative differences from what the numbers should converge to, where that is known."""
-        return {_key(r): r.error for r in self.outcome.results if r.error is not None and r.exact}
-
-    @cached_property
-    def printed_errors(self) -> dict[Key, float]:
-        """Those of published values."""
-        return {
-            _key(r): r.printed_error for r in self.outcome.results if r.printed_error is not None
-        }
-
-    def as_dict(self) -> dict[str, Any]:
-        """The point as it stands in study.json."""
-        named = {"values": self.values, "errors": self.errors, "thesis": self.printed_errors}
-        o = self.outcome
-        return {
-            "curve": self.point.curve,
-            "label": self.point.label,
-            "h": self.point.h,
-            **{
-                kind: {f"{name}|{case.label}": v for (name, case), v in found.items()}
-                for kind, found in named.items()
-            },
-            "stages": dict(o.stages),
-            "seconds": o.seconds,
-            "memory_mb": o.memory_mb,
-            "n_dof": o.n_dof,
-            "failure": o.failure,
-        }
-
-
-def _key(result: PointResult) -> Key:
-    return result.name, result.case
-
-
-@dataclass(frozen=True)
-class TextTable:
-    """A table for a terminal.
-
-    Cells as text, ``align`` a letter per column ("l", "r"), the first column at least ``width``
-    wide. Columns of words named in ``spare`` are left out first where the terminal is narrow.
-    """
-
-    title: str
-    columns: tuple[str, ...]
-    align: str
-    rows: tuple[tuple[str, ...], ...]
-    width: int = 0
-    spare: tuple[str, ...] = ()
+#: numbers the loads alone decide: no level changes them
+_OF_LOADS = ("F_N", "F_T")
+#: divisions, refinements, numbers of modes ...: the levels a user asks for; fractions where a
+#: ladder takes them; None for the usual ones
+Levels = tuple[float, ...] | None
 
 
 @dataclass(frozen=True)
@@ -131,40 +35,163 @@ class StudyReport:
     ----------
     notes
         Sentences below the tables.
+    curves
+        For study.json and the figures.
+    page
+        Tables of study.md, where they are not those of the terminal.
+    charts
+        Makes the figures from the curves as study.json holds them.
     """
 
     tables: tuple[TextTable, ...]
     found: bool
     notes: tuple[str, ...] = ()
+    curves: tuple[ConvergenceCurve, ...] = ()
+    page: tuple[TextTable, ...] = ()
+    charts: Callable[[Sequence[Mapping[str, Any]]], list[Chart]] = work_precision_charts
 
 
-class Study(Protocol):
-    """Points, and what is made of them once they are solved."""
+#: makes the report of solved points of a scene
+Reporter = Callable[[Any, Sequence[SolvedPoint]], StudyReport]
 
-    @property
-    def points(self) -> Sequence[StudyPoint]:
-        """The points, in the order they are solved in."""
 
-    def present(self, solved: Sequence[SolvedPoint]) -> StudyReport:
-        """Tables of what the points gave; those that failed are among them."""
+@dataclass(frozen=True)
+class Study:
+    """Points in the order they are solved in, and what is made of them once they are.
 
-    def write(self, folder: Path, solved: Sequence[SolvedPoint]) -> list[Path]:
-        """Leave study.md and what else there is in ``folder``.
+    Attributes
+    ----------
+    present
+        Makes the report; points that failed are in it.
+    """
+
+    title: str
+    points: tuple[StudyPoint, ...]
+    present: Callable[[Sequence[SolvedPoint]], StudyReport]
+
+    def write(self, folder: Path, solved: Sequence[SolvedPoint], report: StudyReport) -> list[Path]:
+        """Leave study.md, study.json (of a study with points) and the figures in ``folder``.
 
         Returns the paths, the table first.
         """
+        curves = [asdict(one) for one in report.curves]
+        table, data = folder / "study.md", folder / "study.json"
+        lines = [f"# {self.title}", ""]
+        for part in report.page or report.tables:
+            lines += [f"## {part.title}", "", *markdown_table(part), ""]
+        write_text(table, "\n".join([*lines, *(f"- {note}" for note in report.notes)]) + "\n")
+        if not self.points:
+            return [table]
+        content = {
+            "title": self.title,
+            "points": [one.as_dict() for one in solved],
+            "curves": curves,
+            "notes": list(report.notes),
+        }
+        write_text(data, json.dumps(content, indent=1) + "\n")
+        return [table, data, *write_sheets(report.charts(curves), folder)]
 
 
-#: divisions, refinements, numbers of modes ...: the levels a user asks for; fractions where a
-#: ladder takes them
-Levels = tuple[float, ...] | None
-#: makes the study of a scene, of one of the variations it is listed under
-#: (`upd.batch.studies.STUDIES`)
-StudyMaker = Callable[[Any, str, Levels], Study]
+def _costs(scene: AnyScene, vary: str) -> str:
+    return f"what accuracy costs, {vary}"
+
+
+def _nothing(scene: AnyScene) -> Iterable[str]:
+    return ()
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """What is varied in a scene, and what the numbers are compared with.
+
+    Attributes
+    ----------
+    points
+        Scene and levels -> points, coarse to fine. Raises InputError for levels that are none.
+    follow
+        Numbers (shell patterns) beside those the analysis names first.
+    against
+        The limit each number leads to, or the finest level: where levels are no sizes.
+    every_level
+        Whether a table shows the numbers of every level.
+    notes
+        What the levels set in the scene, in sentences.
+    subject
+        Scene and variation -> the title without the scene's.
+    report
+        Makes another report than errors over what they cost.
+    """
+
+    points: Callable[[Any, Levels], Iterable[StudyPoint]]
+    follow: tuple[str, ...] = ()
+    against: Literal["limit", "finest"] = "limit"
+    every_level: bool = False
+    notes: Callable[[Any], Iterable[str]] = _nothing
+    subject: Callable[[Any, str], str] = _costs
+    report: Reporter | None = None
+
+    def study(self, scene: AnyScene, vary: str, levels: Levels = None) -> Study:
+        """The study of the scene. Raises InputError for levels that are none."""
+        report = self.report or self._convergence
+        return Study(
+            f"{scene.title or scene.name}: {self.subject(scene, vary)}",
+            tuple(self.points(scene, levels)),
+            lambda solved: report(scene, solved),
+        )
+
+    def _convergence(self, scene: AnyScene, solved: Sequence[SolvedPoint]) -> StudyReport:
+        names = [
+            name
+            for name in dict.fromkeys((*analysis_of(scene).headline_names, *self.follow))
+            if name not in _OF_LOADS
+        ]
+        curves = (make_curves if self.against == "limit" else finest_curves)(solved, names)
+        before = (level_table(solved, names),) if self.every_level else ()
+        tables, page = convergence_tables(solved, curves)
+        return StudyReport(
+            (*before, *tables), bool(curves), tuple(self.notes(scene)), tuple(curves), page
+        )
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Levels that are one whole number of the scene.
+
+    Attributes
+    ----------
+    curve, label
+        Name of the ladder; a level in words, with {} for the number.
+    path
+        What is set in the scene.
+    usual, least
+        The usual numbers; the least that can be asked for. From 0 on a size is one over the number
+        and one more.
+    base
+        Scene -> what every level sets beside.
+    """
+
+    curve: str
+    label: str
+    path: str
+    usual: tuple[int, ...]
+    least: int
+    base: Callable[[Any], Settings]
+    more: int = 0
+
+    def __call__(self, scene: AnyScene, levels: Levels) -> list[StudyPoint]:
+        return [
+            StudyPoint(
+                self.curve,
+                self.label.format(n),
+                (*self.base(scene), (self.path, n)),
+                1.0 / (n + self.more),
+            )
+            for n in whole_levels(levels, self.least) or self.usual
+        ]
 
 
 def whole_levels(levels: Levels, least: int) -> tuple[int, ...] | None:
-    """The levels as whole numbers, None where none are given.
+    """The levels as rising whole numbers, None where none are given.
 
     Raises InputError unless there are two or more different ones, none below ``least``.
     """
@@ -173,9 +200,9 @@ def whole_levels(levels: Levels, least: int) -> tuple[int, ...] | None:
     whole = tuple(int(n) for n in levels if float(n).is_integer() and n >= least)
     if len(set(whole)) < len(levels) or len(levels) < 2:
         raise InputError(
-            f"--levels {told(levels)}: give at least two different whole numbers, {least} or more"
+            f"--levels {shown(levels)}: give at least two different whole numbers, {least} or more"
         )
-    return whole
+    return tuple(sorted(whole))
 
 
 def refinements(levels: Levels) -> tuple[float, ...] | None:
@@ -188,13 +215,13 @@ def refinements(levels: Levels) -> tuple[float, ...] | None:
     fine = [n for n in levels if n == 0.5 or (n >= 1 and float(n).is_integer())]
     if len(set(fine)) < len(levels) or len(levels) < 2:
         raise InputError(
-            f"--levels {told(levels)}: give at least two different refinements, 0.5 (half as many "
+            f"--levels {shown(levels)}: give at least two different refinements, 0.5 (half as many "
             "elements along every edge) or whole numbers"
         )
     return tuple(float(n) for n in sorted(fine))
 
 
-def told(levels: Iterable[float]) -> str:
+def shown(levels: Iterable[float]) -> str:
     """Levels as the user writes them."""
     return " ".join(f"{n:g}" for n in levels)
 
@@ -205,32 +232,6 @@ def no_levels(levels: Levels, why: str) -> None:
         raise InputError(f"--levels: {why}; leave it out")
 
 
-def followed(scene: AnyScene, *more: str) -> tuple[str, ...]:
-    """Names (shell patterns) a study of the scene follows.
-
-    Those the analysis names first, and ``more``.
-    """
-    return tuple(dict.fromkeys((*analysis_of(scene).headline_names, *more)))
-
-
-def matching(solved: Iterable[SolvedPoint], patterns: Iterable[str]) -> list[Key]:
-    """Numbers of the points whose names match, pattern by pattern in the order of the results."""
-    keys = list(dict.fromkeys(key for one in solved for key in one.values))
-    return list(
-        dict.fromkeys(key for pattern in patterns for key in keys if fnmatchcase(key[0], pattern))
-    )
-
-
-def markdown_report(title: str, report: StudyReport, notes: Iterable[str]) -> str:
-    """A study's tables in Markdown, each under its title, then its notes."""
-    lines = [f"# {title}", ""]
-    for table in report.tables:
-        heads = [head.replace("\n", " ") for head in table.columns]
-        lines += [f"## {table.title}", "", *markdown_table(heads, table.align, table.rows), ""]
-    return "\n".join([*lines, *(f"- {note}" for note in notes)]) + "\n"
-
-
-def markdown_table(columns: Sequence[str], align: str, rows: Iterable[Sequence[str]]) -> list[str]:
-    """Lines of a table in Markdown; ``align`` has a letter per column, "l" or "r"."""
-    marks = "".join("---:|" if letter == "r" else "---|" for letter in align)
-    return [f"| {' | '.join(columns)} |", f"|{marks}", *(f"| {' | '.join(row)} |" for row in rows)]
+def even(count: float) -> int:
+    """An even number of elements, at least 4: the plane y = 0 and the core's side need lines."""
+    return max(4, 2 * round(count / 2.0))

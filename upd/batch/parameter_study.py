@@ -5,27 +5,15 @@ One parameter of the scene at a time, each beside the scene as given.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from upd.analyses import analysis_of
 from upd.analyses.base import Plan
 from upd.analyses.flat.printed import printed_of
-from upd.batch.ladder import (
-    Levels,
-    Settings,
-    SolvedPoint,
-    Study,
-    StudyMaker,
-    StudyPoint,
-    StudyReport,
-    TextTable,
-    markdown_table,
-    no_levels,
-)
-from upd.cache.files import write_text
+from upd.batch.ladder import Ladder, Levels, StudyReport, no_levels
+from upd.batch.study_point import Settings, SolvedPoint, StudyPoint, solved_alone
+from upd.batch.text_table import TextTable
 from upd.labels import number_label
 from upd.mesh import recipes
 from upd.scene import Scene
@@ -56,11 +44,13 @@ _WEDGE = ("base", "height", "length", "patch_offset", "wire_position", "wire_wid
 Row = tuple[str, dict[str, float], str]
 
 
-def parameter_points(scene: Scene) -> list[StudyPoint]:
+def parameter_points(scene: Scene, levels: Levels = None) -> list[StudyPoint]:
     """The scene as given, then with one parameter changed at a time.
 
-    Block, patch, distant sets, tilt, friction, element.
+    Block, patch, distant sets, tilt, friction, element. Raises InputError for levels, and when the
+    scene leaves the mesh to an accuracy.
     """
+    no_levels(levels, "a parameter study changes one parameter at a time")
     return [
         StudyPoint("parameters", label, settings)
         for label, settings in _setups(scene, analysis_of(scene).make_plan(scene))
@@ -176,54 +166,39 @@ def _printed_rows(scene: Scene) -> list[Row]:
     return out
 
 
-@dataclass(frozen=True)
-class ParameterStudy:
-    """Stiffnesses of a flat contact, one parameter at a time."""
+def _report(scene: Scene, solved: Sequence[SolvedPoint]) -> StudyReport:
+    """Stiffnesses in 1e6 N/mm on a terminal, in N/mm in study.md."""
+    rows = parameter_rows(scene, solved)
+    there = {name for _, values, _ in rows for name in values}
+    wanted = [PER_PAD[n] if PER_PAD.get(n) in there else n for n in STIFFNESSES]
+    names = [name for name in wanted if name in there]
 
-    scene: Scene
-    points: tuple[StudyPoint, ...]
-
-    def present(self, solved: Sequence[SolvedPoint]) -> StudyReport:
-        """The table in 1e6 N/mm."""
-        names, rows = self._cells(solved, lambda value: f"{1e-6 * value:.3f}")
-        heads = ("setup", *(number_label(name) for name in names))
-        table = TextTable(
-            "What moves the stiffness, 1e6 N/mm", heads, "l" + "r" * len(names), tuple(rows), 28
+    def table(title: str, heads: Iterable[str], form: Callable[[float], str]) -> TextTable:
+        cells = tuple(
+            (
+                label,
+                *(
+                    (failure, *[""] * (len(names) - 1))
+                    if failure
+                    else (form(values[n]) if n in values else "" for n in names)
+                ),
+            )
+            for label, values, failure in rows
         )
-        return StudyReport((table,), any(not one.outcome.failure for one in solved))
+        return TextTable(title, ("setup", *heads), "l" + "r" * len(names), cells, 28)
 
-    def write(self, folder: Path, solved: Sequence[SolvedPoint]) -> list[Path]:
-        """The table in N/mm."""
-        names, rows = self._cells(solved, lambda value: f"{value:.4g}")
-        title = f"# {self.scene.title or self.scene.name}: what moves the stiffness, N/mm"
-        lines = [title, "", *markdown_table(("setup", *names), "l" + "r" * len(names), rows)]
-        write_text(folder / "study.md", "\n".join(lines) + "\n")
-        return [folder / "study.md"]
-
-    def _cells(
-        self, solved: Sequence[SolvedPoint], shown: Any
-    ) -> tuple[list[str], list[tuple[str, ...]]]:
-        rows = parameter_rows(self.scene, solved)
-        there = {name for _, values, _ in rows for name in values}
-        wanted = [PER_PAD[n] if PER_PAD.get(n) in there else n for n in STIFFNESSES]
-        names = [name for name in wanted if name in there]
-        numbers = [
-            [shown(values[n]) if n in values else "" for n in names] for _, values, _ in rows
-        ]
-        failed = [[failure, *[""] * (len(names) - 1)] for _, _, failure in rows]
-        return names, [
-            (row[0], *(why if row[2] else cells))
-            for row, cells, why in zip(rows, numbers, failed, strict=True)
-        ]
+    title = "What moves the stiffness"
+    short = table(
+        f"{title}, 1e6 N/mm", map(number_label, names), lambda value: f"{1e-6 * value:.3f}"
+    )
+    whole = table(f"{title}, N/mm", names, lambda value: f"{value:.4g}")
+    return StudyReport((short,), bool(solved_alone(solved)), page=(whole,))
 
 
-def parameter_study(scene: Scene, vary: str, levels: Levels = None) -> Study:
-    """What moves the stiffness.
-
-    Raises InputError for levels, and when the scene leaves the mesh to an accuracy.
-    """
-    no_levels(levels, "a parameter study changes one parameter at a time")
-    return ParameterStudy(scene, tuple(parameter_points(scene)))
-
-
-PARAMETERS: Mapping[str, StudyMaker] = {"parameters": parameter_study}
+PARAMETERS: Mapping[str, Ladder] = {
+    "parameters": Ladder(
+        parameter_points,
+        subject=lambda scene, vary: "what moves the stiffness",
+        report=_report,
+    )
+}

@@ -115,10 +115,6 @@ class PointResult:
         Whether the reference is what the number should converge to.
     withheld
         Why the number was not reached.
-    low, high
-        Ends of a number that is a range, None for a single one.
-    why
-        Why it is a range.
     estimated
         Estimated relative error.
     inputs
@@ -133,9 +129,6 @@ class PointResult:
     printed_error: float | None = None
     exact: bool = True
     withheld: str = ""
-    low: float | None = None
-    high: float | None = None
-    why: str = ""
     estimated: float | None = None
     inputs: tuple[InputPart, ...] = ()
 
@@ -144,30 +137,15 @@ class PointResult:
 
         What is not given is left out.
         """
-        data = {
-            "name": self.name,
+        given = {
+            f.name: value for f in fields(self) if (value := getattr(self, f.name)) != f.default
+        }
+        return {
+            **given,
             "case": self.case.label,
             "case_fields": self.case.given(),
-            "unit": self.unit,
-            "value": self.value,
+            **({"inputs": [part.as_dict() for part in self.inputs]} if self.inputs else {}),
         }
-        more = {
-            "error": self.error,
-            "printed_error": self.printed_error,
-            "estimated": self.estimated,
-        }
-        return (
-            data
-            | {k: v for k, v in more.items() if v is not None}
-            | ({} if self.exact else {"exact": False})
-            | ({"withheld": self.withheld} if self.withheld else {})
-            | (
-                {"low": self.low, "high": self.high, "why": self.why}
-                if self.low is not None
-                else {}
-            )
-            | ({"inputs": [part.as_dict() for part in self.inputs]} if self.inputs else {})
-        )
 
 
 @dataclass(frozen=True)
@@ -237,26 +215,10 @@ def read_outcome(text: str) -> Outcome:
 
 
 def _read_result(data: Mapping[str, Any]) -> PointResult:
-    name, case, unit = str(data["name"]), Case(**data["case_fields"]), str(data["unit"])
-
-    def given(key: str) -> float | None:
-        return None if data.get(key) is None else float(data[key])
-
-    return PointResult(
-        name,
-        case,
-        unit,
-        given("value"),
-        given("error"),
-        given("printed_error"),
-        bool(data.get("exact", True)),
-        str(data.get("withheld", "")),
-        given("low"),
-        given("high"),
-        str(data.get("why", "")),
-        given("estimated"),
-        tuple(map(read_input_part, data.get("inputs", ()))),
-    )
+    given = {**data}
+    case = Case(**given.pop("case_fields"))
+    inputs = tuple(map(read_input_part, given.get("inputs", ())))
+    return PointResult(**(given | {"case": case, "inputs": inputs}))
 
 
 def solve_task(text: str) -> str:
@@ -368,9 +330,6 @@ def _number(row: Result) -> PointResult:
         _finite(row.printed_error),
         row.exact,
         row.withheld,
-        _finite(row.low),
-        _finite(row.high),
-        row.why if row.low is not None else "",
         _finite(row.estimated_error),
         row.inputs,
     )

@@ -5,13 +5,15 @@ Points of one group follow each other on one worker, a dead worker's point is gi
 
 from __future__ import annotations
 
-from collections import deque
+import time
+from collections import Counter, deque
 from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 
 from upd.batch.executors import Executor
 from upd.batch.point import OTHER_CODE, Outcome, read_outcome
-from upd.errors import InputError
+from upd.errors import InputError, UpdError
 
 #: A point whose worker dies this often is given up.
 ATTEMPTS = 3
@@ -81,30 +83,51 @@ def dispatch(
 
     Raises
     ------
-    InputError
-        When a worker has other sources; and whatever ``record`` raises.
+    InputError, UpdError
+        When a worker has other sources, or cannot run points; and whatever ``record`` raises.
     """
     queue = _Queue(jobs)
-    running: dict[int, Job] = {}
-    deaths = dict.fromkeys((job.number for job in jobs), 0)
+    running: dict[Future[str], tuple[str, Job]] = {}
+    deaths: Counter[int] = Counter()
     while len(queue) or running:
-        for worker in executor.free():
-            if not len(queue):
-                break
-            job = queue.take(worker)
-            running[job.number] = job
-            executor.give(worker, job.number, job.task)
+        there = executor.workers()
+        busy = {worker for worker, _ in running.values()}
+        for worker in there:
+            if len(queue) and worker not in busy:
+                job = queue.take(worker)
+                running[executor.submit(worker, job.task)] = (worker, job)
         idle(len(running))
-        for answer in executor.wait(_LOOK_S):
-            job = running.pop(answer.number)
-            if answer.text is not None:
-                record(job.number, _checked(read_outcome(answer.text)))
+        done = wait(running, _LOOK_S, FIRST_COMPLETED).done
+        if not running:
+            time.sleep(_LOOK_S)
+        for future, (worker, job) in list(running.items()):
+            # A worker that is gone does not come back under its name.
+            if future not in done and worker in there:
                 continue
+            del running[future]
+            text = _text(future, executor) if future in done else None
+            if text is not None:
+                record(job.number, _checked(read_outcome(text)))
+                continue
+            future.cancel()
             deaths[job.number] += 1
             if deaths[job.number] < ATTEMPTS:
                 queue.put_back(job)
             else:
                 record(job.number, Outcome(failure=_killed(deaths[job.number]), final=False))
+
+
+def _text(future: Future[str], executor: Executor) -> str | None:
+    """The outcome as JSON; None where the worker died."""
+    try:
+        return future.result()
+    except executor.deaths:
+        return None
+    except Exception as error:
+        raise UpdError(
+            f"a worker cannot run points ({type(error).__name__}: {error}): install the same upd "
+            "there as here"
+        ) from error
 
 
 def _killed(times: int) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -10,38 +11,27 @@ from pathlib import Path
 from typing import Any
 
 from upd.analyses import analysis_of
-from upd.batch import (
-    accuracy_ladder,
-    contact_ladder,
-    forced_ladder,
-    modal_ladder,
-    response_mesh_ladder,
-    seated_ladder,
-    whole_faces_ladder,
-)
+from upd.batch import contact_ladders, response_ladders, rig_ladders, whole_faces
 from upd.batch.dask import check_address
 from upd.batch.engine import Watcher, Workers, check_numbers, fitting, run_points
-from upd.batch.ladder import Levels, SolvedPoint, Study, StudyMaker, StudyReport
+from upd.batch.ladder import Ladder, Levels, Study, StudyReport
 from upd.batch.parameter_study import PARAMETERS
 from upd.batch.sensitivity import SENSITIVITIES
 from upd.batch.store import PointStore
-from upd.batch.studied_load import scene_at
+from upd.batch.study_point import SolvedPoint
 from upd.cache.sources import source_digest
 from upd.errors import InputError
 from upd.linalg import select
 from upd.scene import AnyScene, load_scene
+from upd.units import parse_quantity
 
-#: analysis -> what can be varied -> who makes the study
-STUDIES: Mapping[str, Mapping[str, StudyMaker]] = {
-    "hertz": {**contact_ladder.CURVED, **accuracy_ladder.LADDERS},
-    "flat": {**contact_ladder.FLAT, **accuracy_ladder.LADDERS, **PARAMETERS},
-    "modal": {**modal_ladder.LADDERS, **SENSITIVITIES},
-    "forced": {
-        **response_mesh_ladder.LADDERS,
-        **forced_ladder.LADDERS,
-        **whole_faces_ladder.LADDERS,
-    },
-    "seated": seated_ladder.LADDERS,
+#: analysis -> what can be varied
+STUDIES: Mapping[str, Mapping[str, Ladder]] = {
+    "hertz": contact_ladders.CURVED,
+    "flat": {**contact_ladders.FLAT, **PARAMETERS},
+    "modal": {**rig_ladders.MODAL, **SENSITIVITIES},
+    "forced": {**response_ladders.FORCED, **whole_faces.CONTACT},
+    "seated": rig_ladders.SEATED,
 }
 #: analysis -> its scenes in words
 _KINDS = {
@@ -68,8 +58,6 @@ _NOTHING = {
 #: analyses of contacts, and the variation that has a meaning for them only where normal and
 #: tangential contact are coupled
 _CONTACTS, _COUPLED = ("hertz", "flat"), "steps"
-#: variations by the names they had
-_FORMER_NAMES = {"setup": "parameters"}
 
 
 @dataclass(frozen=True)
@@ -149,17 +137,13 @@ def study(
     return run_study(loaded, planned, Path(out), workers=who, watch=watch)
 
 
-def variations(scene: AnyScene) -> Mapping[str, StudyMaker]:
-    """What can be varied in the scene, and who makes the study of it."""
+def variations(scene: Any) -> Mapping[str, Ladder]:
+    """What can be varied in the scene."""
     analysis = analysis_of(scene).name
     offered = STUDIES[analysis]
-    if analysis in _CONTACTS and not _is_coupled(scene):
-        return {vary: made for vary, made in offered.items() if vary != _COUPLED}
+    if analysis in _CONTACTS and not scene.coupled:
+        return {vary: ladder for vary, ladder in offered.items() if vary != _COUPLED}
     return offered
-
-
-def _is_coupled(scene: Any) -> bool:
-    return bool(scene.coupled)
 
 
 def plan_study(scene: AnyScene, vary: str, levels: Levels = None) -> Study:
@@ -168,14 +152,14 @@ def plan_study(scene: AnyScene, vary: str, levels: Levels = None) -> Study:
     Raises InputError when the scene's analysis has none of that name, and for levels that are none.
     """
     offered = variations(scene)
-    name = _FORMER_NAMES.get(vary, vary)
-    if name not in offered:
-        why = _NOTHING.get(name, "")
-        if analysis_of(scene).name in _CONTACTS and name == _COUPLED:
+    if vary not in offered:
+        analysis = analysis_of(scene).name
+        why = _NOTHING.get(vary, "")
+        if analysis in _CONTACTS and vary == _COUPLED:
             why = 'no number that load steps change, unless contact.coupling = "coupled"'
-        told = f"; {_KINDS[analysis_of(scene).name]} has {why}" if why else ""
-        raise InputError(f"--vary {vary}: choose one of {', '.join(offered)}{told}")
-    return offered[name](scene, name, levels)
+        reason = f"; {_KINDS[analysis]} has {why}" if why else ""
+        raise InputError(f"--vary {vary}: choose one of {', '.join(offered)}{reason}")
+    return offered[vary].study(scene, vary, levels)
 
 
 def study_workers(
@@ -274,7 +258,70 @@ def run_study(
         )
         report = planned.present(solved)
         with store.writing():
-            files = planned.write(folder, solved)
+            files = planned.write(folder, solved, report)
     return StudyResult(
         planned, solved, report, tuple(files), tuple(sorted(known)), time.perf_counter() - begin
     )
+
+
+def scene_at(scene: AnyScene, at: float | str | None) -> AnyScene:
+    """The scene at one load.
+
+    Parameters
+    ----------
+    at
+        F_C/F_E of a forced response; the normal force of a contact, or F_C of a seated damper: N
+        as a number, or text with a unit. None: the scene as it is.
+
+    Raises
+    ------
+    InputError
+        For what is no such load, a scene without one, and one that does not take it.
+    """
+    if at is None:
+        return scene
+    analysis = analysis_of(scene).name
+    if analysis == "modal":
+        raise InputError(
+            f"--at {at}: free vibration has no load to choose; leave it out, or study a forced "
+            "response"
+        )
+    settings = _ratio(scene, at) if analysis == "forced" else _force(analysis, at)
+    try:
+        changed: AnyScene = load_scene(tomllib.loads(scene.text), settings)
+    except InputError as problem:
+        raise InputError(f"--at {at}: the scene does not take it: {problem}") from None
+    return changed
+
+
+def _ratio(scene: Any, at: float | str) -> dict[str, Any]:
+    try:
+        ratio = float(at)
+    except ValueError:
+        ratio = math.nan
+    if not 0.0 < ratio < math.inf:
+        raise InputError(
+            f"--at {at}: a forced response is studied at one F_C/F_E; write a positive number "
+            "without a unit, for example --at 194"
+        )
+    return {
+        "excitation.centrifugal_to_force": [ratio],
+        **({"excitation.force": []} if scene.excitation.force else {}),
+    }
+
+
+def _force(analysis: str, at: float | str) -> dict[str, Any]:
+    try:
+        force = float(at)
+    except ValueError:
+        try:
+            force = float(parse_quantity(at, "force"))
+        except InputError:
+            force = math.nan
+    if not 0.0 < force < math.inf:
+        of = "F_C of a seated damper" if analysis == "seated" else "the normal force of a contact"
+        raise InputError(
+            f'--at {at}: chooses {of}; write a positive force, for example --at "200 N"'
+        )
+    text = f"{force!r} N"
+    return {"damper.centrifugal": text} if analysis == "seated" else {"loads.normal": [text]}

@@ -79,8 +79,7 @@ def make_columns(outcomes: Sequence[Outcome], follow: Sequence[str]) -> list[Col
 
     A column holds one number of one case, whatever the order in which a point lists it. Where the
     parameters set an attribute of the cases (F=50 N, F=80 N), it is written as *: one value at
-    every point, or the k-th smallest of as many values at every point. A path downwards fills what
-    the path upwards lacks, and has a column of its own where a point has both.
+    every point, or the k-th smallest of as many values at every point.
     """
     tables = [_by_name(outcome) for outcome in outcomes]
     names = list(dict.fromkeys(name for table in tables for name in table))
@@ -129,10 +128,10 @@ def _columns(name: str, tables: Sequence[Mapping[str, list[PointResult]]]) -> li
                 # the same number twice in a point: nothing but its place tells it
                 key = (*key, ("again", seen[key]))
             rows.setdefault(key, {})[k] = one
-    joined = _with_paths_down(_with_known_modes(rows))
+    joined = _with_known_modes(rows)
     # one value at every point: what it is at those that have the number says nothing
     single = [field for field, places in ranks.items() if max(map(len, places)) == 1]
-    made = [_column(name, key, mine, tables, single) for key, mine in joined]
+    made = [_column(name, key, mine, tables, single) for key, mine in joined.items()]
     titles, seen_titles, out = Counter(c.case for c in made), Counter[str](), []
     for column in made:
         seen_titles[column.case] += 1
@@ -184,28 +183,6 @@ def _without(key: _Key, *fields: str) -> _Key:
     return tuple(pair for pair in key if pair[0] not in fields)
 
 
-def _with_paths_down(
-    rows: Mapping[_Key, Mapping[int, PointResult]],
-) -> list[tuple[_Key, dict[int, PointResult]]]:
-    """Rows of every column: what a path upwards lacks is that of the path downwards."""
-    out: dict[_Key, dict[int, PointResult]] = {}
-    extra: dict[_Key, dict[int, PointResult]] = {}
-    for key, mine in rows.items():
-        if ("reversed", True) in key:
-            extra[_without(key, "reversed")] = dict(mine)
-            out.setdefault(_without(key, "reversed"), {})
-        else:
-            out.setdefault(key, {}).update(mine)
-    columns = []
-    for key, mine in out.items():
-        down = extra.get(key, {})
-        both = any(_has(mine, k) and _has(down, k) for k in down)
-        columns.append((key, mine | {k: one for k, one in down.items() if not _has(mine, k)}))
-        if both:
-            columns.append((key, down))
-    return columns
-
-
 def _has(rows: Mapping[int, PointResult], k: int) -> bool:
     return k in rows and rows[k].value is not None
 
@@ -219,8 +196,6 @@ def _column(
 ) -> Column:
     cases = [one.case for one in rows.values()]
     cases = [case for case in cases if case.mode] or cases
-    if len({case.reversed for case in cases}) > 1:
-        cases = [replace(case, reversed=False) for case in cases]
     values = [one.value if (one := rows.get(k)) else None for k in range(len(tables))]
     missing = [
         "" if not tables[k] or value is not None else _why(rows.get(k), key, tables[k])
@@ -237,7 +212,7 @@ def _column(
 
 
 #: attributes that tell numbers of one curve apart
-_WITHIN = ("mode", "peak", "side", "reversed", "again")
+_WITHIN = ("mode", "peak", "side", "again")
 
 
 def _why(one: PointResult | None, key: _Key, table: Mapping[str, list[PointResult]]) -> str:

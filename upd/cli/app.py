@@ -195,8 +195,8 @@ def study(
         seated dampers) or time steps a period (forced responses: sweeps up and down). modes: rigs
         and forced responses, those kept in the reduction. harmonics, samples, contacts (points of
         the springs), contact (springs, then both faces node by node): forced responses. accuracy,
-        solver: contacts. patch: curved contacts. parameters (or setup: one at a time): flat
-        contacts. dimensions (d ln f / d ln p): rigs.
+        solver: contacts. patch: curved contacts. parameters (one at a time): flat contacts.
+        dimensions (d ln f / d ln p): rigs.
     levels
         Levels of a ladder, coarse to fine: divisions of the patch (mesh, element and solver of
         contacts), refinements (of rigs and forced responses: 0.5 1 2), elements up a face (contact:
@@ -217,8 +217,7 @@ def study(
         Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs
         upd[cluster].
     """
-    from upd.batch.studied_load import scene_at
-    from upd.batch.studies import plan_study, run_study, study_workers
+    from upd.batch.studies import plan_study, run_study, scene_at, study_workers
     from upd.cli.progress import ProgressLine
     from upd.cli.study import print_study, print_study_plan
     from upd.labels import file_name

@@ -6,8 +6,9 @@ from rich.console import Console
 from rich.markup import escape
 
 from upd.batch.engine import Workers
-from upd.batch.ladder import Study, TextTable
+from upd.batch.ladder import Study
 from upd.batch.studies import StudyResult
+from upd.batch.text_table import TextTable
 from upd.cli.progress import counted, duration
 from upd.cli.tables import print_table
 from upd.report.columns import TextColumn

@@ -120,8 +120,7 @@ def _tops(outcome: Outcome, found: ChosenDamper) -> dict[float, float]:
         ratio = one.case.force_ratio
         named = one.name.startswith("peak_") and one.name.endswith("_accelerance")
         if named and ratio is not None and not one.case.kind and one.value is not None:
-            high = one.value if one.high is None else one.high
-            tops[ratio] = max(tops.get(ratio, 0.0), high)
+            tops[ratio] = max(tops.get(ratio, 0.0), one.value)
     return tops if len(tops) == len(grid_scene(found).excitation.force) else {}
 
 

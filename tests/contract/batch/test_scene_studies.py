@@ -4,7 +4,6 @@ import io
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +14,14 @@ from rigs import LINES
 
 from upd import load_scene, make_plan, run
 from upd.analyses.forced.points import lattice_points
-from upd.batch.accuracy_ladder import ESTIMATED, TRUE, accuracy_curves
-from upd.batch.convergence import ConvergenceStudy, markdown
-from upd.batch.curves import make_curves
+from upd.batch.curves import ESTIMATED, TRUE, accuracy_curves, finest_curves, make_curves
 from upd.batch.engine import Workers
-from upd.batch.forced_ladder import forced_curves, forced_points, with_ends
-from upd.batch.ladder import SolvedPoint, StudyPoint
+from upd.batch.ladder import Ladder
 from upd.batch.point import Outcome, PointResult, read_outcome
-from upd.batch.response_mesh_ladder import response_mesh_points
-from upd.batch.seated_ladder import seated_points
-from upd.batch.studied_load import scene_at
-from upd.batch.studies import plan_study, run_study, variations
+from upd.batch.response_ladders import response_meshes
+from upd.batch.studies import plan_study, run_study, scene_at, variations
+from upd.batch.study_point import SolvedPoint, StudyPoint
+from upd.batch.text_table import markdown_table
 from upd.cli import main
 from upd.cli.study import _columns
 from upd.cli.tables import print_table
@@ -101,7 +97,7 @@ def test_a_refusal_says_what_is_missing_and_what_there_is(name: str, vary: str) 
 def test_the_load_that_is_studied() -> None:
     response = scene_at(load_scene("symmetric-response"), "100")
     assert response.excitation.centrifugal_to_force == (100.0,)
-    assert dict(forced_points(response, "harmonics")[0].settings)[
+    assert dict(plan_study(response, "harmonics").points[0].settings)[
         "excitation.centrifugal_to_force"
     ] == [100.0]
     by_force = load_scene(
@@ -171,7 +167,7 @@ def test_contact_points_are_the_same_areas_on_every_mesh(name: str) -> None:
     """Their places and shares are, so that the ladder shows the mesh alone."""
     scene = load_scene(name, LINES)
     found: dict[str, list[Any]] = {"left": [], "right": []}
-    points = response_mesh_points(scene, "mesh", (0.5, 1, 2))
+    points = list(response_meshes(scene, (0.5, 1, 2)))
     for point in points:
         level = load_scene(name, {**LINES, **dict(point.settings), "mesh.element": "hex8"})
         parameters = {k: v for k, v in level.geometry.items() if k != "recipe"}
@@ -198,7 +194,7 @@ def test_what_the_mesh_ladder_of_a_response_sets() -> None:
     )
     made = [
         load_scene("symmetric-response", {**LINES, **dict(p.settings)})
-        for p in response_mesh_points(scene, "element")
+        for p in response_meshes(scene, None, vary="element")
     ]
     assert {one.mesh.element for one in made} == {"hex8", "hex8i", "hex20", "hex27"}
     for one in made:
@@ -209,12 +205,12 @@ def test_what_the_mesh_ladder_of_a_response_sets() -> None:
         "symmetric-response",
         {"contact.model": "interface", "mesh.element": "hex8i", "want": ["response"]},
     )
-    points = response_mesh_points(faces, "element")
+    points = list(response_meshes(faces, None, vary="element"))
     assert {p.curve for p in points} == {"hex8", "hex8i"}, "faces of four nodes alone carry it"
     assert not any(key.startswith("contact.rows") for p in points for key, _ in p.settings)
     own = replace(scene, geometry={"recipe": "sphere_block"})
     with pytest.raises(InputError, match="--vary mesh: the recipe has no parameter refine"):
-        response_mesh_points(own, "mesh")
+        list(response_meshes(own, None))
 
 
 def test_a_toy_response_converges_with_its_mesh_on_two_workers(tmp_path: Path) -> None:
@@ -250,7 +246,7 @@ def test_load_steps_of_a_contact_and_of_a_seated_damper() -> None:
         ).loads.cycle_steps
         for p in points
     ] == [20, 40]
-    seated = seated_points(load_scene("symmetric-seated"), "steps", (2, 4))
+    seated = plan_study(load_scene("symmetric-seated"), "steps", (2, 4)).points
     assert [dict(p.settings)["seating.steps"] for p in seated] == [2, 4]
 
 
@@ -290,26 +286,22 @@ def peak(value: float, **more: Any) -> PointResult:
     return PointResult("peak_1_frequency", case, "Hz", value, **more)
 
 
-def test_both_ends_of_a_range_have_their_order() -> None:
-    """Ends 300 - 8 h^2 and 320 + 4 h; on the finest level the sweeps agree on neither."""
+def test_both_sweeps_have_their_order() -> None:
+    """Peaks of 300 - 8 h^2 on the way up and 320 + 4 h on the way down."""
+    up, down = (Case(force_ratio=194.0, choice=f"sweep {way}") for way in ("up", "down"))
     levels = [
         level(
             "steps",
             n,
-            peak(320 + 4 / n, low=300 - 8 / n**2, high=320 + 4 / n, why="not unique"),
+            PointResult("peak_1_frequency", up, "Hz", 300 - 8 / n**2),
+            PointResult("peak_1_frequency", down, "Hz", 320 + 4 / n),
         )
         for n in (1, 2, 4)
     ]
-    curves = {c.name: c for c in forced_curves(levels, ["*peak_1_frequency"])}
-    assert set(curves) == {"lowest_peak_1_frequency", "highest_peak_1_frequency"}
-    assert curves["lowest_peak_1_frequency"].order == pytest.approx(2.0, abs=1e-6)
-    assert curves["highest_peak_1_frequency"].order == pytest.approx(1.0, abs=1e-6)
-    assert curves["highest_peak_1_frequency"].verdict == "converges, order 1.0"
-    # a single number on one level is both ends there
-    mixed = with_ends([levels[0], level("steps", 2, peak(310.0))])
-    assert [sorted(one.values.values()) for one in mixed] == [[292.0, 324.0], [310.0, 310.0]]
-    alike = [level("steps", n, peak(310.0 + 1 / n)) for n in (1, 2)]
-    assert with_ends(alike) == alike
+    curves = {c.case: c for c in finest_curves(levels, ["*peak_1_frequency"])}
+    assert curves[up.label].order == pytest.approx(2.0, abs=1e-6)
+    assert curves[down.label].order == pytest.approx(1.0, abs=1e-6)
+    assert curves[down.label].verdict == "converges, order 1.0"
 
 
 def test_seconds_are_those_of_what_the_levels_change() -> None:
@@ -317,7 +309,7 @@ def test_seconds_are_those_of_what_the_levels_change() -> None:
     levels = [level("steps", n, peak(310.0 + 1 / n), spent) for n in (1, 2)]
     sweeps = [replace(one, outcome=replace(one.outcome, stages={"sweeps": 5.0})) for one in levels]
     for solved, seconds in ((levels, 2.0), (sweeps, 7.0)):
-        (curve,) = forced_curves(solved, ["peak_1_frequency"])
+        (curve,) = finest_curves(solved, ["peak_1_frequency"])
         assert curve.seconds == (seconds, seconds)
 
 
@@ -326,7 +318,7 @@ def test_time_steps_are_of_the_sweeps_and_samples_of_the_balance() -> None:
     for vary, method in (("steps", "march"), ("samples", "balance")):
         made = [
             load_scene("symmetric-response", dict(p.settings))
-            for p in forced_points(scene, vary, (32, 64))
+            for p in plan_study(scene, vary, (32, 64)).points
         ]
         assert [one.balance.samples for one in made] == [32, 64]
         assert {one.balance.method for one in made} == {method}
@@ -371,7 +363,8 @@ def test_a_narrow_terminal_keeps_order_and_estimate() -> None:
         )
         for h in (2.0, 1.0, 0.5)
     ]
-    study = ConvergenceStudy("", (), partial(make_curves, names=["peak_1_frequency"]), notes=("n",))
+    ladder = Ladder(lambda scene, levels: (), ("peak_1_frequency",), notes=lambda scene: ("n",))
+    study = ladder.study(load_scene("symmetric-response"), "mesh")
     report = study.present(levels)
     assert report.notes == ("n",)
     console = Console(width=100, file=io.StringIO())
@@ -380,7 +373,7 @@ def test_a_narrow_terminal_keeps_order_and_estimate() -> None:
     assert "estimated" in printed
     assert "order" in printed
     assert "not shown at this width: against, verdict" in printed
-    text = markdown("", levels, study.curves(levels))
+    text = "\n".join(markdown_table(report.page[-1]))
     assert "0.5: +" in text
     assert "2: +" in text
     assert "refine:" not in text
@@ -388,7 +381,7 @@ def test_a_narrow_terminal_keeps_order_and_estimate() -> None:
         replace(one, point=replace(one.point, label=label))
         for one, label in zip(levels, ("row 2", "rows 0-1, 2 spots", "all rows"), strict=True)
     ]
-    assert "rows 0-1, 2 spots: +" in markdown("", named, study.curves(named))
+    assert "rows 0-1, 2 spots: +" in "\n".join(markdown_table(study.present(named).page[-1]))
 
 
 def test_figures_show_both_costs_and_the_estimate() -> None:

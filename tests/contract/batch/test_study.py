@@ -14,10 +14,9 @@ from upd import load_scene, make_plan, run
 from upd.analyses.base import Plan
 from upd.analyses.contact import accuracy
 from upd.analyses.hertz.accuracy import LADDER
-from upd.batch.contact_ladder import contact_points
 from upd.batch.curves import make_curves
 from upd.batch.engine import Progress, Workers
-from upd.batch.parameter_study import ParameterStudy, parameter_points, parameter_rows
+from upd.batch.parameter_study import parameter_points, parameter_rows
 from upd.batch.store import PointStore
 from upd.batch.studies import STUDIES, plan_study, run_study, study, study_workers, variations
 from upd.cli import main
@@ -150,7 +149,7 @@ def test_who_solves_a_study(monkeypatch: pytest.MonkeyPatch) -> None:
     ("vary", "curves"), [("mesh", 1), ("element", 4), ("patch", 1), ("solver", 3)]
 )
 def test_variations(vary: str, curves: int) -> None:
-    points = contact_points(load_scene("hertz"), vary)
+    points = plan_study(load_scene("hertz"), vary).points
     assert len({p.curve for p in points}) == curves
     assert len({p.settings for p in points}) == len(points)
     for p in points:
@@ -319,7 +318,7 @@ def test_flat_contact_stiffness_converges_and_edge_pressure_does_not(tmp_path: P
     found = study(
         "symmetric", "mesh", levels=(4, 6, 8, 12), overrides=FLAT, out=tmp_path, workers=0
     )
-    curves = {c.name: c for c in found.study.curves(found.solved)}
+    curves = {c.name: c for c in found.report.curves}
     assert "no limit" in curves["max_pressure"].verdict
     assert curves["K_N_secant_raw"].verdict.startswith("converges, order")
     assert 0.7 < curves["K_N_secant_raw"].change < 2.0
@@ -346,10 +345,9 @@ def test_parameters_are_changed_one_at_a_time(tmp_path: Path) -> None:
     assert (scaled["geometry.length"], scaled["geometry.base"]) == ("17.0 mm", "12.0 mm")
     for point in points.values():
         load_scene("symmetric", dict(point.settings))
-    assert plan_study(scene, "setup") == plan_study(scene, "parameters"), "the name it had"
-    chosen = ParameterStudy(
-        scene,
-        tuple(
+    chosen = replace(
+        plan_study(scene, "parameters"),
+        points=tuple(
             points[label]
             for label in (
                 "as given",
@@ -378,7 +376,7 @@ def test_two_pads_are_compared_one_by_one(tmp_path: Path) -> None:
     points = {p.label: p for p in parameter_points(scene)}
     gap = dict(points["pads 7.2 x 3.2 mm"].settings)["geometry.pad_gap"]
     assert float(gap.removesuffix(" mm")) == pytest.approx(42.5 - 2.0 * 7.2)
-    chosen = ParameterStudy(scene, (points["as given"],))
+    chosen = replace(plan_study(scene, "parameters"), points=(points["as given"],))
     found = run_study(scene, chosen, tmp_path, workers=HERE)
     (given, values, _), (source, thesis, _) = parameter_rows(scene, found.solved)
     assert (given, source) == ("as given", "thesis, Table XII (one K_T)")
@@ -391,7 +389,7 @@ def test_two_pads_are_compared_one_by_one(tmp_path: Path) -> None:
 
 def test_settings_and_threads_name_a_point(tmp_path: Path) -> None:
     scene = load_scene("hertz", LIGHT)
-    points = contact_points(scene, "mesh", (8, 12))
+    points = plan_study(scene, "mesh", (8, 12)).points
     store = PointStore(tmp_path, "study")
     tasks: list[Any] = [
         point.task(scene, threads, code)

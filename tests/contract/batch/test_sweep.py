@@ -441,8 +441,8 @@ def test_a_point_with_other_cases_keeps_its_numbers_in_their_columns() -> None:
     ]
 
 
-def test_a_point_with_a_path_downwards_has_the_peaks_of_its_modes() -> None:
-    """The order of the peaks and an extra path move no number into another column."""
+def test_peaks_stand_in_the_columns_of_their_modes() -> None:
+    """The order of the peaks moves no number into another column."""
 
     def peak(ratio: float, mode: str, **more: Any) -> Case:
         return Case(stiffness="own", force_ratio=ratio, mode=mode, **more)
@@ -451,7 +451,7 @@ def test_a_point_with_a_path_downwards_has_the_peaks_of_its_modes() -> None:
     stopped = Outcome(
         (
             PointResult(one, peak(50.0, "in phase"), "Hz", 300.0),
-            PointResult(two, peak(50.0, "out of phase", reversed=True), "Hz", 444.0),
+            PointResult(two, peak(50.0, "out of phase"), "Hz", 444.0),
             PointResult("friction_energy", peak(50.0, "out of phase", peak=2), "N mm", 1.0),
         )
     )
@@ -531,18 +531,6 @@ def test_a_withheld_peak_of_no_known_mode_has_its_reason_in_the_row_and_no_colum
     strange = [both(5.0), Outcome((lost.results[0], other)), both(9.0)]
     energy = make_columns(strange, ["energy"])
     assert "not among the numbers" in reasons(strange, energy)[1]
-
-
-def test_both_paths_of_a_point_have_a_column() -> None:
-    down = Case(stiffness="own", reversed=True)
-    found = [
-        rows(("p", Case(stiffness="own"), 1.0), ("p", down, 2.0)),
-        rows(("p", Case(stiffness="own"), 3.0)),
-    ]
-    up, back = make_columns(found, ["p"])
-    assert (up.case, back.case) == ("own", "own, downwards")
-    np.testing.assert_array_equal(up.values, [1.0, 3.0])
-    np.testing.assert_array_equal(back.values, [2.0, np.nan])
 
 
 def test_shared_label() -> None:

@@ -1,6 +1,5 @@
 """The ladder of a forced response from springs to both faces node by node."""
 
-import csv
 import io
 import json
 from collections.abc import Mapping
@@ -13,16 +12,14 @@ from rich.console import Console
 from rigs import LINES
 
 from upd import load_scene, make_plan
-from upd.batch import point
 from upd.batch.engine import Workers
-from upd.batch.ladder import SolvedPoint, StudyPoint
-from upd.batch.level_peaks import ladder_curves
 from upd.batch.point import Outcome, PointResult, read_outcome
 from upd.batch.studies import plan_study, run_study
-from upd.batch.whole_faces_ladder import WholeFacesStudy, whole_faces_points
+from upd.batch.study_point import SolvedPoint, StudyPoint
+from upd.batch.whole_faces import change_curves, whole_faces_points
 from upd.cli.study import print_study
 from upd.errors import InputError
-from upd.results import Case, Result
+from upd.results import Case
 
 STUCK: Mapping[str, Any] = {
     **LINES,
@@ -56,9 +53,9 @@ def test_levels_are_springs_of_every_stiffness_then_finer_faces(
 ) -> None:
     both = {"contact.stiffness": ["thesis", "own"]}
     scene = load_scene(name, both | {"balance.time_march": ["330 Hz"]})
-    usual = whole_faces_points(scene, "contact")
+    usual = whole_faces_points(scene)
     assert [p.label for p in usual[2:]] == USUAL[name]
-    points = whole_faces_points(scene, "contact", ASKED[name])
+    points = whole_faces_points(scene, ASKED[name])
     assert points[:3] == usual[:3]
     assert [(p.curve, p.label) for p in points[:2]] == [("springs", "thesis"), ("springs", "own")]
     made = [load_scene(name, dict(p.settings)) for p in points]
@@ -77,14 +74,14 @@ def test_levels_are_springs_of_every_stiffness_then_finer_faces(
 
 def test_levels_a_user_asks_for() -> None:
     scene = load_scene("symmetric-response", {"contact.stiffness": ["thesis"]})
-    points = whole_faces_points(scene, "contact", (5, 4))
+    points = whole_faces_points(scene, (5, 4))
     assert [p.label for p in points] == ["thesis", "4 x 10", "5 x 14"]
     for bad in ((1, 4), (4, 4)):
         with pytest.raises(InputError, match="elements up a face, 2 or more"):
-            whole_faces_points(scene, "contact", bad)
+            whole_faces_points(scene, bad)
     own = replace(scene, geometry={"recipe": "./own.py", "patch_along_slope": 4})
     with pytest.raises(InputError, match="the recipe has no patch_along_y, by which"):
-        whole_faces_points(own, "contact")
+        whole_faces_points(own)
 
 
 def level(curve: str, label: str, h: float, seconds: float, *results: PointResult) -> SolvedPoint:
@@ -93,13 +90,14 @@ def level(curve: str, label: str, h: float, seconds: float, *results: PointResul
     return SolvedPoint(StudyPoint(curve, label, (), h), read_outcome(outcome.text()))
 
 
-def peak(stiffness: str, k: int, height: float, **more: Any) -> PointResult:
+def peak(stiffness: str, k: int, height: float | None, **more: Any) -> PointResult:
     mode = {1: "in phase", 2: "out of phase"}[k]
-    case = Case(stiffness=stiffness, force_ratio=194.0, mode=mode, reversed=more.pop("down", False))
+    case = Case(stiffness=stiffness, force_ratio=194.0, mode=mode, choice=more.pop("choice", ""))
     return PointResult(f"peak_{k}_accelerance", case, "(m/s2)/N", height, **more)
 
 
-SWEPT = "not unique: sweep up 100 at 450 Hz, sweep down 200 at 440 Hz"
+STUDY = plan_study(load_scene("symmetric-response"), "contact")
+UP, DOWN = ({"choice": f"sweep {way}"} for way in ("up", "down"))
 LADDER = (
     level(
         "springs",
@@ -108,8 +106,7 @@ LADDER = (
         2.0,
         PointResult("peak_1_accelerance", Case(stiffness="thesis", kind="stuck"), "", 1.0),
         peak("thesis", 2, 99.0),
-        peak("thesis", 1, None, withheld="stopped at 300 Hz"),  # type: ignore[arg-type]
-        peak("thesis", 1, 120.0, down=True),
+        peak("thesis", 1, 120.0),
     ),
     level("interface", "4 x 10", 0.25, 20.0, peak("interface", 1, 100.0)),
     level(
@@ -117,15 +114,17 @@ LADDER = (
         "8 x 20",
         0.125,
         50.0,
-        peak("interface", 1, 200.0, low=100.0, high=200.0, why=SWEPT),
-        peak("interface", 2, None, withheld="neither sweep has it"),  # type: ignore[arg-type]
+        peak("interface", 1, 100.0, **UP),
+        peak("interface", 1, 200.0, **DOWN),
+        peak("interface", 2, None, withheld="stopped at 300 Hz", **UP),
+        peak("interface", 2, None, withheld="stopped at 299 Hz", **DOWN),
     ),
     SolvedPoint(StudyPoint("interface", "12 x 34", (), 0.08), Outcome(failure="no memory")),
 )
 
 
 def test_rows_are_aligned_by_peak_with_ranges_and_reasons() -> None:
-    report = WholeFacesStudy("", (), ()).present(LADDER)
+    report = STUDY.present(LADDER)
     cost, first, second = report.tables
     assert [row[0] for row in cost.rows] == [
         "springs, thesis",
@@ -148,43 +147,28 @@ def test_rows_are_aligned_by_peak_with_ranges_and_reasons() -> None:
         ("not reached", ""),
         ("none", ""),
     ]
-    assert f"interface, 8 x 20, peak 1: {SWEPT}" in report.notes
-    assert "interface, 8 x 20, peak 2: neither sweep has it" in report.notes
-
-
-def test_a_worker_hands_on_ranges_with_their_reason() -> None:
-    one = Result("peak_1_accelerance", Case(), 2.0, "", low=1.0, high=2.0, why=SWEPT)
-    assert point._number(one) == PointResult(
-        "peak_1_accelerance", Case(), "", 2.0, low=1.0, high=2.0, why=SWEPT
-    )
-    alike = replace(one, low=None, high=None, why="time march, up and down alike")
-    assert point._number(alike).why == ""
+    assert "interface, 8 x 20, peak 2: stopped at 300 Hz" in report.notes
 
 
 def test_a_peak_that_one_sweep_alone_has_is_no_single_number() -> None:
-    lone = peak("interface", 1, 60.0, low=60.0, high=60.0, why="not unique: sweep down none")
-    (_, table) = (
-        WholeFacesStudy("", (), ()).present([level("interface", "a", 0.5, 1.0, lone)]).tables
+    lone = (
+        peak("interface", 1, None, withheld="no peak between 300 and 500 Hz", **UP),
+        peak("interface", 1, 60.0, **DOWN),
     )
+    (_, table) = STUDY.present([level("interface", "a", 0.5, 1.0, *lone)]).tables
     assert table.rows[0][3] == "60 or none"
 
 
 def test_files_hold_every_digit_and_the_figure_every_change(tmp_path: Path) -> None:
-    study = WholeFacesStudy("two models", (), ("a note",))
-    table, rows, data, figure = study.write(tmp_path, LADDER)
-    with rows.open(encoding="utf-8", newline="") as file:
-        read = list(csv.DictReader(file))
-    assert [float(row["peak_1_accelerance_high ((m/s2)/N)"] or 0.0) for row in read] == [
-        120.0,
-        100.0,
-        200.0,
-        0.0,
-    ]
-    assert read[2]["peak_1_accelerance_low ((m/s2)/N)"] == "100.0"
-    assert SWEPT in read[2]["why"]
-    assert read[3]["failure"] == "no memory"
-    curves = json.loads(data.read_text(encoding="utf-8"))["curves"]
-    assert [(c["curve"], c["error"], c["seconds"]) for c in curves] == [
+    table, data, figure = STUDY.write(tmp_path, LADDER, STUDY.present(LADDER))
+    written = json.loads(data.read_text(encoding="utf-8"))
+    values = written["points"][2]["values"]
+    case = "interface, F_C/F_E 194, in phase, sweep"
+    assert values[f"peak_1_accelerance|{case} up"] == 100.0
+    assert values[f"peak_1_accelerance|{case} down"] == 200.0
+    assert written["points"][3]["failure"] == "no memory"
+    assert "interface, 8 x 20, peak 2: stopped at 300 Hz" in written["notes"]
+    assert [(c["curve"], c["error"], c["seconds"]) for c in written["curves"]] == [
         ("springs, thesis", pytest.approx([-0.4]), [2.0]),
         ("interface", pytest.approx([-0.5, 0.0]), [20.0, 50.0]),
     ]
@@ -194,10 +178,11 @@ def test_files_hold_every_digit_and_the_figure_every_change(tmp_path: Path) -> N
 
 
 def test_without_whole_faces_nothing_is_compared(tmp_path: Path) -> None:
-    study = WholeFacesStudy("", (), ())
-    assert not study.present(LADDER[:1]).found
-    assert ladder_curves(LADDER[:1]) == []
-    assert [path.suffix for path in study.write(tmp_path, LADDER[:1])] == [".md", ".csv", ".json"]
+    report = STUDY.present(LADDER[:1])
+    assert not report.found
+    assert change_curves(LADDER[:1]) == []
+    written = STUDY.write(tmp_path, LADDER[:1], report)
+    assert [path.suffix for path in written] == [".md", ".json"]
 
 
 def test_a_toy_ladder_finds_the_stuck_peaks_of_both_models(tmp_path: Path) -> None:

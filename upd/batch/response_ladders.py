@@ -1,0 +1,231 @@
+"""Ladders of a forced response: harmonics, samples, time steps, modes kept, contact points, meshes.
+
+All at the scene's first stiffness and lowest F_C/F_E.
+
+A contact point at a node of its own would never converge over meshes: the displacement under a
+point force grows with every refinement. On the ladders of meshes a point takes the mean over an
+area of the face which is the same on every level: groups of rows and columns into which every level
+divides evenly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from functools import partial
+from typing import Any
+
+from upd.analyses.cost import NODES
+from upd.analyses.forced.mesh_counts import FACES, count_of
+from upd.batch.ladder import Counts, Ladder, Levels, no_levels, refinements
+from upd.batch.study_point import Settings, StudyPoint
+from upd.errors import InputError
+from upd.mesh import recipes
+from upd.scene import ForcedScene
+from upd.scene.forced_contact import GAUSS, SIDES
+
+#: numbers a ladder follows beside those the analysis names first: where the model changes, the
+#: stuck frequencies
+_NUMBERS = ("peak_?_frequency", "peak_?_accelerance", "stuck_in_phase", "stuck_out_of_phase")
+#: element -> refinements beside each other: one more of linear elements, which cost less
+_REFINE: Mapping[str, tuple[float, ...]] = {
+    "hex8": (0.5, 1, 2, 3),
+    "hex8i": (0.5, 1, 2, 3),
+    "hex20": (0.5, 1, 2),
+    "hex27": (0.5, 1),
+}
+#: elements whose faces of four nodes carry a contact node by node
+_NODE_BY_NODE = ("hex8i", "hex8")
+#: arrangement -> the most columns of points
+_COLUMNS: Mapping[str, int] = {"symmetric": 3, "asymmetric": 2}
+#: rows of points, where there are more than one: those of a face of two elements
+_MOST_ROWS = 2
+
+
+#: choices of contact points on the symmetric patch of 5 x 11 lattice lines, and on the asymmetric
+#: faces of 4 rows; the whole face last
+_SYMMETRIC: tuple[tuple[str, Any, Any], ...] = (
+    ("row 2", [2], 3),
+    ("rows 0-1, 2 spots", [0, 1], [1, 9]),
+    ("rows 0-1", [0, 1], 3),
+    ("rows 1-2, 2 spots", [1, 2], [1, 9]),
+    ("rows 1-2", [1, 2], 3),
+    ("rows 0-2", [0, 1, 2], 3),
+    ("all rows, 2 spots", "all", [1, 9]),
+    ("all rows", "all", 3),
+)
+_ASYMMETRIC: tuple[tuple[str, Any, Any], ...] = (
+    ("rows 1-2", [1, 2], 2),
+    ("rows 0 and 3", [0, 3], 2),
+    ("2 groups of rows", 2, 2),
+    ("all rows, 1 column", "all", 1),
+    ("all rows, 2 columns", "all", 2),
+    ("all rows, 4 columns", "all", 4),
+)
+
+
+def at_ratio(scene: ForcedScene) -> Settings:
+    """What every level of a response sets: the lowest F_C/F_E, where most slips.
+
+    At a load under which every point sticks no level differs from another.
+    """
+    return (
+        ("want", ["response"]),
+        ("left_out.solve", "no"),
+        ("excitation.centrifugal_to_force", [min(scene.excitation.centrifugal_to_force)]),
+        *([("excitation.force", [])] if scene.excitation.force else []),
+    )
+
+
+def _base(scene: ForcedScene, method: str = "balance") -> Settings:
+    """One stiffness, and one path of the balance or the sweeps alone."""
+    return (
+        *at_ratio(scene),
+        ("contact.stiffness", [next(iter(scene.stiffnesses))]),
+        ("balance.method", method),
+    )
+
+
+def _contact_points(scene: ForcedScene, levels: Levels) -> list[StudyPoint]:
+    no_levels(levels, "the choices of contact points are fixed")
+    return [
+        StudyPoint(
+            "contacts",
+            label,
+            (
+                *_base(scene),
+                ("contact.rule", "lines"),
+                ("contact.rows", rows),
+                ("contact.columns", columns),
+            ),
+        )
+        for label, rows, columns in (
+            _SYMMETRIC if scene.arrangement == "symmetric" else _ASYMMETRIC
+        )
+    ]
+
+
+def response_meshes(
+    scene: ForcedScene, levels: Levels, *, vary: str = "mesh"
+) -> Iterator[StudyPoint]:
+    """geometry.refine, with the scene's element ("mesh") or all that carry the contact ("element").
+
+    Raises InputError for levels that are none, and for a recipe without ``refine``.
+    """
+    if not recipes.has_parameter(scene.recipe, "refine"):
+        raise InputError(
+            f"--vary {vary}: the recipe has no parameter refine, by which its bodies are divided; "
+            "to fix it: give it one, or run the scene with meshes of your own"
+        )
+    whole_faces = scene.contact.model != "springs"
+    known = _NODE_BY_NODE if whole_faces else tuple(_REFINE)
+    asked = refinements(levels)
+    # Gauss points do not hang on the mesh
+    keeps = whole_faces or scene.contact.rule == GAUSS
+    base = (*_base(scene), *(() if keeps else _same_areas(scene)))
+    for element in (scene.mesh.element,) if vary == "mesh" else known:
+        for refine in asked or _usual(scene, element):
+            settings = (*base, ("geometry.refine", refine), ("mesh.element", element))
+            size = _size(scene, base, element, refine)
+            yield StudyPoint(element, f"refine {refine:g}", settings, size)
+
+
+def _usual(scene: ForcedScene, element: str) -> tuple[float, ...]:
+    """The usual refinements; whole ones where the recipe takes no others."""
+    default = recipes.parameters(scene.recipe).__dataclass_fields__["refine"].default
+    return tuple(n for n in _REFINE[element] if n >= 1 or not isinstance(default, int))
+
+
+def _size(scene: ForcedScene, base: Settings, element: str, refine: float) -> float:
+    """Size of an element against that at refine 1: counts that are not whole are rounded, so it is
+    told by the numbers of elements, a cube root.
+    """
+    if refine == int(refine) or recipes.counted_by_mesh(scene.recipe):
+        return 1.0 / refine
+    head = "geometry."
+    given = {key: value for key, value in scene.geometry.items() if key != "recipe"}
+    given |= {key.removeprefix(head): v for key, v in base if key.startswith(head)}
+    given |= {"element_nodes": NODES[element]}
+    hexes = [
+        sum(body["hexes"] for body in recipes.count(scene.recipe, given | {"refine": n}).values())
+        for n in (1, refine)
+    ]
+    return float((hexes[0] / hexes[1]) ** (1.0 / 3.0))
+
+
+def _same_areas(scene: ForcedScene) -> Settings:
+    """Points over areas that all levels share: rows and columns of them, and counts of elements
+    that even half of them divides.
+    """
+    slopes, along = FACES[scene.arrangement]
+    rows, columns = _MOST_ROWS, _COLUMNS[scene.arrangement]
+    for side in SIDES:
+        up, across = scene.contact.lines(side)
+        rows, columns = min(rows, _lines(up)), min(columns, _lines(across))
+    settings: dict[str, Any] = {"contact.rows": rows, "contact.columns": columns}
+    for side, own in (("left", scene.contact.left), ("right", scene.contact.right)):
+        settings |= {f"contact.{side}.rows": rows} if own.rows is not None else {}
+        settings |= {f"contact.{side}.columns": columns} if own.columns is not None else {}
+    # two halves of the face along the damper, each with whole elements on half of the counts
+    wanted = dict.fromkeys(slopes, 2 * rows) | {
+        along: math.lcm(4, 2 * columns) if scene.arrangement == "symmetric" else 2
+    }
+    for key, step in wanted.items():
+        if recipes.has_parameter(scene.recipe, key):
+            settings[f"geometry.{key}"] = _multiple(count_of(scene, key), step)
+    return tuple(settings.items())
+
+
+def _lines(choice: Any) -> int:
+    """How many lines of points a choice gives, at least; "all" has as many as are asked."""
+    if choice == "all":
+        return max(_MOST_ROWS, *_COLUMNS.values())
+    return int(choice) if isinstance(choice, int) else len(choice)
+
+
+def _multiple(count: int, step: int) -> int:
+    """The nearest multiple, at least two of them: half of it is one still."""
+    return step * max(1, round(count / step))
+
+
+def _notes(scene: ForcedScene) -> Iterator[str]:
+    """What the levels set in the scene."""
+    if scene.contact.model != "springs" or scene.contact.rule == GAUSS:
+        return
+    areas = ", ".join(f"{key} = {value}" for key, value in _same_areas(scene))
+    yield (
+        f"every level: {areas}: a contact point takes the mean over the same area on every level, "
+        "so that the ladder shows the mesh alone (what the choice of points does: --vary contacts)"
+    )
+
+
+def response_title(scene: ForcedScene, vary: str) -> str:
+    """Title of a ladder, with the load it is run at."""
+    ratio = min(scene.excitation.centrifugal_to_force)
+    return f"what accuracy costs, {vary}, F_C/F_E {ratio:g}"
+
+
+_march = partial(_base, method="march")
+_on_levels = partial(
+    Ladder, follow=_NUMBERS, against="finest", every_level=True, subject=response_title
+)
+_on_meshes = partial(Ladder, follow=_NUMBERS, notes=_notes, subject=response_title)
+
+FORCED: Mapping[str, Ladder] = {
+    "mesh": _on_meshes(response_meshes),
+    "element": _on_meshes(partial(response_meshes, vary="element")),
+    "harmonics": _on_levels(
+        Counts("harmonics", "to harmonic {}", "balance.harmonics", (1, 3, 5, 7), 1, _base, 1)
+    ),
+    "samples": _on_levels(
+        Counts("samples", "{} samples", "balance.samples", (32, 64, 128, 256, 512), 8, _base, 1)
+    ),
+    # What sweeps up and down reach is what time steps change.
+    "steps": _on_levels(
+        Counts("steps", "{} steps a period", "balance.samples", (32, 64, 128, 256), 8, _march, 1)
+    ),
+    "modes": _on_levels(
+        Counts("modes", "{} modes a blade", "reduction.modes", (0, 2, 5, 10, 20, 40), 0, _base, 1)
+    ),
+    "contacts": _on_levels(_contact_points),
+}
