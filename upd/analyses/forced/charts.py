@@ -46,8 +46,10 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
         [ChartedCurve(g, case_of(g), ratios.index(g.attributes["force_ratio"])) for g in some]
         for some in (groups, others)
     )
-    peaks = [one for c in (*curves, *marched) if "peak" in c.group for one in charted_peaks(c)]
-    moving = [c for c in curves if c.moves] or curves[:1]
+    # the page opens on the lowest F_C/F_E on which something slips
+    shown, shown_marched = (sorted(some, key=_rank) for some in (curves, marched))
+    peaks = [one for c in (*shown, *shown_marched) if "peak" in c.group for one in charted_peaks(c)]
+    moving = [c for c in shown if c.moves] or shown[:1]
     sliding = [
         one for one in peaks if one.curve.data("state")[one.index, :, SLIP_SHARE].max() > 0.0
     ] or peaks[:1]
@@ -74,7 +76,7 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
         *([loss_chart(rubbed)] if rubbed else []),
         *(
             motion_chart(c, k)
-            for c in curves
+            for c in shown
             if "damper_amplitude" in c.group
             for k in range(len(MOTIONS))
         ),
@@ -85,6 +87,11 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
             for k in range(len(MOTIONS))
         ),
     ]
+
+
+def _rank(curve: ChartedCurve) -> tuple[bool, float]:
+    """Curves on which something slips first, by rising F_C/F_E."""
+    return not curve.slips, float(curve.case.force_ratio or 0.0)
 
 
 def _responses(

@@ -182,7 +182,7 @@ def _parts(
         found = [
             (one, ratio(one))
             for one in mine
-            if not one.why and (place is None or place in one.peaks)
+            if (one.peaks or not one.why) and (place is None or place in one.peaks)
         ]
         good = [(one, r) for one, r in found if math.isfinite(r)]
         seconds = math.fsum(one.seconds for one in mine)

@@ -93,7 +93,7 @@ class PeakLevel(NamedTuple):
     seconds
         It took.
     why
-        Why nothing was found; "" otherwise.
+        Why something was not found; "" otherwise.
     """
 
     source: str
@@ -284,7 +284,10 @@ def model_level(peaks: FoundPeaks, made: MadeModel) -> PeakLevel:
     begin = time.perf_counter() - made.seconds
     if isinstance(made.model, str):
         return _none(made.source, made.label, made.model)
-    return _level(peaks, made.model, made.source, made.label, made.size, begin)
+    try:
+        return _level(peaks, made.model, made.source, made.label, made.size, begin)
+    except UpdError as error:
+        return _none(made.source, made.label, one_line(error))
 
 
 def _level(
@@ -538,7 +541,7 @@ def balance_level(peaks: FoundPeaks, source: str, more: int, factor: int) -> Pea
     """
     label = f"{more} harmonics more" if more else f"{factor} times the samples"
     begin, found, size = time.perf_counter(), dict[Place, Found](), 1.0 / factor
-    plan, model = peaks.plan, peaks.model
+    plan, model, why = peaks.plan, peaks.model, ""
     with threads_for(len(model.M)):
         for curve in peaks.curves:
             old = curve.answer.balance
@@ -549,11 +552,17 @@ def balance_level(peaks: FoundPeaks, source: str, more: int, factor: int) -> Pea
             b = balance_like(plan, model, curve.force, old, numbers, samples)
             for side, number, top in _first_blades(curve):
                 if top.slips:
-                    x = b.embedded(top.x, old)
-                    again = found_again(plan, model, curve, side, number, top, b, x)
+                    try:
+                        x = b.embedded(top.x, old)
+                        again = found_again(plan, model, curve, side, number, top, b, x)
+                    except UpdError as error:
+                        why = one_line(error)
+                        log.info("%s, %s: %s", label, curve.case, why)
+                        again = Found(math.nan, math.nan)
                     found[curve.ratio, side, number] = again
                     found |= _other_blade(curve, side, number, top, again)
-    return PeakLevel(source, label, size, found, (math.nan, math.nan), time.perf_counter() - begin)
+    seconds = time.perf_counter() - begin
+    return PeakLevel(source, label, size, found, (math.nan, math.nan), seconds, why)
 
 
 def at_place(
