@@ -24,7 +24,7 @@ from rig_response import Rig, accelerance, rig
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
-from upd.analyses.forced.march_modes import stuck_modes_list
+from upd.analyses.forced.linear_limits import stuck_modes_list
 from upd.analyses.forced.measures import PathPeak
 from upd.analyses.forced.model import preloaded
 from upd.analyses.forced.paths import respond

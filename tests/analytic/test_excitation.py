@@ -13,8 +13,7 @@ from upd.analyses import make_plan
 from upd.analyses.forced import measures
 from upd.analyses.forced.excitation import Excitation, excitation_of
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
-from upd.analyses.forced.linear_peaks import linear_peaks
-from upd.analyses.forced.march_modes import linear_curves
+from upd.analyses.forced.linear_limits import linear_curves, linear_peaks
 from upd.analyses.forced.measures import Array, ComplexArray
 from upd.analyses.forced.mode_peaks import tell_stuck_peaks
 from upd.analyses.forced.model import Model, make_model

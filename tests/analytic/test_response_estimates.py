@@ -17,18 +17,10 @@ from upd.analyses.forced import levels
 from upd.analyses.forced import solve as solving
 from upd.analyses.forced.curves import Top
 from upd.analyses.forced.estimates import bound, estimate
-from upd.analyses.forced.levels import (
-    HARMONICS,
-    MESH,
-    MODES,
-    POINTS,
-    SAMPLES,
-    PeakLevel,
-    carried,
-    moved_points,
-)
+from upd.analyses.forced.levels import HARMONICS, MESH, MODES, POINTS, SAMPLES, PeakLevel
 from upd.analyses.forced.model import make_model
 from upd.analyses.forced.peaks import climbed
+from upd.analyses.forced.peaks_again import carried, moved_points
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import make_bodies
@@ -239,7 +231,8 @@ def test_a_level_that_fails_leaves_only_its_part(
 
     solution, numbers, estimates = slipping
     (name, known), (peaks, *_) = next(iter(solution.levels.items())), solution.searched.values()
-    monkeypatch.setattr(levels, "found_again", fails)
+    for function in ("found_again", "peak_on"):
+        monkeypatch.setattr(levels, function, fails)
     model = levels.MadeModel(MODES, "2 modes a blade", 2.0, peaks.model, 0.0)
     failed = {
         HARMONICS: levels.balance_level(peaks, HARMONICS, 2, 1),

@@ -13,7 +13,7 @@ from functools import partial
 from typing import Any
 
 from upd.analyses.cost import NODES
-from upd.analyses.forced.mesh_counts import FACES, count_of
+from upd.analyses.forced.levels import FACES, count_of
 from upd.batch.convergence import ConvergenceStudy
 from upd.batch.curves import make_curves
 from upd.batch.forced_ladder import FORCED_NAMES, base_settings, ladder_title

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.input_data import DataChange
+from upd.analyses.forced.input_uncertainty import DataChange
 from upd.analyses.forced.mode_peaks import ModePeak, numbered_peaks
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.paths import balance_of, fine_grid, quiet, respond

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.forced.linear_peaks import linear_peaks
+from upd.analyses.forced.linear_limits import linear_peaks
 from upd.analyses.forced.linear_sensitivity import (
     limit_peak,
     linear_system,
@@ -22,8 +22,8 @@ from upd.analyses.forced.linear_sensitivity import (
 from upd.analyses.forced.measures import Unsolved
 from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, tell_stuck_peaks, unmoved
 from upd.analyses.forced.model import Model
-from upd.analyses.forced.paths import balance_of, grid
-from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.paths import balance_of
+from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.errors import ConvergenceError
 from upd.fitting.targets import PEAK_NUMBERS, STUCK_MODES, FitTarget
 from upd.hbm.parameter_change import ParameterChange

@@ -1,29 +1,149 @@
-"""Arrays of curves by harmonic balance, of their linear limits and of peaks over F_C/F_E."""
+"""Arrays of curves by harmonic balance and by sweeps, of linear limits, of peaks over F_C/F_E."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.array_parts import (
-    HZ,
-    N_LOOPS,
-    PER_N,
-    Variables,
-    amplitude_words,
-    complex_array,
-    loop_arrays,
-    marked_peaks,
-    peak_arrays,
-    share_array,
-)
-from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves
+from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, SweptCurve
 from upd.analyses.forced.excitation import Excitation, excitation_of
+from upd.analyses.forced.measures import PathPeak
+from upd.analyses.forced.mode_peaks import ModePeak
+from upd.analyses.forced.model import Array
 from upd.analyses.forced.performance import Performance
-from upd.analyses.forced.solution import ForcedSolution
+from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
+from upd.analyses.forced.sweeps import face_shares, marched_damper, marched_loops
 from upd.scene.forced_contact import SIDES
+
+Variables = dict[str, Any]
+#: what the groups of result.nc hold, their attribute ``content``
+POINTS, LINEAR, FRICTION, MEASURED = "points", "linear", "friction", "measured"
+PERFORMANCE, SWEEP, MARCHED = "performance", "sweep", "marched peaks"
+#: loops kept of a peak
+N_LOOPS = 4
+HZ, PER_N = {"units": "Hz"}, {"units": "(m/s2)/N"}
+
+
+def complex_array(H: Any) -> tuple[tuple[str, str], Any, dict[str, str]]:
+    """Real and imaginary part of an accelerance along a curve."""
+    return (
+        ("frequency", "part"),
+        np.stack([H.real, H.imag], axis=-1),
+        {"units": "(m/s2)/N", "part": "real imaginary"},
+    )
+
+
+def peak_arrays(name: str, peaks: Sequence[PathPeak | ModePeak]) -> Variables:
+    """Frequencies and heights of the peaks of a curve, no variables when it has none."""
+    if not peaks:
+        return {}
+    at = (f"peak_{name}",)
+    return {
+        f"peak_frequency_{name}": (at, np.array([p.frequency for p in peaks]), HZ),
+        f"peak_accelerance_{name}": (at, np.array([p.height for p in peaks]), PER_N),
+    }
+
+
+def marked_peaks(at: Sequence[tuple[int, str, int]]) -> Variables:
+    """Which points of a curve are its peaks."""
+    return {
+        "peak": (
+            ("peak",),
+            np.array([number for number, *_ in at]),
+            {
+                "long_name": "number of the peak's mode; 0 is the highest point of a curve without",
+                # which mode each is, in the same order
+                "modes": ", ".join(mode for _, mode, _ in at),
+            },
+        ),
+        "peak_index": (
+            ("peak",),
+            np.array([i for *_, i in at]),
+            {"long_name": "place of the peak in frequency, from 0"},
+        ),
+    }
+
+
+def share_array(
+    values: Any, mean: str = "stiffness"
+) -> tuple[tuple[str, ...], Any, dict[str, str]]:
+    """(frequency, side, state) of the cycle."""
+    words = f"stick slip lift, mean over the face by {mean}"
+    about = {"units": "1", "side": " ".join(SIDES), "state": words}
+    return ("frequency", "side", "state"), values, about
+
+
+def shares_by_face(
+    state: Array, places: ContactPlaces
+) -> tuple[tuple[str, ...], Any, dict[str, str]]:
+    """Shares of the cycle of each face from those of its points, (frequency, points, state)."""
+    share = np.stack([face_shares(one, places) for one in state])
+    return share_array(share, "stiffness, or area without springs")
+
+
+def amplitude_words(solution: ForcedSolution) -> str:
+    """Which harmonic the damper's amplitudes are of."""
+    k = excitation_of(solution.plan.scene.excitation).lowest
+    return f"amplitude of {'the first harmonic' if k == 1 else f'harmonic {k}'}"
+
+
+def loop_arrays(
+    found: Sequence[tuple[int, float, measures.Loop]], face: Any, along: Array, up: Array
+) -> Variables:
+    """Hysteresis loops at every peak, with what tells them apart.
+
+    The peak, the point's face and place, the loss.
+
+    Parameters
+    ----------
+    found
+        Number and frequency of the peak, and a loop.
+    face, along, up
+        (n_point,) of all points.
+    """
+    if not found:
+        return {}
+    loops = [one for *_, one in found]
+    point = np.array([one.point for one in loops])
+    return {
+        "loop_frequency": (
+            ("loop",),
+            np.array([f for _, f, _ in found]),
+            HZ | {"long_name": "the peak each loop belongs to"},
+        ),
+        "loop_point": (("loop",), point, {"long_name": "contact point of each loop"}),
+        "loop_displacement": (
+            ("loop", "sample"),
+            np.array([one.displacement for one in loops]),
+            {"units": "mm"},
+        ),
+        "loop_traction": (
+            ("loop", "sample"),
+            np.array([one.traction for one in loops]),
+            {"units": "N"},
+        ),
+        "loop_limit": (("loop", "sample"), np.array([one.limit for one in loops]), {"units": "N"}),
+        "loop_peak": (
+            ("loop",),
+            np.array([number for number, *_ in found]),
+            {"long_name": "number of the peak"},
+        ),
+        "loop_side": (("loop",), face[point], {"flag_meanings": "left right"}),
+        "loop_along": (
+            ("loop",),
+            along[point],
+            {"units": "mm", "long_name": "place along the damper"},
+        ),
+        "loop_up": (("loop",), up[point], {"units": "mm", "long_name": "place up the slope"}),
+        "loop_energy": (
+            ("loop",),
+            np.array([one.energy for one in loops]),
+            {"units": "N mm", "long_name": "loss per cycle"},
+        ),
+    }
 
 
 def linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:
@@ -216,3 +336,109 @@ def performance_arrays(found: Performance) -> Variables:
             "best_accelerance": ((), np.array(best.worst.height), PER_N),
         }
     return out
+
+
+def swept_arrays(one: SweptCurve, excited: Excitation) -> Variables:
+    """Accelerance of both blades along a sweep, its states, losses and cost."""
+    found, at = one.found, ("frequency",)
+    scale = (2.0 * np.pi * excited.lowest * found.frequency) ** 2 * 1e-3 / one.force
+    out: Variables = {
+        "frequency": (at, found.frequency, HZ | {"status": found.status}),
+        "excitation_force": ((), np.array(one.force), {"units": "N"}),
+        **{f"accelerance_{side}": complex_array(one.accelerance[side]) for side in SIDES},
+        **{
+            f"accelerance_{side}_harmonic_{k}": complex_array(one.accelerance_in(k, j, b))
+            for j, k in enumerate(excited.harmonics[1:], 1)
+            for b, side in enumerate(SIDES)
+        },
+        "share": (
+            ("frequency", "state"),
+            found.share[:, [1, 2, 0]],
+            {"units": "1", "state": "stick slip lift, mean over all points of both faces"},
+        ),
+        "energy": (
+            ("frequency", "kind"),
+            found.energy,
+            {"units": "N mm", "kind": "work of the excitation, lost by damping, by friction"},
+        ),
+        "settled": (at, found.settled.astype(np.int8), {"units": "1"}),
+        "periods": (at, found.periods, {"units": "1"}),
+    }
+    for k, side in enumerate(SIDES):
+        out[f"lowest_{side}"] = (at, scale * found.lowest[:, k], PER_N)
+        out[f"highest_{side}"] = (at, scale * found.highest[:, k], PER_N)
+        out |= peak_arrays(side, one.peaks[side])
+    return out
+
+
+def peaks_by_sweep(marched: Sequence[MarchedPeak]) -> list[tuple[SweptCurve, list[MarchedPeak]]]:
+    """Peaks of every sweep that has some."""
+    cases = dict.fromkeys(one.sweep.case for one in marched)
+    found = [[one for one in marched if one.sweep.case == case] for case in cases]
+    return [(some[0].sweep, some) for some in found]
+
+
+def marched_arrays(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Variables:
+    """States, losses, loops and the damper's motion at peaks of a sweep, in the variables of a path
+    by the balance with these points.
+    """
+    scene, at, fp = solution.plan.scene, ("frequency",), ("frequency", "contact_point")
+    f = np.array([one.frequency for one in found])
+    # of a half model each node stands for its image too
+    copies = np.array([one.period.copies for one in found])[:, None]
+    energy = copies * np.array([one.period.loss for one in found])
+    out: Variables = {
+        "frequency": (at, f, HZ),
+        "excitation_force": ((), np.array(found[0].sweep.force), {"units": "N"}),
+        "state": (
+            (*fp, "state"),
+            np.array([one.period.share for one in found]),
+            {"units": "1", "state": "stick slip lift, shares of the cycle"},
+        ),
+        "energy": (fp, energy, {"units": "N mm", "long_name": "friction loss per cycle"}),
+        "power": (fp, 1e-3 * energy * f[:, None], {"units": "W"}),
+        "peak": (
+            ("peak",),
+            np.array([one.peak.number for one in found]),
+            {
+                "long_name": "number of the peak's mode",
+                "modes": ", ".join(one.peak.mode for one in found),
+            },
+        ),
+        "peak_index": (
+            ("peak",),
+            np.arange(len(found)),
+            {"long_name": "place of the peak in frequency, from 0"},
+        ),
+    }
+    if scene.wants("contact_state"):
+        out["share"] = shares_by_face(out["state"][1], found[0].places)
+    if scene.wants("damper_motion"):
+        both = [marched_damper(solution, one) for one in found]
+        dofs = {"units": "mm, rad"}
+        out |= {
+            "damper_motion": (
+                ("frequency", "damper_dof", "sample"),
+                np.array([one.motion.T for one in found]),
+                dofs | {"long_name": "over the period, from the damper at rest"},
+            ),
+            "damper_static": (
+                ("frequency", "damper_dof"),
+                np.array([static for static, _ in both]),
+                dofs | {"long_name": "mean, from the damper at rest"},
+            ),
+            "damper_amplitude": (
+                ("frequency", "damper_dof"),
+                np.array([amplitude for _, amplitude in both]),
+                dofs | {"long_name": amplitude_words(solution)},
+            ),
+        }
+    if not scene.wants("hysteresis"):
+        return out
+    loops = [
+        (one.peak.number, one.frequency, loop)
+        for one in found
+        for loop in marched_loops(one, N_LOOPS)
+    ]
+    places = found[0].places
+    return out | loop_arrays(loops, places.face, places.along, places.up)

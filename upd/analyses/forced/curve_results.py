@@ -10,7 +10,6 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, SweptCurve
 from upd.analyses.forced.excitation import excitation_of
-from upd.analyses.forced.marched_peaks import marched_damper, marched_shares
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.peak_results import (
     highest_in_harmonic,
@@ -21,6 +20,7 @@ from upd.analyses.forced.peak_results import (
     whole_contact_results,
 )
 from upd.analyses.forced.solution import ForcedSolution, MarchedPeak
+from upd.analyses.forced.sweeps import marched_damper, marched_shares
 from upd.results import Case, Result, withheld
 from upd.scene.forced_contact import SIDES, Side
 

@@ -15,12 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from upd.analyses.forced.curves import ForcedCurve, Top
-from upd.analyses.forced.levels import FoundPeaks, found_again
 from upd.analyses.forced.measures import stuck_modes
 from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak
 from upd.analyses.forced.model import Model, preloaded
-from upd.analyses.forced.moved_points import moved
 from upd.analyses.forced.paths import balance_of
+from upd.analyses.forced.peaks_again import FoundPeaks, found_again, moved
 from upd.analyses.forced.statics import StaticState, state_of_ratio
 from upd.errors import InputError, UpdError, one_line
 from upd.linalg.parallel import threads_for

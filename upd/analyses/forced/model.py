@@ -15,19 +15,20 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from upd.analyses.forced.blade_parts import (
+    EVEN_DOFS,
     BladePart,
+    MirrorPairs,
     attached_part,
+    mirror_pairs,
     nodal_part,
     ritz,
     symmetric,
 )
 from upd.analyses.forced.excitation import Excitation, excitation_of
-from upd.analyses.forced.gauss_points import gauss_points
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.points import FacePoints, free_points, lattice_points
+from upd.analyses.forced.points import FacePoints, free_points, gauss_points, lattice_points
 from upd.analyses.forced.statics import StaticState, point_preload, static_state
 from upd.analyses.forced.stiffness import FaceLaw, mirrored
-from upd.analyses.forced.symmetry import EVEN_DOFS, MirrorPairs, mirror_pairs
 from upd.analyses.seated.bodies import Bodies
 from upd.fem import modal_damping
 from upd.hbm import Contacts, RigidDamper, contact_rows, contacts, rigid_damper

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.array_parts import (
+from upd.analyses.forced.curve_arrays import (
     FRICTION,
     HZ,
     LINEAR,
@@ -20,20 +20,20 @@ from upd.analyses.forced.array_parts import (
     POINTS,
     SWEEP,
     Variables,
-    shares_by_face,
-)
-from upd.analyses.forced.curve_arrays import (
     faces_friction,
     friction_arrays,
     linear_arrays,
+    marched_arrays,
+    peaks_by_sweep,
     performance_arrays,
+    shares_by_face,
+    swept_arrays,
 )
 from upd.analyses.forced.excitation import excitation_of
-from upd.analyses.forced.marched_peaks import faces_places
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.printed import measured_peaks
 from upd.analyses.forced.solution import ForcedSolution
-from upd.analyses.forced.swept_arrays import marched_arrays, peaks_by_sweep, swept_arrays
+from upd.analyses.forced.sweeps import faces_places
 from upd.analyses.measured import measured_arrays
 from upd.results import ArrayGroup, Case
 

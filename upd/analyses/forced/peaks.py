@@ -346,35 +346,3 @@ def _amplitude(model: Model, b: Balance, x: Array, f: float, side: Side) -> floa
     force = b.force(x, False).force.reshape(1, len(b.Psi), b.harmonics.size)
     moving = to_complex(b.displacement(omega, force, b.split(x)[1][None])[0], b.harmonics)
     return float(abs(model.row(side) @ moving[:, j]))
-
-
-# -- a band about a peak ---------------------------------------------------------------------------
-
-
-def peak_of_mode(
-    plan: ForcedPlan,
-    model: Model,
-    force: float,
-    side: Side,
-    number: int,
-    frequency: Array,
-    **changes: object,
-) -> tuple[float, float] | None:
-    """Frequency and height of a mode's peak on a path along some frequencies; None without.
-
-    Parameters
-    ----------
-    number
-        Of the mode.
-    frequency
-        (n,) Hz.
-    **changes
-        As `respond` takes them.
-    """
-    answer = respond(plan, model, force, frequency, **changes)
-    if not len(answer.frequency):
-        return None
-    size = np.abs(measures.accelerance(answer, model.row(side), force))
-    found = numbered_peaks(model, answer, size, plan.scene.excitation.stop)
-    mine = [p for p in found if p.number == number]
-    return (mine[0].frequency, mine[0].height) if mine else None

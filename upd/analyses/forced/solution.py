@@ -11,10 +11,11 @@ from upd.analyses.base import Resolved
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, SweptCurve, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.inputs import InputEffect
-from upd.analyses.forced.levels import FoundPeaks, PeakLevel
-from upd.analyses.forced.march_modes import stuck_peaks_of
+from upd.analyses.forced.levels import PeakLevel
+from upd.analyses.forced.linear_limits import stuck_peaks_of
 from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, tell_stuck_peaks
 from upd.analyses.forced.model import Array, Model
+from upd.analyses.forced.peaks_again import FoundPeaks
 from upd.analyses.forced.performance import Performance, RatioPoint
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.seated.bodies import Bodies
