@@ -336,7 +336,7 @@ def test_no_smaller_number_stands_for_one_not_reached(response: ForcedSolution) 
     curve = response.curves[0]
     (peak,) = curve.peaks["right"]
     part = _points(response, slice(peak.sample - 3))
-    none = RatioPoint(250.0, (), True, 0.0)
+    none = RatioPoint(250.0, (), True)
     performance = replace(response.performances["thesis"], points=(none,))
     bare = replace(part.curves[0], peaks={"left": (), "right": ()}, tops={}, checked=(), folds=())
     part = replace(part, curves=[bare], sweeps=[], marched=[])

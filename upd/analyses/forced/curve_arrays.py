@@ -8,10 +8,15 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, SweptCurve
+from upd.analyses.forced.curves import (
+    FacesCurve,
+    ForcedCurve,
+    FrictionCurve,
+    LinearCurves,
+    SweptCurve,
+)
 from upd.analyses.forced.excitation import Excitation, excitation_of
-from upd.analyses.forced.measures import PathPeak
-from upd.analyses.forced.mode_peaks import ModePeak
+from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.performance import Performance
 from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
@@ -36,7 +41,16 @@ def complex_array(H: Any) -> tuple[tuple[str, str], Any, dict[str, str]]:
     )
 
 
-def peak_arrays(name: str, peaks: Sequence[PathPeak | ModePeak]) -> Variables:
+def _accelerances(curve: FrictionCurve) -> Variables:
+    """Both blades in every harmonic that is excited."""
+    return {f"accelerance_{side}": complex_array(curve.accelerance[side]) for side in SIDES} | {
+        f"accelerance_{side}_harmonic_{k}": complex_array(H[side])
+        for k, H in curve.more.items()
+        for side in SIDES
+    }
+
+
+def peak_arrays(name: str, peaks: Sequence[CurvePeak]) -> Variables:
     """Frequencies and heights of the peaks of a curve, no variables when it has none."""
     if not peaks:
         return {}
@@ -187,14 +201,7 @@ def friction_arrays(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
             {"units": "1", "long_name": "0 between two folds, where the frequency falls"},
         ),
         **_fold_arrays(curve),
-        **{f"accelerance_{side}": complex_array(curve.accelerance[side]) for side in SIDES},
-        **{
-            f"accelerance_{side}_harmonic_{k}": complex_array(
-                measures.accelerance(answer, model.row(side), curve.force, k)
-            )
-            for k in model.excitation.harmonics[1:]
-            for side in SIDES
-        },
+        **_accelerances(curve),
         "state": (
             (*fp, "state"),
             answer.state,
@@ -256,17 +263,13 @@ def _fold_arrays(curve: ForcedCurve) -> Variables:
     }
 
 
-def faces_friction(
-    curve: FacesCurve, at: Sequence[tuple[int, str, int]], excited: Excitation
-) -> Variables:
+def faces_friction(curve: FacesCurve, at: Sequence[tuple[int, str, int]]) -> Variables:
     """A curve of whole faces: accelerance of both blades, states and losses of every node, jumps.
 
     Parameters
     ----------
     at
         Number, mode and point of its peaks.
-    excited
-        What of the blades is excited.
     """
     answer, on = curve.answer, ("frequency",)
     nodes, jumped = ("frequency", "contact_point"), np.zeros(len(curve.frequency), np.int8)
@@ -275,12 +278,7 @@ def faces_friction(
     out: Variables = {
         "frequency": (on, answer.frequency, HZ | {"status": answer.status}),
         "excitation_force": ((), np.array(curve.force), {"units": "N"}),
-        **{f"accelerance_{side}": complex_array(curve.accelerance[side]) for side in SIDES},
-        **{
-            f"accelerance_{side}_harmonic_{k}": complex_array(curve.accelerance_in(k, side))
-            for k in excited.harmonics[1:]
-            for side in SIDES
-        },
+        **_accelerances(curve),
         "state": (
             (*nodes, "state"),
             np.array([one.nodes for one in answer.points])[:, :, [1, 2, 0]],
@@ -345,12 +343,7 @@ def swept_arrays(one: SweptCurve, excited: Excitation) -> Variables:
     out: Variables = {
         "frequency": (at, found.frequency, HZ | {"status": found.status}),
         "excitation_force": ((), np.array(one.force), {"units": "N"}),
-        **{f"accelerance_{side}": complex_array(one.accelerance[side]) for side in SIDES},
-        **{
-            f"accelerance_{side}_harmonic_{k}": complex_array(one.accelerance_in(k, j, b))
-            for j, k in enumerate(excited.harmonics[1:], 1)
-            for b, side in enumerate(SIDES)
-        },
+        **_accelerances(one),
         "share": (
             ("frequency", "state"),
             found.share[:, [1, 2, 0]],

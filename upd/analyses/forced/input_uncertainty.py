@@ -18,9 +18,9 @@ import numpy as np
 from upd.analyses.base import InputChange, InputEnds
 from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.linear_sensitivity import limit_peak, stuck_frequencies
-from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, unmoved
+from upd.analyses.forced.measures import CurvePeak
+from upd.analyses.forced.mode_peaks import CANDIDATES, peak_name, reduction_name, unmoved
 from upd.analyses.forced.model import Array, Model, preloaded
-from upd.analyses.forced.peak_results import LEFT, reduction_name
 from upd.analyses.forced.plan import ForcedPlan, newton_seconds
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import StaticState, static_state
@@ -296,7 +296,7 @@ def _of_model(
 
 
 def _named(side: Side, number: int, case: Case, change: PeakChange, basis: str) -> Iterator[Told]:
-    name = f"{LEFT * (side == 'left')}peak_{number}"
+    name = peak_name(side, number)
     yield (f"{name}_frequency", case), change.frequency, basis
     yield (f"{name}_accelerance", case), change.height, basis
 
@@ -329,7 +329,7 @@ def _stuck_frequencies(
 
 def _linear_peaks(
     solution: ForcedSolution, name: str, kind: str
-) -> Iterator[tuple[Side, ModePeak]]:
+) -> Iterator[tuple[Side, CurvePeak]]:
     linear = solution.linear.get(name)
     for side in SIDES if linear is not None else ():
         assert linear is not None
@@ -342,7 +342,7 @@ def _linear_peaks(
 
 
 def _linear_change(
-    model: Model, data: Sequence[DataChange], kind: str, side: Side, peak: ModePeak
+    model: Model, data: Sequence[DataChange], kind: str, side: Side, peak: CurvePeak
 ) -> PeakChange:
     changes = [one.whole(model) for one in data]
     found = limit_peak(model, side, kind == "stuck", peak.frequency, changes)
@@ -386,7 +386,7 @@ def _followed(
     curve: ForcedCurve,
     data: Sequence[DataChange],
     side: Side,
-    peak: ModePeak,
+    peak: CurvePeak,
 ) -> PeakChange:
     """The derivatives of a peak of a curve, per newton of F_E.
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh, qr
@@ -17,11 +16,10 @@ from upd.analyses.base import Resolved
 from upd.analyses.forced.blade_parts import MIRROR_SIGNS
 from upd.analyses.forced.curves import Top
 from upd.analyses.forced.inputs import few
-from upd.analyses.forced.measures import StuckMode, tell_modes
-from upd.analyses.forced.mode_peaks import ModePeak
+from upd.analyses.forced.measures import CurvePeak, StuckMode, tell_modes
 from upd.analyses.forced.model import Array, Model, make_model
 from upd.analyses.forced.paths import balance_of
-from upd.analyses.forced.peaks_again import FoundPeaks, found_again
+from upd.analyses.forced.peaks_again import FoundPeaks, RunPeak, found_again
 from upd.analyses.forced.plan import ALONG, ELASTIC, ForcedPlan
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.stiffness import FaceLaw
@@ -127,16 +125,10 @@ def _at(values: Array, frame: Array, nodes: IntArray, n_node: int) -> Array:
     return np.asarray(rows.reshape(len(values), 3, -1))
 
 
-class AlongModel(NamedTuple):
-    """The model in which friction resists sliding along the damper too."""
-
-    model: Model
-
-
-def with_along(
-    solution: ForcedSolution, name: str, laws: Mapping[Side, FaceLaw]
-) -> AlongModel | None:
-    """The model with both sliding directions; None where the run has them or nothing rubs."""
+def with_along(solution: ForcedSolution, name: str, laws: Mapping[Side, FaceLaw]) -> Model | None:
+    """The model in which friction resists sliding along the damper too; None where the run has it
+    or nothing rubs.
+    """
     plan, model = solution.plan, solution.models[name]
     scene = plan.scene
     if model.contacts.tangents == 2 or not scene.contact.friction:
@@ -144,12 +136,10 @@ def with_along(
     contact = replace(scene.contact, directions="two")
     plan = replace(plan, scene=replace(scene, contact=contact), workers=1)
     assert solution.bodies is not None
-    return AlongModel(make_model(plan, solution.bodies, laws, model.state))
+    return make_model(plan, solution.bodies, laws, model.state)
 
 
-def along_changes(
-    peaks: FoundPeaks, tops: Mapping[ModePeak, Top], along: AlongModel
-) -> list[Resolved]:
+def along_changes(peaks: FoundPeaks, tops: Mapping[CurvePeak, Top], along: Model) -> list[Resolved]:
     """Change of the highest peak of the curve with the lowest F_C/F_E, with few harmonics.
 
     Parameters
@@ -164,16 +154,14 @@ def along_changes(
     peak = max(loose, key=lambda one: loose[one].height)
     top, old = loose[peak], curve.answer.balance
     numbers = few(peaks, old.harmonics.highest)
-    one, b = (
-        balance_of(peaks.plan, model, curve.force, numbers) for model in (peaks.model, along.model)
-    )
+    one, b = (balance_of(peaks.plan, model, curve.force, numbers) for model in (peaks.model, along))
     W, rest = one.split(top.x)
     both = np.zeros((W.shape[0], 3, W.shape[2]))
     # normal, along, up the slope
     both[:, [0, 2]] = W
     x = np.concatenate([both.ravel(), rest])
-    with threads_for(len(along.model.M)):
-        found = found_again(peaks.plan, along.model, curve, "right", peak.number, top, b, x)
+    with threads_for(len(along.M)):
+        found = found_again(peaks.plan, along, RunPeak(curve, "right", peak.number, top), b, x)
     case, remedy = replace(curve.case, mode=peak.mode), 'set contact.directions = "two"'
     return [
         Resolved(ALONG, f"peak_{peak.number}_{kind}", case, before, after, unit, remedy)

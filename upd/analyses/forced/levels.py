@@ -15,15 +15,17 @@ from dataclasses import replace
 from typing import Any, Literal, NamedTuple
 
 from upd.analyses.cost import NODES
-from upd.analyses.forced.curves import ForcedCurve, LinearCurves, Top
+from upd.analyses.forced.curves import ForcedCurve, LinearCurves
 from upd.analyses.forced.mode_peaks import tell_stuck_peaks
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import (
     balance_like,
 )
 from upd.analyses.forced.peaks_again import (
+    NOT_FOUND,
     Found,
     FoundPeaks,
+    RunPeak,
     found_again,
     linear_of,
     moved_points,
@@ -353,35 +355,33 @@ def _level(
         found = dict(_linear_peaks(peaks, linear))
         move = moved_points(base, model)
         for curve in peaks.curves:
-            for side, number, top in _first_blades(curve):
-                place = (curve.ratio, side, number)
-                if top.slips:
-                    again = peak_on(peaks, model, linear, curve, side, number, top, move)
+            for one in _first_blades(curve):
+                if one.top.slips:
+                    again = peak_on(peaks, model, linear, one, move)
                 else:
-                    again = found.get(("stuck", side, number), Found(math.nan, math.nan))
-                found[place] = again
-                found |= _other_blade(curve, side, number, top, again)
+                    again = found.get(("stuck", one.blade, one.number), NOT_FOUND)
+                found |= _both_blades(one, again)
     stuck = stuck_frequency(linear, True), stuck_frequency(linear, False)
     return PeakLevel(source, label, size, found, stuck, time.perf_counter() - begin)
 
 
-def _first_blades(curve: ForcedCurve) -> Iterator[tuple[Side, int, Top]]:
+def _first_blades(curve: ForcedCurve) -> Iterator[RunPeak]:
     """Every mode's peak once, of the right blade where that has one."""
     for number in dict.fromkeys(number for _, number in curve.tops):
         side: Side = "right" if ("right", number) in curve.tops else "left"
-        yield side, number, curve.tops[side, number]
+        yield RunPeak(curve, side, number, curve.tops[side, number])
 
 
-def _other_blade(
-    curve: ForcedCurve, side: Side, number: int, top: Top, again: Found
-) -> dict[Place, Found]:
-    """The other blade's peak of the same mode: it changes alike."""
-    other: Side = "left" if side == "right" else "right"
-    own = curve.tops.get((other, number))
-    if own is None:
-        return {}
-    f, height = again.frequency / top.frequency, again.height / top.height
-    return {(curve.ratio, other, number): Found(f * own.frequency, height * own.height)}
+def _both_blades(one: RunPeak, again: Found) -> dict[Place, Found]:
+    """A peak, and the other blade's of the same mode: it changes alike."""
+    ratio, number = one.curve.ratio, one.number
+    out: dict[Place, Found] = {(ratio, one.blade, number): again}
+    other: Side = "left" if one.blade == "right" else "right"
+    own = one.curve.tops.get((other, number))
+    if own is not None:
+        f, height = again.frequency / one.top.frequency, again.height / one.top.height
+        out[ratio, other, number] = Found(f * own.frequency, height * own.height)
+    return out
 
 
 def _none(source: str, label: str, why: str) -> PeakLevel:
@@ -443,17 +443,14 @@ def balance_level(peaks: FoundPeaks, source: str, more: int, factor: int) -> Pea
             numbers = range(highest + 1)
             samples = max(factor * old.samples, sample_count(harmonics_of(numbers)))
             b = balance_like(plan, model, curve.force, old, numbers, samples)
-            for side, number, top in _first_blades(curve):
-                if top.slips:
-                    try:
-                        x = b.embedded(top.x, old)
-                        again = found_again(plan, model, curve, side, number, top, b, x)
-                    except UpdError as error:
-                        why = one_line(error)
-                        log.info("%s, %s: %s", label, curve.case, why)
-                        again = Found(math.nan, math.nan)
-                    found[curve.ratio, side, number] = again
-                    found |= _other_blade(curve, side, number, top, again)
+            for one in (each for each in _first_blades(curve) if each.top.slips):
+                try:
+                    again = found_again(plan, model, one, b, b.embedded(one.top.x, old))
+                except UpdError as error:
+                    why = one_line(error)
+                    log.info("%s, %s: %s", label, curve.case, why)
+                    again = NOT_FOUND
+                found |= _both_blades(one, again)
     seconds = time.perf_counter() - begin
     return PeakLevel(source, label, size, found, (math.nan, math.nan), seconds, why)
 

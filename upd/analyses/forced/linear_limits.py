@@ -21,11 +21,11 @@ from upd.analyses.forced.measures import (
     Array,
     Balanced,
     ComplexArray,
-    PathPeak,
+    CurvePeak,
     StuckMode,
     chosen_peaks,
 )
-from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, ModeShapes, mode_words, numbered
+from upd.analyses.forced.mode_peaks import CANDIDATES, ModeShapes, mode_words, numbered
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.hbm.balance import Balance
@@ -93,7 +93,7 @@ def finer(frequency: Array, modes: Array, width: Array) -> Array:
     return np.union1d(frequency, around_modes(modes[coarse], width[coarse], *ends))
 
 
-def exact_peaks(height: Callable[[Array], Array], f: Array, grid: Array) -> list[PathPeak]:
+def exact_peaks(height: Callable[[Array], Array], f: Array, grid: Array) -> list[CurvePeak]:
     """The peaks of a curve, each by a local search between its neighbours.
 
     Parameters
@@ -112,7 +112,7 @@ def exact_peaks(height: Callable[[Array], Array], f: Array, grid: Array) -> list
     ]
     highest = max([float(a.max(initial=0.0)), *(top for _, top in found)])
     peaks = [
-        PathPeak(at, top, int(np.abs(grid - at).argmin()))
+        CurvePeak(at, top, int(np.abs(grid - at).argmin()))
         for at, top in found
         if top >= measures.PEAKS_ABOVE * highest
     ]
@@ -132,7 +132,7 @@ def _top(height: Callable[[Array], Array], low: float, high: float) -> tuple[flo
 
 def linear_peaks(
     answer: Balanced, row: Array, force: float, grid: Array, stuck: bool
-) -> list[PathPeak]:
+) -> list[CurvePeak]:
     """Peaks of the accelerance without contacts or with all points stuck.
 
     Parameters
@@ -148,7 +148,7 @@ def linear_peaks(
 
     Returns
     -------
-    list of PathPeak
+    list of CurvePeak
         At most the two highest within the sweep, by rising frequency; heights in (m/s2)/N.
     """
     # a mode answers where the harmonic that is read meets it
@@ -214,8 +214,8 @@ def stuck_modes_of(march: InterfaceModel, below: float) -> ModeShapes:
 
 
 def stuck_peaks_of(
-    march: InterfaceModel, peaks: Sequence[PathPeak], below: float, excitation: Excitation
-) -> list[ModePeak]:
+    march: InterfaceModel, peaks: Sequence[CurvePeak], below: float, excitation: Excitation
+) -> list[CurvePeak]:
     """Peaks of a stuck curve by the numbers of their modes.
 
     Parameters
@@ -250,7 +250,7 @@ def _told(frequency: Array, tips: Array, below: float) -> list[StuckMode]:
 
 def linear_curves(
     march: InterfaceModel, frequency: Array, excitation: Excitation, *, stuck: bool
-) -> tuple[Mapping[Side, ComplexArray], Mapping[Side, list[PathPeak]]]:
+) -> tuple[Mapping[Side, ComplexArray], Mapping[Side, list[CurvePeak]]]:
     """Accelerance of both blades per newton of F_E, (m/s2)/N, and its peaks, free or stuck.
 
     Parameters

@@ -29,9 +29,9 @@ from upd.analyses.forced.curve_arrays import (
     shares_by_face,
     swept_arrays,
 )
+from upd.analyses.forced.curve_results import measured_peaks
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.model import Model
-from upd.analyses.forced.printed import measured_peaks
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.sweeps import faces_places
 from upd.analyses.measured import measured_arrays
@@ -75,7 +75,7 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
                 friction_arrays(solution, curve), content=FRICTION, case=curve.case
             )
     for path in (c for c in solution.balanced if not c.empty):
-        whole = faces_friction(path, solution.marked_points(path), excited)
+        whole = faces_friction(path, solution.marked_points(path))
         if solution.plan.scene.wants("contact_state"):
             whole["share"] = shares_by_face(
                 whole["state"][1], faces_places(solution, path.stiffness)

@@ -49,6 +49,9 @@ class Found(NamedTuple):
     height: float
 
 
+NOT_FOUND = Found(math.nan, math.nan)
+
+
 @dataclass(frozen=True)
 class FoundPeaks:
     """What is looked for on every level, by one contact stiffness.
@@ -77,7 +80,7 @@ class FoundPeaks:
 def _bare(curve: ForcedCurve) -> ForcedCurve:
     a = curve.answer
     nothing = {name: getattr(a, name)[:0] for name in _ALONG}
-    return replace(curve, answer=replace(a, **nothing), accelerance={})
+    return replace(curve, answer=replace(a, **nothing), accelerance={}, more={})
 
 
 _ALONG = (
@@ -107,15 +110,17 @@ def stuck_frequency(linear: LinearCurves, in_phase: bool) -> float:
     return next(found, math.nan)
 
 
+class RunPeak(NamedTuple):
+    """A peak of a curve of the run with friction: its blade, the number of its mode, its top."""
+
+    curve: ForcedCurve
+    blade: Side
+    number: int
+    top: Top
+
+
 def peak_on(
-    peaks: FoundPeaks,
-    model: Model,
-    linear: LinearCurves,
-    curve: ForcedCurve,
-    side: Side,
-    number: int,
-    top: Top,
-    move: Array | None,
+    peaks: FoundPeaks, model: Model, linear: LinearCurves, one: RunPeak, move: Array | None
 ) -> Found:
     """A peak with friction on another model.
 
@@ -125,11 +130,11 @@ def peak_on(
         (n, n_run) motion of the model's points from that of the run's; None where they are the
         same.
     """
-    old = curve.answer.balance
-    b = balance_of(peaks.plan, model, curve.force, old.harmonics.numbers, old.samples)
+    old, top = one.curve.answer.balance, one.top
+    b = balance_of(peaks.plan, model, one.curve.force, old.harmonics.numbers, old.samples)
     x = top.x if move is None else carried(b, old, top.x, move)
-    ratio = expected(peaks.linear, linear, number, top.frequency)
-    return found_again(peaks.plan, model, curve, side, number, top, b, x, ratio)
+    ratio = expected(peaks.linear, linear, one.number, top.frequency)
+    return found_again(peaks.plan, model, one, b, x, ratio)
 
 
 def expected(own: LinearCurves, other: LinearCurves, number: int, frequency: float) -> float:
@@ -152,13 +157,11 @@ def expected(own: LinearCurves, other: LinearCurves, number: int, frequency: flo
 def found_again(
     plan: ForcedPlan,
     model: Model,
-    curve: ForcedCurve,
-    side: Side,
-    number: int,
-    top: Top,
+    one: RunPeak,
     b: Balance,
     x: Array,
     ratio: float = 1.0,
+    *,
     any_height: bool = False,
     **changes: Any,
 ) -> Found:
@@ -176,12 +179,13 @@ def found_again(
     **changes
         Of the problem, as `respond` takes them.
     """
+    top, force = one.top, one.curve.force
     for factor in dict.fromkeys((ratio, 1.0)) if not top.crowded else ():
         f = factor * top.frequency
         start = newton(b, x, f)
         if start is not None:
             about = top._replace(frequency=f)
-            new = climbed(model, b, start, f, side, curve.force, about, _CLOSE * FIRST_REACH)
+            new = climbed(model, b, start, f, one.blade, force, about, _CLOSE * FIRST_REACH)
             if new is not None:
                 return Found(new.frequency, new.height)
     f = ratio * top.frequency
@@ -195,13 +199,15 @@ def found_again(
         given: dict[str, Any] = {"harmonics": b.harmonics.numbers, "samples": b.samples}
         given["settings"] = replace(LONG_STEPS, most_points=_MOST_POINTS)
         try:
-            peak = peak_of_mode(plan, model, curve.force, side, number, band, **(given | changes))
+            peak = peak_of_mode(
+                plan, model, force, one.blade, one.number, band, **(given | changes)
+            )
         except ConvergenceError as error:
             log.info("band about %.6g Hz: %s", f, one_line(error))
             continue
         if peak is not None and (any_height or is_near(peak[0] / f, peak[1] / top.height)):
             return Found(*peak)
-    return Found(math.nan, math.nan)
+    return NOT_FOUND
 
 
 def moved_points(base: Model, other: Model) -> Array | None:

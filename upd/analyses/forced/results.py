@@ -9,7 +9,12 @@ import numpy as np
 
 from upd.analyses import measured
 from upd.analyses.forced import measures
-from upd.analyses.forced.curve_results import balanced_results, curve_results, swept_results
+from upd.analyses.forced.curve_results import (
+    balanced_results,
+    curve_results,
+    peak_results,
+    swept_results,
+)
 from upd.analyses.forced.curves import FrictionCurve, LinearCurves, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.inputs import InputEffect
@@ -17,7 +22,6 @@ from upd.analyses.forced.linear_limits import linear_curves
 from upd.analyses.forced.mode_peaks import unmoved
 from upd.analyses.forced.model import Array, ComplexArray, Model
 from upd.analyses.forced.paths import balance_of
-from upd.analyses.forced.peak_results import LEFT, left_peak_results, peak_results
 from upd.analyses.forced.performance import Performance
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import StaticState
@@ -159,16 +163,14 @@ def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -
         found = next((m for m in linear.modes if m.axis == "x" and m.in_phase == in_phase), None)
         if found is not None:
             results.append(Result(f"stuck_{phase[in_phase]}", case, found.frequency, "Hz"))
-    for kind, told in (
-        ("free", unmoved(linear.free_peaks["right"])),
-        ("stuck", solution.stuck_peaks(name)),
-    ):
-        results += peak_results(solution, replace(case, kind=kind), told)
     # Without a damper a blade that is not excited, on a base of its own, stays at rest.
-    results += left_peak_results(replace(case, kind="free"), unmoved(linear.free_peaks["left"]))
-    return results + left_peak_results(
-        replace(case, kind="stuck"), solution.stuck_peaks(name, "left")
-    )
+    for blade in SIDES[::-1]:
+        for kind, peaks in (
+            ("free", unmoved(linear.free_peaks[blade])),
+            ("stuck", solution.stuck_peaks(name, blade)),
+        ):
+            results += peak_results(solution, replace(case, kind=kind), peaks, blade)
+    return results
 
 
 def _performance_results(name: str, found: Performance) -> list[Result]:
@@ -221,9 +223,8 @@ def _input_results(
         case = Case(
             stiffness=name, force_ratio=ratio, mode=one.mode, choice=f"{one.name}: {one.label}"
         )
-        peak = f"{LEFT * (one.blade == 'left')}peak_{one.number}"
         for kind, value in (("frequency", one.frequency), ("accelerance", one.height)):
-            number = f"{peak}_{kind}_change"
+            number = f"peak_{one.number}_{kind}_change"
             # without such a peak near there is no change to tell
             if np.isfinite(value):
                 out.append(Result(number, case, 100.0 * value, "%"))
@@ -294,12 +295,12 @@ def _linear_at(
 
 def _with_friction(c: FrictionCurve, side: Side) -> Computed:
     """A curve with friction, between its points by straight lines."""
-    f, H = c.frequency, c.accelerance[side]  # type: ignore[attr-defined]
+    f, H = c.frequency, c.accelerance[side]
     way = slice(None) if f[-1] > f[0] else slice(None, None, -1)
     f, H = f[way], H[way]
-    peaks = c.peaks.get(side, ())  # type: ignore[attr-defined]
+    peaks = c.peaks.get(side, ())
     return Computed(
-        replace(c.case, blade=side),  # type: ignore[attr-defined]
+        replace(c.case, blade=side),
         (float(f.min()), float(f.max())),
         lambda at: on_path(at, f, H),
         list(peaks),

@@ -12,7 +12,7 @@ import numpy as np
 
 from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.inputs import INPUTS, few_harmonics, input_effects
-from upd.analyses.forced.left_out import AlongModel, along_changes, elastic_changes, with_along
+from upd.analyses.forced.left_out import along_changes, elastic_changes, with_along
 from upd.analyses.forced.levels import (
     COARSER,
     HARMONICS,
@@ -202,7 +202,7 @@ def _around(
         jobs.append((job[0], job[1:]))
         into.append((kind, name))
 
-    along: AlongModel | None = None
+    along: Model | None = None
     further: list[RatioPoint] = []
     for name, model in solution.models.items():
         mine = tuple(c for c in solution.curves if c.stiffness == name and not c.empty)

@@ -8,22 +8,25 @@ are read from the last period.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from upd.analyses.forced.curves import SweptCurve, Way
-from upd.analyses.forced.excitation import excitation_of
+from upd.analyses.forced.excitation import ComplexArray, Excitation, excitation_of
 from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.linear_limits import stuck_modes_of
 from upd.analyses.forced.measures import (
     MOTIONS,
     PEAKS_ABOVE,
+    CurvePeak,
     Loop,
-    PathPeak,
+    accelerance_of,
     loop_along_main,
     losing_most,
     place,
 )
-from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, ModeShapes, numbered
+from upd.analyses.forced.mode_peaks import CANDIDATES, ModeShapes, numbered
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.plan import ForcedPlan, grid, time_steps
 from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
@@ -70,21 +73,31 @@ def both_ways(
                 fallback=by_coulomb,
                 accelerate=False,
             )
-            start, k = found.state, excitation.lowest
-            scale = -((2.0 * np.pi * k * found.frequency) ** 2) * 1e-3 / force
-            H = {side: scale * found.amplitude[:, j] for j, side in enumerate(SIDES)}
+            start, f = found.state, found.frequency
+            H, *others = (
+                {side: accelerance_of(moved[:, j], f, k, force) for j, side in enumerate(SIDES)}
+                for k, moved in _by_harmonic(found, excitation)
+            )
+            more = dict(zip(excitation.harmonics[1:], others, strict=True))
             peaks = {side: _peaks(found, np.abs(H[side]), modes) for side in SIDES}
-            out.append(SweptCurve(name, ratio, force, way, found, H, peaks))
+            out.append(SweptCurve(name, ratio, force, H, more, peaks, way, found))
     return out
 
 
-def _peaks(found: SteppedSine, size: Array, modes: ModeShapes) -> tuple[ModePeak, ...]:
+def _by_harmonic(found: SteppedSine, excitation: Excitation) -> Iterator[tuple[int, ComplexArray]]:
+    """Every harmonic excited, the lowest first, and the outputs' amplitudes in it."""
+    yield excitation.lowest, found.amplitude
+    for i, k in enumerate(excitation.harmonics[1:], 1):
+        yield k, found.harmonics[:, i]
+
+
+def _peaks(found: SteppedSine, size: Array, modes: ModeShapes) -> tuple[CurvePeak, ...]:
     maxima = sweep_maxima(found.frequency, size)
     at = np.array([one.sample for one in maxima], int)
     return tuple(numbered(modes, maxima, found.amplitude[at, len(SIDES) :]))
 
 
-def sweep_maxima(frequency: Array, size: Array) -> list[PathPeak]:
+def sweep_maxima(frequency: Array, size: Array) -> list[CurvePeak]:
     """Local maxima of a sweep, at its own points: the motion may jump between two of them.
 
     Parameters
@@ -97,7 +110,7 @@ def sweep_maxima(frequency: Array, size: Array) -> list[PathPeak]:
     inner = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
     least = PEAKS_ABOVE * float(size.max())
     return [
-        PathPeak(float(frequency[i]), float(size[i]), int(i)) for i in inner if size[i] >= least
+        CurvePeak(float(frequency[i]), float(size[i]), int(i)) for i in inner if size[i] >= least
     ]
 
 
@@ -123,7 +136,7 @@ def march_peaks(solution: ForcedSolution, stages: Stages) -> None:
                 solution.marched.append(marched_peak(solution, sweep, top))
 
 
-def marched_peak(solution: ForcedSolution, sweep: SweptCurve, peak: ModePeak) -> MarchedPeak:
+def marched_peak(solution: ForcedSolution, sweep: SweptCurve, peak: CurvePeak) -> MarchedPeak:
     """The last period of a sweep at one of its peaks, marched again and kept."""
     places, rest, kept = _contact(solution, sweep.stiffness)
     period = period_of_sweep(sweep.found, peak.sample, by_coulomb)

@@ -23,8 +23,8 @@ from upd.analyses.forced.interface_model import (
     worn_start,
 )
 from upd.analyses.forced.linear_limits import linear_curves, stuck_modes_list, stuck_modes_of
-from upd.analyses.forced.measures import PEAKS_ABOVE, PathPeak, path_maxima
-from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, ModeShapes, numbered
+from upd.analyses.forced.measures import PEAKS_ABOVE, CurvePeak, accelerance_of, path_maxima
+from upd.analyses.forced.mode_peaks import CANDIDATES, ModeShapes, numbered
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.plan import SAMPLES, ForcedPlan, blade_harmonics, grid
 from upd.analyses.forced.solution import ForcedSolution
@@ -197,17 +197,22 @@ def balance_curve(plan: ForcedPlan, name: str, faces: WholeFaces, ratio: float) 
         samples=SAMPLES if b.samples == "auto" else b.samples,
         fallback=by_coulomb,
     )
-    read = found.amplitude[:, excitation.lowest]
-    scale = -((2.0 * np.pi * excitation.lowest * found.frequency) ** 2) * 1e-3 / force
-    H = {side: scale * read[:, k] for k, side in enumerate(SIDES)}
+    every = {
+        k: {
+            side: accelerance_of(found.amplitude[:, k, j], found.frequency, k, force)
+            for j, side in enumerate(SIDES)
+        }
+        for k in excitation.harmonics
+    }
+    H, read = every.pop(excitation.lowest), found.amplitude[:, excitation.lowest]
     modes = stuck_modes_of(faces.march, CANDIDATES * plan.scene.excitation.stop)
     peaks = {side: _peaks(found, np.abs(H[side]), read, modes) for side in SIDES}
-    return FacesCurve(name, ratio, force, found, H, peaks)
+    return FacesCurve(name, ratio, force, H, every, peaks, found)
 
 
 def _peaks(
     found: InterfaceResponse, size: Array, read: ComplexArray, modes: ModeShapes
-) -> tuple[ModePeak, ...]:
+) -> tuple[CurvePeak, ...]:
     if not len(size):
         return ()
     maxima = _maxima(found, size)
@@ -215,7 +220,7 @@ def _peaks(
     return tuple(numbered(modes, maxima, read[at, len(SIDES) :]))
 
 
-def _maxima(found: InterfaceResponse, size: Array) -> list[PathPeak]:
+def _maxima(found: InterfaceResponse, size: Array) -> list[CurvePeak]:
     """Local maxima of a curve; none is read across a jump, and a stretch may be highest where one
     ends it.
     """
@@ -225,6 +230,6 @@ def _maxima(found: InterfaceResponse, size: Array) -> list[PathPeak]:
         out += [one._replace(sample=one.sample + begin) for one in path_maxima(f, a, 0.0)]
         for i, inner, jumped in ((0, 1, begin > 0), (len(a) - 1, len(a) - 2, end < len(size))):
             if jumped and (len(a) == 1 or a[i] > a[inner]):
-                out.append(PathPeak(float(f[i]), float(a[i]), begin + i))
+                out.append(CurvePeak(float(f[i]), float(a[i]), begin + i))
         begin = end
     return [one for one in out if one.height >= PEAKS_ABOVE * size.max()]
