@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -55,32 +56,29 @@ def check_faces_curve(curve: FacesCurve, points: int, harmonic: int) -> list[Che
     left_out = [one.unresolved for one in answer.points]
     highest = answer.equations.highest
     return [
-        Check(
+        _warning(
             "balance residual",
             case,
             float(max(residual)),
             _RESIDUAL,
             "misfit of blades' forces, slips and damper's motion of a period, relative",
             "report this scene",
-            fatal=False,
         ),
-        Check(
+        _warning(
             "energy balance",
             case,
             float(loss.max()),
             _ENERGY,
             "|work - damping - friction| / their sum, of a period",
             "take more samples: balance.samples",
-            fatal=False,
         ),
-        Check(
+        _warning(
             "truncation",
             case,
             float(max(left_out)),
             _LEFT_OUT,
             f"motion of the faces by blades' harmonics above {highest}, relative",
             f"take more: balance.harmonics = {highest + 2}",
-            fatal=False,
         ),
         *_step(curve, points, harmonic),
     ]
@@ -99,7 +97,7 @@ def _step(curve: FacesCurve, points: int, harmonic: int) -> list[Check]:
     widest = max(steps, key=lambda peak: steps[peak])
     more = math.ceil((points - 1) * steps[widest] / WIDEST_STEP) + 1
     return [
-        Check(
+        _warning(
             "frequency step",
             curve.case,
             steps[widest],
@@ -107,7 +105,6 @@ def _step(curve: FacesCurve, points: int, harmonic: int) -> list[Check]:
             "largest step at a peak over its half-power width",
             f"peak {widest.number} at {widest.frequency:.4g} Hz lies between points too far apart "
             f"for its height; take more: excitation.points = {more}",
-            fatal=False,
         )
     ]
 
@@ -141,8 +138,12 @@ _SWEEP_ENERGY = 10.0 * TOLERANCE
 _NODES = 1e-9
 
 
+#: a curve that stopped early or misses a check is kept: none ends the run
+_warning = partial(Check, fatal=False)
+
+
 def check_solution(solution: ForcedSolution) -> list[Check]:
-    """All self-checks. None ends the run: a curve that stopped early is kept, with a warning."""
+    """All self-checks."""
     checks: list[Check] = []
     scene = solution.plan.scene
     least = scene.damper.centrifugal / max(scene.excitation.centrifugal_to_force, default=np.inf)
@@ -181,14 +182,13 @@ def _model_checks(name: str, model: Model, least: float) -> list[Check]:
         return []
     mu = float(model.contacts.law.mu.max(initial=0.0))
     return [
-        Check(
+        _warning(
             "static balance",
             Case(stiffness=name, choice=model.state.name),
             measures.static_error(model),
             BALANCE,
             "|static contact forces - F_C| / F_C, moments by their arms",
             "report this scene",
-            fatal=False,
         ),
         _preloaded(name, model.state, mu, least),
     ]
@@ -215,14 +215,13 @@ def _preloaded(name: str, state: StaticState, mu: float, least: float) -> Check:
         "the stuck one: upd design tells whether this damper hangs or jams; set contact.static = "
         '"frictionless", or N and T of both faces'
     )
-    return Check(
+    return _warning(
         "preloaded contact",
         Case(stiffness=name, choice=state.name),
         worst,
         0,
         "faces without preload, or whose friction is mobilised everywhere",
         remedy,
-        fatal=False,
     )
 
 
@@ -240,14 +239,13 @@ def _path(curve: ForcedCurve | FacesCurve) -> Check:
             f"at {astray} points the contact forces do not come back to their start, so that "
             'they are no steady state: balance.slider = "mid", or contact.directions = "one"'
         )
-    return Check(
+    return _warning(
         "path complete",
         curve.case,
         float(curve.stopped) or float(astray),
         0,
         "curves that stopped early, or points that are not periodic",
         remedy,
-        fatal=False,
     )
 
 
@@ -257,7 +255,7 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
     rest = measures.rest_error(answer, solution.models[curve.stiffness])
     levels = solution.levels.get(curve.stiffness, [])
     return [
-        Check(
+        _warning(
             "balance residual",
             case,
             measures.residual_error(answer),
@@ -265,25 +263,22 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
             "misfit of contact motion and force at the worst point, evaluated again, relative",
             "that point is off by about this share, beside a contact that changes its state: read "
             "the curve there from its neighbours",
-            fatal=False,
         ),
-        Check(
+        _warning(
             "energy balance",
             case,
             balance,
             _BALANCE,
             "|work - viscous loss - friction| / work",
             "report this scene",
-            fatal=False,
         ),
-        Check(
+        _warning(
             "damper at rest",
             case,
             rest,
             _BALANCE,
             "|mean contact forces - F_C| / F_C",
             "report this scene",
-            fatal=False,
         ),
         *_by_level(curve, levels),
         *_integrated(curve),
@@ -322,7 +317,7 @@ def _by_level(curve: ForcedCurve, levels: list[PeakLevel]) -> list[Check]:
                 changes.append(change if math.isfinite(change) else math.inf)
         if changes:
             says = f"largest change of a peak's height with {last.label}" if last else ""
-            out.append(Check(name, curve.case, max(changes), limit, says, remedy, fatal=False))
+            out.append(_warning(name, curve.case, max(changes), limit, says, remedy))
     return out
 
 
@@ -337,7 +332,7 @@ def _integrated(curve: ForcedCurve) -> list[Check]:
                 )
                 says = "the top of a peak that was not reached"
                 case = replace(curve.case, mode=peak.mode)
-                return [Check(CONFIRMED, case, math.inf, _INTEGRATED, says, remedy, fatal=False)]
+                return [_warning(CONFIRMED, case, math.inf, _INTEGRATED, says, remedy)]
     if not curve.checked:
         return []
     worst = max(curve.checked, key=lambda one: one.difference)
@@ -348,14 +343,13 @@ def _integrated(curve: ForcedCurve) -> list[Check]:
         'sweep as a test does: balance.method = "march"'
     )
     return [
-        Check(
+        _warning(
             CONFIRMED,
             replace(curve.case, mode=worst.mode),
             worst.difference,
             _INTEGRATED,
             "|time integration from the peak's own motion / harmonic balance - 1|",
             remedy,
-            fatal=False,
         )
     ]
 
@@ -367,42 +361,39 @@ def _complete(name: str, found: Performance) -> Check:
         f"the curves at F_C/F_E {at} ended early, so that a higher peak may be missing: raise "
         "performance.lowest"
     )
-    return Check(
+    return _warning(
         "performance complete",
         Case(stiffness=name, name="performance"),
         float(len(lost)),
         0,
         f"of {len(found.points)} curves that ended early",
         remedy,
-        fatal=False,
     )
 
 
 def _march(solution: ForcedSolution, march: TimeMarch) -> Check:
     case = replace(march.curve.case, frequency=march.frequency)
     if not march.verifies:
-        return Check(
+        return _warning(
             "time march",
             case,
             1.0,
             0,
             "time integrations that found no period to compare with",
             f"{march.steady.message}: it verifies nothing; choose another frequency",
-            fatal=False,
         )
     marched = march.accelerance(solution.models[march.curve.stiffness])
     remedy = (
         f"{march.steady.message}; take more harmonics (balance.harmonics), or points that stay "
         "stuck remember another slider start"
     )
-    return Check(
+    return _warning(
         "time march",
         case,
         abs(marched / march.height - 1.0),
         _MARCH,
         "|time integration / harmonic balance - 1|",
         remedy,
-        fatal=False,
     )
 
 
@@ -413,14 +404,13 @@ def _faces_balance(name: str, faces: WholeFaces) -> Check:
     turns = np.array(faces.of.kept) >= 3
     arm = float(np.abs(march.columns[: march.n, turns]).max(initial=1.0))
     size = float(np.abs(march.load).max())
-    return Check(
+    return _warning(
         "static balance",
         Case(stiffness=name, choice=faces.state.name),
         float(np.abs(off / np.where(turns, arm, 1.0)).max() / size),
         BALANCE,
         "|static contact forces - F_C| / F_C, moments by their arms",
         "report this scene",
-        fatal=False,
     )
 
 
@@ -432,16 +422,15 @@ def _sweep_checks(one: SweptCurve) -> list[Check]:
     loss = off / np.where(work > 0.0, work, 1.0)[found.settled]
     lost = int((~found.settled).sum())
     return [
-        Check(
+        _warning(
             "sweep complete",
             one.case,
             float(found.status == "stopped"),
             0,
             "sweeps that stopped early",
             f"{found.message}. What was found is kept",
-            fatal=False,
         ),
-        Check(
+        _warning(
             "sweep settled",
             one.case,
             float(lost),
@@ -449,9 +438,8 @@ def _sweep_checks(one: SweptCurve) -> list[Check]:
             f"of {len(found.settled)} frequencies that did not settle",
             f"{lost} of {len(found.settled)} frequencies did not settle: their amplitudes are "
             "those of the last period",
-            fatal=False,
         ),
-        Check(
+        _warning(
             "sweep energy",
             one.case,
             float(loss.max(initial=0.0)),
@@ -459,19 +447,17 @@ def _sweep_checks(one: SweptCurve) -> list[Check]:
             "|work - damping - friction| / their sum, of a period",
             "the damper rattles on its faces faster than the steps resolve, which damps it: take "
             "more balance.samples",
-            fatal=False,
         ),
     ]
 
 
 def _loss_by_nodes(one: MarchedPeak) -> Check:
     """The losses of all nodes are that of the sweep where the period was read."""
-    return Check(
+    return _warning(
         "loss by nodes",
         one.case,
         one.off,
         _NODES,
         f"|sum over nodes - friction| / work and losses, at {one.frequency:.5g} Hz",
         "a step has two answers there: take more steps (balance.samples)",
-        fatal=False,
     )

@@ -50,6 +50,20 @@ def _accelerances(curve: FrictionCurve) -> Variables:
     }
 
 
+def _contact(state: Array, energy: Array, power: Array) -> Variables:
+    """States (frequency, point, 3) and losses (frequency, point) of contact points."""
+    at = ("frequency", "contact_point")
+    return {
+        "state": (
+            (*at, "state"),
+            state,
+            {"units": "1", "state": "stick slip lift, shares of the cycle"},
+        ),
+        "energy": (at, energy, {"units": "N mm", "long_name": "friction loss per cycle"}),
+        "power": (at, power, {"units": "W"}),
+    }
+
+
 def peak_arrays(name: str, peaks: Sequence[CurvePeak]) -> Variables:
     """Frequencies and heights of the peaks of a curve, no variables when it has none."""
     if not peaks:
@@ -187,7 +201,7 @@ def linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:
 def friction_arrays(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
     """A path of points: accelerance of both blades, states, losses, motion of the damper, loops."""
     answer, model, scene = curve.answer, solution.models[curve.stiffness], solution.plan.scene
-    fp, at = ("frequency", "contact_point"), solution.marked_points(curve)
+    at = solution.marked_points(curve)
     out: Variables = {
         "frequency": (
             ("frequency",),
@@ -202,13 +216,7 @@ def friction_arrays(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
         ),
         **_fold_arrays(curve),
         **_accelerances(curve),
-        "state": (
-            (*fp, "state"),
-            answer.state,
-            {"units": "1", "state": "stick slip lift, shares of the cycle"},
-        ),
-        "energy": (fp, answer.energy, {"units": "N mm", "long_name": "friction loss per cycle"}),
-        "power": (fp, measures.power(answer), {"units": "W"}),
+        **_contact(answer.state, answer.energy, measures.power(answer)),
         "truncation": (("frequency",), answer.truncation, {"units": "1"}),
         "highest_harmonic": (("frequency",), answer.highest_harmonic, {"units": "1"}),
         "periodic": (
@@ -272,20 +280,18 @@ def faces_friction(curve: FacesCurve, at: Sequence[tuple[int, str, int]]) -> Var
         Number, mode and point of its peaks.
     """
     answer, on = curve.answer, ("frequency",)
-    nodes, jumped = ("frequency", "contact_point"), np.zeros(len(curve.frequency), np.int8)
+    jumped = np.zeros(len(curve.frequency), np.int8)
     jumped[list(answer.jumps)] = 1
     loss = np.array([one.loss for one in answer.points])
     out: Variables = {
         "frequency": (on, answer.frequency, HZ | {"status": answer.status}),
         "excitation_force": ((), np.array(curve.force), {"units": "N"}),
         **_accelerances(curve),
-        "state": (
-            (*nodes, "state"),
+        **_contact(
             np.array([one.nodes for one in answer.points])[:, :, [1, 2, 0]],
-            {"units": "1", "state": "stick slip lift, shares of the cycle"},
+            loss,
+            1e-3 * loss * answer.frequency[:, None],
         ),
-        "energy": (nodes, loss, {"units": "N mm", "long_name": "friction loss per cycle"}),
-        "power": (nodes, 1e-3 * loss * answer.frequency[:, None], {"units": "W"}),
         "truncation": (
             on,
             np.array([one.unresolved for one in answer.points]),
@@ -375,7 +381,7 @@ def marched_arrays(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Va
     """States, losses, loops and the damper's motion at peaks of a sweep, in the variables of a path
     by the balance with these points.
     """
-    scene, at, fp = solution.plan.scene, ("frequency",), ("frequency", "contact_point")
+    scene, at = solution.plan.scene, ("frequency",)
     f = np.array([one.frequency for one in found])
     # of a half model each node stands for its image too
     copies = np.array([one.period.copies for one in found])[:, None]
@@ -383,26 +389,10 @@ def marched_arrays(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Va
     out: Variables = {
         "frequency": (at, f, HZ),
         "excitation_force": ((), np.array(found[0].sweep.force), {"units": "N"}),
-        "state": (
-            (*fp, "state"),
-            np.array([one.period.share for one in found]),
-            {"units": "1", "state": "stick slip lift, shares of the cycle"},
+        **_contact(
+            np.array([one.period.share for one in found]), energy, 1e-3 * energy * f[:, None]
         ),
-        "energy": (fp, energy, {"units": "N mm", "long_name": "friction loss per cycle"}),
-        "power": (fp, 1e-3 * energy * f[:, None], {"units": "W"}),
-        "peak": (
-            ("peak",),
-            np.array([one.peak.number for one in found]),
-            {
-                "long_name": "number of the peak's mode",
-                "modes": ", ".join(one.peak.mode for one in found),
-            },
-        ),
-        "peak_index": (
-            ("peak",),
-            np.arange(len(found)),
-            {"long_name": "place of the peak in frequency, from 0"},
-        ),
+        **marked_peaks([(one.peak.number, one.peak.mode, i) for i, one in enumerate(found)]),
     }
     if scene.wants("contact_state"):
         out["share"] = shares_by_face(out["state"][1], found[0].places)

@@ -19,6 +19,7 @@ from upd.analyses.forced.solution import ForcedSolution, MarchedPeak
 from upd.analyses.forced.sweeps import marched_damper, marched_shares
 from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result, withheld
+from upd.scene import ForcedScene
 from upd.scene.forced_contact import SIDES, Side
 
 #: name under which measured peaks are printed: which of a run's peaks each is stands nowhere
@@ -257,27 +258,26 @@ def _at_point(
     solution: ForcedSolution, curve: ForcedCurve, model: Model, at: Case, i: int
 ) -> list[Result]:
     """Contact state, losses and damper motion at point i of the path."""
-    scene, answer, results = solution.plan.scene, curve.answer, []
-    for side, N in measures.static_normal(answer, model, i).items():
-        results.append(Result("static_normal", replace(at, side=side), N, "N"))
-    for side, share in measures.shares(answer, model).items():
-        for name, value in zip(("stick", "slip", "lift"), share[i], strict=True):
-            results.append(
-                Result(f"share_{name}", replace(at, side=side), 100.0 * float(value), "%")
-            )
+    scene, answer = solution.plan.scene, curve.answer
     mean = answer.state[i].mean(axis=0)
-    results += [
-        Result(f"contact_{name}", at, 100.0 * float(value), "%")
-        for name, value in zip(("slip", "lift"), mean[1:], strict=True)
+    results = [
+        *(
+            Result("static_normal", replace(at, side=side), N, "N")
+            for side, N in measures.static_normal(answer, model, i).items()
+        ),
+        *_shares(at, {side: one[i] for side, one in measures.shares(answer, model).items()}),
+        *(
+            Result(f"contact_{name}", at, 100.0 * float(value), "%")
+            for name, value in zip(("slip", "lift"), mean[1:], strict=True)
+        ),
+        *_losses(
+            scene,
+            at,
+            answer.state[i],
+            float(answer.energy[i].sum()),
+            1e3 * float(measures.power(answer)[i].sum()),
+        ),
     ]
-    results.append(Result("friction_energy", at, float(answer.energy[i].sum()), "N mm"))
-    if scene.wants("contact_state"):
-        # Their mean traction remembers where the sliders began.
-        stuck = int((answer.state[i, :, 0] == 1.0).sum())
-        results.append(Result("points_always_stuck", at, float(stuck), ""))
-    if scene.wants("hysteresis"):
-        power = 1e3 * float(measures.power(answer)[i].sum())
-        results.append(Result("friction_power", at, power, "mW"))
     if scene.wants("damper_motion"):
         results += motion_results(at, *measures.damper_motion(answer, model, i))
     return results
@@ -285,19 +285,29 @@ def _at_point(
 
 def _at_marched(solution: ForcedSolution, one: MarchedPeak) -> list[Result]:
     """Contact state of each face, loss and damper motion at a peak of a sweep."""
-    scene, at = solution.plan.scene, one.case
-    results = [Result("friction_energy", at, one.period.energy, "N mm")]
+    scene, at, energy = solution.plan.scene, one.case, one.period.energy
+    results = list(_losses(scene, at, one.period.share, energy, energy * one.frequency))
     if scene.wants("contact_state"):
-        for side, share in zip(SIDES, marched_shares(one), strict=True):
-            results += [
-                Result(f"share_{name}", replace(at, side=side), 100.0 * float(value), "%")
-                for name, value in zip(("stick", "slip", "lift"), share, strict=True)
-            ]
-        stuck = int((one.period.share[:, 0] == 1.0).sum())
-        results.append(Result("points_always_stuck", at, float(stuck), ""))
-    if scene.wants("hysteresis"):
-        # N mm a period to mW
-        results.append(Result("friction_power", at, one.period.energy * one.frequency, "mW"))
+        results += _shares(at, dict(zip(SIDES, marched_shares(one), strict=True)))
     if scene.wants("damper_motion"):
         results += motion_results(at, *marched_damper(solution, one))
     return results
+
+
+def _shares(at: Case, shares: Mapping[Side, Array]) -> Iterator[Result]:
+    """Shares (3,) of the cycle of each face."""
+    for side, share in shares.items():
+        for name, value in zip(("stick", "slip", "lift"), share, strict=True):
+            yield Result(f"share_{name}", replace(at, side=side), 100.0 * float(value), "%")
+
+
+def _losses(
+    scene: ForcedScene, at: Case, state: Array, energy: float, power: float
+) -> Iterator[Result]:
+    """Loss of all points, N mm and mW, and how many of them stick all the time."""
+    yield Result("friction_energy", at, energy, "N mm")
+    if scene.wants("contact_state"):
+        # Their mean traction remembers where the sliders began.
+        yield Result("points_always_stuck", at, float((state[:, 0] == 1.0).sum()), "")
+    if scene.wants("hysteresis"):
+        yield Result("friction_power", at, power, "mW")

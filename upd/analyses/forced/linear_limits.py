@@ -6,6 +6,7 @@ Peaks are sought around their own modes: they do not depend on the frequencies a
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -25,7 +26,7 @@ from upd.analyses.forced.measures import (
     StuckMode,
     chosen_peaks,
 )
-from upd.analyses.forced.mode_peaks import CANDIDATES, ModeShapes, mode_words, numbered
+from upd.analyses.forced.mode_peaks import CANDIDATES, ModeShapes, numbered, shapes_along_x
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.hbm.balance import Balance
@@ -202,15 +203,9 @@ def stuck_modes_of(march: InterfaceModel, below: float) -> ModeShapes:
         Hz; modes above are left out.
     """
     frequency, shapes, tips = stuck_system(march)
-    count, column, number, words = {True: 0, False: 0}, [], [], []
-    for k, mode in enumerate(_told(frequency, tips, below)):
-        if mode.axis == "x":
-            count[mode.in_phase] += 1
-            column.append(k)
-            number.append(2 * count[mode.in_phase] - mode.in_phase)
-            words.append(mode_words(count[mode.in_phase], mode.in_phase))
     rows = march.seen_modes[len(SIDES) :]
-    return ModeShapes(np.eye(len(rows)), rows @ shapes[:, column], tuple(number), tuple(words))
+    found = shapes_along_x(np.eye(len(rows)), shapes, _told(frequency, tips, below))
+    return replace(found, shape=rows @ found.shape)
 
 
 def stuck_peaks_of(

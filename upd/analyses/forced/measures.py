@@ -377,25 +377,24 @@ def rest_error(answer: FrequencyResponse, model: Model) -> float:
     """
     if not len(answer.frequency) or not answer.harmonics.static:
         return 0.0
-    rows = model.damper_rows[:, : 1 + answer.balance.contacts.tangents]
-    total = np.einsum("pdr,npd->nr", rows, answer.contact_force[..., 0])
-    rotation = np.array(model.damper.kept) >= 3
-    arm = np.sqrt(float((rows[:, :, rotation] ** 2).sum(axis=(1, 2)).max()))
-    size = float(np.linalg.norm(model.damper.force))
-    return float(np.abs((total - model.damper.force) / np.where(rotation, arm, 1.0)).max() / size)
+    return _off_balance(model, answer.contact_force[..., 0])
 
 
 def static_error(model: Model) -> float:
     """Largest misfit of the points' static forces and moments on the damper against F_C, relative
     to it (moments by the damper's arms).
     """
-    force = np.column_stack([model.contacts.law.preload, model.traction])
-    rows = model.damper_rows[:, : force.shape[1]]
+    return _off_balance(model, np.column_stack([model.contacts.law.preload, model.traction])[None])
+
+
+def _off_balance(model: Model, force: Array) -> float:
+    """Of contact forces (n, n_point, 1 + d) on the damper against F_C."""
+    rows = model.damper_rows[:, : force.shape[2]]
+    total = np.einsum("pdr,npd->nr", rows, force)
     rotation = np.array(model.damper.kept) >= 3
     arm = np.sqrt(float((rows[:, :, rotation] ** 2).sum(axis=(1, 2)).max()))
-    off = np.einsum("pdr,pd->r", rows, force) - model.damper.force
     size = float(np.linalg.norm(model.damper.force))
-    return float(np.abs(off / np.where(rotation, arm, 1.0)).max() / size)
+    return float(np.abs((total - model.damper.force) / np.where(rotation, arm, 1.0)).max() / size)
 
 
 def residual_error(answer: FrequencyResponse) -> float:
@@ -412,13 +411,13 @@ def residual_error(answer: FrequencyResponse) -> float:
     return worst
 
 
-def static_normal(answer: FrequencyResponse, model: Model, i: int) -> dict[str, float]:
+def static_normal(answer: FrequencyResponse, model: Model, i: int) -> dict[Side, float]:
     """Mean normal force in N on each face at point i of the path."""
     N = answer.contact_force[i, :, 0, 0]
     return {side: float(N[model.face == k].sum()) for k, side in enumerate(SIDES)}
 
 
-def shares(answer: FrequencyResponse, model: Model) -> dict[str, Array]:
+def shares(answer: FrequencyResponse, model: Model) -> dict[Side, Array]:
     """Shares of the cycle in every contact state, averaged over the points of each face by their
     normal stiffness.
 
@@ -428,7 +427,7 @@ def shares(answer: FrequencyResponse, model: Model) -> dict[str, Array]:
         Side -> (n, 3) stick, slip and lift-off along the path.
     """
     w = model.contacts.law.k_n
-    out: dict[str, Array] = {}
+    out: dict[Side, Array] = {}
     for k, side in enumerate(SIDES):
         on = model.face == k
         out[side] = np.einsum("npc,p->nc", answer.state[:, on], w[on] / w[on].sum())

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.measures import ComplexArray, CurvePeak
+from upd.analyses.forced.measures import ComplexArray, CurvePeak, StuckMode
 from upd.analyses.forced.model import Array, Model
 from upd.hbm import FrequencyResponse
 from upd.hbm.contact_points import stuck_stiffness
@@ -64,19 +64,21 @@ class ModeShapes:
 def mode_shapes(model: Model, below: float) -> ModeShapes:
     """The stuck modes along x below ``below`` Hz, numbered by the phase of the tips."""
     M, values, shapes = measures.stuck_shapes(model)
+    return shapes_along_x(M, shapes, measures.tell_modes(model, values, shapes, below))
+
+
+def shapes_along_x(M: Array, shapes: Array, modes: Sequence[StuckMode]) -> ModeShapes:
+    """Of shapes (n, k), the first of which are these modes, those along x, numbered."""
     count, column, number, words = {True: 0, False: 0}, [], [], []
-    for k, mode in enumerate(measures.tell_modes(model, values, shapes, below)):
+    for j, mode in enumerate(modes):
         if mode.axis == "x":
             count[mode.in_phase] += 1
-            column.append(k)
-            number.append(2 * count[mode.in_phase] - mode.in_phase)
-            words.append(mode_words(count[mode.in_phase], mode.in_phase))
+            k = count[mode.in_phase]
+            column.append(j)
+            number.append(2 * k - mode.in_phase)
+            kind = "in phase" if mode.in_phase else "out of phase"
+            words.append(kind + (f" {k}" if k > 1 else ""))
     return ModeShapes(M, shapes[:, column], tuple(number), tuple(words))
-
-
-def mode_words(k: int, in_phase: bool) -> str:
-    """A mode in words: how the tips move, and which of its kind."""
-    return ("in phase" if in_phase else "out of phase") + (f" {k}" if k > 1 else "")
 
 
 def motion_shares(M: Array, motion: ComplexArray, shape: Array) -> Array:
