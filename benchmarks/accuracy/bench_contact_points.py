@@ -21,10 +21,10 @@ import numpy as np
 sys.path.append(str(Path(__file__).parents[1]))
 from rig_response import rig
 
+from upd.analyses.forced.levels import OFF_CONTACT, count_of, times
+from upd.analyses.forced.levels import graded as graded_mesh
 from upd.analyses.forced.linear_limits import linear_limits_of
 from upd.analyses.forced.measures import Unsolved, accelerance, path_maxima
-from upd.analyses.forced.mesh_counts import OFF_CONTACT, count_of, times
-from upd.analyses.forced.mesh_counts import graded as graded_mesh
 from upd.analyses.forced.paths import balance_of, respond
 from upd.scene import load_scene
 

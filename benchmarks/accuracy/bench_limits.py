@@ -24,8 +24,8 @@ from rig_response import Rig, accelerance, rig
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
-from upd.analyses.forced.march_modes import stuck_modes_list
-from upd.analyses.forced.measures import PathPeak
+from upd.analyses.forced.linear_limits import stuck_modes_list
+from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import preloaded
 from upd.analyses.forced.paths import respond
 from upd.analyses.forced.plan import MARCH_SAMPLES
@@ -105,7 +105,7 @@ def curve(built: Rig, ratio: float, **changes: Any) -> FrequencyResponse:
     return respond(built.plan, built.model, force, frequencies, **changes)
 
 
-def peaks(name: str, built: Rig, answer: FrequencyResponse, ratio: float) -> dict[str, PathPeak]:
+def peaks(name: str, built: Rig, answer: FrequencyResponse, ratio: float) -> dict[str, CurvePeak]:
     """In phase and out of phase: Hz and (m/s2)/N of the highest maximum below and above the valley
     between them, climbed to, so that the points of the path do not move it.
     """
@@ -130,7 +130,7 @@ def peaks(name: str, built: Rig, answer: FrequencyResponse, ratio: float) -> dic
     return out
 
 
-def stays(built: Rig, answer: FrequencyResponse, peak: PathPeak, ratio: float) -> str:
+def stays(built: Rig, answer: FrequencyResponse, peak: CurvePeak, ratio: float) -> str:
     """Whether a march from the balance's motion at a peak stays there, in words."""
     force, i = built.plan.scene.damper.centrifugal / ratio, peak.sample
     springs, f = make_springs(built.plan, built.model), float(answer.frequency[peak.sample])

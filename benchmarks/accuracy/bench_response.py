@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.paths import grid
 from upd.analyses.forced.performance import peaks_at
+from upd.analyses.forced.plan import grid
 from upd.hbm import FrequencyResponse, contacts, frequency_response
 from upd.hbm.fourier import analysis, harmonics, synthesis
 from upd.hbm.friction import harmonic_force

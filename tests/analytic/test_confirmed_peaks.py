@@ -14,7 +14,7 @@ from rigs import LINES
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import peaks
 from upd.analyses.forced.curves import ForcedCurve, TimeCheck, Top
-from upd.analyses.forced.mode_peaks import ModePeak
+from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.spring_march import make_springs
 from upd.errors import ConvergenceError
@@ -159,7 +159,9 @@ def confirm(
     answer: Any = SimpleNamespace(
         frequency=f, x=np.arange(len(size), dtype=float)[:, None], balance=None
     )
-    curve = ForcedCurve("own", 1.0, 1.0, answer, dict.fromkeys(SIDES, size.astype(complex)), 0.0)
+    curve = ForcedCurve(
+        "own", 1.0, 1.0, dict.fromkeys(SIDES, size.astype(complex)), {}, {}, answer, 0.0
+    )
     top = int(size.argmax())
 
     def motion(*args: Any) -> np.ndarray | None:
@@ -169,7 +171,7 @@ def confirm(
         return np.array([[height, height], [height, 0.99 * height]]) if good(int(i)) else None
 
     monkeypatch.setattr(peaks, "_stays", motion)
-    peak = ModePeak(1, float(f[top]), float(size[top]), top)
+    peak = CurvePeak(float(f[top]), float(size[top]), top, 1)
     very_top = Top(float(f[top]), float(size[top]), np.array([-1.0]), True)
     nothing: Any = None
     found = peaks._confirmed(nothing, nothing, curve, "right", peak, very_top, 256)

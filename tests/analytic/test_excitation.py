@@ -13,8 +13,7 @@ from upd.analyses import make_plan
 from upd.analyses.forced import measures
 from upd.analyses.forced.excitation import Excitation, excitation_of
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
-from upd.analyses.forced.linear_peaks import linear_peaks
-from upd.analyses.forced.march_modes import linear_curves
+from upd.analyses.forced.linear_limits import linear_curves, linear_peaks
 from upd.analyses.forced.measures import Array, ComplexArray
 from upd.analyses.forced.mode_peaks import tell_stuck_peaks
 from upd.analyses.forced.model import Model, make_model
@@ -136,16 +135,15 @@ def test_the_second_harmonic_is_the_first_of_twice_the_frequency() -> None:
     first, second = excited(ONE, OTHER), excited(*(replace(p, harmonic=2) for p in (ONE, OTHER)))
     one, two = (accelerances(m, f) for m, f in ((first, F), (second, F / 2.0)))
     assert np.abs(one - two).max() < 1e-9 * np.abs(one).max()
-    # with its peaks, its widths, and its place in every number that is read
+    # with its peaks, and its place in every number that is read
     tops = []
     for model, f, k in ((first, F, 1), (second, F / 2.0, 2)):
         found = answer(model, f)
         grid = np.linspace(380.0, 480.0, 101) / k
         (peak,) = linear_peaks(found, model.row("right"), STUCK, grid, True)
         (told,) = tell_stuck_peaks(model, [peak], 480.0)
-        width = measures.half_power_width(found, 1)
         damper = measures.damper_amplitude(found, model)[1]
-        tops.append([k * peak.frequency, peak.height, told.mac, k * width, *damper[[0, 4]]])
+        tops.append([k * peak.frequency, peak.height, told.mac, *damper[[0, 4]]])
     assert tops[1] == pytest.approx(tops[0], rel=1e-6)
 
 

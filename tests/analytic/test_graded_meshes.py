@@ -9,7 +9,7 @@ import pytest
 from rigs import LINES
 
 from upd.analyses.forced.accuracy import ROUNDS
-from upd.analyses.forced.mesh_counts import GRADED, OFF_CONTACT, graded, times
+from upd.analyses.forced.levels import GRADED, OFF_CONTACT, graded, times
 from upd.analyses.levels_choice import Levels
 from upd.fem import Material, mass, stiffness
 from upd.linalg import modes

@@ -10,7 +10,7 @@ from rigs import LINES
 
 from upd.analyses import forced, make_plan
 from upd.analyses.forced.inputs import INPUTS, InputEffect, few_harmonics, input_effects
-from upd.analyses.forced.levels import FoundPeaks, linear_of
+from upd.analyses.forced.peaks_again import FoundPeaks, linear_of
 from upd.analyses.forced.solution import ForcedSolution
 from upd.progress import Stages, silent
 from upd.scene import load_scene

@@ -7,8 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.linear_peaks import finer, linear_modes, linear_peaks
-from upd.analyses.forced.measures import half_power_width
+from upd.analyses.forced.linear_limits import finer, linear_modes, linear_peaks
 from upd.hbm import contacts, frequency_response
 from upd.scene.forced_contact import SIDES
 
@@ -67,39 +66,6 @@ def test_peak_outside_the_sweep_is_none_of_it() -> None:
         [[1.0]], [[C]], [[1.0]], slider, harmonic_force=[F], frequencies=grid, harmonics=(1,)
     )
     assert linear_peaks(answer, ROW, F, grid, False) == []
-
-
-def test_width_is_that_of_the_viscous_loss_where_all_sticks() -> None:
-    slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=2.0, mu=1.0, preload=1e6)
-    grid = np.linspace(0.2, 0.4, 5)
-    answer = frequency_response(
-        [[1.0]], [[C]], [[1.0]], slider, harmonic_force=[F], frequencies=grid, harmonics=(1,)
-    )
-    # 2 zeta w0 / (2 pi) = c / (2 pi m), wherever the point lies
-    widths = [half_power_width(answer, i) for i in range(len(answer.frequency))]
-    assert widths == pytest.approx([C / (2.0 * np.pi)] * len(widths), rel=1e-9)
-
-
-def test_width_holds_the_loss_of_a_slider() -> None:
-    limit, stiffness = np.pi / 2.0, 1.0
-    slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=stiffness, mu=1.0, preload=limit)
-    grid = np.array([0.9, 1.0, 1.1]) * np.sqrt(1.5) / (2.0 * np.pi)
-    answer = frequency_response(
-        [[1.0]],
-        [[0.0]],
-        [[1.0]],
-        slider,
-        harmonic_force=[1.0],
-        frequencies=grid,
-        harmonics=(1,),
-        samples=1024,
-    )
-    i = int(np.argmax(answer.amplitude(ROW)))
-    f, A = float(answer.frequency[i]), float(answer.amplitude(ROW)[i])
-    assert limit / stiffness < A, "it slides"
-    loss = 4.0 * limit * (A - limit / stiffness)
-    energy = 0.5 * (2.0 * np.pi * f * A) ** 2
-    assert half_power_width(answer, i) == pytest.approx(f * loss / (2.0 * np.pi * energy), rel=1e-3)
 
 
 def test_a_light_shape_far_above_does_not_turn_modes_across_the_blades() -> None:

@@ -15,16 +15,16 @@ from rigs import state_of
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import measures
 from upd.analyses.forced.interface_model import by_coulomb
-from upd.analyses.forced.marched_peaks import (
-    marched_damper,
-    marched_loops,
-    marched_shares,
-)
 from upd.analyses.forced.output import arrays
 from upd.analyses.forced.paths import respond
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution, MarchedPeak
 from upd.analyses.forced.spring_march import make_springs
+from upd.analyses.forced.sweeps import (
+    marched_damper,
+    marched_loops,
+    marched_shares,
+)
 from upd.hbm.interface_march import InterfaceMarch
 from upd.hbm.interface_record import period_of_sweep, recorded_period
 from upd.hbm.interface_step import OPEN, SLIP, STICK

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from upd.analyses.forced.measures import path_maxima
+from upd.analyses.forced.measures import CurvePeak, path_maxima
 from upd.analyses.forced.mode_peaks import (
-    ModePeak,
     ModeShapes,
     in_quadrature,
     motion_shares,
@@ -26,7 +25,7 @@ SHAPE = np.array([[1.0, 1.0], [0.5, -0.5]]) / np.sqrt(2.0)
 MODES = ModeShapes(M, SHAPE, (1, 2), ("in phase", "out of phase"))
 
 
-def peaks(in_phase: float, out_of_phase: float) -> list[ModePeak]:
+def peaks(in_phase: float, out_of_phase: float) -> list[CurvePeak]:
     """Peaks of the driven mass; the natural frequencies in Hz, with 0.5 % modal damping."""
     f = np.linspace(80.0, 120.0, 4001)
     w, own = 2 * np.pi * f[:, None], 2 * np.pi * np.array([in_phase, out_of_phase])

@@ -5,6 +5,7 @@ made of nothing.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,24 +13,18 @@ import pytest
 from rigs import LINES
 
 from upd.analyses import forced, make_plan
+from upd.analyses.forced import levels
 from upd.analyses.forced import solve as solving
 from upd.analyses.forced.curves import Top
 from upd.analyses.forced.estimates import bound, estimate
-from upd.analyses.forced.levels import (
-    HARMONICS,
-    MESH,
-    MODES,
-    POINTS,
-    SAMPLES,
-    PeakLevel,
-    carried,
-    moved_points,
-)
+from upd.analyses.forced.levels import HARMONICS, MESH, MODES, POINTS, SAMPLES, PeakLevel
 from upd.analyses.forced.model import make_model
 from upd.analyses.forced.peaks import climbed
+from upd.analyses.forced.peaks_again import carried, moved_points
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import make_bodies
+from upd.errors import ConvergenceError
 from upd.hbm import climb, contacts, frequency_response
 from upd.progress import Stages, silent
 from upd.results import ErrorPart, Estimates, Result
@@ -233,6 +228,36 @@ def test_where_all_sticks_the_peak_is_that_of_the_linear_answer(sticking: Found)
     assert not top_of(sticking).slips
     # nothing slips: neither harmonics nor samples leave anything
     assert set(parts_of(sticking, "peak_2_accelerance")) == {MESH, MODES, POINTS}
+
+
+def test_a_level_that_fails_leaves_only_its_part(
+    slipping: Found, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The run goes on, and says why this part of the error is not known."""
+
+    def fails(*_: Any, **__: Any) -> Any:
+        raise ConvergenceError("no motion was found")
+
+    solution, numbers, estimates = slipping
+    (name, known), (peaks, *_) = next(iter(solution.levels.items())), solution.searched.values()
+    for function in ("found_again", "peak_on"):
+        monkeypatch.setattr(levels, function, fails)
+    model = levels.MadeModel(MODES, "2 modes a blade", 2.0, peaks.model, 0.0)
+    failed = {
+        HARMONICS: levels.balance_level(peaks, HARMONICS, 2, 1),
+        MODES: levels.model_level(peaks, model),
+    }
+    mixed = [failed.get(one.source, one) for one in known]
+    again = estimate(replace(solution, levels={name: mixed}), numbers, Stages(silent))
+    one = number(slipping, "peak_2_accelerance")
+    was, now = ({p.source: p for p in found[one.name, one.case]} for found in (estimates, again))
+    for source, part in now.items():
+        if source in failed:
+            assert math.isnan(part.error)
+            assert part.basis == "not estimated: no motion was found"
+        else:
+            assert part == was[source]
+    assert set(now) == set(was)
 
 
 def test_a_wanted_accuracy_unknown_solves_no_level(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ from rigs import LINES, state_of
 
 from upd.analyses import forced, make_plan
 from upd.analyses.forced.interface_model import by_coulomb
-from upd.analyses.forced.march_modes import stuck_modes_of
+from upd.analyses.forced.linear_limits import stuck_modes_of
 from upd.analyses.forced.mode_peaks import stuck_motion
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.spring_march import make_springs, spring_march

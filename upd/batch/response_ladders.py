@@ -16,7 +16,7 @@ from functools import partial
 from typing import Any
 
 from upd.analyses.cost import NODES
-from upd.analyses.forced.mesh_counts import FACES, count_of
+from upd.analyses.forced.levels import FACES, count_of
 from upd.batch.ladder import Counts, Ladder, Levels, no_levels, refinements
 from upd.batch.study_point import Settings, StudyPoint
 from upd.errors import InputError

@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.input_data import DataChange
-from upd.analyses.forced.mode_peaks import ModePeak, numbered_peaks
+from upd.analyses.forced.input_uncertainty import DataChange
+from upd.analyses.forced.measures import CurvePeak
+from upd.analyses.forced.mode_peaks import numbered_peaks
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.paths import balance_of, fine_grid, quiet, respond
 from upd.analyses.forced.plan import ForcedPlan
@@ -286,7 +287,7 @@ class FollowedCurve:
         model: Model,
         answer: FrequencyResponse,
         key: PeakKey,
-        peak: ModePeak | None,
+        peak: CurvePeak | None,
     ) -> tuple[Array, float, float]:
         side, number = key
         name = f"{'left_' * (side == 'left')}peak_{number}@{self.ratio:g}"

@@ -13,17 +13,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.forced.linear_peaks import linear_peaks
+from upd.analyses.forced.linear_limits import linear_peaks
 from upd.analyses.forced.linear_sensitivity import (
     limit_peak,
     linear_system,
     stuck_frequencies,
 )
-from upd.analyses.forced.measures import Unsolved
-from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, tell_stuck_peaks, unmoved
+from upd.analyses.forced.measures import CurvePeak, Unsolved
+from upd.analyses.forced.mode_peaks import CANDIDATES, tell_stuck_peaks, unmoved
 from upd.analyses.forced.model import Model
-from upd.analyses.forced.paths import balance_of, grid
-from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.paths import balance_of
+from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.errors import ConvergenceError
 from upd.fitting.targets import PEAK_NUMBERS, STUCK_MODES, FitTarget
 from upd.hbm.parameter_change import ParameterChange
@@ -51,7 +51,7 @@ class LimitNumbers:
     def __init__(self, plan: ForcedPlan, model: Model, changes: Sequence[ParameterChange]) -> None:
         self.plan, self.model, self.changes = plan, model, changes
         self._modes: dict[str, tuple[float, Array]] | None = None
-        self._peaks: dict[tuple[str, Side], list[ModePeak]] = {}
+        self._peaks: dict[tuple[str, Side], list[CurvePeak]] = {}
 
     def __call__(self, of: str) -> tuple[float, Array]:
         """A number and its changes.
@@ -176,7 +176,7 @@ def limit_curve(
     return np.concatenate(value), np.concatenate(slope)
 
 
-def _peaks(plan: ForcedPlan, model: Model, stuck: bool, side: Side) -> list[ModePeak]:
+def _peaks(plan: ForcedPlan, model: Model, stuck: bool, side: Side) -> list[CurvePeak]:
     if not stuck and side not in model.excitation.free_blades:
         return []
     force = plan.scene.damper.centrifugal

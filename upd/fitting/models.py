@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from upd.analyses import make_plan
 from upd.analyses.base import InputEnds
-from upd.analyses.forced.input_data import DataChange, data_change, is_known
+from upd.analyses.forced.input_uncertainty import DataChange, data_change, is_known
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.stiffness import FaceLaw, face_laws

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.forced.input_data import DataChange
+from upd.analyses.forced.input_uncertainty import DataChange
 from upd.fitting.followed import FollowedCurve, FollowedMemory, PeakKey, PeakWithChanges
 from upd.fitting.journal import Journal
 from upd.fitting.limits import limit_curve, limit_numbers

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.forced.peak_results import LEFT
+from upd.analyses.forced.mode_peaks import LEFT
 from upd.errors import InputError
 from upd.measured import MeasuredCurve, read_measured
 from upd.scene import ForcedScene

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from upd.analyses import make_plan
 from upd.analyses.base import InputEnds
 from upd.analyses.forced import measures
-from upd.analyses.forced.input_data import data_change, is_known
-from upd.analyses.forced.linear_peaks import QUARTER, linear_modes, linear_peaks
-from upd.analyses.forced.measures import Unsolved
-from upd.analyses.forced.mode_peaks import ModePeak, numbered_peaks, tell_stuck_peaks
+from upd.analyses.forced.input_uncertainty import data_change, is_known
+from upd.analyses.forced.linear_limits import QUARTER, linear_modes, linear_peaks
+from upd.analyses.forced.measures import CurvePeak, Unsolved
+from upd.analyses.forced.mode_peaks import numbered_peaks, tell_stuck_peaks
 from upd.analyses.forced.model import Model, make_model
-from upd.analyses.forced.paths import balance_of, grid, path_settings, respond
-from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.paths import balance_of, path_settings, respond
+from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.analyses.forced.statics import static_state
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
@@ -273,7 +273,7 @@ class RigPeaks:
         self.resumed = len(points)
 
 
-def _seen(answer: FrequencyResponse, peak: ModePeak) -> SeenPeak:
+def _seen(answer: FrequencyResponse, peak: CurvePeak) -> SeenPeak:
     """A peak of a curve, whose top is not beyond the points of the path beside it."""
     k = peak.sample
     beside = answer.frequency[max(k - _BESIDE, 0) : k + _BESIDE + 1]

@@ -289,6 +289,23 @@ def test_the_page_opens_on_a_curve_on_which_something_slips(arrays: dict[str, Gr
     assert [one["case_fields"]["force_ratio"] for one in both] == [194.0]
 
 
+def test_charts_of_contact_and_damper_open_on_the_lowest_ratio_that_slips(
+    arrays: dict[str, Group],
+) -> None:
+    """194 slips; 600, first in the scene, slips too; 100 does not."""
+    more, stuck = (friction(np.linspace(290.0, 300.0, 4)) for _ in range(2))
+    stuck["state"] = values(
+        np.tile([1.0, 0.0, 0.0], (4, 4, 1)), "frequency", "contact_point", "state"
+    )
+    more.attributes, stuck.attributes = CURVE | {"force_ratio": 600.0}, CURVE | {"force_ratio": 100}
+    found = forced.ANALYSIS.charts({"more": more, "stuck": stuck} | arrays, {})
+    first = {c.title: c for c in reversed(found)}
+    for title in ("Damper motion: translation", "Contact state", "Hysteresis"):
+        assert first[title].case.startswith("own, F_C/F_E 194"), title
+    cases = [c.case for c in found if c.title == "Damper motion: translation"]
+    assert cases == [f"own, F_C/F_E {ratio}" for ratio in (194, 600, 100)]
+
+
 def test_where_nothing_slides_the_first_curve_stands_for_all(arrays: dict[str, Group]) -> None:
     first = arrays["friction own, F_C per F_E 194"]
     first["state"] = values(

@@ -13,13 +13,12 @@ import pytest
 from upd.analyses import forced, make_plan, modal
 from upd.analyses.base import Resolved
 from upd.analyses.forced.levels import HARMONICS, SAMPLES
-from upd.analyses.forced.marched_peaks import marched_peak
 from upd.analyses.forced.measures import accelerance, residual_error
 from upd.analyses.forced.performance import Performance, RatioPoint, of_curve
 from upd.analyses.forced.solution import ForcedSolution, TimeMarch
 from upd.analyses.forced.spring_march import make_springs
 from upd.analyses.forced.statics import StaticState
-from upd.analyses.forced.sweeps import both_ways
+from upd.analyses.forced.sweeps import both_ways, marched_peak
 from upd.analyses.modal.solve import ModalSolution, modal_error
 from upd.hbm.march import steady_state
 from upd.progress import Stages, silent
@@ -337,7 +336,7 @@ def test_no_smaller_number_stands_for_one_not_reached(response: ForcedSolution) 
     curve = response.curves[0]
     (peak,) = curve.peaks["right"]
     part = _points(response, slice(peak.sample - 3))
-    none = RatioPoint(250.0, (), True, 0.0)
+    none = RatioPoint(250.0, (), True)
     performance = replace(response.performances["thesis"], points=(none,))
     bare = replace(part.curves[0], peaks={"left": (), "right": ()}, tops={}, checked=(), folds=())
     part = replace(part, curves=[bare], sweeps=[], marched=[])

@@ -73,7 +73,7 @@ def test_points_that_are_not_periodic_are_counted() -> None:
     answer: Any = SimpleNamespace(
         periodic=np.array([True, False, True, False]), frequency=np.arange(4.0), arrived=True
     )
-    curve = ForcedCurve("own", 60.0, 1.0, answer, {}, 0.0)
+    curve = ForcedCurve("own", 60.0, 1.0, {}, {}, {}, answer, 0.0)
     check = checks._path(curve)
     assert check.value == 2
     assert not check.passed

@@ -16,7 +16,6 @@ from upd.analyses.forced import (
     charts,
     checks,
     estimates,
-    input_cost,
     input_uncertainty,
     output,
     plan,
@@ -57,7 +56,7 @@ ANALYSIS = Analysis(
     answer=answer.answer,
     verdict_names=("best_peak", "reduction_of_free_peak"),
     input_changes=input_uncertainty.input_changes,
-    known_inputs=input_cost.known_inputs,
+    known_inputs=input_uncertainty.known_inputs,
     coarsened=lambda plan: coarsened_rig(plan, ("response",), ("balance.method", "balance")),
     estimate=estimates.estimate,
 )

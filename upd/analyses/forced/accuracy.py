@@ -12,8 +12,7 @@ from dataclasses import replace
 from upd.analyses import accuracy_rounds
 from upd.analyses.accuracy_rounds import AT_BEST, Rounds, Setting, mesh_falls
 from upd.analyses.forced.estimates import estimate
-from upd.analyses.forced.levels import HARMONICS, MESH, MODES, POINTS, SAMPLES
-from upd.analyses.forced.mesh_counts import RECIPE, graded
+from upd.analyses.forced.levels import HARMONICS, MESH, MODES, POINTS, RECIPE, SAMPLES, graded
 from upd.analyses.forced.plan import ForcedPlan, make_plan, time_steps
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution

@@ -3,35 +3,288 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from upd.analyses.forced.array_parts import FRICTION, LINEAR, MARCHED, MEASURED, POINTS, SWEEP
-from upd.analyses.forced.chart_parts import (
-    BLADES,
-    MOTIONS,
-    PER_N,
-    SHEET,
-    SLIP_SHARE,
-    ChartedCurve,
-    charted_peaks,
+from upd.analyses.forced.curve_arrays import (
+    FRICTION,
+    LINEAR,
+    MARCHED,
+    MEASURED,
+    PERFORMANCE,
+    POINTS,
+    SWEEP,
 )
-from upd.analyses.forced.contact_charts import (
-    contact_map,
-    loops_chart,
-    loss_chart,
-    motion_chart,
-    shares_chart,
-    turn_chart,
-)
-from upd.analyses.forced.performance_chart import performance_charts
 from upd.analyses.measured.charts import damping_charts, measured_traces
-from upd.plot.chart import Array, Arrays, Axis, Band, Chart, Group, Mark, Style, Trace
-from upd.plot.common import case_of, frequency_of, magnitude, scalar, with_content
+from upd.plot.chart import Area, Array, Arrays, Axis, Band, Chart, Group, Mark, Pies, Style, Trace
+from upd.plot.common import UM, case_of, frequency_of, magnitude, scalar, with_content
 from upd.results import Case
 from upd.scene.forced_contact import SIDES
+
+#: the blade that is excited first
+BLADES = ("right", "left")
+#: shares of the cycle, in the order of the variables
+SHARES = ("stick", "slip", "lift-off")
+STICK_SHARE, SLIP_SHARE = 0, 1
+PER_N = "(m/s²)/N"
+HZ_AXIS = Axis("frequency", "Hz")
+SHEET: dict[str, Any] = {"columns": 2, "size": (6.4, 4.4)}
+#: name, unit, scale, first degree of freedom and names of the damper's motions
+MOTIONS = (
+    ("translation", "µm", 1e3, 0, ("x, across the blades", "y, along the damper", "z, radial")),
+    ("rotation", "mrad", 1e3, 3, ("about x", "about y", "about z")),
+)
+#: ticks of a path that turns back
+PATH_TICKS = 6
+
+
+@dataclass(frozen=True)
+class ChartedCurve:
+    """A curve with friction and its colour, one for every F_C/F_E."""
+
+    group: Group
+    case: Case
+    colour: int
+
+    def data(self, name: str) -> NDArray[Any]:
+        """A variable."""
+        return np.asarray(self.group[name].data)
+
+    @property
+    def frequency(self) -> Array:
+        """Hz, along the path."""
+        return frequency_of(self.group)
+
+    @property
+    def slips(self) -> bool:
+        """Whether a contact point slips anywhere on it."""
+        return bool(self.data("state")[..., SLIP_SHARE].max() > 0.0)
+
+    @property
+    def moves(self) -> bool:
+        """Whether a contact point slips or lifts off anywhere on it."""
+        return bool(self.data("state")[..., STICK_SHARE].min() < 1.0)
+
+    @property
+    def told(self) -> tuple[str, float | None]:
+        """Stiffness and F_C/F_E."""
+        return self.case.stiffness, self.case.force_ratio
+
+
+@dataclass(frozen=True)
+class ChartedPeak:
+    """A peak of a curve: its number and its place on the path, its mode where it is told."""
+
+    curve: ChartedCurve
+    number: int
+    index: int
+    mode: str = ""
+
+    @property
+    def case(self) -> Case:
+        """The curve's, at the peak."""
+        given = self.curve.case.given() | {"peak": self.number, "mode": self.mode}
+        return replace(Case(**given), choice="")
+
+    def moves(self, points: Group, side: int) -> bool:
+        """Whether a contact point of a face slips or lifts off."""
+        stick = self.curve.data("state")[self.index, :, STICK_SHARE]
+        return bool((stick[np.asarray(points["face"].data) == side] < 1.0).any())
+
+    @property
+    def detail(self) -> str:
+        """Where it lies, and the sweep that tells it where that is no balance."""
+        words = [f"{self.curve.frequency[self.index]:.1f} Hz"]
+        if self.curve.case.choice:
+            words = ["time integration", self.curve.case.choice, *words]
+        return ", ".join(words)
+
+
+def charted_peaks(curve: ChartedCurve) -> list[ChartedPeak]:
+    """The peaks of a curve."""
+    numbers, index = curve.data("peak"), curve.data("peak_index")
+    told = str(curve.group["peak"].attributes.get("modes", ""))
+    modes = told.split(", ") if told else [""] * len(numbers)
+    return [
+        ChartedPeak(curve, int(number), int(i), mode)
+        for number, i, mode in zip(numbers, index, modes, strict=True)
+    ]
+
+
+def shares_chart(curve: ChartedCurve, k: int) -> Chart:
+    """Share of the cycle that one face sticks, slips and is lifted off, stacked over frequency."""
+    share, f = 100.0 * curve.data("share")[:, k], curve.frequency
+    top = np.cumsum(share, axis=1)
+    steps = np.diff(f)
+    turns = not ((steps > 0.0).all() or (steps < 0.0).all())
+    # A path that turns back has several states at one frequency: they are drawn one after the
+    # other.
+    place = np.arange(len(f), dtype=float)
+    x = place if turns else f
+    # A path of one point has no ends.
+    low, high = (float(x[[0, -1]].min()), float(x[[0, -1]].max())) if len(f) > 1 else (None, None)
+    axis = Axis("frequency", "Hz", low=low, high=high)
+    if turns:
+        ticks = tuple(
+            (float(at), f"{np.interp(at, place, f):.1f}")
+            for at in np.linspace(0, len(f) - 1, PATH_TICKS)
+        )
+        axis = Axis("frequency along the path", "Hz", low=low, high=high, ticks=ticks)
+    areas = tuple(
+        Area(state, x, top[:, j] - share[:, j], top[:, j], j, state)
+        for j, state in enumerate(SHARES)
+    )
+    y, case = Axis("share of the cycle", "%", low=0.0, high=100.0), f"{curve.case}, {SIDES[k]} face"
+    return Chart("Contact state", axis, y, areas=areas, case=case, figure="contact_state", **SHEET)
+
+
+def contact_map(at: ChartedPeak, points: Group, k: int) -> Chart:
+    """Contact points of one face at a peak.
+
+    Sectors of stick, slip and lift-off, size by the friction loss.
+    """
+    on, energy = np.asarray(points["face"].data) == k, at.curve.data("energy")[at.index]
+    # Of all points, so that rounding on a face that sticks does not show.
+    most = float(energy.max())
+    size = np.maximum(energy[on], 0.0) / most if most > 0.0 else np.zeros(int(on.sum()))
+    y, up = (np.asarray(points[name].data)[on] for name in ("along", "up"))
+    pies = Pies(y, up, at.curve.data("state")[at.index][on], size, SHARES, "friction loss")
+    axes = (Axis("along the damper y", "mm"), Axis("up the slope", "mm"))
+    case = f"{at.case}, {SIDES[k]} face"
+    return Chart(
+        "Contact points at the peak",
+        *axes,
+        pies=(pies,),
+        case=case,
+        figure="contact_map",
+        detail=at.detail,
+        **SHEET,
+    )
+
+
+def loops_chart(at: ChartedPeak) -> Chart:
+    """Hysteresis loops of the points that lose most at a peak."""
+    curve = at.curve
+    traces: list[Trace] = []
+    for one in np.flatnonzero(curve.data("loop_peak") == at.number):
+        side, y, up, energy = (
+            curve.data(f"loop_{name}")[one] for name in ("side", "along", "up", "energy")
+        )
+        label = f"{SIDES[side]}, y {y + 0.0:.1f}, up {up:.1f} mm: {energy:.3g} N mm"
+        d, T = (
+            np.append(loop, loop[:1])
+            for loop in (curve.data("loop_displacement")[one], curve.data("loop_traction")[one])
+        )
+        traces.append(Trace(label, UM * d, T, "line", len(traces)))
+    axes = (Axis("sliding displacement", "µm"), Axis("friction force", "N"))
+    return Chart(
+        "Hysteresis",
+        *axes,
+        tuple(traces),
+        case=at.case.label,
+        figure="hysteresis",
+        detail=at.detail,
+        **SHEET,
+    )
+
+
+def loss_chart(curves: Sequence[ChartedCurve]) -> Chart:
+    """Friction loss of all points over frequency."""
+    traces = tuple(
+        Trace(c.case.label, c.frequency, 1e3 * c.data("power").sum(axis=1), "line", k)
+        for k, c in enumerate(curves)
+    )
+    return Chart("Friction loss", HZ_AXIS, Axis("power of all contact points", "mW"), traces)
+
+
+def motion_chart(curve: ChartedCurve, kind: int) -> Chart:
+    """The damper's degrees of freedom over frequency: amplitudes of the first harmonic."""
+    name, unit, scale, first, names = MOTIONS[kind]
+    amplitude = scale * curve.data("damper_amplitude")[:, first : first + 3]
+    # Motions that symmetry forbids are rounding.
+    shown = [
+        k
+        for k in range(3)
+        if amplitude[:, k].max() > np.sqrt(np.finfo(float).eps) * amplitude.max()
+    ]
+    traces = tuple(Trace(names[k], curve.frequency, amplitude[:, k], "line", k) for k in shown)
+    y = Axis(f"{name}, first harmonic", unit)
+    return Chart(
+        f"Damper motion: {name}",
+        HZ_AXIS,
+        y,
+        traces,
+        case=curve.case.label,
+        figure="damper_motion",
+        **SHEET,
+    )
+
+
+def turn_chart(at: ChartedPeak, kind: int) -> Chart:
+    """The damper's degrees of freedom over a period at a peak, about their means."""
+    name, unit, scale, first, names = MOTIONS[kind]
+    motion = scale * at.curve.data("damper_motion")[at.index, first : first + 3]
+    motion = motion - motion.mean(axis=1, keepdims=True)
+    size = np.abs(motion).max(axis=1)
+    # Motions that symmetry forbids are rounding.
+    shown = np.flatnonzero(size > np.sqrt(np.finfo(float).eps) * size.max())
+    turn = np.arange(1, motion.shape[1] + 1) / motion.shape[1]
+    traces = tuple(Trace(names[k], turn, motion[k], "line", int(k)) for k in shown)
+    return Chart(
+        f"Damper motion over a period: {name}",
+        Axis("time in periods", low=0.0, high=1.0),
+        Axis(f"{name} about its mean", unit),
+        traces,
+        case=at.case.label,
+        figure="damper_period",
+        detail=at.detail,
+        **SHEET,
+    )
+
+
+_STAR = 5
+#: curves at most: the highest of all and of single modes
+_MOST = 3
+
+
+def performance_charts(arrays: Arrays) -> list[Chart]:
+    """Peaks of both blades over F_C/F_E, one chart for every stiffness."""
+    return [
+        _chart(group) for group in with_content(arrays, PERFORMANCE) if group["ratio"].data.size
+    ]
+
+
+def _chart(group: Group) -> Chart:
+    ratio = np.asarray(group["ratio"].data, float)
+    traces = [
+        Trace(
+            "highest of all", ratio, np.asarray(group["highest_accelerance"].data, float), "line", 0
+        )
+    ]
+    names = [key for key in group if key.startswith("peak_") and key.endswith("_right")]
+    for name in sorted(key for key in names if "accelerance" in key):
+        mode = str(group[name].attributes.get("mode", ""))
+        height, colour = np.asarray(group[name].data, float), len(traces)
+        found = np.isfinite(height)
+        if found.sum() > 1 and len(traces) < _MOST:
+            label = f"right blade, {mode}"
+            traces.append(Trace(label, ratio[found], height[found], "both", colour))
+    ends = np.array([ratio.min(), ratio.max()])
+    styles: tuple[tuple[str, Style], ...] = (("free", "dashed"), ("stuck", "dashdot"))
+    for kind, style in styles:
+        limit = np.full(2, float(group[f"{kind}_peak"].data))
+        traces.append(Trace(kind, ends, limit, style, closed=True))
+    if "best_ratio" in group:
+        best, least = (float(group[f"best_{name}"].data) for name in ("ratio", "accelerance"))
+        label = f"best, F_C/F_E {best:.3g}"
+        traces.append(Trace(label, np.array([best]), np.array([least]), "star", _STAR))
+    axis = Axis("F_C/F_E", log=True)
+    case = f"stiffness {group.attributes['stiffness']}"
+    y = Axis("peak accelerance", PER_N, log=True)
+    return Chart("Performance", axis, y, tuple(traces), case=case, figure="performance", **SHEET)
 
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
@@ -46,8 +299,10 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
         [ChartedCurve(g, case_of(g), ratios.index(g.attributes["force_ratio"])) for g in some]
         for some in (groups, others)
     )
-    peaks = [one for c in (*curves, *marched) if "peak" in c.group for one in charted_peaks(c)]
-    moving = [c for c in curves if c.moves] or curves[:1]
+    # the page opens on the lowest F_C/F_E on which something slips
+    shown, shown_marched = (sorted(some, key=_rank) for some in (curves, marched))
+    peaks = [one for c in (*shown, *shown_marched) if "peak" in c.group for one in charted_peaks(c)]
+    moving = [c for c in shown if c.moves] or shown[:1]
     sliding = [
         one for one in peaks if one.curve.data("state")[one.index, :, SLIP_SHARE].max() > 0.0
     ] or peaks[:1]
@@ -74,7 +329,7 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
         *([loss_chart(rubbed)] if rubbed else []),
         *(
             motion_chart(c, k)
-            for c in curves
+            for c in shown
             if "damper_amplitude" in c.group
             for k in range(len(MOTIONS))
         ),
@@ -85,6 +340,11 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
             for k in range(len(MOTIONS))
         ),
     ]
+
+
+def _rank(curve: ChartedCurve) -> tuple[bool, float]:
+    """Curves on which something slips first, by rising F_C/F_E."""
+    return not curve.slips, float(curve.case.force_ratio or 0.0)
 
 
 def _responses(

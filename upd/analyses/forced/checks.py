@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, SweptCurve, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
-from upd.analyses.forced.faces_checks import check_faces_curve
 from upd.analyses.forced.levels import HARMONICS, SAMPLES, PeakLevel
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.performance import Performance
@@ -21,8 +21,106 @@ from upd.analyses.forced.solution import ForcedSolution, MarchedPeak, TimeMarch
 from upd.analyses.forced.statics import BALANCE, StaticState
 from upd.analyses.forced.sweeps import TOLERANCE
 from upd.analyses.measured import fit_checks
+from upd.hbm.adaptive import TRUNCATION
 from upd.results import Case, Check
 from upd.scene.forced_contact import SIDES
+
+#: what may be left of the equations, over what they are made of: the corrections of Newton's method
+#: end at 1e-6 of the unknowns, and what they leave is of their square
+_RESIDUAL = 1e-6
+#: what the samples of a period may lose of its energy: slips are weighted with the mean of the
+#: forces at the ends of a step, so that it closes with the square of the step
+_ENERGY = 1e-2
+#: motion of the faces by blades' harmonics left out before a warning
+_LEFT_OUT = 10.0 * TRUNCATION
+#: largest step of a path at a peak, in half-power widths: of one mode two points or more then lie
+#: within them, and the highest is at most 1 - 1/sqrt(1 + 1/4), 11 %, below the peak between them
+WIDEST_STEP = 0.5
+
+
+def check_faces_curve(curve: FacesCurve, points: int, harmonic: int) -> list[Check]:
+    """What is left of the equations and of a period's energy, harmonics left out, steps at peaks.
+
+    Parameters
+    ----------
+    points
+        Frequencies asked for.
+    harmonic
+        That is read.
+    """
+    answer, case = curve.answer, curve.case
+    work = np.abs(answer.energy).sum(axis=1)
+    off = np.abs(answer.energy[:, 0] - answer.energy[:, 1:].sum(axis=1))
+    loss = off / np.where(work > 0.0, work, 1.0)
+    residual = [one.residual for one in answer.points]
+    left_out = [one.unresolved for one in answer.points]
+    highest = answer.equations.highest
+    return [
+        _warning(
+            "balance residual",
+            case,
+            float(max(residual)),
+            _RESIDUAL,
+            "misfit of blades' forces, slips and damper's motion of a period, relative",
+            "report this scene",
+        ),
+        _warning(
+            "energy balance",
+            case,
+            float(loss.max()),
+            _ENERGY,
+            "|work - damping - friction| / their sum, of a period",
+            "take more samples: balance.samples",
+        ),
+        _warning(
+            "truncation",
+            case,
+            float(max(left_out)),
+            _LEFT_OUT,
+            f"motion of the faces by blades' harmonics above {highest}, relative",
+            f"take more: balance.harmonics = {highest + 2}",
+        ),
+        *_step(curve, points, harmonic),
+    ]
+
+
+def _step(curve: FacesCurve, points: int, harmonic: int) -> list[Check]:
+    """The steps beside the right blade's peaks against their widths."""
+    f, steps = curve.frequency, {}
+    for peak in curve.peaks["right"]:
+        beside = np.diff(f[max(peak.sample - 1, 0) : peak.sample + 2])
+        # one that a jump ends lies on its point
+        if len(beside) == 2 and not {peak.sample - 1, peak.sample} & set(curve.answer.jumps):
+            steps[peak] = float(beside.max()) / half_power_width(curve, peak.sample, harmonic)
+    if not steps:
+        return []
+    widest = max(steps, key=lambda peak: steps[peak])
+    more = math.ceil((points - 1) * steps[widest] / WIDEST_STEP) + 1
+    return [
+        _warning(
+            "frequency step",
+            curve.case,
+            steps[widest],
+            WIDEST_STEP,
+            "largest step at a peak over its half-power width",
+            f"peak {widest.number} at {widest.frequency:.4g} Hz lies between points too far apart "
+            f"for its height; take more: excitation.points = {more}",
+        )
+    ]
+
+
+def half_power_width(curve: FacesCurve, i: int, harmonic: int) -> float:
+    """Of a resonance of a harmonic at point i, Hz: f eta with the loss factor eta = lost / (2 pi E)
+    of one of its cycles.
+
+    E is the largest kinetic energy of the blades, 1/2 omega^2 sum |q|^2 in mass-normalised modes;
+    the damper's is small beside it.
+    """
+    one, model = curve.answer.points[i], curve.answer.equations.model
+    omega, mine = 2.0 * np.pi * harmonic * one.frequency, one.q[2 * harmonic - 1 :][:2]
+    energy = 0.5 * model.copies * omega**2 * float((mine**2).sum())
+    return one.frequency * float(one.energy[1:].sum()) / harmonic / (2.0 * np.pi * energy)
+
 
 #: largest imbalance of work and losses over a cycle, and of static forces on the damper: far above
 #: the solver's tolerance
@@ -40,8 +138,12 @@ _SWEEP_ENERGY = 10.0 * TOLERANCE
 _NODES = 1e-9
 
 
+#: a curve that stopped early or misses a check is kept: none ends the run
+_warning = partial(Check, fatal=False)
+
+
 def check_solution(solution: ForcedSolution) -> list[Check]:
-    """All self-checks. None ends the run: a curve that stopped early is kept, with a warning."""
+    """All self-checks."""
     checks: list[Check] = []
     scene = solution.plan.scene
     least = scene.damper.centrifugal / max(scene.excitation.centrifugal_to_force, default=np.inf)
@@ -80,14 +182,13 @@ def _model_checks(name: str, model: Model, least: float) -> list[Check]:
         return []
     mu = float(model.contacts.law.mu.max(initial=0.0))
     return [
-        Check(
+        _warning(
             "static balance",
             Case(stiffness=name, choice=model.state.name),
             measures.static_error(model),
             BALANCE,
             "|static contact forces - F_C| / F_C, moments by their arms",
             "report this scene",
-            fatal=False,
         ),
         _preloaded(name, model.state, mu, least),
     ]
@@ -114,14 +215,13 @@ def _preloaded(name: str, state: StaticState, mu: float, least: float) -> Check:
         "the stuck one: upd design tells whether this damper hangs or jams; set contact.static = "
         '"frictionless", or N and T of both faces'
     )
-    return Check(
+    return _warning(
         "preloaded contact",
         Case(stiffness=name, choice=state.name),
         worst,
         0,
         "faces without preload, or whose friction is mobilised everywhere",
         remedy,
-        fatal=False,
     )
 
 
@@ -139,14 +239,13 @@ def _path(curve: ForcedCurve | FacesCurve) -> Check:
             f"at {astray} points the contact forces do not come back to their start, so that "
             'they are no steady state: balance.slider = "mid", or contact.directions = "one"'
         )
-    return Check(
+    return _warning(
         "path complete",
         curve.case,
         float(curve.stopped) or float(astray),
         0,
         "curves that stopped early, or points that are not periodic",
         remedy,
-        fatal=False,
     )
 
 
@@ -156,7 +255,7 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
     rest = measures.rest_error(answer, solution.models[curve.stiffness])
     levels = solution.levels.get(curve.stiffness, [])
     return [
-        Check(
+        _warning(
             "balance residual",
             case,
             measures.residual_error(answer),
@@ -164,25 +263,22 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
             "misfit of contact motion and force at the worst point, evaluated again, relative",
             "that point is off by about this share, beside a contact that changes its state: read "
             "the curve there from its neighbours",
-            fatal=False,
         ),
-        Check(
+        _warning(
             "energy balance",
             case,
             balance,
             _BALANCE,
             "|work - viscous loss - friction| / work",
             "report this scene",
-            fatal=False,
         ),
-        Check(
+        _warning(
             "damper at rest",
             case,
             rest,
             _BALANCE,
             "|mean contact forces - F_C| / F_C",
             "report this scene",
-            fatal=False,
         ),
         *_by_level(curve, levels),
         *_integrated(curve),
@@ -221,7 +317,7 @@ def _by_level(curve: ForcedCurve, levels: list[PeakLevel]) -> list[Check]:
                 changes.append(change if math.isfinite(change) else math.inf)
         if changes:
             says = f"largest change of a peak's height with {last.label}" if last else ""
-            out.append(Check(name, curve.case, max(changes), limit, says, remedy, fatal=False))
+            out.append(_warning(name, curve.case, max(changes), limit, says, remedy))
     return out
 
 
@@ -236,7 +332,7 @@ def _integrated(curve: ForcedCurve) -> list[Check]:
                 )
                 says = "the top of a peak that was not reached"
                 case = replace(curve.case, mode=peak.mode)
-                return [Check(CONFIRMED, case, math.inf, _INTEGRATED, says, remedy, fatal=False)]
+                return [_warning(CONFIRMED, case, math.inf, _INTEGRATED, says, remedy)]
     if not curve.checked:
         return []
     worst = max(curve.checked, key=lambda one: one.difference)
@@ -247,14 +343,13 @@ def _integrated(curve: ForcedCurve) -> list[Check]:
         'sweep as a test does: balance.method = "march"'
     )
     return [
-        Check(
+        _warning(
             CONFIRMED,
             replace(curve.case, mode=worst.mode),
             worst.difference,
             _INTEGRATED,
             "|time integration from the peak's own motion / harmonic balance - 1|",
             remedy,
-            fatal=False,
         )
     ]
 
@@ -266,42 +361,39 @@ def _complete(name: str, found: Performance) -> Check:
         f"the curves at F_C/F_E {at} ended early, so that a higher peak may be missing: raise "
         "performance.lowest"
     )
-    return Check(
+    return _warning(
         "performance complete",
         Case(stiffness=name, name="performance"),
         float(len(lost)),
         0,
         f"of {len(found.points)} curves that ended early",
         remedy,
-        fatal=False,
     )
 
 
 def _march(solution: ForcedSolution, march: TimeMarch) -> Check:
     case = replace(march.curve.case, frequency=march.frequency)
     if not march.verifies:
-        return Check(
+        return _warning(
             "time march",
             case,
             1.0,
             0,
             "time integrations that found no period to compare with",
             f"{march.steady.message}: it verifies nothing; choose another frequency",
-            fatal=False,
         )
     marched = march.accelerance(solution.models[march.curve.stiffness])
     remedy = (
         f"{march.steady.message}; take more harmonics (balance.harmonics), or points that stay "
         "stuck remember another slider start"
     )
-    return Check(
+    return _warning(
         "time march",
         case,
         abs(marched / march.height - 1.0),
         _MARCH,
         "|time integration / harmonic balance - 1|",
         remedy,
-        fatal=False,
     )
 
 
@@ -312,14 +404,13 @@ def _faces_balance(name: str, faces: WholeFaces) -> Check:
     turns = np.array(faces.of.kept) >= 3
     arm = float(np.abs(march.columns[: march.n, turns]).max(initial=1.0))
     size = float(np.abs(march.load).max())
-    return Check(
+    return _warning(
         "static balance",
         Case(stiffness=name, choice=faces.state.name),
         float(np.abs(off / np.where(turns, arm, 1.0)).max() / size),
         BALANCE,
         "|static contact forces - F_C| / F_C, moments by their arms",
         "report this scene",
-        fatal=False,
     )
 
 
@@ -331,16 +422,15 @@ def _sweep_checks(one: SweptCurve) -> list[Check]:
     loss = off / np.where(work > 0.0, work, 1.0)[found.settled]
     lost = int((~found.settled).sum())
     return [
-        Check(
+        _warning(
             "sweep complete",
             one.case,
             float(found.status == "stopped"),
             0,
             "sweeps that stopped early",
             f"{found.message}. What was found is kept",
-            fatal=False,
         ),
-        Check(
+        _warning(
             "sweep settled",
             one.case,
             float(lost),
@@ -348,9 +438,8 @@ def _sweep_checks(one: SweptCurve) -> list[Check]:
             f"of {len(found.settled)} frequencies that did not settle",
             f"{lost} of {len(found.settled)} frequencies did not settle: their amplitudes are "
             "those of the last period",
-            fatal=False,
         ),
-        Check(
+        _warning(
             "sweep energy",
             one.case,
             float(loss.max(initial=0.0)),
@@ -358,19 +447,17 @@ def _sweep_checks(one: SweptCurve) -> list[Check]:
             "|work - damping - friction| / their sum, of a period",
             "the damper rattles on its faces faster than the steps resolve, which damps it: take "
             "more balance.samples",
-            fatal=False,
         ),
     ]
 
 
 def _loss_by_nodes(one: MarchedPeak) -> Check:
     """The losses of all nodes are that of the sweep where the period was read."""
-    return Check(
+    return _warning(
         "loss by nodes",
         one.case,
         one.off,
         _NODES,
         f"|sum over nodes - friction| / work and losses, at {one.frequency:.5g} Hz",
         "a step has two answers there: take more steps (balance.samples)",
-        fatal=False,
     )

@@ -2,27 +2,132 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from upd.analyses import printed
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, SweptCurve
-from upd.analyses.forced.excitation import excitation_of
-from upd.analyses.forced.marched_peaks import marched_damper, marched_shares
-from upd.analyses.forced.model import Model
-from upd.analyses.forced.peak_results import (
-    highest_in_harmonic,
-    left_peak_results,
-    motion_results,
-    peak_results,
-    reduction_name,
-    whole_contact_results,
-)
+from upd.analyses.forced.measures import CurvePeak
+from upd.analyses.forced.mode_peaks import LEFT, peak_name, reduction_name
+from upd.analyses.forced.model import Array, Model
+from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import ForcedSolution, MarchedPeak
+from upd.analyses.forced.sweeps import marched_damper, marched_shares
+from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result, withheld
+from upd.scene import ForcedScene
 from upd.scene.forced_contact import SIDES, Side
+
+#: name under which measured peaks are printed: which of a run's peaks each is stands nowhere
+MEASURED_PEAK = "peak_frequency"
+
+
+def printed_of(plan: ForcedPlan) -> Lookup:
+    """What was printed of the rig, and of the damper in it under the loads of the ready scene."""
+    scene, look_up = plan.scene, printed.printed_of(plan.scene)
+    ready = printed.ready_scene(scene)
+    damped = ready is not None and (
+        (scene.damper.centrifugal, scene.damper.density, scene.contact.friction)
+        == (ready.damper.centrifugal, ready.damper.density, ready.contact.friction)
+    )
+    ratios = (None, *(ready.excitation.centrifugal_to_force if damped else ()))
+
+    def under_load(name: str, case: Mapping[str, Any]) -> tuple[Printed, ...]:
+        free = case.get("kind") == "free"
+        same = damped and case.get("force_ratio") in ratios
+        return look_up(name, case) if free or same else ()
+
+    return under_load
+
+
+def measured_peaks(plan: ForcedPlan) -> tuple[Printed, ...]:
+    """Peaks in Hz measured with the damper."""
+    return printed_of(plan)(MEASURED_PEAK, {})
+
+
+_DAMPER = ("x", "y", "z")
+
+
+def peak_results(
+    solution: ForcedSolution, case: Case, peaks: Sequence[CurvePeak], blade: Side
+) -> list[Result]:
+    """Numbered peaks of a blade; of the right one measured frequencies go to the nearest, each
+    once.
+    """
+    found = printed_of(solution.plan)(MEASURED_PEAK, case.given())
+    nearest = (
+        {int(np.argmin([abs(peak.frequency - p.value) for peak in peaks])): p for p in found}
+        if peaks and blade == "right"
+        else {}
+    )
+    results = []
+    for k, peak in enumerate(peaks):
+        one, name, mine = (
+            nearest.get(k),
+            peak_name(blade, peak.number),
+            replace(case, mode=peak.mode),
+        )
+        reference, source = (one.value, one.source) if one is not None else (None, "")
+        results += [
+            Result(f"{name}_frequency", mine, peak.frequency, "Hz", reference, source, exact=False),
+            Result(f"{name}_accelerance", mine, peak.height, "(m/s2)/N"),
+        ]
+        if not case.kind and blade == "right":
+            results.append(Result(f"{name}_mac", mine, peak.mac, ""))
+    return results
+
+
+def _more_harmonics(curve: AnyCurve) -> Iterator[Result]:
+    """Highest points in the harmonics beside the one that is read, which has the numbered peaks."""
+    for k, H in curve.more.items() if not curve.empty else ():
+        for blade in SIDES[::-1]:
+            f, size = curve.frequency, np.abs(H[blade])
+            top = max(measures.path_maxima(f, size), key=lambda p: p.height, default=None)
+            i = int(size.argmax())
+            at, height = (float(f[i]), float(size[i])) if top is None else top[:2]
+            name = f"{LEFT * (blade == 'left')}harmonic_{k}"
+            yield Result(f"{name}_frequency", curve.case, at, "Hz")
+            yield Result(f"{name}_accelerance", curve.case, height, "(m/s2)/N")
+
+
+def whole_contact_results(case: Case, share: Array, energy: float) -> list[Result]:
+    """States and friction loss of the whole contact.
+
+    Parameters
+    ----------
+    share
+        (3,) of lift, stick and slip.
+    energy
+        N mm a period.
+    """
+    told = dict(zip(("lift", "stick", "slip"), share, strict=True))
+    return [
+        *(
+            Result(f"share_{name}", case, 100.0 * float(told[name]), "%")
+            for name in ("stick", "slip", "lift")
+        ),
+        Result("friction_energy", case, float(energy), "N mm"),
+    ]
+
+
+def motion_results(case: Case, static: Array, amplitude: Array) -> list[Result]:
+    """Translations and rotations of the damper, (6,) mm and rad each: mean and amplitude."""
+    results, names = [], [f"damper_{kind}{axis}" for kind in "ur" for axis in _DAMPER]
+    both = np.maximum(np.abs(static), np.abs(amplitude))
+    # motions that symmetry forbids are rounding
+    least = np.repeat([both[:3].max(), both[3:].max()], 3) * np.sqrt(np.finfo(float).eps)
+    for part, values in (("", amplitude), ("_static", static)):
+        shown = np.flatnonzero(np.abs(values) > least)
+        results += [
+            Result(f"{names[k]}{part}", case, 1e3 * float(values[k]), "um" if k < 3 else "mrad")
+            for k in shown
+        ]
+    return results
+
 
 #: by how much lower than the peak a sweep ends that is reported
 _LOWER = 0.01
@@ -31,12 +136,8 @@ AnyCurve = ForcedCurve | FacesCurve | SweptCurve
 
 def curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:
     """Peaks of a path of points, states, losses and damper motion there, what the path took."""
-    answer, model, case = curve.answer, solution.models[curve.stiffness], curve.case
-    results = [*_of_curve(solution, curve), *_folds(curve)]
-    for k in model.excitation.harmonics[1:] if not curve.empty else ():
-        for blade in SIDES[::-1]:
-            H = measures.accelerance(answer, model.row(blade), curve.force, k)
-            results += highest_in_harmonic(case, curve.frequency, np.abs(H), k, blade)
+    model, case = solution.models[curve.stiffness], curve.case
+    results = [*_of_curve(solution, curve), *_folds(curve), *_more_harmonics(curve)]
     for peak in curve.peaks.get("right", ()):
         at = replace(case, peak=peak.number, mode=peak.mode)
         results += _at_point(solution, curve, model, at, peak.sample)
@@ -70,11 +171,8 @@ def balanced_results(solution: ForcedSolution, curve: FacesCurve) -> list[Result
     results = [
         *_of_curve(solution, curve),
         Result("path_jumps", case, float(len(curve.answer.jumps)), ""),
+        *_more_harmonics(curve),
     ]
-    for k in excitation_of(solution.plan.scene.excitation).harmonics[1:]:
-        for blade in SIDES[::-1] if not curve.empty else ():
-            H = np.abs(curve.accelerance_in(k, blade))
-            results += highest_in_harmonic(case, curve.frequency, H, k, blade)
     for peak in curve.peaks["right"]:
         at, i = replace(case, peak=peak.number, mode=peak.mode), peak.sample
         results += whole_contact_results(at, curve.answer.share[i], curve.answer.energy[i, 2])
@@ -84,11 +182,7 @@ def balanced_results(solution: ForcedSolution, curve: FacesCurve) -> list[Result
 def swept_results(solution: ForcedSolution, sweep: SweptCurve) -> list[Result]:
     """Peaks of a sweep, states and losses there, what the sweep took."""
     case = sweep.case
-    results = _of_curve(solution, sweep)
-    for j, k in enumerate(excitation_of(solution.plan.scene.excitation).harmonics[1:], 1):
-        for b, blade in enumerate(SIDES) if not sweep.empty else ():
-            H = np.abs(sweep.accelerance_in(k, j, b))
-            results += highest_in_harmonic(case, sweep.frequency, H, k, blade)
+    results = [*_of_curve(solution, sweep), *_more_harmonics(sweep)]
     known = {(m.sweep.case, m.peak.number) for m in solution.marched}
     for peak in sweep.peaks["right"]:
         if (case, peak.number) not in known:
@@ -107,8 +201,11 @@ def _of_curve(solution: ForcedSolution, curve: AnyCurve) -> list[Result]:
         Result("excitation_force", case, curve.force, "N"),
         Result("path_points", case, float(len(curve.frequency)), ""),
         Result("curve_seconds", case, curve.seconds, "s"),
-        *peak_results(solution, case, list(curve.peaks.get("right", ()))),
-        *left_peak_results(case, list(curve.peaks.get("left", ()))),
+        *(
+            one
+            for blade in SIDES[::-1]
+            for one in peak_results(solution, case, curve.peaks.get(blade, ()), blade)
+        ),
         *_not_reached(solution, curve),
         *(r for blade in SIDES[::-1] for r in _reduction(solution, curve, blade)),
     ]
@@ -161,27 +258,26 @@ def _at_point(
     solution: ForcedSolution, curve: ForcedCurve, model: Model, at: Case, i: int
 ) -> list[Result]:
     """Contact state, losses and damper motion at point i of the path."""
-    scene, answer, results = solution.plan.scene, curve.answer, []
-    for side, N in measures.static_normal(answer, model, i).items():
-        results.append(Result("static_normal", replace(at, side=side), N, "N"))
-    for side, share in measures.shares(answer, model).items():
-        for name, value in zip(("stick", "slip", "lift"), share[i], strict=True):
-            results.append(
-                Result(f"share_{name}", replace(at, side=side), 100.0 * float(value), "%")
-            )
+    scene, answer = solution.plan.scene, curve.answer
     mean = answer.state[i].mean(axis=0)
-    results += [
-        Result(f"contact_{name}", at, 100.0 * float(value), "%")
-        for name, value in zip(("slip", "lift"), mean[1:], strict=True)
+    results = [
+        *(
+            Result("static_normal", replace(at, side=side), N, "N")
+            for side, N in measures.static_normal(answer, model, i).items()
+        ),
+        *_shares(at, {side: one[i] for side, one in measures.shares(answer, model).items()}),
+        *(
+            Result(f"contact_{name}", at, 100.0 * float(value), "%")
+            for name, value in zip(("slip", "lift"), mean[1:], strict=True)
+        ),
+        *_losses(
+            scene,
+            at,
+            answer.state[i],
+            float(answer.energy[i].sum()),
+            1e3 * float(measures.power(answer)[i].sum()),
+        ),
     ]
-    results.append(Result("friction_energy", at, float(answer.energy[i].sum()), "N mm"))
-    if scene.wants("contact_state"):
-        # Their mean traction remembers where the sliders began.
-        stuck = int((answer.state[i, :, 0] == 1.0).sum())
-        results.append(Result("points_always_stuck", at, float(stuck), ""))
-    if scene.wants("hysteresis"):
-        power = 1e3 * float(measures.power(answer)[i].sum())
-        results.append(Result("friction_power", at, power, "mW"))
     if scene.wants("damper_motion"):
         results += motion_results(at, *measures.damper_motion(answer, model, i))
     return results
@@ -189,19 +285,29 @@ def _at_point(
 
 def _at_marched(solution: ForcedSolution, one: MarchedPeak) -> list[Result]:
     """Contact state of each face, loss and damper motion at a peak of a sweep."""
-    scene, at = solution.plan.scene, one.case
-    results = [Result("friction_energy", at, one.period.energy, "N mm")]
+    scene, at, energy = solution.plan.scene, one.case, one.period.energy
+    results = list(_losses(scene, at, one.period.share, energy, energy * one.frequency))
     if scene.wants("contact_state"):
-        for side, share in zip(SIDES, marched_shares(one), strict=True):
-            results += [
-                Result(f"share_{name}", replace(at, side=side), 100.0 * float(value), "%")
-                for name, value in zip(("stick", "slip", "lift"), share, strict=True)
-            ]
-        stuck = int((one.period.share[:, 0] == 1.0).sum())
-        results.append(Result("points_always_stuck", at, float(stuck), ""))
-    if scene.wants("hysteresis"):
-        # N mm a period to mW
-        results.append(Result("friction_power", at, one.period.energy * one.frequency, "mW"))
+        results += _shares(at, dict(zip(SIDES, marched_shares(one), strict=True)))
     if scene.wants("damper_motion"):
         results += motion_results(at, *marched_damper(solution, one))
     return results
+
+
+def _shares(at: Case, shares: Mapping[Side, Array]) -> Iterator[Result]:
+    """Shares (3,) of the cycle of each face."""
+    for side, share in shares.items():
+        for name, value in zip(("stick", "slip", "lift"), share, strict=True):
+            yield Result(f"share_{name}", replace(at, side=side), 100.0 * float(value), "%")
+
+
+def _losses(
+    scene: ForcedScene, at: Case, state: Array, energy: float, power: float
+) -> Iterator[Result]:
+    """Loss of all points, N mm and mW, and how many of them stick all the time."""
+    yield Result("friction_energy", at, energy, "N mm")
+    if scene.wants("contact_state"):
+        # Their mean traction remembers where the sliders began.
+        yield Result("points_always_stuck", at, float((state[:, 0] == 1.0).sum()), "")
+    if scene.wants("hysteresis"):
+        yield Result("friction_power", at, power, "mW")

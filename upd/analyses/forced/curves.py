@@ -9,8 +9,7 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.forced.measures import ComplexArray, PathPeak, StuckMode
-from upd.analyses.forced.mode_peaks import ModePeak
+from upd.analyses.forced.measures import ComplexArray, CurvePeak, StuckMode
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.statics import StaticState
 from upd.analyses.seated.interface import Interface
@@ -19,7 +18,7 @@ from upd.hbm.interface_balance import InterfaceResponse
 from upd.hbm.interface_state import InterfaceModel, InterfaceState
 from upd.hbm.interface_sweep import SteppedSine
 from upd.results import Case
-from upd.scene.forced_contact import SIDES, Side
+from upd.scene.forced_contact import Side
 
 
 @dataclass(frozen=True)
@@ -43,8 +42,8 @@ class LinearCurves:
     free: Mapping[Side, ComplexArray]
     stuck: Mapping[Side, ComplexArray]
     modes: list[StuckMode]
-    free_peaks: Mapping[Side, list[PathPeak]]
-    stuck_peaks: Mapping[Side, list[PathPeak]]
+    free_peaks: Mapping[Side, list[CurvePeak]]
+    stuck_peaks: Mapping[Side, list[CurvePeak]]
 
 
 @dataclass(frozen=True)
@@ -59,11 +58,25 @@ class FrictionCurve:
         F_C/F_E.
     force
         F_E, N.
+    accelerance
+        Side -> (n,) of the blade in the lowest harmonic excited, (m/s2)/N.
+    more
+        Other harmonics that are excited -> the same in these.
+    peaks
+        Side -> peaks by the numbers of their modes: what is reported.
     """
 
     stiffness: str
     ratio: float
     force: float
+    accelerance: Mapping[Side, ComplexArray]
+    more: Mapping[int, Mapping[Side, ComplexArray]]
+    peaks: Mapping[Side, tuple[CurvePeak, ...]]
+
+    @property
+    def case(self) -> Case:
+        """What its numbers and arrays belong to."""
+        return Case(stiffness=self.stiffness, force_ratio=self.ratio)
 
     @property
     def frequency(self) -> Array:
@@ -74,11 +87,6 @@ class FrictionCurve:
     def empty(self) -> bool:
         """Whether not one point was found."""
         return not len(self.frequency)
-
-    def _accelerance(self, harmonic: int, moved: ComplexArray) -> ComplexArray:
-        """(n,) (m/s2)/N of F_E, from the amplitudes (n,) mm of a harmonic."""
-        scale = -((2.0 * np.pi * harmonic * self.frequency) ** 2) * 1e-3 / self.force
-        return np.asarray(scale * moved)
 
 
 class Top(NamedTuple):
@@ -183,12 +191,8 @@ class ForcedCurve(FrictionCurve):
     ----------
     answer
         The path in frequency.
-    accelerance
-        Side -> (n,) of the blade along the path, (m/s2)/N.
     seconds
         It took.
-    peaks
-        Side -> peaks by the numbers of their modes: what is reported.
     tops
         Blade and number of a peak -> its top by harmonic balance.
     checked
@@ -198,17 +202,10 @@ class ForcedCurve(FrictionCurve):
     """
 
     answer: FrequencyResponse
-    accelerance: Mapping[Side, ComplexArray]
     seconds: float
-    peaks: Mapping[Side, tuple[ModePeak, ...]] = field(default_factory=dict)
     tops: Mapping[tuple[Side, int], Top] = field(default_factory=dict)
     checked: tuple[TimeCheck, ...] = ()
     folds: tuple[Fold, ...] = ()
-
-    @property
-    def case(self) -> Case:
-        """What its numbers and arrays belong to."""
-        return Case(stiffness=self.stiffness, force_ratio=self.ratio)
 
     @property
     def frequency(self) -> Array:
@@ -286,25 +283,10 @@ class FacesCurve(FrictionCurve):
     ----------
     answer
         The motions along the curve.
-    accelerance
-        Side -> (k,) of the blade, (m/s2)/N.
-    peaks
-        Side -> peaks by the numbers of their modes.
     """
 
     answer: InterfaceResponse
-    accelerance: Mapping[Side, ComplexArray]
-    peaks: Mapping[Side, tuple[ModePeak, ...]]
     folds: ClassVar[tuple[Fold, ...]] = ()
-
-    @property
-    def case(self) -> Case:
-        """What its numbers and arrays belong to."""
-        return Case(stiffness=self.stiffness, force_ratio=self.ratio)
-
-    def accelerance_in(self, harmonic: int, blade: Side) -> ComplexArray:
-        """(k,) of a blade in a harmonic of the excitation, (m/s2)/N of F_E."""
-        return self._accelerance(harmonic, self.answer.amplitude[:, harmonic, SIDES.index(blade)])
 
     @property
     def seconds(self) -> float:
@@ -346,16 +328,10 @@ class SweptCurve(FrictionCurve):
         Rising or falling frequency.
     found
         The motions in their order.
-    accelerance
-        Side -> (k,) of the blade, (m/s2)/N.
-    peaks
-        Side -> peaks by the numbers of their modes.
     """
 
     way: Way
     found: SteppedSine
-    accelerance: Mapping[Side, ComplexArray]
-    peaks: Mapping[Side, tuple[ModePeak, ...]]
     folds: ClassVar[tuple[Fold, ...]] = ()
 
     @property
@@ -373,18 +349,6 @@ class SweptCurve(FrictionCurve):
     def seconds(self) -> float:
         """It took."""
         return float(self.found.seconds.sum())
-
-    def accelerance_in(self, harmonic: int, place: int, blade: int) -> ComplexArray:
-        """(k,) of a blade in another harmonic that is excited, (m/s2)/N of F_E.
-
-        Parameters
-        ----------
-        harmonic, place
-            Its number, and its place among those excited.
-        blade
-            Place of the blade among the outputs.
-        """
-        return self._accelerance(harmonic, self.found.harmonics[:, place, blade])
 
     @property
     def stopped(self) -> bool:

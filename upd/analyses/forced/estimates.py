@@ -31,8 +31,8 @@ from upd.analyses.forced.levels import (
     at_place,
     linear_numbers,
 )
-from upd.analyses.forced.mode_peaks import ModePeak
-from upd.analyses.forced.peak_results import LEFT, reduction_name
+from upd.analyses.forced.measures import CurvePeak
+from upd.analyses.forced.mode_peaks import LEFT, peak_name, reduction_name
 from upd.analyses.forced.solution import ForcedSolution
 from upd.progress import Stages
 from upd.results import Case, ErrorPart, Estimates, Result
@@ -93,7 +93,7 @@ def _linear_numbers(
             modes = {one.number: one.mode for one in told}
             for number, peak in zip(linear_numbers(peaks, kind, side), own, strict=False):
                 case = Case(stiffness=name, kind=kind, mode=modes.get(number, ""))
-                mine = ModePeak(number, peak.frequency, peak.height, peak.sample)
+                mine = peak._replace(number=number)
                 out |= _of_peak(solution, levels, case, kind, side, mine)
     for k, word in enumerate(("in_phase", "out_of_phase")):
         in_phase = word == "in_phase"
@@ -118,10 +118,10 @@ def _of_peak(
     case: Case,
     at: float | str,
     side: Side,
-    peak: ModePeak,
+    peak: CurvePeak,
 ) -> dict[Key, tuple[ErrorPart, ...]]:
     """Errors of a peak's frequency and height."""
-    name = f"{LEFT * (side == 'left')}peak_{peak.number}"
+    name = peak_name(side, peak.number)
     place: Place = (at, side, peak.number)
     case = replace(case, mode=peak.mode or case.mode)
     own = peak.frequency, peak.height
@@ -182,7 +182,7 @@ def _parts(
         found = [
             (one, ratio(one))
             for one in mine
-            if not one.why and (place is None or place in one.peaks)
+            if (one.peaks or not one.why) and (place is None or place in one.peaks)
         ]
         good = [(one, r) for one, r in found if math.isfinite(r)]
         seconds = math.fsum(one.seconds for one in mine)

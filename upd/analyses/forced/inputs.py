@@ -15,12 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from upd.analyses.forced.curves import ForcedCurve, Top
-from upd.analyses.forced.levels import FoundPeaks, found_again
-from upd.analyses.forced.measures import stuck_modes
-from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak
+from upd.analyses.forced.measures import CurvePeak, stuck_modes
+from upd.analyses.forced.mode_peaks import CANDIDATES
 from upd.analyses.forced.model import Model, preloaded
-from upd.analyses.forced.moved_points import moved
 from upd.analyses.forced.paths import balance_of
+from upd.analyses.forced.peaks_again import FoundPeaks, RunPeak, found_again, moved
 from upd.analyses.forced.statics import StaticState, state_of_ratio
 from upd.errors import InputError, UpdError, one_line
 from upd.linalg.parallel import threads_for
@@ -62,15 +61,14 @@ class InputEffect:
     ----------
     name, label
         Of the input; its value.
-    blade, number, mode
-        Of the peak.
+    number, mode
+        Of the right blade's peak.
     frequency, height
         Relative changes.
     """
 
     name: str
     label: str
-    blade: Side
     number: int
     mode: str
     frequency: float
@@ -182,7 +180,7 @@ INPUTS = (
 )
 
 
-def input_effects(peaks: FoundPeaks, tops: Mapping[ModePeak, Top], name: str) -> list[InputEffect]:
+def input_effects(peaks: FoundPeaks, tops: Mapping[CurvePeak, Top], name: str) -> list[InputEffect]:
     """What one input does to the peaks of the curve with the lowest F_C/F_E.
 
     Parameters
@@ -215,7 +213,7 @@ def few(peaks: FoundPeaks, highest: int) -> range:
     return range(min(max(FEW_HARMONICS, *peaks.model.excitation.harmonics), highest) + 1)
 
 
-def few_harmonics(peaks: FoundPeaks) -> dict[ModePeak, Top]:
+def few_harmonics(peaks: FoundPeaks) -> dict[CurvePeak, Top]:
     """The right blade's peaks of the curve with the lowest F_C/F_E, with few harmonics."""
     if not peaks.curves:
         return {}
@@ -223,7 +221,7 @@ def few_harmonics(peaks: FoundPeaks) -> dict[ModePeak, Top]:
         return dict(_few_harmonics(peaks, min(peaks.curves, key=lambda c: c.ratio)))
 
 
-def _few_harmonics(peaks: FoundPeaks, curve: ForcedCurve) -> Iterator[tuple[ModePeak, Top]]:
+def _few_harmonics(peaks: FoundPeaks, curve: ForcedCurve) -> Iterator[tuple[CurvePeak, Top]]:
     old, model = curve.answer.balance, peaks.model
     numbers = few(peaks, old.harmonics.highest)
     b = balance_of(peaks.plan, model, curve.force, numbers)
@@ -232,9 +230,8 @@ def _few_harmonics(peaks: FoundPeaks, curve: ForcedCurve) -> Iterator[tuple[Mode
         if top is None:
             continue
         x = b.embedded(top.x, old)
-        found = found_again(
-            peaks.plan, model, curve, "right", peak.number, top, b, x, any_height=True
-        )
+        one = RunPeak(curve, "right", peak.number, top)
+        found = found_again(peaks.plan, model, one, b, x, any_height=True)
         if math.isfinite(found.height):
             yield peak, top._replace(frequency=found.frequency, height=found.height, x=x)
 
@@ -260,7 +257,7 @@ def _effects(
     curve: ForcedCurve,
     name: str,
     end: Changed,
-    tops: Mapping[ModePeak, Top],
+    tops: Mapping[CurvePeak, Top],
 ) -> Iterator[InputEffect]:
     numbers = few(peaks, curve.answer.balance.harmonics.highest)
     b = balance_of(peaks.plan, end.model, curve.force, numbers)
@@ -268,10 +265,10 @@ def _effects(
         b = b.with_sliders(end.changes["start"], b.slider)
     for peak, top in tops.items():
         ratio = _expected(peaks, end.model, peak.number, top.frequency)
-        plan, model, number = peaks.plan, end.model, peak.number
+        one = RunPeak(curve, "right", peak.number, top)
         try:
             f, height = found_again(
-                plan, model, curve, "right", number, top, b, top.x, ratio, True, **end.changes
+                peaks.plan, end.model, one, b, top.x, ratio, any_height=True, **end.changes
             )
         except UpdError as error:
             log.info("%s, %s: %s", name, end.label, one_line(error))
@@ -279,7 +276,6 @@ def _effects(
         yield InputEffect(
             name,
             end.label,
-            "right",
             peak.number,
             peak.mode,
             f / top.frequency - 1.0,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,6 @@ def make_interface_model(
     friction: float,
     centrifugal: float,
     damping: float,
-    gap: Array | None = None,
     n_modes: int = MODES,
     excited: Sequence[Side] = ("right",),
 ) -> InterfaceModel:
@@ -56,8 +55,6 @@ def make_interface_model(
         F_C on the whole, N.
     damping
         Of all modes, ratio to critical.
-    gap
-        (n,) mm before any load; None: the faces fit.
     n_modes
         Of each blade.
     excited
@@ -81,6 +78,52 @@ def make_interface_model(
         [partial(_part, b, n_modes, solver, excited=b.side in excited) for b in blades],
         plan.workers,
     )
+    both = _side_by_side(parts, interface, excited)
+    Phi = both.shapes
+    G = interface.compliance - (Phi / (2.0 * np.pi * both.frequency) ** 2) @ Phi.T
+    inertia = np.zeros((6, 6))
+    inertia[:3, :3], inertia[3:, 3:] = bodies.damper.mass * np.eye(3), bodies.damper.inertia
+    kept = list(interface.kept)
+    load = np.zeros(len(kept))
+    load[kept.index(2)] = centrifugal / interface.copies
+    return InterfaceModel(
+        both.frequency,
+        np.full(len(both.frequency), damping),
+        Phi,
+        0.5 * (G + G.T),
+        interface.columns,
+        inertia[np.ix_(kept, kept)],
+        load,
+        np.zeros(n),
+        np.full(n, friction),
+        both.places,
+        both.pushed,
+        both.seen_modes,
+        both.seen_contact,
+        both.seen_drive,
+        interface.copies,
+    )
+
+
+class _Blades(NamedTuple):
+    """Both blades' parts of an `InterfaceModel`, in its terms."""
+
+    frequency: Array
+    shapes: Array
+    places: Array
+    pushed: Array
+    seen_modes: Array
+    seen_contact: Array
+    seen_drive: Array
+
+
+def _side_by_side(
+    parts: Sequence[tuple[Array, Array, Array, Array, Array]],
+    interface: Interface,
+    excited: Sequence[Side],
+) -> _Blades:
+    """The blades' parts of `_part` beside each other."""
+    n, n_modes = interface.n, len(parts[0][0])
     m, L, K = 2 * n_modes, len(excited), len(SIDES) + len(excited)
     shapes, seen_modes, places = np.zeros((3, n, m)), np.zeros((K, m)), np.zeros((m, L))
     pushed, seen_contact, seen_drive = np.zeros((3, n, L)), np.zeros((K, 3, n)), np.zeros((K, L))
@@ -102,29 +145,14 @@ def make_interface_model(
             places[mine, j] = seen[1]
             pushed[:, on, j] = rest[1]
             seen_drive[rows, j] = direct[:, 1] - (seen * flexible) @ seen[1]
-    Phi = shapes.reshape(3 * n, m)
-    G = interface.compliance - (Phi / (2.0 * np.pi * frequency) ** 2) @ Phi.T
-    inertia = np.zeros((6, 6))
-    inertia[:3, :3], inertia[3:, 3:] = bodies.damper.mass * np.eye(3), bodies.damper.inertia
-    kept = list(interface.kept)
-    load = np.zeros(len(kept))
-    load[kept.index(2)] = centrifugal / interface.copies
-    return InterfaceModel(
+    return _Blades(
         frequency,
-        np.full(m, damping),
-        Phi,
-        0.5 * (G + G.T),
-        interface.columns,
-        inertia[np.ix_(kept, kept)],
-        load,
-        np.zeros(n) if gap is None else np.asarray(gap, float),
-        np.full(n, friction),
+        shapes.reshape(3 * n, m),
         places,
         pushed.reshape(3 * n, L),
         seen_modes,
         seen_contact.reshape(K, 3 * n),
         seen_drive,
-        interface.copies,
     )
 
 

@@ -7,36 +7,128 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import eigh, qr
+from scipy.spatial import cKDTree
 
 from upd.analyses.base import Resolved
-from upd.analyses.forced import effects as checks
+from upd.analyses.forced.blade_parts import MIRROR_SIGNS
 from upd.analyses.forced.curves import Top
-from upd.analyses.forced.elastic_damper import elastic_stuck
 from upd.analyses.forced.inputs import few
-from upd.analyses.forced.levels import FoundPeaks, found_again
-from upd.analyses.forced.mode_peaks import ModePeak
-from upd.analyses.forced.model import Model, make_model
+from upd.analyses.forced.measures import CurvePeak, StuckMode, tell_modes
+from upd.analyses.forced.model import Array, Model, make_model
 from upd.analyses.forced.paths import balance_of
+from upd.analyses.forced.peaks_again import FoundPeaks, RunPeak, found_again
+from upd.analyses.forced.plan import ALONG, ELASTIC, ForcedPlan
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.stiffness import FaceLaw
+from upd.analyses.seated.bodies import Bodies
+from upd.fem import Material, mass, rigid_body_modes, stiffness
+from upd.hbm.contact_points import stuck_stiffness
+from upd.hbm.damper import attach
+from upd.linalg import factorise
 from upd.linalg.parallel import threads_for
+from upd.linalg.symmetric import Symmetric
+from upd.mesh import IntArray
 from upd.results import Case
-from upd.scene.forced_contact import Side
+from upd.scene.forced_contact import SIDES, Side
 
 
-class AlongModel(NamedTuple):
-    """The model in which friction resists sliding along the damper too."""
+def elastic_stuck(plan: ForcedPlan, bodies: Bodies, model: Model) -> list[StuckMode]:
+    """Stuck modes with the damper's elastic compliance in series with the contact springs.
 
-    model: Model
+    The damper floats: its rigid motion keeps its inertia, and its deformation follows
+    quasi-statically from self-equilibrated contact forces (inertia relief), G = B P' K^+ P B' with
+    P = I - M R (R' M R)^-1 R'. The force of stuck points per rigid relative displacement is then
+    (k^-1 + G)^-1 in place of k.
+
+    Returns
+    -------
+    list of StuckMode
+        Up to twice the end of the sweep.
+
+    References
+    ----------
+    .. [1] R. R. Craig, A. J. Kurdila, Fundamentals of Structural Dynamics, 2nd ed., 17.5 (inertia
+           relief).
+    """
+    M, _, K, points = attach(
+        model.M, model.C, model.K, model.contacts, model.damper, model.damper_rows
+    )
+    k = stuck_stiffness(points).ravel()
+    G = elastic_compliance(plan, bodies, model)
+    # (k^-1 + G)^-1, also where k = 0
+    joint = np.linalg.solve(np.eye(len(k)) + k[:, None] * G, np.diag(k))
+    values, shapes = eigh(K + points.B.T @ joint @ points.B, M)
+    return tell_modes(model, values, shapes, 2.0 * plan.scene.excitation.stop)
 
 
-def with_along(
-    solution: ForcedSolution, name: str, laws: Mapping[Side, FaceLaw]
-) -> AlongModel | None:
-    """The model with both sliding directions; None where the run has them or nothing rubs."""
+def elastic_compliance(plan: ForcedPlan, bodies: Bodies, model: Model) -> Array:
+    """Elastic compliance of the free damper at its contact rows, mm/N.
+
+    Returns
+    -------
+    Array
+        (n, n), n = n_point (1 + tangents), point by point; symmetric, positive semidefinite.
+    """
+    mesh, m = bodies.damper_mesh, plan.scene.material
+    material = Material(m.E, m.nu, plan.scene.damper.density or m.density)
+    K = stiffness(mesh, material, plan.scene.mesh.element)
+    M = mass(mesh, material)
+    B = _rows(bodies, model, mesh.n_node)
+    R = rigid_body_modes(mesh.points)
+    MR = M @ R
+    inertia = np.linalg.inv(R.T @ MR)
+    loads = B.T - MR @ (inertia @ (R.T @ B.T))
+    # six dofs that hold it: the ones its rigid motions move most independently
+    held = qr(R.T, mode="r", pivoting=True)[1][:6]
+    free = np.setdiff1d(np.arange(3 * mesh.n_node), held)
+    u = np.zeros_like(loads)
+    factor = factorise(
+        Symmetric.of(K).submatrix(free.astype(np.int64)), solver=plan.scene.solver.name
+    )
+    u[free] = factor.solve(loads[free])
+    u -= R @ (inertia @ (MR.T @ u))
+    G = B @ u
+    return np.asarray(0.5 * (G + G.T))
+
+
+def _rows(bodies: Bodies, model: Model, n_node: int) -> Array:
+    """Displacement of the damper's contact points along their normals and tangents.
+
+    (n, 3 n_node) of its nodal displacements; a point that stands for a pair moves as the even part
+    of both.
+    """
+    mesh, out = bodies.damper_mesh, []
+    tree = cKDTree(mesh.points)
+    components = [0, 1, 2] if model.contacts.tangents == 2 else [0, 2]
+    for side in SIDES:
+        face, blade = model.faces[side], bodies.blades[side].mesh
+        # the k-th nodes of both patches lie on each other
+        own = dict(zip(blade.nodes["patch"], mesh.nodes[f"{side}_patch"], strict=True))
+        nodes = np.array([own[node] for node in face.nodes])
+        rows = _at(face.values, face.frame, nodes, n_node)
+        if model.halved:
+            image = tree.query(mesh.points[nodes] * np.array([1.0, -1.0, 1.0]))[1]
+            mirrored = _at(face.values, face.frame, np.asarray(image), n_node)
+            rows = 0.5 * (rows + MIRROR_SIGNS[:, None] * mirrored)
+        out.append(rows[:, components])
+    joined = np.concatenate(out)
+    return np.asarray(joined.reshape(-1, joined.shape[-1]))
+
+
+def _at(values: Array, frame: Array, nodes: IntArray, n_node: int) -> Array:
+    """(m, 3, 3 n_node) rows of points with shape functions ``values`` (m, k) at ``nodes``."""
+    rows = np.zeros((len(values), 3, n_node, 3))
+    rows[:, :, nodes] = np.einsum("mk,fc->mfkc", values, frame)
+    return np.asarray(rows.reshape(len(values), 3, -1))
+
+
+def with_along(solution: ForcedSolution, name: str, laws: Mapping[Side, FaceLaw]) -> Model | None:
+    """The model in which friction resists sliding along the damper too; None where the run has it
+    or nothing rubs.
+    """
     plan, model = solution.plan, solution.models[name]
     scene = plan.scene
     if model.contacts.tangents == 2 or not scene.contact.friction:
@@ -44,12 +136,10 @@ def with_along(
     contact = replace(scene.contact, directions="two")
     plan = replace(plan, scene=replace(scene, contact=contact), workers=1)
     assert solution.bodies is not None
-    return AlongModel(make_model(plan, solution.bodies, laws, model.state))
+    return make_model(plan, solution.bodies, laws, model.state)
 
 
-def along_changes(
-    peaks: FoundPeaks, tops: Mapping[ModePeak, Top], along: AlongModel
-) -> list[Resolved]:
+def along_changes(peaks: FoundPeaks, tops: Mapping[CurvePeak, Top], along: Model) -> list[Resolved]:
     """Change of the highest peak of the curve with the lowest F_C/F_E, with few harmonics.
 
     Parameters
@@ -64,19 +154,17 @@ def along_changes(
     peak = max(loose, key=lambda one: loose[one].height)
     top, old = loose[peak], curve.answer.balance
     numbers = few(peaks, old.harmonics.highest)
-    one, b = (
-        balance_of(peaks.plan, model, curve.force, numbers) for model in (peaks.model, along.model)
-    )
+    one, b = (balance_of(peaks.plan, model, curve.force, numbers) for model in (peaks.model, along))
     W, rest = one.split(top.x)
     both = np.zeros((W.shape[0], 3, W.shape[2]))
     # normal, along, up the slope
     both[:, [0, 2]] = W
     x = np.concatenate([both.ravel(), rest])
-    with threads_for(len(along.model.M)):
-        found = found_again(peaks.plan, along.model, curve, "right", peak.number, top, b, x)
+    with threads_for(len(along.M)):
+        found = found_again(peaks.plan, along, RunPeak(curve, "right", peak.number, top), b, x)
     case, remedy = replace(curve.case, mode=peak.mode), 'set contact.directions = "two"'
     return [
-        Resolved(checks.ALONG, f"peak_{peak.number}_{kind}", case, before, after, unit, remedy)
+        Resolved(ALONG, f"peak_{peak.number}_{kind}", case, before, after, unit, remedy)
         for kind, unit, before, after in (
             ("accelerance", "(m/s2)/N", top.height, found.height),
             ("frequency", "Hz", top.frequency, found.frequency),
@@ -102,5 +190,5 @@ def elastic_changes(solution: ForcedSolution, name: str) -> list[Resolved]:
             )
             new = math.nan if after is None else after
             case = Case(stiffness=name)
-            out.append(Resolved(checks.ELASTIC, quantity, case, before, new, "Hz", remedy))
+            out.append(Resolved(ELASTIC, quantity, case, before, new, "Hz", remedy))
     return out

@@ -11,41 +11,153 @@ import logging
 import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Literal, NamedTuple
 
-import numpy as np
-
 from upd.analyses.cost import NODES
-from upd.analyses.forced.curves import ForcedCurve, LinearCurves, Top
-from upd.analyses.forced.linear_limits import linear_limits_of
-from upd.analyses.forced.measures import Unsolved
-from upd.analyses.forced.mesh_counts import OFF_CONTACT, RECIPE, on_contact, times
+from upd.analyses.forced.curves import ForcedCurve, LinearCurves
 from upd.analyses.forced.mode_peaks import tell_stuck_peaks
-from upd.analyses.forced.model import Array, Model, make_model
-from upd.analyses.forced.moved_points import straight
+from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import (
-    BAND,
-    BAND_POINTS,
-    LONG_STEPS,
-    SWEEP_POINTS,
     balance_like,
-    balance_of,
 )
-from upd.analyses.forced.peaks import climbed, peak_of_mode
+from upd.analyses.forced.peaks_again import (
+    NOT_FOUND,
+    Found,
+    FoundPeaks,
+    RunPeak,
+    found_again,
+    linear_of,
+    moved_points,
+    peak_on,
+    stuck_frequency,
+)
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies, make_bodies
-from upd.errors import ConvergenceError, UpdError, one_line
-from upd.hbm.balance import Balance
+from upd.errors import UpdError, one_line
 from upd.hbm.fourier import harmonics as harmonics_of
 from upd.hbm.fourier import sample_count
-from upd.hbm.peaks import FIRST_REACH, is_near
-from upd.hbm.starts import newton
 from upd.linalg.parallel import threads_for
+from upd.mesh import recipes
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import GAUSS, SIDES, FaceLines, FrictionChoice, Side
 from upd.scene.quantities import UNKNOWN
+
+RECIPE = "blade_rig"
+#: off the contact, see `geometry.blade_rig_params`
+OFF_CONTACT = (
+    "across",
+    "base_columns",
+    "base_side",
+    "base_layers",
+    "shank_layers",
+    "platform_layers",
+    "core_layers",
+    "core_upper",
+    "wing_columns",
+)
+#: arrangement -> counts up its faces, and the count along the damper
+FACES: Mapping[str, tuple[tuple[str, ...], str]] = {
+    "symmetric": (("patch_along_slope",), "patch_along_y"),
+    "asymmetric": (("pad_along_slope", "face_along_z"), "pad_along_y"),
+}
+#: elements of the coarsest graded mesh for those of the recipe's defaults: from every re-entrant
+#: edge on as many, which shank, core and platform have on both sides; few along the damper and many
+#: up the slope, where free and stuck frequencies gain the least and the most for their dofs
+GRADED: Mapping[str, int] = {
+    "across": 4,
+    "base_columns": 4,
+    "base_side": 2,
+    "base_layers": 4,
+    "shank_layers": 4,
+    "platform_layers": 6,
+    "core_layers": 6,
+    "core_upper": 2,
+    "wing_columns": 4,
+    "patch_along_slope": 8,
+    "patch_along_y": 6,
+    "pad_along_slope": 4,
+    "pad_along_y": 4,
+    "face_along_z": 4,
+}
+#: ratio of neighbouring sizes in the coarsest graded mesh, and its elements beside a re-entrant
+#: edge outside and inside of shank, core and platform
+_GROWTH, _OUTSIDE, _INSIDE = 2.0, 4, 2
+#: exponent of displacements at a right-angled re-entrant edge: sin(3 pi x / 2) = -x
+_EDGE = 0.5445
+
+
+def count_of(scene: ForcedScene, key: str) -> int:
+    """A number of elements, as the scene or the recipe gives it."""
+    default = recipes.parameters(scene.recipe).__dataclass_fields__[key].default
+    return int(scene.geometry.get(key, default))
+
+
+def on_contact(scene: ForcedScene) -> tuple[str, ...]:
+    """Counts of the scene's contact faces that its recipe has."""
+    slopes, along = FACES[scene.arrangement]
+    return tuple(key for key in (*slopes, along) if recipes.has_parameter(scene.recipe, key))
+
+
+def meshed(scene: ForcedScene) -> tuple[str, ...]:
+    """Counts that its mesh is refined by: on the contact too, where the contact points are none of
+    its nodes.
+    """
+    return (*OFF_CONTACT, *(on_contact(scene) if scene.contact.rule == GAUSS else ()))
+
+
+def times(scene: ForcedScene, keys: tuple[str, ...], factor: float) -> dict[str, Any]:
+    """So many times the counts, rounded up to those the recipe allows, as its parameters."""
+    known = recipes.parameters(scene.recipe).__dataclass_fields__
+    out = {}
+    for key in keys:
+        step = 2 if known[key].metadata["bounds"].even else 1
+        count = -int(-factor * count_of(scene, key) / step // 1)
+        out[key] = step * max(1, count)
+    return out
+
+
+def graded(scene: ForcedScene, factor: float) -> dict[str, Any]:
+    """A mesh that gets finer at re-entrant edges faster than elsewhere, as the recipe's parameters.
+
+    Where displacements go with r^a from an edge, elements of order p leave an error of h^p if their
+    sizes are h r^(1 - a/p) [1]_: a stretch that ends there is divided at (i/n)^q, q = p/a, and its
+    last size is n^(q - 1) times its first. With s times the elements, sizes that grow by g each do
+    so with g^(n - 1) = 2^(n_1 - 1) s^(q - 1), n = s n_1; a = 0.5445 at a right angle [2]_. Equal
+    division, or one that keeps the ratio of sizes, leaves h^a, and one that keeps g as much as its
+    largest elements leave.
+
+    Parameters
+    ----------
+    scene
+        Its own counts multiply those of the mesh, over the defaults of the recipe.
+    factor
+        s, 1 or more.
+
+    Returns
+    -------
+    dict
+        Counts, those on the contact where it is refined too (`meshed`), and growths.
+
+    References
+    ----------
+    .. [1] I. Babuska, R. B. Kellogg, J. Pitkaranta, Numer. Math. 33 (1979) 447.
+    .. [2] M. L. Williams, J. Appl. Mech. 19 (1952) 526.
+    """
+    known = recipes.parameters(scene.recipe).__dataclass_fields__
+    order = 1 if NODES[scene.mesh.element] == 8 else 2
+    out: dict[str, Any] = {}
+    for key in meshed(scene):
+        step = 2 if known[key].metadata["bounds"].even else 1
+        own = count_of(scene, key) / int(known[key].default)
+        # up to rounding in the product
+        out[key] = step * max(1, math.ceil(round(factor * GRADED[key] * own / step, 9)))
+    for name, n in (("growth", _OUTSIDE), ("growth_inside", _INSIDE)):
+        ends = _GROWTH ** (n - 1) * factor ** (order / _EDGE - 1.0)
+        out[name] = ends ** (1.0 / (factor * n - 1.0))
+    return out
+
 
 log = logging.getLogger(__name__)
 MESH, MODES, POINTS = "mesh", "modes kept", "contact points"
@@ -60,21 +172,9 @@ MORE_ROWS = (1.5, 2.0)
 _GAUSS_ROWS, _LATTICE = (4, 8), 3
 #: harmonics that a finer level has more than the run
 MORE_HARMONICS = (2,)
-#: first step of a climb that begins at the run's own top, over the usual one: maxima side by side
-#: of a flat top are nearer than that
-_CLOSE = 0.1
-#: points of a path along a band
-_MOST_POINTS = 400
 #: number and blade of a peak, with F_C/F_E, or None of a linear limit with its kind
 Place = tuple[float | str, Side, int]
 Laws = Mapping[Side, FaceLaw]
-
-
-class Found(NamedTuple):
-    """Frequency in Hz and height in (m/s2)/N of a peak on a level; nan where it was not found."""
-
-    frequency: float
-    height: float
 
 
 class PeakLevel(NamedTuple):
@@ -93,7 +193,7 @@ class PeakLevel(NamedTuple):
     seconds
         It took.
     why
-        Why nothing was found; "" otherwise.
+        Why something was not found; "" otherwise.
     """
 
     source: str
@@ -103,52 +203,6 @@ class PeakLevel(NamedTuple):
     stuck: tuple[float, float]
     seconds: float
     why: str = ""
-
-
-@dataclass(frozen=True)
-class FoundPeaks:
-    """What is looked for on every level, by one contact stiffness.
-
-    Attributes
-    ----------
-    plan, model
-        Of the run.
-    linear
-        Its linear limits.
-    curves
-        With their peaks and tops.
-    """
-
-    plan: ForcedPlan
-    model: Model
-    linear: LinearCurves
-    curves: tuple[ForcedCurve, ...]
-
-    @property
-    def bare(self) -> FoundPeaks:
-        """Without what a level does not need of the curves: less to send."""
-        return replace(self, curves=tuple(_bare(one) for one in self.curves))
-
-
-def _bare(curve: ForcedCurve) -> ForcedCurve:
-    a = curve.answer
-    nothing = {name: getattr(a, name)[:0] for name in _ALONG}
-    return replace(curve, answer=replace(a, **nothing), accelerance={})
-
-
-_ALONG = (
-    "frequency",
-    "x",
-    "contact_displacement",
-    "contact_force",
-    "state",
-    "energy",
-    "linear",
-    "truncation",
-    "aliasing",
-    "periodic",
-    "highest_harmonic",
-)
 
 
 # -- levels that are models ------------------------------------------------------------------------
@@ -284,7 +338,10 @@ def model_level(peaks: FoundPeaks, made: MadeModel) -> PeakLevel:
     begin = time.perf_counter() - made.seconds
     if isinstance(made.model, str):
         return _none(made.source, made.label, made.model)
-    return _level(peaks, made.model, made.source, made.label, made.size, begin)
+    try:
+        return _level(peaks, made.model, made.source, made.label, made.size, begin)
+    except UpdError as error:
+        return _none(made.source, made.label, one_line(error))
 
 
 def _level(
@@ -298,35 +355,33 @@ def _level(
         found = dict(_linear_peaks(peaks, linear))
         move = moved_points(base, model)
         for curve in peaks.curves:
-            for side, number, top in _first_blades(curve):
-                place = (curve.ratio, side, number)
-                if top.slips:
-                    again = peak_on(peaks, model, linear, curve, side, number, top, move)
+            for one in _first_blades(curve):
+                if one.top.slips:
+                    again = peak_on(peaks, model, linear, one, move)
                 else:
-                    again = found.get(("stuck", side, number), Found(math.nan, math.nan))
-                found[place] = again
-                found |= _other_blade(curve, side, number, top, again)
-    stuck = _stuck(linear, True), _stuck(linear, False)
+                    again = found.get(("stuck", one.blade, one.number), NOT_FOUND)
+                found |= _both_blades(one, again)
+    stuck = stuck_frequency(linear, True), stuck_frequency(linear, False)
     return PeakLevel(source, label, size, found, stuck, time.perf_counter() - begin)
 
 
-def _first_blades(curve: ForcedCurve) -> Iterator[tuple[Side, int, Top]]:
+def _first_blades(curve: ForcedCurve) -> Iterator[RunPeak]:
     """Every mode's peak once, of the right blade where that has one."""
     for number in dict.fromkeys(number for _, number in curve.tops):
         side: Side = "right" if ("right", number) in curve.tops else "left"
-        yield side, number, curve.tops[side, number]
+        yield RunPeak(curve, side, number, curve.tops[side, number])
 
 
-def _other_blade(
-    curve: ForcedCurve, side: Side, number: int, top: Top, again: Found
-) -> dict[Place, Found]:
-    """The other blade's peak of the same mode: it changes alike."""
-    other: Side = "left" if side == "right" else "right"
-    own = curve.tops.get((other, number))
-    if own is None:
-        return {}
-    f, height = again.frequency / top.frequency, again.height / top.height
-    return {(curve.ratio, other, number): Found(f * own.frequency, height * own.height)}
+def _both_blades(one: RunPeak, again: Found) -> dict[Place, Found]:
+    """A peak, and the other blade's of the same mode: it changes alike."""
+    ratio, number = one.curve.ratio, one.number
+    out: dict[Place, Found] = {(ratio, one.blade, number): again}
+    other: Side = "left" if one.blade == "right" else "right"
+    own = one.curve.tops.get((other, number))
+    if own is not None:
+        f, height = again.frequency / one.top.frequency, again.height / one.top.height
+        out[ratio, other, number] = Found(f * own.frequency, height * own.height)
+    return out
 
 
 def _none(source: str, label: str, why: str) -> PeakLevel:
@@ -334,23 +389,11 @@ def _none(source: str, label: str, why: str) -> PeakLevel:
     return PeakLevel(source, label, 1.0, {}, (math.nan, math.nan), 0.0, why)
 
 
-def linear_of(plan: ForcedPlan, model: Model) -> LinearCurves:
-    """The linear limits of a model."""
-    force = plan.scene.damper.centrifugal
-    problem = balance_of(plan, model, force, (0, *model.excitation.harmonics))
-    return linear_limits_of(plan, model, Unsolved(problem), force)
-
-
 def _alike(plan: ForcedPlan, model: Model) -> ForcedPlan:
     """The plan with the sliding directions of a model, one blade after the other."""
     directions: Literal["one", "two"] = "one" if model.contacts.tangents < 2 else "two"
     contact = replace(plan.scene.contact, directions=directions)
     return replace(plan, scene=replace(plan.scene, contact=contact), workers=1)
-
-
-def _stuck(linear: LinearCurves, in_phase: bool) -> float:
-    found = (m.frequency for m in linear.modes if m.axis == "x" and m.in_phase == in_phase)
-    return next(found, math.nan)
 
 
 def _linear_peaks(peaks: FoundPeaks, linear: LinearCurves) -> Iterator[tuple[Place, Found]]:
@@ -376,153 +419,6 @@ def linear_numbers(peaks: FoundPeaks, kind: str, side: Side) -> list[int]:
     return [one.number for one in sorted(told, key=lambda p: p.frequency)]
 
 
-# -- a peak on another level -----------------------------------------------------------------------
-
-
-def peak_on(
-    peaks: FoundPeaks,
-    model: Model,
-    linear: LinearCurves,
-    curve: ForcedCurve,
-    side: Side,
-    number: int,
-    top: Top,
-    move: Array | None,
-) -> Found:
-    """A peak with friction on another model.
-
-    Parameters
-    ----------
-    move
-        (n, n_run) motion of the model's points from that of the run's; None where they are the
-        same.
-    """
-    old = curve.answer.balance
-    b = balance_of(peaks.plan, model, curve.force, old.harmonics.numbers, old.samples)
-    x = top.x if move is None else carried(b, old, top.x, move)
-    ratio = expected(peaks.linear, linear, number, top.frequency)
-    return found_again(peaks.plan, model, curve, side, number, top, b, x, ratio)
-
-
-def expected(own: LinearCurves, other: LinearCurves, number: int, frequency: float) -> float:
-    """Ratio of a peak's frequency on another model to that of the run, between those of the free
-    and of the stuck mode by where the peak lies.
-    """
-    in_phase = number % 2 == 1
-    stuck, again = _stuck(own, in_phase), _stuck(other, in_phase)
-    free = [one.free_peaks["right"] or one.free_peaks["left"] for one in (own, other)]
-    if not (math.isfinite(stuck) and math.isfinite(again) and all(free)):
-        return 1.0
-    start = free[0][0].frequency
-    ends = free[1][0].frequency / start, again / stuck
-    if stuck == start:
-        return ends[1]
-    share = min(max((frequency - start) / (stuck - start), 0.0), 1.0)
-    return ends[0] + share * (ends[1] - ends[0])
-
-
-def found_again(
-    plan: ForcedPlan,
-    model: Model,
-    curve: ForcedCurve,
-    side: Side,
-    number: int,
-    top: Top,
-    b: Balance,
-    x: Array,
-    ratio: float = 1.0,
-    any_height: bool = False,
-    **changes: Any,
-) -> Found:
-    """A peak of another problem: climbed to from the run's top; in a band about it, then in the
-    whole sweep, as the highest of several maxima, where the run has these or the climb fails.
-
-    Parameters
-    ----------
-    b, x
-        The problem, and the run's motion at the top in its unknowns.
-    ratio
-        Of its frequency to that of the run, as far as the linear limits tell.
-    any_height
-        Whether it may lie anywhere in the sweep and have any height: the highest of its mode.
-    **changes
-        Of the problem, as `respond` takes them.
-    """
-    for factor in dict.fromkeys((ratio, 1.0)) if not top.crowded else ():
-        f = factor * top.frequency
-        start = newton(b, x, f)
-        if start is not None:
-            about = top._replace(frequency=f)
-            new = climbed(model, b, start, f, side, curve.force, about, _CLOSE * FIRST_REACH)
-            if new is not None:
-                return Found(new.frequency, new.height)
-    f = ratio * top.frequency
-    e = plan.scene.excitation
-    bands = [
-        np.linspace((1.0 - BAND) * f, (1.0 + BAND) * f, BAND_POINTS),
-        # the loop of a fold may be longer than any band
-        np.linspace(e.start, e.stop, SWEEP_POINTS),
-    ]
-    for band in bands:
-        given: dict[str, Any] = {"harmonics": b.harmonics.numbers, "samples": b.samples}
-        given["settings"] = replace(LONG_STEPS, most_points=_MOST_POINTS)
-        try:
-            peak = peak_of_mode(plan, model, curve.force, side, number, band, **(given | changes))
-        except ConvergenceError as error:
-            log.info("band about %.6g Hz: %s", f, one_line(error))
-            continue
-        if peak is not None and (any_height or is_near(peak[0] / f, peak[1] / top.height)):
-            return Found(*peak)
-    return Found(math.nan, math.nan)
-
-
-def moved_points(base: Model, other: Model) -> Array | None:
-    """(n, n_base) displacements of a model's points from those of the run's, on the same faces, by
-    straight lines up the slope; None where the points are the same.
-    """
-    if np.array_equal(base.position.shape, other.position.shape) and np.allclose(
-        _up(base), _up(other), atol=1e-6 * float(np.ptp(_up(base)) or 1.0)
-    ):
-        return None
-    out = np.zeros((other.contacts.n_point, base.contacts.n_point))
-    for k in range(len(SIDES)):
-        mine, new = np.flatnonzero(base.face == k), np.flatnonzero(other.face == k)
-        x, s = _up(base)[mine], _up(other)[new]
-        rows = np.unique(np.round(x, 9))
-        weight = straight(rows, s)
-        for j, row in enumerate(rows):
-            on = mine[np.isclose(x, row, atol=1e-8 * max(np.ptp(x), 1.0))]
-            # along the damper the motion hardly changes: the mean of the row's points
-            out[np.ix_(new, on)] = weight[:, j : j + 1] / len(on)
-    return out
-
-
-def _up(model: Model) -> Array:
-    """(n,) places up the slope from the middle of each face, mm."""
-    out = np.zeros(len(model.face))
-    for k, side in enumerate(SIDES):
-        on, face = model.face == k, model.faces[side]
-        local = face.position @ face.frame[2]
-        out[on] = local - face.weight @ local
-    return out
-
-
-def carried(b: Balance, old: Balance, x: Array, move: Array) -> Array:
-    """Unknowns of a motion on another model: the same motion of its points, and the rigid motion
-    that goes with it.
-    """
-    W, _ = old.split(x)
-    moved = np.einsum("pq,qdk->pdk", move, W)
-    flat = np.concatenate([moved.ravel(), np.zeros(b.rigid)])
-    if not b.rigid:
-        return flat
-    F = b.force(flat, False).force.reshape(len(b.Psi), -1)
-    rows = b.Psi[:, b.modal.rigid]
-    mean = moved.reshape(len(b.Psi), -1)[:, 0] + b.G0 @ F[:, 0] - b.u0
-    a = np.linalg.lstsq(rows, mean, rcond=None)[0]
-    return np.concatenate([moved.ravel(), a])
-
-
 # -- harmonics and samples -------------------------------------------------------------------------
 
 
@@ -538,7 +434,7 @@ def balance_level(peaks: FoundPeaks, source: str, more: int, factor: int) -> Pea
     """
     label = f"{more} harmonics more" if more else f"{factor} times the samples"
     begin, found, size = time.perf_counter(), dict[Place, Found](), 1.0 / factor
-    plan, model = peaks.plan, peaks.model
+    plan, model, why = peaks.plan, peaks.model, ""
     with threads_for(len(model.M)):
         for curve in peaks.curves:
             old = curve.answer.balance
@@ -547,13 +443,16 @@ def balance_level(peaks: FoundPeaks, source: str, more: int, factor: int) -> Pea
             numbers = range(highest + 1)
             samples = max(factor * old.samples, sample_count(harmonics_of(numbers)))
             b = balance_like(plan, model, curve.force, old, numbers, samples)
-            for side, number, top in _first_blades(curve):
-                if top.slips:
-                    x = b.embedded(top.x, old)
-                    again = found_again(plan, model, curve, side, number, top, b, x)
-                    found[curve.ratio, side, number] = again
-                    found |= _other_blade(curve, side, number, top, again)
-    return PeakLevel(source, label, size, found, (math.nan, math.nan), time.perf_counter() - begin)
+            for one in (each for each in _first_blades(curve) if each.top.slips):
+                try:
+                    again = found_again(plan, model, one, b, b.embedded(one.top.x, old))
+                except UpdError as error:
+                    why = one_line(error)
+                    log.info("%s, %s: %s", label, curve.case, why)
+                    again = NOT_FOUND
+                found |= _both_blades(one, again)
+    seconds = time.perf_counter() - begin
+    return PeakLevel(source, label, size, found, (math.nan, math.nan), seconds, why)
 
 
 def at_place(

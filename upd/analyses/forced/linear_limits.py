@@ -1,17 +1,290 @@
-"""Linear limits of a model: free and with every point stuck."""
+"""Linear limits: free and with every point stuck, of contact points and of whole faces.
+
+Peaks are sought around their own modes: they do not depend on the frequencies asked for.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+from scipy.optimize import minimize_scalar
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import LinearCurves
-from upd.analyses.forced.linear_peaks import finer, linear_modes, linear_peaks
-from upd.analyses.forced.mode_peaks import CANDIDATES
-from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.paths import grid
-from upd.analyses.forced.plan import ForcedPlan
-from upd.scene.forced_contact import SIDES
+from upd.analyses.forced.excitation import Excitation
+from upd.analyses.forced.measures import (
+    PEAKS_ABOVE,
+    Array,
+    Balanced,
+    ComplexArray,
+    CurvePeak,
+    StuckMode,
+    chosen_peaks,
+)
+from upd.analyses.forced.mode_peaks import CANDIDATES, ModeShapes, numbered, shapes_along_x
+from upd.analyses.forced.model import Model
+from upd.analyses.forced.plan import ForcedPlan, grid
+from upd.hbm.balance import Balance
+from upd.hbm.contact_points import stuck_stiffness
+from upd.hbm.interface_state import InterfaceModel
+from upd.scene.forced_contact import SIDES, Side
+
+#: half-power widths on each side of a mode in which its peak is sought, and of a width between two
+#: points there
+_WIDTHS, QUARTER = 3, 0.25
+
+
+def linear_modes(balance: Balance, stuck: bool) -> tuple[Array, Array]:
+    """Natural frequencies and half-power widths without contacts or with all points stuck.
+
+    In the mass-normalised modes of the system without contacts, K = Lambda + Psi^T k Psi and
+    C = Phi^T C Phi. A mode v of it, w^2 = v^T K v, has the width 2 zeta f = v^T C v / (2 pi).
+
+    Returns
+    -------
+    frequency, width
+        (m,) Hz, rising; widths as if the damping did not couple the modes.
+
+    References
+    ----------
+    D. J. Ewins, Modal Testing: Theory, Practice and Application, 2nd ed. (2000), 2.4 and 4.2.
+    """
+    modal, Psi = balance.modal, balance.Psi
+    k = stuck_stiffness(balance.contacts).ravel() if stuck else np.zeros(len(Psi))
+    values, shapes = eigh(np.diag(modal.eigenvalues) + Psi.T @ (k[:, None] * Psi))
+    C = np.diag(modal.damping) if modal.proportional else modal.damping
+    width = np.einsum("ij,ik,kj->j", shapes, C, shapes) / (2.0 * np.pi)
+    return np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), np.maximum(width, 0.0)
+
+
+def around_modes(frequency: Array, width: Array, start: float, stop: float) -> Array:
+    """Frequencies (n,) from start to stop in Hz that pass every mode in steps of a quarter of its
+    half-power width.
+    """
+    steps = np.linspace(-_WIDTHS, _WIDTHS, round(2 * _WIDTHS / QUARTER) + 1)
+    near = (frequency[:, None] + width[:, None] * steps).ravel()
+    inside = near[(near > start) & (near < stop)]
+    return np.unique(np.concatenate([[start], inside, [stop]]))
+
+
+def finer(frequency: Array, modes: Array, width: Array) -> Array:
+    """Frequencies of a sweep, and around every mode that they are too coarse for, further apart
+    than a quarter of its half-power width, such ones.
+
+    Between coarser ones a curve has peaks that no point shows, and contact points begin to slip
+    unseen.
+
+    Parameters
+    ----------
+    frequency
+        (n,) Hz, rising.
+    modes, width
+        (m,) Hz.
+    """
+    if len(frequency) < 2:
+        return frequency
+    place = np.clip(np.searchsorted(frequency, modes) - 1, 0, len(frequency) - 2)
+    coarse = np.diff(frequency)[place] > QUARTER * width
+    ends = float(frequency[0]), float(frequency[-1])
+    return np.union1d(frequency, around_modes(modes[coarse], width[coarse], *ends))
+
+
+def exact_peaks(height: Callable[[Array], Array], f: Array, grid: Array) -> list[CurvePeak]:
+    """The peaks of a curve, each by a local search between its neighbours.
+
+    Parameters
+    ----------
+    height
+        Of the curve at any frequencies (n,) in Hz.
+    f
+        (n,) Hz, rising, fine enough to hold every peak.
+    grid
+        (m,) Hz on which the curve is kept: the point next to a peak is one of these.
+    """
+    a = height(f)
+    found = [
+        _top(height, f[i - 1], f[i + 1])
+        for i in np.flatnonzero((a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])) + 1
+    ]
+    highest = max([float(a.max(initial=0.0)), *(top for _, top in found)])
+    peaks = [
+        CurvePeak(at, top, int(np.abs(grid - at).argmin()))
+        for at, top in found
+        if top >= measures.PEAKS_ABOVE * highest
+    ]
+    return chosen_peaks(peaks)
+
+
+def _top(height: Callable[[Array], Array], low: float, high: float) -> tuple[float, float]:
+    # flat at the top: to half of the digits of f, of the height lacks (eps^1/2 f / width)^2
+    found = minimize_scalar(
+        lambda f: -float(height(np.array([f]))[0]),
+        bounds=(low, high),
+        method="bounded",
+        options={"xatol": float(np.sqrt(np.finfo(float).eps)) * high},
+    )
+    return float(found.x), -float(found.fun)
+
+
+def linear_peaks(
+    answer: Balanced, row: Array, force: float, grid: Array, stuck: bool
+) -> list[CurvePeak]:
+    """Peaks of the accelerance without contacts or with all points stuck.
+
+    Parameters
+    ----------
+    row
+        (n_dof,) output.
+    force
+        Excitation of the answer, N.
+    grid
+        (n,) Hz, rising: the sweep.
+    stuck
+        All points closed and sticking; else without contacts.
+
+    Returns
+    -------
+    list of CurvePeak
+        At most the two highest within the sweep, by rising frequency; heights in (m/s2)/N.
+    """
+    # a mode answers where the harmonic that is read meets it
+    k = measures.read_harmonic(answer)
+    modes, width = linear_modes(answer.balance, stuck)
+
+    def height(f: NDArray[np.float64]) -> Array:
+        return np.abs(measures.linear_accelerance(answer, row, force, f, stuck))
+
+    f = around_modes(modes / k, width / k, float(grid[0]), float(grid[-1]))
+    return exact_peaks(height, f, grid)
+
+
+def stuck_system(march: InterfaceModel) -> tuple[Array, Array, Array]:
+    r"""Modes with every contact closed and sticking.
+
+    With the relative motion held, f = G^-1 (B s - Phi q), and
+    K = [[Lambda + Phi' G^-1 Phi, -Phi' G^-1 B], [-B' G^-1 Phi, B' G^-1 B]] on (q, s),
+    M = diag(1, M_D).
+
+    Parameters
+    ----------
+    march
+        Its first two outputs are the tips along x.
+
+    Returns
+    -------
+    frequency, shapes, tips
+        (k,) Hz rising; (m, k) in the coordinates of the blades' modes; (2, k) of both tips.
+    """
+    m = len(march.frequency)
+    both = np.hstack([-march.shapes, march.columns])
+    force = np.linalg.solve(march.compliance, both)
+    K = both.T @ force
+    K[:m, :m] += np.diag(march.omega**2)
+    M = np.eye(len(K))
+    M[m:, m:] = march.mass
+    values, shapes = eigh(0.5 * (K + K.T), M)
+    tips = march.seen_modes[:2] @ shapes[:m] + march.seen_contact[:2] @ (force @ shapes)
+    return np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), shapes[:m], tips
+
+
+def stuck_modes_of(march: InterfaceModel, below: float) -> ModeShapes:
+    """Stuck modes that move the tips along x, on the outputs behind the tips.
+
+    Parameters
+    ----------
+    march
+        Its first two outputs are the tips along x, the others coordinates of blades' modes.
+    below
+        Hz; modes above are left out.
+    """
+    frequency, shapes, tips = stuck_system(march)
+    rows = march.seen_modes[len(SIDES) :]
+    found = shapes_along_x(np.eye(len(rows)), shapes, _told(frequency, tips, below))
+    return replace(found, shape=rows @ found.shape)
+
+
+def stuck_peaks_of(
+    march: InterfaceModel, peaks: Sequence[CurvePeak], below: float, excitation: Excitation
+) -> list[CurvePeak]:
+    """Peaks of a stuck curve by the numbers of their modes.
+
+    Parameters
+    ----------
+    below
+        Hz; modes above have no number.
+    excitation
+        Of the curve.
+    """
+    if not peaks:
+        return []
+    f = excitation.lowest * np.array([one.frequency for one in peaks])
+    motion = march.linear_response(f, excitation.read, stuck=True)[:, len(SIDES) :]
+    return numbered(stuck_modes_of(march, below), peaks, motion)
+
+
+def stuck_modes_list(march: InterfaceModel, below: float) -> list[StuckMode]:
+    """Stuck modes below ``below`` Hz."""
+    frequency, _, tips = stuck_system(march)
+    return _told(frequency, tips, below)
+
+
+def _told(frequency: Array, tips: Array, below: float) -> list[StuckMode]:
+    size = np.abs(tips).max(axis=0)
+    moved = size > PEAKS_ABOVE * size.max()
+    return [
+        StuckMode(float(f), "x" if x else "y", bool(tips[0, k] * tips[1, k] > 0.0))
+        for k, (f, x) in enumerate(zip(frequency, moved, strict=True))
+        if f < below
+    ]
+
+
+def linear_curves(
+    march: InterfaceModel, frequency: Array, excitation: Excitation, *, stuck: bool
+) -> tuple[Mapping[Side, ComplexArray], Mapping[Side, list[CurvePeak]]]:
+    """Accelerance of both blades per newton of F_E, (m/s2)/N, and its peaks, free or stuck.
+
+    Parameters
+    ----------
+    frequency
+        (n,) Hz, rising: the sweep.
+    excitation
+        What of the blades is excited.
+    stuck
+        Every node closed and sticking; else none touches.
+    """
+    at = stuck_system(march)[0] if stuck else np.sort(march.frequency)
+    width = 2.0 * float(march.damping.max()) * at
+    low, high, k = float(frequency[0]), float(frequency[-1]), excitation.lowest
+    # a mode answers where the harmonic that is read meets it
+    fine = around_modes(at / k, width / k, low, high)
+    curve, moving = partial(_accelerance, march, stuck, excitation), excitation.free_blades
+    rest = np.zeros(len(frequency), complex)
+    return (
+        {s: curve(j, frequency) if stuck or s in moving else rest for j, s in enumerate(SIDES)},
+        {
+            s: exact_peaks(partial(_size, curve, j), fine, frequency)
+            if stuck or s in moving
+            else []
+            for j, s in enumerate(SIDES)
+        },
+    )
+
+
+def _accelerance(
+    march: InterfaceModel, stuck: bool, excitation: Excitation, blade: int, f: Array
+) -> ComplexArray:
+    f = excitation.lowest * f
+    moved = march.linear_response(f, excitation.read, stuck=stuck)[:, blade]
+    return np.asarray(-((2.0 * np.pi * f) ** 2) * 1e-3 * moved)
+
+
+def _size(curve: partial[ComplexArray], k: int, f: Array) -> Array:
+    return np.asarray(np.abs(curve(k, f)))
 
 
 def linear_limits_of(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from upd.hbm.balance import Balance
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
 from upd.hbm.fourier import to_complex
-from upd.scene.forced_contact import SIDES
+from upd.scene.forced_contact import SIDES, Side
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -119,15 +119,21 @@ def accelerance(
     return np.asarray(-((2 * np.pi * k * answer.frequency) ** 2) * u * _M / force)
 
 
+def accelerance_of(
+    moved: ComplexArray, frequency: Array, harmonic: int, force: float
+) -> ComplexArray:
+    """(n,) (m/s2)/N of F_E, from the amplitudes (n,) mm of a harmonic at frequencies (n,) in Hz."""
+    return np.asarray(-((2.0 * np.pi * harmonic * frequency) ** 2) * _M / force * moved)
+
+
 def linear_accelerance(
     answer: Balanced,
     row: Array,
     force: float,
     frequency: Array,
     stuck: bool,
-    harmonic: int | None = None,
 ) -> ComplexArray:
-    """Accelerance without contacts or with all points stuck.
+    """Accelerance without contacts or with all points stuck, in the lowest harmonic excited.
 
     Parameters
     ----------
@@ -139,29 +145,35 @@ def linear_accelerance(
         (n,) Hz.
     stuck
         All points closed and sticking; else without contacts.
-    harmonic
-        Its number; the lowest that is excited when None.
 
     Returns
     -------
     ComplexArray
         (n,) in (m/s2)/N.
     """
-    k = read_harmonic(answer) if harmonic is None else harmonic
+    k = read_harmonic(answer)
     omega = 2 * np.pi * frequency
     moved = answer.balance.linear_displacement(omega, stuck, k) @ row
     return np.asarray(-((k * omega) ** 2) * moved * _M / force)
 
 
-class PathPeak(NamedTuple):
-    """A local maximum: frequency in Hz, height, and the point of the path next to it."""
+class CurvePeak(NamedTuple):
+    """A peak of a curve: frequency in Hz, height, and the point of the path next to it.
+
+    Number, words and MAC of its mode; "" and nan of a curve that moves in no stuck mode (free). The
+    blade, where peaks of both stand together.
+    """
 
     frequency: float
     height: float
     sample: int
+    number: int = 0
+    mode: str = ""
+    mac: float = float("nan")
+    blade: Side | Literal[""] = ""
 
 
-def chosen_peaks(maxima: Sequence[PathPeak]) -> list[PathPeak]:
+def chosen_peaks(maxima: Sequence[CurvePeak]) -> list[CurvePeak]:
     """The two highest of some maxima by rising frequency; a path that turns round passes the same
     peak again.
     """
@@ -174,7 +186,7 @@ def chosen_peaks(maxima: Sequence[PathPeak]) -> list[PathPeak]:
     return sorted(once[:2])
 
 
-def path_maxima(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) -> list[PathPeak]:
+def path_maxima(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) -> list[CurvePeak]:
     """All local maxima along a path that may turn back, in its order.
 
     Parameters
@@ -196,9 +208,9 @@ def path_maxima(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) 
         if (f[i + 1] - f[i]) * (f[i] - f[i - 1]) > 0.0:
             found = find_peaks(f[part][::sense], a[part][::sense])
             if len(found.frequency):
-                out.append(PathPeak(float(found.frequency[0]), float(found.height[0]), int(i)))
+                out.append(CurvePeak(float(found.frequency[0]), float(found.height[0]), int(i)))
                 continue
-        out.append(PathPeak(float(f[i]), float(a[i]), int(i)))
+        out.append(CurvePeak(float(f[i]), float(a[i]), int(i)))
     return out
 
 
@@ -365,48 +377,24 @@ def rest_error(answer: FrequencyResponse, model: Model) -> float:
     """
     if not len(answer.frequency) or not answer.harmonics.static:
         return 0.0
-    rows = model.damper_rows[:, : 1 + answer.balance.contacts.tangents]
-    total = np.einsum("pdr,npd->nr", rows, answer.contact_force[..., 0])
-    rotation = np.array(model.damper.kept) >= 3
-    arm = np.sqrt(float((rows[:, :, rotation] ** 2).sum(axis=(1, 2)).max()))
-    size = float(np.linalg.norm(model.damper.force))
-    return float(np.abs((total - model.damper.force) / np.where(rotation, arm, 1.0)).max() / size)
+    return _off_balance(model, answer.contact_force[..., 0])
 
 
 def static_error(model: Model) -> float:
     """Largest misfit of the points' static forces and moments on the damper against F_C, relative
     to it (moments by the damper's arms).
     """
-    force = np.column_stack([model.contacts.law.preload, model.traction])
-    rows = model.damper_rows[:, : force.shape[1]]
+    return _off_balance(model, np.column_stack([model.contacts.law.preload, model.traction])[None])
+
+
+def _off_balance(model: Model, force: Array) -> float:
+    """Of contact forces (n, n_point, 1 + d) on the damper against F_C."""
+    rows = model.damper_rows[:, : force.shape[2]]
+    total = np.einsum("pdr,npd->nr", rows, force)
     rotation = np.array(model.damper.kept) >= 3
     arm = np.sqrt(float((rows[:, :, rotation] ** 2).sum(axis=(1, 2)).max()))
-    off = np.einsum("pdr,pd->r", rows, force) - model.damper.force
     size = float(np.linalg.norm(model.damper.force))
-    return float(np.abs(off / np.where(rotation, arm, 1.0)).max() / size)
-
-
-def half_power_width(answer: FrequencyResponse, i: int) -> float:
-    """Half-power width in Hz of a resonance at point i of the path, from its own losses.
-
-    The loss factor eta = D / (2 pi E) is the width over the frequency: D the viscous and friction
-    loss per cycle, E = w^2 z^H M z / 2 the largest kinetic energy of the harmonic z that is read,
-    w its angular frequency. Of one viscously damped mode it is 2 zeta f; it does not need the
-    points beside i.
-
-    References
-    ----------
-    D. J. Ewins, Modal Testing: Theory, Practice and Application, 2nd ed. (2000), 2.4.
-    """
-    j, k = read_place(answer), read_harmonic(answer)
-    modal, f = answer.balance.modal, float(answer.frequency[i])
-    z = to_complex(answer.coefficients[i], answer.harmonics)[:, j]
-    eta = np.linalg.solve(modal.Phi, z)
-    damped = modal.damping * eta if modal.proportional else modal.damping @ eta
-    omega = 2.0 * np.pi * k * f
-    loss = np.pi * omega * float((eta.conj() @ damped).real) + float(answer.energy[i].sum()) / k
-    kinetic = 0.5 * omega**2 * float((eta.conj() @ eta).real)
-    return f * loss / (2.0 * np.pi * kinetic)
+    return float(np.abs((total - model.damper.force) / np.where(rotation, arm, 1.0)).max() / size)
 
 
 def residual_error(answer: FrequencyResponse) -> float:
@@ -423,27 +411,23 @@ def residual_error(answer: FrequencyResponse) -> float:
     return worst
 
 
-def static_normal(answer: FrequencyResponse, model: Model, i: int) -> dict[str, float]:
+def static_normal(answer: FrequencyResponse, model: Model, i: int) -> dict[Side, float]:
     """Mean normal force in N on each face at point i of the path."""
     N = answer.contact_force[i, :, 0, 0]
     return {side: float(N[model.face == k].sum()) for k, side in enumerate(SIDES)}
 
 
-def shares(answer: FrequencyResponse, model: Model, weights: Any = None) -> dict[str, Array]:
-    """Shares of the cycle in every contact state, averaged over the points of each face.
-
-    Parameters
-    ----------
-    weights
-        (n_point,) of the average; the normal stiffness when None.
+def shares(answer: FrequencyResponse, model: Model) -> dict[Side, Array]:
+    """Shares of the cycle in every contact state, averaged over the points of each face by their
+    normal stiffness.
 
     Returns
     -------
     dict
         Side -> (n, 3) stick, slip and lift-off along the path.
     """
-    w = model.contacts.law.k_n if weights is None else np.asarray(weights)
-    out: dict[str, Array] = {}
+    w = model.contacts.law.k_n
+    out: dict[Side, Array] = {}
     for k, side in enumerate(SIDES):
         on = model.face == k
         out[side] = np.einsum("npc,p->nc", answer.state[:, on], w[on] / w[on].sum())

@@ -9,38 +9,36 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.measures import ComplexArray, PathPeak
+from upd.analyses.forced.measures import ComplexArray, CurvePeak, StuckMode
 from upd.analyses.forced.model import Array, Model
 from upd.hbm import FrequencyResponse
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
 from upd.hbm.fourier import to_complex
+from upd.scene.forced_contact import Side
 
 #: share of the motion above which a mode has more than all others together
 MAJORITY = 0.5
 #: modes up to so many times the highest frequency of a sweep are told in it
 CANDIDATES = 2.0
+#: how numbers of the left blade begin
+LEFT = "left_"
 
 
-class ModePeak(NamedTuple):
-    """A peak of a curve: number and words of its mode, Hz, height, point of the path, MAC.
+def peak_name(blade: Side, number: int) -> str:
+    """How the names of a peak's numbers begin."""
+    return f"{LEFT * (blade == 'left')}peak_{number}"
 
-    ``mode`` is "" and ``mac`` nan for a peak of a curve that moves in no stuck mode (free).
-    """
 
-    number: int
-    frequency: float
-    height: float
-    sample: int
-    mode: str = ""
-    mac: float = float("nan")
+def reduction_name(blade: Side) -> str:
+    """Name of the number that tells how far a blade's highest peak is below its free one."""
+    return f"{LEFT * (blade == 'left')}reduction_of_free_peak"
 
 
 @dataclass(frozen=True)
@@ -66,19 +64,21 @@ class ModeShapes:
 def mode_shapes(model: Model, below: float) -> ModeShapes:
     """The stuck modes along x below ``below`` Hz, numbered by the phase of the tips."""
     M, values, shapes = measures.stuck_shapes(model)
+    return shapes_along_x(M, shapes, measures.tell_modes(model, values, shapes, below))
+
+
+def shapes_along_x(M: Array, shapes: Array, modes: Sequence[StuckMode]) -> ModeShapes:
+    """Of shapes (n, k), the first of which are these modes, those along x, numbered."""
     count, column, number, words = {True: 0, False: 0}, [], [], []
-    for k, mode in enumerate(measures.tell_modes(model, values, shapes, below)):
+    for j, mode in enumerate(modes):
         if mode.axis == "x":
             count[mode.in_phase] += 1
-            column.append(k)
-            number.append(2 * count[mode.in_phase] - mode.in_phase)
-            words.append(mode_words(count[mode.in_phase], mode.in_phase))
+            k = count[mode.in_phase]
+            column.append(j)
+            number.append(2 * k - mode.in_phase)
+            kind = "in phase" if mode.in_phase else "out of phase"
+            words.append(kind + (f" {k}" if k > 1 else ""))
     return ModeShapes(M, shapes[:, column], tuple(number), tuple(words))
-
-
-def mode_words(k: int, in_phase: bool) -> str:
-    """A mode in words: how the tips move, and which of its kind."""
-    return ("in phase" if in_phase else "out of phase") + (f" {k}" if k > 1 else "")
 
 
 def motion_shares(M: Array, motion: ComplexArray, shape: Array) -> Array:
@@ -144,7 +144,7 @@ def tell_apart(share: Array, height: Array) -> dict[int, int]:
 
 def numbered_peaks(
     model: Model, answer: FrequencyResponse, height: Array, stop: float
-) -> list[ModePeak]:
+) -> list[CurvePeak]:
     """Peaks of a path by the numbers of their modes.
 
     Parameters
@@ -169,7 +169,9 @@ def numbered_peaks(
     return numbered(mode_shapes(model, CANDIDATES * stop), maxima, motion)
 
 
-def numbered(modes: ModeShapes, maxima: Sequence[PathPeak], motion: ComplexArray) -> list[ModePeak]:
+def numbered(
+    modes: ModeShapes, maxima: Sequence[CurvePeak], motion: ComplexArray
+) -> list[CurvePeak]:
     """Peaks by the number of their mode.
 
     Parameters
@@ -183,10 +185,11 @@ def numbered(modes: ModeShapes, maxima: Sequence[PathPeak], motion: ComplexArray
         return []
     share = motion_shares(modes.M, motion, modes.shape)
     found = tell_apart(share, np.array([one.height for one in maxima]))
-    return sorted(
-        ModePeak(modes.number[j], *maxima[i], modes.words[j], float(share[i, j]))
+    named = [
+        maxima[i]._replace(number=modes.number[j], mode=modes.words[j], mac=float(share[i, j]))
         for j, i in found.items()
-    )
+    ]
+    return sorted(named, key=lambda peak: peak.number)
 
 
 def first_harmonic(answer: FrequencyResponse, points: NDArray[np.int64]) -> ComplexArray:
@@ -235,12 +238,12 @@ def stuck_motion(model: Model, frequency: Array) -> ComplexArray:
     return np.array([np.linalg.solve(K + 1j * w * C - w**2 * M, force) for w in omega])
 
 
-def unmoved(peaks: Sequence[PathPeak]) -> list[ModePeak]:
+def unmoved(peaks: Sequence[CurvePeak]) -> list[CurvePeak]:
     """Peaks of a curve of no stuck mode, numbered by frequency."""
-    return [ModePeak(k, *peak) for k, peak in enumerate(peaks, 1)]
+    return [peak._replace(number=k) for k, peak in enumerate(peaks, 1)]
 
 
-def tell_stuck_peaks(model: Model, peaks: Sequence[PathPeak], stop: float) -> list[ModePeak]:
+def tell_stuck_peaks(model: Model, peaks: Sequence[CurvePeak], stop: float) -> list[CurvePeak]:
     """Peaks of a stuck curve by the numbers of their modes.
 
     Parameters

@@ -15,19 +15,20 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from upd.analyses.forced.blade_parts import (
+    EVEN_DOFS,
     BladePart,
+    MirrorPairs,
     attached_part,
+    mirror_pairs,
     nodal_part,
     ritz,
     symmetric,
 )
 from upd.analyses.forced.excitation import Excitation, excitation_of
-from upd.analyses.forced.gauss_points import gauss_points
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.points import FacePoints, free_points, lattice_points
+from upd.analyses.forced.points import FacePoints, free_points, gauss_points, lattice_points
 from upd.analyses.forced.statics import StaticState, point_preload, static_state
 from upd.analyses.forced.stiffness import FaceLaw, mirrored
-from upd.analyses.forced.symmetry import EVEN_DOFS, MirrorPairs, mirror_pairs
 from upd.analyses.seated.bodies import Bodies
 from upd.fem import modal_damping
 from upd.hbm import Contacts, RigidDamper, contact_rows, contacts, rigid_damper
@@ -41,7 +42,7 @@ from upd.scene.forced_contact import GAUSS, SIDES, Side
 log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-_AXIS_X, _AXIS_Y = 0, 1
+_AXIS_Y = 1
 #: relative change of the stuck frequencies up to which sliding along the damper is left out
 ALONG_MATTERS = 1e-3
 
@@ -76,9 +77,6 @@ class Model:
         (n_point, d) N along the tangents before anything moves.
     state
         The static state that preload and traction are; None without.
-    along
-        Relative change of the stuck frequencies by what resists sliding along the damper; None
-        where it may drift along it.
     """
 
     M: Array
@@ -98,7 +96,6 @@ class Model:
     static: Array
     traction: Array
     state: StaticState | None = None
-    along: float | None = None
 
     @property
     def n(self) -> int:
@@ -159,20 +156,9 @@ def make_model(
     """
     scene = plan.scene
     whole = {side: _face(scene, bodies, side, laws[side]) for side in SIDES}
-    parts = in_parallel(
-        [partial(_reduced, plan, bodies, side, whole[side]) for side in SIDES], plan.workers
-    )
-    sized = {side: _points(whole[side], laws[side]) for side in SIDES}
-    joined = plan.symmetry == "half" and not bodies.half
-    pairs = {side: mirror_pairs(whole[side]) if joined else None for side in SIDES}
-    small = _small(whole, parts, pairs)
-    if small is None:
-        pairs = dict.fromkeys(SIDES)
-        small = _small(whole, parts, pairs)
-    assert small is not None
-    paired = all(pairs.values())
-    half = paired or bodies.half
-    faces = {side: pairs[side].face(whole[side]) if paired else whole[side] for side in SIDES}  # type: ignore[union-attr]
+    small, pairs = _reduced_blades(plan, bodies, whole)
+    half = pairs is not None or bodies.half
+    faces = {side: pairs[side].face(whole[side]) for side in SIDES} if pairs else whole
     K, M = _beside(small[0][0], small[1][0]), _beside(small[0][1], small[1][1])
     values, shapes = eigh(K, M)
     frequency = np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
@@ -180,44 +166,34 @@ def make_model(
     # M has a block for each blade
     share = np.stack([(part * (M @ shapes)[on]).sum(axis=0) for on, part in _blades(shapes, n)], 1)
     damping = scene.modal_damping(frequency, share)
+    before_after = ((0, n[1]), (n[0], 0))
     rows = np.concatenate(
         [
-            np.pad(small[0][2], ((0, 0), (0, 0), (0, n[1]))),
-            np.pad(small[1][2], ((0, 0), (0, 0), (n[0], 0))),
+            np.pad(part[2], ((0, 0), (0, 0), at))
+            for part, at in zip(small, before_after, strict=True)
         ]
     )
-    probes = [np.pad(small[0][3], ((0, 0), (0, n[1]))), np.pad(small[1][3], ((0, 0), (n[0], 0)))]
+    probes = [np.pad(part[3], ((0, 0), at)) for part, at in zip(small, before_after, strict=True)]
     excitation = excitation_of(scene.excitation)
-    own = bodies.damper.with_mirror_image(_AXIS_Y) if bodies.half else bodies.damper
-    damper = rigid_damper(
-        own.mass,
-        symmetric(own.inertia),
-        own.centre,
-        [0.0, 0.0, scene.damper.centrifugal],
-        kept=EVEN_DOFS if half else range(6),
-    )
-    position = np.vstack([faces[side].position for side in SIDES])
-    frames = np.concatenate(
-        [np.tile(faces[side].frame, (faces[side].n_point, 1, 1)) for side in SIDES]
-    )
-    k_n, k_t = (
-        np.concatenate(
-            [
-                pairs[side].total(sized[side][j]) if paired else sized[side][j]  # type: ignore[union-attr]
-                for side in SIDES
-            ]
-        )
-        for j in range(2)
-    )
+    damper = _rigid(scene, bodies, half)
+    k_n, k_t = _stiffnesses(whole, laws, pairs)
     # the blade's motion opens the contact that the damper's closes
     made = contacts(
         -rows[:, 0], [-rows[:, 1], -rows[:, 2]], k_n=k_n, k_t=k_t, mu=scene.contact.friction
     )
-    on_damper = contact_rows(damper, position, frames)
-    change = _along_change(M, K, made, damper, on_damper) if half else None
-    if scene.contact.directions == "one" or (
-        scene.contact.directions == "auto" and change is not None and change <= ALONG_MATTERS
+    on_damper = contact_rows(
+        damper,
+        np.vstack([faces[side].position for side in SIDES]),
+        np.concatenate([np.tile(faces[side].frame, (faces[side].n_point, 1, 1)) for side in SIDES]),
+    )
+    directions = scene.contact.directions
+    if (
+        directions == "auto"
+        and half
+        and _along_change(M, K, made, damper, on_damper) <= ALONG_MATTERS
     ):
+        directions = "one"
+    if directions == "one":
         # normal and up the slope
         kept = [0, 2]
         made, on_damper = (
@@ -241,12 +217,65 @@ def make_model(
         np.repeat([0, 1], [faces[side].n_point for side in SIDES]),
         np.zeros(len(M)),
         np.zeros((made.n_point, made.tangents)),
-        None,
-        change,
     )
     if not scene.contact.loaded:
         return model
     return preloaded(model, state or static_state(plan, bodies))
+
+
+def _reduced_blades(
+    plan: ForcedPlan, bodies: Bodies, faces: Mapping[Side, FacePoints]
+) -> tuple[list[tuple[Array, Array, Array, Array]], Mapping[Side, MirrorPairs] | None]:
+    """K, M, contact rows and probe rows of each blade; pairs of the points where only motion even
+    about y = 0 is kept.
+    """
+    parts = in_parallel(
+        [partial(_reduced, plan, bodies, side, faces[side]) for side in SIDES], plan.workers
+    )
+    pairs: dict[Side, MirrorPairs] = {}
+    for side in SIDES if plan.symmetry == "half" and not bodies.half else ():
+        found = mirror_pairs(faces[side])
+        if found is not None:
+            pairs[side] = found
+    if len(pairs) == len(SIDES):
+        small = [ritz(part, pairs[side]) for side, part in zip(SIDES, parts, strict=True)]
+        even = [one for one in small if one is not None]
+        if len(even) == len(SIDES):
+            return even, pairs
+        log.info("modes of mixed parity, both halves are kept")
+    out = []
+    for side, part in zip(SIDES, parts, strict=True):
+        if faces[side].at_nodes:
+            out.append((part.K, part.M, part.rows, part.probes))
+        else:
+            found_ritz = ritz(part)
+            assert found_ritz is not None
+            out.append(found_ritz)
+    return out, None
+
+
+def _rigid(scene: ForcedScene, bodies: Bodies, half: bool) -> RigidDamper:
+    """The whole damper, in all its motions or those even about y = 0."""
+    own = bodies.damper.with_mirror_image(_AXIS_Y) if bodies.half else bodies.damper
+    return rigid_damper(
+        own.mass,
+        symmetric(own.inertia),
+        own.centre,
+        [0.0, 0.0, scene.damper.centrifugal],
+        kept=EVEN_DOFS if half else range(6),
+    )
+
+
+def _stiffnesses(
+    faces: Mapping[Side, FacePoints],
+    laws: Mapping[Side, FaceLaw],
+    pairs: Mapping[Side, MirrorPairs] | None,
+) -> list[Array]:
+    """k_n and k_t of all points, of pairs together."""
+    sized = {side: _points(faces[side], laws[side]) for side in SIDES}
+    if pairs is not None:
+        sized = {s: (pairs[s].total(k_n), pairs[s].total(k_t)) for s, (k_n, k_t) in sized.items()}
+    return [np.concatenate([sized[side][j] for side in SIDES]) for j in range(2)]
 
 
 def preloaded(model: Model, state: StaticState) -> Model:
@@ -298,32 +327,6 @@ def _along_change(
         B, k = joined.rows[:, kept].reshape(-1, len(M)), stuck_stiffness(joined)[:, kept].ravel()
         found.append(np.sqrt(eigh(K + B.T @ (k[:, None] * B), M, subset_by_index=[0, 1])[0]))
     return float(np.abs(found[1] / found[0] - 1.0).max())
-
-
-def _small(
-    faces: Mapping[Side, FacePoints],
-    parts: Sequence[BladePart],
-    pairs: Mapping[Side, MirrorPairs | None],
-) -> list[tuple[Array, Array, Array, Array]] | None:
-    """K, M, contact rows and probe rows of each blade.
-
-    Reduced by symmetry about y = 0 where both faces have pairs; None when that fails.
-    """
-    out = []
-    for side, part in zip(SIDES, parts, strict=True):
-        if all(pairs.values()):
-            even = ritz(part, pairs[side])
-            if even is None:
-                log.info("%s blade: modes of mixed parity, both halves are kept", side)
-                return None
-            out.append(even)
-        elif faces[side].at_nodes:
-            out.append((part.K, part.M, part.rows, part.probes))
-        else:
-            found = ritz(part)
-            assert found is not None
-            out.append(found)
-    return out
 
 
 def _face(scene: ForcedScene, bodies: Bodies, side: Side, law: FaceLaw) -> FacePoints:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.array_parts import (
+from upd.analyses.forced.curve_arrays import (
     FRICTION,
     HZ,
     LINEAR,
@@ -20,21 +20,22 @@ from upd.analyses.forced.array_parts import (
     POINTS,
     SWEEP,
     Variables,
-    shares_by_face,
-)
-from upd.analyses.forced.curve_arrays import (
     faces_friction,
     friction_arrays,
     linear_arrays,
+    marched_arrays,
+    peaks_by_sweep,
     performance_arrays,
+    shares_by_face,
+    swept_arrays,
 )
+from upd.analyses.forced.curve_results import measured_peaks
 from upd.analyses.forced.excitation import excitation_of
-from upd.analyses.forced.marched_peaks import faces_places
-from upd.analyses.forced.model import Model
-from upd.analyses.forced.printed import measured_peaks
+from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.solution import ForcedSolution
-from upd.analyses.forced.swept_arrays import marched_arrays, peaks_by_sweep, swept_arrays
+from upd.analyses.forced.sweeps import faces_places
 from upd.analyses.measured import measured_arrays
+from upd.mesh import IntArray
 from upd.results import ArrayGroup, Case
 
 
@@ -75,7 +76,7 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
                 friction_arrays(solution, curve), content=FRICTION, case=curve.case
             )
     for path in (c for c in solution.balanced if not c.empty):
-        whole = faces_friction(path, solution.marked_points(path), excited)
+        whole = faces_friction(path, solution.marked_points(path))
         if solution.plan.scene.wants("contact_state"):
             whole["share"] = shares_by_face(
                 whole["state"][1], faces_places(solution, path.stiffness)
@@ -107,24 +108,12 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
 
 
 def _points(model: Model) -> Variables:
-    law, (along, up) = model.contacts.law, measures.place(model)
-    return {
-        "position": (("contact_point", "component"), model.position, {"units": "mm"}),
-        "face": (("contact_point",), model.face, {"flag_meanings": "left right"}),
-        "k_n": (("contact_point",), law.k_n, {"units": "N/mm"}),
-        "k_t": (("contact_point",), law.k_t, {"units": "N/mm"}),
-        "along": (
-            ("contact_point",),
-            along,
-            {"units": "mm", "long_name": "place along the damper"},
-        ),
-        "up": (
-            ("contact_point",),
-            up,
-            {"units": "mm", "long_name": "place up the slope, from the lowest point of the face"},
-        ),
+    law, at = model.contacts.law, ("contact_point",)
+    return _places(model.position, model.face, *measures.place(model)) | {
+        "k_n": (at, law.k_n, {"units": "N/mm"}),
+        "k_t": (at, law.k_t, {"units": "N/mm"}),
         "static_force": (
-            ("contact_point", "static_component"),
+            (*at, "static_component"),
             np.column_stack([law.preload, model.traction]),
             {"units": "N", "long_name": "before vibration: normal force, then tractions"},
         ),
@@ -134,17 +123,19 @@ def _points(model: Model) -> Variables:
 def _nodes(solution: ForcedSolution, name: str) -> Variables:
     """Nodes of whole faces, in the variables of contact points without springs."""
     of, places = solution.faces[name].of, faces_places(solution, name)
+    area = {"area": (("contact_point",), places.weight, {"units": "mm2"})}
+    return _places(of.position, places.face, places.along, places.up) | area
+
+
+def _places(position: Array, face: IntArray, along: Array, up: Array) -> Variables:
+    """Where contact points lie: in space, and in the frames of their faces."""
     mm, at = {"units": "mm"}, ("contact_point",)
+    low = "place up the slope, from the lowest point of the face"
     return {
-        "position": ((*at, "component"), of.position, mm),
-        "face": (at, places.face, {"flag_meanings": "left right"}),
-        "along": (at, places.along, mm | {"long_name": "place along the damper"}),
-        "up": (
-            at,
-            places.up,
-            mm | {"long_name": "place up the slope, from the lowest point of the face"},
-        ),
-        "area": (at, places.weight, {"units": "mm2"}),
+        "position": ((*at, "component"), position, mm),
+        "face": (at, face, {"flag_meanings": "left right"}),
+        "along": (at, along, mm | {"long_name": "place along the damper"}),
+        "up": (at, up, mm | {"long_name": low}),
     }
 
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.forced.linear_peaks import finer, linear_modes
+from upd.analyses.forced.linear_limits import finer, linear_modes
 from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.hbm import FrequencyResponse, Settings, frequency_response, harmonics
 from upd.hbm.assembled import assembled
 from upd.hbm.balance import Balance
@@ -28,14 +28,6 @@ LEAST_POINTS, MOST_POINTS = 1800, 4
 #: steps of a path whose tops are climbed to afterwards: half the points of the usual ones, and tops
 #: between them that differ by 0.2 % in height
 LONG_STEPS = Settings(angle=0.7, kink_step=0.1, wanted_iterations=8)
-
-
-def grid(plan: ForcedPlan) -> Array:
-    """Frequencies of the sweep in Hz, those of the time march among them."""
-    e = plan.scene.excitation
-    return np.unique(
-        np.concatenate([np.linspace(e.start, e.stop, e.points), plan.scene.balance.time_march])
-    )
 
 
 def fine_grid(

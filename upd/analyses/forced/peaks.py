@@ -27,10 +27,8 @@ from upd.analyses.forced.curves import (
     rising,
 )
 from upd.analyses.forced.interface_model import by_coulomb
-from upd.analyses.forced.mode_peaks import (
-    ModePeak,
-    numbered_peaks,
-)
+from upd.analyses.forced.measures import CurvePeak
+from upd.analyses.forced.mode_peaks import numbered_peaks
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.paths import fine_grid, respond
 from upd.analyses.forced.plan import ForcedPlan, time_steps
@@ -77,8 +75,12 @@ def solve_curve(
     """
     begin, force = time.perf_counter(), plan.scene.damper.centrifugal / ratio
     answer = respond(plan, model, force, fine_grid(plan, model, force))
-    blades = {side: measures.accelerance(answer, model.row(side), force) for side in SIDES}
-    curve = ForcedCurve(name, ratio, force, answer, blades, time.perf_counter() - begin)
+    H = {
+        k: {side: measures.accelerance(answer, model.row(side), force, k) for side in SIDES}
+        for k in model.excitation.harmonics
+    }
+    read = H.pop(model.excitation.lowest)
+    curve = ForcedCurve(name, ratio, force, read, H, {}, answer, time.perf_counter() - begin)
     if curve.empty:
         return curve
     curve = with_tops(plan, model, linear, curve)
@@ -94,7 +96,7 @@ def with_tops(
 ) -> ForcedCurve:
     """The curve with its peaks between the points of the path."""
     stop, answer = plan.scene.excitation.stop, curve.answer
-    peaks: dict[Side, tuple[ModePeak, ...]] = {}
+    peaks: dict[Side, tuple[CurvePeak, ...]] = {}
     tops: dict[tuple[Side, int], Top] = {}
     for side in SIDES:
         size, mine = np.abs(curve.accelerance[side]), []
@@ -108,7 +110,7 @@ def with_tops(
     return replace(curve, peaks=peaks, tops=tops)
 
 
-def _crowded(curve: ForcedCurve, size: Array, peak: ModePeak) -> bool:
+def _crowded(curve: ForcedCurve, size: Array, peak: CurvePeak) -> bool:
     """Whether the path has more maxima about a peak that are nearly as high."""
     f = curve.frequency
     maxima = measures.path_maxima(f, size)
@@ -121,7 +123,7 @@ def _crowded(curve: ForcedCurve, size: Array, peak: ModePeak) -> bool:
 
 
 def _top(
-    model: Model, linear: LinearCurves, curve: ForcedCurve, side: Side, peak: ModePeak
+    model: Model, linear: LinearCurves, curve: ForcedCurve, side: Side, peak: CurvePeak
 ) -> Top | None:
     a, i = curve.answer, peak.sample
     if a.linear[max(i - 1, 0) : i + 2].all():
@@ -142,7 +144,7 @@ def climbed(
     frequency: float,
     side: Side,
     force: float,
-    about: ModePeak | Top,
+    about: CurvePeak | Top,
     reach: float = FIRST_REACH,
 ) -> Top | None:
     """The top of the accelerance of a blade uphill from a solved point; None where none is near.
@@ -225,7 +227,7 @@ def _confirmed(
     model: Model,
     curve: ForcedCurve,
     side: Side,
-    peak: ModePeak,
+    peak: CurvePeak,
     top: Top,
     steps: int,
 ) -> TimeCheck:
@@ -346,35 +348,3 @@ def _amplitude(model: Model, b: Balance, x: Array, f: float, side: Side) -> floa
     force = b.force(x, False).force.reshape(1, len(b.Psi), b.harmonics.size)
     moving = to_complex(b.displacement(omega, force, b.split(x)[1][None])[0], b.harmonics)
     return float(abs(model.row(side) @ moving[:, j]))
-
-
-# -- a band about a peak ---------------------------------------------------------------------------
-
-
-def peak_of_mode(
-    plan: ForcedPlan,
-    model: Model,
-    force: float,
-    side: Side,
-    number: int,
-    frequency: Array,
-    **changes: object,
-) -> tuple[float, float] | None:
-    """Frequency and height of a mode's peak on a path along some frequencies; None without.
-
-    Parameters
-    ----------
-    number
-        Of the mode.
-    frequency
-        (n,) Hz.
-    **changes
-        As `respond` takes them.
-    """
-    answer = respond(plan, model, force, frequency, **changes)
-    if not len(answer.frequency):
-        return None
-    size = np.abs(measures.accelerance(answer, model.row(side), force))
-    found = numbered_peaks(model, answer, size, plan.scene.excitation.stop)
-    mine = [p for p in found if p.number == number]
-    return (mine[0].frequency, mine[0].height) if mine else None

@@ -8,7 +8,6 @@ nothing is lost: a curve shows all its peaks.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -17,8 +16,9 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import ForcedCurve, LinearCurves
-from upd.analyses.forced.mode_peaks import ModePeak, numbered_peaks
-from upd.analyses.forced.model import Array, Model
+from upd.analyses.forced.measures import CurvePeak
+from upd.analyses.forced.mode_peaks import numbered_peaks
+from upd.analyses.forced.model import Model
 from upd.analyses.forced.paths import LONG_STEPS, SWEEP_POINTS, fine_grid, respond
 from upd.analyses.forced.plan import ForcedPlan
 from upd.linalg.parallel import threads_for
@@ -29,30 +29,15 @@ from upd.scene.forced_contact import SIDES, Side
 MOST_POINTS = 600
 
 
-class RatioPeak(NamedTuple):
-    """A peak at one F_C/F_E: blade, number and words of its mode, Hz, (m/s2)/N, shares of the cycle
-    in which points slip and are open.
-    """
-
-    blade: Side
-    number: int
-    mode: str
-    frequency: float
-    height: float
-    slip: float
-    lift: float
-
-
 class RatioPoint(NamedTuple):
-    """The peaks at one F_C/F_E; whether the curve reached its end, and seconds."""
+    """The peaks of both blades at one F_C/F_E; whether the curve reached its end."""
 
     ratio: float
-    peaks: tuple[RatioPeak, ...]
+    peaks: tuple[CurvePeak, ...]
     arrived: bool
-    seconds: float
 
     @property
-    def worst(self) -> RatioPeak | None:
+    def worst(self) -> CurvePeak | None:
         """The highest of both blades and all modes."""
         return max(self.peaks, key=lambda one: one.height, default=None)
 
@@ -130,12 +115,12 @@ def peaks_at(
     changes
         Other choices of it, as `respond` takes them.
     """
-    begin, force, e = time.perf_counter(), plan.scene.damper.centrifugal / ratio, plan.scene
+    force, e = plan.scene.damper.centrifugal / ratio, plan.scene
     span = np.linspace(e.excitation.start, e.excitation.stop, SWEEP_POINTS)
     sweep = fine_grid(plan, model, force, span)
     settings = replace(LONG_STEPS, most_points=MOST_POINTS)
     given = {"harmonics": range(harmonics + 1), "settings": settings} | dict(changes or {})
-    found: dict[tuple[Side, int], RatioPeak] = {}
+    found: dict[tuple[Side, int], CurvePeak] = {}
     up_to = -math.inf
     with threads_for(len(model.M)):
         for down in (False, True):
@@ -144,29 +129,21 @@ def peaks_at(
             for side in SIDES if len(f) else ():
                 size = np.abs(measures.accelerance(answer, model.row(side), force))
                 for peak in numbered_peaks(model, answer, size, e.excitation.stop):
-                    one = _of(side, peak, answer.state[peak.sample].mean(axis=0))
                     known = found.get((side, peak.number))
-                    if known is None or one.height > known.height:
-                        found[side, peak.number] = one
+                    if known is None or peak.height > known.height:
+                        found[side, peak.number] = peak._replace(blade=side)
             whole = answer.arrived or (down and float(f.min(initial=math.inf)) <= up_to)
             up_to = float(f.max(initial=-math.inf))
             if whole:
                 break
     # what one path does not reach the one from the other end does
-    return RatioPoint(ratio, tuple(found.values()), whole, time.perf_counter() - begin)
-
-
-def _of(side: Side, peak: ModePeak, state: Array) -> RatioPeak:
-    return RatioPeak(
-        side, peak.number, peak.mode, peak.frequency, peak.height, float(state[1]), float(state[2])
-    )
+    return RatioPoint(ratio, tuple(found.values()), whole)
 
 
 def of_curve(curve: ForcedCurve) -> RatioPoint:
     """The peaks of a curve of the run."""
-    state = curve.answer.state
-    found = [_of(s, p, state[p.sample].mean(axis=0)) for s in SIDES for p in curve.peaks[s]]
-    return RatioPoint(curve.ratio, tuple(found), not curve.stopped, curve.seconds)
+    found = [p._replace(blade=s) for s in SIDES for p in curve.peaks[s]]
+    return RatioPoint(curve.ratio, tuple(found), not curve.stopped)
 
 
 def ratios_of(plan: ForcedPlan) -> list[float]:

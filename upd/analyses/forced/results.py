@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from upd.analyses.forced.compared import measured_results
-from upd.analyses.forced.curve_results import balanced_results, curve_results, swept_results
-from upd.analyses.forced.curves import LinearCurves, WholeFaces
+from upd.analyses import measured
+from upd.analyses.forced import measures
+from upd.analyses.forced.curve_results import (
+    balanced_results,
+    curve_results,
+    peak_results,
+    swept_results,
+)
+from upd.analyses.forced.curves import FrictionCurve, LinearCurves, WholeFaces
+from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.inputs import InputEffect
+from upd.analyses.forced.linear_limits import linear_curves
 from upd.analyses.forced.mode_peaks import unmoved
-from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.peak_results import LEFT, left_peak_results, peak_results
+from upd.analyses.forced.model import Array, ComplexArray, Model
+from upd.analyses.forced.paths import balance_of
 from upd.analyses.forced.performance import Performance
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import StaticState
+from upd.analyses.measured import FREE, STUCK, Computed
+from upd.measured.compare import on_path
+from upd.measured.curve import LEAST_POINTS
 from upd.results import Case, Result, withheld
-from upd.scene.forced_contact import SIDES
+from upd.scene.forced_contact import SIDES, Side
+from upd.scene.measured import MeasuredChoice
 
 #: a rigid damper in the same static state; of the seated one, as far as friction can oppose F_C
 _SAID = {
@@ -151,16 +163,14 @@ def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -
         found = next((m for m in linear.modes if m.axis == "x" and m.in_phase == in_phase), None)
         if found is not None:
             results.append(Result(f"stuck_{phase[in_phase]}", case, found.frequency, "Hz"))
-    for kind, told in (
-        ("free", unmoved(linear.free_peaks["right"])),
-        ("stuck", solution.stuck_peaks(name)),
-    ):
-        results += peak_results(solution, replace(case, kind=kind), told)
     # Without a damper a blade that is not excited, on a base of its own, stays at rest.
-    results += left_peak_results(replace(case, kind="free"), unmoved(linear.free_peaks["left"]))
-    return results + left_peak_results(
-        replace(case, kind="stuck"), solution.stuck_peaks(name, "left")
-    )
+    for blade in SIDES[::-1]:
+        for kind, peaks in (
+            ("free", unmoved(linear.free_peaks[blade])),
+            ("stuck", solution.stuck_peaks(name, blade)),
+        ):
+            results += peak_results(solution, replace(case, kind=kind), peaks, blade)
+    return results
 
 
 def _performance_results(name: str, found: Performance) -> list[Result]:
@@ -213,10 +223,85 @@ def _input_results(
         case = Case(
             stiffness=name, force_ratio=ratio, mode=one.mode, choice=f"{one.name}: {one.label}"
         )
-        peak = f"{LEFT * (one.blade == 'left')}peak_{one.number}"
         for kind, value in (("frequency", one.frequency), ("accelerance", one.height)):
-            number = f"{peak}_{kind}_change"
+            number = f"peak_{one.number}_{kind}_change"
             # without such a peak near there is no change to tell
             if np.isfinite(value):
                 out.append(Result(number, case, 100.0 * value, "%"))
     return out
+
+
+def measured_results(solution: ForcedSolution) -> list[Result]:
+    """Every measured curve beside the computed ones of its blade and state."""
+    scene = solution.plan.scene
+    return measured.measured_results(
+        scene.measured,
+        lambda choice: list(_computed(solution, choice)),
+        lambda choice: _nothing(solution, choice),
+        scene.excitation.damping,
+    )
+
+
+def _nothing(solution: ForcedSolution, choice: MeasuredChoice) -> str:
+    """Why nothing stands beside a measured curve."""
+    if choice.state is not None:
+        return (
+            f"the {choice.blade} blade is at rest without the damper"
+            if choice.state == FREE
+            else "the run has no stuck curve"
+        )
+    ratios = ", ".join(f"{r:g}" for r in solution.plan.scene.excitation.centrifugal_to_force)
+    return (
+        f"the run has no curve at F_C/F_E {choice.centrifugal_to_force:g}, it has {ratios}; add it "
+        "to excitation.centrifugal_to_force"
+    )
+
+
+def _computed(solution: ForcedSolution, choice: MeasuredChoice) -> Iterator[Computed]:
+    """The computed curves of the blade and state of a measured one."""
+    side, scene = choice.blade, solution.plan.scene
+    if choice.state is not None:
+        stuck = choice.state == STUCK
+        if not stuck and side not in excitation_of(scene.excitation).free_blades:
+            return
+        for name, linear in solution.linear.items():
+            told = solution.stuck_peaks(name, side) if stuck else unmoved(linear.free_peaks[side])
+            case = Case(stiffness=name, kind=choice.state, blade=side)
+            band = (scene.excitation.start, scene.excitation.stop)
+            yield Computed(case, band, _linear_at(solution, name, side, stuck), told)
+        return
+    curves: list[FrictionCurve] = [*solution.curves, *solution.balanced, *solution.sweeps]
+    # as the labels of curves tell them apart
+    wanted = f"{choice.centrifugal_to_force:.6g}"
+    for c in curves:
+        if f"{c.ratio:.6g}" == wanted and len(c.frequency) >= LEAST_POINTS:
+            yield _with_friction(c, side)
+
+
+def _linear_at(
+    solution: ForcedSolution, name: str, side: Side, stuck: bool
+) -> Callable[[Array], ComplexArray]:
+    """Accelerance of a blade free or stuck, exact at any frequency."""
+    if name in solution.faces:
+        excitation = excitation_of(solution.plan.scene.excitation)
+        march = solution.faces[name].march
+        return lambda f: np.asarray(linear_curves(march, f, excitation, stuck=stuck)[0][side])
+    model, plan = solution.models[name], solution.plan
+    force = plan.scene.damper.centrifugal
+    numbers = (0, *model.excitation.harmonics)
+    problem, row = measures.Unsolved(balance_of(plan, model, force, numbers)), model.row(side)
+    return lambda f: measures.linear_accelerance(problem, row, force, f, stuck)
+
+
+def _with_friction(c: FrictionCurve, side: Side) -> Computed:
+    """A curve with friction, between its points by straight lines."""
+    f, H = c.frequency, c.accelerance[side]
+    way = slice(None) if f[-1] > f[0] else slice(None, None, -1)
+    f, H = f[way], H[way]
+    peaks = c.peaks.get(side, ())
+    return Computed(
+        replace(c.case, blade=side),
+        (float(f.min()), float(f.max())),
+        lambda at: on_path(at, f, H),
+        list(peaks),
+    )

@@ -11,10 +11,12 @@ from upd.analyses.base import Resolved
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, SweptCurve, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.inputs import InputEffect
-from upd.analyses.forced.levels import FoundPeaks, PeakLevel
-from upd.analyses.forced.march_modes import stuck_peaks_of
-from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, tell_stuck_peaks
+from upd.analyses.forced.levels import PeakLevel
+from upd.analyses.forced.linear_limits import stuck_peaks_of
+from upd.analyses.forced.measures import CurvePeak
+from upd.analyses.forced.mode_peaks import CANDIDATES, tell_stuck_peaks
 from upd.analyses.forced.model import Array, Model
+from upd.analyses.forced.peaks_again import FoundPeaks
 from upd.analyses.forced.performance import Performance, RatioPoint
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.seated.bodies import Bodies
@@ -58,7 +60,7 @@ class MarchedPeak:
     """
 
     sweep: SweptCurve
-    peak: ModePeak
+    peak: CurvePeak
     period: RecordedPeriod
     places: ContactPlaces
     motion: Array
@@ -145,12 +147,7 @@ class ForcedSolution:
         reduced = [len(one.M) for one in self.models.values()]
         return max([*reduced, *(3 * one.of.n for one in self.faces.values())], default=0)
 
-    @property
-    def paths(self) -> list[ForcedCurve | FacesCurve]:
-        """All curves by harmonic balance."""
-        return [*self.curves, *self.balanced]
-
-    def stuck_peaks(self, stiffness: str, blade: Side = "right") -> list[ModePeak]:
+    def stuck_peaks(self, stiffness: str, blade: Side = "right") -> list[CurvePeak]:
         """Peaks of the stuck curve within the sweep: what a whole curve is asked for."""
         linear = self.linear.get(stiffness)
         if linear is None:
@@ -167,7 +164,7 @@ class ForcedSolution:
 
         Number 0 and the highest point of a curve without a peak.
         """
-        peaks: Sequence[ModePeak] = curve.peaks["right"]
+        peaks: Sequence[CurvePeak] = curve.peaks["right"]
         if peaks:
             return [(peak.number, peak.mode, peak.sample) for peak in peaks]
         return [(0, "", int(np.abs(curve.accelerance["right"]).argmax()))]

@@ -11,27 +11,24 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.forced.curves import ForcedCurve
-from upd.analyses.forced.faces_curve import solve_faces
 from upd.analyses.forced.inputs import INPUTS, few_harmonics, input_effects
-from upd.analyses.forced.left_out import AlongModel, along_changes, elastic_changes, with_along
+from upd.analyses.forced.left_out import along_changes, elastic_changes, with_along
 from upd.analyses.forced.levels import (
     COARSER,
     HARMONICS,
     MORE_HARMONICS,
     SAMPLES,
-    FoundPeaks,
     Laws,
     MadeModel,
     balance_level,
     coarse_model,
-    linear_of,
     model_level,
     other_models,
 )
-from upd.analyses.forced.marched_peaks import march_peaks
 from upd.analyses.forced.model import Model, make_model, preloaded
-from upd.analyses.forced.paths import grid, quiet
+from upd.analyses.forced.paths import quiet
 from upd.analyses.forced.peaks import solve_curve
+from upd.analyses.forced.peaks_again import FoundPeaks, linear_of
 from upd.analyses.forced.performance import (
     RatioPoint,
     further_points,
@@ -41,13 +38,13 @@ from upd.analyses.forced.performance import (
     ratios_of,
     with_curves,
 )
-from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.analyses.forced.solution import BandPoint, ForcedSolution, TimeMarch
 from upd.analyses.forced.spring_march import make_springs
 from upd.analyses.forced.statics import StaticState, admissible, same, static_state
 from upd.analyses.forced.stiffness import face_laws
-from upd.analyses.forced.sweeps import both_ways
-from upd.analyses.forced.whole_faces import INTERFACE, linear_limits, make_whole_faces
+from upd.analyses.forced.sweeps import both_ways, march_peaks
+from upd.analyses.forced.whole_faces import INTERFACE, linear_limits, make_whole_faces, solve_faces
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import InputError, UpdError, one_line
 from upd.hbm.march import steady_state
@@ -205,7 +202,7 @@ def _around(
         jobs.append((job[0], job[1:]))
         into.append((kind, name))
 
-    along: AlongModel | None = None
+    along: Model | None = None
     further: list[RatioPoint] = []
     for name, model in solution.models.items():
         mine = tuple(c for c in solution.curves if c.stiffness == name and not c.empty)

@@ -2,25 +2,39 @@
 
 Where friction and lift-off leave several steady motions, a curve by harmonic balance follows one
 path through all of them. A sweep shows what a rig would: rising, the motion that the past below
-leads to; falling, the one from above.
+leads to; falling, the one from above. Contact states, loops and the damper's motion at their peaks
+are read from the last period.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from upd.analyses.forced.curves import SweptCurve, Way
-from upd.analyses.forced.excitation import excitation_of
+from upd.analyses.forced.excitation import ComplexArray, Excitation, excitation_of
 from upd.analyses.forced.interface_model import by_coulomb
-from upd.analyses.forced.march_modes import stuck_modes_of
-from upd.analyses.forced.measures import PEAKS_ABOVE, PathPeak
-from upd.analyses.forced.mode_peaks import CANDIDATES, ModePeak, ModeShapes, numbered
+from upd.analyses.forced.linear_limits import stuck_modes_of
+from upd.analyses.forced.measures import (
+    MOTIONS,
+    PEAKS_ABOVE,
+    CurvePeak,
+    Loop,
+    accelerance_of,
+    loop_along_main,
+    losing_most,
+    place,
+)
+from upd.analyses.forced.mode_peaks import CANDIDATES, ModeShapes, numbered
 from upd.analyses.forced.model import Array
-from upd.analyses.forced.paths import grid
-from upd.analyses.forced.plan import ForcedPlan, time_steps
+from upd.analyses.forced.plan import ForcedPlan, grid, time_steps
+from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
+from upd.hbm.interface_record import period_of_sweep
 from upd.hbm.interface_state import InterfaceModel, InterfaceState
 from upd.hbm.interface_sweep import SteppedSine, stepped_sine
 from upd.linalg.parallel import threads_for
+from upd.progress import Stages
 from upd.scene.forced_contact import SIDES
 
 #: how steady a motion has to be
@@ -59,21 +73,31 @@ def both_ways(
                 fallback=by_coulomb,
                 accelerate=False,
             )
-            start, k = found.state, excitation.lowest
-            scale = -((2.0 * np.pi * k * found.frequency) ** 2) * 1e-3 / force
-            H = {side: scale * found.amplitude[:, j] for j, side in enumerate(SIDES)}
+            start, f = found.state, found.frequency
+            H, *others = (
+                {side: accelerance_of(moved[:, j], f, k, force) for j, side in enumerate(SIDES)}
+                for k, moved in _by_harmonic(found, excitation)
+            )
+            more = dict(zip(excitation.harmonics[1:], others, strict=True))
             peaks = {side: _peaks(found, np.abs(H[side]), modes) for side in SIDES}
-            out.append(SweptCurve(name, ratio, force, way, found, H, peaks))
+            out.append(SweptCurve(name, ratio, force, H, more, peaks, way, found))
     return out
 
 
-def _peaks(found: SteppedSine, size: Array, modes: ModeShapes) -> tuple[ModePeak, ...]:
+def _by_harmonic(found: SteppedSine, excitation: Excitation) -> Iterator[tuple[int, ComplexArray]]:
+    """Every harmonic excited, the lowest first, and the outputs' amplitudes in it."""
+    yield excitation.lowest, found.amplitude
+    for i, k in enumerate(excitation.harmonics[1:], 1):
+        yield k, found.harmonics[:, i]
+
+
+def _peaks(found: SteppedSine, size: Array, modes: ModeShapes) -> tuple[CurvePeak, ...]:
     maxima = sweep_maxima(found.frequency, size)
     at = np.array([one.sample for one in maxima], int)
     return tuple(numbered(modes, maxima, found.amplitude[at, len(SIDES) :]))
 
 
-def sweep_maxima(frequency: Array, size: Array) -> list[PathPeak]:
+def sweep_maxima(frequency: Array, size: Array) -> list[CurvePeak]:
     """Local maxima of a sweep, at its own points: the motion may jump between two of them.
 
     Parameters
@@ -86,5 +110,127 @@ def sweep_maxima(frequency: Array, size: Array) -> list[PathPeak]:
     inner = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
     least = PEAKS_ABOVE * float(size.max())
     return [
-        PathPeak(float(frequency[i]), float(size[i]), int(i)) for i in inner if size[i] >= least
+        CurvePeak(float(frequency[i]), float(size[i]), int(i)) for i in inner if size[i] >= least
     ]
+
+
+#: outputs that are read from them
+WANTS = ("contact_state", "hysteresis", "damper_motion")
+
+
+def march_peaks(solution: ForcedSolution, stages: Stages) -> None:
+    """Add the last period of every sweep at every peak of the right blade.
+
+    Parameters
+    ----------
+    solution
+        With its sweeps.
+    stages
+        To tell.
+    """
+    if not any(solution.plan.scene.wants(one) for one in WANTS):
+        return
+    for sweep in solution.sweeps:
+        for top in sweep.peaks["right"]:
+            with stages("time march", f"{sweep.case}, peak {top.number}: its last period"):
+                solution.marched.append(marched_peak(solution, sweep, top))
+
+
+def marched_peak(solution: ForcedSolution, sweep: SweptCurve, peak: CurvePeak) -> MarchedPeak:
+    """The last period of a sweep at one of its peaks, marched again and kept."""
+    places, rest, kept = _contact(solution, sweep.stiffness)
+    period = period_of_sweep(sweep.found, peak.sample, by_coulomb)
+    motion = np.zeros((len(period.motion), MOTIONS))
+    motion[:, kept] = period.motion - rest
+    return MarchedPeak(sweep, peak, period, places, motion)
+
+
+def _contact(solution: ForcedSolution, name: str) -> tuple[ContactPlaces, Array, list[int]]:
+    """Places of the nodes; the damper's motion at rest, and which of the six motions it is."""
+    if name in solution.faces:
+        faces = solution.faces[name]
+        places = faces_places(solution, name)
+        return places, faces.start.s, list(faces.of.kept)
+    model = solution.models[name]
+    along, up = place(model)
+    law = model.contacts.law
+    places = ContactPlaces(model.face, along, up, law.k_n, 1.0 / law.k_t)
+    # springs count from the static state
+    return places, np.zeros(model.damper.n_dof), list(model.damper.kept)
+
+
+def faces_places(solution: ForcedSolution, name: str) -> ContactPlaces:
+    """Nodes of whole faces in the frames of their faces."""
+    of = solution.faces[name].of
+    along, up = np.zeros(of.n), np.zeros(of.n)
+    for k in range(len(SIDES)):
+        on = of.face == k
+        local = of.position[on] @ of.frame[k].T
+        along[on], up[on] = local[:, 1], local[:, 2] - local[:, 2].min()
+    return ContactPlaces(of.face, along, up, of.area, np.zeros(of.n))
+
+
+def marched_loops(one: MarchedPeak, count: int) -> list[Loop]:
+    """Loops of the nodes that lose most, as `upd.analyses.forced.measures.loops`.
+
+    The displacement is the slip and what the springs give, f_t / k_t, about its mean: the march
+    counts slips from faces that carry nothing.
+
+    Parameters
+    ----------
+    one
+        A peak.
+    count
+        Loops at most.
+    """
+    period, out = one.period, []
+    friction = one.sweep.found.model.friction
+    for p in losing_most(period.loss, count):
+        traction = period.force[:, 1:, p].T
+        motion = period.slip[:, :, p].T + one.places.compliance[p] * traction
+        motion -= motion.mean(axis=1, keepdims=True)
+        limit = friction[p] * period.force[:, 0, p]
+        out.append(loop_along_main(int(p), motion, traction, limit, float(period.loss[p])))
+    return out
+
+
+def face_shares(state: Array, places: ContactPlaces) -> Array:
+    """Of the cycle that each face sticks, slips, is open, by stiffness or area.
+
+    Parameters
+    ----------
+    state
+        (n, 3) of the points or nodes.
+    places
+        Of these.
+
+    Returns
+    -------
+    Array
+        (2, 3).
+    """
+    out = np.zeros((len(SIDES), 3))
+    for k in range(len(SIDES)):
+        on = places.face == k
+        weight = places.weight[on]
+        out[k] = weight @ state[on] / weight.sum()
+    return out
+
+
+def marched_shares(one: MarchedPeak) -> Array:
+    """(2, 3) of the cycle that each face sticks, slips, is open at a peak."""
+    return face_shares(one.period.share, one.places)
+
+
+def marched_damper(solution: ForcedSolution, one: MarchedPeak) -> tuple[Array, Array]:
+    """Motion of the damper's six dofs about its rest, as
+    `upd.analyses.forced.measures.damper_motion`.
+
+    Returns
+    -------
+    static, amplitude
+        (6,) mean, and amplitude of the lowest harmonic that is excited, mm and rad.
+    """
+    k, N = excitation_of(solution.plan.scene.excitation).lowest, len(one.motion)
+    turn = np.exp(-2j * np.pi * k * np.arange(1, N + 1) / N)
+    return one.motion.mean(axis=0), np.abs(2.0 / N * turn @ one.motion)
