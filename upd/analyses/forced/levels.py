@@ -17,7 +17,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from upd.analyses.cost import NODES
-from upd.analyses.forced.curves import ForcedCurve, LinearCurves, Top
+from upd.analyses.forced import measures
+from upd.analyses.forced.curves import ForcedCurve, LinearCurves, TimeCheck, Top
 from upd.analyses.forced.linear_limits import linear_limits_of
 from upd.analyses.forced.measures import Unsolved
 from upd.analyses.forced.mesh_counts import OFF_CONTACT, RECIPE, on_contact, times
@@ -31,8 +32,9 @@ from upd.analyses.forced.paths import (
     SWEEP_POINTS,
     balance_like,
     balance_of,
+    respond,
 )
-from upd.analyses.forced.peaks import climbed, peak_of_mode
+from upd.analyses.forced.peaks import climbed, confirmed, peak_of_mode, with_tops
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies, make_bodies
@@ -305,7 +307,7 @@ def _level(
                 else:
                     again = found.get(("stuck", side, number), Found(math.nan, math.nan))
                 found[place] = again
-                found |= _other_blade(curve, side, number, top, again)
+                found |= _other_blade(curve, side, number, again)
     stuck = _stuck(linear, True), _stuck(linear, False)
     return PeakLevel(source, label, size, found, stuck, time.perf_counter() - begin)
 
@@ -317,16 +319,14 @@ def _first_blades(curve: ForcedCurve) -> Iterator[tuple[Side, int, Top]]:
         yield side, number, curve.tops[side, number]
 
 
-def _other_blade(
-    curve: ForcedCurve, side: Side, number: int, top: Top, again: Found
-) -> dict[Place, Found]:
+def _other_blade(curve: ForcedCurve, side: Side, number: int, again: Found) -> dict[Place, Found]:
     """The other blade's peak of the same mode: it changes alike."""
     other: Side = "left" if side == "right" else "right"
-    own = curve.tops.get((other, number))
-    if own is None:
+    own, first = curve.compared(other, number), curve.compared(side, number)
+    if own is None or first is None:
         return {}
-    f, height = again.frequency / top.frequency, again.height / top.height
-    return {(curve.ratio, other, number): Found(f * own.frequency, height * own.height)}
+    f, height = again.frequency / first[0], again.height / first[1]
+    return {(curve.ratio, other, number): Found(f * own[0], height * own[1])}
 
 
 def _none(source: str, label: str, why: str) -> PeakLevel:
@@ -398,10 +398,46 @@ def peak_on(
         same.
     """
     old = curve.answer.balance
+    ratio = expected(peaks.linear, linear, number, top.frequency)
+    check = curve.stayed(side, number)
+    if check is not None:
+        return confirmed_again(peaks, model, linear, curve, check, ratio)
     b = balance_of(peaks.plan, model, curve.force, old.harmonics.numbers, old.samples)
     x = top.x if move is None else carried(b, old, top.x, move)
-    ratio = expected(peaks.linear, linear, number, top.frequency)
     return found_again(peaks.plan, model, curve, side, number, top, b, x, ratio)
+
+
+def confirmed_again(
+    peaks: FoundPeaks,
+    model: Model,
+    linear: LinearCurves,
+    curve: ForcedCurve,
+    check: TimeCheck,
+    ratio: float,
+) -> Found:
+    """The highest motion that stays on another model, where the top of the run's path leaves: the
+    border between both moves too.
+    """
+    plan, force, old = peaks.plan, curve.force, curve.answer.balance
+    f = ratio * check.frequency
+    band = np.linspace((1.0 - 2.0 * BAND) * f, (1.0 + 2.0 * BAND) * f, 2 * BAND_POINTS)
+    settings = replace(LONG_STEPS, most_points=_MOST_POINTS)
+    answer = respond(
+        plan,
+        model,
+        force,
+        band,
+        harmonics=old.harmonics.numbers,
+        samples=old.samples,
+        settings=settings,
+    )
+    blades = {s: measures.accelerance(answer, model.row(s), force) for s in SIDES}
+    path = ForcedCurve(curve.stiffness, curve.ratio, force, answer, blades, 0.0)
+    if path.empty:
+        return Found(math.nan, math.nan)
+    path = confirmed(plan, model, with_tops(plan, model, linear, path))
+    mine = [p for p in path.peaks[check.blade] if p.number == check.number]
+    return Found(mine[0].frequency, mine[0].height) if mine else Found(math.nan, math.nan)
 
 
 def expected(own: LinearCurves, other: LinearCurves, number: int, frequency: float) -> float:
@@ -548,11 +584,11 @@ def balance_level(peaks: FoundPeaks, source: str, more: int, factor: int) -> Pea
             samples = max(factor * old.samples, sample_count(harmonics_of(numbers)))
             b = balance_like(plan, model, curve.force, old, numbers, samples)
             for side, number, top in _first_blades(curve):
-                if top.slips:
+                if top.slips and curve.stayed(side, number) is None:
                     x = b.embedded(top.x, old)
                     again = found_again(plan, model, curve, side, number, top, b, x)
                     found[curve.ratio, side, number] = again
-                    found |= _other_blade(curve, side, number, top, again)
+                    found |= _other_blade(curve, side, number, again)
     return PeakLevel(source, label, size, found, (math.nan, math.nan), time.perf_counter() - begin)
 
 
