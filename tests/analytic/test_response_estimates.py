@@ -13,14 +13,14 @@ import pytest
 from rigs import LINES
 
 from upd.analyses import forced, make_plan
-from upd.analyses.forced import levels
+from upd.analyses.forced import levels, peaks_again
 from upd.analyses.forced import solve as solving
-from upd.analyses.forced.curves import Top
+from upd.analyses.forced.curves import ForcedCurve, Top
 from upd.analyses.forced.estimates import bound, estimate
 from upd.analyses.forced.levels import HARMONICS, MESH, MODES, POINTS, SAMPLES, PeakLevel
 from upd.analyses.forced.model import make_model
 from upd.analyses.forced.peaks import climbed
-from upd.analyses.forced.peaks_again import carried, moved_points
+from upd.analyses.forced.peaks_again import RunPeak, carried, moved_points, peak_on
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import make_bodies
@@ -30,6 +30,7 @@ from upd.progress import Stages, silent
 from upd.results import ErrorPart, Estimates, Result
 from upd.results.number import with_estimates
 from upd.scene import load_scene
+from upd.scene.forced_contact import SIDES
 
 pytestmark = pytest.mark.estimated
 
@@ -219,6 +220,52 @@ def test_contact_points_tell_what_many_more_show(slipping: Found) -> None:
     true = abs(top_of(fine).height / top_of(slipping).height - 1.0)
     assert true > 1e-4
     assert bounded(parts_of(slipping, "peak_2_accelerance")[POINTS], true, 10.0)
+
+
+def test_a_height_is_known_no_better_than_its_frequency(sticking: Found) -> None:
+    """By its meshes: heights of few meshes may agree by chance."""
+    for blade in ("", "left_"):
+        f, height = (
+            parts_of(sticking, f"{blade}peak_2_{word}")[MESH]
+            for word in ("frequency", "accelerance")
+        )
+        assert height.error >= f.error > 0.0
+
+
+def test_where_a_top_leaves_levels_are_taken_to_the_border(
+    slipping: Found, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solution = slipping[0]
+    (curve,), peaks = solution.curves, solution.searched["thesis"]
+    top, key = top_of(slipping), ("right", 2)
+    assert top.slips and curve.stayed("right", 2) is None
+    assert curve.compared("right", 2) == (top.frequency, top.height)
+    check = replace(
+        next(c for c in curve.checked if (c.blade, c.number) == key),
+        frequency=0.998 * top.frequency,
+        integrated=0.9 * top.height,
+        stays=True,
+        sample=3,
+    )
+    leaves = replace(curve, checked=(check,))
+    assert leaves.compared("right", 2) == (check.frequency, check.integrated)
+    seen: list[ForcedCurve] = []
+
+    def confirmed(plan: Any, model: Any, path: ForcedCurve) -> ForcedCurve:
+        """Half of every height."""
+        seen.append(path)
+        lower = {s: tuple(p._replace(height=0.5 * p.height) for p in path.peaks[s]) for s in SIDES}
+        return replace(path, peaks=lower)
+
+    monkeypatch.setattr(peaks_again, "confirmed", confirmed)
+    run = RunPeak(curve, "right", 2, top)
+    found = peak_on(peaks, peaks.model, peaks.linear, run._replace(curve=leaves), None)
+    assert found.frequency == pytest.approx(top.frequency, rel=1e-3)
+    assert found.height == pytest.approx(0.5 * top.height, rel=1e-3)
+    assert len(seen) == 1
+    found = peak_on(peaks, peaks.model, peaks.linear, run, None)
+    assert found.height == pytest.approx(top.height, rel=1e-3)
+    assert len(seen) == 1
 
 
 def test_where_all_sticks_the_peak_is_that_of_the_linear_answer(sticking: Found) -> None:

@@ -207,6 +207,20 @@ class ForcedCurve(FrictionCurve):
     checked: tuple[TimeCheck, ...] = ()
     folds: tuple[Fold, ...] = ()
 
+    def stayed(self, side: Side, number: int) -> TimeCheck | None:
+        """The highest motion that stays, where the top of a peak leaves; None where it stays."""
+        mine = (c for c in self.checked if (c.blade, c.number) == (side, number))
+        return next((c for c in mine if c.stays and not c.at_top), None)
+
+    def compared(self, side: Side, number: int) -> tuple[float, float] | None:
+        """Hz and height that other levels of a peak are compared with: of the motion that stays,
+        else of its top; None without.
+        """
+        check, top = self.stayed(side, number), self.tops.get((side, number))
+        if check is not None:
+            return check.frequency, check.integrated
+        return (top.frequency, top.height) if top is not None else None
+
     @property
     def frequency(self) -> Array:
         """(n,) Hz along the path."""

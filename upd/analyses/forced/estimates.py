@@ -128,14 +128,22 @@ def _of_peak(
     check = None
     if not isinstance(at, str):
         curve = next(c for c in solution.curves if c.case == replace(case, mode=""))
-        top = curve.tops.get((side, peak.number))
-        # levels are compared with the top of the path, whatever is reported of it
-        own = (top.frequency, top.height) if top is not None else own
+        own = curve.compared(side, peak.number) or own
         mine = [one for one in curve.checked if (one.blade, one.number) == (side, peak.number)]
         check = mine[0] if mine else None
-    out = {}
+    out: dict[Key, tuple[ErrorPart, ...]] = {}
+    mesh = 0.0
     for k, word in enumerate(("frequency", "accelerance")):
         parts = list(_parts(levels, partial(_peak_ratio, place, k, own[k]), place))
+        # of a height that the meshes show by chance: no better known than its frequency
+        known = [one.error for one in parts if one.source == MESH and one.known]
+        parts = [
+            replace(one, error=mesh, basis=f"as of its frequency; {one.basis}")
+            if one.source == MESH and one.known and one.error < mesh
+            else one
+            for one in parts
+        ]
+        mesh = max(known, default=0.0)
         if check is not None:
             parts = _with_time(parts, check, word)
         out[f"{name}_{word}", case] = tuple(parts)

@@ -377,10 +377,10 @@ def _both_blades(one: RunPeak, again: Found) -> dict[Place, Found]:
     ratio, number = one.curve.ratio, one.number
     out: dict[Place, Found] = {(ratio, one.blade, number): again}
     other: Side = "left" if one.blade == "right" else "right"
-    own = one.curve.tops.get((other, number))
-    if own is not None:
-        f, height = again.frequency / one.top.frequency, again.height / one.top.height
-        out[ratio, other, number] = Found(f * own.frequency, height * own.height)
+    own, first = one.curve.compared(other, number), one.curve.compared(one.blade, number)
+    if own is not None and first is not None:
+        f, height = again.frequency / first[0], again.height / first[1]
+        out[ratio, other, number] = Found(f * own[0], height * own[1])
     return out
 
 
@@ -443,7 +443,9 @@ def balance_level(peaks: FoundPeaks, source: str, more: int, factor: int) -> Pea
             numbers = range(highest + 1)
             samples = max(factor * old.samples, sample_count(harmonics_of(numbers)))
             b = balance_like(plan, model, curve.force, old, numbers, samples)
-            for one in (each for each in _first_blades(curve) if each.top.slips):
+            for one in _first_blades(curve):
+                if not one.top.slips or curve.stayed(one.blade, one.number) is not None:
+                    continue
                 try:
                     again = found_again(plan, model, one, b, b.embedded(one.top.x, old))
                 except UpdError as error:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import ForcedCurve, LinearCurves, Top
+from upd.analyses.forced.curves import ForcedCurve, LinearCurves, TimeCheck, Top
 from upd.analyses.forced.linear_limits import linear_limits_of
 from upd.analyses.forced.measures import Unsolved
 from upd.analyses.forced.mode_peaks import numbered_peaks
@@ -26,7 +26,7 @@ from upd.analyses.forced.paths import (
     balance_of,
     respond,
 )
-from upd.analyses.forced.peaks import climbed
+from upd.analyses.forced.peaks import climbed, confirmed, with_tops
 from upd.analyses.forced.plan import ForcedPlan
 from upd.errors import ConvergenceError, one_line
 from upd.hbm.balance import Balance
@@ -131,10 +131,38 @@ def peak_on(
         same.
     """
     old, top = one.curve.answer.balance, one.top
+    ratio = expected(peaks.linear, linear, one.number, top.frequency)
+    check = one.curve.stayed(one.blade, one.number)
+    if check is not None:
+        return confirmed_again(peaks.plan, model, linear, one.curve, check, ratio)
     b = balance_of(peaks.plan, model, one.curve.force, old.harmonics.numbers, old.samples)
     x = top.x if move is None else carried(b, old, top.x, move)
-    ratio = expected(peaks.linear, linear, one.number, top.frequency)
     return found_again(peaks.plan, model, one, b, x, ratio)
+
+
+def confirmed_again(
+    plan: ForcedPlan,
+    model: Model,
+    linear: LinearCurves,
+    curve: ForcedCurve,
+    check: TimeCheck,
+    ratio: float,
+) -> Found:
+    """The highest motion that stays on another model, where the top of the run's path leaves: the
+    border between both moves too.
+    """
+    old, f = curve.answer.balance, ratio * check.frequency
+    band = np.linspace((1.0 - 2.0 * BAND) * f, (1.0 + 2.0 * BAND) * f, 2 * BAND_POINTS)
+    given: dict[str, Any] = {"harmonics": old.harmonics.numbers, "samples": old.samples}
+    given["settings"] = replace(LONG_STEPS, most_points=_MOST_POINTS)
+    answer = respond(plan, model, curve.force, band, **given)
+    blades = {s: measures.accelerance(answer, model.row(s), curve.force) for s in SIDES}
+    path = replace(curve, answer=answer, accelerance=blades, peaks={}, tops={}, checked=())
+    if path.empty:
+        return NOT_FOUND
+    path = confirmed(plan, model, with_tops(plan, model, linear, path))
+    mine = [p for p in path.peaks[check.blade] if p.number == check.number]
+    return Found(mine[0].frequency, mine[0].height) if mine else NOT_FOUND
 
 
 def expected(own: LinearCurves, other: LinearCurves, number: int, frequency: float) -> float:
