@@ -27,9 +27,9 @@ Array = NDArray[np.float64]
 #: Numbers of the raw bodies: their error is taken against the converged value on the same bodies,
 #: not against the half-space.
 _SAME_BODIES = re.compile(r"approach|f\d+_(free|glued)")
-#: raw number -> the same with the finite bodies' share taken off, which has a closed form
+#: raw number -> the same without the finite bodies' share, which has a closed form
 _WITHOUT_BODIES = {"approach": "approach_contact"}
-#: order of change below which a number is said not to converge: a logarithm has 0, the edge of a
+#: order of change below which a number does not converge: a logarithm has 0, the edge of a
 #: punch less
 _CONVERGES = 0.2
 #: kinds of the linear curves of a response, whose peaks are the stuck and free frequencies

@@ -17,7 +17,7 @@ from upd.batch.ladder import Ladder, Levels, StudyReport, even, shown
 from upd.batch.point import PointResult
 from upd.batch.response_ladders import at_ratio
 from upd.batch.study_point import Settings, SolvedPoint, StudyPoint, solved_alone
-from upd.batch.text_table import TableColumn, TextTable, cost_columns, make_table
+from upd.batch.study_tables import TableColumn, TextTable, cost_columns, make_table
 from upd.errors import InputError
 from upd.labels import percent
 from upd.plot.work_precision import change_charts
