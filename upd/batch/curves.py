@@ -101,21 +101,16 @@ def make_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[Con
 
     Failed points are left out.
     """
-    good = solved_alone(solved)
-    ladders: dict[str, list[SolvedPoint]] = {}
-    for one in good:
-        ladders.setdefault(one.point.curve, []).append(one)
-    curves = []
+    good, curves = solved_alone(solved), []
     for key in matching(good, names):
-        mine = {
-            curve: [p for p in points if np.isfinite(p.values.get(key, np.nan))]
-            for curve, points in ladders.items()
-        }
-        # What ends in zero has no relative error.
-        known = {curve: points for curve, points in mine.items() if points}
+        ladders: dict[str, list[SolvedPoint]] = {}
+        for one in good:
+            if np.isfinite(one.values.get(key, np.nan)):
+                ladders.setdefault(one.point.curve, []).append(one)
         curves += [
-            _curve(key, points, _finer_level(curve, known))
-            for curve, points in known.items()
+            _curve(key, points, _finer_level(curve, ladders))
+            for curve, points in ladders.items()
+            # What ends in zero has no relative error.
             if points[-1].values[key]
         ]
     return curves
