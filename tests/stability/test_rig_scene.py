@@ -14,11 +14,7 @@ import upd
 from upd.analyses import modal
 from upd.analyses.modal.sensitivity import STEP, frequency_changes
 from upd.batch.engine import Workers, run_points
-from upd.batch.rig_ladders import MODES_ONLY
-from upd.batch.sensitivity import (
-    DIMENSIONS,
-    frequency_derivatives,
-)
+from upd.batch.rig_ladders import DIMENSIONS, MODES_ONLY, frequency_derivatives
 from upd.batch.store import PointStore
 from upd.batch.studies import plan_study, run_study
 from upd.batch.study_point import SolvedPoint, StudyPoint
@@ -212,7 +208,7 @@ def test_sensitivity_of_a_cantilever(tmp_path: Path, monkeypatch: pytest.MonkeyP
     """
     scene = upd.load_scene("rig", CHEAP)
     two = {name: DIMENSIONS[name] for name in ("core_length", "shank_tx")}
-    monkeypatch.setattr("upd.batch.sensitivity.DIMENSIONS", two)
+    monkeypatch.setattr("upd.batch.rig_ladders.DIMENSIONS", two)
     (report,) = plan_study(scene, "dimensions").present(()).tables
     assert [row[0] for row in report.rows] == ["as given, Hz", *two]
     _, found = frequency_derivatives(scene)

@@ -21,9 +21,8 @@ import pytest
 from upd import load_scene
 from upd.batch import store as point_store
 from upd.batch import study
-from upd.batch.engine import Progress, Workers
+from upd.batch.engine import ATTEMPTS, Progress, Workers
 from upd.batch.ladder import Study, StudyReport
-from upd.batch.schedule import ATTEMPTS
 from upd.batch.studies import plan_study, run_study
 from upd.batch.study_point import StudyPoint
 from upd.errors import InputError, UpdError

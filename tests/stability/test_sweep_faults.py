@@ -23,9 +23,8 @@ import pytest
 from upd import load_scene
 from upd.batch import store as point_store
 from upd.batch import sweep
-from upd.batch.engine import Progress
+from upd.batch.engine import ATTEMPTS, Job, Progress, dispatch
 from upd.batch.point import OTHER_CODE, Outcome, Task, read_outcome, solve_task
-from upd.batch.schedule import ATTEMPTS, Job, dispatch
 from upd.errors import InputError, UpdError
 
 TINY = {

@@ -17,7 +17,7 @@ from upd.analyses.hertz import accuracy as hertz
 from upd.batch.curves import accuracy_curves, true_errors
 from upd.batch.ladder import Counts, Ladder, Levels, StudyReport, even, shown
 from upd.batch.study_point import Key, Settings, SolvedPoint, StudyPoint, matching
-from upd.batch.text_table import TextTable, cost_columns, make_table
+from upd.batch.study_tables import TextTable, cost_columns, make_table
 from upd.errors import InputError
 from upd.labels import number_label
 from upd.linalg import select
@@ -56,8 +56,7 @@ _ASKED: Mapping[str, tuple[tuple[str, ...], tuple[float, ...]]] = {
     "flat": (flat.GOVERNING, (20.0, 10.0, 5.0)),
 }
 _ACCURACY_NOTES = (
-    "estimated: what the run says of itself, a bound; true: against the closed form, where a "
-    "number has one",
+    "estimated: by the run itself, a bound; true: against the closed form, where a number has one",
     "the accuracy is asked of these numbers alone; where one mesh reaches two accuracies, both "
     "levels are that mesh",
 )

@@ -27,9 +27,9 @@ Array = NDArray[np.float64]
 #: Numbers of the raw bodies: their error is taken against the converged value on the same bodies,
 #: not against the half-space.
 _SAME_BODIES = re.compile(r"approach|f\d+_(free|glued)")
-#: raw number -> the same with the finite bodies' share taken off, which has a closed form
+#: raw number -> the same without the finite bodies' share, which has a closed form
 _WITHOUT_BODIES = {"approach": "approach_contact"}
-#: order of change below which a number is said not to converge: a logarithm has 0, the edge of a
+#: order of change below which a number does not converge: a logarithm has 0, the edge of a
 #: punch less
 _CONVERGES = 0.2
 #: kinds of the linear curves of a response, whose peaks are the stuck and free frequencies
@@ -101,21 +101,16 @@ def make_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[Con
 
     Failed points are left out.
     """
-    good = solved_alone(solved)
-    ladders: dict[str, list[SolvedPoint]] = {}
-    for one in good:
-        ladders.setdefault(one.point.curve, []).append(one)
-    curves = []
+    good, curves = solved_alone(solved), []
     for key in matching(good, names):
-        mine = {
-            curve: [p for p in points if np.isfinite(p.values.get(key, np.nan))]
-            for curve, points in ladders.items()
-        }
-        # What ends in zero has no relative error.
-        known = {curve: points for curve, points in mine.items() if points}
+        ladders: dict[str, list[SolvedPoint]] = {}
+        for one in good:
+            if np.isfinite(one.values.get(key, np.nan)):
+                ladders.setdefault(one.point.curve, []).append(one)
         curves += [
-            _curve(key, points, _finer_level(curve, known))
-            for curve, points in known.items()
+            _curve(key, points, _finer_level(curve, ladders))
+            for curve, points in ladders.items()
+            # What ends in zero has no relative error.
             if points[-1].values[key]
         ]
     return curves

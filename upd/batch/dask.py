@@ -118,7 +118,7 @@ class DaskCluster:
 def _quiet() -> dict[str, int]:
     """Dask's loggers silenced, and their levels before.
 
-    What goes wrong is said once, by an error of ours.
+    What goes wrong is reported once, by an error of ours.
     """
     levels = {
         name: logging.getLogger(name).level

@@ -39,7 +39,7 @@ class Executor(Protocol):
     deaths: tuple[type[BaseException], ...]
 
     def workers(self) -> Sequence[str]:
-        """Names of the workers there are. Raises UpdError when nobody is left."""
+        """Names of the workers there are. Raises UpdError when none will come."""
 
     def submit(self, worker: str, task: str) -> Future[str]:
         """Let a worker that has nothing to do solve the task: the future of its JSON outcome."""

@@ -54,12 +54,8 @@ class GridAxis:
         return str(self.values[k]) if self.numbers is None else self.numbers[k]
 
 
-@dataclass(frozen=True)
-class Place:
-    """One point of the grid: its number and its place along every axis."""
-
-    number: int
-    index: tuple[int, ...]
+#: one point of a grid: its place along every axis
+Place = tuple[int, ...]
 
 
 def parse_axes(texts: Sequence[str], scene: Mapping[str, Any]) -> tuple[GridAxis, ...]:
@@ -91,20 +87,17 @@ def parse_axes(texts: Sequence[str], scene: Mapping[str, Any]) -> tuple[GridAxis
 
 def places(axes: Sequence[GridAxis]) -> list[Place]:
     """Full factorial of the axes, the last one fastest."""
-    return [
-        Place(k, index)
-        for k, index in enumerate(itertools.product(*(range(len(axis.values)) for axis in axes)))
-    ]
+    return list(itertools.product(*(range(len(axis.values)) for axis in axes)))
 
 
 def values_at(axes: Sequence[GridAxis], place: Place) -> dict[str, Any]:
     """Path -> value of one point, as tables have it."""
-    return {axis.path: axis.values[k] for axis, k in zip(axes, place.index, strict=True)}
+    return {axis.path: axis.values[k] for axis, k in zip(axes, place, strict=True)}
 
 
 def settings(axes: Sequence[GridAxis], place: Place) -> dict[str, Any]:
     """Path -> value of one point."""
-    return {axis.path: axis.setting(k) for axis, k in zip(axes, place.index, strict=True)}
+    return {axis.path: axis.setting(k) for axis, k in zip(axes, place, strict=True)}
 
 
 def _axis(text: str, scene: Mapping[str, Any]) -> GridAxis:

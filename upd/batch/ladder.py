@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from upd.analyses import analysis_of
-from upd.batch.convergence import convergence_tables, level_table
 from upd.batch.curves import ConvergenceCurve, finest_curves, make_curves
 from upd.batch.study_point import Settings, SolvedPoint, StudyPoint
-from upd.batch.text_table import TextTable, markdown_table
+from upd.batch.study_tables import TextTable, convergence_tables, level_table, markdown_table
 from upd.cache.files import write_text
 from upd.errors import InputError
 from upd.plot.chart import Chart
@@ -164,10 +163,11 @@ class Counts:
     path
         What is set in the scene.
     usual, least
-        The usual numbers; the least that can be asked for. From 0 on a size is one over the number
-        and one more.
+        The usual numbers; the least that can be asked for.
     base
         Scene -> what every level sets beside.
+    offset
+        The size of a level is 1 / (number + offset): 1 where 0 is a level.
     """
 
     curve: str
@@ -176,7 +176,7 @@ class Counts:
     usual: tuple[int, ...]
     least: int
     base: Callable[[Any], Settings]
-    more: int = 0
+    offset: int = 0
 
     def __call__(self, scene: AnyScene, levels: Levels) -> list[StudyPoint]:
         return [
@@ -184,7 +184,7 @@ class Counts:
                 self.curve,
                 self.label.format(n),
                 (*self.base(scene), (self.path, n)),
-                1.0 / (n + self.more),
+                1.0 / (n + self.offset),
             )
             for n in whole_levels(levels, self.least) or self.usual
         ]

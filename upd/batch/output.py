@@ -10,7 +10,7 @@ import io
 import json
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +19,11 @@ import numpy as np
 from upd.batch.grid import GridAxis, values_at
 from upd.batch.plan import SweepPlan
 from upd.batch.point import Outcome
-from upd.batch.sample import Sample
 from upd.batch.store import PointStore
 from upd.batch.table import Column, csv_text, reasons
 from upd.cache.files import write_text
 from upd.cache.sources import versions
+from upd.errors import InputError
 from upd.plot.matplotlib import write_sheets
 from upd.plot.sample_charts import sample_charts
 from upd.plot.sweep_charts import figure_names, sweep_charts
@@ -31,38 +31,58 @@ from upd.results import write_netcdf
 from upd.results.sampled import SampledNumber
 
 
-def write_outputs(
-    store: PointStore,
-    plan: SweepPlan,
-    outcomes: Sequence[Outcome],
-    columns: Sequence[Column],
-    sampled: Sequence[SampledNumber] | None,
-    seconds: float,
-) -> list[Path]:
+@dataclass(frozen=True)
+class SweepResult:
+    """A finished sweep: its plan, the outcome of every point in the grid's order, the followed
+    numbers, seconds of this call, files, what went wrong with its pictures, and of a sample what it
+    makes of the numbers.
+    """
+
+    plan: SweepPlan
+    outcomes: tuple[Outcome, ...]
+    columns: tuple[Column, ...]
+    seconds: float
+    folder: Path
+    files: tuple[Path, ...] = ()
+    faults: tuple[str, ...] = ()
+    sampled: tuple[SampledNumber, ...] = ()
+
+    @property
+    def failed(self) -> list[int]:
+        """Numbers of the points that failed."""
+        return [k for k, outcome in enumerate(self.outcomes) if outcome.failure]
+
+    def column(self, name: str, case: str | None = None) -> Column:
+        """The followed number ``name`` of ``case`` (the first when None).
+
+        Raises InputError when there is none.
+        """
+        for column in self.columns:
+            if column.name == name and case in (None, column.case):
+                return column
+        raise InputError(
+            f"no followed number {name!r} of case {case!r}; there are "
+            f"{', '.join(c.title for c in self.columns)}"
+        )
+
+
+def write_outputs(store: PointStore, result: SweepResult) -> list[Path]:
     """Write the numbers; returns the paths, the table first.
 
     The figures of an earlier call, which may have followed other numbers, are removed.
     Raises OSError when the disk does not take it.
     """
-    folder = store.folder
+    folder, plan = store.folder, result.plan
     earlier = _earlier(folder)
-    table = folder / "table.csv"
-    write_text(table, csv_text(plan.axes, plan.places, outcomes, columns))
-    arrays = folder / "sweep.nc"
-    write_netcdf(arrays, {"": _arrays(plan, outcomes, columns)})
-    data = folder / "sweep.json"
-    write_text(
-        data,
-        json.dumps(
-            _summary(store, plan, outcomes, columns, sampled, seconds), indent=1, allow_nan=False
-        )
-        + "\n",
-    )
+    table, arrays, data = (folder / f"{name}" for name in ("table.csv", "sweep.nc", "sweep.json"))
+    write_text(table, csv_text(plan.axes, plan.places, result.outcomes, result.columns))
+    write_netcdf(arrays, {"": _arrays(result)})
+    write_text(data, json.dumps(_summary(store, result), indent=1, allow_nan=False) + "\n")
     _remove_figures(folder, earlier)
-    if sampled is None:
+    if plan.sample is None:
         return [table, arrays, data]
     compared = folder / "sample.csv"
-    write_text(compared, sample_text(sampled))
+    write_text(compared, sample_text(result.sampled))
     return [compared, table, arrays, data]
 
 
@@ -80,14 +100,14 @@ def draw(
     folder: Path,
     axes: Sequence[GridAxis],
     columns: Sequence[Column],
-    sampled: Sequence[SampledNumber] | None = None,
+    sampled: Sequence[SampledNumber] = (),
 ) -> list[Path]:
     """Write the figures into ``folder``, of a grid or of a sample; earlier ones are removed.
 
     Returns their paths.
     """
     _remove_figures(folder, ((column.name, column.case) for column in columns))
-    if sampled is not None:
+    if sampled:
         values = [column.values for column in columns]
         return write_sheets(sample_charts(sampled, values), folder)
     return write_sheets(sweep_charts(axes, columns), folder)
@@ -122,10 +142,8 @@ def dimension(axis: GridAxis, axes: Sequence[GridAxis]) -> str:
     )
 
 
-def _arrays(
-    plan: SweepPlan, outcomes: Sequence[Outcome], columns: Sequence[Column]
-) -> dict[str, Any]:
-    axes = plan.axes
+def _arrays(result: SweepResult) -> dict[str, Any]:
+    plan, axes = result.plan, result.plan.axes
     names = tuple(dimension(axis, axes) for axis in axes)
     if plan.sample is None:
         shape, dims = tuple(len(axis.values) for axis in axes), names
@@ -136,20 +154,14 @@ def _arrays(
         notes = {"long_name": axis.path, **({"units": axis.unit} if axis.unit else {})}
         along = (name,) if plan.sample is None else dims
         out[name] = (along, *_coordinate(axis, notes))
-    for column in columns:
+    for column in result.columns:
         notes = {"long_name": column.title, "units": column.unit or "1"}
         out[_free(column.variable, out)] = (dims, column.values.reshape(shape), notes)
-    failed = np.array([bool(outcome.failure) for outcome in outcomes], np.int8).reshape(shape)
-    out["status"] = (
-        dims,
-        failed,
-        {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "ok failed"},
-    )
-    out["seconds"] = (
-        dims,
-        np.array([outcome.seconds for outcome in outcomes]).reshape(shape),
-        {"units": "s"},
-    )
+    failed = np.array([bool(outcome.failure) for outcome in result.outcomes], np.int8)
+    flags = {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "ok failed"}
+    out["status"] = (dims, failed.reshape(shape), flags)
+    seconds = np.array([outcome.seconds for outcome in result.outcomes])
+    out["seconds"] = (dims, seconds.reshape(shape), {"units": "s"})
     return out
 
 
@@ -172,22 +184,18 @@ def _free(name: str, taken: dict[str, Any]) -> str:
     return candidate
 
 
-def _summary(
-    store: PointStore,
-    plan: SweepPlan,
-    outcomes: Sequence[Outcome],
-    columns: Sequence[Column],
-    sampled: Sequence[SampledNumber] | None,
-    seconds: float,
-) -> dict[str, Any]:
-    sample = {} if plan.sample is None else {"sample": _sample(plan.sample, sampled or ())}
-    return sample | {
+def _summary(store: PointStore, result: SweepResult) -> dict[str, Any]:
+    plan, sample = result.plan, result.plan.sample
+    why = reasons(result.outcomes, result.columns)
+    numbers = [one.as_dict() for one in result.sampled]
+    drawn = {} if sample is None else {"sample": sample.as_dict() | {"numbers": numbers}}
+    return drawn | {
         "scene": plan.scene.name,
         "title": plan.scene.title,
         "version": versions()["upd"],
         "versions": versions(),
         "axes": [{"path": a.path, "unit": a.unit, "values": list(a.values)} for a in plan.axes],
-        "followed": [{"name": c.name, "case": c.case, "unit": c.unit} for c in columns],
+        "followed": [{"name": c.name, "case": c.case, "unit": c.unit} for c in result.columns],
         "plan": {
             "points": len(plan.places),
             "kept": len(plan.kept),
@@ -198,48 +206,34 @@ def _summary(
             "threads": plan.workers.threads,
             "notes": list(plan.notes),
         },
-        "cost": _cost(outcomes, seconds),
-        "points": [
-            _point(store, plan, number, outcome, columns, reason)
-            for number, (outcome, reason) in enumerate(
-                zip(outcomes, reasons(outcomes, columns), strict=True)
-            )
-        ],
+        "cost": _cost(result),
+        "points": [_point(store, result, number, reason) for number, reason in enumerate(why)],
         "text": plan.scene.text,
     }
 
 
-def _sample(sample: Sample, sampled: Sequence[SampledNumber]) -> dict[str, Any]:
-    """The draw, and what it makes of the numbers."""
-    return sample.as_dict() | {"numbers": [one.as_dict() for one in sampled]}
-
-
-def _cost(outcomes: Sequence[Outcome], seconds: float) -> dict[str, Any]:
+def _cost(result: SweepResult) -> dict[str, Any]:
     stages: dict[str, float] = {}
     shared: dict[str, int] = {}
-    for outcome in outcomes:
+    for outcome in result.outcomes:
         for name, took in outcome.stages.items():
             stages[name] = stages.get(name, 0.0) + took
         for name, count in outcome.shared.items():
             shared[name] = shared.get(name, 0) + count
     return {
-        "this_call_s": round(seconds, 3),
-        "points_s": round(math.fsum(outcome.seconds for outcome in outcomes), 3),
+        "this_call_s": round(result.seconds, 3),
+        "points_s": round(math.fsum(outcome.seconds for outcome in result.outcomes), 3),
         "stages_s": {name: round(took, 3) for name, took in stages.items()},
         "shared": shared,
-        "peak_rss_mb": max((outcome.memory_mb for outcome in outcomes), default=0.0),
+        "peak_rss_mb": max((outcome.memory_mb for outcome in result.outcomes), default=0.0),
     }
 
 
-def _point(
-    store: PointStore,
-    plan: SweepPlan,
-    number: int,
-    outcome: Outcome,
-    columns: Sequence[Column],
-    reason: str,
-) -> dict[str, Any]:
-    values = [float(column.values[number]) for column in columns]
+def _point(store: PointStore, result: SweepResult, number: int, reason: str) -> dict[str, Any]:
+    plan, outcome = result.plan, result.outcomes[number]
+    values = [float(column.values[number]) for column in result.columns]
+    kept = outcome.final and number not in plan.refused
+    file = store.path(plan.tasks[number]).relative_to(store.folder).as_posix() if kept else ""
     return {
         "set": dict(plan.tasks[number].settings) or values_at(plan.axes, plan.places[number]),
         "values": [None if math.isnan(v) else v for v in values],
@@ -247,7 +241,5 @@ def _point(
         "reason": reason,
         "warnings": list(outcome.warnings),
         "seconds": round(outcome.seconds, 3),
-        "file": store.path(plan.tasks[number]).relative_to(store.folder).as_posix()
-        if outcome.final and number not in plan.refused
-        else "",
+        "file": file,
     }

@@ -13,7 +13,7 @@ from upd.analyses.base import Plan
 from upd.analyses.flat.printed import printed_of
 from upd.batch.ladder import Ladder, Levels, StudyReport, no_levels
 from upd.batch.study_point import Settings, SolvedPoint, StudyPoint, solved_alone
-from upd.batch.text_table import TextTable
+from upd.batch.study_tables import TextTable
 from upd.labels import number_label
 from upd.mesh import recipes
 from upd.scene import Scene
@@ -60,16 +60,9 @@ def parameter_points(scene: Scene, levels: Levels = None) -> list[StudyPoint]:
 def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Settings]]:
     p = plan.parameters
     yield "as given", ()
-    for factor in (0.25, 0.5, 1.5) if "margin" in p else ():
-        yield (
-            f"block margin {factor * p['margin']:g} mm",
-            (("geometry.margin", f"{factor * p['margin']!r} mm"),),
-        )
-    for factor in (0.25, 0.5, 1.5) if "thickness" in p else ():
-        yield (
-            f"block thickness {factor * p['thickness']:g} mm",
-            (("geometry.thickness", f"{factor * p['thickness']!r} mm"),),
-        )
+    for name in ("margin", "thickness"):
+        for factor in (0.25, 0.5, 1.5) if name in p else ():
+            yield f"block {name} {factor * p[name]:g} mm", _lengths({name: factor * p[name]})
     yield from _patches(scene.recipe, p)
     for body, names in _distant_sets(scene, plan).items():
         for name in names:
@@ -85,7 +78,7 @@ def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Settings]]:
         if scene.mesh.element != element:
             yield f"element {element}", (("mesh.element", element),)
     if "band" in p:
-        yield f"bands {0.2 * p['band']:g} mm wide", (("geometry.band", f"{0.2 * p['band']!r} mm"),)
+        yield f"bands {0.2 * p['band']:g} mm wide", _lengths({"band": 0.2 * p["band"]})
 
 
 def _patches(recipe: str, parameters: Mapping[str, Any]) -> Iterable[tuple[str, Settings]]:

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from upd.analyses import analysis_of, make_plan
 from upd.analyses.base import Needs
@@ -77,19 +78,13 @@ class SweepPlan:
     notes: tuple[str, ...]
     sample: Sample | None = None
 
-    @property
-    def missing(self) -> list[int]:
-        """Numbers of the points to solve."""
-        return sorted(self.groups)
-
     def label(self, number: int) -> str:
         """Values of a point in words: friction 0.3, centrifugal 350 N."""
         if self.sample is not None:
             return f"point {number} of {self.sample.count}" if number else "inputs as given"
-        index = self.places[number].index
         return ", ".join(
             f"{axis.path.rpartition('.')[2]} {_brief(axis.values[k])}"
-            for axis, k in zip(self.axes, index, strict=True)
+            for axis, k in zip(self.axes, self.places[number], strict=True)
         )
 
 
@@ -153,25 +148,15 @@ def plan_sweep(
         Task(text, changed, threads, where, limit, scene.recipe, code) for text, changed in given
     )
     kept = PointStore(folder, "sweep").finished(tasks)
-    refused: dict[int, Outcome] = {}
-    needs: dict[int, Needs] = {}
-    seconds: dict[int, float] = {}
-    memory = 0.0
-    for number, task in enumerate(tasks):
-        if number in kept:
-            continue
-        try:
-            needs[number], taken, seconds[number] = _needs(task)
-            memory = max(memory, taken)
-        except InputError as error:
-            refused[number] = Outcome(failure=" ".join(f"InputError: {error}".split()))
+    needs, refused = _needs(tasks, kept)
     if len(refused) == len(grid):
         raise InputError(
             f"no point of the {'grid' if drawn is None else 'sample'} can be run. The first: "
             f"{refused[0].failure.removeprefix('InputError: ')}"
         )
+    memory = max((one.memory_bytes for one in needs.values()), default=0.0)
     many, notes = fitting(workers, threads, len(needs), memory)
-    parts = frozenset().union(*(need.condensations for need in needs.values()))
+    shared = [one.shared for one in needs.values()]
     return SweepPlan(
         scene=scene,
         axes=axes,
@@ -179,13 +164,13 @@ def plan_sweep(
         tasks=tasks,
         kept=kept,
         refused=refused,
-        groups={number: need.model for number, need in needs.items()},
-        meshes=len({need.mesh for need in needs.values()}),
-        condensations=len(parts),
+        groups={number: one.shared.model for number, one in needs.items()},
+        meshes=len({one.mesh for one in shared}),
+        condensations=len(frozenset().union(*(one.condensations for one in shared))),
         memory_bytes=memory,
-        seconds=seconds,
+        seconds={number: one.seconds for number, one in needs.items()},
         workers=Workers(many, threads, cluster),
-        notes=(*notes, *_sharing_notes(needs)),
+        notes=(*notes, *_sharing_notes(shared)),
         sample=drawn,
     )
 
@@ -207,26 +192,47 @@ def _drawn(
     return draw_sample(scene, count, kept_seed(folder) if seed is None else seed)
 
 
-def _needs(task: Task) -> tuple[Needs, float, float]:
-    """What one point needs, its bytes and its seconds."""
-    data = tomllib.loads(task.scene)
-    scene = load_scene(data, point_settings(data, task.settings))
-    plan = make_plan(scene)
-    return analysis_of(scene).needs(plan, task.threads), plan.memory_bytes, plan.seconds
+class _PointNeeds(NamedTuple):
+    """What a point shares with others, its memory and its seconds."""
+
+    shared: Needs
+    memory_bytes: float
+    seconds: float
 
 
-def _sharing_notes(needs: Mapping[int, Needs]) -> list[str]:
+def _needs(
+    tasks: Sequence[Task], kept: Collection[int]
+) -> tuple[dict[int, _PointNeeds], dict[int, Outcome]]:
+    """What every missing point needs, and the points that the scene does not allow."""
+    needs: dict[int, _PointNeeds] = {}
+    refused: dict[int, Outcome] = {}
+    for number, task in enumerate(tasks):
+        if number in kept:
+            continue
+        try:
+            data = tomllib.loads(task.scene)
+            scene = load_scene(data, point_settings(data, task.settings))
+            plan = make_plan(scene)
+            shared = analysis_of(scene).needs(plan, task.threads)
+        except InputError as error:
+            refused[number] = Outcome(failure=" ".join(f"InputError: {error}".split()))
+        else:
+            needs[number] = _PointNeeds(shared, plan.memory_bytes, plan.seconds)
+    return needs, refused
+
+
+def _sharing_notes(shared: Sequence[Needs]) -> list[str]:
     notes = []
-    if any(need.factors for need in needs.values()):
+    if any(one.factors for one in shared):
         notes.append(
             "displacements inside the bodies are asked for: their factor is not kept on "
             "disk, each worker makes it once a model"
         )
-    if any(need.condensations for need in needs.values()):
+    if any(one.condensations for one in shared):
         notes.append(
             "points do not start from their neighbours: a contact set is found from load "
             "to load inside a point, at hardly any cost"
         )
-    elif needs:
+    elif shared:
         notes.append("points do not start from their neighbours: each is solved on its own")
     return notes

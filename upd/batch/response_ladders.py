@@ -138,7 +138,7 @@ def _usual(scene: ForcedScene, element: str) -> tuple[float, ...]:
 
 def _size(scene: ForcedScene, base: Settings, element: str, refine: float) -> float:
     """Size of an element against that at refine 1: counts that are not whole are rounded, so it is
-    told by the numbers of elements, a cube root.
+    found from the numbers of elements, a cube root.
     """
     if refine == int(refine) or recipes.counted_by_mesh(scene.recipe):
         return 1.0 / refine
@@ -211,21 +211,23 @@ _on_levels = partial(
 )
 _on_meshes = partial(Ladder, follow=_NUMBERS, notes=_notes, subject=response_title)
 
+_counts = partial(Counts, base=_base, offset=1)
+
 FORCED: Mapping[str, Ladder] = {
     "mesh": _on_meshes(response_meshes),
     "element": _on_meshes(partial(response_meshes, vary="element")),
     "harmonics": _on_levels(
-        Counts("harmonics", "to harmonic {}", "balance.harmonics", (1, 3, 5, 7), 1, _base, 1)
+        _counts("harmonics", "to harmonic {}", "balance.harmonics", (1, 3, 5, 7), 1)
     ),
     "samples": _on_levels(
-        Counts("samples", "{} samples", "balance.samples", (32, 64, 128, 256, 512), 8, _base, 1)
+        _counts("samples", "{} samples", "balance.samples", (32, 64, 128, 256, 512), 8)
     ),
     # What sweeps up and down reach is what time steps change.
     "steps": _on_levels(
-        Counts("steps", "{} steps a period", "balance.samples", (32, 64, 128, 256), 8, _march, 1)
+        _counts("steps", "{} steps a period", "balance.samples", (32, 64, 128, 256), 8, base=_march)
     ),
     "modes": _on_levels(
-        Counts("modes", "{} modes a blade", "reduction.modes", (0, 2, 5, 10, 20, 40), 0, _base, 1)
+        _counts("modes", "{} modes a blade", "reduction.modes", (0, 2, 5, 10, 20, 40), 0)
     ),
     "contacts": _on_levels(_contact_points),
 }

@@ -57,7 +57,7 @@ class Sample:
         return len(self.shifts) - 1
 
     def as_dict(self) -> dict[str, Any]:
-        """What tells the sample from others, for the sweep folder."""
+        """What identifies the sample, for the sweep folder."""
         return {
             "count": self.count,
             "seed": self.seed,
@@ -83,9 +83,9 @@ def draw_sample(scene: AnyScene, count: int, seed: int) -> Sample:
             'is known of them, for example --set contact.friction="0.6 +- 0.1"'
         )
     elif not least <= count <= MOST_POINTS:
-        told = "1 input" if len(inputs) == 1 else f"{len(inputs)} inputs"
+        known = "1 input" if len(inputs) == 1 else f"{len(inputs)} inputs"
         problems.append(
-            f"--sample {count}: {told} known within limits need {least} points or more, at most "
+            f"--sample {count}: {known} known within limits need {least} points or more, at most "
             f"{MOST_POINTS}; some tens tell a band to a tenth"
         )
     if seed < 0:
@@ -117,11 +117,11 @@ def sample_axes(sample: Sample) -> tuple[GridAxis, ...]:
 
 def sample_places(sample: Sample) -> tuple[Place, ...]:
     """The k-th value of every input together, point by point."""
-    return tuple(Place(k, (k,) * len(sample.inputs)) for k in range(len(sample.shifts)))
+    return tuple((k,) * len(sample.inputs) for k in range(len(sample.shifts)))
 
 
 def sample_texts(scene: AnyScene, sample: Sample, axes: Sequence[GridAxis]) -> list[str]:
-    """The scenes of all points as TOML: first as given with its half-widths, whose run tells the
+    """The scenes of all points as TOML: first as given with its half-widths, whose run gives the
     first-order bands; then with the values drawn alone.
     """
     out = []

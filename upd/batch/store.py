@@ -41,7 +41,7 @@ class PointStore:
     def finished(self, tasks: Sequence[Task]) -> dict[int, Outcome]:
         """Number of the task -> outcome kept by an earlier call.
 
-        A damaged file, or one that says to try again, counts as none.
+        A damaged file, or one whose point is to be tried again, counts as none.
         """
         found = ((number, _read(self.path(task))) for number, task in enumerate(tasks))
         return {
@@ -96,7 +96,7 @@ class PointStore:
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """What goes wrong with the disk in this block, told with its remedy as UpdError."""
+        """What goes wrong with the disk in this block as UpdError, with its remedy."""
         try:
             yield
         except OSError as error:
@@ -119,7 +119,7 @@ class PointStore:
         if earlier is not None and not _same(earlier, grid):
             differs = "" if earlier["axes"] != grid["axes"] else ", of a scene with other values"
             raise InputError(
-                f"the sweep folder {self.folder} holds another sweep ({_told(earlier)}{differs}): "
+                f"the sweep folder {self.folder} holds another sweep ({_shown(earlier)}{differs}): "
                 "choose another folder with --out (copy its points/ there to keep what is solved), "
                 "or delete it"
             )
@@ -149,7 +149,7 @@ class PointStore:
         try:
             there = {entry.name for entry in self.folder.iterdir()}
         except OSError:
-            # Missing, or a file: told by whoever writes into it.
+            # Missing, or a file: whoever writes into it reports that.
             return
         # Points alone were copied there to keep what is solved.
         if there and there != {"points"} and not there & _OURS:
@@ -170,12 +170,12 @@ class PointStore:
 
 
 def _same(earlier: Mapping[str, Any], grid: Mapping[str, Any]) -> bool:
-    """Whether it is the same sweep; those from before the scene was kept are told by their axes."""
+    """Whether it is the same sweep; those from before the scene was kept have axes alone."""
     known = [key for key in ("scene", "axes", "given") if earlier[key] is not None]
     return all(earlier[key] == grid[key] for key in known)
 
 
-def _told(grid: Mapping[str, Any]) -> str:
+def _shown(grid: Mapping[str, Any]) -> str:
     """A grid in words."""
     if grid.get("sample"):
         drawn = grid["sample"]

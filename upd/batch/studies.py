@@ -16,7 +16,6 @@ from upd.batch.dask import check_address
 from upd.batch.engine import Watcher, Workers, check_numbers, fitting, run_points
 from upd.batch.ladder import Ladder, Levels, Study, StudyReport
 from upd.batch.parameter_study import PARAMETERS
-from upd.batch.sensitivity import SENSITIVITIES
 from upd.batch.store import PointStore
 from upd.batch.study_point import SolvedPoint
 from upd.cache.sources import source_digest
@@ -29,7 +28,7 @@ from upd.units import parse_quantity
 STUDIES: Mapping[str, Mapping[str, Ladder]] = {
     "hertz": contact_ladders.CURVED,
     "flat": {**contact_ladders.FLAT, **PARAMETERS},
-    "modal": {**rig_ladders.MODAL, **SENSITIVITIES},
+    "modal": rig_ladders.MODAL,
     "forced": {**response_ladders.FORCED, **whole_faces.CONTACT},
     "seated": rig_ladders.SEATED,
 }

@@ -32,7 +32,7 @@ class StudyPoint:
     settings
         What it sets in the scene.
     h
-        Size that a ladder lets go to zero: the node spacing in the patch in mm, one over a
+        Size that goes to zero along a ladder: the node spacing in the patch in mm, one over a
         refinement or a number of levels.
     estimates
         Whether the point estimates its own errors. Others leave that out: the seconds are those of

@@ -7,58 +7,22 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 from upd.batch.engine import Watcher, run_points
-from upd.batch.output import draw, write_outputs
+from upd.batch.output import SweepResult, draw, write_outputs
 from upd.batch.plan import SweepPlan, plan_sweep
 from upd.batch.point import Outcome
 from upd.batch.sample import sampled_numbers
 from upd.batch.store import PointStore
-from upd.batch.table import Column, check_follow, make_columns, patterns
-from upd.errors import InputError, one_line
-from upd.results.sampled import SampledNumber
+from upd.batch.table import check_follow, make_columns, patterns
+from upd.errors import one_line
 from upd.scene import load_scene
 
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class SweepResult:
-    """A finished sweep: its plan, the outcome of every point in the grid's order, the followed
-    numbers, seconds of this call, files, what went wrong with its pictures, and of a sample what it
-    makes of the numbers.
-    """
-
-    plan: SweepPlan
-    outcomes: tuple[Outcome, ...]
-    columns: tuple[Column, ...]
-    seconds: float
-    folder: Path
-    files: tuple[Path, ...]
-    faults: tuple[str, ...] = ()
-    sampled: tuple[SampledNumber, ...] = ()
-
-    @property
-    def failed(self) -> list[int]:
-        """Numbers of the points that failed."""
-        return [k for k, outcome in enumerate(self.outcomes) if outcome.failure]
-
-    def column(self, name: str, case: str | None = None) -> Column:
-        """The followed number ``name`` of ``case`` (the first when None).
-
-        Raises InputError when there is none.
-        """
-        for column in self.columns:
-            if column.name == name and case in (None, column.case):
-                return column
-        raise InputError(
-            f"no followed number {name!r} of case {case!r}; there are "
-            f"{', '.join(c.title for c in self.columns)}"
-        )
 
 
 def sweep(
@@ -180,10 +144,11 @@ def run_sweep(
             watch=watch,
         )
         columns = tuple(make_columns(found, patterns(plan.scene, follow)))
-        sampled = None if plan.sample is None else sampled_numbers(plan.sample, columns)
+        sampled = () if plan.sample is None else sampled_numbers(plan.sample, columns)
         seconds = time.perf_counter() - begin
+        result = SweepResult(plan, found, columns, seconds, folder, sampled=sampled)
         with store.writing():
-            files = write_outputs(store, plan, found, columns, sampled, seconds)
+            files = write_outputs(store, result)
             # Of an earlier call, perhaps.
             (folder / "report.html").unlink(missing_ok=True)
         pictures: dict[str, Callable[[], list[Path]]] = {
@@ -198,8 +163,7 @@ def run_sweep(
             except Exception as error:
                 log.exception("%s not written", what)
                 faults.append(f"{what} not written ({one_line(error)})")
-    made = (tuple(files), tuple(faults), sampled or ())
-    return SweepResult(plan, found, columns, seconds, folder, *made)
+    return replace(result, files=tuple(files), faults=tuple(faults))
 
 
 def _write_page(folder: Path) -> list[Path]:

@@ -96,8 +96,8 @@ def reasons(outcomes: Sequence[Outcome], columns: Sequence[Column]) -> list[str]
         for column in columns:
             if column.missing and column.missing[k]:
                 found.setdefault(column.missing[k], []).append(column.title)
-        told = [f"{', '.join(titles)}: {reason}" for reason, titles in found.items()]
-        out.append(outcome.failure or "; ".join(told))
+        lacks = [f"{', '.join(titles)}: {reason}" for reason, titles in found.items()]
+        out.append(outcome.failure or "; ".join(lacks))
     return out
 
 
@@ -125,11 +125,11 @@ def _columns(name: str, tables: Sequence[Mapping[str, list[PointResult]]]) -> li
             key = _key(one.case, [ranks[field][k] for field in ranks], list(ranks))
             seen[key] += 1
             if seen[key] > 1:
-                # the same number twice in a point: nothing but its place tells it
+                # the same number twice in a point: only its place differs
                 key = (*key, ("again", seen[key]))
             rows.setdefault(key, {})[k] = one
     joined = _with_known_modes(rows)
-    # one value at every point: what it is at those that have the number says nothing
+    # one value at every point: the label does not need it
     single = [field for field, places in ranks.items() if max(map(len, places)) == 1]
     made = [_column(name, key, mine, tables, single) for key, mine in joined.items()]
     titles, seen_titles, out = Counter(c.case for c in made), Counter[str](), []
@@ -155,7 +155,7 @@ def _set_by_parameters(cases: Sequence[Sequence[Case]]) -> dict[str, list[dict[A
 
 
 def _key(case: Case, places: Sequence[Mapping[Any, int]], fields: Sequence[str]) -> _Key:
-    """What tells a number among those of its name."""
+    """What identifies a number among those of its name."""
     given = case.given()
     for field, place in zip(fields, places, strict=True):
         if field in given:
@@ -254,16 +254,16 @@ def csv_text(
         ]
     )
     why = reasons(outcomes, columns)
-    for place, outcome in zip(places, outcomes, strict=True):
-        shown = [axis.shown(k) for axis, k in zip(axes, place.index, strict=True)]
-        numbers = [float(column.values[place.number]) for column in columns]
+    for number, (place, outcome) in enumerate(zip(places, outcomes, strict=True)):
+        shown = [axis.shown(k) for axis, k in zip(axes, place, strict=True)]
+        numbers = [float(column.values[number]) for column in columns]
         status = "failed" if outcome.failure else "ok"
         write(
             [
                 *shown,
                 *("" if np.isnan(v) else repr(v) for v in numbers),
                 status,
-                why[place.number],
+                why[number],
                 "; ".join(outcome.warnings),
                 f"{outcome.seconds:.3f}",
             ]

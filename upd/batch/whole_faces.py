@@ -12,23 +12,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from upd.analyses.forced.whole_faces import INTERFACE
+from upd.analyses.seated.varied import PATCH
 from upd.batch.curves import ConvergenceCurve, make_curve
 from upd.batch.ladder import Ladder, Levels, StudyReport, even, shown
 from upd.batch.point import PointResult
 from upd.batch.response_ladders import at_ratio
 from upd.batch.study_point import Settings, SolvedPoint, StudyPoint, solved_alone
-from upd.batch.text_table import TableColumn, TextTable, cost_columns, make_table
+from upd.batch.study_tables import TableColumn, TextTable, cost_columns, make_table
 from upd.errors import InputError
 from upd.labels import percent
 from upd.plot.work_precision import change_charts
 from upd.results import Case
 from upd.scene import ForcedScene
 
-#: arrangement -> elements up a face that are divided, and those that grow with them
-_DIVIDED = {
-    "symmetric": ("patch_along_slope", ("patch_along_y",)),
-    "asymmetric": ("pad_along_slope", ("pad_along_y", "face_along_z")),
-}
 #: meshes of both faces: 60, 198 and 468 nodes of the symmetric damper's half (the last has the
 #: thesis's elements), 60, 196 and 460 of the asymmetric one's
 _MESHES: Mapping[str, Mapping[int, tuple[int, ...]]] = {
@@ -98,7 +94,7 @@ def _meshes(scene: ForcedScene, levels: Levels) -> Iterator[dict[str, int]]:
             f"--levels {shown(asked)}: give different whole numbers of elements up a face, 2 or "
             "more"
         )
-    slope, others = _DIVIDED[scene.arrangement]
+    slope, others = PATCH[scene.arrangement]
     missing = [key for key in (slope, *others) if key not in scene.geometry]
     if missing:
         raise InputError(

@@ -8,7 +8,7 @@ from rich.markup import escape
 from upd.batch.engine import Workers
 from upd.batch.ladder import Study
 from upd.batch.studies import StudyResult
-from upd.batch.text_table import TextTable
+from upd.batch.study_tables import TextTable
 from upd.cli.progress import counted, duration
 from upd.cli.tables import print_table
 from upd.report.columns import TextColumn

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.markup import escape
 
+from upd.batch.output import SweepResult
 from upd.batch.plan import SweepPlan
-from upd.batch.sweeps import SweepResult
 from upd.cli.progress import counted, duration
 from upd.cli.tables import print_table
 from upd.labels import number, number_label, percent_of
@@ -69,12 +69,12 @@ def print_sweep(console: Console, result: SweepResult) -> None:
     columns = [
         TextColumn(
             _head(axis.path.rpartition(".")[2], "", axis.unit),
-            tuple(_plain(axis.shown(place.index[k])) for place in places),
+            tuple(_plain(axis.shown(place[k])) for place in places),
         )
         for k, axis in enumerate(plan.axes)
     ]
     for k, column in enumerate(result.columns):
-        values = (_shown(result, place.number, column.values, k) for place in places)
+        values = (_shown(result, number, column.values, k) for number in range(len(places)))
         head = _head(column.name, column.case, column.unit)
         columns.append(TextColumn(head, tuple(values), right=True, rank=k))
     left_out = print_table(console, columns, told=False)

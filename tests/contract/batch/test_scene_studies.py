@@ -21,7 +21,7 @@ from upd.batch.point import Outcome, PointResult, read_outcome
 from upd.batch.response_ladders import response_meshes
 from upd.batch.studies import plan_study, run_study, scene_at, variations
 from upd.batch.study_point import SolvedPoint, StudyPoint
-from upd.batch.text_table import markdown_table
+from upd.batch.study_tables import markdown_table
 from upd.cli import main
 from upd.cli.study import _columns
 from upd.cli.tables import print_table

@@ -118,7 +118,7 @@ def test_all_faults_of_the_axes_at_once() -> None:
 def test_grid_is_the_full_factorial_last_axis_fastest() -> None:
     axes = parse_axes(["contact.friction=0.1,0.2", "loads.normal=10 N,20 N,30 N"], SCENE)
     grid = places(axes)
-    assert [place.index for place in grid] == [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]
+    assert grid == [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]
     assert settings(axes, grid[4]) == {"contact.friction": 0.2, "loads.normal": ["20 N"]}
 
 
