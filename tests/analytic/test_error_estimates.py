@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import weakref
 from dataclasses import replace
 from functools import partial
 
@@ -12,11 +13,14 @@ import pytest
 
 from upd.analyses.contact.levels import half_cost
 from upd.analyses.hertz.plan import make_plan
+from upd.errors import InputError
+from upd.progress import Stages
 from upd.results import Case, ErrorPart, Result, with_estimates, with_parts
 from upd.scene import load_scene
 from upd.vary.errors import merged, source_estimates
 from upd.vary.orders import estimate_error, finer_level_error, fitted_error
-from upd.vary.variation import RUN, SolvedVariation, Variation
+from upd.vary.solve import solve as solve_variations
+from upd.vary.variation import RUN, Levels, Problem, SolvedVariation, Variation
 
 #: sizes of a run and its companions, ratio sqrt 2
 SIZES = np.array([1.0, 2.0**0.5, 2.0, 2.0**1.5])
@@ -164,3 +168,36 @@ def test_a_pair_stands_for_the_run() -> None:
         (lost,) = found["F", case]
         assert not lost.known
         assert "base: without this number" in lost.basis
+
+
+def test_a_variation_is_let_go_before_the_next_is_solved() -> None:
+    """Its factors are the memory of the next. A fault is a reason, and one of what stands on it."""
+
+    class Factors:
+        pass
+
+    held = list[weakref.ref[Factors]]()
+
+    def solve(refine: int, stages: Stages) -> Factors:
+        assert [one for one in held if one() is not None] == []
+        if refine == 3:
+            raise InputError("too fine")
+        factors = Factors()
+        held.append(weakref.ref(factors))
+        return factors
+
+    problem = Problem(
+        make_plan=lambda scene: scene.geometry["refine"],
+        solve=solve,
+        make_results=lambda _: [NUMBER],
+        bare=lambda _: (),
+        sources=("mesh",),
+        levels=lambda _: Levels(()),
+        half_cost=lambda *_: 0.0,
+    )
+    finer = [Variation("mesh", f"{n}", (("geometry.refine", n),)) for n in (1, 2, 3)]
+    last = Variation("mesh", "4", (("geometry.refine", 4),), base=finer[2])
+    found = solve_variations(problem, load_scene("rig"), SOLVED, [*finer, last], Stages())
+    assert len(held) == 2
+    assert [one.reason for one in found] == ["", "", "3: too fine", "3 was not solved"]
+    assert found[1].values == SOLVED.values

@@ -10,6 +10,8 @@ from typing import Any
 
 from upd.errors import UpdError, one_line
 from upd.progress import Stages
+from upd.results import Result
+from upd.vary.scatter import Samples
 from upd.vary.variation import RUN, Overrides, Problem, SolvedVariation, Variation
 
 log = logging.getLogger(__name__)
@@ -56,12 +58,19 @@ def solve(
         begin = perf_counter()
         try:
             with stages("error estimates", one.label):
-                solution = problem.solve(varied_plan(problem, scene, one), Stages())
-                numbers = problem.make_results(solution)
-                samples = {} if problem.sample is None else problem.sample(solution)
+                numbers, samples = _numbers(problem, scene, one)
         except UpdError as error:
             log.info("variation with %s not solved: %s", one.label, error)
             done[one] = SolvedVariation(one, reason=f"{one.label}: {one_line(error)}")
             continue
         done[one] = SolvedVariation(one, numbers, perf_counter() - begin, samples, base)
     return list(done.values())[1:]
+
+
+def _numbers(
+    problem: Problem, scene: Any, variation: Variation
+) -> tuple[Sequence[Result], Samples]:
+    """Of a variation; its solution is let go, whose factors are the memory of the next."""
+    solution = problem.solve(varied_plan(problem, scene, variation), Stages())
+    samples = {} if problem.sample is None else problem.sample(solution)
+    return problem.make_results(solution), samples

@@ -55,9 +55,8 @@ class AccuracyLadder:
 
 @dataclass(frozen=True)
 class Level(Generic[Solved]):
-    """One level that has run: its scene and plan, what was solved, its numbers, its seconds."""
+    """One level that has run: its plan, what was solved, its numbers, its seconds."""
 
-    scene: Scene
     plan: ContactPlan
     solved: Solved
     results: tuple[Result, ...]
@@ -154,8 +153,7 @@ def choose(
     miss, level = math.inf, None
     estimates: Estimates | None = None
     for make in ladder.scenes(scene):
-        here = make()
-        plan = ladder.problem.make_plan(here)
+        plan = ladder.problem.make_plan(make())
         try:
             refuse_oversize(plan)
         except InputError as refused:
@@ -165,7 +163,7 @@ def choose(
         # No more of a level than its numbers: its factors are the memory of the next.
         level = None
         try:
-            level = Level(here, plan, *solve(plan))
+            level = Level(plan, *solve(plan))
         except InputError as refused:
             if not known:
                 raise
