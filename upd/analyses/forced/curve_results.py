@@ -24,61 +24,10 @@ from upd.scene.forced_contact import SIDES, Side
 
 #: name under which measured peaks are printed: which of a run's peaks each is stands nowhere
 MEASURED_PEAK = "peak_frequency"
-
-
-def printed_of(plan: ForcedPlan) -> Lookup:
-    """What was printed of the rig, and of the damper in it under the loads of the ready scene."""
-    scene, look_up = plan.scene, printed.printed_of(plan.scene)
-    ready = printed.ready_scene(scene)
-    damped = ready is not None and (
-        (scene.damper.centrifugal, scene.damper.density, scene.contact.friction)
-        == (ready.damper.centrifugal, ready.damper.density, ready.contact.friction)
-    )
-    ratios = (None, *(ready.excitation.centrifugal_to_force if damped else ()))
-
-    def under_load(name: str, case: Mapping[str, Any]) -> tuple[Printed, ...]:
-        free = case.get("kind") == "free"
-        same = damped and case.get("force_ratio") in ratios
-        return look_up(name, case) if free or same else ()
-
-    return under_load
-
-
-def measured_peaks(plan: ForcedPlan) -> tuple[Printed, ...]:
-    """Peaks in Hz measured with the damper."""
-    return printed_of(plan)(MEASURED_PEAK, {})
-
-
 _DAMPER = ("x", "y", "z")
-
-
-def peak_results(
-    solution: ForcedSolution, case: Case, peaks: Sequence[CurvePeak], blade: Side
-) -> list[Result]:
-    """Numbered peaks of a blade; of the right one measured frequencies go to the nearest, each
-    once.
-    """
-    found = printed_of(solution.plan)(MEASURED_PEAK, case.given())
-    nearest = (
-        {int(np.argmin([abs(peak.frequency - p.value) for peak in peaks])): p for p in found}
-        if peaks and blade == "right"
-        else {}
-    )
-    results = []
-    for k, peak in enumerate(peaks):
-        one, name, mine = (
-            nearest.get(k),
-            peak_name(blade, peak.number),
-            replace(case, mode=peak.mode),
-        )
-        reference, source = (one.value, one.source) if one is not None else (None, "")
-        results += [
-            Result(f"{name}_frequency", mine, peak.frequency, "Hz", reference, source, exact=False),
-            Result(f"{name}_accelerance", mine, peak.height, "(m/s2)/N"),
-        ]
-        if not case.kind and blade == "right":
-            results.append(Result(f"{name}_mac", mine, peak.mac, ""))
-    return results
+#: by how much lower than the peak a sweep ends that is reported
+_LOWER = 0.01
+AnyCurve = ForcedCurve | FacesCurve | SweptCurve
 
 
 def _more_harmonics(curve: AnyCurve) -> Iterator[Result]:
@@ -92,46 +41,6 @@ def _more_harmonics(curve: AnyCurve) -> Iterator[Result]:
             name = f"{LEFT * (blade == 'left')}harmonic_{k}"
             yield Result(f"{name}_frequency", curve.case, at, "Hz")
             yield Result(f"{name}_accelerance", curve.case, height, "(m/s2)/N")
-
-
-def whole_contact_results(case: Case, share: Array, energy: float) -> list[Result]:
-    """States and friction loss of the whole contact.
-
-    Parameters
-    ----------
-    share
-        (3,) of lift, stick and slip.
-    energy
-        N mm a period.
-    """
-    told = dict(zip(("lift", "stick", "slip"), share, strict=True))
-    return [
-        *(
-            Result(f"share_{name}", case, 100.0 * float(told[name]), "%")
-            for name in ("stick", "slip", "lift")
-        ),
-        Result("friction_energy", case, float(energy), "N mm"),
-    ]
-
-
-def motion_results(case: Case, static: Array, amplitude: Array) -> list[Result]:
-    """Translations and rotations of the damper, (6,) mm and rad each: mean and amplitude."""
-    results, names = [], [f"damper_{kind}{axis}" for kind in "ur" for axis in _DAMPER]
-    both = np.maximum(np.abs(static), np.abs(amplitude))
-    # motions that symmetry forbids are rounding
-    least = np.repeat([both[:3].max(), both[3:].max()], 3) * np.sqrt(np.finfo(float).eps)
-    for part, values in (("", amplitude), ("_static", static)):
-        shown = np.flatnonzero(np.abs(values) > least)
-        results += [
-            Result(f"{names[k]}{part}", case, 1e3 * float(values[k]), "um" if k < 3 else "mrad")
-            for k in shown
-        ]
-    return results
-
-
-#: by how much lower than the peak a sweep ends that is reported
-_LOWER = 0.01
-AnyCurve = ForcedCurve | FacesCurve | SweptCurve
 
 
 def curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:
@@ -311,3 +220,96 @@ def _losses(
         yield Result("points_always_stuck", at, float((state[:, 0] == 1.0).sum()), "")
     if scene.wants("hysteresis"):
         yield Result("friction_power", at, power, "mW")
+
+
+# -- numbers of peaks and of the damper's motion ---------------------------------------------------
+
+
+def peak_results(
+    solution: ForcedSolution, case: Case, peaks: Sequence[CurvePeak], blade: Side
+) -> list[Result]:
+    """Numbered peaks of a blade; of the right one measured frequencies go to the nearest, each
+    once.
+    """
+    found = printed_of(solution.plan)(MEASURED_PEAK, case.given())
+    nearest = (
+        {int(np.argmin([abs(peak.frequency - p.value) for peak in peaks])): p for p in found}
+        if peaks and blade == "right"
+        else {}
+    )
+    results = []
+    for k, peak in enumerate(peaks):
+        one, name, mine = (
+            nearest.get(k),
+            peak_name(blade, peak.number),
+            replace(case, mode=peak.mode),
+        )
+        reference, source = (one.value, one.source) if one is not None else (None, "")
+        results += [
+            Result(f"{name}_frequency", mine, peak.frequency, "Hz", reference, source, exact=False),
+            Result(f"{name}_accelerance", mine, peak.height, "(m/s2)/N"),
+        ]
+        if not case.kind and blade == "right":
+            results.append(Result(f"{name}_mac", mine, peak.mac, ""))
+    return results
+
+
+def whole_contact_results(case: Case, share: Array, energy: float) -> list[Result]:
+    """States and friction loss of the whole contact.
+
+    Parameters
+    ----------
+    share
+        (3,) of lift, stick and slip.
+    energy
+        N mm a period.
+    """
+    told = dict(zip(("lift", "stick", "slip"), share, strict=True))
+    return [
+        *(
+            Result(f"share_{name}", case, 100.0 * float(told[name]), "%")
+            for name in ("stick", "slip", "lift")
+        ),
+        Result("friction_energy", case, float(energy), "N mm"),
+    ]
+
+
+def motion_results(case: Case, static: Array, amplitude: Array) -> list[Result]:
+    """Translations and rotations of the damper, (6,) mm and rad each: mean and amplitude."""
+    results, names = [], [f"damper_{kind}{axis}" for kind in "ur" for axis in _DAMPER]
+    both = np.maximum(np.abs(static), np.abs(amplitude))
+    # motions that symmetry forbids are rounding
+    least = np.repeat([both[:3].max(), both[3:].max()], 3) * np.sqrt(np.finfo(float).eps)
+    for part, values in (("", amplitude), ("_static", static)):
+        shown = np.flatnonzero(np.abs(values) > least)
+        results += [
+            Result(f"{names[k]}{part}", case, 1e3 * float(values[k]), "um" if k < 3 else "mrad")
+            for k in shown
+        ]
+    return results
+
+
+# -- what was printed and measured -----------------------------------------------------------------
+
+
+def printed_of(plan: ForcedPlan) -> Lookup:
+    """What was printed of the rig, and of the damper in it under the loads of the ready scene."""
+    scene, look_up = plan.scene, printed.printed_of(plan.scene)
+    ready = printed.ready_scene(scene)
+    damped = ready is not None and (
+        (scene.damper.centrifugal, scene.damper.density, scene.contact.friction)
+        == (ready.damper.centrifugal, ready.damper.density, ready.contact.friction)
+    )
+    ratios = (None, *(ready.excitation.centrifugal_to_force if damped else ()))
+
+    def under_load(name: str, case: Mapping[str, Any]) -> tuple[Printed, ...]:
+        free = case.get("kind") == "free"
+        same = damped and case.get("force_ratio") in ratios
+        return look_up(name, case) if free or same else ()
+
+    return under_load
+
+
+def measured_peaks(plan: ForcedPlan) -> tuple[Printed, ...]:
+    """Peaks in Hz measured with the damper."""
+    return printed_of(plan)(MEASURED_PEAK, {})

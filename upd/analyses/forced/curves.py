@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal, NamedTuple
@@ -126,9 +127,7 @@ class TimeCheck:
         Of the peak.
     frequency, balance, integrated
         Of the highest motion that stays: Hz, and its height by harmonic balance and by time
-        integration, (m/s2)/N.
-    stays
-        Whether one was found.
+        integration, (m/s2)/N; nan where none was found.
     sample
         Its place on the path; `AT_TOP` where it is the top of the peak itself.
     step, apart
@@ -144,11 +143,15 @@ class TimeCheck:
     frequency: float
     balance: float
     integrated: float
-    stays: bool
     sample: int
-    step: float
-    apart: float
-    starts: int
+    step: float = 0.0
+    apart: float = 0.0
+    starts: int = 0
+
+    @property
+    def stays(self) -> bool:
+        """Whether a motion that stays was found."""
+        return math.isfinite(self.integrated)
 
     @property
     def at_top(self) -> bool:

@@ -35,6 +35,78 @@ from upd.results import Case
 from upd.scene.forced_contact import SIDES, Side
 
 
+def with_along(solution: ForcedSolution, name: str, laws: Mapping[Side, FaceLaw]) -> Model | None:
+    """The model in which friction resists sliding along the damper too; None where the run has it
+    or nothing rubs.
+    """
+    plan, model = solution.plan, solution.models[name]
+    scene = plan.scene
+    if model.contacts.tangents == 2 or not scene.contact.friction:
+        return None
+    contact = replace(scene.contact, directions="two")
+    plan = replace(plan, scene=replace(scene, contact=contact), workers=1)
+    assert solution.bodies is not None
+    return make_model(plan, solution.bodies, laws, model.state)
+
+
+def along_changes(peaks: FoundPeaks, tops: Mapping[CurvePeak, Top], along: Model) -> list[Resolved]:
+    """Change of the highest peak of the curve with the lowest F_C/F_E, with few harmonics.
+
+    Parameters
+    ----------
+    tops
+        Of that curve, with few harmonics.
+    """
+    loose = {peak: top for peak, top in tops.items() if top.slips}
+    if not loose:
+        return []
+    curve = min(peaks.curves, key=lambda c: c.ratio)
+    peak = max(loose, key=lambda one: loose[one].height)
+    top, old = loose[peak], curve.answer.balance
+    numbers = few(peaks, old.harmonics.highest)
+    one, b = (balance_of(peaks.plan, model, curve.force, numbers) for model in (peaks.model, along))
+    W, rest = one.split(top.x)
+    both = np.zeros((W.shape[0], 3, W.shape[2]))
+    # normal, along, up the slope
+    both[:, [0, 2]] = W
+    x = np.concatenate([both.ravel(), rest])
+    with threads_for(len(along.M)):
+        found = found_again(peaks.plan, along, RunPeak(curve, "right", peak.number, top), b, x)
+    case, remedy = replace(curve.case, mode=peak.mode), 'set contact.directions = "two"'
+    return [
+        Resolved(ALONG, f"peak_{peak.number}_{kind}", case, before, after, unit, remedy)
+        for kind, unit, before, after in (
+            ("accelerance", "(m/s2)/N", top.height, found.height),
+            ("frequency", "Hz", top.frequency, found.frequency),
+        )
+    ]
+
+
+def elastic_changes(solution: ForcedSolution, name: str) -> list[Resolved]:
+    """Stuck frequencies with the damper's elasticity in series with the contact springs."""
+    out, model = [], solution.models[name]
+    assert solution.bodies is not None
+    rigid = solution.linear[name].modes
+    elastic = elastic_stuck(solution.plan, solution.bodies, model)
+    for in_phase, quantity in ((True, "stuck_in_phase"), (False, "stuck_out_of_phase")):
+        before, after = (
+            next((m.frequency for m in modes if m.axis == "x" and m.in_phase == in_phase), None)
+            for modes in (rigid, elastic)
+        )
+        if before is not None:
+            remedy = (
+                "the rigid damper is too stiff for these springs, unless they hold its elasticity "
+                "already: compare with a contact analysis of the damper"
+            )
+            new = math.nan if after is None else after
+            case = Case(stiffness=name)
+            out.append(Resolved(ELASTIC, quantity, case, before, new, "Hz", remedy))
+    return out
+
+
+# -- the elastic damper ----------------------------------------------------------------------------
+
+
 def elastic_stuck(plan: ForcedPlan, bodies: Bodies, model: Model) -> list[StuckMode]:
     """Stuck modes with the damper's elastic compliance in series with the contact springs.
 
@@ -123,72 +195,3 @@ def _at(values: Array, frame: Array, nodes: IntArray, n_node: int) -> Array:
     rows = np.zeros((len(values), 3, n_node, 3))
     rows[:, :, nodes] = np.einsum("mk,fc->mfkc", values, frame)
     return np.asarray(rows.reshape(len(values), 3, -1))
-
-
-def with_along(solution: ForcedSolution, name: str, laws: Mapping[Side, FaceLaw]) -> Model | None:
-    """The model in which friction resists sliding along the damper too; None where the run has it
-    or nothing rubs.
-    """
-    plan, model = solution.plan, solution.models[name]
-    scene = plan.scene
-    if model.contacts.tangents == 2 or not scene.contact.friction:
-        return None
-    contact = replace(scene.contact, directions="two")
-    plan = replace(plan, scene=replace(scene, contact=contact), workers=1)
-    assert solution.bodies is not None
-    return make_model(plan, solution.bodies, laws, model.state)
-
-
-def along_changes(peaks: FoundPeaks, tops: Mapping[CurvePeak, Top], along: Model) -> list[Resolved]:
-    """Change of the highest peak of the curve with the lowest F_C/F_E, with few harmonics.
-
-    Parameters
-    ----------
-    tops
-        Of that curve, with few harmonics.
-    """
-    loose = {peak: top for peak, top in tops.items() if top.slips}
-    if not loose:
-        return []
-    curve = min(peaks.curves, key=lambda c: c.ratio)
-    peak = max(loose, key=lambda one: loose[one].height)
-    top, old = loose[peak], curve.answer.balance
-    numbers = few(peaks, old.harmonics.highest)
-    one, b = (balance_of(peaks.plan, model, curve.force, numbers) for model in (peaks.model, along))
-    W, rest = one.split(top.x)
-    both = np.zeros((W.shape[0], 3, W.shape[2]))
-    # normal, along, up the slope
-    both[:, [0, 2]] = W
-    x = np.concatenate([both.ravel(), rest])
-    with threads_for(len(along.M)):
-        found = found_again(peaks.plan, along, RunPeak(curve, "right", peak.number, top), b, x)
-    case, remedy = replace(curve.case, mode=peak.mode), 'set contact.directions = "two"'
-    return [
-        Resolved(ALONG, f"peak_{peak.number}_{kind}", case, before, after, unit, remedy)
-        for kind, unit, before, after in (
-            ("accelerance", "(m/s2)/N", top.height, found.height),
-            ("frequency", "Hz", top.frequency, found.frequency),
-        )
-    ]
-
-
-def elastic_changes(solution: ForcedSolution, name: str) -> list[Resolved]:
-    """Stuck frequencies with the damper's elasticity in series with the contact springs."""
-    out, model = [], solution.models[name]
-    assert solution.bodies is not None
-    rigid = solution.linear[name].modes
-    elastic = elastic_stuck(solution.plan, solution.bodies, model)
-    for in_phase, quantity in ((True, "stuck_in_phase"), (False, "stuck_out_of_phase")):
-        before, after = (
-            next((m.frequency for m in modes if m.axis == "x" and m.in_phase == in_phase), None)
-            for modes in (rigid, elastic)
-        )
-        if before is not None:
-            remedy = (
-                "the rigid damper is too stiff for these springs, unless they hold its elasticity "
-                "already: compare with a contact analysis of the damper"
-            )
-            new = math.nan if after is None else after
-            case = Case(stiffness=name)
-            out.append(Resolved(ELASTIC, quantity, case, before, new, "Hz", remedy))
-    return out

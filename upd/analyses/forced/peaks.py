@@ -9,6 +9,7 @@ highest motion along the path that stays is the peak, found by bisection down fr
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -239,26 +240,25 @@ def _confirmed(
         starts += 1
         return _stays(springs, model, b, x, f, curve.force, steps)
 
-    def told(f: float, both: Array, sample: int, step: float, apart: float) -> TimeCheck:
-        k = SIDES.index(side)
-        balance, integrated = float(both[0, k]), float(both[1, k])
-        return TimeCheck(
-            blade=side,
-            number=peak.number,
-            mode=peak.mode,
+    nothing = TimeCheck(
+        side, peak.number, peak.mode, top.frequency, top.height, math.nan, peak.sample
+    )
+
+    def staying(f: float, both: Array, sample: int, step: float, apart: float) -> TimeCheck:
+        balance, integrated = (float(value) for value in both[:, SIDES.index(side)])
+        return replace(
+            nothing,
             frequency=f,
             balance=balance,
             integrated=integrated,
-            stays=True,
             sample=sample,
             step=step,
             apart=apart,
-            starts=starts,
         )
 
     both = stays(top.x, top.frequency)
     if both is not None:
-        return told(top.frequency, both, AT_TOP, 0.0, 0.0)
+        return replace(staying(top.frequency, both, AT_TOP, 0.0, 0.0), starts=starts)
     size, f = np.abs(curve.accelerance[side]), curve.frequency
     best: TimeCheck | None = None
     for way in _downhill(curve, size, peak.sample):
@@ -278,24 +278,10 @@ def _confirmed(
                 high, kept = middle, both
         i, beyond = way[high], way[low]
         step = abs(float(size[beyond] / size[i]) - 1.0)
-        found = told(float(f[i]), kept, i, step, abs(float(f[beyond] / f[i]) - 1.0))
+        found = staying(float(f[i]), kept, i, step, abs(float(f[beyond] / f[i]) - 1.0))
         if best is None or found.integrated > best.integrated:
             best = found
-    if best is not None:
-        return replace(best, starts=starts)
-    return TimeCheck(
-        blade=side,
-        number=peak.number,
-        mode=peak.mode,
-        frequency=top.frequency,
-        balance=top.height,
-        integrated=float("nan"),
-        stays=False,
-        sample=peak.sample,
-        step=0.0,
-        apart=0.0,
-        starts=starts,
-    )
+    return replace(best or nothing, starts=starts)
 
 
 def _downhill(curve: ForcedCurve, size: Array, top: int) -> Iterator[list[int]]:

@@ -26,6 +26,7 @@ from upd.scene import ForcedScene
 from upd.scene.forced_contact import GAUSS
 from upd.scene.rig import rig_parameters
 
+Array = NDArray[np.float64]
 #: harmonics of the blades and samples in a period where the scene leaves them to the rule: two
 #: more harmonics change peaks by up to 0.5 %, twice the samples by 0.05 %
 HARMONICS, SAMPLES = 3, 128
@@ -33,177 +34,9 @@ HARMONICS, SAMPLES = 3, 128
 # 60 and 198 nodes; of one sample the time for each contact dof that moves, a share of all, and the
 # flops of its rows, solved for the unknowns.
 _ITERATIONS, _MOVED_S, _MOVING = 250.0, 2e-6, 0.2
-
-
-def blade_harmonics(scene: ForcedScene) -> int:
-    """The highest of the blades in the balance."""
-    asked = scene.balance.harmonics
-    if asked == "adaptive":
-        return max(HARMONICS, scene.excitation.highest_harmonic)
-    return int(asked)
-
-
-def balance_seconds(scene: ForcedScene, dofs: float) -> float:
-    """Seconds of all curves by the balance.
-
-    Parameters
-    ----------
-    scene
-        With whole faces.
-    dofs
-        Of the contact.
-    """
-    b, e = scene.balance, scene.excitation
-    if b.method == "march" or scene.contact.friction == 0.0:
-        return 0.0
-    samples = SAMPLES if b.samples == "auto" else int(b.samples)
-    rows = _MOVING * dofs
-    evaluations = _ITERATIONS * len(e.centrifugal_to_force) * samples
-    return evaluations * _MOVED_S * rows + dense_s(evaluations * 2.0 * rows**2 * dofs)
-
-
-def harmonics_effect(scene: ForcedScene) -> Effect:
-    """Harmonics of the blades."""
-    b = scene.balance
-    if b.method == "march":
-        return Effect("harmonics", True, "all of them: a time march")
-    return Effect(
-        "harmonics",
-        True,
-        f"0 to {blade_harmonics(scene)} of the blades; contact and damper in time",
-        "truncation",
-    )
-
-
 #: checks of what is left out; each solves a number again with the effect
-Array = NDArray[np.float64]
 ALONG = "sliding along y"
 ELASTIC = "elastic damper"
-
-
-def effects_of_points(scene: ForcedScene) -> list[Effect]:
-    """Of contact by springs at points."""
-    mu, b, c = scene.contact.friction, scene.balance, scene.contact
-    adaptive, swept = b.harmonics == "adaptive", b.method == "march"
-    samples = "power of two by rule" if b.samples == "auto" else f"{b.samples} a period"
-    whole = scene.mesh.symmetry == "full"
-    return [
-        Effect(
-            "friction",
-            mu > 0.0,
-            f"Coulomb, mu = {mu:g}; a curve stuck everywhere is answered linearly"
-            if mu
-            else "mu = 0",
-            applies=mu > 0.0,
-        ),
-        _along(scene),
-        Effect(
-            "motion odd about y = 0",
-            whole,
-            "the full model"
-            if whole
-            else "rig, load and contact are even about y = 0: an even motion excites no odd one",
-            applies=whole,
-        ),
-        _excited(scene),
-        Effect("lift-off", True, "every point may open: N = max(0, k_n w)"),
-        Effect("static balance", True, f"mean positions are unknowns; {_static_words(scene)}"),
-        Effect(
-            "blades spread by F_C",
-            not c.loaded,
-            f"the faces fit each other {'under F_C, worn in' if c.loaded else 'without load'}",
-            applies=not c.loaded,
-        ),
-        Effect("damper inertia", True, "rigid body; mass and inertia from its mesh"),
-        Effect(
-            "harmonics",
-            True,
-            "all: time integration"
-            if swept
-            else "as many as matter, up to 31"
-            if adaptive
-            else f"0 to {b.harmonics}; {samples} samples",
-            "" if swept else "more harmonics",
-        ),
-        Effect(
-            "damper elasticity",
-            False,
-            "in the contact stiffness; the body moves rigidly",
-            ELASTIC if scene.left_out.solves else "",
-        ),
-        Effect("modes above", False, f"{scene.reduction.modes} modes a blade, static remainder"),
-        *centrifugal_effects(scene),
-    ]
-
-
-def effects_of_faces(scene: ForcedScene) -> list[Effect]:
-    """Of contact by all nodes of both faces."""
-    mu, c = scene.contact.friction, scene.contact
-    whole = scene.mesh.symmetry == "full"
-    return [
-        Effect(
-            "friction",
-            mu > 0.0,
-            f"Coulomb, mu = {mu:g}, both directions, every node of both faces" if mu else "mu = 0",
-            applies=mu > 0.0,
-        ),
-        Effect("normal and tangential coupling", True, "solved together at every step in time"),
-        Effect(
-            "motion odd about y = 0",
-            whole,
-            "the full model is marched" if whole else "load and bodies are even about it",
-            applies=whole,
-        ),
-        _excited(scene),
-        Effect("lift-off", True, "every node may open"),
-        Effect("damper elasticity", True, "its deformation follows its forces statically"),
-        Effect("damper inertia", True, "mass and inertia from its mesh"),
-        Effect(
-            "worn faces",
-            c.worn > 0.0,
-            f"worn in under F_C to {100.0 * c.worn:g} %"
-            if c.worn
-            else "flat faces that fit without load",
-            applies=c.worn > 0.0,
-        ),
-        Effect("static balance", True, _static_words(scene), "static balance"),
-        harmonics_effect(scene),
-        *centrifugal_effects(scene),
-    ]
-
-
-def _excited(scene: ForcedScene) -> Effect:
-    """Which blades the excitation acts on."""
-    return Effect("excitation", True, f"{excitation_of(scene.excitation).words}, along x")
-
-
-def _static_words(scene: ForcedScene) -> str:
-    """Where the static forces of the faces come from."""
-    static = scene.contact.static
-    if not isinstance(static, str):
-        return "N and T of both faces are given"
-    return {
-        "seated": "F_C raised from nothing on both faces, coupled contact",
-        "frictionless": "no mean friction before vibration, near what vibration leaves",
-        "opposing": "friction fully mobilised against F_C",
-        "reversed": "friction fully mobilised along F_C",
-    }[static]
-
-
-def _along(scene: ForcedScene) -> Effect:
-    """Whether the second sliding direction is simulated."""
-    name, c = "sliding along the damper", scene.contact
-    if c.directions == "two":
-        return Effect(name, True, "slip circle: along the damper and up the slope")
-    why = (
-        "left out where it changes the stuck frequencies by less than 0.1 %"
-        if c.directions == "auto"
-        else "asked for"
-    )
-    check = ALONG if scene.left_out.solves and scene.balance.method == "balance" else ""
-    return Effect(name, False, why, check, ("contact.directions=two",), applies=c.friction > 0.0)
-
-
 # Counted and timed on the ready scenes, their elements and harmonics, one thread. A point of a path
 # that sticks, per contact point.
 _STUCK_S = 1.9e-4
@@ -240,6 +73,8 @@ _PERIODS, _SPRING_S, _POINT_S = 150.0, 1.2e-6, 4e-8
 _RATIO, _AROUND, _PEAK_STEPS, _MESHES = 2.0, 4.0, 300.0, 0.3
 # Figures, files and page, and those of a curve.
 _FILES_S, _CURVE_S = 4.0, 1.0
+#: time steps in a period of a time integration where the scene names none
+MARCH_SAMPLES = 128
 
 
 @dataclass(frozen=True)
@@ -253,10 +88,6 @@ class ForcedPlan(Plan[ForcedScene]):
     """
 
     asked: ForcedScene | None = None
-
-
-#: time steps in a period of a time integration where the scene names none
-MARCH_SAMPLES = 128
 
 
 def make_plan(scene: ForcedScene) -> ForcedPlan:
@@ -478,3 +309,172 @@ def needs(plan: ForcedPlan, threads: int) -> Needs:
     mesh = {"recipe": scene.recipe, "parameters": dict(plan.parameters)}
     model = mesh | {"mesh": scene.mesh, "material": scene.material, "reduction": scene.reduction}
     return Needs(key_of(model), key_of(mesh))
+
+
+# -- what is simulated and left out ----------------------------------------------------------------
+
+
+def effects_of_points(scene: ForcedScene) -> list[Effect]:
+    """Of contact by springs at points."""
+    mu, b, c = scene.contact.friction, scene.balance, scene.contact
+    adaptive, swept = b.harmonics == "adaptive", b.method == "march"
+    samples = "power of two by rule" if b.samples == "auto" else f"{b.samples} a period"
+    whole = scene.mesh.symmetry == "full"
+    return [
+        Effect(
+            "friction",
+            mu > 0.0,
+            f"Coulomb, mu = {mu:g}; a curve stuck everywhere is answered linearly"
+            if mu
+            else "mu = 0",
+            applies=mu > 0.0,
+        ),
+        _along(scene),
+        Effect(
+            "motion odd about y = 0",
+            whole,
+            "the full model"
+            if whole
+            else "rig, load and contact are even about y = 0: an even motion excites no odd one",
+            applies=whole,
+        ),
+        _excited(scene),
+        Effect("lift-off", True, "every point may open: N = max(0, k_n w)"),
+        Effect("static balance", True, f"mean positions are unknowns; {_static_words(scene)}"),
+        Effect(
+            "blades spread by F_C",
+            not c.loaded,
+            f"the faces fit each other {'under F_C, worn in' if c.loaded else 'without load'}",
+            applies=not c.loaded,
+        ),
+        Effect("damper inertia", True, "rigid body; mass and inertia from its mesh"),
+        Effect(
+            "harmonics",
+            True,
+            "all: time integration"
+            if swept
+            else "as many as matter, up to 31"
+            if adaptive
+            else f"0 to {b.harmonics}; {samples} samples",
+            "" if swept else "more harmonics",
+        ),
+        Effect(
+            "damper elasticity",
+            False,
+            "in the contact stiffness; the body moves rigidly",
+            ELASTIC if scene.left_out.solves else "",
+        ),
+        Effect("modes above", False, f"{scene.reduction.modes} modes a blade, static remainder"),
+        *centrifugal_effects(scene),
+    ]
+
+
+def effects_of_faces(scene: ForcedScene) -> list[Effect]:
+    """Of contact by all nodes of both faces."""
+    mu, c = scene.contact.friction, scene.contact
+    whole = scene.mesh.symmetry == "full"
+    return [
+        Effect(
+            "friction",
+            mu > 0.0,
+            f"Coulomb, mu = {mu:g}, both directions, every node of both faces" if mu else "mu = 0",
+            applies=mu > 0.0,
+        ),
+        Effect("normal and tangential coupling", True, "solved together at every step in time"),
+        Effect(
+            "motion odd about y = 0",
+            whole,
+            "the full model is marched" if whole else "load and bodies are even about it",
+            applies=whole,
+        ),
+        _excited(scene),
+        Effect("lift-off", True, "every node may open"),
+        Effect("damper elasticity", True, "its deformation follows its forces statically"),
+        Effect("damper inertia", True, "mass and inertia from its mesh"),
+        Effect(
+            "worn faces",
+            c.worn > 0.0,
+            f"worn in under F_C to {100.0 * c.worn:g} %"
+            if c.worn
+            else "flat faces that fit without load",
+            applies=c.worn > 0.0,
+        ),
+        Effect("static balance", True, _static_words(scene), "static balance"),
+        harmonics_effect(scene),
+        *centrifugal_effects(scene),
+    ]
+
+
+def _excited(scene: ForcedScene) -> Effect:
+    """Which blades the excitation acts on."""
+    return Effect("excitation", True, f"{excitation_of(scene.excitation).words}, along x")
+
+
+def _static_words(scene: ForcedScene) -> str:
+    """Where the static forces of the faces come from."""
+    static = scene.contact.static
+    if not isinstance(static, str):
+        return "N and T of both faces are given"
+    return {
+        "seated": "F_C raised from nothing on both faces, coupled contact",
+        "frictionless": "no mean friction before vibration, near what vibration leaves",
+        "opposing": "friction fully mobilised against F_C",
+        "reversed": "friction fully mobilised along F_C",
+    }[static]
+
+
+def _along(scene: ForcedScene) -> Effect:
+    """Whether the second sliding direction is simulated."""
+    name, c = "sliding along the damper", scene.contact
+    if c.directions == "two":
+        return Effect(name, True, "slip circle: along the damper and up the slope")
+    why = (
+        "left out where it changes the stuck frequencies by less than 0.1 %"
+        if c.directions == "auto"
+        else "asked for"
+    )
+    check = ALONG if scene.left_out.solves and scene.balance.method == "balance" else ""
+    return Effect(name, False, why, check, ("contact.directions=two",), applies=c.friction > 0.0)
+
+
+# -- whole faces by harmonic balance ---------------------------------------------------------------
+
+
+def blade_harmonics(scene: ForcedScene) -> int:
+    """The highest of the blades in the balance."""
+    asked = scene.balance.harmonics
+    if asked == "adaptive":
+        return max(HARMONICS, scene.excitation.highest_harmonic)
+    return int(asked)
+
+
+def balance_seconds(scene: ForcedScene, dofs: float) -> float:
+    """Seconds of all curves by the balance.
+
+    Parameters
+    ----------
+    scene
+        With whole faces.
+    dofs
+        Of the contact.
+    """
+    b, e = scene.balance, scene.excitation
+    if b.method == "march" or scene.contact.friction == 0.0:
+        return 0.0
+    samples = SAMPLES if b.samples == "auto" else int(b.samples)
+    rows = _MOVING * dofs
+    evaluations = _ITERATIONS * len(e.centrifugal_to_force) * samples
+    return evaluations * _MOVED_S * rows + dense_s(evaluations * 2.0 * rows**2 * dofs)
+
+
+def harmonics_effect(scene: ForcedScene) -> Effect:
+    """Harmonics of the blades."""
+    b = scene.balance
+    if b.method == "march":
+        return Effect("harmonics", True, "all of them: a time march")
+    return Effect(
+        "harmonics",
+        True,
+        f"0 to {blade_harmonics(scene)} of the blades; contact and damper in time",
+        "truncation",
+    )

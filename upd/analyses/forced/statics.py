@@ -164,11 +164,11 @@ def admissible(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> list[StaticS
     return out
 
 
-def same(a: StaticState, b: StaticState, F: float, within: float = BALANCE) -> bool:
-    """Whether two states have the same forces, to a share of F_C: that to which the balance is
-    checked, or another.
+def same(a: StaticState, b: StaticState, F: float) -> bool:
+    """Whether two states have the same forces, to the share of F_C to which the balance is
+    checked.
     """
-    return bool(np.abs(np.concatenate([a.N - b.N, a.T - b.T])).max() <= within * F)
+    return bool(np.abs(np.concatenate([a.N - b.N, a.T - b.T])).max() <= BALANCE * F)
 
 
 def imbalance(frames: Array, F: float, N: Array, T: Array) -> float:
