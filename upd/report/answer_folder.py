@@ -1,4 +1,4 @@
-"""Answers of one figure and a few numbers: their folder, and what a notebook shows."""
+"""Answers of one figure and a few tables: their text, their folder, and what a notebook shows."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from upd.errors import InputError, one_line
 from upd.plot.chart import Chart
 from upd.plot.matplotlib import chart_png, write_sheet
 from upd.plot.png import png_uri
+from upd.report.columns import whole_table
+from upd.results.answer_table import AnswerTable
 
 #: characters of a line of an answer: a terminal of 80 columns shows it whole
 WIDTH = 79
@@ -59,8 +61,8 @@ def write_answer(
         with whole_files(folder) as stage:
             text = json.dumps(numbers, indent=1, allow_nan=False) + "\n"
             (stage / f"{name}.json").write_text(text, encoding="utf-8")
-            for file, told in (texts or {}).items():
-                (stage / file).write_text(told, encoding="utf-8")
+            for file, content in (texts or {}).items():
+                (stage / file).write_text(content, encoding="utf-8")
             write_sheet(charts, stage / f"{name}.png")
     except OSError as error:
         raise InputError(
@@ -91,7 +93,7 @@ def wrapped(text: str, indent: str = "  ") -> list[str]:
 
 @dataclass(frozen=True, repr=False)
 class FigureAnswer(ABC):
-    """An answer in words, one figure and a few numbers.
+    """A verdict, a few tables and notes, and one figure.
 
     Attributes
     ----------
@@ -120,9 +122,15 @@ class FigureAnswer(ABC):
     def as_dict(self) -> dict[str, Any]:
         """All numbers with their units, as JSON takes them; what is not known is null."""
 
+    @property
     @abstractmethod
-    def told(self) -> Sequence[str]:
-        """The lines of the answer in words."""
+    def tables(self) -> tuple[AnswerTable, ...]:
+        """Its main numbers, the most important table first; empty ones are not shown."""
+
+    @property
+    @abstractmethod
+    def notes(self) -> tuple[str, ...]:
+        """What a reader has to know beside the tables, a sentence each."""
 
     def texts(self, numbers: Mapping[str, Any], charts: Sequence[Chart]) -> dict[str, str]:
         """Name of a further file -> its text.
@@ -153,7 +161,13 @@ class FigureAnswer(ABC):
         return replace(self, folder=folder)
 
     def __str__(self) -> str:
-        return "\n".join(self.told())
+        lines = wrapped(self.verdict, "")
+        for table in self.tables:
+            if table.rows:
+                rows = [f"  {line}" for line in whole_table(table, WIDTH - 2)]
+                lines += ["", f"{table.heading}:", *rows, *wrapped(table.note)]
+        lines += [""] * bool(self.notes)
+        return "\n".join([*lines, *(line for note in self.notes for line in wrapped(note, ""))])
 
     def __repr__(self) -> str:
         return str(self)
