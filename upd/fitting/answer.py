@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -223,7 +223,7 @@ def fit(
         found,
         value[:m],
         slope[:m],
-        known,
+        replace(known, rises=spread.rises),
         spread.profiles,
         spread.curves,
         further,
@@ -232,8 +232,6 @@ def fit(
         tuple(responses.exact),
         responses.evaluations,
         time.perf_counter() - begin,
-        responses.source.cost,
-        spread.rises,
     )
     if out is not None:
         result = result.write(out)

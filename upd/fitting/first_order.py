@@ -49,6 +49,9 @@ class Knowledge:
     error : ndarray, optional
         (n,) half-widths of ln(factor), or what ln(factor) moves as every target is known to its own
         size alone; None where directions are unknown.
+    rises : ndarray, optional
+        (n, 2) how far the misfit rises to the ends of the intervals, 1 where it is quadratic; None
+        where there are none, or all profiles were traced.
     """
 
     singular: Array
@@ -56,6 +59,7 @@ class Knowledge:
     unknown: NDArray[np.bool_]
     correlation: Array | None
     error: Array | None
+    rises: Array | None = None
 
 
 def misfit_rises(

@@ -93,8 +93,8 @@ def plain_numbers(found: FittedInputs) -> dict[str, Any]:
             for one in found.profiles
         ],
         "misfit_rises_at_first_order_ends": None
-        if found.rises is None
-        else [[_finite(rise) for rise in row] for row in found.rises.tolist()],
+        if known.rises is None
+        else [[_finite(rise) for rise in row] for row in known.rises.tolist()],
         "further_measurements": [asdict(one) for one in found.further],
         "starts": [
             {

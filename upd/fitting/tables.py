@@ -185,7 +185,7 @@ def notes(found: FittedInputs) -> tuple[str, ...]:
     bent = [
         name
         for k, name in enumerate(names)
-        if found.rises is not None and not found.is_traced(k) and is_bent(found.rises[k], TOLD)
+        if known.rises is not None and not found.is_traced(k) and is_bent(known.rises[k], TOLD)
     ]
     if bent:
         out.append(
@@ -201,10 +201,9 @@ def notes(found: FittedInputs) -> tuple[str, ...]:
     ]
     ended = sum(math.isfinite(one.misfit) for one in found.starts)
     slopes = "exact" if all(found.exact) else "partly" * any(found.exact) + " by differences"
-    cost = f" ({found.cost})" if found.cost else ""
     out.append(
         f"{ended} of {len(found.starts)} starts ended; {found.evaluations} models in "
-        f"{found.seconds:.1f} s{cost}; derivatives {slopes.strip()}."
+        f"{found.seconds:.1f} s; derivatives {slopes.strip()}."
     )
     return tuple(out)
 

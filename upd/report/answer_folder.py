@@ -23,54 +23,6 @@ from upd.results.answer_table import AnswerTable
 WIDTH = 79
 
 
-def write_answer(
-    out: str | Path,
-    name: str,
-    numbers: Mapping[str, Any],
-    charts: Sequence[Chart],
-    texts: Mapping[str, str] | None = None,
-) -> Path:
-    """Write NAME.json, NAME.png and other texts into a folder, all of them or none.
-
-    Parameters
-    ----------
-    out
-        The folder, made where there is none.
-    name
-        Of the figure and of the numbers.
-    numbers
-        As JSON takes them.
-    charts
-        Of the figure.
-    texts
-        Name of a file -> its text.
-
-    Returns
-    -------
-    Path
-        The folder.
-
-    Raises
-    ------
-    InputError
-        When it cannot be written.
-    """
-    folder = Path(out)
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with whole_files(folder) as stage:
-            text = json.dumps(numbers, indent=1, allow_nan=False) + "\n"
-            (stage / f"{name}.json").write_text(text, encoding="utf-8")
-            for file, content in (texts or {}).items():
-                (stage / file).write_text(content, encoding="utf-8")
-            write_sheet(charts, stage / f"{name}.png")
-    except OSError as error:
-        raise InputError(
-            f"{folder}: cannot be written ({one_line(error)}); choose another with --out"
-        ) from None
-    return folder
-
-
 def wrapped(text: str, indent: str = "  ") -> list[str]:
     """A sentence as a terminal shows it, its further lines indented by two more.
 
@@ -144,7 +96,8 @@ class FigureAnswer(ABC):
         return {}
 
     def write(self, out: str | Path) -> Self:
-        """Write the numbers, the figure and further files into a folder; the same with it.
+        """Write the numbers, the figure and further files into a folder, all of them or none; the
+        same with it.
 
         Parameters
         ----------
@@ -156,8 +109,19 @@ class FigureAnswer(ABC):
         InputError
             When it cannot be written.
         """
-        numbers, charts = self.as_dict(), self.charts
-        folder = write_answer(out, self.figure, numbers, charts, self.texts(numbers, charts))
+        numbers, charts, folder = self.as_dict(), self.charts, Path(out)
+        text = json.dumps(numbers, indent=1, allow_nan=False) + "\n"
+        files = {f"{self.figure}.json": text, **self.texts(numbers, charts)}
+        try:
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            with whole_files(folder) as stage:
+                for file, content in files.items():
+                    (stage / file).write_text(content, encoding="utf-8")
+                write_sheet(charts, stage / f"{self.figure}.png")
+        except OSError as error:
+            raise InputError(
+                f"{folder}: cannot be written ({one_line(error)}); choose another with --out"
+            ) from None
         return replace(self, folder=folder)
 
     def __str__(self) -> str:

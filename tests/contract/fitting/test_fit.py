@@ -163,7 +163,7 @@ def test_an_interval_that_is_not_of_first_order_is_the_profile_s(scene: ForcedSc
     width = 0.3 * height
     found = upd.fit(scene, to.format(height, width), vary, starts=1)
     (one,) = found.profiles
-    assert found.rises is not None and found.known.error is not None
+    assert found.known.rises is not None and found.known.error is not None
     first = found.answers[0][0] + np.array([-1.0, 1.0]) * found.known.error[0]
     off = [
         numbers(scene, "peak_2_accelerance@100", vary, [math.exp(z)])[0] - height
