@@ -19,8 +19,8 @@ from upd.hbm import FrequencyResponse, contacts, frequency_response
 from upd.hbm.curve_peaks import CurvePeaks, PeakPoint, SeenPeak
 from upd.reference.friction import jenkins_peak
 from upd.sizing import LowestWorst, PeaksOverRatio, WorstPeak, least_worst, lowest_worst
+from upd.sizing.margins import STILL_AT, how_far, how_far_force
 from upd.sizing.ratio_curves import AGREES, JUMP_STEP, Deciding
-from upd.sizing.reach import STILL_AT, how_far, how_far_force
 
 #: limit of the slider per unit of "F_C", spring, and F_C/F_E between which peaks are asked for
 MU, K_T = 0.5, 1.3

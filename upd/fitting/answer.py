@@ -19,9 +19,9 @@ from upd.cache.sources import key_of, source_digest
 from upd.errors import InputError, UpdError
 from upd.fitting.charts import FIGURE, fit_charts
 from upd.fitting.first_order import KEPT, Knowledge, is_bent, knowledge, misfit_rises
-from upd.fitting.found import FittedCurve, FittedInputs
-from upd.fitting.further import rank_measurements
+from upd.fitting.fitted_inputs import FittedCurve, FittedInputs
 from upd.fitting.journal import Journal
+from upd.fitting.next_measurement import rank_measurements
 from upd.fitting.numbers import plain_numbers, summary
 from upd.fitting.parameters import VariedInput, fitted_scene, read_parameters
 from upd.fitting.profile import Profile, profile

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from upd.fitting.found import FittedCurve, FittedInputs
+from upd.fitting.fitted_inputs import FittedCurve, FittedInputs
 from upd.fitting.profile import Profile
 from upd.fitting.tables import family_profile
 from upd.plot.chart import Axis, Band, Chart, Trace

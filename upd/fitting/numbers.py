@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from upd.cache.sources import versions
-from upd.fitting.found import FittedCurve, FittedInputs
+from upd.fitting.fitted_inputs import FittedCurve, FittedInputs
 from upd.fitting.tables import interval, on_bound, verdict
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.fitting.first_order import TOLD, is_bent
-from upd.fitting.found import FittedInputs
+from upd.fitting.fitted_inputs import FittedInputs
 from upd.fitting.profile import Profile
 from upd.fitting.weights import CurveNoise
 from upd.results.answer_table import AnswerTable

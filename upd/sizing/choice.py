@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.sizing.least_worst import LowestWorst
+from upd.sizing.margins import Reach
 from upd.sizing.ranges import Ranges
-from upd.sizing.reach import Reach
 from upd.sizing.rig_peaks import RigPeaks
 from upd.sizing.worst_peak import WorstPeak
 

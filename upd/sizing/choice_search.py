@@ -33,9 +33,9 @@ from upd.progress import Listener, Stages
 from upd.scene import ForcedScene
 from upd.sizing.choice import GROWTHS, ChosenDamper, Objective, Reaches, Tried, is_along
 from upd.sizing.least_worst import LowestWorst, has_moved, lowest_worst
+from upd.sizing.margins import Reach, how_far, how_far_force
 from upd.sizing.ranges import FORCE, InputRange, Ranges, with_values
 from upd.sizing.ratio_curves import AGREES, SCAN_STEP
-from upd.sizing.reach import Reach, how_far, how_far_force
 from upd.sizing.rig_peaks import RigPeaks, bare
 from upd.sizing.worst_peak import COMPARED_STEP, WorstPeak
 

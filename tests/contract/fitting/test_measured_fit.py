@@ -23,8 +23,8 @@ from upd.fitting import (
     read_parameters,
     read_targets,
 )
-from upd.fitting.further import rank_measurements
 from upd.fitting.journal import Journal
+from upd.fitting.next_measurement import rank_measurements
 from upd.fitting.parameters import fitted_scene
 from upd.measured import MeasuredCurve
 from upd.scene import ForcedScene, load_scene

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.fitting.first_order import Knowledge
-from upd.fitting.further import FurtherMeasurement
+from upd.fitting.next_measurement import FurtherMeasurement
 from upd.fitting.parameters import VariedInput
 from upd.fitting.profile import Profile
 from upd.fitting.residuals import Start
