@@ -24,14 +24,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+# The benchmarks are no package: what they share is found by its folder.
+sys.path.append(str(Path(__file__).parents[1]))
+from choice_grid import GridCheck, check_by_grid
+
 import upd
 from upd.analyses.forced.paths import path_settings, respond
+from upd.plot.chart import Trace
 from upd.plot.matplotlib import write_sheet
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 from upd.sizing import BestDamper
-from upd.sizing.choice import GROWTHS, GridCheck
-from upd.sizing.choice_grid import check_by_grid
+from upd.sizing.choice import GROWTHS
 from upd.sizing.rig_peaks import CURVE_POINTS, RigPeaks, bare
 
 #: rigs that are reduced in a second
@@ -209,8 +213,10 @@ def main(names: Sequence[str]) -> None:
             print(f"    {value:9.4g} N {height:9.4g}")
         for row in rows(name, found, took, grid):
             print(row, flush=True)
-        with_grid = replace(found, found=replace(found.found, grid=grid))
-        write_sheet(with_grid.charts, Path(__file__).parent / f"choice_{name}.png")
+        points = Trace(f"grid of {len(grid.values)}", grid.values, grid.heights, "points", 7)
+        first, *others = found.charts
+        charts = [replace(first, traces=(*first.traces, points)), *others]
+        write_sheet(charts, Path(__file__).parent / f"choice_{name}.png")
 
 
 if __name__ == "__main__":

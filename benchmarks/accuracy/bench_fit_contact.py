@@ -139,13 +139,9 @@ def coverage(
     inside = np.zeros((3, repeats, len(true)), bool)
     bent = np.zeros((repeats, len(true)), bool)
     half = np.zeros((repeats, len(true)))
-    made.forget()
-    made.at(true)
-    kept = made.memory()
     for i in range(repeats):
         made.targets = with_noise(exact, noise, rng)
         residuals = Residuals(made)
-        made.restore(kept)
         best = settled(residuals, [Start(true, true, np.inf, 0)])[0]
         known = knowledge(residuals, best.end)
         if known.error is None:

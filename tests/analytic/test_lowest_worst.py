@@ -19,8 +19,8 @@ from upd.hbm import FrequencyResponse, contacts, frequency_response
 from upd.hbm.curve_peaks import CurvePeaks, PeakPoint, SeenPeak
 from upd.reference.friction import jenkins_peak
 from upd.sizing import LowestWorst, PeaksOverRatio, WorstPeak, least_worst, lowest_worst
+from upd.sizing.margins import STILL_AT, how_far, how_far_force
 from upd.sizing.ratio_curves import AGREES, JUMP_STEP, Deciding
-from upd.sizing.reach import STILL_AT, how_far, how_far_force
 
 #: limit of the slider per unit of "F_C", spring, and F_C/F_E between which peaks are asked for
 MU, K_T = 0.5, 1.3
@@ -157,8 +157,8 @@ def test_ranges_end_at_a_higher_peak_on_the_way(known_slopes: bool) -> None:
     assert math.log(reach.end) == pytest.approx(7.0 / 3.0 + math.log(1.1), abs=JUMP_STEP)
     # a growth that the jump hides: the highest before it, 1/2, is told to the step of a jump
     c = math.log(reach.end)
-    assert worst.told(c) == pytest.approx(1.0 / 3.0 + math.log(1.1), abs=JUMP_STEP)
-    far = worst.told(4.0)
+    assert worst.solved_worst(c) == pytest.approx(1.0 / 3.0 + math.log(1.1), abs=JUMP_STEP)
+    far = worst.solved_worst(4.0)
     assert far == pytest.approx(max(0.65, 0.5), abs=2e-2)
     # no more whole curves than an even grid as fine as a jump is told has by far
     assert len(found.points) < 40
@@ -273,7 +273,7 @@ def test_what_is_told_is_no_lower_than_whole_curves_in_the_window() -> None:
     for step in (0.6, 0.8, 1.0, 1.3):
         for c in np.linspace(2.9, 3.1, 41):
             peaks = PeaksOverRatio(cast(CurvePeaks, _Jumps(True)), -2.0, 5.0, step=step)
-            told = WorstPeak([peaks], (1.0, math.exp(0.7))).told(c)
+            told = WorstPeak([peaks], (1.0, math.exp(0.7))).solved_worst(c)
             known = [peaks.top(s) for s in peaks.nodes if c - 0.7 <= s <= c]
             assert told >= max(known) - AGREES
 
@@ -312,10 +312,10 @@ def test_a_whole_curve_tells_what_is_beside_it_where_a_neighbour_confirms_its_sl
 def test_neighbours_of_one_branch_tell_a_place_between_and_others_do_not() -> None:
     found: Any = _Smooth()
     smooth = PeaksOverRatio(found, 0.0, 1.0, step=0.2)
-    assert not smooth.tell(0.5, 1e-3)
+    assert not smooth.look_unless_known(0.5, 1e-3)
     found = _Jumps(True)
     jumps = PeaksOverRatio(found, 2.0, 3.0, step=0.25)
-    assert jumps.tell(2.4, 1e-3)
+    assert jumps.look_unless_known(2.4, 1e-3)
 
 
 def test_places_of_new_curves() -> None:

@@ -1,7 +1,7 @@
 """Which inputs: those of a scene that give wanted numbers, and what these leave unknown.
 
 `fit` is what a user calls; `FitResponses` what is aimed at with its derivatives, `Residuals` and
-`knowledge` what is sought and what is told of it.
+`knowledge` the misfit that is least, and what is known of the inputs.
 """
 
 from upd.fitting.answer import Fit, fit

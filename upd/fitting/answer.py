@@ -5,53 +5,56 @@ left unknown.
 from __future__ import annotations
 
 import json
-import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.cache.sources import key_of, source_digest
-from upd.errors import InputError, UpdError, one_line
+from upd.errors import InputError, UpdError
 from upd.fitting.charts import FIGURE, fit_charts
-from upd.fitting.first_order import KEPT, is_bent, knowledge, misfit_rises
-from upd.fitting.found import FittedCurve, FittedInputs
-from upd.fitting.further import rank_measurements
+from upd.fitting.first_order import KEPT, Knowledge, is_bent, knowledge, misfit_rises
+from upd.fitting.fitted_inputs import FittedCurve, FittedInputs
 from upd.fitting.journal import Journal
-from upd.fitting.page import fit_page, fit_summary
+from upd.fitting.next_measurement import rank_measurements
+from upd.fitting.numbers import plain_numbers, summary
 from upd.fitting.parameters import VariedInput, fitted_scene, read_parameters
-from upd.fitting.plain import plain_numbers
 from upd.fitting.profile import Profile, profile
 from upd.fitting.residuals import Residuals
 from upd.fitting.responses import FitResponses
-from upd.fitting.solver import answers, search, settled, status_of
+from upd.fitting.solver import Status, answers, search, settled, status_of
+from upd.fitting.tables import notes, tables, verdict
 from upd.fitting.targets import CurveTarget, Targets, read_targets
 from upd.fitting.weights import as_complex
-from upd.fitting.words import headline, lines
 from upd.measured import MeasuredCurve
 from upd.plot.chart import Chart
 from upd.progress import Listener, Stages, silent
 from upd.report.answer_folder import FigureAnswer
 from upd.report.answer_page import answer_page
+from upd.results.answer_table import AnswerTable
 from upd.scene import AnyScene, ForcedScene
 from upd.scene.forced import FORCED
 from upd.scene.read import as_scene
 from upd.scene.written import scene_as_run
 
-log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 #: starts where evaluations take milliseconds, where something is followed with friction, and where
 #: they make new bodies
 _STARTS, _SOME, _FEW = 8, 4, 2
-#: seconds of an evaluation that are told
-_SLOW_S = 0.2
 #: points of the curves of the targets over each parameter
 _CURVE = 41
+#: word and kind of every way a fit ends
+_OUTCOMES = {
+    "found": ("Found", "passed"),
+    "several": ("Several", "warning"),
+    "family": ("A family", "warning"),
+    "not reached": ("Not reached", "failed"),
+}
 S = TypeVar("S")
 T = TypeVar("T")
 
@@ -67,7 +70,7 @@ class Fit(FigureAnswer, FittedInputs):
     @property
     def verdict(self) -> str:
         """One sentence."""
-        return headline(self)
+        return verdict(self)
 
     def value(self, path: str) -> float:
         """What the first answer has for an input, in the unit inside.
@@ -99,18 +102,25 @@ class Fit(FigureAnswer, FittedInputs):
         """What stands in fit.json: numbers with their units; what is not known is null."""
         return plain_numbers(self)
 
-    def told(self) -> list[str]:
-        """The lines of the answer in words."""
-        return lines(self)
+    @property
+    def tables(self) -> tuple[AnswerTable, ...]:
+        """Inputs with their intervals, targets, and what to measure next."""
+        return tables(self)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the targets leave unknown, and the cost."""
+        return notes(self)
 
     def texts(self, numbers: Mapping[str, Any], charts: Sequence[Chart]) -> dict[str, str]:
         """The scene with the fitted values, the summary and the page."""
         toml = f"# {self.verdict}\n{scene_as_run(self.scene)}"
-        summary = json.dumps(fit_summary(self, numbers), indent=1, allow_nan=False)
+        title = f"Fit: {self.source.title or self.source.name}"
+        written = (toml, "The scene with the fitted values.")
         return {
             f"{self.scene.name}.toml": toml,
-            "summary.json": f"{summary}\n",
-            "report.html": answer_page(fit_page(self, toml), charts),
+            "summary.json": f"{json.dumps(summary(self, numbers), indent=1, allow_nan=False)}\n",
+            "report.html": answer_page(self, charts, title, _OUTCOMES[self.status], written),
         }
 
 
@@ -178,54 +188,31 @@ def fit(
     responses = FitResponses(loaded, targets, parameters, journal)
     residuals = Residuals(responses)
     stages = Stages(progress)
-    if journal.found:
-        progress("fit", f"goes on: {journal.found} evaluations of an earlier call", 0.0)
+    if journal.kept:
+        progress("fit", f"continues from {journal.kept} evaluations of an earlier call", 0.0)
     with stages("blades", "mesh, assembly and reduction"):
-        # a target that is not there is told before anything is sought
-        none = np.zeros(len(parameters))
-        since = time.perf_counter()
-        responses.at(none)
-        slow = _seconds_of(residuals) if responses.cheap else time.perf_counter() - since
+        # a target that is not there is an error before anything is sought
+        responses.at(np.zeros(len(parameters)))
     count = starts or (_FEW if not responses.cheap else _SOME if targets.ratios else _STARTS)
-    if slow > _SLOW_S:
-        why = f"; {responses.source.cost_words}" if responses.source.cost_words else ""
-        progress("fit", f"{slow:.2g} s an evaluation with its derivatives{why}", 0.0)
-    what = f"{targets.count} values, {len(parameters)} parameters, {count} starts"
-    with stages("fit", what):
+    if responses.source.cost:
+        progress("fit", responses.source.cost, 0.0)
 
-        def tell(text: str, seconds: float | None) -> None:
-            progress("fit", f"{text}, {responses.evaluations} models", seconds)
+    def report(text: str, seconds: float | None) -> None:
+        progress("fit", f"{text}, {responses.evaluations} models", seconds)
 
-        done = settled(residuals, search(residuals, count, tell))
+    with stages("fit", f"{targets.count} values, {len(parameters)} parameters, {count} starts"):
+        done = settled(residuals, search(residuals, count, report))
         found = answers(residuals, done)
         best = found[0]
         known = knowledge(residuals, best)
         status = status_of(residuals, known, found)
-    traced: tuple[Profile, ...] = ()
-    curves: tuple[Array, ...] = ()
-    n = len(parameters)
-    spread = (status == "family" or residuals.known) and status != "not reached"
-    if profiles or (profiles is None and responses.cheap and not targets.ratios):
-        with stages("profiles", "sets of parameters that fit as well"):
-            if spread:
-                traced = tuple(profile(residuals, known, best, k) for k in range(n))
-            if targets.numbers:
-                curves = tuple(_curve(residuals, best, k) for k in range(n))
-    rises = None
-    if residuals.known and not traced and known.error is not None:
-        with stages("intervals", "the misfit at their ends"):
-            rises = misfit_rises(residuals, known, best, residuals.low, residuals.high)
-    ranked = traced
-    if rises is not None and profiles is None and responses.cheap:
-        for k in range(n):
-            if is_bent(rises[k], KEPT):
-                # what first order tells is another interval: its end is a step from the profile's
-                with stages("intervals", f"{parameters[k].name}: the profile"):
-                    traced += (profile(residuals, known, best, k, first=1.0),)
+    spread = _spread(residuals, known, best, status, profiles, stages)
     with stages("further measurements", "what each would tell"):
-        further = rank_measurements(loaded, targets, parameters, residuals, best, ranked)
+        # profiles of single inputs do not say how far predictions reach
+        family = spread.profiles if spread.rises is None else ()
+        further = rank_measurements(loaded, targets, parameters, residuals, best, family)
     value, slope = responses.at(best)
-    m, solved = len(targets.numbers), responses.evaluations
+    m = len(targets.numbers)
     result = Fit(
         loaded,
         responses.stiffness,
@@ -236,22 +223,61 @@ def fit(
         found,
         value[:m],
         slope[:m],
-        known,
-        traced,
-        curves,
+        replace(known, rises=spread.rises),
+        spread.profiles,
+        spread.curves,
         further,
         done,
         responses.directions(best),
         tuple(responses.exact),
-        solved,
+        responses.evaluations,
         time.perf_counter() - begin,
-        responses.source.cost_words,
-        rises,
     )
     if out is not None:
         result = result.write(out)
     journal.done()
     return result
+
+
+class _Spread(NamedTuple):
+    """What fits as well as an answer; see `FittedInputs`."""
+
+    profiles: tuple[Profile, ...]
+    curves: tuple[Array, ...]
+    rises: Array | None
+
+
+def _spread(
+    residuals: Residuals,
+    known: Knowledge,
+    best: Array,
+    status: Status,
+    asked: bool | None,
+    stages: Stages,
+) -> _Spread:
+    """Profiles where they are asked for or cheap, and of parameters whose misfit is not quadratic
+    within the interval of first order.
+    """
+    responses = residuals.responses
+    each, targets = range(len(best)), responses.targets
+    profiles: tuple[Profile, ...] = ()
+    curves: tuple[Array, ...] = ()
+    if asked or (asked is None and responses.cheap and not targets.ratios):
+        with stages("profiles", "sets of parameters that fit as well"):
+            if (status == "family" or residuals.known) and status != "not reached":
+                profiles = tuple(profile(residuals, known, best, k) for k in each)
+            if targets.numbers:
+                curves = tuple(_curve(residuals, best, k) for k in each)
+    if not residuals.known or profiles or known.error is None:
+        return _Spread(profiles, curves, None)
+    with stages("intervals", "the misfit at their ends"):
+        rises = misfit_rises(residuals, known, best, residuals.low, residuals.high)
+    if asked is None and responses.cheap:
+        with stages("intervals", "profiles of those that are not of first order"):
+            # the end by first order is one step away
+            bent = [k for k in each if is_bent(rises[k], KEPT)]
+            profiles = tuple(profile(residuals, known, best, k, first=1.0) for k in bent)
+    return _Spread(profiles, curves, rises)
 
 
 def _key(scene: ForcedScene, targets: Targets, parameters: Sequence[VariedInput]) -> str:
@@ -270,18 +296,6 @@ def _key(scene: ForcedScene, targets: Targets, parameters: Sequence[VariedInput]
     )
 
 
-def _seconds_of(residuals: Residuals) -> float:
-    """Of an evaluation beside the scene itself, whose models are made already."""
-    low, high = residuals.low, residuals.high
-    near = np.clip(np.full(len(low), 0.01), low, high)
-    begin = time.perf_counter()
-    try:
-        residuals.responses.at(near)
-    except UpdError as error:
-        log.info("beside the scene: %s", one_line(error))
-    return time.perf_counter() - begin
-
-
 def _fitted_curves(residuals: Residuals, value: Array) -> tuple[FittedCurve, ...]:
     return tuple(
         FittedCurve(one, noise, as_complex(one, value[part]))
@@ -292,16 +306,16 @@ def _fitted_curves(residuals: Residuals, value: Array) -> tuple[FittedCurve, ...
 
 
 def _together(first: Callable[[], S], second: Callable[[], T]) -> tuple[S, T]:
-    """What two readers give; what is wrong with either is told at once."""
-    told: list[str] = []
+    """What two readers give; all errors at once."""
+    problems: list[str] = []
     out: list[Any] = []
     for read in (first, second):
         try:
             out.append(read())
         except InputError as error:
-            told.append(str(error))
-    if told:
-        raise InputError("\n".join(told))
+            problems.append(str(error))
+    if problems:
+        raise InputError("\n".join(problems))
     return out[0], out[1]
 
 
@@ -312,7 +326,7 @@ def _curve(residuals: Residuals, best: Array, k: int) -> Array:
         z = best.copy()
         z[k] = place
         try:
-            numbers = residuals.responses.at(z)[0][: residuals.numbers]
+            numbers = residuals.responses.value(z)[: residuals.numbers]
         except UpdError:
             numbers = np.full(residuals.numbers, np.nan)
         rows.append([place, *numbers])

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from upd.fitting.found import FittedCurve, FittedInputs
+from upd.fitting.fitted_inputs import FittedCurve, FittedInputs
 from upd.fitting.profile import Profile
-from upd.fitting.words import family_profile
+from upd.fitting.tables import family_profile
 from upd.plot.chart import Axis, Band, Chart, Trace
 
 FIGURE = "fit"
@@ -54,7 +54,7 @@ def _over(one: FittedCurve, k: int) -> Chart:
 
 def _axis(found: FittedInputs, k: int) -> Axis:
     one = found.parameters[k]
-    # of one table its name is told once: a second line would lie on the legend
+    # the name of a table stands once: a second line would lie on the legend
     table = one.paths[0].rpartition(".")[0] + "."
     more = (path.removeprefix(table) for path in one.paths[1:])
     return Axis(" + ".join((one.paths[0], *more)), one.unit, log=True)

@@ -1,6 +1,6 @@
 """What the targets of a fit leave unknown, to first order.
 
-J = dr/dz at the answer tells what is known: with the singular values s and right singular vectors w
+J = dr/dz at the answer shows what is known: with the singular values s and right singular vectors w
 of J diag(high - low), a share t of the room along w_i moves the residuals by s_i t. The covariance
 of z is (J'J)^-1, in squared half-widths of the targets.
 
@@ -25,8 +25,8 @@ from upd.fitting.residuals import Residuals
 Array = NDArray[np.float64]
 #: quantile of 95 % intervals
 _T = float(norm.ppf(0.975))
-#: shares of a first-order half-width by which its ends may be off: untold; and such that a 95 %
-#: interval keeps its probability to half of its last digit, 2 t phi(t) share = 0.005
+#: shares of a first-order half-width by which its ends may be off: without a note; and such that
+#: a 95 % interval keeps its probability to half of its last digit, 2 t phi(t) share = 0.005
 TOLD, KEPT = 0.1, 0.005 / (2.0 * _T * float(norm.pdf(_T)))
 
 
@@ -49,6 +49,9 @@ class Knowledge:
     error : ndarray, optional
         (n,) half-widths of ln(factor), or what ln(factor) moves as every target is known to its own
         size alone; None where directions are unknown.
+    rises : ndarray, optional
+        (n, 2) how far the misfit rises to the ends of the intervals, 1 where it is quadratic; None
+        where there are none, or all profiles were traced.
     """
 
     singular: Array
@@ -56,6 +59,7 @@ class Knowledge:
     unknown: NDArray[np.bool_]
     correlation: Array | None
     error: Array | None
+    rises: Array | None = None
 
 
 def misfit_rises(

@@ -1,7 +1,7 @@
 """What a long fit found, kept on disk evaluation by evaluation.
 
-A search goes the same way every time: begun again after it was stopped, it passes over what is
-kept and goes on from there.
+A search takes the same way every time: begun again after it was stopped, it reads what is kept and
+continues from there.
 """
 
 from __future__ import annotations
@@ -30,36 +30,18 @@ class Journal:
 
     def __init__(self, key: str) -> None:
         self.path = cache_folder() / f"fit-{key[:32]}.jsonl"
-        #: evaluations that an earlier call left
-        self.passed = 0
-        #: how often what has friction was followed afresh: the same parameters may then have
-        #: other values
-        self.chapter = 0
         self._known = _read(self.path)
-        self._kept = len(self._known)
-
-    @property
-    def found(self) -> int:
-        """Evaluations that lay there at the beginning."""
-        return self._kept
+        #: evaluations that an earlier call left
+        self.kept = len(self._known)
 
     def find(self, z: Array) -> tuple[Array, Array] | None:
-        """What was found at these parameters."""
-        found = self._known.get((self.chapter, z.tobytes()))
-        self.passed += found is not None
-        return found
+        """The evaluation at these parameters."""
+        return self._known.get(z.tobytes())
 
     def keep(self, z: Array, value: Array, slope: Array) -> None:
         """Add an evaluation; where the disk does not take it, only a line of the log."""
-        self._known[self.chapter, z.tobytes()] = (value, slope)
-        line = json.dumps(
-            {
-                "chapter": self.chapter,
-                "z": z.tolist(),
-                "value": value.tolist(),
-                "slope": slope.tolist(),
-            }
-        )
+        self._known[z.tobytes()] = (value, slope)
+        line = json.dumps([z.tolist(), value.tolist(), slope.tolist()])
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with self.path.open("a", encoding="utf-8") as file:
@@ -75,22 +57,18 @@ class Journal:
             log.warning("%s: not removed (%s)", self.path, problem)
 
 
-def _read(path: Path) -> dict[tuple[int, bytes], tuple[Array, Array]]:
+def _read(path: Path) -> dict[bytes, tuple[Array, Array]]:
     """The evaluations of a file; a last line that was cut short is left out."""
-    out: dict[tuple[int, bytes], tuple[Array, Array]] = {}
+    out: dict[bytes, tuple[Array, Array]] = {}
     try:
-        lines = path.read_text("utf-8").splitlines()
-    except FileNotFoundError:
-        return out
+        lines = path.read_text("utf-8").splitlines() if path.exists() else []
     except (OSError, UnicodeDecodeError) as problem:
         log.warning("%s cannot be read (%s): made again", path, problem)
-        return out
+        lines = []
     for line in lines:
         try:
-            one = json.loads(line)
-            z, value, slope = (np.array(one[name], float) for name in ("z", "value", "slope"))
-            chapter = int(one["chapter"])
-        except (ValueError, KeyError, TypeError):
+            z, value, slope = (np.array(one, float) for one in json.loads(line))
+        except (ValueError, TypeError):
             continue
-        out[chapter, z.tobytes()] = (value, slope.reshape(len(value), len(z)))
+        out[z.tobytes()] = (value, slope.reshape(len(value), len(z)))
     return out

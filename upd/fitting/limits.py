@@ -25,7 +25,7 @@ from upd.analyses.forced.model import Model
 from upd.analyses.forced.paths import balance_of
 from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.errors import ConvergenceError
-from upd.fitting.targets import PEAK_NUMBERS, STUCK_MODES, FitTarget
+from upd.fitting.targets import PEAK_NUMBERS, STUCK_MODES
 from upd.hbm.parameter_change import ParameterChange
 from upd.scene.forced_contact import Side
 
@@ -87,43 +87,6 @@ class LimitNumbers:
             )
         f, change = self._modes[of]
         return f, f * change
-
-
-def limit_numbers(
-    plan: ForcedPlan,
-    model: Model,
-    targets: Sequence[FitTarget],
-    changes: Sequence[ParameterChange],
-    *,
-    needed: bool = True,
-) -> tuple[Array, Array]:
-    """The numbers (m,) and what the changes do to them (m, n).
-
-    Parameters
-    ----------
-    plan, model, changes
-        As of `LimitNumbers`.
-    targets
-        Which numbers.
-    needed
-        Whether each has to be there; else those that are not are nan.
-
-    Raises
-    ------
-    ConvergenceError
-        Where a target that is needed is not among the numbers.
-    """
-    read = LimitNumbers(plan, model, changes)
-    found: list[tuple[float, Array]] = []
-    for one in targets:
-        try:
-            found.append(read(one.of))
-        except ConvergenceError:
-            if needed:
-                raise
-            found.append((np.nan, np.full(len(changes), np.nan)))
-    slope = np.array([s for _, s in found]).reshape(len(found), len(changes))
-    return np.array([v for v, _ in found]), slope
 
 
 def limit_curve(

@@ -116,10 +116,10 @@ class ModelSource:
         self.exact = [is_known(self._ends(none, k)) for k in range(len(self.parameters))]
         paths = [path for one in parameters for path in one.paths]
         seated = bool(ratios) and scene.contact.loaded and scene.contact.static == _SEATED
-        #: whether every evaluation re-uses the same reduced blades
-        self.cheap = all(
-            p.startswith(_CHEAP) and not (seated and p == "contact.friction") for p in paths
-        )
+        #: inputs that make new blades, or a new static state, with every evaluation
+        self.dear = [
+            p for p in paths if not p.startswith(_CHEAP) or (seated and p == "contact.friction")
+        ]
         contact = scene.stiffness[self.stiffness].scene
         self._contact = contact if any(p.startswith("geometry.") for p in paths) else None
         #: of central differences of every parameter
@@ -131,21 +131,15 @@ class ModelSource:
         ]
 
     @property
-    def cost_words(self) -> str:
-        """Which inputs make an evaluation dear, and why; "" where none does."""
-        new = [p for one in self.parameters for p in one.paths if not p.startswith(_CHEAP)]
-        seated = bool(self.ratios) and self.scene.contact.static == _SEATED
-        rubbed = any("contact.friction" in one.paths for one in self.parameters)
-        told = []
-        if new:
-            contact = " and the contact analysis again" if self._contact else ""
-            told.append(f"{', '.join(new)}: every value makes new blades{contact}")
-        differ = [one.name for one, e in zip(self.parameters, self.exact, strict=True) if not e]
-        if differ:
-            told.append(f"{', '.join(differ)}: derivatives by differences, two models more each")
-        if seated and rubbed:
-            told.append('contact.friction: every value is seated again (contact.static = "seated")')
-        return "; ".join(told)
+    def cheap(self) -> bool:
+        """Whether every evaluation re-uses the same reduced blades."""
+        return not self.dear
+
+    @property
+    def cost(self) -> str:
+        """Which inputs make an evaluation slow; "" where none does."""
+        why = "every value makes new blades or a new static state"
+        return f"{', '.join(self.dear)}: {why}" if self.dear else ""
 
     def at(self, z: Array, *, changes: bool = False) -> FittedModel:
         """The model with moved inputs.

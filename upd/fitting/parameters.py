@@ -150,9 +150,8 @@ def _check_ends(scene: ForcedScene, one: VariedInput, *, own: bool) -> None:
             read(scene, [one], np.log([factor]))
         except InputError as error:
             shown = quantity_text(factor * one.values[0], one.kind)
-            told = one_line(error)
             raise InputError(
-                f"the scene refuses {shown} ({told}); to fix it: give "
+                f"the scene refuses {shown} ({one_line(error)}); to fix it: give "
                 f"{'other' if own else 'your own'} bounds, {one.paths[0]}=low:high"
             ) from None
 
@@ -205,7 +204,7 @@ def fitted_scene(
     scene: ForcedScene, parameters: Sequence[VariedInput], z: Array, **more: Any
 ) -> ForcedScene:
     """The scene read again from its text with parameters moved; inputs that are not keep what the
-    scene says of how well it knows them.
+    scene knows of their limits.
 
     Parameters
     ----------

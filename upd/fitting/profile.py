@@ -139,7 +139,7 @@ def _closed_in(
     """Sets that fit as well, ever nearer to the end of a profile, with their rises.
 
     The root of the rise is proportional to the distance where the misfit is quadratic: its chord
-    tells where it is 1; where the outer set has none, the middle does.
+    leads to where it is 1; where the outer set has none, the middle does.
 
     Parameters
     ----------

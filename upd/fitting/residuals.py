@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
-from upd.errors import UpdError, one_line
+from upd.errors import ConvergenceError, UpdError, one_line
 from upd.fitting.responses import FitResponses
 from upd.fitting.weights import as_complex, first_noise, magnitude_of, noise_after
 
@@ -195,14 +195,19 @@ class Residuals:
             return z
 
         def residual(part: Array) -> Array:
-            return self(whole(part))
+            try:
+                return self(whole(part))
+            except ConvergenceError:
+                # the method takes a shorter step
+                return np.full(len(first), np.inf)
 
         def slope(part: Array) -> Array:
             return self.jacobian(whole(part))[:, free]
 
         try:
+            first = self(begin)
             if not free.size:
-                return Start(begin, begin, float((self(begin) ** 2).sum()), 1)
+                return Start(begin, begin, float((first**2).sum()), 1)
             # with noise the misfit stays, and the last digits of z change nothing that is known
             small = self.rounding if not self.parts else max(self.rounding, FLAT)
             found = least_squares(

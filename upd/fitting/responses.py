@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.forced.input_uncertainty import DataChange
-from upd.fitting.followed import FollowedCurve, FollowedMemory, PeakKey, PeakWithChanges
+from upd.errors import ConvergenceError
+from upd.fitting.friction import CurveWithFriction, PeakKey, PeakWithChanges
 from upd.fitting.journal import Journal
-from upd.fitting.limits import limit_curve, limit_numbers
+from upd.fitting.limits import LimitNumbers, limit_curve
 from upd.fitting.models import STEP, FittedModel, ModelSource
 from upd.fitting.parameters import VariedInput
 from upd.fitting.targets import (
@@ -71,7 +72,7 @@ class FitResponses:
         self.stiffness = self.source.stiffness
         self._journal, self._needed = journal, needed
         self._kept: tuple[bytes, Array, Array] | None = None
-        self._followed = [_followed(ratio, targets, self.exact, needed) for ratio in targets.ratios]
+        self._friction = [_curve_at(ratio, targets) for ratio in targets.ratios]
 
     @property
     def evaluations(self) -> int:
@@ -80,8 +81,8 @@ class FitResponses:
 
     @property
     def curves(self) -> int:
-        """Curves with friction that were followed over all frequencies."""
-        return sum(one.curves for one in self._followed)
+        """Curves with friction that were solved."""
+        return sum(one.solved for one in self._friction)
 
     def at(self, z: Array) -> tuple[Array, Array]:
         """The numbers, then the points of the curves, and their derivatives.
@@ -115,38 +116,10 @@ class FitResponses:
         self._kept = (key, *found)
         return found
 
-    def forget(self) -> None:
-        """Follow what has friction afresh: over the whole curve, on the branch that comes from its
-        lowest frequency.
-        """
-        if not self._followed:
-            return
-        self._kept = None
-        if self._journal is not None:
-            self._journal.chapter += 1
-        for one in self._followed:
-            one.forget()
-
-    def memory(self) -> list[FollowedMemory]:
-        """From where what has friction is followed next."""
-        return [one.memory() for one in self._followed]
-
-    def restore(self, memory: Sequence[FollowedMemory]) -> None:
-        """Follow what has friction from there again.
-
-        Parameters
-        ----------
-        memory
-            Of an earlier `memory`.
-        """
-        self._kept = None
-        for one, kept in zip(self._followed, memory, strict=True):
-            one.restore(kept)
-
     def value(self, z: Array) -> Array:
         """(m,) without derivatives."""
         z = np.asarray(z, float)
-        return self._evaluate(z, self.source.at(z), keep=True)[0]
+        return self._evaluate(z, self.source.at(z))[0]
 
     def directions(self, z: Array) -> str:
         """As `ModelSource.directions`."""
@@ -155,7 +128,7 @@ class FitResponses:
     def _solved(self, z: Array) -> tuple[Array, Array]:
         made = self.source.at(z, changes=True)
         known = [k for k, exact in enumerate(self.exact) if exact]
-        value, some = self._evaluate(z, made, keep=True)
+        value, some = self._evaluate(z, made)
         slope = np.zeros((len(value), len(self.parameters)))
         # of half an interval of STEP each way
         slope[:, known] = some / np.sinh(STEP)
@@ -168,46 +141,43 @@ class FitResponses:
     def _shifted(self, z: Array, k: int, shift: float) -> Array:
         moved = z.copy()
         moved[k] += shift
-        return self._evaluate(moved, self.source.at(moved), keep=False)[0]
+        return self.value(moved)
 
-    def _evaluate(self, z: Array, made: FittedModel, *, keep: bool) -> tuple[Array, Array]:
+    def _evaluate(self, z: Array, made: FittedModel) -> tuple[Array, Array]:
         """Values, and what the changes do to them."""
         plan, model, data = made.plan, made.model, made.changes
         changes = [one.whole(model) for one in data]
+        parts: list[tuple[Array, Array]] = []
         with threads_for(len(model.M)):
-            of_ratio = {
-                one.ratio: one.at(z, plan, model, data, keep=keep) for one in self._followed
-            }
-            linear = [one for one in self.targets.numbers if _is_limit(one)]
-            limits = limit_numbers(plan, model, linear, changes, needed=self._needed)
-            numbers = iter(zip(*limits, strict=True))
-            value: list[Array] = []
-            slope: list[Array] = []
+            friction = {one.ratio: one.at(plan, model, data) for one in self._friction}
+            limits = LimitNumbers(plan, model, changes)
             for one in self.targets.numbers:
-                if _is_limit(one):
-                    v, s = next(numbers)
-                elif one.of in CONTACT_TOTALS:
-                    v, s = self._total(z, one, data)
-                else:
-                    assert one.ratio is not None
-                    v, s = _peak_number(one, of_ratio[one.ratio][0], len(changes))
-                value.append(np.array([v]))
-                slope.append(np.asarray(s)[None, :])
+                try:
+                    if one.of in CONTACT_TOTALS:
+                        v, s = self._total(z, one, data)
+                    elif one.ratio is None:
+                        v, s = limits(one.of)
+                    else:
+                        v, s = _peak_number(one, friction[one.ratio][0])
+                except ConvergenceError:
+                    if self._needed:
+                        raise
+                    v, s = np.nan, np.full(len(changes), np.nan)
+                parts.append((np.array([v]), np.asarray(s)[None, :]))
             for curve in self.targets.curves:
                 of = curve.curve
                 if of.force_ratio is None:
                     H, dH = limit_curve(model, of.blade, of.state == "stuck", of.frequency, changes)
                 else:
-                    H, dH = of_ratio[of.force_ratio][1][of.blade]
+                    H, dH = friction[of.force_ratio][1][of.blade]
                     at = np.searchsorted(self._frequencies(of.force_ratio), of.frequency)
                     H, dH = H[at], dH[at]
-                v, s = _in_parts(curve, H, dH)
-                value.append(v)
-                slope.append(s)
+                parts.append(_in_parts(curve, H, dH))
+        value, slope = zip(*parts, strict=True)
         return np.concatenate(value), np.concatenate(slope)
 
     def _frequencies(self, ratio: float) -> Array:
-        return next(one.frequencies for one in self._followed if one.ratio == ratio)
+        return next(one.frequencies for one in self._friction if one.ratio == ratio)
 
     def _total(self, z: Array, one: FitTarget, data: Sequence[DataChange]) -> tuple[float, Array]:
         """A total of the right face, and its changes by known parameters."""
@@ -225,11 +195,7 @@ class FitResponses:
         return total(z), np.array(change)
 
 
-def _is_limit(one: FitTarget) -> bool:
-    return one.ratio is None and one.of not in CONTACT_TOTALS
-
-
-def _followed(ratio: float, targets: Targets, exact: Sequence[bool], needed: bool) -> FollowedCurve:
+def _curve_at(ratio: float, targets: Targets) -> CurveWithFriction:
     """What targets need of one F_C/F_E."""
     peaks: dict[PeakKey, None] = {}
     for one in targets.numbers:
@@ -238,16 +204,16 @@ def _followed(ratio: float, targets: Targets, exact: Sequence[bool], needed: boo
             peaks[side, number] = None
     over = [one.curve.frequency for one in targets.curves if one.curve.force_ratio == ratio]
     frequencies = np.unique(np.concatenate(over)) if over else np.zeros(0)
-    return FollowedCurve(ratio, list(peaks), frequencies, exact, needed=needed)
+    return CurveWithFriction(ratio, list(peaks), frequencies)
 
 
 def _peak_number(
-    one: FitTarget, peaks: Mapping[PeakKey, PeakWithChanges], n: int
+    one: FitTarget, peaks: Mapping[PeakKey, PeakWithChanges | ConvergenceError]
 ) -> tuple[float, Array]:
     _, side, number, what = PEAK_NUMBERS[one.of]
-    peak = peaks.get((side, number))
-    if peak is None:
-        return np.nan, np.full(n, np.nan)
+    peak = peaks[side, number]
+    if isinstance(peak, ConvergenceError):
+        raise peak
     if what == "frequency":
         return peak.frequency, peak.by_frequency
     return peak.height, peak.by_height

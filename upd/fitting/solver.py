@@ -20,10 +20,8 @@ Array = NDArray[np.float64]
 Status = Literal["found", "several", "family", "not reached"]
 #: rounds in which the weights of curves are renewed, and change of a weight below which they end
 _ROUNDS, _SETTLED = 12, 1e-3
-#: times that curves with friction are followed afresh at the end of a start at most
-_BRANCHES = 4
-#: seconds of a start that is told when it ends
-_TOLD_S = 2.0
+#: seconds of a start that is reported when it ends
+_LONG_S = 2.0
 #: two ends of starts nearer than this in every ln(factor) are one answer
 _SAME = 1e-3
 
@@ -53,7 +51,7 @@ def search(
         since = time.perf_counter()
         done.append(_from(residuals, begin))
         took = time.perf_counter() - since
-        if took > _TOLD_S:
+        if took > _LONG_S:
             end = done[-1].failure or f"misfit {done[-1].misfit:.3g}"
             tell(f"start {k} of {count}: {end}", took)
     if not np.isfinite([one.misfit for one in done]).any():
@@ -65,7 +63,6 @@ def _from(residuals: Residuals, begin: Array) -> Start:
     """One start: of curves their magnitudes first, as logarithms, then as they are."""
     if not residuals.parts:
         return residuals.solve(begin)
-    residuals.responses.forget()
     residuals.coarse = True
     try:
         near = residuals.solve(begin)
@@ -73,19 +70,8 @@ def _from(residuals: Residuals, begin: Array) -> Start:
         residuals.coarse = False
     if near.failure:
         return near
-    found, count = near, near.evaluations
-    for _ in range(_BRANCHES):
-        # curves with friction may have been followed onto another of their branches
-        residuals.responses.forget()
-        again = residuals.solve(residuals.inside(found.end))
-        count += again.evaluations
-        nearer = found is near or again.misfit < (1.0 - _SETTLED) * found.misfit
-        found = again if nearer and not again.failure else found
-        if not nearer or again.failure or not residuals.responses.targets.ratios:
-            break
-    if found is near:
-        return replace(again, begin=begin, evaluations=count)
-    return replace(found, begin=begin, evaluations=count)
+    found = residuals.solve(residuals.inside(near.end))
+    return replace(found, begin=begin, evaluations=near.evaluations + found.evaluations)
 
 
 def settled(residuals: Residuals, done: list[Start]) -> list[Start]:
@@ -139,8 +125,8 @@ def answers(residuals: Residuals, done: Sequence[Start]) -> list[Array]:
 
     def apart(a: Array, b: Array) -> bool:
         """Whether two ends differ, and by more than is known."""
-        told = J is None or float(((J @ (a - b)) ** 2).sum()) > 1.0
-        return bool(np.abs(a - b).max() > _SAME) and told
+        known = J is None or float(((J @ (a - b)) ** 2).sum()) > 1.0
+        return bool(np.abs(a - b).max() > _SAME) and known
 
     more = 1.0 if residuals.known else max(residuals.rounding**2, ROUNDING * best)
     out: list[Array] = []

@@ -226,8 +226,8 @@ def _number(name: str, text: str) -> FitTarget:
         )
     friction = of in PEAK_NUMBERS and not PEAK_NUMBERS[of][0]
     if friction != bool(at):
-        told = f"{of}@194" if friction else of
-        raise InputError(f"{'needs its' if friction else 'has no'} F_C/F_E; write {told}")
+        right = f"{of}@194" if friction else of
+        raise InputError(f"{'needs its' if friction else 'has no'} F_C/F_E; write {right}")
     kind = "frequency" if of in STUCK_MODES else "stiffness"
     if of in PEAK_NUMBERS:
         kind = _OF_PEAK[PEAK_NUMBERS[of][3]]

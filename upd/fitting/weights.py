@@ -4,7 +4,7 @@ leaves.
 With residuals r of N values and p inputs, the noise sigma^2 = (a |H|)^2 + b^2 follows by
 `upd.measured.noise` and the half-width is t sigma, t of Student's distribution with N - p degrees
 of freedom at 95 %. It holds for independent errors: what the curve has and the model has not makes
-neighbouring residuals alike, and `CurveNoise.correlation` tells.
+neighbouring residuals alike, and `CurveNoise.correlation` shows it.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class CurveNoise:
     rms
         Of the residuals, over the half-widths.
     rounding
-        Whether no more is left than what the model itself is off.
+        Whether the residuals are no more than what the model itself is off.
     """
 
     relative: float

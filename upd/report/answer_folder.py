@@ -1,4 +1,4 @@
-"""Answers of one figure and a few numbers: their folder, and what a notebook shows."""
+"""Answers of one figure and a few tables: their text, their folder, and what a notebook shows."""
 
 from __future__ import annotations
 
@@ -16,57 +16,11 @@ from upd.errors import InputError, one_line
 from upd.plot.chart import Chart
 from upd.plot.matplotlib import chart_png, write_sheet
 from upd.plot.png import png_uri
+from upd.report.columns import whole_table
+from upd.results.answer_table import AnswerTable
 
 #: characters of a line of an answer: a terminal of 80 columns shows it whole
 WIDTH = 79
-
-
-def write_answer(
-    out: str | Path,
-    name: str,
-    numbers: Mapping[str, Any],
-    charts: Sequence[Chart],
-    texts: Mapping[str, str] | None = None,
-) -> Path:
-    """Write NAME.json, NAME.png and other texts into a folder, all of them or none.
-
-    Parameters
-    ----------
-    out
-        The folder, made where there is none.
-    name
-        Of the figure and of the numbers.
-    numbers
-        As JSON takes them.
-    charts
-        Of the figure.
-    texts
-        Name of a file -> its text.
-
-    Returns
-    -------
-    Path
-        The folder.
-
-    Raises
-    ------
-    InputError
-        When it cannot be written.
-    """
-    folder = Path(out)
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with whole_files(folder) as stage:
-            text = json.dumps(numbers, indent=1, allow_nan=False) + "\n"
-            (stage / f"{name}.json").write_text(text, encoding="utf-8")
-            for file, told in (texts or {}).items():
-                (stage / file).write_text(told, encoding="utf-8")
-            write_sheet(charts, stage / f"{name}.png")
-    except OSError as error:
-        raise InputError(
-            f"{folder}: cannot be written ({one_line(error)}); choose another with --out"
-        ) from None
-    return folder
 
 
 def wrapped(text: str, indent: str = "  ") -> list[str]:
@@ -91,7 +45,7 @@ def wrapped(text: str, indent: str = "  ") -> list[str]:
 
 @dataclass(frozen=True, repr=False)
 class FigureAnswer(ABC):
-    """An answer in words, one figure and a few numbers.
+    """A verdict, a few tables and notes, and one figure.
 
     Attributes
     ----------
@@ -120,9 +74,15 @@ class FigureAnswer(ABC):
     def as_dict(self) -> dict[str, Any]:
         """All numbers with their units, as JSON takes them; what is not known is null."""
 
+    @property
     @abstractmethod
-    def told(self) -> Sequence[str]:
-        """The lines of the answer in words."""
+    def tables(self) -> tuple[AnswerTable, ...]:
+        """Its main numbers, the most important table first; empty ones are not shown."""
+
+    @property
+    @abstractmethod
+    def notes(self) -> tuple[str, ...]:
+        """What a reader has to know beside the tables, a sentence each."""
 
     def texts(self, numbers: Mapping[str, Any], charts: Sequence[Chart]) -> dict[str, str]:
         """Name of a further file -> its text.
@@ -136,7 +96,8 @@ class FigureAnswer(ABC):
         return {}
 
     def write(self, out: str | Path) -> Self:
-        """Write the numbers, the figure and further files into a folder; the same with it.
+        """Write the numbers, the figure and further files into a folder, all of them or none; the
+        same with it.
 
         Parameters
         ----------
@@ -148,12 +109,29 @@ class FigureAnswer(ABC):
         InputError
             When it cannot be written.
         """
-        numbers, charts = self.as_dict(), self.charts
-        folder = write_answer(out, self.figure, numbers, charts, self.texts(numbers, charts))
+        numbers, charts, folder = self.as_dict(), self.charts, Path(out)
+        text = json.dumps(numbers, indent=1, allow_nan=False) + "\n"
+        files = {f"{self.figure}.json": text, **self.texts(numbers, charts)}
+        try:
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            with whole_files(folder) as stage:
+                for file, content in files.items():
+                    (stage / file).write_text(content, encoding="utf-8")
+                write_sheet(charts, stage / f"{self.figure}.png")
+        except OSError as error:
+            raise InputError(
+                f"{folder}: cannot be written ({one_line(error)}); choose another with --out"
+            ) from None
         return replace(self, folder=folder)
 
     def __str__(self) -> str:
-        return "\n".join(self.told())
+        lines = wrapped(self.verdict, "")
+        for table in self.tables:
+            if table.rows:
+                rows = [f"  {line}" for line in whole_table(table, WIDTH - 2)]
+                lines += ["", f"{table.heading}:", *rows, *wrapped(table.note)]
+        lines += [""] * bool(self.notes)
+        return "\n".join([*lines, *(line for note in self.notes for line in wrapped(note, ""))])
 
     def __repr__(self) -> str:
         return str(self)

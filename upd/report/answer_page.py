@@ -3,58 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from upd.cache.sources import versions
 from upd.plot.chart import Chart
+from upd.report.answer_folder import FigureAnswer
 from upd.report.page import render
 from upd.report.panels import make_panels
-from upd.results.answer_table import AnswerTable
 
 
-@dataclass(frozen=True)
-class AnswerPage:
-    """What stands on a page.
-
-    Attributes
-    ----------
-    title : str
-    kind : {"passed", "warning", "failed"}
-        Of the verdict.
-    word, says : str
-        The verdict: its word and a sentence.
-    tables : tuple of AnswerTable
-    notes : tuple of str
-        Sentences below the tables.
-    figures : str
-        Heading of the charts.
-    text : str
-        The scene file.
-    text_says : str
-        What that is.
-    """
-
-    title: str
-    kind: str
-    word: str
-    says: str
-    tables: tuple[AnswerTable, ...]
-    notes: tuple[str, ...]
-    figures: str
-    text: str
-    text_says: str = "The scene with the fitted values."
-
-
-def answer_page(page: AnswerPage, charts: Sequence[Chart]) -> str:
+def answer_page(
+    answer: FigureAnswer,
+    charts: Sequence[Chart],
+    title: str,
+    outcome: tuple[str, str],
+    scene: tuple[str, str],
+) -> str:
     """The page as HTML that needs nothing beside it.
 
     Parameters
     ----------
-    page
-        What stands on it.
+    answer
+        Verdict, tables and notes.
     charts
         Of its figures.
+    title
+        Of the page.
+    outcome
+        The word of the verdict and its kind: passed, warning or failed.
+    scene
+        A scene file, and a sentence of what it is.
     """
+    word, kind = outcome
+    text, text_is = scene
+    page: Mapping[str, object] = {
+        "title": title,
+        "word": word,
+        "kind": kind,
+        "says": f"{answer.verdict}.",
+        "tables": answer.tables,
+        "notes": answer.notes,
+        "text": text,
+        "text_is": text_is,
+    }
     panels = make_panels(charts, {})
-    context: Mapping[str, object] = {"page": page, "title": page.title, "versions": versions()}
+    context: Mapping[str, object] = {"page": page, "title": title, "versions": versions()}
     return render("answer.html.j2", panels, [], context)

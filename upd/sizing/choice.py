@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.sizing.least_worst import LowestWorst
+from upd.sizing.margins import Reach
 from upd.sizing.ranges import Ranges
-from upd.sizing.reach import Reach
 from upd.sizing.rig_peaks import RigPeaks
 from upd.sizing.worst_peak import WorstPeak
 
@@ -87,38 +87,6 @@ class Reaches:
 
 
 @dataclass(frozen=True)
-class GridCheck:
-    """Worst peaks by a grid of runs.
-
-    Attributes
-    ----------
-    path : str
-        What is varied.
-    values, heights : (n,) ndarray
-        In the unit inside; worst peak, nan of points that failed or lack one.
-    seconds, processor_seconds : float
-        Of the grid; 0 of points kept of earlier calls.
-    """
-
-    path: str
-    values: Array
-    heights: Array
-    seconds: float
-    processor_seconds: float
-
-    @property
-    def best(self) -> int:
-        """Number of the lowest."""
-        return int(np.nanargmin(self.heights))
-
-    def within(self, value: float) -> bool:
-        """Whether a value is between the neighbours of the lowest."""
-        k = self.best
-        ends = self.values[max(k - 1, 0)], self.values[min(k + 1, len(self.values) - 1)]
-        return bool(ends[0] <= value <= ends[1])
-
-
-@dataclass(frozen=True)
 class ChosenDamper:
     """The damper with the lowest worst peak, and what is known beside it.
 
@@ -145,10 +113,8 @@ class ChosenDamper:
     nominal_at_worst : float
         Worst peak of the nominal optimum over all ranges; nan where it is not known.
     settled : (bool, bool)
-        Whether both are told to the step of a jump; else they are the highest of whole curves, with
-        jumps between that may hide a higher one.
-    grid : GridCheck, optional
-        The same by a grid of runs.
+        Whether both are known to the step of a jump; else they are the highest of whole curves,
+        with jumps between that may hide a higher one.
     """
 
     ranges: Ranges
@@ -163,7 +129,6 @@ class ChosenDamper:
     robust_at_nominal: float
     nominal_at_worst: float
     settled: tuple[bool, bool]
-    grid: GridCheck | None = None
 
     @property
     def best(self) -> Tried:
@@ -219,10 +184,10 @@ class ChosenDamper:
 
     @property
     def gaps(self) -> list[tuple[float, float]]:
-        """F_C/F_E of the optimum between which whole curves were not followed through."""
+        """F_C/F_E of the optimum between which no whole curve with peaks is known."""
         c, f = self.best.best.log_centrifugal, self.best.worst.f
         out = []
-        for low, high in (pair for one in self.best.worst.peaks for pair in one.gaps):
+        for low, high in (pair for one in self.best.worst.peaks for pair in one.holes):
             ends = max(low, c - f[1]), min(high, c - f[0])
             if ends[0] < ends[1]:
                 out.append((math.exp(ends[0]), math.exp(ends[1])))

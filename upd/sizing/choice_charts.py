@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.plot.chart import Axis, Band, Chart, Mark, Trace
-from upd.sizing.branch_cubics import SAME
 from upd.sizing.choice import UNITS_OF, ChosenDamper
+from upd.sizing.ratio_curves import SAME
 from upd.sizing.worst_peak import WorstPeak
 
 Array = NDArray[np.float64]
@@ -52,15 +52,6 @@ def _curve(worst: WorstPeak, low: float, high: float) -> tuple[Array, Array]:
     return np.exp(c), np.where(c >= worst.known_from() - SAME, np.exp(y), math.nan)
 
 
-def _grid_points(found: ChosenDamper, path: str) -> tuple[Trace, ...]:
-    """The grid over an input, if it is of that one."""
-    grid = found.grid
-    if grid is None or grid.path != path:
-        return ()
-    name = f"grid of {len(grid.values)}, upd sweep"
-    return (Trace(name, grid.values, grid.heights, "points", 7),)
-
-
 def _over_centrifugal(found: ChosenDamper) -> Chart:
     best, press = found.best, found.ranges.pressing
     low, high = best.ends
@@ -74,7 +65,6 @@ def _over_centrifugal(found: ChosenDamper) -> Chart:
     (F, robust), (G, plain) = (_curve(w, low, high) for w in (best.worst, found.plain.plain))
     solved = np.array([math.log(found.centrifugal), math.log(found.nominal_centrifugal)])
     at = shown(np.exp(solved))
-    points = _grid_points(found, "" if press is None else press.path)
     name = "F_C" if press is None or press.path.endswith("centrifugal") else press.path
     return Chart(
         f"{scene.name}: worst peak",
@@ -83,7 +73,6 @@ def _over_centrifugal(found: ChosenDamper) -> Chart:
         traces=(
             Trace("over the ranges", shown(F), robust, "line", 0),
             Trace("the scene's own values", shown(G), plain, "dashed", 1),
-            *points,
             Trace("robust optimum", at[:1], np.array([found.worst]), "star", 0, outline=True),
             Trace("nominal optimum", at[1:], np.array([found.nominal_peak]), "star", 1),
         ),
@@ -144,7 +133,6 @@ def _over_shape(found: ChosenDamper, k: int) -> Chart:
         traces=(
             Trace("over the ranges", x, robust, "both", 0),
             Trace("the scene's own values", x, plain, "both", 1),
-            *_grid_points(found, shape.path),
             Trace(
                 "robust optimum",
                 np.array([found.best.values[k]]),

@@ -17,9 +17,10 @@ import itertools
 import logging
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -32,9 +33,9 @@ from upd.progress import Listener, Stages
 from upd.scene import ForcedScene
 from upd.sizing.choice import GROWTHS, ChosenDamper, Objective, Reaches, Tried, is_along
 from upd.sizing.least_worst import LowestWorst, has_moved, lowest_worst
+from upd.sizing.margins import Reach, how_far, how_far_force
 from upd.sizing.ranges import FORCE, InputRange, Ranges, with_values
 from upd.sizing.ratio_curves import AGREES, SCAN_STEP
-from upd.sizing.reach import Reach, how_far, how_far_force
 from upd.sizing.rig_peaks import RigPeaks, bare
 from upd.sizing.worst_peak import COMPARED_STEP, WorstPeak
 
@@ -48,15 +49,13 @@ _TURNS = 4
 _LOOKS = 4
 #: of the range of F_E, as ln F_E: steps between the first whole curves
 _SHARE = 0.5
-#: beyond a range of F_E up to which its ends are told, as ln F_E
+#: beyond a range of F_E up to which its ends are sought, as ln F_E
 _REACH = 3.0
 #: values added where peaks are highest inside the range of an uncertain input
 _INSIDE = 3
 
 
-def choose_damper(
-    ranges: Ranges, objective: Objective, progress: Listener, *, begin: float | None = None
-) -> ChosenDamper:
+def choose_damper(ranges: Ranges, objective: Objective, progress: Listener) -> ChosenDamper:
     """The damper whose worst peak over the ranges is lowest.
 
     Parameters
@@ -68,22 +67,20 @@ def choose_damper(
         levels of excitation count alike. "acceleration": the highest acceleration.
     progress
         Called at the beginning and the end of every stage.
-    begin
-        When the call began, by the performance counter.
 
     Raises
     ------
     InputError
-        For a scene whose peaks are not told over F_C/F_E.
+        For a scene whose peaks are not functions of F_C/F_E.
     ConvergenceError
         Where the worst peak is known nowhere.
     """
-    begin = time.perf_counter() if begin is None else begin
     with quiet():
-        return _choose(ranges, objective, progress, begin)
+        return _choose(ranges, objective, progress)
 
 
-def _choose(ranges: Ranges, objective: Objective, progress: Listener, begin: float) -> ChosenDamper:
+def _choose(ranges: Ranges, objective: Objective, progress: Listener) -> ChosenDamper:
+    begin = time.perf_counter()
     search = _Search(ranges, objective, progress)
     if ranges.shapes:
         search.by_turns()
@@ -94,11 +91,12 @@ def _choose(ranges: Ranges, objective: Objective, progress: Listener, begin: flo
     tried = tuple(sorted(search.tried, key=lambda one: one.values))
     for _ in range(_LOOKS):
         robust, nominal = _lowest(tried)
-        moved, reaches, here, there, settled = search.around(tried[robust], tried[nominal])
-        if not moved:
+        both = tried[robust], tried[nominal]
+        reaches, (here, there, settled) = search.reaches(both[0]), search.compared(*both)
+        if not any(any(_moved(one)) for one in both):
             break
         # whole curves on the way have shown another optimum
-        tried = tuple(search.again(one) for one in tried)
+        tried = tuple(map(_again, tried))
     else:
         robust, nominal = _lowest(tried)
         reaches = _withheld(reaches)
@@ -128,8 +126,22 @@ def _lowest(tried: Sequence[Tried]) -> tuple[int, int]:
     )
 
 
+def _moved(one: Tried) -> tuple[bool, bool]:
+    """Whether whole curves solved since show another robust or another nominal optimum."""
+    return has_moved(one.worst, one.best, *one.ends), has_moved(one.plain, one.nominal, *one.ends)
+
+
+def _again(one: Tried) -> Tried:
+    """The optima of a place on all whole curves that are known by now."""
+    if _moved(one)[0]:
+        one = replace(one, best=lowest_worst(one.worst, *one.ends))
+    if _moved(one)[1]:
+        one = replace(one, nominal=lowest_worst(one.plain, *one.ends, jump=COMPARED_STEP))
+    return one
+
+
 def _withheld(reaches: Reaches) -> Reaches:
-    """Nothing told of what an optimum that moves with every look rests on."""
+    """No reaches of an optimum that moves with every look."""
     none = Reach(math.nan, f"the optimum has moved with each of {_LOOKS} looks at whole curves")
     return Reaches(
         tuple((none, none) for _ in reaches.centrifugal),
@@ -265,103 +277,66 @@ class _Search:
                 if all(of.low <= v <= of.high for of, v in zip(r.unsure, w, strict=True))
             ]
             worst = WorstPeak([rigs[w].peaks for w in counted], r.forces, self.weight)
-            small = threads_for(len(rigs[own].model.M))
-            with self.stages("search", self._words(chosen)), small:
+            with self._searching(self._words(chosen), list(rigs.items())):
                 best = lowest_worst(worst, *ends)
             inside = self._inside(counted, worst, best)
             if inside is None or len(rigs) > len(values) + _INSIDE:
                 break
             rigs[inside] = self._rig(chosen, inside, place, window)
         plain = WorstPeak([rigs[own].peaks], r.nominal_forces, self.weight)
-        small = threads_for(len(rigs[own].model.M))
-        with self.stages("search", f"{self._words(chosen)}, the scene's own values"), small:
+        words = f"{self._words(chosen)}, the scene's own values"
+        with self._searching(words, list(rigs.items())):
             nominal = lowest_worst(plain, *ends, jump=COMPARED_STEP)
-        told = tuple((w, rigs[w]) for w in rigs)
-        return Tried(place, told, worst, best, plain, nominal, ends)
+        return Tried(place, tuple(rigs.items()), worst, best, plain, nominal, ends)
 
-    def around(
-        self, best: Tried, plain: Tried
-    ) -> tuple[bool, Reaches, float, float, tuple[bool, bool]]:
-        """How far F_C and F_E may move from the robust optimum, and what each optimum has in the
-        other's place.
-
-        Parameters
-        ----------
-        best, plain
-            The robust and the nominal optimum.
-
-        Returns
-        -------
-        moved : bool
-            Whether the whole curves solved for it show another optimum.
-        reaches : Reaches
-            The former.
-        here, there : float
-            Peak of the robust optimum with the scene's own values, worst peak of the nominal one.
-        settled : (bool, bool)
-            Whether these two are told to the step of a jump.
-        """
-        worst, found, f = best.worst, best.best, self.ranges.forces
-        own = dict(best.rigs)[tuple(one.nominal for one in self.ranges.unsure)]
-        with self.stages("search", "how far the optimum reaches"), threads_for(len(own.model.M)):
-            reaches = Reaches(
-                tuple(
-                    (
-                        how_far(worst, found, growth, best.ends[0]),
-                        how_far(worst, found, growth, best.ends[1]),
-                    )
-                    for growth in GROWTHS
-                    if best.ends[0] < best.ends[1]
-                ),
-                *(
-                    tuple(
-                        how_far_force(worst, found, growth, way, end * math.exp(way * _REACH))
-                        for growth in GROWTHS
-                        if any(one.path == FORCE for one in self.ranges.during)
-                    )
-                    for way, end in zip((-1.0, 1.0), f, strict=True)
-                ),
-            )
-        here, there, settled = self.compared(best, plain)
-        moved = any(
-            has_moved(worst, found, *one.ends)
-            for one in (best, plain)
-            for worst, found in ((one.worst, one.best), (one.plain, one.nominal))
-        )
-        return moved, reaches, here, there, settled
-
-    def compared(self, best: Tried, plain: Tried) -> tuple[float, float, tuple[bool, bool]]:
-        """What each optimum has in the other's place, and whether that is told to the step of a
-        jump, as `around`.
-
-        Parameters
-        ----------
-        best, plain
-            The robust and the nominal optimum.
-        """
-        places = (
-            (best.plain, best.best.log_centrifugal),
-            (plain.worst, plain.nominal.log_centrifugal),
-        )
-        own = dict(best.rigs)[tuple(one.nominal for one in self.ranges.unsure)]
-        with self.stages("search", "the optima compared"), threads_for(len(own.model.M)):
-            here, there = (one.told(c) for one, c in places)
-            sure = [w.is_settled(c, y) for (w, c), y in zip(places, (here, there), strict=True)]
-        return math.exp(here), math.exp(there), (sure[0], sure[1])
-
-    def again(self, one: Tried) -> Tried:
-        """The optima of a place on all whole curves that are known by now.
+    def reaches(self, one: Tried) -> Reaches:
+        """How far F_C and F_E may move from the robust optimum.
 
         Parameters
         ----------
         one
-            The place.
+            The optimum.
         """
-        if has_moved(one.worst, one.best, *one.ends):
-            one = replace(one, best=lowest_worst(one.worst, *one.ends))
-        if has_moved(one.plain, one.nominal, *one.ends):
-            one = replace(one, nominal=lowest_worst(one.plain, *one.ends, jump=COMPARED_STEP))
-        return one
+        counted = any(of.path == FORCE for of in self.ranges.during)
+        with self._searching("how far the optimum reaches", one.rigs):
+            centrifugal = tuple(
+                (
+                    how_far(one.worst, one.best, growth, one.ends[0]),
+                    how_far(one.worst, one.best, growth, one.ends[1]),
+                )
+                for growth in GROWTHS
+                if one.ends[0] < one.ends[1]
+            )
+            lowest, highest = (
+                tuple(
+                    how_far_force(one.worst, one.best, growth, way, end * math.exp(way * _REACH))
+                    for growth in GROWTHS
+                    if counted
+                )
+                for way, end in zip((-1.0, 1.0), self.ranges.forces, strict=True)
+            )
+        return Reaches(centrifugal, lowest, highest)
+
+    def compared(self, best: Tried, plain: Tried) -> tuple[float, float, tuple[bool, bool]]:
+        """Peak of the robust optimum with the scene's own values, worst peak of the nominal one,
+        and whether each is known to the step of a jump.
+
+        Parameters
+        ----------
+        best, plain
+            The robust and the nominal optimum.
+        """
+        with self._searching("the optima compared", best.rigs):
+            c, d = best.best.log_centrifugal, plain.nominal.log_centrifugal
+            here, there = best.plain.solved_worst(c), plain.worst.solved_worst(d)
+            settled = best.plain.is_settled(c, here), plain.worst.is_settled(d, there)
+        return math.exp(here), math.exp(there), settled
+
+    @contextmanager
+    def _searching(self, detail: str, rigs: Sequence[tuple[Any, RigPeaks]]) -> Iterator[None]:
+        """A stage of the search, with as many threads as matrices of these rigs take."""
+        with self.stages("search", detail), threads_for(len(rigs[0][1].model.M)):
+            yield
 
     def _inside(
         self, counted: list[tuple[float, ...]], worst: WorstPeak, best: LowestWorst
@@ -398,14 +373,15 @@ class _Search:
         values = chosen | {of.path: of.text(v) for of, v in given}
         words = self._words(values)
         scene = self._with(values)
-        told: Callable[[str], None] = lambda text: self.progress(  # noqa: E731
-            "peaks", f"{words}: {text}", None
-        )
-        # an F_C is told to be none by a curve in its window: two curves in each are enough
+
+        def report(text: str) -> None:
+            self.progress("peaks", f"{words}: {text}", None)
+
+        # one curve in its window rules an F_C out: two curves in each are enough
         step = max(SCAN_STEP, _SHARE * math.log(r.forces[1] / r.forces[0]))
         with self.stages("peaks", words):
             return RigPeaks(
-                scene, self.stiffness, window, step, tuple(given), self.bodies, self.stages, told
+                scene, self.stiffness, window, step, tuple(given), self.bodies, self.stages, report
             )
 
     def _with(self, values: dict[str, object]) -> ForcedScene:
@@ -414,6 +390,5 @@ class _Search:
         return bare(with_values(self.ranges.scene, values), self.stiffness)
 
     def _words(self, values: dict[str, object]) -> str:
-        known = {one.path: one for one in (*self.ranges.over, *self.ranges.during)}
-        told = [f"{known[path].path} = {value}" for path, value in values.items()]
-        return ", ".join([self.ranges.scene.name, *told])
+        texts = (f"{path} = {value}" for path, value in values.items())
+        return ", ".join([self.ranges.scene.name, *texts])

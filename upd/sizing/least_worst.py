@@ -24,8 +24,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from upd.errors import ConvergenceError
-from upd.sizing.branch_cubics import SAME
-from upd.sizing.ratio_curves import AGREES, JUMP_STEP, Deciding
+from upd.sizing.ratio_curves import AGREES, JUMP_STEP, SAME, Deciding
 from upd.sizing.worst_peak import WorstPeak
 
 #: how closely F_C is found, as its logarithm
@@ -82,7 +81,7 @@ def lowest_worst(worst: WorstPeak, low: float, high: float, jump: float = JUMP_S
     low, high
         F_C [N]; the same when it is fixed.
     jump
-        How closely jumps are told, as ln(F_C/F_E).
+        How closely jumps are located, as ln(F_C/F_E).
 
     Raises
     ------
@@ -90,7 +89,7 @@ def lowest_worst(worst: WorstPeak, low: float, high: float, jump: float = JUMP_S
         Where the worst peak is known at no F_C between the bounds.
     """
     ends = math.log(low), math.log(high)
-    before, told, rounds = math.nan, list[tuple[float, float]](), 0
+    before, solved, rounds = math.nan, list[tuple[float, float]](), 0
     while rounds < ROUNDS:
         known = max(ends[0], worst.known_from())
         if known > ends[1] + SAME:
@@ -109,25 +108,25 @@ def lowest_worst(worst: WorstPeak, low: float, high: float, jump: float = JUMP_S
         deciding = worst.solved(c)
         off = abs(worst.value(c, deciding[0]) - float(worst.at(np.array([c]))[0]))
         off = max(off, abs(guessed - worst.value(c, deciding[0])))
-        told.append((worst.value(c, deciding[0]), c))
+        solved.append((worst.value(c, deciding[0]), c))
         near = abs(c - before) <= STILL or c in (known, ends[1])
         if off <= AGREES and near:
             # whole curves between may have higher peaks, and others hide lower ones
-            if worst.settle((c, c), told[-1][0], jump=jump) or worst.explore(
-                (known, ends[1]), told[-1][0]
+            if worst.settle((c, c), solved[-1][0], jump=jump) or worst.explore(
+                (known, ends[1]), solved[-1][0]
             ):
-                told.pop()
+                solved.pop()
                 rounds -= 1
                 continue
             status = _status(c, ends, known)
             return LowestWorst(
-                c, told[-1][0], _shared(worst, c, deciding), status, (known, ends[1])
+                c, solved[-1][0], _shared(worst, c, deciding), status, (known, ends[1])
             )
         before = c
-    told = told or [(worst.value(c, worst.solved(c)[0]), c)]
+    solved = solved or [(worst.value(c, worst.solved(c)[0]), c)]
     # later whole curves may have shown higher peaks at F_C that were solved before
-    read = worst.at(np.array([c for _, c in told]))
-    _, c = min((max(y, float(now)), c) for (y, c), now in zip(told, read, strict=True))
+    read = worst.at(np.array([c for _, c in solved]))
+    _, c = min((max(y, float(now)), c) for (y, c), now in zip(solved, read, strict=True))
     deciding = worst.solved(c)
     y = max(worst.value(c, deciding[0]), float(worst.at(np.array([c]))[0]))
     return LowestWorst(c, y, _shared(worst, c, deciding), "bracketed", (known, ends[1]))

@@ -235,7 +235,7 @@ def _input(scene: ForcedScene, path: str) -> tuple[str, float]:
 
 
 def with_values(scene: ForcedScene, values: Mapping[str, Any]) -> ForcedScene:
-    """The scene read again with some values, all others as it says.
+    """The scene read again with some values, all others unchanged.
 
     Raises
     ------

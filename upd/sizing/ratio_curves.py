@@ -5,20 +5,28 @@ slopes, not beyond the values of both ends where the peaks there are not of one 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
 from upd.errors import ConvergenceError
 from upd.hbm.curve_peaks import CurvePeaks, PeakPoint
-from upd.sizing.branch_cubics import MISS, SAME, joined_cubics, of_one_branch, slope_of, with_slopes
+from upd.hbm.peaks import JUMP_FREQUENCY
 
 Array = NDArray[np.float64]
-#: ln(F_C/F_E) between the whole curves of the first scan, between those that something told rests
-#: on, and how closely a jump is told
+#: ln(F_C/F_E): points that are one
+SAME = 1e-6
+#: ln of heights: how far values and slopes of neighbours of one branch may miss each other
+MISS = 0.02
+#: step of slopes that are read from a curve
+_STEP = 2e-3
+#: ln(F_C/F_E) between the whole curves of the first scan, between those of an answer, and how
+#: closely a jump is located
 SCAN_STEP, TOLD_STEP, JUMP_STEP = 0.7, 0.5, 0.02
 #: how closely heights are known, as logarithms: tops have ripples of a thousandth, by the samples
 #: of a period
@@ -34,7 +42,7 @@ _FAR = 0.1
 class Deciding(NamedTuple):
     """A solved point that decides a worst peak: ln(F_C/F_E), ln of the height, slope g of the worst
     peak that it decides by ln F_C, derivatives by parameters, frequency [Hz], peak's name, share l
-    in the optimum's conditions, ln(F_C/F_E) of the whole curve that tells it.
+    in the optimum's conditions, ln(F_C/F_E) of its whole curve.
     """
 
     s: float
@@ -70,7 +78,7 @@ class PeaksOverRatio:
         self.found, self.low, self.high = found, low, high
         self._curves: dict[str, Callable[[Array], Array]] = {}
         #: nodes with what is known there, slopes that are not from the nodes beside
-        self._told: dict[float, dict[str, PeakPoint]] = {}
+        self._peaks: dict[float, dict[str, PeakPoint]] = {}
         self._curves_of = -1
         for s in np.linspace(high, low, math.ceil((high - low) / step) + 1):
             self.look(float(s))
@@ -88,9 +96,9 @@ class PeaksOverRatio:
                 break
         return True
 
-    def tell(self, s: float, near: float) -> bool:
+    def look_unless_known(self, s: float, near: float) -> bool:
         """As `look`, unless neighbours tell the peak there."""
-        return not self.tells(s) and self.look(s, near)
+        return not self.is_known(s) and self.look(s, near)
 
     @property
     def failed(self) -> list[float]:
@@ -104,18 +112,7 @@ class PeaksOverRatio:
     @property
     def nodes(self) -> list[float]:
         """ln(F_C/F_E) at which the highest peak is known, rising."""
-        return sorted(s for s, told in self.found.points.items() if told)
-
-    @property
-    def gaps(self) -> list[tuple[float, float]]:
-        """ln(F_C/F_E) between which no whole curve is known, rising."""
-        known = [-math.inf, *sorted(self.found.points), math.inf]
-        out = [
-            (max(a, self.low), min(b, self.high))
-            for a, b in pairwise(known)
-            if any(a < s < b for s in self.failed)
-        ]
-        return [(a, b) for a, b in out if a < b]
+        return sorted(s for s, peaks in self.found.points.items() if peaks)
 
     @property
     def holes(self) -> list[tuple[float, float]]:
@@ -150,7 +147,7 @@ class PeaksOverRatio:
             How nearly, as ln of heights.
         """
         self.curves()
-        ends = self._told[a], self._told[b]
+        ends = self._peaks[a], self._peaks[b]
         names = {
             name
             for end in ends
@@ -164,7 +161,7 @@ class PeaksOverRatio:
             for name in names
         )
 
-    def tells(self, s: float) -> bool:
+    def is_known(self, s: float) -> bool:
         """Whether neighbours of one branch tell the highest peak between them as closely as heights
         are known: their cubic is a parabola to that.
         """
@@ -178,7 +175,7 @@ class PeaksOverRatio:
         self.curves()
         top = -math.inf
         for end, way in ((a, 1.0), (b, -1.0)):
-            for name, p in self._told[end].items():
+            for name, p in self._peaks[end].items():
                 raw = self._at(end).get(name)
                 known = raw is not None and not math.isnan(raw.slope)
                 rise = max(way * p.slope, 0.0 if known else max(way, 0.0))
@@ -209,7 +206,7 @@ class PeaksOverRatio:
             return math.nan
         top, at = height, math.nan
         for end, way in ((a, 1.0), (b, -1.0)):
-            for name, p in self._told[end].items():
+            for name, p in self._peaks[end].items():
                 rise = way * p.slope
                 if way > 0.0 and not self._is_confirmed(name, end):
                     rise = max(rise, 1.0)
@@ -232,8 +229,8 @@ class PeaksOverRatio:
         """
         self.curves()
         top = -math.inf
-        for name in self._told[a].keys() & self._told[b].keys():
-            p, q = self._told[a][name], self._told[b][name]
+        for name in self._peaks[a].keys() & self._peaks[b].keys():
+            p, q = self._peaks[a][name], self._peaks[b][name]
             if p.slope > q.slope:
                 d = (q.log_height - p.log_height - q.slope * (b - a)) / (p.slope - q.slope)
                 top = max(top, p.log_height + p.slope * min(max(d, 0.0), b - a))
@@ -253,7 +250,7 @@ class PeaksOverRatio:
         return self.found.points[s]
 
     def curves(self) -> dict[str, Callable[[Array], Array]]:
-        """Name -> ln height over ln r; -inf where the curve says nothing."""
+        """Name -> ln height over ln r; -inf where nothing is known."""
         count = len(self.found.points)
         if self._curves_of != count:
             self._curves, self._curves_of = self._all_curves(), count
@@ -261,21 +258,21 @@ class PeaksOverRatio:
 
     def _all_curves(self) -> dict[str, Callable[[Array], Array]]:
         nodes = self.nodes
-        told = {s: dict(self._at(s)) for s in nodes}
+        peaks = {s: dict(self._at(s)) for s in nodes}
         out = {}
-        for name in dict.fromkeys(name for s in nodes for name in told[s]):
-            here = [s for s in nodes if name in told[s]]
-            points = with_slopes(here, [told[s][name] for s in here])
+        for name in dict.fromkeys(name for s in nodes for name in peaks[s]):
+            here = [s for s in nodes if name in peaks[s]]
+            points = with_slopes(here, [peaks[s][name] for s in here])
             for s, p in zip(here, points, strict=True):
-                told[s][name] = p
-            lacking = [s for s in nodes if name not in told[s]]
+                peaks[s][name] = p
+            lacking = [s for s in nodes if name not in peaks[s]]
             joined = [
                 not any(a < s < b for s in lacking)
                 and not any(a >= c and b <= d for c, d in self.holes)
                 for a, b in pairwise(here)
             ]
             out[name] = joined_cubics(np.array(here), points, np.array(joined, bool))
-        self._told = told
+        self._peaks = peaks
         return out
 
     def distance(self, s: float) -> float:
@@ -291,8 +288,8 @@ class PeaksOverRatio:
 
     def _beside(self, s: float) -> Deciding | None:
         """The highest peak as it is read beside a whole curve, None where that is not as good as
-        solved: nearer than jumps are told, on a tangent that is the curve as closely as heights are
-        known, and whose slope that of a neighbour confirms.
+        solved: nearer than jumps are located, on a tangent that is the curve as closely as heights
+        are known, and whose slope that of a neighbour confirms.
         """
         nodes, curves = self.nodes, self.curves()
         at = self.node(s, JUMP_STEP)
@@ -315,7 +312,7 @@ class PeaksOverRatio:
         if raw is None or math.isnan(raw.slope):
             return False
         ends = [
-            (b - a, self._told[a].get(name), self._told[b].get(name))
+            (b - a, self._peaks[a].get(name), self._peaks[b].get(name))
             for a, b in pairwise(self.nodes)
             if at in (a, b)
         ]
@@ -340,10 +337,80 @@ class PeaksOverRatio:
                 f"no whole curve was followed at F_C/F_E {math.exp(s):.4g}; to fix it: other ranges"
                 " of F_C and F_E"
             )
-        told = self._at(at)
-        name = max(told, key=lambda one: told[one].log_height)
-        p, slope = told[name], told[name].slope
+        peaks = self._at(at)
+        name = max(peaks, key=lambda one: peaks[one].log_height)
+        p, slope = peaks[name], peaks[name].slope
         if math.isnan(slope):
             slope = slope_of(self.curves()[name], at, self.nodes[0], self.nodes[-1])
         y = p.log_height + (0.0 if math.isnan(slope) else slope * (s - at))
         return Deciding(s, y, slope, p.by, p.frequency, name, node=at)
+
+
+def of_one_branch(h: float, a: PeakPoint, b: PeakPoint, miss: float = MISS) -> bool:
+    """Whether points h apart are of one branch.
+
+    A cubic with the values y and the slopes g of its ends has
+    y_b - y_a - h (g_a + g_b)/2 = -h^3 y'''/12: none where it is a parabola.
+    """
+    if abs(b.frequency / a.frequency - 1.0) > JUMP_FREQUENCY:
+        return False
+    return abs(b.log_height - a.log_height - 0.5 * h * (a.slope + b.slope)) <= miss
+
+
+def with_slopes(s: Sequence[float], points: Sequence[PeakPoint]) -> list[PeakPoint]:
+    """Points of one peak, slopes that are not known by differences to second order."""
+    if len(s) < 2:
+        return [replace(p, slope=0.0 if math.isnan(p.slope) else p.slope) for p in points]
+    y = np.array([p.log_height for p in points])
+    read = np.gradient(y, np.array(s), edge_order=2 if len(s) > 2 else 1)
+    return [
+        replace(p, slope=float(g)) if math.isnan(p.slope) else p
+        for p, g in zip(points, read, strict=True)
+    ]
+
+
+def slope_of(curve: Callable[[Array], Array], s: float, low: float, high: float) -> float:
+    ends = np.clip([s - _STEP, s + _STEP], low, high)
+    values = curve(ends)
+    if not ends[1] > ends[0] or not np.isfinite(values).all():
+        # at the rim of what is known
+        return math.nan
+    return float((values[1] - values[0]) / (ends[1] - ends[0]))
+
+
+def joined_cubics(
+    x: Array, points: Sequence[PeakPoint], joined: NDArray[np.bool_]
+) -> Callable[[Array], Array]:
+    """The cubics through values and slopes of one peak; -inf outside and where neighbours are not
+    joined.
+
+    Parameters
+    ----------
+    x
+        (n,) ln r.
+    points
+        n of the peak.
+    joined
+        (n - 1,).
+    """
+    v = np.array([p.log_height for p in points])
+    if len(x) > 1:
+        cubic = CubicHermiteSpline(x, v, [p.slope for p in points])
+        ends = zip(pairwise(x), pairwise(points), strict=True)
+        one = [of_one_branch(b - a, p, q) for (a, b), (p, q) in ends]
+        low = np.where(one, -math.inf, np.minimum(v[:-1], v[1:]))
+        high = np.where(one, math.inf, np.maximum(v[:-1], v[1:]))
+
+    def value(at: Array) -> Array:
+        at = np.asarray(at, float)
+        out = np.full(at.shape, -math.inf)
+        for s, y in zip(x, v, strict=True):
+            out[np.abs(at - s) <= SAME] = y
+        if len(x) > 1:
+            k = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
+            inside = (at >= x[0]) & (at <= x[-1]) & joined[k]
+            read = np.clip(cubic(np.clip(at, x[0], x[-1])), low[k], high[k])
+            out = np.where(inside, read, out)
+        return out
+
+    return value

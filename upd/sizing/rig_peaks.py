@@ -1,6 +1,6 @@
 """Peaks of a rig over F_C/F_E, of whole curves by harmonic balance.
 
-They are kept on disk as they are solved: called again, a choice goes on where it was.
+They are kept on disk as they are solved: called again, a choice continues.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from upd.analyses import make_plan
 from upd.analyses.base import InputEnds
 from upd.analyses.forced import measures
 from upd.analyses.forced.input_uncertainty import data_change, is_known
-from upd.analyses.forced.linear_limits import QUARTER, linear_modes, linear_peaks
+from upd.analyses.forced.linear_limits import linear_peaks
 from upd.analyses.forced.measures import CurvePeak, Unsolved
 from upd.analyses.forced.mode_peaks import numbered_peaks, tell_stuck_peaks
 from upd.analyses.forced.model import Model, make_model
@@ -55,7 +55,7 @@ def bare(scene: ForcedScene, stiffness: str) -> ForcedScene:
     Raises
     ------
     InputError
-        With everything for which peaks over F_C/F_E are not told.
+        With everything for which peaks are no functions of F_C/F_E.
     """
     problems = []
     if scene.contact.model == "interface":
@@ -109,7 +109,7 @@ class RigPeaks:
         Text of what blades and damper are -> them: re-used.
     stages
         Of the whole.
-    told
+    report
         Called with words before every solution.
     """
 
@@ -122,9 +122,9 @@ class RigPeaks:
         parameters: tuple[tuple[InputRange, float], ...],
         bodies: dict[str, Bodies],
         stages: Stages,
-        told: Callable[[str], None],
+        report: Callable[[str], None],
     ) -> None:
-        self.scene, self.stiffness, self._told = scene, stiffness, told
+        self.scene, self.stiffness, self._report = scene, stiffness, report
         self.resumed = self.curves = 0
         e = scene.excitation
         self._sweep = np.linspace(e.start, e.stop, min(e.points, CURVE_POINTS))
@@ -172,8 +172,7 @@ class RigPeaks:
         problem = balance_of(self.plan, model, force, range(scene.balance.harmonics + 1))
         stop = scene.excitation.stop
         stuck = linear_peaks(Unsolved(problem), model.row("right"), force, grid(self.plan), True)
-        told = tell_stuck_peaks(model, stuck, stop)
-        if not told:
+        if not tell_stuck_peaks(model, stuck, stop):
             raise InputError(
                 f"no stuck peak of the right blade between {scene.excitation.start:g} and {stop:g} "
                 "Hz; to fix it: widen excitation.start and stop"
@@ -212,25 +211,13 @@ class RigPeaks:
         found = data_change(self.plan, self.bodies, self.stiffness, self.model, ends, stages)
         return found.whole(self.model) * (1.0 / STEP)
 
-    @property
-    def fine_points(self) -> int:
-        """Frequencies of a sweep that are a quarter of the narrowest stuck peak's width apart."""
-        e, k = self.scene.excitation, self.model.excitation.lowest
-        modes, width = (v / k for v in linear_modes(self.found.balance, True))
-        inside = width[(modes > e.start) & (modes < e.stop) & (width > 0.0)]
-        if not inside.size:
-            return int(e.points)
-        return max(
-            int(e.points), math.ceil((e.stop - e.start) / (QUARTER * float(inside.min()))) + 1
-        )
-
     # -- curves ------------------------------------------------------------------------------------
 
     def _whole_curve(self, ratio: float) -> list[SeenPeak] | None:
         """Peaks of the whole curve by harmonic balance, up or down; None where neither arrives."""
         force = self.scene.damper.centrifugal / ratio
         for down in (False, True):
-            self._told(f"whole curve, F_C/F_E {ratio:.4g}")
+            self._report(f"whole curve, F_C/F_E {ratio:.4g}")
             self.curves += 1
             answer = respond(
                 self.plan,
@@ -251,7 +238,7 @@ class RigPeaks:
 
     def _save(self) -> None:
         found, arrays = self.found, dict[str, NDArray[np.generic]]()
-        each = [(s, name, p) for s, told in found.points.items() for name, p in told.items()]
+        each = [(s, name, p) for s, peaks in found.points.items() for name, p in peaks.items()]
         arrays["curves"] = np.array(sorted(found.points))
         arrays["failed"] = np.array(sorted(found.failed))
         arrays["names"] = np.array([name for _, name, _ in each], str)

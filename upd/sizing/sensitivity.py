@@ -11,7 +11,8 @@ from scipy.interpolate import PchipInterpolator
 
 from upd.sizing.choice import GROWTHS, ChosenDamper, is_along
 from upd.sizing.least_worst import STILL
-from upd.sizing.ranges import CENTRIFUGAL, FORCE, InputRange
+from upd.sizing.ranges import FORCE, TURNING, InputRange
+from upd.sizing.worst_peak import WorstPeak
 
 Array = NDArray[np.float64]
 #: points between which curves are searched
@@ -37,7 +38,7 @@ class Sensitivity:
         "lower" or "upper" where it sits at a bound of its range.
     of : InputRange
         The parameter.
-    untold : tuple of str
+    withheld : tuple of str
         Why ends are withheld.
     """
 
@@ -48,7 +49,7 @@ class Sensitivity:
     within: tuple[tuple[float, float], ...]
     bound: str
     of: InputRange
-    untold: tuple[str, ...] = ()
+    withheld: tuple[str, ...] = ()
 
 
 def sensitivities(found: ChosenDamper) -> list[Sensitivity]:
@@ -72,15 +73,12 @@ def sensitivities(found: ChosenDamper) -> list[Sensitivity]:
 
 def _pressing(found: ChosenDamper, one: InputRange) -> Sensitivity:
     best, scene = found.best, found.ranges.scene
-    power = 1.0 / (1.0 if one.path == CENTRIFUGAL else math.log(one.centrifugal(math.e, scene)))
-    if one.path != CENTRIFUGAL:
-        power = math.log(one.centrifugal(2.0 * one.nominal, scene) / scene.damper.centrifugal)
-        power /= math.log(2.0)
+    power = TURNING.get(one.path, 1.0)
     slopes = [p.slope for p in best.best.deciding] or [math.nan]
     within = []
     for low, high in found.reaches.centrifugal:
         within.append((one.value_at(low.end, scene), one.value_at(high.end, scene)))
-    untold = [end.why for pair in found.reaches.centrifugal for end in pair if end.why]
+    withheld = [end.why for pair in found.reaches.centrifugal for end in pair if end.why]
     return Sensitivity(
         one.path,
         one.value_at(found.centrifugal, scene),
@@ -91,7 +89,7 @@ def _pressing(found: ChosenDamper, one: InputRange) -> Sensitivity:
         if best.best.status.startswith("at the")
         else "",
         one,
-        tuple(dict.fromkeys(untold)),
+        tuple(dict.fromkeys(withheld)),
     )
 
 
@@ -130,15 +128,13 @@ def _forces(found: ChosenDamper, one: InputRange) -> list[Sensitivity]:
     out = []
     for word, end, way in (("lowest", one.low, -1.0), ("highest", one.high, 1.0)):
         f = math.log(end)
-        slope = sum(
-            -p.slope * p.share for p in best.best.deciding if abs(c - p.s - f) < 10.0 * STILL
-        )
-        slope += weight if any(abs(c - p.s - f) < 10.0 * STILL for p in best.best.deciding) else 0.0
+        near = [p for p in best.best.deciding if abs(c - p.s - f) < 10.0 * STILL]
+        slope = sum(-p.slope * p.share for p in near) + weight * bool(near)
         reaches = found.reaches.lowest if way < 0 else found.reaches.highest
         within = [(r.end, math.nan) if way < 0 else (math.nan, r.end) for r in reaches]
-        untold = tuple(dict.fromkeys(r.why for r in reaches if r.why))
+        withheld = tuple(dict.fromkeys(r.why for r in reaches if r.why))
         name = f"{one.path}, {word}"
-        out.append(Sensitivity(name, end, slope, slope, tuple(within), "", one, untold))
+        out.append(Sensitivity(name, end, slope, slope, tuple(within), "", one, withheld))
     return out
 
 
@@ -155,10 +151,9 @@ def _unsure(found: ChosenDamper, one: InputRange) -> Sensitivity:
     if known[place]:
         j = sum(known[:place])
         slope = float(sum(p.share * p.by[j] for p in best.best.deciding if p.share > 0.0))
-    forces = tuple(math.exp(f) for f in best.worst.f)
+    weight = best.worst.weight
     heights = {
-        w: float(type(best.worst)([rig.peaks], (forces[0], forces[1]), best.worst.weight).at(c)[0])
-        for w, rig in best.rigs
+        w: float(WorstPeak([rig.peaks], ranges.forces, weight).at(c)[0]) for w, rig in best.rigs
     }
     worst = max(heights, key=lambda w: heights[w])
     line = sorted((w[k], y) for w, y in heights.items() if is_along(w, worst, k))

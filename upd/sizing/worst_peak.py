@@ -7,7 +7,7 @@ Peaks h per unit of F_E depend on s = ln r = c - f alone, with c = ln F_C and f 
 
 k = 0 for peaks per newton, 1 for accelerations, is the largest value of one curve in a window that
 slides with c: every whole response curve serves all pairs of forces. Between whole curves y is the
-cubic of their values and slopes. What is told of a window rests on whole curves that stand closely
+cubic of their values and slopes. The worst of a window comes from whole curves that stand closely
 there, and more so where neighbours are not of one branch and may hide a higher peak.
 """
 
@@ -22,18 +22,18 @@ from numpy.typing import NDArray
 
 from upd.errors import ConvergenceError
 from upd.hbm.peaks import JUMP_HEIGHT
-from upd.sizing.branch_cubics import SAME
 from upd.sizing.ratio_curves import (
     AGREES,
     BESIDE,
     JUMP_STEP,
+    SAME,
     TOLD_STEP,
     Deciding,
     PeaksOverRatio,
 )
 
 Array = NDArray[np.float64]
-#: how closely jumps are told, as ln(F_C/F_E), where an optimum is compared with another one
+#: how closely jumps are located, as ln(F_C/F_E), where an optimum is compared with another one
 COMPARED_STEP = 0.2
 #: below the worst within which a point may decide, as a logarithm
 _NEAR = 0.02
@@ -73,15 +73,8 @@ class WorstPeak:
 
     def at(self, c: Array) -> Array:
         """ln of the worst peak at ln F_C (n,), on the curves between solved points."""
-        c = np.atleast_1d(np.asarray(c, float))
-        out = np.full(len(c), -math.inf)
         f = self._forces()
-        for one in self.peaks:
-            curves = list(one.curves().values())
-            for i, at in enumerate(c):
-                y = np.max([curve(at - f) for curve in curves], axis=0) + self.weight * f
-                out[i] = max(out[i], float(y.max()))
-        return out
+        return np.array([float(self.single(one, f).max()) for one in np.atleast_1d(c)])
 
     def over(self, low: float, high: float) -> tuple[Array, Array]:
         """ln F_C from end to end, evenly, and ln of the worst peaks there, all at once: the largest
@@ -158,10 +151,10 @@ class WorstPeak:
         """Solve whole curves at the deciding places unless so near ones are known, or neighbours
         tell the peaks there; whether any is new.
         """
-        solved = [self.peaks[k].tell(s, near) for k, s in self.places(c)]
+        solved = [self.peaks[k].look_unless_known(s, near) for k, s in self.places(c)]
         return any(solved)
 
-    def told(self, c: float) -> float:
+    def solved_worst(self, c: float) -> float:
         """ln of the worst peak at ln F_C, on whole curves; nan where it is not known."""
         if c < self.known_from() - SAME:
             return math.nan
@@ -181,11 +174,11 @@ class WorstPeak:
         most: float | None = None,
         jump: float = JUMP_STEP,
     ) -> bool:
-        """Solve the whole curve that is wanted most where neighbours are too far apart for what is
-        told of the worst peaks between two ln F_C.
+        """Solve the whole curve that is wanted most where neighbours are too far apart for the
+        worst peaks between two ln F_C.
 
         Neighbours are too far apart with more than `TOLD_STEP` between them, unless tangents of
-        both stay below a limit by the factor that tells another peak (`upd.hbm.peaks`); and with
+        both stay below a limit by the factor that makes another peak (`upd.hbm.peaks`); and with
         more than a jump where tangents may reach the limit, if the neighbours are not of one branch
         or their tangents meet above it.
 
@@ -198,7 +191,7 @@ class WorstPeak:
         most
             ln of the largest F_E; that of the range when None.
         jump
-            How closely jumps are told, as ln(F_C/F_E).
+            How closely jumps are located, as ln(F_C/F_E).
 
         Returns
         -------
@@ -212,7 +205,7 @@ class WorstPeak:
         """Solve the whole curve that is wanted most for telling whether worst peaks between two
         ln F_C pass a limit: where the tangent of a neighbour passes it, between neighbours that do
         not tell that none does. There the peak is above the limit, or it is lost and below it up to
-        there: one curve tells which.
+        there: one curve shows which.
 
         Parameters
         ----------
@@ -246,8 +239,8 @@ class WorstPeak:
         self, ends: tuple[float, float], limit: float, most: float | None, jump: float
     ) -> list[tuple[float, float, PeaksOverRatio]]:
         """Heights that may be reached, places and of which peaks whole curves are wanted, the
-        highest first; see `settle`. What is asked for has more of an interval than jumps are told
-        to, else the neighbour tells it.
+        highest first; see `settle`. What is asked for has more of an interval than the step of
+        a jump, else the neighbour shows it.
         """
         low, high = ends[0] - self.f[1], ends[1] - self.f[0]
         over, far = limit + AGREES, limit - math.log(JUMP_HEIGHT)

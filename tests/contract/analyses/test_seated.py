@@ -22,8 +22,7 @@ from upd.errors import InputError
 from upd.progress import Stages, silent
 from upd.results import Check, write_netcdf
 from upd.scene import load_scene
-from upd.sizing.section import scene_damper
-from upd.sizing.statics import motion_state
+from upd.sizing.statics import motion_state, scene_damper
 
 F_C = 350.0
 WEDGE = {

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.sizing.branch_cubics import SAME
 from upd.sizing.least_worst import ROUNDS, LowestWorst
+from upd.sizing.ratio_curves import SAME
 from upd.sizing.worst_peak import FINE, WorstPeak
 
 Array = NDArray[np.float64]
-#: ln(F_C/F_E) between an end of what is told and the whole curve that tells it
+#: ln(F_C/F_E) between an end and the whole curve that it comes from
 STILL_AT = 5e-3
 
 
@@ -46,7 +46,7 @@ def how_far(worst: WorstPeak, found: LowestWorst, growth: float, bound: float) -
     growth
         1.05 for 5 %.
     bound
-        F_C [N] up to which it is told, on either side.
+        F_C [N] up to which it is sought, on either side.
     """
     c, way = found.log_centrifugal, math.copysign(1.0, math.log(bound) - found.log_centrifugal)
     end = max(math.log(bound), worst.known_from())
@@ -77,7 +77,7 @@ def how_far_force(
     way
         -1.0 for the lower end of the range, 1.0 for the upper one.
     bound
-        F_E [N] up to which it is told.
+        F_E [N] up to which it is sought.
     """
     c, begin = found.log_centrifugal, worst.f[0 if way < 0.0 else 1]
     # between the F_C/F_E that are known
@@ -91,7 +91,7 @@ def how_far_force(
         return f, worst.single(c, f)
 
     def solve(at: float) -> bool:
-        solved = [one.tell(c - at, STILL_AT) for one in worst.peaks]
+        solved = [one.look_unless_known(c - at, STILL_AT) for one in worst.peaks]
         return any(solved)
 
     def settle(at: float, limit: float) -> bool | None:
@@ -105,7 +105,7 @@ def how_far_force(
 def _settled(
     worst: WorstPeak, ends: tuple[float, float], limit: float, most: float | None
 ) -> bool | None:
-    """Solve a whole curve that tells whether worst peaks between two ln F_C pass a limit: whether
+    """Solve a whole curve that decides whether worst peaks between two ln F_C pass a limit: whether
     one was; None where one is not known.
     """
     if not worst.is_whole(ends):

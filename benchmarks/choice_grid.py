@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import resource
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.analyses.forced.linear_limits import QUARTER, linear_modes
 from upd.batch.engine import Watcher
 from upd.batch.plan import plan_sweep
 from upd.batch.point import Outcome
@@ -16,11 +18,44 @@ from upd.batch.sweeps import run_sweep
 from upd.errors import InputError
 from upd.scene import ForcedScene
 from upd.scene.quantities import FROM_FORCE, UNKNOWN
-from upd.sizing.branch_cubics import SAME
-from upd.sizing.choice import ChosenDamper, GridCheck
+from upd.sizing.choice import ChosenDamper
 from upd.sizing.ranges import InputRange, with_values
+from upd.sizing.ratio_curves import SAME
+from upd.sizing.rig_peaks import RigPeaks
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class GridCheck:
+    """Worst peaks by a grid of runs.
+
+    Attributes
+    ----------
+    path : str
+        What is varied.
+    values, heights : (n,) ndarray
+        In the unit inside; worst peak, nan of points that failed or lack one.
+    seconds, processor_seconds : float
+        Of the grid; 0 of points kept of earlier calls.
+    """
+
+    path: str
+    values: Array
+    heights: Array
+    seconds: float
+    processor_seconds: float
+
+    @property
+    def best(self) -> int:
+        """Number of the lowest."""
+        return int(np.nanargmin(self.heights))
+
+    def within(self, value: float) -> bool:
+        """Whether a value is between the neighbours of the lowest."""
+        k = self.best
+        ends = self.values[max(k - 1, 0)], self.values[min(k + 1, len(self.values) - 1)]
+        return bool(ends[0] <= value <= ends[1])
 
 
 def check_by_grid(
@@ -101,7 +136,7 @@ def grid_scene(found: ChosenDamper) -> ForcedScene:
             "excitation.force": [f"{f!r} N" for f in sorted(set(forces))],
             "excitation.centrifugal_to_force": FROM_FORCE,
             # between coarser ones peaks are read too high or lost
-            "excitation.points": max(rig.fine_points for _, rig in found.best.rigs),
+            "excitation.points": max(_fine_points(rig) for _, rig in found.best.rigs),
             "want": ["response"],
             "contact.stiffness": [found.stiffness],
             "left_out.solve": "no",
@@ -109,6 +144,16 @@ def grid_scene(found: ChosenDamper) -> ForcedScene:
             **{of.path: of.text(value) for of, value in shapes},
         },
     )
+
+
+def _fine_points(rig: RigPeaks) -> int:
+    """Frequencies of a sweep that are a quarter of the narrowest stuck peak's width apart."""
+    e, k = rig.scene.excitation, rig.model.excitation.lowest
+    modes, width = (v / k for v in linear_modes(rig.found.balance, True))
+    inside = width[(modes > e.start) & (modes < e.stop) & (width > 0.0)]
+    if not inside.size:
+        return int(e.points)
+    return max(int(e.points), math.ceil((e.stop - e.start) / (QUARTER * float(inside.min()))) + 1)
 
 
 def _tops(outcome: Outcome, found: ChosenDamper) -> dict[float, float]:

@@ -50,7 +50,7 @@ Array = NDArray[np.float64]
 _ASSUMED = {"Hz": 1e-3, "(m/s2)/N": 0.05, "N/mm": 0.05}
 #: F_C/F_E beside the scene's own, as parts of its lowest
 _LOWER = (0.3, 0.1)
-#: information below which a measurement tells nothing
+#: information below which a measurement is useless
 _LEAST_BITS = 0.01
 #: members of the longest family at which a measurement is predicted
 _MEMBERS = 5

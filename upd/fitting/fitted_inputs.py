@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.fitting.first_order import Knowledge
-from upd.fitting.further import FurtherMeasurement
+from upd.fitting.next_measurement import FurtherMeasurement
 from upd.fitting.parameters import VariedInput
 from upd.fitting.profile import Profile
 from upd.fitting.residuals import Start
@@ -91,11 +91,6 @@ class FittedInputs:
         Solved models.
     seconds : float
         Of the fit.
-    cost : str
-        Why an evaluation takes long, in words; "" where it does not.
-    rises : ndarray, optional
-        (n, 2) how far the misfit rises to the ends of the first-order intervals, 1 where it is
-        quadratic; None where there are none, or all profiles were traced.
     """
 
     source: ForcedScene
@@ -116,8 +111,6 @@ class FittedInputs:
     exact: tuple[bool, ...]
     evaluations: int
     seconds: float
-    cost: str = ""
-    rises: Array | None = None
 
     def is_traced(self, k: int) -> bool:
         """Whether there is a profile of a parameter, by its number."""
