@@ -244,7 +244,6 @@ def test_where_a_top_leaves_levels_are_taken_to_the_border(
         next(c for c in curve.checked if (c.blade, c.number) == key),
         frequency=0.998 * top.frequency,
         integrated=0.9 * top.height,
-        stays=True,
         sample=3,
     )
     leaves = replace(curve, checked=(check,))

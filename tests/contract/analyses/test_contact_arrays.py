@@ -6,9 +6,7 @@ Their groups say what they hold and of which case, closed forms lie beside what 
 from __future__ import annotations
 
 from dataclasses import fields
-from pathlib import Path
 
-import h5netcdf
 import numpy as np
 import pytest
 
@@ -22,10 +20,8 @@ from upd.reference import (
     mindlin,
     tangential_compliance_modulus,
 )
-from upd.report import write_report
 from upd.report.folder import RunFolder, read_arrays, read_run
 from upd.report.notebook import RunResult
-from upd.report.panels import charts_of
 from upd.results import Case
 
 MU, RADIUS, E, NU, F = 0.6, 5.0, 2e5, 0.3, 200.0
@@ -203,25 +199,3 @@ def test_what_a_dampers_charts_draw_lies_in_the_file(folders: dict[str, RunResul
     # The damper is pressed at two bands, one the mirror image of the other about mid-length.
     left, right = first["worn_zone_middle"].data
     assert left + right == pytest.approx(float(first["x"].data[-1]), rel=1e-12)
-
-
-@pytest.mark.parametrize("scene", ["hertz", "asymmetric"])
-def test_a_folder_without_attributes_still_makes_a_page(
-    folders: dict[str, RunResult], scene: str, tmp_path: Path
-) -> None:
-    now = _folder(folders[scene])
-    for name in ("summary.json", "scene.toml", "run.log", "result.nc"):
-        (tmp_path / name).write_bytes((now.path / name).read_bytes())
-    with h5netcdf.File(tmp_path / "result.nc", "a") as file:
-        for group in file.groups.values():
-            for key in list(group.attrs):
-                del group.attrs[key]
-    before = read_run(tmp_path)
-    assert {name: case_of(g) for name, g in before.arrays.items()} == {
-        name: case_of(g) for name, g in now.arrays.items()
-    }
-    titles = [
-        [(c.title, c.case) for c in charts_of(r).charts(r.arrays, r.summary)] for r in (before, now)
-    ]
-    assert titles[0] == titles[1]
-    assert "Contact pressure" in write_report(tmp_path).read_text("utf-8")
