@@ -160,7 +160,10 @@ def confirmed_again(
     path = replace(curve, answer=answer, accelerance=blades, peaks={}, tops={}, checked=())
     if path.empty:
         return NOT_FOUND
-    path = confirmed(plan, model, with_tops(plan, model, linear, path))
+    path = with_tops(plan, model, linear, path)
+    # the other blade changes alike
+    tops = {key: top for key, top in path.tops.items() if key == (check.blade, check.number)}
+    path = confirmed(plan, model, replace(path, tops=tops))
     mine = [p for p in path.peaks[check.blade] if p.number == check.number]
     return Found(mine[0].frequency, mine[0].height) if mine else NOT_FOUND
 
