@@ -265,6 +265,12 @@ def test_where_a_top_leaves_levels_are_taken_to_the_border(
     found = peak_on(peaks, peaks.model, peaks.linear, run, None)
     assert found.height == pytest.approx(top.height, rel=1e-3)
     assert len(seen) == 1
+    # a band that misses the top by ten times its width: the whole sweep has it, at one of the
+    # maxima side by side of this flat top
+    assert top.crowded
+    monkeypatch.setattr(peaks_again, "BAND", 1e-4)
+    found = peak_on(peaks, peaks.model, peaks.linear, run._replace(curve=leaves), None)
+    assert found.height == pytest.approx(0.5 * top.height, rel=1e-2)
 
 
 def test_where_all_sticks_the_peak_is_that_of_the_linear_answer(sticking: Found) -> None:

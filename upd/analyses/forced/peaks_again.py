@@ -151,21 +151,32 @@ def confirmed_again(
     """The highest motion that stays on another model, where the top of the run's path leaves: the
     border between both moves too.
     """
-    old, f = curve.answer.balance, ratio * check.frequency
-    band = np.linspace((1.0 - 2.0 * BAND) * f, (1.0 + 2.0 * BAND) * f, 2 * BAND_POINTS)
+    old, f, e = curve.answer.balance, ratio * check.frequency, plan.scene.excitation
     given: dict[str, Any] = {"harmonics": old.harmonics.numbers, "samples": old.samples}
     given["settings"] = replace(LONG_STEPS, most_points=_MOST_POINTS)
-    answer = respond(plan, model, curve.force, band, **given)
-    blades = {s: measures.accelerance(answer, model.row(s), curve.force) for s in SIDES}
-    path = replace(curve, answer=answer, accelerance=blades, peaks={}, tops={}, checked=())
-    if path.empty:
-        return NOT_FOUND
-    path = with_tops(plan, model, linear, path)
-    # the other blade changes alike
-    tops = {key: top for key, top in path.tops.items() if key == (check.blade, check.number)}
-    path = confirmed(plan, model, replace(path, tops=tops))
-    mine = [p for p in path.peaks[check.blade] if p.number == check.number]
-    return Found(mine[0].frequency, mine[0].height) if mine else NOT_FOUND
+    for band in (
+        np.linspace((1.0 - 2.0 * BAND) * f, (1.0 + 2.0 * BAND) * f, 2 * BAND_POINTS),
+        # the loop of a fold may be longer than any band
+        np.linspace(e.start, e.stop, SWEEP_POINTS),
+    ):
+        try:
+            answer = respond(plan, model, curve.force, band, **given)
+        except ConvergenceError as error:
+            log.info("band about %.6g Hz: %s", f, one_line(error))
+            continue
+        blades = {s: measures.accelerance(answer, model.row(s), curve.force) for s in SIDES}
+        path = replace(curve, answer=answer, accelerance=blades, peaks={}, tops={}, checked=())
+        if path.empty:
+            continue
+        path = with_tops(plan, model, linear, path)
+        # the other blade changes alike
+        tops = {key: top for key, top in path.tops.items() if key == (check.blade, check.number)}
+        path = confirmed(plan, model, replace(path, tops=tops))
+        for peak in path.peaks[check.blade] if tops else ():
+            near = is_near(peak.frequency / f, peak.height / check.integrated)
+            if peak.number == check.number and near:
+                return Found(peak.frequency, peak.height)
+    return NOT_FOUND
 
 
 def expected(own: LinearCurves, other: LinearCurves, number: int, frequency: float) -> float:
