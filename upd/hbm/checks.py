@@ -145,8 +145,8 @@ def _stuck_forces(b: Balance, x: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def missing(h: Harmonics) -> Harmonics:
-    """Harmonics that are not in the set, up to twice its highest plus three."""
-    return harmonics(k for k in range(1, 2 * h.highest + 4) if k not in h.numbers)
+    """Harmonics that are not in the set, from 0 up to twice its highest plus three."""
+    return harmonics(k for k in range(2 * h.highest + 4) if k not in h.numbers)
 
 
 def truncation(
@@ -185,8 +185,25 @@ def truncation(
         # structure
         motion = np.abs(eta @ b.Psi.T) / (1 + b.modal.drive_point(b.Psi, w) * stiffness)
         size = np.abs(to_complex(W, b.harmonics)).max(axis=(1, 2, 3))
-        out[part] = motion.reshape(len(W), -1).max(axis=1) / np.where(size > 0, size, np.inf)
+        most = motion.reshape(len(W), -1).max(axis=1)
+        if rest.static:
+            mean = force.reshape(len(W), len(b.Psi), -1)[..., 0]
+            most = np.maximum(most, _mean_motion(b, mean).max(axis=1))
+        out[part] = most / np.where(size > 0, size, np.inf)
     return out
+
+
+def _mean_motion(b: Balance, force: FloatArray) -> FloatArray:
+    """Contact motion (n, r) [mm] that mean contact forces (n, r) cause on closed contacts.
+
+    From (Lambda + Psi'k Psi) eta = Psi'f. Motions without any stiffness take the least stiffness
+    that rounding leaves.
+    """
+    stiffness = np.diag(np.where(b.modal.rigid, 0.0, b.modal.eigenvalues))
+    stiffness += b.Psi.T @ (stuck_stiffness(b.contacts).ravel()[:, None] * b.Psi)
+    values, vectors = np.linalg.eigh(stiffness)
+    values = np.maximum(values, len(values) * EPS * values[-1])
+    return np.asarray(np.abs((force @ b.Psi @ vectors / values) @ (b.Psi @ vectors).T))
 
 
 def aliasing(b: Balance, x: FloatArray, force: FloatArray) -> FloatArray:

@@ -424,7 +424,8 @@ def _answer(found: Whole, adaptive: bool) -> FrequencyResponse:
     if worst > (TRUNCATION if adaptive else 10 * TRUNCATION):
         at = int(np.argmax(whole.truncation))
         notes.append(
-            f"harmonics above {highest[at]} would move the contacts by up to {worst:.1%}: take more"
+            f"the omitted harmonics ({_omitted(whole.balance.harmonics)}) would move the contacts "
+            f"by up to {worst:.1%}: take more"
             if not adaptive
             else f"at {int((whole.truncation > TRUNCATION).sum())} points up to {highest.max()} "
             f"harmonics are not enough: those left out would move the contacts by up to "
@@ -460,6 +461,11 @@ def _answer(found: Whole, adaptive: bool) -> FrequencyResponse:
         whole.periodic,
         highest,
     )
+
+
+def _omitted(h: Harmonics) -> str:
+    between = [k for k in range(h.highest) if k not in h.numbers]
+    return ", ".join([*map(str, between), f"above {h.highest}"])
 
 
 def _dense(name: str, A: ArrayLike) -> FloatArray:
