@@ -463,3 +463,14 @@ def test_one_tilt_over_the_end_of_the_nodes_and_beyond() -> None:
     assert over.normal.gap.min() >= 0.0
     with pytest.raises(InputError, match="tips over"):
         tilted_contact(C, gap, half - [0.0, 1.01 * end], load=10.0, free=(False, True))
+
+
+@pytest.mark.parametrize("seed", [0, 1, 5, 17])
+def test_rough_faces_are_solved_by_newton_alone(seed: int) -> None:
+    # a wrong energy stops its line search, and the fallback hides it
+    rng = np.random.default_rng(seed)
+    C, arms = lattice(8, 8)
+    h = rng.uniform(0, 10.0 ** rng.uniform(-4, -1), len(arms))
+    answer = tilted_contact(C, h, arms=arms, load=F)
+    assert_solved(answer, C, h, arms, F)
+    assert answer.normal.method == "active set" and 2 <= answer.steps <= 4

@@ -8,7 +8,9 @@ it imports.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import logging
 import os
 import re
 import shutil
@@ -19,6 +21,12 @@ from pathlib import Path
 from typing import Any, cast
 
 import numba
+from numba.core.caching import FunctionCache
+
+log = logging.getLogger(__name__)
+
+# the compiler has no types
+_FunctionCache: Any = FunctionCache
 
 _ROOT = Path(__file__).resolve().parents[2]
 _IMPORT = re.compile(r"^\s*(?:from|import) (upd[\w.]*)", re.MULTILINE)
@@ -52,10 +60,43 @@ def compiled(function: Callable[..., Any], **more: Any) -> Callable[..., Any]:
     if folder is not None:
         options.CACHE_DIR = str(folder)
     try:
-        made = numba.njit(cache=True, error_model="numpy", nogil=True, **more)(function)
+        made: Any = numba.njit(error_model="numpy", nogil=True, **more)(function)
+        made._cache = _Kept(function)
+    except RuntimeError:
+        _not_kept("no folder for them can be written")
     finally:
         options.CACHE_DIR = usual
     return cast("Callable[..., Any]", made)
+
+
+class _Kept(_FunctionCache):  # type: ignore[misc]
+    """Functions kept on disk; what cannot be read or written is compiled again.
+
+    The compiler's own cache raises at a damaged file in every process, and on a full disk.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # damaged bytes raise anything
+            with contextlib.suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)
+        except Exception as error:  # a full disk, or a damaged index that could not be replaced
+            _not_kept(getattr(error, "strerror", None) or type(error).__name__)
+
+
+@cache
+def _not_kept(reason: str) -> None:
+    log.warning(
+        "compiled functions cannot be kept on disk (%s): every start compiles them again, about "
+        "a minute; to fix it: set NUMBA_CACHE_DIR to a folder that can be written",
+        reason,
+    )
 
 
 @cache
