@@ -27,8 +27,6 @@ SWEEP = (145.0, 235.0)
 #: answers of an independent implementation with 15 harmonics: peak (Hz, m), and points Hz -> m
 PEAK = (162.96, 2.2733e-4)
 POINTS = {150.0: 2.7919e-5, 160.0: 2.0006e-4, 165.0: 1.5215e-4, 200.0: 3.2477e-5}
-#: seconds and frequencies the original prints for one curve in Octave
-OCTAVE_SECONDS, OCTAVE_POINTS = 20.0, 230
 
 
 def stiffness() -> Array:

@@ -1,13 +1,11 @@
 """Dampers chosen by followed peaks against a grid of 40 runs through `upd sweep`, and what both
 cost.
 
-Both rigs on coarse meshes with one column of contact points and the printed stiffness, and the
-ready symmetric scene, seated, against a grid of 12. Processor
+Both rigs on coarse meshes with one column of contact points and the printed stiffness. Processor
 seconds of this process in the same run, nothing kept from before; the choice comes first, so that
 compiled code is loaded at its cost. `python benchmarks/accuracy/bench_choice.py [RIG ...]` prints
-the choices in words and the grid as well, how far its points pass what is told of the range within
-10 %, and draws choice_RIG.png; with `paths` for a rig it counts the whole curves of the ready mesh
-that do not arrive.
+the choices in words and the grid as well, how far its points pass what is printed of the range
+within 10 %, and draws choice_RIG.png.
 """
 
 from __future__ import annotations
@@ -29,14 +27,10 @@ sys.path.append(str(Path(__file__).parents[1]))
 from choice_grid import GridCheck, check_by_grid
 
 import upd
-from upd.analyses.forced.paths import path_settings, respond
 from upd.plot.chart import Trace
 from upd.plot.matplotlib import write_sheet
-from upd.progress import Stages, silent
-from upd.scene import load_scene
 from upd.sizing import BestDamper
 from upd.sizing.choice import GROWTHS
-from upd.sizing.rig_peaks import CURVE_POINTS, RigPeaks, bare
 
 #: rigs that are reduced in a second
 COARSE: dict[str, Any] = {
@@ -53,8 +47,6 @@ COARSE: dict[str, Any] = {
     # coarser curves miss the tops between their points
     "excitation.points": 400,
 }
-#: the ready scene with one stiffness, its mesh, points and seated static state
-READY: dict[str, Any] = {"contact.stiffness": ["thesis"], "balance.method": "balance"}
 
 
 class Case(NamedTuple):
@@ -76,15 +68,9 @@ CASES = {
     "asymmetric": Case(
         "asymmetric-response", COARSE, "damper.centrifugal=4:400", "excitation.force=1:1.5"
     ),
-    # a point of its grid takes a dozen seconds of processor
-    "ready_mesh": Case(
-        "symmetric-response", READY, "damper.centrifugal=20:200", "excitation.force=0.5:5", 12
-    ),
 }
 #: share of the grid's cost that a choice may take
 SHARE = 0.2
-#: F_C/F_E whose whole curves are followed up and down, and how many
-PATHS = (4.0, 200.0, 30)
 
 
 @contextmanager
@@ -160,40 +146,6 @@ def rows(name: str, found: BestDamper, took: float, grid: GridCheck) -> Iterator
     }
 
 
-def paths() -> Iterator[dict[str, Any]]:
-    """Whole curves of the ready mesh that were not followed to their end."""
-    case = CASES["ready_mesh"]
-    scene = bare(load_scene(case.scene, case.changes), "thesis")
-    low, high, count = PATHS
-    e, lost = scene.excitation, []
-    with _empty_cache():
-        rig = RigPeaks(scene, "thesis", (high, high), 1.0, (), {}, Stages(silent), lambda _: None)
-        sweep = np.linspace(e.start, e.stop, CURVE_POINTS)
-        for ratio in np.geomspace(low, high, count):
-            force = scene.damper.centrifugal / ratio
-            for down in (False, True):
-                begin = time.process_time()
-                found = respond(
-                    rig.plan,
-                    rig.model,
-                    force,
-                    sweep,
-                    sweep_down=down,
-                    settings=path_settings(e.points),
-                )
-                if not found.arrived:
-                    took = time.process_time() - begin
-                    lost.append(f"{ratio:.4g} {'down' if down else 'up'} ({took:.1f} s)")
-    yield {
-        "name": "whole curves that do not arrive",
-        "case": "ready_mesh",
-        "value": len(lost),
-        "unit": "",
-        "target": "0",
-        "note": f"of {2 * count}, F_C/F_E {low:g} to {high:g}: {', '.join(lost) or 'none'}",
-    }
-
-
 def run() -> Iterator[dict[str, Any]]:
     """Both rigs."""
     for name in CASES:
@@ -203,10 +155,6 @@ def run() -> Iterator[dict[str, Any]]:
 def main(names: Sequence[str]) -> None:
     """Print choices, grids and rows."""
     for name in names or CASES:
-        if name == "paths":
-            for row in paths():
-                print(row, flush=True)
-            continue
         found, took, grid = both(name)
         print(found)
         for value, height in zip(grid.values, grid.heights, strict=True):

@@ -1,10 +1,9 @@
 """What contact points and elements leave in the frequencies of a response.
 
 Stuck frequencies of ``symmetric-response`` with the thesis's stiffness on points of lines, of equal
-strips and of Gauss; peaks with friction of both rigs on Gauss points; the free in-phase frequency
-with every count of elements off the contact doubled alone, and all of them times 1 to 3; free and
-stuck frequencies on meshes graded toward re-entrant edges, as an accuracy takes them (``graded``);
-maxima of the path at the symmetric second peak on many rows of Gauss points (``maxima``).
+strips and of Gauss; the free in-phase frequency with every count of elements off the contact
+doubled alone, and all of them times 1 to 3; free and stuck frequencies on meshes graded toward
+re-entrant edges, as an accuracy takes them (``graded``).
 """
 
 from __future__ import annotations
@@ -24,8 +23,8 @@ from rig_response import rig
 from upd.analyses.forced.levels import OFF_CONTACT, count_of, times
 from upd.analyses.forced.levels import graded as graded_mesh
 from upd.analyses.forced.linear_limits import linear_limits_of
-from upd.analyses.forced.measures import Unsolved, accelerance, path_maxima
-from upd.analyses.forced.paths import balance_of, respond
+from upd.analyses.forced.measures import Unsolved
+from upd.analyses.forced.paths import balance_of
 from upd.scene import load_scene
 
 Row = dict[str, Any]
@@ -41,18 +40,13 @@ POINTS: Mapping[str, Mapping[str, Any]] = {
         for n, m in ((2, 2), (3, 2), (4, 4), (6, 6))
     },
 }
-#: rows of Gauss points, the band of the peak in Hz, and harmonics of the peaks with friction
-SLIPPING = {"symmetric": (330.0, 365.0), "asymmetric": (370.0, 395.0)}
-ROWS, HIGHEST, RATIO = (4, 6, 8, 12), 7, 194.0
 #: levels of graded meshes, and rows of Gauss points on them
 GRADED, GRADED_ROWS = (1, 1.5, 2, 2.5), 6
-#: rows, band in Hz, harmonics and samples of the maxima
-MANY_ROWS, MANY_BAND, MANY_HIGHEST, MANY_SAMPLES = (24, 32, 48, 64), (420.0, 445.0), 5, 256
 
 
 def run() -> Iterator[Row]:
     """Rows of all."""
-    for one in (points, elements, slipping, graded, maxima):
+    for one in (points, elements, graded):
         yield from one()
 
 
@@ -105,30 +99,6 @@ def elements() -> Iterator[Row]:
         )
 
 
-def slipping() -> Iterator[Row]:
-    """Highest peak of a band with friction, on the path of the balance."""
-    for name, (low, high) in SLIPPING.items():
-        bodies = None
-        for rows in ROWS:
-            begin = time.process_time()
-            gauss = {"contact.rule": "gauss", "contact.rows": rows, "contact.columns": 2}
-            changes = {"mesh.element": _ELEMENT, "contact.static": "seated", **gauss}
-            made = rig(f"{name}-response", bodies, **changes)
-            bodies, force = made.bodies, made.plan.scene.damper.centrifugal / RATIO
-            grid = np.linspace(280.0, 500.0, 200)
-            answer = respond(made.plan, made.model, force, grid, harmonics=range(HIGHEST + 1))
-            size = np.abs(accelerance(answer, made.model.row("right"), force))
-            inside = [p for p in path_maxima(answer.frequency, size) if low < p.frequency < high]
-            top = max(inside, key=lambda p: p.height, default=None)
-            told = f"{answer.status}, {len(answer.frequency)} points"
-            case = f"{name}, F_C/F_E {RATIO:g}, {HIGHEST} harmonics, {rows} rows"
-            if top is None:
-                yield {"name": "peak with friction", "case": case, "note": f"no peak; {told}"}
-                continue
-            height = f"{top.height:.0f} (m/s2)/N; {told}"
-            yield _row("peak with friction", case, top.frequency, "Hz", begin, height)
-
-
 def _gauss(rows: int) -> dict[str, Any]:
     return {
         "contact.rule": "gauss",
@@ -159,25 +129,7 @@ def graded() -> Iterator[Row]:
             yield _row("stuck frequency", f"{case}, {word}", found, "Hz", begin, size)
 
 
-def maxima() -> Iterator[Row]:
-    """The highest maximum of the path at the symmetric second peak, and the others."""
-    scenes = {"contact.static": "seated", **_gauss(max(MANY_ROWS))}
-    made, (low, high) = rig("symmetric-response", **scenes), MANY_BAND
-    force = made.plan.scene.damper.centrifugal / RATIO
-    grid = np.linspace(low, high, round(high - low) + 1)
-    for rows in MANY_ROWS:
-        begin = time.process_time()
-        model = rig("symmetric-response", **{**scenes, **_gauss(rows)}).model
-        given = {"harmonics": range(MANY_HIGHEST + 1), "samples": MANY_SAMPLES}
-        answer = respond(made.plan, model, force, grid, **given)
-        size = np.abs(accelerance(answer, model.row("right"), force))
-        top, *others = sorted(path_maxima(answer.frequency, size), key=lambda p: -p.height)
-        told = ", ".join(f"{p.height:.1f} at {p.frequency:.2f} Hz" for p in others) or "none"
-        height = f"{top.height:.2f} (m/s2)/N; others: {told}"
-        yield _row("maxima of the path", f"{rows} rows", top.frequency, "Hz", begin, height)
-
-
 if __name__ == "__main__":
-    for name in sys.argv[1:] or ("points", "elements", "slipping", "graded", "maxima"):
+    for name in sys.argv[1:] or ("points", "elements", "graded"):
         for row in globals()[name]():
             print(row, flush=True)

@@ -1,6 +1,6 @@
 """Contact stiffness of both dampers.
 
-Shipped scenes against the thesis, seconds of the commands, and what mesh and effects cost.
+Shipped scenes against the thesis, and seconds of the commands.
 """
 
 from __future__ import annotations
@@ -23,8 +23,6 @@ def run() -> list[dict[str, Any]]:
     for scene in _SECONDS:
         result = upd.run(scene)
         rows += _against_thesis(scene, result)
-        rows += _straightness(scene, result)
-        rows += _symmetry(scene, result)
         rows.append(_command(scene))
     return rows
 
@@ -42,61 +40,6 @@ def _against_thesis(scene: str, result: RunResult) -> list[dict[str, Any]]:
         }
         for r in result.rows
         if r.case == first and r.name in ("K_N_secant_raw", "K_Tx_initial_raw", "K_Ty_initial_raw")
-    ]
-
-
-def _straightness(scene: str, result: RunResult) -> list[dict[str, Any]]:
-    peaks = next(r for r in result.rows if r.name == "pressure_peaks")
-    offs = [
-        abs(r.value - r.reference)
-        for r in result.rows
-        if r.name.startswith("peak_") and r.reference is not None
-    ]
-    away = max(offs, default=float("nan"))
-    return [
-        {
-            "name": "track_slope_spread",
-            "case": scene,
-            "value": result.value("slope_spread"),
-            "unit": "%",
-            "target": 1,
-        },
-        {
-            "name": "track_pressure_peaks",
-            "case": f"{scene}, {peaks.case}",
-            "value": peaks.value,
-            "unit": "",
-            "target": 2,
-        },
-        {"name": "track_peaks_off_worn_zones", "case": scene, "value": away, "unit": "mm"},
-    ]
-
-
-def _symmetry(scene: str, result: RunResult) -> list[dict[str, Any]]:
-    full = upd.run(scene, overrides=["mesh.symmetry=full"])
-    theirs = {(r.name, r.case): r.value for r in full.rows}
-    shared = [
-        r
-        for r in result.rows
-        if theirs.get((r.name, r.case)) and r.name not in ("stick_share", "slope_spread")
-    ]
-    worst = max(abs(r.value / theirs[r.name, r.case] - 1.0) for r in shared)
-    saved = float(full.cost["total_s"]) / float(result.cost["total_s"])
-    return [
-        {
-            "name": "track_half_against_full",
-            "case": f"{scene}, worst number",
-            "value": worst,
-            "unit": "",
-            "target": 1e-6,
-        },
-        {
-            "name": "time_saved",
-            "case": f"{scene}, mirror symmetry used",
-            "value": saved,
-            "unit": "times",
-            "note": f"{result.cost['total_s']:.1f} s instead of {full.cost['total_s']:.1f} s",
-        },
     ]
 
 

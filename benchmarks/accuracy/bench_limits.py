@@ -29,7 +29,7 @@ from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import preloaded
 from upd.analyses.forced.paths import respond
 from upd.analyses.forced.plan import MARCH_SAMPLES
-from upd.analyses.forced.spring_march import make_springs, state_at
+from upd.analyses.forced.spring_march import make_springs
 from upd.analyses.forced.statics import static_state
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
@@ -130,17 +130,6 @@ def peaks(name: str, built: Rig, answer: FrequencyResponse, ratio: float) -> dic
     return out
 
 
-def stays(built: Rig, answer: FrequencyResponse, peak: CurvePeak, ratio: float) -> str:
-    """Whether a march from the balance's motion at a peak stays there, in words."""
-    force, i = built.plan.scene.damper.centrifugal / ratio, peak.sample
-    springs, f = make_springs(built.plan, built.model), float(answer.frequency[peak.sample])
-    at = state_at(springs, built.model, answer.balance, answer.x[i], f, force)
-    one = settled(springs.march, f, force, at)
-    here = float(answer.amplitude(built.model.row("right"))[i])
-    off = 100.0 * (abs(one.first_harmonic[RIGHT]) / here - 1.0)
-    return f"a march from {f:.1f} Hz there ends {off:+.1f} % from it"
-
-
 def compared(
     name: str,
     built: Rig,
@@ -159,10 +148,9 @@ def compared(
             yield {"name": f"{what}_peak", "case": where, "note": f"not reached: {why}"}
             continue
         a, b = one[words], other[words]
-        where_to = stays(built, answers[1], b, ratio) if what == "harmonics" else ""
         ends = "; ".join(f"stopped: {x.message}" for x in answers if not x.arrived)
         note = f"{a.height:.4g} and {b.height:.4g} (m/s2)/N"
-        note = "; ".join(part for part in (note, where_to, ends) if part)
+        note = "; ".join(part for part in (note, ends) if part)
         off = 100.0 * (a.height / b.height - 1.0)
         yield told(f"{what}_peak", where, off, "%", targets[0], note)
         off = 100.0 * (a.frequency / b.frequency - 1.0)
@@ -171,14 +159,11 @@ def compared(
 
 
 def harmonics(name: str, built: Rig) -> Iterator[Row]:
-    """3 against 5, and 5 against 9."""
+    """3 against 5."""
     for ratio in RATIOS:
-        answers = {h: curve(built, ratio, harmonics=range(h + 1)) for h in (3, 5, 9)}
+        answers = {h: curve(built, ratio, harmonics=range(h + 1)) for h in (3, 5)}
         yield from compared(
             name, built, "harmonics", "3 / 5", ratio, (answers[3], answers[5]), (0.5, 0.1)
-        )
-        yield from compared(
-            name, built, "harmonics", "5 / 9", ratio, (answers[5], answers[9]), (None, None)
         )
 
 
@@ -266,22 +251,6 @@ def energy(name: str, built: Rig) -> Iterator[Row]:
         worst = float(np.abs(answer.energy_balance).max())
         yield told(
             "energy", case, worst, "", 1e-9, f"balance, largest along {len(answer.x)} points"
-        )
-        f, force = MOVING[name][ratio], built.plan.scene.damper.centrifugal / ratio
-        model, rest = springs_at_rest(built)
-        parts = []
-        for n in (MARCH_SAMPLES, 4 * MARCH_SAMPLES, 16 * MARCH_SAMPLES):
-            one = settle(InterfaceMarch(model, f, [force], n, by_coulomb), rest.copy(), 1e-5, 2000)
-            into, damped, rubbed = one.last.energy
-            parts.append((n, abs(into - damped - rubbed) / into, rubbed / into))
-        more = ", ".join(f"{n} steps {off:.1e}" for n, off, _ in parts)
-        yield told(
-            "energy",
-            case,
-            parts[0][1],
-            "",
-            None,
-            f"march, {f:g} Hz: {more}; friction takes {100 * parts[0][2]:.0f} %",
         )
 
 

@@ -5,8 +5,7 @@ numbers that were asked for over what was wanted of them, the levels, and the pr
 one level for all sources over those of the choice. A response is then solved again with every level
 raised by one and 13 harmonics, as far as the memory goes, for the true error, of numbers that were
 given up too. ``python benchmarks/accuracy/bench_wanted_accuracy.py asymmetric`` runs the last
-accuracy of these responses alone, ``... asymmetric 3,2,1,2,1,0`` one trial of these levels, in the
-order that the plan tells them, and ``own`` behind either with that contact stiffness of the scene.
+accuracy of these responses alone, and ``own`` behind it with that contact stiffness of the scene.
 """
 
 from __future__ import annotations
@@ -124,26 +123,6 @@ def _response(
             }
 
 
-def _trial(name: str, levels: Levels, stiffness: str) -> Iterator[Row]:
-    """Numbers of one choice of levels, with what they leave in shares of what is wanted."""
-    asked = _asked(name, WANTED[-1], stiffness)
-    chooser, begin = Chooser(forced.ROUNDS, asked), time.process_time()
-    if len(levels) != len(chooser.settings):
-        names = ", ".join(one.knob.name for one in chooser.settings)
-        sys.exit(f"{len(levels)} levels for {len(chooser.settings)} sources: give one of {names}.")
-    solution = solve(chooser.trial(levels), Stages())
-    numbers = make_results(solution)
-    shares = shares_of(estimate(solution, numbers, Stages()), chooser.wanted)
-    took = time.process_time() - begin
-    yield {
-        "name": f"trial of {name}-response",
-        "case": chooser.words(levels),
-        "value": took,
-        "unit": "s",
-    }
-    yield from _left(name, numbers, shares)
-
-
 def _left(
     name: str, numbers: Iterable[Any], shares: Mapping[Any, Mapping[str, float]]
 ) -> Iterator[Row]:
@@ -206,12 +185,6 @@ def _finer(chooser: Chooser, levels: Levels) -> Levels | None:
 if __name__ == "__main__":
     words = [word for word in sys.argv[1:] if word in RESPONSES]
     stiffness = next((word for word in sys.argv[1:] if word in STIFFNESSES), STIFFNESSES[0])
-    chosen = [word for word in sys.argv[1:] if word not in (*RESPONSES, *STIFFNESSES)]
     for one in words:
-        rows = (
-            _trial(one, tuple(int(k) for k in chosen[0].split(",")), stiffness)
-            if chosen
-            else _response(one, WANTED[-1], stiffness)
-        )
-        for row in rows:
+        for row in _response(one, WANTED[-1], stiffness):
             print(row, flush=True)

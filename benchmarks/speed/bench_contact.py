@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.contact import normal_contact, normal_curve, tangential_contact, tangential_path
+from upd.contact import normal_contact, tangential_path
 from upd.reference.half_space import half_space_compliance
 from upd.reference.hertz import sphere_gap
 
@@ -52,76 +52,30 @@ def _row(name: str, case: str, seconds: float, reference: str, note: str) -> dic
 
 
 def run() -> list[dict[str, Any]]:
-    """Rows {name, case, value, unit, reference, note}; about ten seconds."""
+    """Rows {name, case, value, unit, reference, note}; a few seconds."""
     rows = []
-    C, h = _patch(21, CELL)
-    seconds, normal = _best(lambda: normal_contact(C, h, load=LOAD))
-    rows.append(
-        _row("time_normal_441_nodes", "sphere, 21 x 21 lattice", seconds, "", normal.message)
-    )
-    seconds, curve = _best(lambda: normal_curve(C, h, np.linspace(0, LOAD, 31)))
-    steps = sum(point.iterations for point in curve)
-    rows.append(
-        _row(
-            "time_normal_curve_31_loads",
-            "sphere, 21 x 21 lattice",
-            seconds,
-            "",
-            f"{steps} factorisations",
-        )
-    )
     fine, fine_gap = _patch(41, CELL / 2)
     seconds, answer = _best(lambda: normal_contact(fine, fine_gap, load=LOAD), repeats=3)
     rows.append(
         _row("time_normal_1681_nodes", "sphere, 41 x 41 lattice", seconds, "", answer.message)
     )
-
+    C, h = _patch(21, CELL)
+    normal = normal_contact(C, h, load=LOAD)
     c = normal.contact
     limit = MU * normal.force[c]
-    both = np.concatenate((c, c))
-    Ct = 2 * half_space_compliance(21, 21, CELL, CELL, E, NU, "both")[np.ix_(both, both)]
-    m = limit.size
+    Ct = 2 * half_space_compliance(21, 21, CELL, CELL, E, NU, "both")[: c.size, : c.size]
     T = 0.8 * MU * LOAD * np.interp(np.arange(300), [0, 60, 180, 299], [0, 1, -1, 1])
-    seconds, path = _best(lambda: tangential_path(Ct[:m, :m], limit, loads=T))
+    seconds, path = _best(lambda: tangential_path(Ct[np.ix_(c, c)], limit, loads=T))
     note = (
-        f"{m} nodes, one direction, {int(path.iterations.sum())} steps of the active set, "
+        f"{limit.size} nodes, one direction, {int(path.iterations.sum())} steps of the active set, "
         f"{path.fallbacks} fallbacks"
     )
     rows.append(
         _row("time_tangential_cycle_300_steps", "sphere, T* = 0.8 mu N", seconds, "0.3 s", note)
-    )
-    seconds, step = _best(lambda: tangential_contact(Ct, limit, load=[0.9 * MU * LOAD, 0.0]))
-    rows.append(
-        _row(
-            "time_tangential_disk_one_load",
-            f"{m} nodes, two directions, T = 0.9 mu N",
-            seconds,
-            "",
-            step.message,
-        )
-    )
-    circle = (
-        0.6
-        * MU
-        * LOAD
-        * np.column_stack(
-            (np.cos(np.linspace(0, 2 * np.pi, 60)), np.sin(np.linspace(0, 2 * np.pi, 60)))
-        )
-    )
-    seconds, path = _best(lambda: tangential_path(Ct, limit, loads=circle), repeats=1)
-    note = (
-        f"{m} nodes, two directions, {int(path.iterations.sum())} Newton steps, "
-        f"{path.fallbacks} fallbacks"
-    )
-    rows.append(
-        _row("time_tangential_circle_60_steps", "load turns once, T = 0.6 mu N", seconds, "", note)
     )
     return rows
 
 
 if __name__ == "__main__":
     for row in run():
-        print(
-            f"{row['name']:36s} {row['value']:9.4f} {row['unit']}  {row['reference']:6s} "
-            f"{row['case']}: {row['note']}"
-        )
+        print(row)

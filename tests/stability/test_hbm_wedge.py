@@ -18,6 +18,7 @@ from upd.hbm import (
     frequency_response,
     rigid_damper,
 )
+from upd.hbm.balance import Balance
 from upd.hbm.march import steady_state
 from upd.hbm.modal import modal
 from upd.hbm.starts import from_stuck, newton, static_point
@@ -155,7 +156,9 @@ def test_identical_blades_do_not_move_across_when_pushed_alike() -> None:
     base = wedge(1.0, frequencies=BAND[:2])
     load = np.zeros((1, 9), dtype=complex)
     load[0, [0, 3]] = 1.0
-    b = base.balance._changed(dynamic=load, loads=load @ base.balance.modal.Phi)
+    own = base.balance
+    points, static, start = own.contacts, own.static, own.start
+    b = Balance(own.modal, points, own.harmonics, own.samples, static, load, start, own.slider)
     x = newton(b, b.stuck(2 * np.pi * 250.0), 250.0)
     assert x is not None
     w = b.split(x)[0][:, :, 1:]

@@ -5,7 +5,6 @@ Volumes, sets, lattices, gluing, counts, faults, and the frequencies it was tune
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import replace
 from typing import Any
@@ -274,7 +273,6 @@ def test_symmetric_patch_is_the_lattice_below_the_tip(size: int) -> None:
 
 
 @pytest.mark.parametrize("size", [8, 20])
-@pytest.mark.parametrize("damper", ["none", "free"])
 @pytest.mark.parametrize(
     ("changes", "n_y"),
     [
@@ -288,11 +286,9 @@ def test_symmetric_patch_is_the_lattice_below_the_tip(size: int) -> None:
         ({"patch_width": 24.0, "shank_wy": 46.0}, 10),
     ],
 )
-def test_a_patch_narrower_than_the_platform(
-    changes: dict[str, Any], n_y: int, damper: str, size: int
-) -> None:
+def test_a_patch_narrower_than_the_platform(changes: dict[str, Any], n_y: int, size: int) -> None:
     """Its place and size alone change: bodies keep their volumes, both sides their lattice."""
-    p = rig(patch_length=6.0, patch_offset=5.0, element_nodes=size, damper=damper, **changes)
+    p = rig(patch_length=6.0, patch_offset=5.0, element_nodes=size, damper="free", **changes)
     meshes = build(p)
     for side in ("left", "right"):
         mesh = meshes[side]
@@ -311,14 +307,12 @@ def test_a_patch_narrower_than_the_platform(
         assert moments(mesh)[0] == pytest.approx(blade_volume(p, side), rel=1e-12)
         assert len(np.unique(np.round(mesh.points, 6), axis=0)) == mesh.n_node
         assert quality(mesh).min > 0.3
-        if damper == "free":
-            own = meshes["damper"].points[meshes["damper"].nodes[f"{side}_patch"]]
-            assert np.array_equal(own, mesh.points[mesh.nodes["patch"]])
+        own = meshes["damper"].points[meshes["damper"].nodes[f"{side}_patch"]]
+        assert np.array_equal(own, mesh.points[mesh.nodes["patch"]])
     for name, n in count(p).items():
         assert (n["nodes"], n["hexes"]) == (meshes[name].n_node, meshes[name].n_hex)
-    if damper == "free":
-        assert moments(meshes["damper"])[0] == pytest.approx(216.0 * 42.5, rel=1e-12)
-        assert count(p)["damper"]["contact"] == 2 * len(meshes["left"].nodes["patch"])
+    assert moments(meshes["damper"])[0] == pytest.approx(216.0 * 42.5, rel=1e-12)
+    assert count(p)["damper"]["contact"] == 2 * len(meshes["left"].nodes["patch"])
 
 
 def test_asymmetric_patches_are_two_pads_and_the_left_face(
@@ -518,11 +512,6 @@ def test_misfits_are_refused_with_the_remedy(changes: dict[str, Any], word: str)
 
 def test_a_damper_that_is_not_there_does_not_have_to_fit() -> None:
     assert rig(damper_height=16.0).gap_front == 6.0
-
-
-def test_parameters_are_frozen() -> None:
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        rig().pitch = 2.0  # type: ignore[misc]
 
 
 def frequencies(mesh: Mesh, family: str, number: int) -> FloatArray:
