@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from upd.analyses.base import require_memory
+from upd.analyses.base import chosen_by_accuracy, refuse_oversize, require_memory
 from upd.analyses.contact.neighbours import has_neighbours, neighbours_seconds
 from upd.analyses.contact.plan import ContactPlan, contact_plan, refined_growth
 from upd.mesh import recipes
@@ -16,9 +17,11 @@ from upd.progress import Stages
 from upd.results import Result
 from upd.scene import Scene
 from upd.scene.contact import Loads
+from upd.vary.errors import estimate_in_round
 from upd.vary.scatter import Samples
 from upd.vary.solve import varied_plan
 from upd.vary.variation import ALONE, COARSER, Levels, Overrides, Problem, Variation
+from upd.vary.wanted import LevelChoice, Wanted
 
 #: fewest divisions of a level
 FEWEST = 4
@@ -125,7 +128,7 @@ def levels(plan: ContactPlan) -> Levels:
     None where the scene wants none, and for a recipe without divisions.
     """
     scene = plan.scene
-    if not scene.estimates or plan.asked is not None:
+    if not scene.estimates:
         return Levels(())
     # Neighbouring loads show on half the divisions what the dearest level would.
     ratios = COARSER[1:] if has_neighbours(scene) else COARSER
@@ -153,8 +156,9 @@ def mesh_problem(
     return Problem(make_plan, solve, make_results, bare, (MESH,), levels, half_cost, sample)
 
 
-def with_estimates(problem: Problem, plan: ContactPlan) -> ContactPlan:
-    """The plan with what its levels cost."""
+def plan_with_estimates(problem: Problem, scene: Scene) -> ContactPlan:
+    """The plan of a scene with what its levels cost."""
+    plan: ContactPlan = problem.make_plan(scene)
     made = levels(plan).variations
     again = sum(_seconds(problem, plan, one) for one in made)
     again += neighbours_seconds(plan) if made else 0.0
@@ -173,6 +177,52 @@ def _seconds(problem: Problem, plan: ContactPlan, one: Variation) -> float:
         return plan.solve_seconds * float(one.size**-POWER) + neighbours_seconds(plan)
     level: ContactPlan = varied_plan(problem, plan.scene, one)
     return level.solve_seconds + neighbours_seconds(level)
+
+
+def wanted(
+    problem: Problem,
+    choices: Callable[[Scene], Sequence[LevelChoice]],
+    governing: Sequence[str],
+    first: Callable[[float], int],
+) -> Wanted:
+    """A contact whose mesh is chosen by an accuracy.
+
+    Parameters
+    ----------
+    choices
+        scene -> its meshes.
+    governing
+        Names of the numbers (shell patterns) that one accuracy for all is asked of.
+    first
+        accuracy -> the level that a plan predicts.
+    """
+
+    def predicted(scene: Scene) -> list[Scene]:
+        asked = scene.wanted_accuracy
+        least = min(asked.values()) if isinstance(asked, Mapping) else asked
+        assert least is not None
+        (choice,) = choices(scene)
+        return [choice.at(scene, k) for k in range(min(first(least) + 1, len(choice.labels)))]
+
+    return Wanted(
+        choices,
+        {name: name for name in governing},
+        problem.make_plan,
+        problem.solve,
+        problem.make_results,
+        partial(estimate_in_round, problem, level_of),
+        refuse_oversize,
+        chosen_by_accuracy,
+        predicted=predicted,
+    )
+
+
+def level_of(plan: ContactPlan) -> Variation:
+    known = plan.parameters
+    counts = (str(known[n]) for n in ("divisions_long", "divisions") if n in known)
+    edge = next((n for n in ("patch", "patch_length", "pad_length") if n in known), None)
+    size = spacing(known) * (1.0 if edge is None else float(known[edge]))
+    return Variation(MESH, " x ".join(counts) + " divisions", size=size)
 
 
 def half_cost(plan: ContactPlan, source: str, seconds: float, order: float) -> float:

@@ -58,8 +58,6 @@ class ContactPlan(Plan[Scene]):
     ----------
     families
         Its load families.
-    asked
-        The scene as asked for, where that leaves the mesh to an accuracy.
     companion
         A coarser whole model with all directions at once, on which numbers are solved again with
         effects left out.
@@ -71,7 +69,6 @@ class ContactPlan(Plan[Scene]):
     """
 
     families: tuple[Family, ...] = ()
-    asked: Scene | None = None
     companion: ContactPlan | None = None
     solve_seconds: float = 0.0
     otherwise: Mapping[str, Any] | None = None

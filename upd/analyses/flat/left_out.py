@@ -6,6 +6,7 @@ The tilt with the run's own compliance, the others on the plan's companion.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from upd.analyses.contact.plan import (
     direction_name,
     unit_vector,
 )
-from upd.analyses.flat.accuracy import solve_to_accuracy
+from upd.analyses.flat.accuracy import WANTED
 from upd.analyses.flat.results import make_results
 from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, StuckContact
 from upd.analyses.flat.solve import (
@@ -45,6 +46,7 @@ from upd.errors import InputError, UpdError
 from upd.progress import Stages
 from upd.results import Result
 from upd.scene.contact import Coupling
+from upd.vary.wanted import solve_wanted
 
 Array = NDArray[np.float64]
 
@@ -54,7 +56,9 @@ def solve(plan: ContactPlan, stages: Stages) -> FlatSolution:
 
     An error raised on the way carries what converged so far as ``partial``.
     """
-    solution: FlatSolution = solve_to_accuracy(plan, stages)
+    solution: FlatSolution
+    solution, estimates = solve_wanted(WANTED, plan, stages)
+    solution = replace(solution, estimates=estimates)
     plan = solution.plan
     companion = plan.companion
     cases = [case.case for case in solution.normal if case.force > 0.0]

@@ -165,4 +165,4 @@ class FlatSolution:
     paths: list[LoadPath] = field(default_factory=list)
     moved: dict[Case, float] = field(default_factory=dict)
     left_out: list[Resolved] = field(default_factory=list)
-    estimates: Estimates = field(default_factory=dict)
+    estimates: Estimates | None = None

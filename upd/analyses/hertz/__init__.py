@@ -5,10 +5,14 @@ Hertz's and Mindlin's problem.
 
 from __future__ import annotations
 
+from functools import partial
+
 from upd.analyses.base import Analysis
 from upd.analyses.contact.bodies import needs
-from upd.analyses.contact.levels import coarsened
+from upd.analyses.contact.levels import coarsened, plan_with_estimates
 from upd.analyses.hertz import accuracy, charts, checks, left_out, output, results
+from upd.vary import errors
+from upd.vary.wanted import plan_wanted
 
 ANALYSIS = Analysis(
     name="hertz",
@@ -19,7 +23,7 @@ ANALYSIS = Analysis(
         "contact radius against sphere",
         "slope in the contact",
     ),
-    make_plan=accuracy.plan_to_accuracy,
+    make_plan=partial(plan_wanted, accuracy.WANTED, partial(plan_with_estimates, accuracy.PROBLEM)),
     needs=needs,
     solve=left_out.solve,
     make_results=results.make_results,
@@ -29,7 +33,7 @@ ANALYSIS = Analysis(
     write_files=output.write_files,
     charts=charts.charts,
     headline=results.headline,
-    estimate=accuracy.estimate,
+    estimate=partial(errors.estimate, accuracy.PROBLEM),
     coarsened=coarsened,
 )
 

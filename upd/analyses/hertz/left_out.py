@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from upd.analyses.contact.coupled import raised
 from upd.analyses.contact.left_out import Pressed
 from upd.analyses.contact.loading import closed_loop, tangential_compliance
 from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, unit_vector
-from upd.analyses.hertz.accuracy import solve_to_accuracy
+from upd.analyses.hertz.accuracy import WANTED
 from upd.analyses.hertz.results import make_results
 from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution
 from upd.analyses.hertz.solve import solve_normal, solve_tangential
@@ -25,6 +26,7 @@ from upd.errors import UpdError
 from upd.progress import Stages
 from upd.results import Result
 from upd.scene.contact import Coupling
+from upd.vary.wanted import solve_wanted
 
 Array = NDArray[np.float64]
 
@@ -32,9 +34,11 @@ Array = NDArray[np.float64]
 def solve(plan: ContactPlan, stages: Stages) -> HertzSolution:
     """Run everything the plan calls for, and numbers again with the effects it leaves out.
 
-    Errors as for `solve_to_accuracy`.
+    Errors as for `solve_wanted`.
     """
-    solution: HertzSolution = solve_to_accuracy(plan, stages)
+    solution: HertzSolution
+    solution, estimates = solve_wanted(WANTED, plan, stages)
+    solution = replace(solution, estimates=estimates)
     companion = solution.plan.companion
     if companion is None:
         return solution

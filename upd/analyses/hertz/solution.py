@@ -174,4 +174,4 @@ class HertzSolution:
     cycles: list[LoadPath] = field(default_factory=list)
     no_shares: str = ""
     left_out: list[Resolved] = field(default_factory=list)
-    estimates: Estimates = field(default_factory=dict)
+    estimates: Estimates | None = None
