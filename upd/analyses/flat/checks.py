@@ -7,11 +7,11 @@ import numpy as np
 from upd.analyses.contact import checks as common
 from upd.analyses.contact import yielding
 from upd.analyses.contact.coupled import as_normal, opened_by_shear, shear_nodes
-from upd.analyses.contact.left_out import checks_of
+from upd.analyses.contact.effects import checks_of
+from upd.analyses.contact.loading import contact_points_of, load_point, tilt_arms
 from upd.analyses.contact.plan import NORMAL
 from upd.analyses.flat.maps import lattices
 from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
-from upd.analyses.flat.solve import contact_points_of, load_point, tilt_arms
 from upd.results import Check
 
 
@@ -74,7 +74,7 @@ def _normal_checks(solution: FlatSolution, case: FlatNormalCase) -> list[Check]:
             *more,
         ]
     points = contact_points_of(model)[:, :2]
-    arms = points - load_point(solution)
+    arms = points - load_point(solution.plan, model)
     moment = float(np.abs(arms.T @ s.force).max())
     turned = turned + arms @ case.tilt
     return [
@@ -102,7 +102,7 @@ def _tangential_checks(solution: FlatSolution, t: FlatTangentialCase) -> list[Ch
     answer = as_normal(t.state, float("nan"))
     turned = -opened_by_shear(model, t.state)
     if t.state.motion[3:].size:
-        turned = turned + tilt_arms(solution) @ t.state.motion[3:]
+        turned = turned + tilt_arms(solution.plan, model) @ t.state.motion[3:]
     carried = float(answer.unclipped.sum())
     return [
         *checks,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from upd.analyses.base import Effect
-from upd.analyses.contact.left_out import (
+from upd.analyses.contact.effects import (
     DIRECTIONS,
     LARGE,
     TILT,

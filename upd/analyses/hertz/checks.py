@@ -15,7 +15,7 @@ from upd.analyses.contact.coupled import (
     opened_by_shear,
     shear_nodes,
 )
-from upd.analyses.contact.left_out import checks_of
+from upd.analyses.contact.effects import checks_of
 from upd.analyses.contact.plan import NORMAL
 from upd.analyses.hertz.plan import has_mirror_planes, wider_patch
 from upd.analyses.hertz.products import product_checks

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.base import Effect
-from upd.analyses.contact.left_out import (
+from upd.analyses.contact.effects import (
     DIRECTIONS,
     LARGE,
     TOGETHER,

@@ -38,7 +38,7 @@ from upd.analyses.hertz.solution import (
 )
 from upd.contact.bulk import finite_body_share, half_space_mean
 from upd.contact.edge import located_area
-from upd.contact.model import Body
+from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.patch import ContactMeasures, measure
 from upd.contact.stiffness import BodyShare, axis_half_space, axis_share
@@ -62,7 +62,11 @@ def solve_plan(plan: ContactPlan, stages: Stages) -> HertzSolution:
 
     An UpdError raised on the way carries what converged so far as ``partial``.
     """
-    model = prepare(plan, stages)
+    return solve_on(plan, prepare(plan, stages), stages)
+
+
+def solve_on(plan: ContactPlan, model: ContactModel, stages: Stages) -> HertzSolution:
+    """Every load on a contact model."""
     m1, m2 = (plan.scene.materials[b.name] for b in (model.upper, model.lower))
     solution = HertzSolution(plan, model, contact_modulus(m1.E, m1.nu, m2.E, m2.nu))
     try:
