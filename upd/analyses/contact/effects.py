@@ -38,6 +38,7 @@ from upd.analyses.contact.plan import (
     ContactPlan,
     Family,
     direction_name,
+    is_curved,
     unit_vector,
 )
 from upd.contact.model import ContactModel
@@ -294,8 +295,8 @@ def _sheared(again: SolvedAgain, solution: Any, model: ContactModel) -> Iterator
         found = list(_changes(DIRECTIONS, names, numbers, both))
         yield from found or _changes(DIRECTIONS, ("K_T_tangent_raw",), numbers, both)
     if left_out(plan, MATERIALS):
-        curved = scene.analysis == "curved contact"
-        named = {"": 0.0} if curved else {direction_name(d): d for d in directions}
+        along = {direction_name(d): d for d in directions}
+        named = {"": 0.0} if is_curved(scene) else along
         for case in (one for one in mine.normal if one.case.load):
             for name, direction in named.items():
                 cases = [r for r in numbers if r.case.load == case.case.load]

@@ -11,7 +11,7 @@ import numpy as np
 
 from upd.analyses.base import chosen_by_accuracy, refuse_oversize, require_memory
 from upd.analyses.contact.neighbours import has_neighbours, neighbours_seconds
-from upd.analyses.contact.plan import ContactPlan, contact_plan, refined_growth
+from upd.analyses.contact.plan import ContactPlan, contact_plan, is_curved, refined_growth
 from upd.mesh import recipes
 from upd.progress import Stages
 from upd.results import Result
@@ -78,7 +78,7 @@ def coarser_divisions(plan: ContactPlan, ratios: Sequence[float]) -> list[int]:
     usual = plan.parameters.get("divisions")
     if not isinstance(usual, int) or usual <= FEWEST:
         return []
-    step = 2 if plan.scene.analysis == "curved contact" else 1
+    step = 2 if is_curved(plan.scene) else 1
     first, last = min(ratios), min(max(ratios), usual / FEWEST)
     found: list[int] = []
     for ratio in np.geomspace(first, max(first, last), len(ratios)):

@@ -21,7 +21,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 from upd.analyses.contact.levels import FEWEST, MESH, level_geometry, mesh_problem, wanted
-from upd.analyses.flat.plan import make_plan
+from upd.analyses.contact.plans import make_plan
 from upd.analyses.flat.results import make_results
 from upd.analyses.flat.solve import solve_plan
 from upd.errors import InputError

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from upd.analyses.contact.levels import MESH, mesh_problem, wanted
 from upd.analyses.contact.plan import refined_growth
-from upd.analyses.hertz.plan import auto_patch, make_plan
+from upd.analyses.contact.plans import auto_patch, make_plan
 from upd.analyses.hertz.results import make_results
 from upd.analyses.hertz.samples import sample
 from upd.analyses.hertz.solve import solve_plan

@@ -17,7 +17,7 @@ from upd.analyses.contact.coupled import (
 )
 from upd.analyses.contact.effects import checks_of
 from upd.analyses.contact.plan import NORMAL
-from upd.analyses.hertz.plan import has_mirror_planes, wider_patch
+from upd.analyses.contact.plans import has_mirror_planes, wider_patch
 from upd.analyses.hertz.products import product_checks
 from upd.analyses.hertz.results import closed_form_traction, hertz_of
 from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
