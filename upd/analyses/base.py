@@ -20,7 +20,7 @@ from upd.results import ArrayGroup, Case, Check, Estimates, Result, left_out_che
 from upd.results.answer_table import AnswerTable
 from upd.scene import AnyScene
 from upd.scene.base import LeftOut
-from upd.scene.quantities import Uncertainty
+from upd.vary.inputs import ChangesByInputs, KnownInputs
 from upd.vary.variation import Overrides
 
 __all__ = [
@@ -29,9 +29,6 @@ __all__ = [
     "NODES",
     "Analysis",
     "Effect",
-    "InputChange",
-    "InputChanges",
-    "InputEnds",
     "Needs",
     "Plan",
     "Resolved",
@@ -122,31 +119,6 @@ class Resolved:
 
 
 S = TypeVar("S", bound=AnyScene)
-
-
-@dataclass(frozen=True)
-class InputEnds:
-    """An input known within limits, the scene as its file gives it, and with the input at both ends
-    of its interval.
-    """
-
-    of: Uncertainty
-    given: Any
-    low: Any
-    high: Any
-
-
-@dataclass(frozen=True)
-class InputChange:
-    """Relative change of a number by an input's half-width, with its sign, and how it was found."""
-
-    change: float
-    basis: str
-
-
-#: path of an input -> name and case of a number -> what its half-width does to it
-InputChanges = Mapping[str, Mapping[tuple[str, Case], InputChange]]
-ChangesByInputs = Callable[[Any, Sequence[Result], Sequence[InputEnds]], InputChanges]
 
 
 @dataclass(frozen=True)
@@ -295,7 +267,7 @@ class Analysis:
     verdict_names: tuple[str, ...] = ()
     estimate: Callable[[Any, Sequence[Result], Stages], Estimates] | None = None
     input_changes: ChangesByInputs | None = None
-    known_inputs: Callable[[Any, Sequence[InputEnds]], tuple[set[str], float]] | None = None
+    known_inputs: KnownInputs | None = None
     coarsened: Callable[[Any], Overrides] | None = None
 
 

@@ -20,7 +20,7 @@ from upd.scene.contact import Loads
 from upd.vary.errors import estimate_in_round
 from upd.vary.scatter import Samples
 from upd.vary.solve import varied_plan
-from upd.vary.variation import ALONE, COARSER, Levels, Overrides, Problem, Variation
+from upd.vary.variation import ALONE, COARSER, POWER, Levels, Overrides, Problem, Variation
 from upd.vary.wanted import LevelChoice, Wanted
 
 #: fewest divisions of a level
@@ -30,10 +30,8 @@ MESH = "mesh"
 _COARSEST = "the mesh cannot be made coarser: its recipe has no divisions to lower"
 #: outputs that a level need not give: no number of them is estimated, and they cost
 _SPARED = ("fields", "curve")
-#: power of the divisions that the seconds of a level grow with where its mesh is not known: a
-#: direct solver's on a solid, n^2 of n = N^3
-POWER = 6.0
-#: and its memory: the entries of a factor by nested dissection, n^(4/3) (A. George, 1973)
+#: power of the divisions that the memory of a level grows with: the entries of a factor by nested
+#: dissection, n^(4/3) (A. George, 1973)
 MEMORY_POWER = 4.0
 #: parameters of a recipe that the load may size
 SIZED_BY_LOAD = ("patch", "core_depth")

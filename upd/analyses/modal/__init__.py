@@ -8,9 +8,9 @@ from __future__ import annotations
 from functools import partial
 
 from upd.analyses.base import Analysis
-from upd.analyses.input_uncertainty import coarsened_rig
 from upd.analyses.modal import charts, checks, output, plan, results, varied
 from upd.vary import errors
+from upd.vary.inputs import coarsened_rig
 from upd.vary.wanted import plan_wanted
 
 ANALYSIS = Analysis(
