@@ -17,7 +17,6 @@ import numpy as np
 
 from upd.analyses import analysis_of, make_plan
 from upd.analyses.base import Analysis, Plan, refuse_oversize
-from upd.analyses.input_uncertainty import input_parts
 from upd.cache.files import write_text
 from upd.cache.folders import OwnFolder, own_folder
 from upd.cache.sources import versions
@@ -43,6 +42,7 @@ from upd.results import (
 )
 from upd.scene import AnyScene, as_scene
 from upd.scene.written import scene_as_run
+from upd.vary.inputs import input_parts
 
 log = logging.getLogger("upd")
 

@@ -1,11 +1,11 @@
 """Accuracies that are asked of whole runs: reached or not, by how many levels, at what cost.
 
-Every case asks for an accuracy and lets the run choose. The row shows the largest estimate of the
-numbers that were asked for over what was wanted of them, the levels, and the predicted seconds of
-one level for all sources over those of the choice. A response is then solved again with every level
-raised by one and 13 harmonics, as far as the memory goes, for the true error, of numbers that were
-given up too. ``python benchmarks/accuracy/bench_wanted_accuracy.py asymmetric`` runs the last
-accuracy of these responses alone, and ``own`` behind it with that contact stiffness of the scene.
+Every case asks for an accuracy and lets the run choose. The row shows the levels, and of every
+round the largest estimate of the numbers that were asked for over what was wanted of them. A
+response is then solved again with every level raised by one and 13 harmonics, as far as the memory
+goes, for the true error, of numbers that were given up too. ``python
+benchmarks/accuracy/bench_wanted_accuracy.py asymmetric`` runs the last accuracy of these responses
+alone, and ``own`` behind it with that contact stiffness of the scene.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from dataclasses import replace
 from typing import Any
 
 import upd
-from upd.analyses.accuracy_rounds import EFFECT, Chooser, solve_to_accuracy
+from upd.analyses.base import CHOSEN_BY_ACCURACY
 from upd.analyses.forced import accuracy as forced
 from upd.analyses.forced.estimates import estimate
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solve import solve
-from upd.analyses.levels_choice import Levels, shares_of
-from upd.errors import ConvergenceError, UpdError
+from upd.errors import ConvergenceError, InputError, UpdError
 from upd.progress import Stages
 from upd.scene import AnyScene, load_scene
+from upd.vary.wanted import Levels, LevelSearch, shares_of, solve_wanted
 
 Row = dict[str, Any]
 #: at this F_C/F_E most slips
@@ -84,11 +84,11 @@ def _response(
     name: str, wanted: Mapping[str, str], stiffness: str = STIFFNESSES[0]
 ) -> Iterator[Row]:
     asked = _asked(name, wanted, stiffness)
-    chooser, begin = Chooser(forced.ROUNDS, asked), time.process_time()
+    search, begin = LevelSearch(forced.WANTED, asked), time.process_time()
     row: Row = {"name": f"accuracy of {name}-response", "case": _told(wanted), "unit": "s"}
     try:
-        solution, _ = solve_to_accuracy(forced.ROUNDS, forced.plan_to_accuracy(asked), Stages())
-        (effect,) = (e for e in solution.plan.effects if e.name == EFFECT)
+        solution, _ = solve_wanted(forced.WANTED, forced.plan_to_accuracy(asked), Stages())
+        (effect,) = (e for e in solution.plan.effects if e.name in CHOSEN_BY_ACCURACY)
         told = f"reached: {effect.why}"
     except ConvergenceError as error:
         # what it did reach is compared as well
@@ -96,15 +96,15 @@ def _response(
     yield {**row, "value": time.process_time() - begin, "note": told}
     numbers = make_results(solution)
     found = estimate(solution, numbers, Stages())
-    wanted_shares = shares_of(found, chooser.wanted)
+    wanted_shares = shares_of(found, search.accuracies)
     yield from _left(name, numbers, wanted_shares)
-    levels = _levels(chooser, solution)
-    fine = _finer(chooser, levels)
+    levels = _levels(search, solution)
+    fine = _finer(search, levels)
     if fine is None:
         return
     # its bodies are the memory of the finer ones
     del solution
-    plan = chooser.trial(fine)
+    plan = search.trial(fine)
     plan = replace(plan, scene=replace(plan.scene, accuracy="unknown"))
     begin = time.process_time()
     truth = {(r.name, r.case): r.value for r in make_results(solve(plan, Stages()))}
@@ -118,7 +118,7 @@ def _response(
                 "value": 100.0 * abs(truth[key] / own[key] - 1.0),
                 "unit": "%",
                 "target": f"<= {100.0 * bound:.2g}",
-                "note": f"{share:.2g} of what is wanted; true error against {chooser.words(fine)} "
+                "note": f"{share:.2g} of what is wanted; true error against {search.text(fine)} "
                 f"({took:.0f} s)",
             }
 
@@ -141,44 +141,44 @@ def _left(
         }
 
 
-def _levels(chooser: Chooser, solution: Any) -> Levels:
+def _levels(search: LevelSearch, solution: Any) -> Levels:
     """Those of a solution: the levels whose scene is its own."""
-    scene, trial = solution.plan.scene, chooser.rounds.trial
+    scene, trial = solution.plan.scene, search.wanted.trial
     return next(
         levels
-        for levels in _all(chooser)
-        for mine in (chooser.scene(levels),)
+        for levels in _all(search)
+        for mine in (search.scene(levels),)
         if scene in (mine, trial(mine))
     )
 
 
-def _all(chooser: Chooser) -> Iterator[Levels]:
+def _all(search: LevelSearch) -> Iterator[Levels]:
     def rest(k: int) -> Iterator[Levels]:
-        if k == len(chooser.settings):
+        if k == len(search.choices):
             yield ()
             return
-        for level in range(len(chooser.settings[k].knob.labels)):
+        for level in range(len(search.choices[k].labels)):
             for others in rest(k + 1):
                 yield (level, *others)
 
     return rest(0)
 
 
-def _finer(chooser: Chooser, levels: Levels) -> Levels | None:
-    """Every level raised by one, harmonics to the highest, points of the sweep as they are; the
-    mesh too where the finer one does not fit the memory.
+def _finer(search: LevelSearch, levels: Levels) -> Levels | None:
+    """Every level raised by one, harmonics to the highest; the mesh as it is where the finer one
+    does not fit the memory.
     """
-    tops = [len(one.knob.labels) - 1 for one in chooser.settings]
-    names = [one.knob.name for one in chooser.settings]
+    tops = [len(one.labels) - 1 for one in search.choices]
+    names = [one.name for one in search.choices]
     fine = [min(k + 1, top) for k, top in zip(levels, tops, strict=True)]
     fine[names.index("harmonics")] = tops[names.index("harmonics")]
-    # what they leave is known from the climbed peak
-    swept = names.index("points of the sweep")
-    fine[swept] = levels[swept]
     for _ in range(2):
-        if chooser.seconds(tuple(fine)) < float("inf"):
+        try:
+            search.wanted.refuse(search.planned(tuple(fine)))
+        except InputError:
+            fine[names.index("mesh")] = levels[names.index("mesh")]
+        else:
             return tuple(fine)
-        fine[names.index("mesh")] = levels[names.index("mesh")]
     return None
 
 

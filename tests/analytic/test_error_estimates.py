@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from upd.analyses.contact.levels import half_cost
-from upd.analyses.hertz.plan import make_plan
+from upd.analyses.contact.plans import make_plan
 from upd.errors import InputError
 from upd.progress import Stages
 from upd.results import Case, ErrorPart, Result, with_estimates, with_parts

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from rigs import LINES
 
-from upd.analyses.forced.accuracy import ROUNDS
+from upd.analyses.forced.accuracy import WANTED
 from upd.analyses.forced.levels import GRADED, OFF_CONTACT, graded, times
-from upd.analyses.levels_choice import Levels
 from upd.fem import Material, mass, stiffness
 from upd.linalg import modes
 from upd.mesh import recipes
@@ -76,15 +75,11 @@ def test_counts_of_a_level_are_whole_and_multiply_those_of_the_scene() -> None:
 
 def test_levels_of_an_accuracy_are_graded() -> None:
     asked = _scene(accuracy={"peak_frequency": "1 %"}, left_out__solve="no")
-    settings = ROUNDS.settings(asked)
-    place = next(k for k, one in enumerate(settings) if one.knob.name == "mesh")
+    (mesh,) = (one for one in WANTED.choices(asked) if one.name == "mesh")
 
     def plan(level: int) -> Any:
-        levels: Levels = tuple(level if k == place else 0 for k in range(len(settings)))
-        return ROUNDS.make_plan(asked, settings, levels, settings[place].at(asked, level))
+        return WANTED.make_plan(mesh.at(asked, level))
 
     assert plan(0).scene.geometry == asked.geometry
     for level, finer in ((1, 1.5), (3, 2.5), (4, 3)):
         assert plan(level).scene.geometry.items() >= graded(asked, finer).items()
-    falls = settings[place].knob.falls
-    assert list(falls) == sorted(falls, reverse=True)

@@ -14,11 +14,12 @@ import numpy as np
 import pytest
 
 from upd.analyses.contact.bodies import pressed
+from upd.analyses.contact.loading import load_point
 from upd.analyses.contact.plan import refined_growth
-from upd.analyses.flat.plan import make_plan
+from upd.analyses.contact.plans import make_plan
 from upd.analyses.flat.results import band_centres
 from upd.analyses.flat.solution import FlatSolution
-from upd.analyses.flat.solve import load_point, solve_plan
+from upd.analyses.flat.solve import solve_plan
 from upd.progress import Stages
 from upd.scene import load_scene
 from upd.vary.orders import estimate_error
@@ -134,7 +135,8 @@ def test_middles_of_bands_wherever_they_lie(
 def test_half_is_whole(scene: str) -> None:
     half, full = (solved(scene, 4, mesh__symmetry=name) for name in ("half", "full"))
     assert K_N(half) == pytest.approx(K_N(full), rel=1e-9)
-    assert load_point(half) == pytest.approx(load_point(full), abs=1e-12)
+    mine, whole = (load_point(one.plan, one.model) for one in (half, full))
+    assert mine == pytest.approx(whole, abs=1e-12)
     for one in (half, full):
         assert band_centres(one) == pytest.approx([-MIDDLE[scene], MIDDLE[scene]], rel=1e-12)
 
@@ -148,7 +150,8 @@ def test_a_free_tilt_is_softer_and_leaves_no_moment() -> None:
     assert np.abs(case.tilted.moment).max() < 1e-9 * LOAD * 42.5
     # the load line passes through the middle of the bands, at 30 cos(45 deg) / 2 from their low end
     low = 7.5 + 1.5 - 12.0 * np.sqrt(2.0)
-    assert load_point(free) == pytest.approx([0.0, low + 15.0 / np.sqrt(2.0)], abs=1e-9)
+    middle = load_point(free.plan, free.model)
+    assert middle == pytest.approx([0.0, low + 15.0 / np.sqrt(2.0)], abs=1e-9)
 
 
 @pytest.mark.parametrize(("scene", "held"), [("symmetric", "base"), ("asymmetric", "bottom")])

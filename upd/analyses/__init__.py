@@ -9,8 +9,8 @@ from importlib import import_module
 from typing import Any
 
 from upd.analyses.base import Analysis, Plan
-from upd.analyses.input_uncertainty import with_input_cost
 from upd.scene import AnyScene
+from upd.vary.inputs import with_input_cost
 
 #: what a scene or its recipe names as its analysis -> package
 _PACKAGES = {
@@ -43,4 +43,5 @@ def make_plan(scene: AnyScene) -> Plan[Any]:
     What will be simulated, what is left out and why, size and cost. Raises InputError.
     """
     analysis = analysis_of(scene)
-    return with_input_cost(analysis, analysis.make_plan(scene))
+    plan: Plan[Any] = with_input_cost(analysis, analysis.make_plan(scene))
+    return plan

@@ -6,7 +6,7 @@ Its plan (effects, size, cost), its solution, its numbers, checks, arrays, chart
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -20,7 +20,7 @@ from upd.results import ArrayGroup, Case, Check, Estimates, Result, left_out_che
 from upd.results.answer_table import AnswerTable
 from upd.scene import AnyScene
 from upd.scene.base import LeftOut
-from upd.scene.quantities import Uncertainty
+from upd.vary.inputs import ChangesByInputs, KnownInputs
 from upd.vary.variation import Overrides
 
 __all__ = [
@@ -29,16 +29,14 @@ __all__ = [
     "NODES",
     "Analysis",
     "Effect",
-    "InputChange",
-    "InputChanges",
-    "InputEnds",
     "Needs",
     "Plan",
     "Resolved",
+    "chosen_by_accuracy",
     "refuse_oversize",
 ]
 
-#: names of the effects that tell the levels a run chose: of several sources, of a mesh
+#: names of the effect with the levels that a run chose; the second is that of older folders
 CHOSEN_BY_ACCURACY = ("levels chosen by accuracy", "mesh chosen by accuracy")
 #: symmetry -> how many copies of the model make the whole
 COPIES = {"full": 1, "half": 2, "quarter": 4}
@@ -124,31 +122,6 @@ S = TypeVar("S", bound=AnyScene)
 
 
 @dataclass(frozen=True)
-class InputEnds:
-    """An input known within limits, the scene as its file gives it, and with the input at both ends
-    of its interval.
-    """
-
-    of: Uncertainty
-    given: Any
-    low: Any
-    high: Any
-
-
-@dataclass(frozen=True)
-class InputChange:
-    """Relative change of a number by an input's half-width, with its sign, and how it was found."""
-
-    change: float
-    basis: str
-
-
-#: path of an input -> name and case of a number -> what its half-width does to it
-InputChanges = Mapping[str, Mapping[tuple[str, Case], InputChange]]
-ChangesByInputs = Callable[[Any, Sequence[Result], Sequence[InputEnds]], InputChanges]
-
-
-@dataclass(frozen=True)
 class Plan(Generic[S]):
     """Everything decided before the first number is computed.
 
@@ -164,6 +137,8 @@ class Plan(Generic[S]):
         Predicted for the whole run.
     workers
         Bodies worked on side by side.
+    asked
+        The scene as asked for, where that leaves the levels to an accuracy.
     estimate_seconds
         Of ``seconds``, those of the companions that errors are estimated with.
     input_seconds
@@ -183,6 +158,7 @@ class Plan(Generic[S]):
     seconds: float
     memory_bytes: float
     workers: int
+    asked: S | None = field(default=None, kw_only=True)
     estimate_seconds: float = field(default=0.0, kw_only=True)
     input_seconds: float = field(default=0.0, kw_only=True)
     files_seconds: float = field(default=0.0, kw_only=True)
@@ -291,7 +267,7 @@ class Analysis:
     verdict_names: tuple[str, ...] = ()
     estimate: Callable[[Any, Sequence[Result], Stages], Estimates] | None = None
     input_changes: ChangesByInputs | None = None
-    known_inputs: Callable[[Any, Sequence[InputEnds]], tuple[set[str], float]] | None = None
+    known_inputs: KnownInputs | None = None
     coarsened: Callable[[Any], Overrides] | None = None
 
 
@@ -327,6 +303,11 @@ def fitting(plan: Plan[Any], limit: float) -> str:
     factors = any(not why.partition(":")[0].endswith("amg") for why in plan.solver.values())
     fit = dofs * (limit / plan.memory_bytes) ** (0.75 if factors else 1.0)
     return f" (about {fit:.2g} dofs fit, these are {dofs:.2g})"
+
+
+def chosen_by_accuracy(plan: Any, why: str) -> Any:
+    """The plan with the effect that its levels were chosen, and how."""
+    return replace(plan, effects=(*plan.effects, Effect(CHOSEN_BY_ACCURACY[0], True, why)))
 
 
 def refuse_oversize(plan: Plan[Any]) -> None:

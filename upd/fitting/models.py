@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses import make_plan
-from upd.analyses.base import InputEnds
 from upd.analyses.forced.input_uncertainty import DataChange, data_change, is_known
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.plan import ForcedPlan
@@ -35,6 +34,7 @@ from upd.scene import ForcedScene, load_scene
 from upd.scene.forced_contact import SIDES, Side
 from upd.scene.quantities import UNKNOWN, Uncertainty
 from upd.scene.toml import toml_key, toml_value
+from upd.vary.inputs import InputEnds
 
 Array = NDArray[np.float64]
 T = TypeVar("T")

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses import make_plan
-from upd.analyses.base import InputEnds
 from upd.analyses.forced import measures
 from upd.analyses.forced.input_uncertainty import data_change, is_known
 from upd.analyses.forced.linear_limits import linear_peaks
@@ -38,6 +37,7 @@ from upd.scene import ForcedScene
 from upd.scene.quantities import UNKNOWN, Uncertainty
 from upd.sizing.ranges import InputRange, with_values
 from upd.sizing.ratio_curves import PeaksOverRatio
+from upd.vary.inputs import InputEnds
 
 log = logging.getLogger(__name__)
 Array = NDArray[np.float64]

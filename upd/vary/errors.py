@@ -22,7 +22,7 @@ from upd.vary.orders import (
 )
 from upd.vary.scatter import sampled_error
 from upd.vary.solve import solve
-from upd.vary.variation import COARSER, RUN, Key, Problem, SolvedVariation
+from upd.vary.variation import COARSER, RUN, Key, Problem, SolvedVariation, Variation
 
 #: numbers that are errors themselves
 _ERRORS = ("*misfit*", "*_error", "*_mac", "*_difference")
@@ -40,7 +40,15 @@ def estimate(
         Of the run, with its plan.
     stages
         Of the run.
+
+    Returns
+    -------
+    Estimates
+        Those of the rounds where these chose the run's levels.
     """
+    known: Estimates | None = getattr(solution, "estimates", None)
+    if known is not None:
+        return known
     plan, run = solution.plan, SolvedVariation(RUN, numbers, stages.elapsed())
     variations, reasons = problem.levels(plan)
     solved = solve(problem, plan.scene, run, variations, stages)
@@ -60,6 +68,47 @@ def estimate(
         )
     )
     return problem.corrected(solution, run, solved, found)
+
+
+def estimate_in_round(
+    problem: Problem,
+    level_of: Callable[[Any], Variation],
+    solution: Any,
+    numbers: Sequence[Result],
+    stages: Stages,
+    memo: list[SolvedVariation],
+) -> Estimates | None:
+    """What the mesh adds to the errors of a round's numbers, by the coarser ones of earlier rounds.
+
+    Parameters
+    ----------
+    level_of
+        plan -> its level, with the size of its elements in any unit.
+    solution, numbers, stages
+        Of the round.
+    memo
+        The levels of earlier rounds, coarse to fine; this one is added.
+
+    Returns
+    -------
+    Estimates or None
+        None where no level is coarser.
+    """
+    level, seconds = level_of(solution.plan), stages.elapsed()
+    samples = {} if problem.sample is None else problem.sample(solution)
+    run = SolvedVariation(level, numbers, seconds, samples)
+    coarser = [
+        replace(one, variation=replace(one.variation, size=one.variation.size / level.size))
+        for one in reversed(memo)
+        if one.variation.size > level.size
+    ]
+    if all(one.variation.size != level.size for one in memo):
+        memo.append(run)
+    if not coarser:
+        return None
+    half_cost = partial(problem.half_cost, solution.plan, level.source, seconds)
+    found = source_estimates(level.source, run, coarser, half_cost)
+    return problem.corrected(solution, run, coarser, found)
 
 
 def source_estimates(

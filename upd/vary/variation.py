@@ -18,6 +18,9 @@ Key = tuple[str, Case]
 Overrides = tuple[tuple[str, Any], ...]
 #: without what is solved again, and without errors and input bands of its own
 ALONE: Overrides = (("left_out.solve", "no"), ("accuracy", UNKNOWN), ("uncertain", {}))
+#: power of the elements along an edge that the seconds of a level grow with where its mesh is not
+#: known: a direct solver's on a solid, n^2 of n = N^3
+POWER = 6.0
 #: element sizes of coarser levels over those of the run
 COARSER = (2.0**0.5, 2.0, 2.0**1.5)
 

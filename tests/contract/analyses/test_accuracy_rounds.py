@@ -5,24 +5,26 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
+import numpy as np
 import pytest
 from rigs import LINES
 
 import upd
 from upd.analyses import make_plan
-from upd.analyses.accuracy_rounds import EFFECT, Rounds, Setting, mesh_falls, solve_to_accuracy
-from upd.analyses.base import Plan
-from upd.analyses.levels_choice import Knob, Levels
+from upd.analyses.base import CHOSEN_BY_ACCURACY, Plan, chosen_by_accuracy, refuse_oversize
 from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages
 from upd.results import Case, ErrorPart, Estimates, Result, withheld
 from upd.scene import load_scene
+from upd.vary.wanted import LevelChoice, LevelSearch, Wanted, require_named, shares_of, solve_wanted
 
 pytestmark = pytest.mark.estimated
 
 CASE = Case()
+EFFECT = CHOSEN_BY_ACCURACY[0]
 SIZES = (1.0, 0.5, 0.25, 0.125)
 
 
@@ -49,18 +51,13 @@ class MadeUpScene:
 
 
 @dataclass(frozen=True)
-class MadeUpPlan(Plan[Any]):
-    asked: MadeUpScene | None = None
-
-
-@dataclass(frozen=True)
 class MadeUpSolution:
-    plan: MadeUpPlan
+    plan: Plan[Any]
 
 
-def _plan(scene: MadeUpScene) -> MadeUpPlan:
+def _plan(scene: MadeUpScene) -> Plan[Any]:
     seconds = 8.0**scene.mesh * (1.0 + 0.1 * scene.modes)
-    return MadeUpPlan(scene, {}, "full", (), {}, {}, seconds, 1e6 * seconds, 1)
+    return Plan(scene, {}, "full", (), {}, {}, seconds, 1e6 * seconds, 1)
 
 
 def _errors(scene: MadeUpScene) -> dict[str, float]:
@@ -76,40 +73,36 @@ class MadeUp:
 
     def __init__(self) -> None:
         self.solved: list[MadeUpScene] = []
-        falls = tuple(h**2 for h in SIZES)
         labels = ("1", "2", "4", "8")
-        knobs = [Knob((name,), name, labels, falls) for name in ("mesh", "modes")]
-        self.rounds = Rounds(
+        self.wanted = Wanted(
             lambda scene: [
-                Setting(knobs[0], lambda one, k: replace(one, mesh=k)),
-                Setting(knobs[1], lambda one, k: replace(one, modes=k)),
+                LevelChoice("mesh", "mesh", labels, lambda one, k: replace(one, mesh=k)),
+                LevelChoice("modes", "modes", labels, lambda one, k: replace(one, modes=k)),
             ],
             {"number": "number"},
-            lambda scene: replace(scene, want=("number",)),
-            self._make_plan,
+            _plan,
             self._solve,
             lambda solution: [Result("number", CASE, 1.0, "N")],
             self._estimate,
+            refuse_oversize,
+            chosen_by_accuracy,
+            lambda scene: replace(scene, want=("number",)),
         )
 
-    @staticmethod
-    def _make_plan(
-        asked: MadeUpScene, settings: Sequence[Setting], levels: Levels, scene: MadeUpScene
-    ) -> MadeUpPlan:
-        return _plan(scene)
-
-    def _solve(self, plan: MadeUpPlan, stages: Stages) -> MadeUpSolution:
+    def _solve(self, plan: Plan[Any], stages: Stages) -> MadeUpSolution:
         self.solved.append(plan.scene)
         return MadeUpSolution(plan)
 
     @staticmethod
-    def _estimate(solution: Any, numbers: Sequence[Result], stages: Stages) -> Estimates:
+    def _estimate(
+        solution: Any, numbers: Sequence[Result], stages: Stages, memo: list[Any]
+    ) -> Estimates:
         errors = _errors(solution.plan.scene)
         return {("number", CASE): tuple(ErrorPart(s, e, "") for s, e in errors.items())}
 
     def run(self, scene: MadeUpScene) -> tuple[Any, Estimates | None]:
         plan = replace(_plan(replace(scene, accuracy=None)), asked=scene)
-        return solve_to_accuracy(self.rounds, plan, Stages())
+        return solve_wanted(self.wanted, plan, Stages())
 
 
 def test_the_cheapest_levels_are_solved_whole_and_say_what_was_not_needed() -> None:
@@ -118,6 +111,7 @@ def test_the_cheapest_levels_are_solved_whole_and_say_what_was_not_needed() -> N
     # 0.2 / 16 + 0.002 <= 0.02: the mesh twice finer twice over, the modes as they are
     assert [(s.mesh, s.modes, s.want) for s in made.solved] == [
         (0, 0, ("number",)),
+        (1, 0, ("number",)),
         (2, 0, ("number",)),
         (2, 0, ("number", "more")),
     ]
@@ -126,8 +120,6 @@ def test_the_cheapest_levels_are_solved_whole_and_say_what_was_not_needed() -> N
     (effect,) = (e for e in solution.plan.effects if e.name == EFFECT)
     assert "raised: mesh 4" in effect.why
     assert "not needed above: modes 1" in effect.why
-    # (64 * 1.2) / 64
-    assert "one level for all, number 3, would take 1.2 times the seconds" in effect.why
     assert solution.plan.scene.accuracy is None
 
 
@@ -135,8 +127,8 @@ def test_a_wanted_number_that_a_run_withholds_is_not_reached() -> None:
     """Its error has no parts; the others are brought to theirs, and the run says what it lacks."""
     made = MadeUp()
     lost = withheld("number_2", CASE, "N", "no steady motion")
-    made.rounds = replace(
-        made.rounds,
+    made.wanted = replace(
+        made.wanted,
         governing={"all": "number*"},
         make_results=lambda solution: [Result("number", CASE, 1.0, "N"), lost],
     )
@@ -144,8 +136,8 @@ def test_a_wanted_number_that_a_run_withholds_is_not_reached() -> None:
         made.run(MadeUpScene(accuracy={"all": 0.02}))
     assert "reached are number" in str(error.value)
     assert made.solved[-1].mesh == 2
-    unwanted = replace(made.rounds, governing={"all": "number"})
-    made.rounds = unwanted
+    unwanted = replace(made.wanted, governing={"all": "number"})
+    made.wanted = unwanted
     assert made.run(MadeUpScene(accuracy={"all": 0.02}))[1] is not None
 
 
@@ -155,13 +147,15 @@ class WithAScatteringNumber(MadeUp):
     def __init__(self) -> None:
         super().__init__()
         numbers = [Result(name, CASE, 1.0, "N") for name in ("number", "scattering")]
-        self.rounds = replace(
-            self.rounds, governing={"all": "*"}, make_results=lambda solution: numbers
+        self.wanted = replace(
+            self.wanted, governing={"all": "*"}, make_results=lambda solution: numbers
         )
 
     @staticmethod
-    def _estimate(solution: Any, numbers: Sequence[Result], stages: Stages) -> Estimates:
-        parts = MadeUp._estimate(solution, numbers, stages)["number", CASE]
+    def _estimate(
+        solution: Any, numbers: Sequence[Result], stages: Stages, memo: list[Any]
+    ) -> Estimates:
+        parts = MadeUp._estimate(solution, numbers, stages, memo)["number", CASE]
         lost = (*parts[:1], replace(parts[1], error=0.05))
         return {("number", CASE): parts, ("scattering", CASE): lost}
 
@@ -171,8 +165,8 @@ def test_a_number_out_of_reach_is_given_up_and_the_others_are_reached() -> None:
     with pytest.raises(ConvergenceError) as failed:
         made.run(MadeUpScene(accuracy=0.004))
     told = str(failed.value)
-    assert "expected to reach scattering: most of it by modes, 13 times its accuracy" in told
-    assert "reached are number, with mesh 8" in told
+    assert "scattering: most of it by modes, 13 times its accuracy" in told
+    assert "reached are number; rounds: all at their lowest: " in told
     # 0.2 / 64 by the mesh, which the number out of reach had raised with the modes
     (parts,) = (failed.value.estimates["number", CASE],)
     assert sum(p.error for p in parts) <= 0.004
@@ -185,8 +179,10 @@ class WithANumberThatSettles(WithAScatteringNumber):
     """The other number no longer scatters on the finest mesh."""
 
     @staticmethod
-    def _estimate(solution: Any, numbers: Sequence[Result], stages: Stages) -> Estimates:
-        parts = MadeUp._estimate(solution, numbers, stages)["number", CASE]
+    def _estimate(
+        solution: Any, numbers: Sequence[Result], stages: Stages, memo: list[Any]
+    ) -> Estimates:
+        parts = MadeUp._estimate(solution, numbers, stages, memo)["number", CASE]
         # 1/64 of it is too much as well
         lost = (*parts[:1], replace(parts[1], error=0.5))
         settled = solution.plan.scene.mesh == 3
@@ -211,7 +207,7 @@ def test_numbers_alone_are_not_solved_twice() -> None:
 def test_a_scene_without_an_accuracy_runs_as_it_is() -> None:
     made = MadeUp()
     plan = _plan(MadeUpScene())
-    assert solve_to_accuracy(made.rounds, plan, Stages()) == (MadeUpSolution(plan), None)
+    assert solve_wanted(made.wanted, plan, Stages()) == (MadeUpSolution(plan), None)
 
 
 @pytest.mark.parametrize(
@@ -239,12 +235,81 @@ def test_a_name_that_no_number_has_is_refused_in_the_first_round() -> None:
     assert len(made.solved) == 1
 
 
-def test_meshes_are_expected_to_gain_what_second_order_gives() -> None:
-    """Two levels 3 e(1), three 3 e(2), four whose orders agree 1.25 e(2); e(p) of q = 1 + c h^2."""
-    first, *others = mesh_falls((1, 2, 3, 4))
-    assert first == 1.0
-    # of the first 9 c; then 3 (c - c/4) / (2 - 1), 3 c/9, 1.25 c/16
-    assert others == pytest.approx([2.25 / 9.0, (1 / 3) / 9.0, (1.25 / 16) / 9.0], rel=2e-3)
+@pytest.mark.parametrize("seed", range(20))
+def test_rounds_raise_one_source_at_a_time_until_all_is_reached(seed: int) -> None:
+    """Errors that fall by any power: levels only rise, and no source that leaves less than an even
+    part of the accuracy is raised.
+    """
+    rng = np.random.default_rng(seed)
+    power = rng.uniform(0.5, 3.0, 2)
+    first = 0.02 * 10.0 ** rng.uniform(-1.0, 1.0, 2)
+
+    def errors(scene: MadeUpScene) -> dict[str, float]:
+        sizes = SIZES[scene.mesh], SIZES[scene.modes]
+        found = (float(e * h**p) for e, h, p in zip(first, sizes, power, strict=True))
+        return dict(zip(("mesh", "modes"), found, strict=True))
+
+    made = MadeUp()
+    made.wanted = replace(
+        made.wanted,
+        estimate=lambda solution, numbers, stages, memo: {
+            ("number", CASE): tuple(
+                ErrorPart(s, e, "") for s, e in errors(solution.plan.scene).items()
+            )
+        },
+    )
+    asked = MadeUpScene(accuracy=0.02, want=("number",))
+    try:
+        made.run(asked)
+    except ConvergenceError:
+        left = errors(made.solved[-1])
+        most = max(left, key=lambda source: left[source])
+        assert getattr(made.solved[-1], most) == len(SIZES) - 1
+    for before, after in pairwise(made.solved):
+        raised = [s for s in ("mesh", "modes") if getattr(after, s) > getattr(before, s)]
+        assert len(raised) == 1
+        assert after.mesh + after.modes == before.mesh + before.modes + 1
+        assert errors(before)[raised[0]] >= 0.5 * 0.02
+        assert sum(errors(before).values()) > 0.02
+
+
+def test_the_source_that_leaves_most_for_its_seconds_is_raised() -> None:
+    search = LevelSearch(MadeUp().wanted, MadeUpScene(accuracy=0.02))
+    key = ("number", CASE)
+    # a finer mesh takes 7 s more, more modes 0.1 s
+    assert search.raised((0, 0), {key: {"mesh": 5.0, "modes": 1.0}}) == (0, 1)
+    assert search.raised((0, 0), {key: {"mesh": 5.0, "modes": 0.4}}) == (1, 0)
+    assert search.raised((0, 0), {key: {"mesh": 0.5, "modes": 0.5}}) is None
+    # most of it is on its highest level, or is not known
+    assert search.raised((3, 0), {key: {"mesh": 5.0, "modes": 1.0}}) is None
+    assert search.raised((0, 0), {key: {"mesh": math.nan, "modes": 9.0}}) is None
+    # without any bound the first source, which another level shows
+    assert search.raised((0, 0), None) == (1, 0)
+
+
+def test_shares_are_errors_over_what_is_wanted_of_the_number() -> None:
+    found = shares_of(
+        {
+            ("peak_1_frequency", CASE): (
+                ErrorPart("mesh", 0.004, ""),
+                ErrorPart("mesh", 0.002, ""),
+            ),
+            ("peak_1_accelerance", CASE): (ErrorPart("modes", 0.05, ""),),
+            ("static_N", CASE): (ErrorPart("mesh", 0.5, ""),),
+        },
+        {"peak_?_frequency": 0.002, "peak_?_accelerance": 0.05},
+    )
+    assert found == {
+        ("peak_1_frequency", CASE): {"mesh": pytest.approx(3.0)},
+        ("peak_1_accelerance", CASE): {"modes": pytest.approx(1.0)},
+    }
+
+
+def test_names_that_no_number_has_are_refused() -> None:
+    numbers = [Result("K_N", CASE, 1.0, "N/mm")]
+    require_named({"K_*": 0.01}, numbers)
+    with pytest.raises(InputError, match=r"accuracy: K_X, K_Y: this run has no number .* K_N"):
+        require_named({"K_X": 0.01, "K_Y": 0.01, "K_N": 0.1}, numbers)
 
 
 #: a response that takes seconds: at this F_C/F_E every point sticks

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from upd.analyses import analysis_of, make_plan
-from upd.analyses.contact import left_out
+from upd.analyses.contact import effects as left_out
 from upd.analyses.contact.loading import Sheared
 from upd.progress import Stages
 from upd.results import Check

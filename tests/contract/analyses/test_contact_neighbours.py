@@ -10,7 +10,7 @@ import pytest
 
 from upd.analyses.contact.levels import levels
 from upd.analyses.contact.neighbours import neighbours_seconds
-from upd.analyses.hertz.plan import make_plan
+from upd.analyses.contact.plans import make_plan
 from upd.analyses.hertz.results import make_results
 from upd.analyses.hertz.samples import sample
 from upd.analyses.hertz.solve import solve_plan

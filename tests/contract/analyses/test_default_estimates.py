@@ -9,7 +9,7 @@ import pytest
 
 import upd
 from upd.analyses import analysis_of, make_plan
-from upd.analyses.flat import accuracy as flat_accuracy
+from upd.analyses.flat.accuracy import WANTED
 from upd.errors import InputError
 from upd.plot.chart import Entry
 from upd.plot.matplotlib import draw
@@ -132,14 +132,19 @@ def test_an_accuracy_is_reached_on_the_cheapest_level() -> None:
     finer = {"geometry.divisions": 16, "geometry.divisions_long": 32, "accuracy": "unknown"}
     fine = upd.run("symmetric", overrides=WEDGE | finer)
     assert abs(row.value / fine.value("K_N_secant_raw") - 1.0) <= row.estimated_error
-    assert any(e["name"] == "mesh chosen by accuracy" for e in found.effects)
+    assert any(e["name"] == "levels chosen by accuracy" for e in found.effects)
+
+
+def _levels(scene: Any) -> list[Any]:
+    (mesh,) = WANTED.choices(scene)
+    return [mesh.at(scene, k) for k in range(len(mesh.labels))]
 
 
 def test_levels_of_a_flat_contact_have_twenty_nodes() -> None:
     """Unless the scene has elements of 27: the far end under its bands takes more than 8."""
     for element, there in (("hex8i", "hex20"), ("hex8", "hex20"), ("hex27", "hex27")):
         scene = load_scene("symmetric", WEDGE | {"accuracy": "1 %", "mesh.element": element})
-        assert {make().mesh.element for make in flat_accuracy.LADDER.scenes(scene)} == {there}
+        assert {one.mesh.element for one in _levels(scene)} == {there}
         assert make_plan(scene).scene.mesh.element == there
 
 
@@ -148,14 +153,13 @@ def test_levels_of_pads_have_thin_elements_under_the_wires() -> None:
     given = {"accuracy": "1 %", "geometry.divisions": 8, "geometry.divisions_long": 18}
     names = ("divisions", "divisions_long", "first_layer", "bottom_layer")
     for more, layer in (({}, 1.0), ({"geometry.bottom_layer": 0.5}, 0.5)):
-        levels = flat_accuracy.LADDER.scenes(load_scene("asymmetric", given | more))
-        found = [[make().geometry[name] for name in names] for make in levels]
+        levels = _levels(load_scene("asymmetric", given | more))
+        found = [[one.geometry[name] for name in names] for one in levels]
         assert found[:3] == [[k, 9 * k // 2, 0.5, layer] for k in (2, 4, 6)]
 
 
 def test_levels_of_a_wedge_have_an_even_number_along_it() -> None:
-    levels = flat_accuracy.LADDER.scenes(load_scene("symmetric", {"accuracy": "1 %"}))
-    found = [make().geometry for make in levels]
+    found = [one.geometry for one in _levels(load_scene("symmetric", {"accuracy": "1 %"}))]
     assert [g["divisions"] for g in found[:4]] == [4, 6, 8, 12]
     assert [g["divisions_long"] for g in found[:4]] == [12, 16, 22, 34]
     assert not any("bottom_layer" in g for g in found)

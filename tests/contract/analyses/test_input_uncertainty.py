@@ -20,13 +20,13 @@ from upd.analyses import analysis_of
 from upd.analyses.forced import paths, peaks
 from upd.analyses.forced.input_uncertainty import input_changes
 from upd.analyses.forced.solution import ForcedSolution
-from upd.analyses.input_uncertainty import input_ends, input_parts
 from upd.hbm import Settings, climb
 from upd.hbm.balance import Balance
 from upd.hbm.starts import newton
 from upd.progress import Stages
 from upd.results import Case, InputPart, Result
 from upd.scene import load_scene
+from upd.vary.inputs import input_ends, input_parts
 
 SPHERE = {
     "geometry.divisions": 12,

@@ -4,7 +4,8 @@ accuracy.
 
 import json
 import weakref
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,8 @@ import pytest
 
 from upd import load_scene, make_plan, run
 from upd.analyses.base import Plan
-from upd.analyses.contact import accuracy
-from upd.analyses.hertz.accuracy import LADDER
+from upd.analyses.contact.levels import level_of
+from upd.analyses.hertz.accuracy import PROBLEM, WANTED
 from upd.batch.curves import make_curves
 from upd.batch.engine import Progress, Workers
 from upd.batch.parameter_study import parameter_points, parameter_rows
@@ -22,13 +23,16 @@ from upd.batch.studies import STUDIES, plan_study, run_study, study, study_worke
 from upd.cli import main
 from upd.errors import ConvergenceError, InputError
 from upd.linalg import select
+from upd.progress import Stages
 from upd.results import Case, Result
+from upd.vary import errors
+from upd.vary.wanted import plan_wanted, solve_wanted
 
 pytestmark = pytest.mark.estimated
 
 LIGHT = {"want": ["normal"], "loads.normal": ["200 N"], "geometry.patch": "auto"}
 #: levels of made-up numbers, which have no neighbouring loads
-UNSAMPLED = replace(LADDER, problem=replace(LADDER.problem, sample=None))
+UNSAMPLED = partial(errors.estimate_in_round, replace(PROBLEM, sample=None), level_of)
 #: one after the other, in this process, as a single run would
 HERE = Workers(0, 0)
 
@@ -220,16 +224,36 @@ def test_command_prints_points_and_errors(
     assert "2 points kept from an earlier call" in capsys.readouterr().out
 
 
+@dataclass(frozen=True)
+class Solved:
+    """What a made-up solver leaves: its plan, its numbers, what takes the memory."""
+
+    plan: Plan
+    value: float
+    factors: Any = None
+
+
 def synthetic(order: float, amount: float, more: float = 0.0):
     """A solver whose error is amount (h / a)^order, and more of one order higher."""
 
-    def solve(plan: Plan) -> tuple[str, tuple[Result, ...], float]:
+    def solve(plan: Plan, stages: Stages) -> Solved:
         h = float(plan.parameters["patch"]) / float(plan.parameters["divisions"])
         size = h / 0.189686
-        value = 1000.0 * (1.0 + amount * size**order * (1.0 + more * size))
-        return "solved", (Result("max_pressure", Case(load=200.0), value, "MPa"),), 1.0
+        return Solved(plan, 1000.0 * (1.0 + amount * size**order * (1.0 + more * size)))
 
     return solve
+
+
+def choose(target: float, solve: Any) -> tuple[Any, Any]:
+    """The level of the ready sphere that reaches the accuracy with a made-up solver."""
+    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "accuracy": target})
+
+    def numbers(solved: Solved) -> list[Result]:
+        return [Result("max_pressure", Case(load=200.0), solved.value, "MPa")]
+
+    wanted = replace(WANTED, solve=solve, make_results=numbers, estimate=UNSAMPLED)
+    plan = plan_wanted(wanted, wanted.make_plan, scene)
+    return solve_wanted(wanted, plan, Stages())
 
 
 @pytest.mark.parametrize("more", [-0.5, 0.0, 0.5])
@@ -241,59 +265,54 @@ def test_accuracy_is_reached_whatever_the_order(
     order: float, target: float, amount: float, more: float
 ) -> None:
     """The solver's order is none the code could assume."""
-    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "accuracy": target})
-    level, estimates = accuracy.choose(UNSAMPLED, scene, synthetic(order, amount, more))
-    true = abs(level.results[0].value / 1000.0 - 1.0)
+    solved, estimates = choose(target, synthetic(order, amount, more))
+    true = abs(solved.value / 1000.0 - 1.0)
     estimated = estimates["max_pressure", "F=200 N"][0].error
     assert true <= estimated <= target
 
 
 def test_accuracy_of_an_order_that_levels_confirm_costs_no_more_than_needed() -> None:
-    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "accuracy": 0.005})
-    level, estimates = accuracy.choose(UNSAMPLED, scene, synthetic(1.5, 0.2))
-    true = abs(level.results[0].value / 1000.0 - 1.0)
+    solved, estimates = choose(0.005, synthetic(1.5, 0.2))
+    true = abs(solved.value / 1000.0 - 1.0)
     estimated = estimates["max_pressure", "F=200 N"][0].error
     # Roache's 1.25, and the rounding of divisions to even numbers, which moves the ratios.
     assert 1.2 * true < estimated < 1.35 * true
 
 
 def test_accuracy_out_of_reach_is_said() -> None:
-    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "accuracy": 1e-6})
     with pytest.raises(ConvergenceError, match="ask for less"):
-        accuracy.choose(UNSAMPLED, scene, synthetic(1.0, 0.3))
+        choose(1e-6, synthetic(1.0, 0.3))
 
 
 def test_a_level_is_let_go_before_the_next_is_solved() -> None:
     """Its factors are the memory of the next."""
-    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "accuracy": 0.005})
     made_up, held = synthetic(1.5, 0.2), list[weakref.ref[Any]]()
 
     class Factors:
         pass
 
-    def solve(plan: Plan) -> tuple[Factors, tuple[Result, ...], float]:
+    def solve(plan: Plan, stages: Stages) -> Solved:
         assert [one for one in held if one() is not None] == []
         factors = Factors()
         held.append(weakref.ref(factors))
-        return factors, *made_up(plan)[1:]
+        return replace(made_up(plan, stages), factors=factors)
 
-    level, _ = accuracy.choose(UNSAMPLED, scene, solve)
+    solved, _ = choose(0.005, solve)
     assert len(held) > 2
-    assert held[-1]() is level.solved
+    assert held[-1]() is solved.factors
 
 
 def test_a_refused_later_level_ends_as_out_of_reach() -> None:
-    scene = load_scene("hertz", {**LIGHT, "geometry.divisions": "auto", "accuracy": 1e-6})
     made_up, solved = synthetic(1.0, 0.3), []
 
-    def solve(plan: Plan) -> tuple[str, tuple[Result, ...], float]:
+    def solve(plan: Plan, stages: Stages) -> Solved:
         if solved:
             raise InputError("the contact reaches the rim")
         solved.append(plan)
-        return made_up(plan)
+        return made_up(plan, stages)
 
     with pytest.raises(ConvergenceError, match=r"reaches the rim.*ask for less"):
-        accuracy.choose(UNSAMPLED, scene, solve)
+        choose(1e-6, solve)
 
 
 def test_accuracy_of_the_real_scene() -> None:

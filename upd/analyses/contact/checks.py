@@ -6,12 +6,15 @@ Balance, one-sided contact, Coulomb's limit, what the effects left out stand on.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.contact.loading import LoadPath, Sheared, tangential_compliance
-from upd.analyses.contact.plan import ContactPlan
+from upd.analyses.contact.coupled import as_normal, opened_by_shear, shear_nodes
+from upd.analyses.contact.effects import checks_of
+from upd.analyses.contact.loading import LoadPath, Sheared, tangential_compliance, tilt_arms
+from upd.analyses.contact.plan import NORMAL, ContactPlan
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
 from upd.reference import dundurs_beta
@@ -179,6 +182,53 @@ def tangential_checks(case: Case, model: ContactModel, t: Sheared) -> list[Check
     ]
 
 
+def pressed_checks(
+    plan: ContactPlan, model: ContactModel, case: Any, carried: float, tilted: Array | None = None
+) -> list[Check]:
+    """Of a normal load: `normal_checks`, and those of the shear that pressure alone makes.
+
+    Parameters
+    ----------
+    case
+        A normal load of a solution.
+    carried
+        Sum of the contact forces on the whole contact, N.
+    tilted
+        (n,) mm that a free tilt adds to the approach.
+    """
+    checks, turned = [], np.zeros(len(model.gap)) if tilted is None else tilted
+    if case.state is not None:
+        nodes = shear_nodes(model, plan.scene.contact.friction, case.state)
+        checks = tangential_checks(case.case, model, nodes)
+        turned = turned - opened_by_shear(model, case.state)
+    C, load = model.compliance(NORMAL), case.case.load
+    return [
+        *checks,
+        *normal_checks(
+            case.case, load, case.solution, C, model.gap, carried, case.reaction, turned
+        ),
+    ]
+
+
+def sheared_checks(plan: ContactPlan, model: ContactModel, t: Any) -> list[Check]:
+    """Of a tangential load of a solution: `tangential_checks`, and where the pressure follows the
+    shear `normal_checks` of the forces under it.
+    """
+    checks = tangential_checks(t.case, model, t.nodes)
+    if t.state is None:
+        return checks
+    answer = as_normal(t.state, float("nan"))
+    turned = -opened_by_shear(model, t.state)
+    if t.state.motion[3:].size:
+        turned = turned + tilt_arms(plan, model) @ t.state.motion[3:]
+    C, carried = model.compliance(NORMAL), float(answer.unclipped.sum())
+    load = t.normal.case.load
+    return [
+        *checks,
+        *normal_checks(t.case, load, answer, C, model.gap, carried, {}, turned),
+    ]
+
+
 def loop_check(path: LoadPath) -> Check:
     """Area of a cycle's loop against the work of slip."""
     error = abs(path.loop_area / path.slip_work - 1.0) if path.slip_work else path.loop_area
@@ -186,7 +236,16 @@ def loop_check(path: LoadPath) -> Check:
     return Check("loop area", path.case, error, 1e-2, "|loop area / slip work - 1|", remedy)
 
 
-def coupling_check(scene: Scene, model: ContactModel) -> Check:
+def left_out_checks(solution: Any) -> list[Check]:
+    """Of the effects left out of a solution."""
+    plan, scene = solution.plan, solution.plan.scene
+    checks = checks_of(solution.left_out, scene)
+    if plan.effect("friction") and not scene.coupled:
+        checks.append(_coupling_check(scene, solution.model))
+    return checks
+
+
+def _coupling_check(scene: Scene, model: ContactModel) -> Check:
     """How far the materials are from shearing a contact of half-spaces by pressure alone.
 
     Bodies of finite shape couple the two problems whatever their materials: nearly not at all

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from upd.analyses.base import require_memory
+from upd.analyses.base import chosen_by_accuracy, refuse_oversize, require_memory
 from upd.analyses.contact.neighbours import has_neighbours, neighbours_seconds
-from upd.analyses.contact.plan import ContactPlan, contact_plan, refined_growth
+from upd.analyses.contact.plan import ContactPlan, contact_plan, is_curved, refined_growth
 from upd.mesh import recipes
 from upd.progress import Stages
 from upd.results import Result
 from upd.scene import Scene
 from upd.scene.contact import Loads
+from upd.vary.errors import estimate_in_round
 from upd.vary.scatter import Samples
 from upd.vary.solve import varied_plan
-from upd.vary.variation import ALONE, COARSER, Levels, Overrides, Problem, Variation
+from upd.vary.variation import ALONE, COARSER, POWER, Levels, Overrides, Problem, Variation
+from upd.vary.wanted import LevelChoice, Wanted
 
 #: fewest divisions of a level
 FEWEST = 4
@@ -27,10 +30,8 @@ MESH = "mesh"
 _COARSEST = "the mesh cannot be made coarser: its recipe has no divisions to lower"
 #: outputs that a level need not give: no number of them is estimated, and they cost
 _SPARED = ("fields", "curve")
-#: power of the divisions that the seconds of a level grow with where its mesh is not known: a
-#: direct solver's on a solid, n^2 of n = N^3
-POWER = 6.0
-#: and its memory: the entries of a factor by nested dissection, n^(4/3) (A. George, 1973)
+#: power of the divisions that the memory of a level grows with: the entries of a factor by nested
+#: dissection, n^(4/3) (A. George, 1973)
 MEMORY_POWER = 4.0
 #: parameters of a recipe that the load may size
 SIZED_BY_LOAD = ("patch", "core_depth")
@@ -75,7 +76,7 @@ def coarser_divisions(plan: ContactPlan, ratios: Sequence[float]) -> list[int]:
     usual = plan.parameters.get("divisions")
     if not isinstance(usual, int) or usual <= FEWEST:
         return []
-    step = 2 if plan.scene.analysis == "curved contact" else 1
+    step = 2 if is_curved(plan.scene) else 1
     first, last = min(ratios), min(max(ratios), usual / FEWEST)
     found: list[int] = []
     for ratio in np.geomspace(first, max(first, last), len(ratios)):
@@ -125,7 +126,7 @@ def levels(plan: ContactPlan) -> Levels:
     None where the scene wants none, and for a recipe without divisions.
     """
     scene = plan.scene
-    if not scene.estimates or plan.asked is not None:
+    if not scene.estimates:
         return Levels(())
     # Neighbouring loads show on half the divisions what the dearest level would.
     ratios = COARSER[1:] if has_neighbours(scene) else COARSER
@@ -153,8 +154,9 @@ def mesh_problem(
     return Problem(make_plan, solve, make_results, bare, (MESH,), levels, half_cost, sample)
 
 
-def with_estimates(problem: Problem, plan: ContactPlan) -> ContactPlan:
-    """The plan with what its levels cost."""
+def plan_with_estimates(problem: Problem, scene: Scene) -> ContactPlan:
+    """The plan of a scene with what its levels cost."""
+    plan: ContactPlan = problem.make_plan(scene)
     made = levels(plan).variations
     again = sum(_seconds(problem, plan, one) for one in made)
     again += neighbours_seconds(plan) if made else 0.0
@@ -173,6 +175,52 @@ def _seconds(problem: Problem, plan: ContactPlan, one: Variation) -> float:
         return plan.solve_seconds * float(one.size**-POWER) + neighbours_seconds(plan)
     level: ContactPlan = varied_plan(problem, plan.scene, one)
     return level.solve_seconds + neighbours_seconds(level)
+
+
+def wanted(
+    problem: Problem,
+    choices: Callable[[Scene], Sequence[LevelChoice]],
+    governing: Sequence[str],
+    first: Callable[[float], int],
+) -> Wanted:
+    """A contact whose mesh is chosen by an accuracy.
+
+    Parameters
+    ----------
+    choices
+        scene -> its meshes.
+    governing
+        Names of the numbers (shell patterns) that one accuracy for all is asked of.
+    first
+        accuracy -> the level that a plan predicts.
+    """
+
+    def predicted(scene: Scene) -> list[Scene]:
+        asked = scene.wanted_accuracy
+        least = min(asked.values()) if isinstance(asked, Mapping) else asked
+        assert least is not None
+        (choice,) = choices(scene)
+        return [choice.at(scene, k) for k in range(min(first(least) + 1, len(choice.labels)))]
+
+    return Wanted(
+        choices,
+        {name: name for name in governing},
+        problem.make_plan,
+        problem.solve,
+        problem.make_results,
+        partial(estimate_in_round, problem, level_of),
+        refuse_oversize,
+        chosen_by_accuracy,
+        predicted=predicted,
+    )
+
+
+def level_of(plan: ContactPlan) -> Variation:
+    known = plan.parameters
+    counts = (str(known[n]) for n in ("divisions_long", "divisions") if n in known)
+    edge = next((n for n in ("patch", "patch_length", "pad_length") if n in known), None)
+    size = spacing(known) * (1.0 if edge is None else float(known[edge]))
+    return Variation(MESH, " x ".join(counts) + " divisions", size=size)
 
 
 def half_cost(plan: ContactPlan, source: str, seconds: float, order: float) -> float:

@@ -12,16 +12,56 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.analyses.contact.plan import ACROSS, ALONG, ContactPlan, axis_of
 from upd.contact.model import Body, ContactModel
 from upd.contact.tangential import TangentialPath, tangential_path
 from upd.contact.tangential_step import TangentialHistory
 from upd.results import Case
+from upd.scene import Scene
 
 Array = NDArray[np.float64]
 
 #: Relative step of load on both sides of a load over which a slope of the force-approach curve is
 #: taken; the curvature of Hertz's F ~ d^(3/2) makes it 0.074 LOAD_STEP^2 too soft.
 LOAD_STEP = 0.1
+
+
+def contact_points_of(model: ContactModel) -> Array:
+    """(n, 3) the contact nodes that carry forces, in contact axes, mm."""
+    points: Array = model.lower.mesh.points[model.lower.contact[model.multipliers.nodes]]
+    return points
+
+
+def load_point(plan: ContactPlan, model: ContactModel) -> Array:
+    """(2,) where the load line meets the contact plane, contact axes in mm."""
+    upper = model.upper
+    if plan.scene.contact.load_point is not None:
+        low: Array = contact_points_of(model)[:, :2].min(axis=0)
+        return np.asarray(low + np.array(plan.scene.contact.load_point))
+    nodes = upper.mesh.points[upper.mesh.nodes["distant"], :2]
+    weights = upper.mesh.weights.get("distant")
+    # Middle of the set's extent: its nodes need not be evenly spread. Weights say where it is.
+    middle = (
+        0.5 * (nodes.min(axis=0) + nodes.max(axis=0))
+        if weights is None
+        else np.asarray(weights @ nodes / weights.sum())
+    )
+    return np.asarray(middle if 0 not in plan.mirrors else middle * np.array([0.0, 1.0]))
+
+
+def tilt_arms(plan: ContactPlan, model: ContactModel, *, held: bool | None = None) -> Array:
+    """(n, k) mm from the load line to the nodes, for the k free tilts.
+
+    ``held``: in place of what the scene says.
+    """
+    if plan.scene.contact.tilt != "free" if held is None else held:
+        return np.zeros((len(model.gap), 0))
+    return contact_points_of(model)[:, :2] - load_point(plan, model)
+
+
+def slip_components(scene: Scene, direction: float) -> tuple[int, ...]:
+    """Components of a tangential load in a direction (degrees from x)."""
+    return (ALONG, ACROSS) if scene.slip_directions == 2 else (axis_of(direction),)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.contact.plan import ContactPlan, add_loads
+from upd.analyses.contact.plan import ContactPlan, add_loads, is_curved
 from upd.analyses.cost import CostModel
 from upd.scene import Scene
 from upd.vary.scatter import RADIUS
@@ -32,7 +32,7 @@ def has_neighbours(scene: Scene) -> bool:
     """Whether neighbouring loads are cheap: not where the pressure follows the shear, as every load
     then is the end of a march.
     """
-    return scene.analysis == "curved contact" and not scene.coupled and max(scene.loads.forces) > 0
+    return is_curved(scene) and not scene.coupled and max(scene.loads.forces) > 0
 
 
 def neighbours(touching: int) -> list[float]:

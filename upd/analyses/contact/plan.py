@@ -58,8 +58,6 @@ class ContactPlan(Plan[Scene]):
     ----------
     families
         Its load families.
-    asked
-        The scene as asked for, where that leaves the mesh to an accuracy.
     companion
         A coarser whole model with all directions at once, on which numbers are solved again with
         effects left out.
@@ -71,7 +69,6 @@ class ContactPlan(Plan[Scene]):
     """
 
     families: tuple[Family, ...] = ()
-    asked: Scene | None = None
     companion: ContactPlan | None = None
     solve_seconds: float = 0.0
     otherwise: Mapping[str, Any] | None = None
@@ -84,6 +81,11 @@ class ContactPlan(Plan[Scene]):
         return tuple(
             sorted({"xyz".index(name[-1]) for family in self.families for name in family.mirror})
         )
+
+
+def is_curved(scene: Scene) -> bool:
+    """Whether the faces are curved: their contact set depends on the load."""
+    return scene.analysis == "curved contact"
 
 
 def contact_plan(
@@ -166,7 +168,7 @@ def contact_plan(
 
 def _may_learn(scene: Scene) -> bool:
     """Whether products may serve instead of a condensation."""
-    return scene.analysis == "curved contact" and not scene.coupled
+    return is_curved(scene) and not scene.coupled
 
 
 def _products(scene: Scene, effects: Sequence[Effect], family: Family) -> int:
@@ -250,7 +252,7 @@ def add_loads(
     forces = n_load * (3 if scene.wants("stiffness") else 1) + n_curve
     cost.seconds += forces * (_LOAD_S + dense_s(k**3 / 6.0))
     if "friction" in on:
-        curved = scene.analysis == "curved contact"
+        curved = is_curved(scene)
         lines = 1 if curved else len(scene.loads.directions)
         tangential = ratios if scene.wants("tangential") else 0
         cost.seconds += n_load * lines * tangential * (_TANGENTIAL_S + dense_s(3.0 * k**3))
@@ -264,7 +266,7 @@ def add_loads(
         cost.kept_bytes += 64.0 * n_load * lines * tangential * k
     cost.kept_bytes += 64.0 * forces * k
     if scene.coupled:
-        _add_coupled(cost, scene, k, forces, curved=scene.analysis == "curved contact")
+        _add_coupled(cost, scene, k, forces, curved=is_curved(scene))
     if "internal displacement" in on:
         inside = n_load * (2 if "friction" in on else 1) + n_curve
         cost.seconds += inside * solve
@@ -293,7 +295,7 @@ def _add_coupled(cost: CostModel, scene: Scene, k: int, forces: int, *, curved: 
 
 def _files_seconds(scene: Scene, size: Mapping[str, Mapping[str, int]]) -> float:
     """Seconds of figures, files and page."""
-    flat = 0.0 if scene.analysis == "curved contact" else _FLAT_S
+    flat = 0.0 if is_curved(scene) else _FLAT_S
     nodes = sum(c["nodes"] for c in size.values()) if scene.wants("fields") else 0
     # A table row, a group of arrays and a curve per load.
     loads = len(scene.loads.normal) * (1 + len(scene.loads.tangential))
@@ -411,7 +413,7 @@ def require_contact_sets(
 def _patch_problem(scene: Scene, mesh: Mesh) -> str:
     """What is wrong with the node sets contact_..., which are patches of their own, or ""."""
     patches = [name for name in mesh.nodes if name.startswith("contact_")]
-    if scene.analysis == "curved contact" and len(patches) > 1:
+    if is_curved(scene) and len(patches) > 1:
         flat = (
             "bring the contact nodes of both bodies into one plane, which makes the contact of a "
             "mesh file flat"

@@ -16,20 +16,18 @@ order beside what the contact leaves.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 from typing import Any, Final
 
-from upd.analyses.contact import accuracy
-from upd.analyses.contact.accuracy import AccuracyLadder
-from upd.analyses.contact.levels import FEWEST, level_geometry, mesh_problem
-from upd.analyses.flat.plan import make_plan
+from upd.analyses.contact.levels import FEWEST, MESH, level_geometry, mesh_problem, wanted
+from upd.analyses.contact.plans import make_plan
 from upd.analyses.flat.results import make_results
 from upd.analyses.flat.solve import solve_plan
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import Scene
+from upd.vary.wanted import LevelChoice
 
 #: Numbers one accuracy for all is asked of: stiffnesses. The pressure at the edges of flat faces
 #: grows under refinement without a limit.
@@ -47,7 +45,7 @@ _UNDER_WIRES, _AT_CONTACT = 1.0, 0.5
 _ELEMENT: Final = "hex20"
 
 
-def _scenes(scene: Scene) -> list[Callable[[], Scene]]:
+def _choices(scene: Scene) -> list[LevelChoice]:
     """The scene with a share of its divisions, and more."""
     if not isinstance(scene.geometry.get("divisions"), int):
         raise InputError(
@@ -61,7 +59,8 @@ def _scenes(scene: Scene) -> list[Callable[[], Scene]]:
     usual, fewest = geometry["divisions"], 2 if wires else FEWEST
     shares = _SHARES_OF_WIRES if wires else _SHARES
     counts = dict.fromkeys(max(fewest, 2 * round(0.5 * share * usual)) for share in shares)
-    return [partial(_level, plain, n, 1 if wires else 2) for n in counts]
+    levels = [_level(plain, n, 1 if wires else 2) for n in counts]
+    return [LevelChoice(MESH, "mesh", [f"{n} divisions" for n in counts], lambda _, k: levels[k])]
 
 
 def _for_wires(geometry: Mapping[str, Any]) -> dict[str, Any]:
@@ -81,13 +80,5 @@ def _level(scene: Scene, divisions: int, step: int) -> Scene:
     return replace(scene, geometry={**scene.geometry, **own})
 
 
-def _first(scene: Scene, target: float) -> int:
-    del target
-    return min(_PREDICTED, len(_scenes(scene)) - 1)
-
-
 PROBLEM = mesh_problem(make_plan, solve_plan, make_results)
-LADDER = AccuracyLadder(PROBLEM, _scenes, GOVERNING, _first)
-plan_to_accuracy = partial(accuracy.plan_to_accuracy, LADDER)
-solve_to_accuracy = partial(accuracy.solve_to_accuracy, LADDER)
-estimate = partial(accuracy.estimate, LADDER)
+WANTED = wanted(PROBLEM, _choices, GOVERNING, lambda target: _PREDICTED)

@@ -6,12 +6,9 @@ import numpy as np
 
 from upd.analyses.contact import checks as common
 from upd.analyses.contact import yielding
-from upd.analyses.contact.coupled import as_normal, opened_by_shear, shear_nodes
-from upd.analyses.contact.left_out import checks_of
-from upd.analyses.contact.plan import NORMAL
+from upd.analyses.contact.loading import contact_points_of, load_point
 from upd.analyses.flat.maps import lattices
-from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
-from upd.analyses.flat.solve import contact_points_of, load_point, tilt_arms
+from upd.analyses.flat.solution import FlatNormalCase, FlatSolution
 from upd.results import Check
 
 
@@ -25,7 +22,8 @@ def check_solution(solution: FlatSolution) -> list[Check]:
         if case.force > 0.0
         for check in _normal_checks(solution, case)
     ]
-    checks += [check for t in solution.tangential for check in _tangential_checks(solution, t)]
+    for t in solution.tangential:
+        checks += common.sheared_checks(solution.plan, solution.model, t)
     checks += [common.loop_check(path) for path in solution.paths if path.cycle]
     checks += _yield_checks(solution)
     return common.with_missing(solution.plan, [*checks, *_left_out(solution)])
@@ -58,34 +56,19 @@ def _yield_checks(solution: FlatSolution) -> list[Check]:
 
 
 def _normal_checks(solution: FlatSolution, case: FlatNormalCase) -> list[Check]:
-    model, s = solution.model, case.solution
-    carried = solution.plan.copies * float(s.force.sum())
-    C, more = model.compliance(NORMAL), []
-    turned = np.zeros(len(C))
-    if case.state is not None:
-        nodes = shear_nodes(model, solution.plan.scene.contact.friction, case.state)
-        more = common.tangential_checks(case.case, model, nodes)
-        turned = turned - opened_by_shear(model, case.state)
+    model, plan, force = solution.model, solution.plan, case.solution.force
+    carried = plan.copies * float(force.sum())
     if case.tilt is None:
-        return [
-            *common.normal_checks(
-                case.case, case.force, s, C, model.gap, carried, case.reaction, turned
-            ),
-            *more,
-        ]
+        return common.pressed_checks(plan, model, case, carried)
     points = contact_points_of(model)[:, :2]
-    arms = points - load_point(solution)
-    moment = float(np.abs(arms.T @ s.force).max())
-    turned = turned + arms @ case.tilt
+    arms = points - load_point(plan, model)
+    moment = float(np.abs(arms.T @ force).max())
     return [
-        *more,
-        *common.normal_checks(
-            case.case, case.force, s, C, model.gap, carried, case.reaction, turned
-        ),
+        *common.pressed_checks(plan, model, case, carried, arms @ case.tilt),
         Check(
             "moment balance",
             case.case,
-            moment / (float(s.force.sum()) * float(np.ptp(points, axis=0).max())),
+            moment / (float(force.sum()) * float(np.ptp(points, axis=0).max())),
             1e-8,
             "moment about the load line / (F patch length)",
             "report this",
@@ -93,35 +76,11 @@ def _normal_checks(solution: FlatSolution, case: FlatNormalCase) -> list[Check]:
     ]
 
 
-def _tangential_checks(solution: FlatSolution, t: FlatTangentialCase) -> list[Check]:
-    checks = common.tangential_checks(t.case, solution.model, t.nodes)
-    if t.state is None:
-        return checks
-    # The normal forces are those under this load.
-    model, N = solution.model, t.normal.force
-    answer = as_normal(t.state, float("nan"))
-    turned = -opened_by_shear(model, t.state)
-    if t.state.motion[3:].size:
-        turned = turned + tilt_arms(solution) @ t.state.motion[3:]
-    carried = float(answer.unclipped.sum())
-    return [
-        *checks,
-        *common.normal_checks(
-            t.case, N, answer, model.compliance(NORMAL), model.gap, carried, {}, turned
-        ),
-    ]
-
-
 def _left_out(solution: FlatSolution) -> list[Check]:
-    plan = solution.plan
-    checks = checks_of(solution.left_out, plan.scene)
-    return checks + _friction_checks(solution) if plan.effect("friction") else checks
-
-
-def _friction_checks(solution: FlatSolution) -> list[Check]:
-    scene = solution.plan.scene
-    checks = [] if scene.coupled else [common.coupling_check(scene, solution.model)]
-    checks += [
+    checks = common.left_out_checks(solution)
+    if not solution.plan.effect("friction"):
+        return checks
+    return checks + [
         Check(
             "pressure moved by shear",
             case,
@@ -133,4 +92,3 @@ def _friction_checks(solution: FlatSolution) -> list[Check]:
         )
         for case, value in solution.moved.items()
     ]
-    return checks

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from upd.analyses.contact.loading import contact_points_of
 from upd.analyses.contact.plan import NORMAL
 from upd.analyses.flat.solution import FlatNormalCase, FlatSolution
-from upd.analyses.flat.solve import contact_points_of
 from upd.contact.edge import LocatedArea, located_area
 from upd.contact.law import ContactLaw, contact_points
 from upd.contact.normal import NormalContact

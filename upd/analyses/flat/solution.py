@@ -19,7 +19,7 @@ from upd.analyses.contact.plan import (
     ContactPlan,
     direction_name,
 )
-from upd.analyses.flat.plan import DamperLoad
+from upd.analyses.contact.plans import DamperLoad
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
 from upd.contact.tilt import TiltedContact
@@ -165,4 +165,4 @@ class FlatSolution:
     paths: list[LoadPath] = field(default_factory=list)
     moved: dict[Case, float] = field(default_factory=dict)
     left_out: list[Resolved] = field(default_factory=list)
-    estimates: Estimates = field(default_factory=dict)
+    estimates: Estimates | None = None

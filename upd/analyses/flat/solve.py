@@ -25,24 +25,26 @@ from upd.analyses.contact.coupled import (
     slope,
     slope_loads,
 )
+from upd.analyses.contact.effects import largest_ratio
 from upd.analyses.contact.loading import (
     LoadPath,
     Sheared,
     along,
     closed_loop,
     load_history,
+    slip_components,
     tangential_compliance,
+    tilt_arms,
 )
 from upd.analyses.contact.plan import (
     ACROSS,
     ALONG,
     NORMAL,
     ContactPlan,
-    axis_of,
     direction_name,
     unit_vector,
 )
-from upd.analyses.flat.plan import DamperLoad, normal_loads
+from upd.analyses.contact.plans import DamperLoad, normal_loads
 from upd.analyses.flat.solution import (
     FlatNormalCase,
     FlatSolution,
@@ -54,7 +56,6 @@ from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.tangential import TangentialPath, tangential_path
 from upd.contact.tilt import TiltedContact, tilted_contact
 from upd.progress import Stages
-from upd.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -69,11 +70,30 @@ def solve_plan(plan: ContactPlan, stages: Stages) -> FlatSolution:
 
     An error raised on the way carries what converged so far as ``partial``.
     """
-    solution = FlatSolution(plan, prepare(plan, stages))
+    return solve_on(plan, prepare(plan, stages), stages)
+
+
+def solve_companion(plan: ContactPlan, model: ContactModel) -> FlatSolution:
+    """The loads on the companion.
+
+    The march to the largest load takes four steps: exact along one direction; along two the slip
+    turns a little from step to step. Coupled, which nodes stick depends on the steps: the run's.
+    """
+    ratio = largest_ratio(plan.scene)
+    few = ratio * np.array([0.25, 0.5, 0.75])
+    steps = PATH_SHARES[ratio > PATH_SHARES] if plan.scene.coupled else few
+    return solve_on(plan, model, Stages(), steps)
+
+
+def solve_on(
+    plan: ContactPlan, model: ContactModel, stages: Stages, steps: Array = PATH_SHARES
+) -> FlatSolution:
+    """Every load on a contact model; ``steps`` as of `solve_tangential`."""
+    solution = FlatSolution(plan, model)
     try:
         solve_normal(solution, stages)
         if plan.effect("friction"):
-            solve_tangential(solution, stages)
+            solve_tangential(solution, stages, steps)
         if plan.scene.wants("fields"):
             with stages("internal displacement", "back-substitution"):
                 for case in solution.normal:
@@ -83,29 +103,6 @@ def solve_plan(plan: ContactPlan, stages: Stages) -> FlatSolution:
         error.partial = solution  # type: ignore[attr-defined]
         raise
     return solution
-
-
-def contact_points_of(model: ContactModel) -> Array:
-    """(n, 3) the contact nodes that carry forces, in contact axes, mm."""
-    points: Array = model.lower.mesh.points[model.lower.contact[model.multipliers.nodes]]
-    return points
-
-
-def load_point(solution: FlatSolution) -> Array:
-    """(2,) where the load line meets the contact plane, contact axes in mm."""
-    scene, upper = solution.plan.scene, solution.model.upper
-    if scene.contact.load_point is not None:
-        low: Array = contact_points_of(solution.model)[:, :2].min(axis=0)
-        return np.asarray(low + np.array(scene.contact.load_point))
-    nodes = upper.mesh.points[upper.mesh.nodes["distant"], :2]
-    weights = upper.mesh.weights.get("distant")
-    # Middle of the set's extent: its nodes need not be evenly spread. Weights say where it is.
-    middle = (
-        0.5 * (nodes.min(axis=0) + nodes.max(axis=0))
-        if weights is None
-        else np.asarray(weights @ nodes / weights.sum())
-    )
-    return np.asarray(middle if 0 not in solution.plan.mirrors else middle * np.array([0.0, 1.0]))
 
 
 def solve_normal(solution: FlatSolution, stages: Stages) -> None:
@@ -142,19 +139,12 @@ def _pressed(
     """
     gap, copies = solution.model.gap, solution.plan.copies
     distinct = sorted(set(forces))
-    arms = tilt_arms(solution)
+    arms = tilt_arms(solution.plan, solution.model)
     if arms.size:
         tilted = {F: tilted_contact(compliance, gap, arms, load=F / copies) for F in distinct}
         return {F: t.normal for F, t in tilted.items()}, tilted
     found = normal_curve(compliance, gap, [F / copies for F in distinct])
     return dict(zip(distinct, found, strict=True)), {}
-
-
-def tilt_arms(solution: FlatSolution) -> Array:
-    """(n, k) mm from the load line to the nodes, for the k free tilts."""
-    if solution.plan.scene.contact.tilt == "free":
-        return contact_points_of(solution.model)[:, :2] - load_point(solution)
-    return np.zeros((len(solution.model.gap), 0))
 
 
 def _pressed_and_sheared(
@@ -163,7 +153,11 @@ def _pressed_and_sheared(
     """Normal loads with normal and tangential contact at once, the slope of the curve as their
     stiffness.
     """
-    model, mu, arms = solution.model, solution.plan.scene.contact.friction, tilt_arms(solution)
+    model, mu, arms = (
+        solution.model,
+        solution.plan.scene.contact.friction,
+        tilt_arms(solution.plan, solution.model),
+    )
     wanted = [load.force for load in loads]
     states = raised(model, mu, [*slope_loads(wanted), *curve], arms)
     for load in loads:
@@ -233,11 +227,6 @@ def solve_tangential(solution: FlatSolution, stages: Stages, steps: Array = PATH
                 _sheared(solution, case, direction, loaded, steps)
 
 
-def components_of(scene: Scene, direction: float) -> tuple[int, ...]:
-    """Components of a tangential load in a direction (degrees from x)."""
-    return (ALONG, ACROSS) if scene.slip_directions == 2 else (axis_of(direction),)
-
-
 def _sheared(
     solution: FlatSolution,
     case: FlatNormalCase,
@@ -250,7 +239,7 @@ def _sheared(
     if case.state is not None:
         _sheared_together(solution, case, case.state, direction, steps)
         return
-    components = components_of(scene, direction)
+    components = slip_components(scene, direction)
     unit = unit_vector(direction, components)
     C = tangential_compliance(solution.model, components, loaded)
     limit = scene.contact.friction * case.solution.force[loaded]
@@ -428,6 +417,13 @@ def _tangential_case(
     )
 
 
+def note_moved(run: FlatSolution, companion: FlatSolution) -> None:
+    """Note in the run what shear would move of the companion's pressure."""
+    for stuck in companion.stuck:
+        case = next(c for c in companion.normal if c.case == stuck.normal)
+        run.moved[stuck.case] = moved_by_shear(companion, case, stuck)
+
+
 def moved_by_shear(solution: FlatSolution, case: FlatNormalCase, stuck: StuckContact) -> float:
     """How far shear with T = mu N would change the normal forces that are frozen.
 
@@ -437,7 +433,7 @@ def moved_by_shear(solution: FlatSolution, case: FlatNormalCase, stuck: StuckCon
     normal forces change by df = -C_nn^-1 (C_nt t - d e), e'df = 0.
     """
     scene, model = solution.plan.scene, solution.model
-    components = components_of(scene, stuck.direction)
+    components = slip_components(scene, stuck.direction)
     unit = unit_vector(stuck.direction, components)
     total = scene.contact.friction * float(case.solution.force.sum())
     on = np.flatnonzero(case.solution.contact)

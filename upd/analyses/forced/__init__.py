@@ -22,8 +22,8 @@ from upd.analyses.forced import (
     results,
 )
 from upd.analyses.forced.solution import ForcedSolution
-from upd.analyses.input_uncertainty import coarsened_rig
 from upd.linalg.parallel import threads_for
+from upd.vary.inputs import coarsened_rig
 
 Made = TypeVar("Made")
 

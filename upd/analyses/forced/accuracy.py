@@ -9,25 +9,25 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from upd.analyses import accuracy_rounds
-from upd.analyses.accuracy_rounds import AT_BEST, Rounds, Setting, mesh_falls
+from upd.analyses.base import chosen_by_accuracy, refuse_oversize
 from upd.analyses.forced.estimates import estimate
 from upd.analyses.forced.levels import HARMONICS, MESH, MODES, POINTS, RECIPE, SAMPLES, graded
 from upd.analyses.forced.plan import ForcedPlan, make_plan, time_steps
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.solve import solve
-from upd.analyses.levels_choice import Knob, Levels
 from upd.hbm.fourier import harmonics, sample_count
 from upd.progress import Stages
+from upd.results import Estimates, Result
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import GAUSS, SIDES, FaceLines
+from upd.vary.variation import SolvedVariation
+from upd.vary.wanted import LevelChoice, Wanted, plan_wanted, solve_wanted
 
 #: names of accuracies -> numbers they are asked of
 ASKED = {"peak_frequency": "peak_?_frequency", "peak": "peak_?_accelerance"}
-#: times the elements of the coarsest graded mesh; of the first level, the scene's own mesh, at best
-#: so much is left by that one
-_FINER, _GRADED = (1, 1.5, 2, 2.5, 3), 0.5
+#: times the elements of the coarsest graded mesh; the first level is the scene's own mesh
+_FINER = (1, 1.5, 2, 2.5, 3)
 #: times the samples
 _MORE_SAMPLES = (1, 2, 4, 8)
 #: Gauss points up the slope in place of the scene's lines, and those along the damper
@@ -36,42 +36,37 @@ _MODES = (5, 10, 20, 40)
 _HARMONICS = (1, 3, 5, 7, 9, 11, 13)
 
 
-def settings_of(scene: ForcedScene) -> list[Setting]:
+def choices(scene: ForcedScene) -> list[LevelChoice]:
     """What may be chosen of a scene, by source.
 
-    The scene's own mesh and contact points are the lowest levels, finer
-    meshes are graded (`mesh_counts.graded`); numbers of modes and harmonics may fall below its own.
-    Gauss points stand for a face whatever its mesh, so that both errors fall, each by its own knob.
+    The scene's own mesh and contact points are the lowest levels, finer meshes are graded
+    (`mesh_counts.graded`); numbers of modes and harmonics may fall below its own. Gauss points
+    stand for a face whatever its mesh, so that both errors fall, each by its own choice.
     """
     found = [
-        _setting((MODES,), "modes kept", _MODES, _with_modes, "{} a blade"),
-        _setting((HARMONICS,), "harmonics", _HARMONICS, _with_harmonics, "to {}"),
-        _setting((SAMPLES,), "samples", _MORE_SAMPLES, _with_samples, "x {}"),
+        _choice(MODES, "modes kept", _MODES, _with_modes, "{} a blade"),
+        _choice(HARMONICS, "harmonics", _HARMONICS, _with_harmonics, "to {}"),
+        _choice(SAMPLES, "samples", _MORE_SAMPLES, _with_samples, "x {}"),
     ]
     if scene.recipe == RECIPE:
         labels = ("of the scene", *(f"graded x {n:g}" for n in _FINER[1:]))
-        falls = (1.0, *(_GRADED * mesh_falls((1.0, n))[-1] for n in _FINER[1:]))
-        knob = Knob((MESH,), "mesh", labels, falls)
-        found.insert(0, Setting(knob, _with_mesh))
+        found.insert(0, LevelChoice(MESH, "mesh", labels, _with_mesh))
     if _raisable(scene):
         # before the mesh, which it decides the counts of
         labels = ("of the scene", *(f"{n} Gauss points up the slope" for n in _GAUSS))
-        falls = (1.0, *((2.0 / n) ** AT_BEST for n in _GAUSS))
-        knob = Knob((POINTS,), "contact points", labels, falls)
-        found.insert(0, Setting(knob, _with_points))
+        found.insert(0, LevelChoice(POINTS, "contact points", labels, _with_points))
     return found
 
 
-def _setting(
-    sources: tuple[str, ...],
+def _choice(
+    source: str,
     name: str,
     levels: tuple[int, ...],
     made: Callable[[ForcedScene, int], ForcedScene],
     words: str,
-) -> Setting:
-    labels = tuple(words.format(n) for n in levels)
-    falls = tuple((levels[0] / n) ** AT_BEST for n in levels)
-    return Setting(Knob(sources, name, labels, falls), lambda one, k: made(one, levels[k]))
+) -> LevelChoice:
+    labels = [words.format(n) for n in levels]
+    return LevelChoice(source, name, labels, lambda one, k: made(one, levels[k]))
 
 
 def _raisable(scene: ForcedScene) -> bool:
@@ -123,27 +118,41 @@ def _with_samples(scene: ForcedScene, factor: int) -> ForcedScene:
     return replace(scene, balance=replace(scene.balance, samples=count))
 
 
-def _planned(
-    asked: ForcedScene, settings: Sequence[Setting], levels: Levels, scene: ForcedScene
-) -> ForcedPlan:
-    del asked, settings, levels
-    return make_plan(scene)
-
-
 def _trial(scene: ForcedScene) -> ForcedScene:
     return replace(scene, want=("response",), left_out=replace(scene.left_out, solve="no"))
 
 
-ROUNDS = Rounds(settings_of, ASKED, _trial, _planned, solve, make_results, estimate)
+def _estimate(
+    solution: ForcedSolution,
+    numbers: Sequence[Result],
+    stages: Stages,
+    memo: list[SolvedVariation],
+) -> Estimates:
+    """By the levels that the solution has itself."""
+    del memo
+    return estimate(solution, numbers, stages)
+
+
+WANTED = Wanted(
+    choices,
+    ASKED,
+    make_plan,
+    solve,
+    make_results,
+    _estimate,
+    refuse_oversize,
+    chosen_by_accuracy,
+    _trial,
+)
 
 
 def plan_to_accuracy(scene: ForcedScene) -> ForcedPlan:
-    """The plan of a scene, as `upd.analyses.accuracy_rounds.plan_to_accuracy`."""
-    plan: ForcedPlan = accuracy_rounds.plan_to_accuracy(ROUNDS, scene, make_plan)
+    """The plan of a scene, as `upd.vary.wanted.plan_wanted`."""
+    plan: ForcedPlan = plan_wanted(WANTED, make_plan, scene)
     return plan
 
 
 def solve_to_accuracy(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
-    """Run the plan, as `upd.analyses.accuracy_rounds.solve_to_accuracy`."""
-    solution: ForcedSolution = accuracy_rounds.solve_to_accuracy(ROUNDS, plan, stages)[0]
+    """Run the plan, as `upd.vary.wanted.solve_wanted`."""
+    solution: ForcedSolution = solve_wanted(WANTED, plan, stages)[0]
     return solution

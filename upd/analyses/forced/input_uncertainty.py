@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.base import InputChange, InputEnds
 from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.linear_sensitivity import limit_peak, stuck_frequencies
 from upd.analyses.forced.measures import CurvePeak
@@ -35,6 +34,7 @@ from upd.progress import Stages
 from upd.results import Case, Result
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import SIDES, Side, StiffnessChoice
+from upd.vary.inputs import InputChange, InputEnds
 
 log = logging.getLogger(__name__)
 #: peaks of a curve, of both blades

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.contact.plan import ContactPlan
+from upd.analyses.contact.plans import make_plan as make_contact_plan
 from upd.analyses.flat import ANALYSIS as FLAT
-from upd.analyses.flat.plan import make_plan as make_contact_plan
 from upd.cache.arrays import cache_folder
 from upd.cache.sources import source_digest
 from upd.contact.law import ContactLaw

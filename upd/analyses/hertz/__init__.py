@@ -5,11 +5,20 @@ Hertz's and Mindlin's problem.
 
 from __future__ import annotations
 
-from upd.analyses.base import Analysis
-from upd.analyses.contact.bodies import needs
-from upd.analyses.contact.levels import coarsened
-from upd.analyses.hertz import accuracy, charts, checks, left_out, output, results
+from functools import partial
 
+from upd.analyses.base import Analysis
+from upd.analyses.contact import effects
+from upd.analyses.contact.bodies import needs
+from upd.analyses.contact.effects import SolvedAgain
+from upd.analyses.contact.levels import coarsened, plan_with_estimates
+from upd.analyses.hertz import accuracy, charts, checks, output, results
+from upd.analyses.hertz.solve import solve_on
+from upd.progress import Stages
+from upd.vary import errors
+from upd.vary.wanted import plan_wanted
+
+_AGAIN = SolvedAgain(lambda plan, model: solve_on(plan, model, Stages()), results.make_results)
 ANALYSIS = Analysis(
     name="hertz",
     headline_names=results.HEADLINE,
@@ -19,9 +28,9 @@ ANALYSIS = Analysis(
         "contact radius against sphere",
         "slope in the contact",
     ),
-    make_plan=accuracy.plan_to_accuracy,
+    make_plan=partial(plan_wanted, accuracy.WANTED, partial(plan_with_estimates, accuracy.PROBLEM)),
     needs=needs,
-    solve=left_out.solve,
+    solve=partial(effects.solve, accuracy.WANTED, _AGAIN),
     make_results=results.make_results,
     check_solution=checks.check_solution,
     arrays=output.arrays,
@@ -29,7 +38,7 @@ ANALYSIS = Analysis(
     write_files=output.write_files,
     charts=charts.charts,
     headline=results.headline,
-    estimate=accuracy.estimate,
+    estimate=partial(errors.estimate, accuracy.PROBLEM),
     coarsened=coarsened,
 )
 

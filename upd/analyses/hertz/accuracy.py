@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
-from upd.analyses.contact import accuracy
-from upd.analyses.contact.accuracy import AccuracyLadder
-from upd.analyses.contact.levels import mesh_problem
+from upd.analyses.contact.levels import MESH, mesh_problem, wanted
 from upd.analyses.contact.plan import refined_growth
-from upd.analyses.hertz.plan import auto_patch, make_plan
+from upd.analyses.contact.plans import auto_patch, make_plan
 from upd.analyses.hertz.results import make_results
 from upd.analyses.hertz.samples import sample
 from upd.analyses.hertz.solve import solve_plan
@@ -19,6 +15,7 @@ from upd.errors import InputError
 from upd.mesh import recipes
 from upd.reference import contact_modulus, hertz_sphere
 from upd.scene import Scene
+from upd.vary.wanted import LevelChoice
 
 #: Numbers the accuracy is asked of: those of the normal contact. The others carry their estimate
 #: beside them; a slip annulus thinner than an element converges late and would multiply the cost of
@@ -68,20 +65,18 @@ def level_scene(scene: Scene, level: int) -> Scene:
     return replace(scene, geometry=geometry, accuracy=None)
 
 
-def _scenes(scene: Scene) -> list[Callable[[], Scene]]:
-    return [partial(level_scene, scene, k) for k in range(len(LEVELS))]
-
-
-def _first(scene: Scene, target: float) -> int:
-    """The level that the scatter measured suggests."""
+def _choices(scene: Scene) -> list[LevelChoice]:
     del scene
+    labels = [f"with {nodes:g} nodes along the radius" for nodes in LEVELS]
+    return [LevelChoice(MESH, "mesh", labels, level_scene)]
+
+
+def _first(target: float) -> int:
+    """The level that the scatter measured suggests."""
     return next(
         (k for k, nodes in enumerate(LEVELS) if _FIRST / nodes**_POWER <= target), len(LEVELS) - 1
     )
 
 
 PROBLEM = mesh_problem(make_plan, solve_plan, make_results, sample)
-LADDER = AccuracyLadder(PROBLEM, _scenes, GOVERNING, _first)
-plan_to_accuracy = partial(accuracy.plan_to_accuracy, LADDER)
-solve_to_accuracy = partial(accuracy.solve_to_accuracy, LADDER)
-estimate = partial(accuracy.estimate, LADDER)
+WANTED = wanted(PROBLEM, _choices, GOVERNING, _first)

@@ -9,15 +9,8 @@ import numpy as np
 
 from upd.analyses.contact import checks as common
 from upd.analyses.contact import yielding
-from upd.analyses.contact.coupled import (
-    CoupledState,
-    as_normal,
-    opened_by_shear,
-    shear_nodes,
-)
-from upd.analyses.contact.left_out import checks_of
 from upd.analyses.contact.plan import NORMAL
-from upd.analyses.hertz.plan import has_mirror_planes, wider_patch
+from upd.analyses.contact.plans import has_mirror_planes, wider_patch
 from upd.analyses.hertz.products import product_checks
 from upd.analyses.hertz.results import closed_form_traction, hertz_of
 from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
@@ -80,25 +73,11 @@ def _normal_checks(solution: HertzSolution, case: HertzNormalCase) -> list[Check
     if not case.load > 0.0:
         return [rim_check(solution, case)]
     spacing = 3.0 * solution.model.patch.spacing / max(case.measures.radius_moment, 1e-300)
-    model, turned, more = solution.model, None, []
-    if case.state is not None:
-        nodes = shear_nodes(model, solution.plan.scene.contact.friction, case.state)
-        more = common.tangential_checks(case.case, model, nodes)
-        turned = -opened_by_shear(model, case.state)
+    model = solution.model
     return [
         rim_check(solution, case),
-        *more,
         *product_checks(model, case.case, (NORMAL,), case.solution.force),
-        *common.normal_checks(
-            case.case,
-            case.load,
-            case.solution,
-            model.compliance(NORMAL),
-            model.gap,
-            float(case.force.sum()),
-            case.reaction,
-            turned,
-        ),
+        *common.pressed_checks(solution.plan, model, case, float(case.force.sum())),
         Check(
             "resolution",
             case.case,
@@ -113,28 +92,12 @@ def _normal_checks(solution: HertzSolution, case: HertzNormalCase) -> list[Check
 
 
 def _tangential_checks(solution: HertzSolution, t: HertzTangentialCase) -> list[Check]:
-    checks = common.tangential_checks(t.case, solution.model, t.nodes)
     tractions = np.zeros((len(t.nodes.components), len(t.normal.solution.force)))
     tractions[:, t.nodes.loaded] = t.nodes.force.reshape(len(tractions), -1)
-    checks += product_checks(solution.model, t.case, t.nodes.components, tractions.ravel())
-    return checks if t.state is None else [*checks, *_pressed_checks(solution, t, t.state)]
-
-
-def _pressed_checks(
-    solution: HertzSolution, t: HertzTangentialCase, state: CoupledState
-) -> list[Check]:
-    """The normal forces under a tangential load, which coupled contact moves."""
-    model, answer = solution.model, as_normal(state, float("nan"))
-    return common.normal_checks(
-        t.case,
-        t.normal.load,
-        answer,
-        model.compliance(NORMAL),
-        model.gap,
-        float(answer.unclipped.sum()),
-        {},
-        -opened_by_shear(model, state),
-    )
+    return [
+        *common.sheared_checks(solution.plan, solution.model, t),
+        *product_checks(solution.model, t.case, t.nodes.components, tractions.ravel()),
+    ]
 
 
 def _yield_checks(solution: HertzSolution) -> list[Check]:
@@ -183,9 +146,7 @@ def _divisions(solution: HertzSolution, case: HertzNormalCase) -> int:
 
 def _left_out(solution: HertzSolution) -> list[Check]:
     plan, scene = solution.plan, solution.plan.scene
-    checks = checks_of(solution.left_out, scene)
-    if plan.effect("friction") and not scene.coupled:
-        checks.append(common.coupling_check(scene, solution.model))
+    checks = common.left_out_checks(solution)
     if not plan.effect("mirror symmetry") and has_mirror_planes(scene):
         checks += [
             Check(

@@ -20,7 +20,6 @@ from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
 from upd.contact.patch import ContactMeasures
 from upd.contact.stiffness import BodyShare
-from upd.contact.tangential_step import TangentialContact
 from upd.results import Case, Estimates
 
 Array = NDArray[np.float64]
@@ -97,33 +96,23 @@ class HertzNormalCase:
 class HertzTangentialCase:
     """One tangential load T = ratio mu N after one normal load.
 
-    Traction in MPa and slip in mm on the whole patch, (len(X), len(Y)), with a last axis of 2 for
-    two directions; the pressure under it; what the solver left at the nodes, for checks, and with
-    normal and tangential contact at once its state.
+    Displacement in mm along it, and tangent dT/dd in N/mm of the whole contact at the present stick
+    set. Traction in MPa and slip in mm on the whole patch, (len(X), len(Y)), with a last axis of 2
+    for two directions; the pressure under it; what the solver left at the nodes, for checks, and
+    with normal and tangential contact at once its state.
     """
 
     normal: HertzNormalCase
     ratio: float
     load: float
-    solution: TangentialContact
+    displacement: float
+    stiffness: float
     traction: Array
     slip: Array
     stick: NDArray[np.bool_]
     pressure: Array
-    copies: int
     nodes: Sheared
     state: CoupledState | None = None
-
-    @property
-    def stiffness(self) -> float:
-        """Tangent dT/dd along the load in N/mm of the whole contact, at the present stick set."""
-        value = np.asarray(self.solution.stiffness)
-        return self.copies * float(value if value.ndim == 0 else value[0, 0])
-
-    @property
-    def displacement(self) -> float:
-        """Along the load, mm."""
-        return float(np.ravel(self.solution.displacement)[0])
 
     @property
     def traction_along(self) -> Array:
@@ -174,4 +163,4 @@ class HertzSolution:
     cycles: list[LoadPath] = field(default_factory=list)
     no_shares: str = ""
     left_out: list[Resolved] = field(default_factory=list)
-    estimates: Estimates = field(default_factory=dict)
+    estimates: Estimates | None = None

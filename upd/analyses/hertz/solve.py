@@ -5,6 +5,8 @@ Mesh, stiffness, condensation, normal contact, tangential contact. Arrays in, ar
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve as solve_dense
@@ -38,12 +40,11 @@ from upd.analyses.hertz.solution import (
 )
 from upd.contact.bulk import finite_body_share, half_space_mean
 from upd.contact.edge import located_area
-from upd.contact.model import Body
+from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_curve
 from upd.contact.patch import ContactMeasures, measure
 from upd.contact.stiffness import BodyShare, axis_half_space, axis_share
 from upd.contact.tangential import tangential_contact
-from upd.contact.tangential_step import TangentialContact, TangentialHistory
 from upd.errors import MeshError
 from upd.progress import Stages
 from upd.reference import contact_modulus
@@ -62,7 +63,11 @@ def solve_plan(plan: ContactPlan, stages: Stages) -> HertzSolution:
 
     An UpdError raised on the way carries what converged so far as ``partial``.
     """
-    model = prepare(plan, stages)
+    return solve_on(plan, prepare(plan, stages), stages)
+
+
+def solve_on(plan: ContactPlan, model: ContactModel, stages: Stages) -> HertzSolution:
+    """Every load on a contact model."""
     m1, m2 = (plan.scene.materials[b.name] for b in (model.upper, model.lower))
     solution = HertzSolution(plan, model, contact_modulus(m1.E, m1.nu, m2.E, m2.nu))
     try:
@@ -302,7 +307,8 @@ def _sheared(solution: HertzSolution, case: HertzNormalCase, directions: tuple[i
                 load * unit,
                 result.stick,
             )
-            solution.tangential.append(_tangential_case(solution, case, ratio, result, nodes))
+            moved = result.force, result.slip, result.displacement, result.stiffness
+            solution.tangential.append(_tangential_case(solution, case, ratio, nodes, *moved))
     if scene.wants("cycle"):
         ratio = scene.loads.cycle_amplitude
         mine, peak, steps = (
@@ -354,27 +360,20 @@ def _together_case(
     state: CoupledState,
     base: CoupledState,
 ) -> HertzTangentialCase:
-    mu, found = solution.plan.scene.contact.friction, state.found
-    nodes = shear_nodes(solution.model, mu, state)
-    result = TangentialContact(
+    model = solution.model
+    nodes = shear_nodes(model, solution.plan.scene.contact.friction, state)
+    pressure = model.multipliers.pressure(np.maximum(state.force[:, 0], 0.0))
+    found = _tangential_case(
+        solution,
+        case,
+        ratio,
+        nodes,
         nodes.force,
-        found.slip[-1][nodes.loaded].T.ravel(),
-        nodes.stick,
-        ~nodes.stick,
+        state.found.slip[-1][nodes.loaded].T.ravel(),
         state.motion[1:3] - base.motion[1:3],
-        nodes.load,
-        float(found.slip_work[-1]),
         shear_tangent(state),
-        int(found.iterations[-1]),
-        "fallback" if found.fallbacks else "active set",
-        "converged",
-        found.message,
-        TangentialHistory(np.zeros(0), np.zeros(0), np.zeros(0, np.int8)),
-        nodes.force,
     )
-    patch, model = solution.model.patch, solution.model
-    pressure = patch.whole(model.multipliers.pressure(np.maximum(state.force[:, 0], 0.0)))
-    return _tangential_case(solution, case, ratio, result, nodes, pressure, state)
+    return replace(found, pressure=model.patch.whole(pressure), state=state)
 
 
 def _stuck_stiffness(C: Array, n: int) -> float:
@@ -388,16 +387,19 @@ def _tangential_case(
     solution: HertzSolution,
     case: HertzNormalCase,
     ratio: float,
-    result: TangentialContact,
     nodes: Sheared,
-    pressure: Array | None = None,
-    state: CoupledState | None = None,
+    force: Array,
+    slip: Array,
+    displacement: Array | float,
+    stiffness: Array | float,
 ) -> HertzTangentialCase:
-    patch, loaded = solution.model.patch, nodes.loaded
+    """On the whole patch, from forces in N and slips of the loaded nodes, and what the model moves
+    by and resists with, one direction or two.
+    """
+    patch, loaded, copies = solution.model.patch, nodes.loaded, solution.plan.copies
     n = len(patch.order)
-
-    on = np.zeros(n, bool)
-    on[loaded] = True
+    on, stick = np.zeros(n, bool), np.zeros(n, bool)
+    on[loaded], stick[loaded] = True, nodes.stick
 
     def whole(values: Array, *, traction: bool) -> Array:
         parts = []
@@ -409,21 +411,17 @@ def _tangential_case(
             parts.append(patch.whole(full))
         return np.stack(parts, -1) if len(parts) > 1 else parts[0]
 
-    stick = np.zeros(n, bool)
-    stick[loaded] = result.stick
-    load = ratio * solution.plan.scene.contact.friction * case.load
     return HertzTangentialCase(
         case,
         ratio,
-        load,
-        result,
-        whole(result.force, traction=True),
-        whole(result.slip, traction=False),
+        ratio * solution.plan.scene.contact.friction * case.load,
+        float(np.ravel(displacement)[0]),
+        copies * float(np.ravel(stiffness)[0]),
+        whole(force, traction=True),
+        whole(slip, traction=False),
         patch.whole(stick) > 0.0,
-        case.pressure if pressure is None else pressure,
-        solution.plan.copies,
+        case.pressure,
         nodes,
-        state,
     )
 
 

@@ -5,17 +5,21 @@ Modes free and with the damper glued, Craig-Bampton models, linear frequency res
 
 from __future__ import annotations
 
+from functools import partial
+
 from upd.analyses.base import Analysis
-from upd.analyses.input_uncertainty import coarsened_rig
-from upd.analyses.modal import accuracy, charts, checks, output, plan, results
+from upd.analyses.modal import charts, checks, output, plan, results, varied
+from upd.vary import errors
+from upd.vary.inputs import coarsened_rig
+from upd.vary.wanted import plan_wanted
 
 ANALYSIS = Analysis(
     name="modal",
     headline_names=results.HEADLINE,
     input_checks=(),
-    make_plan=accuracy.plan_to_accuracy,
+    make_plan=partial(plan_wanted, varied.WANTED, varied.plan_with_estimates),
     needs=plan.needs,
-    solve=accuracy.solve_to_accuracy,
+    solve=varied.solve_levels,
     make_results=results.make_results,
     check_solution=checks.check_solution,
     arrays=output.arrays,
@@ -23,7 +27,7 @@ ANALYSIS = Analysis(
     write_files=output.write_files,
     charts=charts.charts,
     headline=results.headline,
-    estimate=accuracy.estimate,
+    estimate=partial(errors.estimate, varied.PROBLEM),
     coarsened=lambda plan: coarsened_rig(plan, ("free", "glued", "response")),
 )
 

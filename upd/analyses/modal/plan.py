@@ -5,7 +5,6 @@ cost.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from upd.analyses.base import Effect, Needs, Plan
@@ -21,23 +20,7 @@ _DIRECT_S, _DIRECT_POWER = 4.9e-10, 2.3
 _FILES_S, _PICTURES_S, _NODE_S = 1.6, 1.4, 2.5e-5
 
 
-@dataclass(frozen=True)
-class ModalPlan(Plan[RigScene]):
-    """Plan of a rig.
-
-    Attributes
-    ----------
-    asked
-        The scene as asked for, where that leaves the levels to an accuracy.
-    coarser
-        Refinements that the error of the mesh is estimated with, over that of the run, the finest
-        first; the usual companions when empty.
-    """
-
-    asked: RigScene | None = None
-    coarser: tuple[float, ...] = ()
-
-
+ModalPlan = Plan[RigScene]
 #: check of the modes left out: how many times further they are searched for it
 MODES_ABOVE, MORE_MODES = "modes above", 2.0
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 from functools import partial
 
 from upd.analyses.base import Analysis
-from upd.analyses.input_uncertainty import coarsened_rig
 from upd.analyses.seated import charts, checks, output, plan, results, solve, varied
 from upd.vary import errors
+from upd.vary.inputs import coarsened_rig
 
 ANALYSIS = Analysis(
     name="seated",

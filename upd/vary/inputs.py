@@ -12,39 +12,63 @@ import logging
 import math
 import tomllib
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import Any
 
-from upd.analyses.base import Analysis, InputChange, InputEnds, Plan
-from upd.analyses.contact.levels import POWER
 from upd.errors import UpdError, one_line
 from upd.mesh import recipes
 from upd.progress import Stages
-from upd.results import Case, InputPart, InputParts, Result
+from upd.results import InputPart, InputParts, Result
 from upd.scene import load_scene
+from upd.scene.quantities import Uncertainty
 from upd.scene.uncertain import put_back
 from upd.vary.solve import changed
-from upd.vary.variation import ALONE, Overrides
+from upd.vary.variation import ALONE, POWER, Key, Overrides
 
 log = logging.getLogger(__name__)
-Key = tuple[str, Case]
 #: parameters of a recipe that say how fine a mesh is
 _LEVELS = ("divisions", "refine")
 #: part of a rig's refinement, and the smallest that the ready rig takes
 _COARSER, _LEAST = 0.7, 0.5
 
 
+@dataclass(frozen=True)
+class InputEnds:
+    """An input known within limits, the scene as its file gives it, and with the input at both ends
+    of its interval.
+    """
+
+    of: Uncertainty
+    given: Any
+    low: Any
+    high: Any
+
+
+@dataclass(frozen=True)
+class InputChange:
+    """Relative change of a number by an input's half-width, with its sign, and how it was found."""
+
+    change: float
+    basis: str
+
+
+#: path of an input -> name and case of a number -> what its half-width does to it
+InputChanges = Mapping[str, Mapping[Key, InputChange]]
+ChangesByInputs = Callable[[Any, Sequence[Result], Sequence[InputEnds]], InputChanges]
+KnownInputs = Callable[[Any, Sequence[InputEnds]], tuple[set[str], float]]
+
+
 def input_parts(
-    analysis: Analysis, solution: Any, numbers: Sequence[Result], stages: Stages
+    analysis: Any, solution: Any, numbers: Sequence[Result], stages: Stages
 ) -> InputParts:
     """What every input known within limits does to the main numbers of a run.
 
     Parameters
     ----------
     analysis
-        Of the scene.
+        `upd.analyses.base.Analysis` of the scene.
     solution
         With the plan as run.
     numbers
@@ -86,7 +110,7 @@ def input_parts(
     }
 
 
-def is_main(analysis: Analysis, number: Result) -> bool:
+def is_main(analysis: Any, number: Result) -> bool:
     """Whether it is a number an engineer asks for first."""
     return not number.withheld and any(
         fnmatchcase(number.name, pattern) for pattern in analysis.headline_names
@@ -104,7 +128,7 @@ def input_ends(scene: Any) -> list[InputEnds]:
     return [InputEnds(one, given, at(one, -1.0), at(one, 1.0)) for one in scene.uncertain.values()]
 
 
-def with_input_cost(analysis: Analysis, plan: Plan[Any]) -> Plan[Any]:
+def with_input_cost(analysis: Any, plan: Any) -> Any:
     """The plan with what its scene's inputs known within limits cost."""
     if not plan.scene.uncertain:
         return plan
@@ -118,7 +142,7 @@ def with_input_cost(analysis: Analysis, plan: Plan[Any]) -> Plan[Any]:
     return replace(plan, seconds=plan.seconds + seconds, input_seconds=seconds)
 
 
-def _companion_seconds(analysis: Analysis, plan: Plan[Any], one: InputEnds) -> float:
+def _companion_seconds(analysis: Any, plan: Any, one: InputEnds) -> float:
     """Of the cheap companion at one end of an interval; all ends cost about the same."""
     scene = changed(one.low, _coarser(analysis, plan))
     own = plan.seconds - plan.estimate_seconds - plan.files_seconds
@@ -126,25 +150,25 @@ def _companion_seconds(analysis: Analysis, plan: Plan[Any], one: InputEnds) -> f
         # a plan runs a user's recipe once: the run makes the coarser mesh
         sizes = [(plan.parameters.get(name), scene.geometry.get(name)) for name in _LEVELS]
         ratios = [b / a for a, b in sizes if _is_number(a) and _is_number(b)]
-        return own * float(min(ratios, default=1.0) ** POWER)
+        return float(own * min(ratios, default=1.0) ** POWER)
     try:
         companion = analysis.make_plan(scene)
     except UpdError:
         # not solved either
         return 0.0
-    return companion.seconds - companion.files_seconds
+    return float(companion.seconds - companion.files_seconds)
 
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def _coarser(analysis: Analysis, plan: Plan[Any]) -> Overrides:
+def _coarser(analysis: Any, plan: Any) -> Overrides:
     """What makes a scene into its cheap level."""
     return () if analysis.coarsened is None else analysis.coarsened(plan)
 
 
-def coarsened_rig(plan: Plan[Any], wanted: tuple[str, ...], *more: tuple[str, Any]) -> Overrides:
+def coarsened_rig(plan: Any, wanted: tuple[str, ...], *more: tuple[str, Any]) -> Overrides:
     """What makes scenes of a rig cheap: a coarser mesh, few outputs, nothing solved twice.
 
     Parameters
@@ -171,7 +195,7 @@ def _part(one: InputEnds, found: InputChange | None, faults: dict[str, str]) -> 
 
 
 def _solved_at_ends(
-    analysis: Analysis, plan: Any, numbers: Sequence[Result], one: InputEnds
+    analysis: Any, plan: Any, numbers: Sequence[Result], one: InputEnds
 ) -> dict[Key, InputChange]:
     """Half of the change between both ends of an interval, each solved again."""
     coarser = _coarser(analysis, plan)

@@ -1,7 +1,8 @@
 """Effects left out of a contact, each verified on a number of the run: solved again with it.
 
-Most are solved on the plan's companion, a coarser whole model with all three directions, once
-without the effect and once with it:
+The tilt of the damper is solved with the run's own compliance. The others are solved on the plan's
+companion, a coarser whole model with all three directions, once without the effect and once with
+it:
 
 - normal and tangential contact at once, a run of its own with contact.coupling = "coupled",
 - the shear that pressure alone puts between unlike materials, as a slip already there,
@@ -10,15 +11,25 @@ without the effect and once with it:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import Effect, Resolved
-from upd.analyses.contact.loading import LOAD_STEP, load_history, tangential_compliance
+from upd.analyses.contact.bodies import prepare_companion
+from upd.analyses.contact.coupled import raised, slope, slope_loads
+from upd.analyses.contact.loading import (
+    LOAD_STEP,
+    closed_loop,
+    load_history,
+    slip_components,
+    tangential_compliance,
+    tilt_arms,
+)
 from upd.analyses.contact.plan import (
     ACROSS,
     ALONG,
@@ -26,15 +37,23 @@ from upd.analyses.contact.plan import (
     OWN_LEVEL,
     ContactPlan,
     Family,
+    direction_name,
+    is_curved,
+    unit_vector,
 )
 from upd.contact.model import ContactModel
+from upd.contact.normal import normal_contact
 from upd.contact.tangential import tangential_path
 from upd.contact.tangential_step import TangentialHistory
-from upd.errors import UpdError
+from upd.contact.threads import few_threads
+from upd.contact.tilt import tilted_contact
+from upd.errors import InputError, UpdError
+from upd.progress import Stages
 from upd.reference import dundurs_beta
 from upd.results import Case, Check, Result
 from upd.scene import Scene
 from upd.scene.contact import Coupling
+from upd.vary.wanted import Wanted, solve_wanted
 
 Array = NDArray[np.float64]
 
@@ -87,6 +106,27 @@ class Pressed:
 
 #: gap (n,) mm and load in N -> contact of the companion
 Press = Callable[[Array, float], Pressed]
+#: plan and model of the companion -> its solution
+SolveOn = Callable[[ContactPlan, ContactModel], Any]
+
+
+@dataclass(frozen=True)
+class SolvedAgain:
+    """How an analysis solves its loads on the companion.
+
+    Attributes
+    ----------
+    solve
+        plan, model -> solution.
+    make_results
+        solution -> its numbers.
+    measure
+        solution of the run, that of the companion: what the companion shows beside.
+    """
+
+    solve: SolveOn
+    make_results: Callable[[Any], Sequence[Result]]
+    measure: Callable[[Any, Any], None] = lambda run, companion: None
 
 
 def checks_of(found: Iterable[Resolved], scene: Scene) -> list[Check]:
@@ -149,7 +189,152 @@ def left_out(plan: ContactPlan, name: str) -> bool:
     return solves and any(e.name == name and e.word == "no" for e in plan.effects)
 
 
-def changes(
+def solve(wanted: Wanted, again: SolvedAgain, plan: ContactPlan, stages: Stages) -> Any:
+    """Run everything the plan calls for, and numbers again with the effects it leaves out.
+
+    Errors as for `solve_wanted`; what converged so far is their ``partial``.
+    """
+    solution, estimates = solve_wanted(wanted, plan, stages)
+    solution = replace(solution, estimates=estimates)
+    plan, companion = solution.plan, solution.plan.companion
+    cases = [one for one in solution.normal if one.case.load]
+    tilts = left_out(plan, TILT)
+    if companion is None and not tilts:
+        return solution
+    try:
+        with stages("effects left out", "the tilt; the others on a coarser whole model"):
+            if tilts:
+                solution.left_out += [_tilted(solution, case) for case in cases]
+            if companion is not None:
+                try:
+                    model = prepare_companion(companion)
+                    with few_threads(model.gap):
+                        solution.left_out += list(_on_companion(again, solution, model))
+                except UpdError:
+                    solution.left_out += _not_solved(plan, [one.case for one in cases])
+    except BaseException as error:
+        error.partial = solution  # type: ignore[attr-defined]
+        raise
+    return solution
+
+
+def _tilted(solution: Any, case: Any) -> Resolved:
+    """The run's own contact with a free tilt: rotations of the upper body as a whole beside its
+    condensed compliance.
+
+    A half model is its own mirror image, which leaves the tilt along the plane. A body that tips
+    over has neither stiffness nor approach: 0 N/mm, or NaN.
+    """
+    plan, model = solution.plan, solution.model
+    stiff = plan.scene.wants("stiffness")
+    quantity, unit = _quantity(plan.scene)
+    without = case.stiffness if stiff else 1e3 * case.solution.approach
+    remedy, arms = "", tilt_arms(plan, model, held=False)
+    try:
+        found = tilted_contact(
+            model.compliance(NORMAL),
+            model.gap,
+            arms,
+            load=case.force / plan.copies,
+            start=case.solution.contact,
+            free=(0 not in plan.mirrors, 1 not in plan.mirrors),
+        )
+        included = plan.copies * found.free_stiffness if stiff else 1e3 * found.normal.approach
+        if case.state is not None:
+            # It does not tip over; with friction again.
+            states = raised(model, plan.scene.contact.friction, slope_loads([case.force]), arms)
+            approach = 1e3 * float(states[case.force].motion[0])
+            included = slope(states, case.force) if stiff else approach
+    except InputError:
+        included, remedy = 0.0 if stiff else float("nan"), TIPS
+    except UpdError:
+        included = float("nan")
+    return Resolved(TILT, quantity, case.case, without, included, unit, remedy)
+
+
+def _on_companion(again: SolvedAgain, solution: Any, model: ContactModel) -> Iterator[Resolved]:
+    """Every number that shows what an effect left out changes, on the companion ``model``."""
+    plan, scene = solution.plan, solution.plan.scene
+    arms = tilt_arms(variant(plan, 2), model)
+
+    def press(gap: Array, load: float) -> Pressed:
+        if scene.coupled:
+            state = raised(model, scene.contact.friction, [load], arms, gap=gap)[load]
+            return Pressed(float(state.motion[0]), state.force[:, 0])
+        C = model.compliance(NORMAL)
+        found = (
+            tilted_contact(C, gap, arms, load=load).normal
+            if arms.size
+            else normal_contact(C, gap, load=load)
+        )
+        return Pressed(found.approach, found.force)
+
+    for case in solution.normal:
+        if case.case.load:
+            yield from _displaced_changes(plan, model, press, case.case, case.case.load)
+    # What is left out beside coupling, coupled contact has.
+    if not scene.coupled:
+        yield from _sheared(again, solution, model)
+
+
+def _sheared(again: SolvedAgain, solution: Any, model: ContactModel) -> Iterator[Resolved]:
+    plan, scene = solution.plan, solution.plan.scene
+    mine = again.solve(variant(plan, scene.contact.directions), model)
+    numbers = again.make_results(mine)
+    again.measure(solution, mine)
+
+    def coupled() -> Sequence[Result]:
+        return again.make_results(again.solve(variant(plan, 2, coupling="coupled"), model))
+
+    yield from _coupled_changes(plan, numbers, coupled)
+    directions = scene.loads.directions
+    if left_out(plan, DIRECTIONS):
+        both = again.make_results(again.solve(variant(plan, 2), model))
+        names = ["K_T_initial_raw", "K_T_secant_raw", "cycle_energy"]
+        names += [f"K_T{direction_name(d)}_initial_raw" for d in directions]
+        found = list(_changes(DIRECTIONS, names, numbers, both))
+        yield from found or _changes(DIRECTIONS, ("K_T_tangent_raw",), numbers, both)
+    if left_out(plan, MATERIALS):
+        along = {direction_name(d): d for d in directions}
+        named = {"": 0.0} if is_curved(scene) else along
+        for case in (one for one in mine.normal if one.case.load):
+            for name, direction in named.items():
+                cases = [r for r in numbers if r.case.load == case.case.load]
+                own = [r for r in cases if r.case.direction == name]
+                yield from _unlike(mine, case, direction, own)
+
+
+def _unlike(
+    mine: Any, case: Any, direction: float, numbers: Sequence[Result]
+) -> Iterator[Resolved]:
+    """The tangential loads along a direction with the slip of the pressure alone already there."""
+    scene, model = mine.plan.scene, mine.model
+    components = slip_components(scene, direction)
+    unit, mu = unit_vector(direction, components), scene.contact.friction
+    force, load = case.solution.force, case.case.load
+    loaded = np.flatnonzero(force > 0.0)
+    C, limit = tangential_compliance(model, components, loaded), mu * force[loaded]
+    before = pressure_slip(model, components, force, loaded)
+    for one in (r for r in numbers if r.name == "K_T_secant_raw"):
+        assert one.case.ratio is not None
+        K = _slipped_stiffness(C, limit, before, one.case.ratio * mu * load * unit)
+        yield Resolved(MATERIALS, one.name, one.case, one.value, K, one.unit)
+    for one in (r for r in numbers if r.name == "cycle_energy"):
+        loop = closed_loop(
+            one.case,
+            case.case,
+            C,
+            limit,
+            peak=scene.loads.cycle_amplitude * mu * load,
+            steps=scene.loads.cycle_steps,
+            unit=unit,
+            copies=1,
+            history=before,
+        )
+        yield Resolved(MATERIALS, one.name, one.case, one.value, loop.slip_work, one.unit)
+
+
+def _changes(
     effect: str, names: Iterable[str], without: Iterable[Result], included: Iterable[Result]
 ) -> Iterator[Resolved]:
     """The numbers of ``names`` that both lists of results have."""
@@ -160,7 +345,7 @@ def changes(
             yield Resolved(effect, r.name, r.case, r.value, theirs[r.name, r.case], r.unit)
 
 
-def displaced_changes(
+def _displaced_changes(
     plan: ContactPlan, model: ContactModel, press: Press, case: Case, load: float
 ) -> Iterator[Resolved]:
     """What displaced faces change of the normal stiffness, or of the approach where no stiffness
@@ -188,7 +373,7 @@ def displaced_changes(
     yield Resolved(LARGE, quantity, case, numbers[0], numbers[1], unit)
 
 
-def coupled_changes(
+def _coupled_changes(
     plan: ContactPlan, uncoupled: Iterable[Result], solve: Callable[[], Iterable[Result]]
 ) -> Iterator[Resolved]:
     """What normal and tangential contact at once change of the stiffnesses and of the areas in
@@ -211,7 +396,7 @@ def coupled_changes(
     except (UpdError, np.linalg.LinAlgError):
         again = [replace(r, value=float("nan")) for r in mine]
     areas = {r.case.load: r.value for r in mine if r.name == "contact_area"}
-    for one in changes(COUPLING, [r.name for r in mine], mine, again):
+    for one in _changes(COUPLING, [r.name for r in mine], mine, again):
         area = areas.get(one.case.load, 0.0)
         known = one.quantity == "stick_area" and area > 0.0
         yield replace(one, over=(area, "contact area")) if known else one
@@ -274,10 +459,10 @@ def displaced_gap(model: ContactModel, force: Array) -> Array:
 
 
 def variant(
-    plan: ContactPlan, directions: tuple[int, ...], *, coupling: Coupling = "uncoupled"
+    plan: ContactPlan, directions: Literal[1, 2], *, coupling: Coupling = "uncoupled"
 ) -> ContactPlan:
-    """The companion's plan for slip along ``directions``: the loads that press, sheared as far as
-    the scene asks for, and only what a change is looked for in.
+    """The companion's plan for slip in one direction or two: the loads that press, sheared as far
+    as the scene asks for, and only what a change is looked for in.
     """
     scene, companion = plan.scene, plan.companion
     assert companion is not None
@@ -288,35 +473,22 @@ def variant(
     smaller = replace(
         scene,
         want=tuple(want),
-        contact=replace(
-            scene.contact, directions=2 if len(directions) == 2 else 1, coupling=coupling
-        ),
+        contact=replace(scene.contact, directions=directions, coupling=coupling),
         loads=replace(scene.loads, tangential=(ratio,)),
     )
-    return replace(companion, scene=smaller, families=(Family((NORMAL, *directions)),))
+    family = Family((NORMAL, *(ALONG, ACROSS)[:directions]))
+    return replace(companion, scene=smaller, families=(family,))
 
 
-def slipped_stiffness(
-    model: ContactModel,
-    components: tuple[int, ...],
-    pressed: Pressed,
-    friction: float,
-    load: Array,
-) -> float:
-    """Secant tangential stiffness in N/mm along the load (1 or 2,) in N, with the slip that the
-    pressure alone puts between the bodies; NaN when it is not found.
+def _slipped_stiffness(C: Array, limit: Array, before: TangentialHistory, load: Array) -> float:
+    """Secant tangential stiffness in N/mm along the load (1 or 2,) in N, after a slip that is
+    already there; NaN when it is not found.
     """
-    loaded = np.flatnonzero(pressed.force > 0.0)
-    C = tangential_compliance(model, components, loaded)
-    before = pressure_slip(model, components, pressed.force, loaded)
     size = float(np.linalg.norm(load))
     unit = load / size
     try:
         path = tangential_path(
-            C,
-            friction * pressed.force[loaded],
-            loads=load_history(np.array([0.0, size]), unit),
-            history=before,
+            C, limit, loads=load_history(np.array([0.0, size]), unit), history=before
         )
     except UpdError:
         return float("nan")
@@ -324,7 +496,7 @@ def slipped_stiffness(
     return size / float(last - first)
 
 
-def not_solved(plan: ContactPlan, cases: Iterable[Case]) -> list[Resolved]:
+def _not_solved(plan: ContactPlan, cases: Iterable[Case]) -> list[Resolved]:
     """What the checks are told when the companion has no answer."""
     quantity, unit = _quantity(plan.scene)
     return [

@@ -1,0 +1,391 @@
+"""Levels of a scene that reach a wanted accuracy: round by round, one source raised by one level.
+
+A round solves the wanted numbers and estimates what every source leaves in them. The source that
+leaves most of the number farthest from its accuracy, for the seconds that its next level adds, is
+raised, until all numbers are reached; the whole scene is then solved on these levels.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from typing import Any
+
+from upd.errors import ConvergenceError, InputError, one_line
+from upd.progress import Stages
+from upd.results import ErrorPart, Estimates, Result
+from upd.vary.variation import Key, SolvedVariation
+
+log = logging.getLogger(__name__)
+#: level of every choice, 0 the cheapest
+Levels = tuple[int, ...]
+#: number -> source -> its error over the accuracy that is wanted of the number
+Shares = Mapping[Key, Mapping[str, float]]
+#: fewest seconds that a level is taken to add
+_LEAST_S = 1e-3
+
+
+@dataclass(frozen=True)
+class LevelChoice:
+    """What sets the level of one source of error.
+
+    Attributes
+    ----------
+    source
+        As `upd.results.ErrorPart` names it.
+    name
+        In words: "modes kept".
+    labels
+        Of its levels, cheap to expensive.
+    at
+        scene, level -> the scene on this level.
+    """
+
+    source: str
+    name: str
+    labels: Sequence[str]
+    at: Callable[[Any, int], Any]
+
+
+def _whole(scene: Any) -> Any:
+    return scene
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What an analysis gives to have its levels chosen.
+
+    Attributes
+    ----------
+    choices
+        scene -> what may be chosen of it.
+    governing
+        Names of accuracies -> numbers they are asked of, as shell patterns; one accuracy for all is
+        asked of all of them. Other names stand for themselves.
+    make_plan
+        scene on its levels -> plan. The plan has ``asked``, the scene that asks for an accuracy.
+    solve, make_results
+        plan, stages -> solution, a dataclass with its plan; its numbers.
+    estimate
+        solution, numbers, stages of the round, what the rounds before kept -> the parts of their
+        errors; it may keep more. None where only another level shows them.
+    refuse
+        Raises InputError for a plan beyond the memory.
+    chosen
+        plan, how its levels were chosen -> plan with this effect.
+    trial
+        scene -> the scene with nothing but the numbers that govern.
+    predicted
+        scene that asks -> scenes of the rounds that its plan predicts, the last of the whole run;
+        None: the lowest levels, then the scene's own.
+    """
+
+    choices: Callable[[Any], Sequence[LevelChoice]]
+    governing: Mapping[str, str]
+    make_plan: Callable[[Any], Any]
+    solve: Callable[[Any, Stages], Any]
+    make_results: Callable[[Any], Sequence[Result]]
+    estimate: Callable[[Any, Sequence[Result], Stages, list[SolvedVariation]], Estimates | None]
+    refuse: Callable[[Any], None]
+    chosen: Callable[[Any, str], Any]
+    trial: Callable[[Any], Any] = _whole
+    predicted: Callable[[Any], Sequence[Any]] | None = None
+
+
+def plan_wanted(wanted: Wanted, usual: Callable[[Any], Any], scene: Any) -> Any:
+    """The plan of a scene; with the seconds of the rounds before where it asks for an accuracy.
+
+    Parameters
+    ----------
+    usual
+        scene -> plan of a scene that asks for none.
+
+    Raises
+    ------
+    InputError
+        When parts of the scene do not fit together.
+    """
+    if scene.wanted_accuracy is None:
+        return usual(scene)
+    search = LevelSearch(wanted, scene)
+    if wanted.predicted is not None:
+        scenes, run = wanted.predicted(scene), "a run on levels like these"
+    else:
+        lowest = wanted.trial(search.scene(search.lowest))
+        scenes, run = (lowest, replace(scene, accuracy=None)), "a run on the scene's own"
+    *before, plan = map(wanted.make_plan, scenes)
+    again = sum(one.seconds - one.files_seconds for one in before)
+    names = ", ".join(one.name for one in search.choices)
+    why = f"rounds from the lowest levels up; predicted is {run}: {names}"
+    return replace(
+        wanted.chosen(plan, why),
+        asked=scene,
+        seconds=plan.seconds + again,
+        estimate_seconds=plan.estimate_seconds + again,
+    )
+
+
+def solve_wanted(wanted: Wanted, plan: Any, stages: Stages) -> tuple[Any, Estimates | None]:
+    """Run a plan; on levels that are shown to reach the accuracy where its scene asks for one.
+
+    A number is given up where the source that leaves most of it has no higher level, or none within
+    the memory. The others are still brought to their accuracy, and the run ends with an error that
+    names what it lacks.
+
+    Returns
+    -------
+    solution, Estimates or None
+        With the errors of its numbers where the scene asks for an accuracy.
+
+    Raises
+    ------
+    InputError
+        When the scene names a number that the run does not have.
+    ConvergenceError
+        When an accuracy is not reached; ``partial`` is the last round, ``estimates`` the errors of
+        its numbers.
+    """
+    if plan.asked is None:
+        return wanted.solve(plan, stages), None
+    search = LevelSearch(wanted, plan.asked)
+    levels, solution, found = search.lowest, None, None
+    while True:
+        trial = search.trial(levels)
+        try:
+            wanted.refuse(trial)
+            # its factors are the memory of the next
+            solution = None
+            with stages("accuracy rounds", search.text(levels)):
+                solution, found = search.solved(trial)
+        except InputError as refused:
+            if not search.rounds:
+                raise
+            raise search.missed(one_line(refused), solution, found) from None
+        shares = None if found is None else shares_of(found, search.accuracies)
+        search.rounds.append(f"{search.text(levels)}: {_farthest(shares or {})}")
+        log.info("accuracy: %s", search.rounds[-1])
+        raised = search.raised(levels, shares)
+        if raised is None:
+            break
+        levels = raised
+    if lack := search.lack(shares or {}):
+        raise search.missed(lack, solution, found)
+    whole = search.planned(levels)
+    whole = wanted.chosen(whole, f"{search.saving(levels)}; rounds: {' | '.join(search.rounds)}")
+    if whole.scene != trial.scene:
+        solution = None
+        solution, found = search.solved(whole)
+        if lack := search.lack(shares_of(found, search.accuracies)):
+            why = f"the whole run misses what its numbers alone reached: {lack}"
+            raise search.missed(why, solution, found)
+    return replace(solution, plan=whole), found
+
+
+class LevelSearch:
+    """The levels of one scene that asks for an accuracy.
+
+    Attributes
+    ----------
+    choices, accuracies
+        What may be chosen; names of numbers, as shell patterns -> largest error wanted of them.
+    rounds
+        The levels of every round, and the number farthest from its accuracy.
+    """
+
+    def __init__(self, wanted: Wanted, asked: Any) -> None:
+        self.wanted, self.asked = wanted, asked
+        self.choices = wanted.choices(asked)
+        given, names = asked.wanted_accuracy, wanted.governing
+        self.accuracies: dict[str, float] = (
+            {names.get(name, name): error for name, error in given.items()}
+            if isinstance(given, Mapping)
+            else dict.fromkeys(names.values(), given)
+        )
+        self.rounds: list[str] = []
+        self._memo: list[SolvedVariation] = []
+        self._plans: dict[Levels, Any] = {}
+        self._withheld: dict[Key, str] = {}
+
+    @property
+    def lowest(self) -> Levels:
+        """The cheapest levels."""
+        return (0,) * len(self.choices)
+
+    def scene(self, levels: Levels) -> Any:
+        """The scene on these levels, which asks for no accuracy any more."""
+        scene = replace(self.asked, accuracy=None)
+        for choice, level in zip(self.choices, levels, strict=True):
+            scene = choice.at(scene, level)
+        return scene
+
+    def planned(self, levels: Levels) -> Any:
+        """The plan of the whole run."""
+        if levels not in self._plans:
+            self._plans[levels] = self.wanted.make_plan(self.scene(levels))
+        return self._plans[levels]
+
+    def trial(self, levels: Levels) -> Any:
+        """The plan of the wanted numbers alone."""
+        whole = self.scene(levels)
+        alone = self.wanted.trial(whole)
+        return self.planned(levels) if alone == whole else self.wanted.make_plan(alone)
+
+    def solved(self, plan: Any) -> tuple[Any, Any]:
+        """A plan's solution, and the errors of its numbers."""
+        clock = Stages()
+        solution = self.wanted.solve(plan, clock)
+        numbers = self.wanted.make_results(solution)
+        if isinstance(self.asked.wanted_accuracy, Mapping):
+            require_named(self.accuracies, numbers)
+        self._withheld = {
+            (one.name, one.case): f"{one.name} {one.case.label}: {one.withheld}"
+            for one in numbers
+            if one.withheld and any(fnmatchcase(one.name, name) for name in self.accuracies)
+        }
+        return solution, self.wanted.estimate(solution, numbers, clock, self._memo)
+
+    def raised(self, levels: Levels, shares: Shares | None) -> Levels | None:
+        """The levels of the next round; None where all numbers are reached or given up.
+
+        Of the number farthest from its accuracy the source is raised that leaves most for the
+        seconds it adds, of those that leave more than an even part of the accuracy; the first one
+        where no number has a bound yet.
+        """
+        if shares is None:
+            return self._within_memory(self._lifted(levels, 0))
+        missed = {key: parts for key, parts in shares.items() if 1.0 < _sum(parts) < math.inf}
+        for key in sorted(missed, key=lambda key: -_sum(missed[key])):
+            parts = missed[key]
+            most = max(parts, key=lambda source: parts[source])
+            higher = {
+                one.source: self._within_memory(self._lifted(levels, k))
+                for k, one in enumerate(self.choices)
+                if parts.get(one.source, 0.0) >= min(parts[most], 1.0 / len(parts))
+            }
+            if higher.get(most) is not None:
+                now = self.planned(levels).seconds
+                gains = {
+                    one: parts[source] / max(self.planned(one).seconds - now, _LEAST_S)
+                    for source, one in higher.items()
+                    if one is not None
+                }
+                return max(gains, key=lambda one: gains[one])
+        return None
+
+    def _lifted(self, levels: Levels, k: int) -> Levels | None:
+        """The levels with a choice one higher; None where there is none."""
+        if levels[k] + 1 == len(self.choices[k].labels):
+            return None
+        return (*levels[:k], levels[k] + 1, *levels[k + 1 :])
+
+    def _within_memory(self, levels: Levels | None) -> Levels | None:
+        try:
+            if levels is not None:
+                self.wanted.refuse(self.planned(levels))
+        except InputError:
+            return None
+        return levels
+
+    def text(self, levels: Levels) -> str:
+        """What is above the lowest levels."""
+        return ", ".join(self._labels(levels, raised=True)) or "all at their lowest"
+
+    def _labels(self, levels: Levels, *, raised: bool) -> list[str]:
+        return [
+            f"{one.name} {one.labels[k]}"
+            for one, k in zip(self.choices, levels, strict=True)
+            if bool(k) == raised
+        ]
+
+    def saving(self, levels: Levels) -> str:
+        """What was raised, and what was not needed."""
+        text = f"raised: {', '.join(self._labels(levels, raised=True)) or 'nothing'}"
+        lowest = ", ".join(self._labels(levels, raised=False))
+        return f"{text}; not needed above: {lowest}" if lowest else text
+
+    def lack(self, shares: Shares) -> str:
+        """What is not reached and why, and what is; "" where all is."""
+        missed = [_obstacle(key, one) for key, one in shares.items() if not _sum(one) <= 1.0]
+        missed += self._withheld.values()
+        if not shares:
+            missed.append("no number has a bound")
+        reached = [_name(key) for key, parts in shares.items() if _sum(parts) <= 1.0]
+        if missed and reached:
+            missed.append(f"reached are {', '.join(reached)}")
+        return "; ".join(missed)
+
+    def missed(self, why: str, solution: Any, found: Any) -> ConvergenceError:
+        """The accuracy is not reached: the last round and what is known of its errors stay."""
+        rounds = f"; rounds: {' | '.join(self.rounds)}" if self.rounds else ""
+        failure = ConvergenceError(
+            f"accuracy: no levels within this machine's memory reach it ({why}{rounds}): ask for "
+            "less, or give the levels yourself and no accuracy"
+        )
+        failure.partial, failure.estimates = solution, found
+        return failure
+
+
+def shares_of(
+    estimates: Mapping[Key, Sequence[ErrorPart]], accuracies: Mapping[str, float]
+) -> dict[Key, dict[str, float]]:
+    """Errors of the wanted numbers by source, over what is wanted of them.
+
+    Parameters
+    ----------
+    estimates
+        Parts of the errors of a run's numbers.
+    accuracies
+        Name of a number, as a shell pattern -> largest relative error; of several patterns the
+        first counts.
+    """
+    out: dict[Key, dict[str, float]] = {}
+    for key, parts in estimates.items():
+        target = next((w for name, w in accuracies.items() if fnmatchcase(key[0], name)), None)
+        if target is not None and parts:
+            mine: dict[str, float] = {}
+            for part in parts:
+                mine[part.source] = mine.get(part.source, 0.0) + part.error / target
+            out[key] = mine
+    return out
+
+
+def require_named(wanted: Collection[str], results: Iterable[Result]) -> None:
+    """Raise InputError for names (shell patterns) that no number of the run has."""
+    names = list(dict.fromkeys(r.name for r in results))
+    missing = [n for n in wanted if not any(fnmatchcase(name, n) for name in names)]
+    if missing:
+        raise InputError(
+            f"accuracy: {', '.join(missing)}: this run has no number of that name; it has "
+            f"{', '.join(names)}"
+        )
+
+
+def _sum(parts: Mapping[str, float]) -> float:
+    """Of a number over its accuracy; inf where a source has no estimate."""
+    total = math.fsum(parts.values())
+    return total if math.isfinite(total) else math.inf
+
+
+def _name(key: Key) -> str:
+    return f"{key[0]} {key[1].label}".rstrip()
+
+
+def _farthest(shares: Shares) -> str:
+    key = max(shares, key=lambda key: _sum(shares[key]), default=None)
+    return "no number" if key is None else f"{_name(key)} {_times(_sum(shares[key]))}"
+
+
+def _times(miss: float) -> str:
+    return f"{miss:.2g} times its accuracy" if math.isfinite(miss) else "without a bound"
+
+
+def _obstacle(key: Key, parts: Mapping[str, float]) -> str:
+    """What keeps a number from its accuracy."""
+    unknown = [source for source, error in parts.items() if not math.isfinite(error)]
+    if unknown:
+        return f"{_name(key)}: no estimate of what {', '.join(unknown)} leave"
+    most = max(parts, key=lambda source: parts[source])
+    return f"{_name(key)}: most of it by {most}, {_times(_sum(parts))}"
