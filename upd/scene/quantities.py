@@ -18,7 +18,7 @@ Steps = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Example:
-    """Values that would do, as TOML: what the message about a bad one tells to write.
+    """Values that would do, as TOML: what the message about a bad one proposes.
 
     Several are the items of a list of such values.
     """
@@ -33,7 +33,7 @@ class Example:
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """What a scene says of how well it knows an input.
+    """An input that is known within limits.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Uncertainty:
 
 @dataclass(frozen=True)
 class Noted:
-    """What a reference of the keys says of a value whose own validator reads it.
+    """Unit and bounds, for a reference of the keys, of a value whose own validator reads it.
 
     Attributes
     ----------
@@ -124,9 +124,19 @@ def must(rule: Callable[[Any], bool], message: str, bounds: str = "") -> AfterVa
     """A value that breaks ``rule`` is a problem.
 
     ``message`` ends the sentence that begins with the value; ``bounds`` are the rule in a few
-    words, for the reference of the keys (without them it says what the message forbids).
+    words, for the reference of the keys (without them what the message forbids).
     """
     return AfterValidator(Rule(rule, message, bounds or f"none that {message.partition(';')[0]}"))
+
+
+def is_whole(value: Any) -> bool:
+    """Whether a value is a whole number."""
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def is_name(value: str) -> bool:
+    """Whether a text can name a scene or a table."""
+    return bool(re.fullmatch(r"[\w.-]*\w[\w.-]*", value))
 
 
 def at_least(least: int) -> AfterValidator:
@@ -255,7 +265,7 @@ Memory = Annotated[float, quantity("memory"), positive, Example.of('"4 GB"')]
 Name = Annotated[
     str,
     must(
-        lambda v: bool(re.fullmatch(r"[\w.-]*\w[\w.-]*", v)),
+        is_name,
         "is no name: use letters, digits, '-', '_' and '.'",
         "letters, digits, -, _ and .",
     ),

@@ -13,7 +13,7 @@ import pytest
 
 from upd.errors import InputError
 from upd.scene import ForcedScene, RigScene, Scene, SeatedScene, load_scene
-from upd.scene.overrides import toml_value
+from upd.scene.toml import value_of
 
 SCENES: dict[str, Any] = {
     "hertz": Scene,
@@ -98,7 +98,7 @@ def test_what_the_sentence_tells_to_write_is_taken(name: str, path: str) -> None
             example = found[1]
             if "one of" in found[0]:
                 example = example.split(", ")[0]
-            after = problems(name, path, toml_value(example))
+            after = problems(name, path, value_of(example))
             kept = [b for b in after if b.strip().startswith(f"{path}: ") and "; write " in b]
             assert not kept, (value, line, after)
 
