@@ -18,7 +18,7 @@ below it, none in a circle; contracts in pyproject.toml hold this.
     runner      one run: plan, solve, check, write the run folder
     report      the run folder read back: page, comparison, notebook, figures
     analyses    contact, modal, seated, forced: each plans, solves, checks and describes its charts
-    vary        one scene with one thing changed, solved again: what that tells of its errors
+    vary        one scene with one thing changed, solved again: errors, effects, inputs
     plot        a Chart of arrays drawn by matplotlib or plotly; pictures of modes and surfaces
     scene       scene.toml -> frozen dataclasses
     matrices    K and M of other programs
