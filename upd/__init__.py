@@ -85,17 +85,6 @@ _HOME = {
     "make_plan": "upd.analyses",
     "Plan": "upd.analyses.base",
 }
-_MODULES = (
-    "contact",
-    "dynamics",
-    "hbm",
-    "linalg",
-    "matrices",
-    "measured",
-    "own_matrices",
-    "reduction",
-    "reference",
-)
 
 __all__ = [
     "Plan",
@@ -125,12 +114,11 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name in _MODULES:
-        return import_module(f"upd.{name}")
     if name in _HOME:
-        value = getattr(import_module(_HOME[name]), name)
-        globals()[name] = value
+        globals()[name] = value = getattr(import_module(_HOME[name]), name)
         return value
+    if name in __all__:
+        return import_module(f"upd.{name}")
     raise AttributeError(f"module 'upd' has no attribute {name!r}")
 
 

@@ -56,7 +56,7 @@ CONTACT_WANTS = {
 FRICTION_WANTS = ("stiffness", "tangential", "cycle", "contact_law")
 
 
-Want = Annotated[str, known_output(WANTS), q.Example.of('"normal"', '"stiffness"')]
+Want = Annotated[str, known_output(WANTS), q.Example('"normal"', '"stiffness"')]
 
 
 #: words of contact.coupling
@@ -103,7 +103,7 @@ class ContactData:
     load_point: tuple[q.Length, q.Length] | None = None
     coupling: Coupling = "uncoupled"
     distant: Annotated[
-        Mapping[str, Annotated[str, q.Example.of('"wires"')]], q.Example.of('{ damper = "wires" }')
+        Mapping[str, Annotated[str, q.Example('"wires"')]], q.Example('{ damper = "wires" }')
     ] = field(default_factory=dict)
     coupling_limit: q.Coefficient = 0.1
 
@@ -190,7 +190,7 @@ class Scene(SceneBase):
 
     want: Annotated[tuple[Want, ...], q.FILLED]
     materials: Annotated[
-        Mapping[str, MaterialData], q.Example.of('{ damper = { E = "200 GPa", nu = 0.3 } }')
+        Mapping[str, MaterialData], q.Example('{ damper = { E = "200 GPa", nu = 0.3 } }')
     ]
     loads: Loads
     contact: ContactData = field(default_factory=ContactData)

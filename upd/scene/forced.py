@@ -146,7 +146,7 @@ class ExcitationChoice:
     forces: Annotated[
         tuple[HarmonicForce, ...],
         q.FILLED,
-        q.Example.of('[{ blade = "left", amplitude = 0.5, phase = "180 deg" }]'),
+        q.Example('[{ blade = "left", amplitude = 0.5, phase = "180 deg" }]'),
     ] = (HarmonicForce(),)
 
     @property
@@ -224,12 +224,12 @@ class ForcedScene(RigBase):
 
     analysis: Literal["forced response"]
     want: Annotated[
-        tuple[Annotated[str, known_output(FORCED_WANTS), q.Example.of('"response"')], ...], q.FILLED
+        tuple[Annotated[str, known_output(FORCED_WANTS), q.Example('"response"')], ...], q.FILLED
     ]
     stiffness: Annotated[
         Mapping[q.Name, StiffnessChoice],
         q.FILLED,
-        q.Example.of('{ own = { K_N = "1e6 N/mm", K_T = "5e5 N/mm" } }'),
+        q.Example('{ own = { K_N = "1e6 N/mm", K_T = "5e5 N/mm" } }'),
     ]
     mesh: MeshChoice = field(default_factory=lambda: MeshChoice(element="hex20"))
     reduction: BladeReduction = field(default_factory=BladeReduction)

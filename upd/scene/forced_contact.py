@@ -14,7 +14,7 @@ from upd.scene.base import STRICT
 from upd.scene.rig import FaceFriction, Fit
 from upd.units import parse_quantity
 
-Stiffness = Annotated[float, q.quantity("stiffness"), q.positive, q.Example.of('"1e6 N/mm"')]
+Stiffness = Annotated[float, q.quantity("stiffness"), q.positive, q.Example('"1e6 N/mm"')]
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
 #: contact.rule of points by polynomials
@@ -54,7 +54,7 @@ Static = Annotated[
     Any,
     BeforeValidator(_static),
     q.Noted(bounds=f"{', '.join(STATES)}, or T/N or N and T of the left and the right face"),
-    q.Example.of('"frictionless"'),
+    q.Example('"frictionless"'),
 ]
 
 
@@ -81,7 +81,7 @@ Lines = Annotated[
     Any,
     BeforeValidator(_lines),
     q.Noted(bounds="all, a number of groups, or a list of line numbers from 0"),
-    q.Example.of('"all"'),
+    q.Example('"all"'),
 ]
 
 
@@ -155,7 +155,7 @@ class FrictionChoice(FaceFriction):
     static: Static = "frictionless"
     directions: Literal["auto", "one", "two"] = "auto"
     share: Literal["area", "equal"] = "area"
-    stiffness: tuple[Annotated[str, q.Example.of('"thesis"')], ...] = ()
+    stiffness: tuple[Annotated[str, q.Example('"thesis"')], ...] = ()
 
     @property
     def loaded(self) -> bool:

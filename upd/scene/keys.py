@@ -106,11 +106,6 @@ class SceneKey:
         return ".".join(self.steps)
 
     @property
-    def table(self) -> str:
-        """The table it stands in, "" for the scene itself."""
-        return ".".join(self.steps[:-1])
-
-    @property
     def name(self) -> str:
         """Without its table."""
         return self.steps[-1]

@@ -31,7 +31,7 @@ ResponseUnit = Annotated[
         f"is no unit of a response; use one of {', '.join(_UNITS)}",
         "of accelerance, mobility or receptance",
     ),
-    q.Example.of('"(m/s2)/N"'),
+    q.Example('"(m/s2)/N"'),
 ]
 
 
@@ -64,7 +64,7 @@ class MeasuredChoice:
     """
 
     __pydantic_config__ = STRICT
-    file: Annotated[str, q.Noted(bounds="a .csv, text or .nc file"), q.Example.of('"free.csv"')]
+    file: Annotated[str, q.Noted(bounds="a .csv, text or .nc file"), q.Example('"free.csv"')]
     blade: Literal["right", "left"] = "right"
     state: Literal["free", "stuck"] | None = None
     centrifugal_to_force: q.Ratio | None = None

@@ -103,7 +103,7 @@ class ResponseChoice:
     stop: q.Frequency = 600.0
     points: Annotated[int, q.at_least(10)] = 2000
     damping: Annotated[q.Share, q.or_from(FROM_MEASURED, UNTIL_READ)] = 0.005
-    peak: Annotated[float, q.positive, q.Noted("(m/s2)/N"), q.Example.of("120.0")] | None = None
+    peak: Annotated[float, q.positive, q.Noted("(m/s2)/N"), q.Example("120.0")] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +120,7 @@ class ModalScene(RigBase):
     analysis: ClassVar[str] = "rig"
 
     want: Annotated[
-        tuple[Annotated[str, known_output(MODAL_WANTS), q.Example.of('"free"', '"glued"')], ...],
+        tuple[Annotated[str, known_output(MODAL_WANTS), q.Example('"free"', '"glued"')], ...],
         q.FILLED,
     ]
     mesh: MeshChoice = field(default_factory=lambda: MeshChoice(element="hex20"))

@@ -29,8 +29,8 @@ SEATED = "seated damper"
 #: tables that only this scene has
 SEATED_ONLY = ("seating", "moved", "blades")
 
-Way = Annotated[float, q.quantity("length"), q.positive, q.Example.of('"20 um"')]
-Over = Annotated[float, q.must(lambda v: v > 1.0, "is not above 1", "> 1"), q.Example.of("1.5")]
+Way = Annotated[float, q.quantity("length"), q.positive, q.Example('"20 um"')]
+Over = Annotated[float, q.must(lambda v: v > 1.0, "is not above 1", "> 1"), q.Example("1.5")]
 whole_quarters = q.must(
     lambda v: v >= 4 and v % 4 == 0, "is not 4, 8, 12 and so on", "4, 8, 12 and so on"
 )
@@ -131,7 +131,7 @@ class SeatedScene(RigBase):
 
     analysis: Literal["seated damper"]
     want: Annotated[
-        tuple[Annotated[str, known_output(SEATED_WANTS), q.Example.of('"seating"')], ...], q.FILLED
+        tuple[Annotated[str, known_output(SEATED_WANTS), q.Example('"seating"')], ...], q.FILLED
     ]
     blades: BladesChoice = field(default_factory=BladesChoice)
     damper: DamperChoice = field(default_factory=DamperChoice)
