@@ -205,7 +205,7 @@ class _Blade:
 
     @property
     def sign(self) -> float:
-        """Side of x = 0 the blade stands on."""
+        """Side of x = 0 of the blade."""
         return -1.0 if self.side == "left" else 1.0
 
     def put(self, column: str, row: str, out: float, z: float, kind: str) -> str:
@@ -428,7 +428,7 @@ def _wedge(p: BladeRig, layout: Layout, left: list[str], right: list[str]) -> No
 def _triangle(p: BladeRig, layout: Layout, left: list[str], pads: list[str]) -> None:
     """The asymmetric damper.
 
-    stand on the upper face.
+    are on the upper face.
 
     Parameters
     ----------

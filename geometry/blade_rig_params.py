@@ -17,7 +17,7 @@ class BladeRig:
     """The two blades on their bases, with or without the damper.
 
     Axes: x across the blades, y along the damper, z up; the bases end at z = 0, the blade axes
-    stand at x = -pitch/2 and pitch/2. Blade: shank, platform, core. The platform has a front side
+    are at x = -pitch/2 and pitch/2. Blade: shank, platform, core. The platform has a front side
     with an inclined underside and a rear side: vertical on the left blade, inclined on the right
     one. The damper is as long as the platform is wide. The numbers of elements are those at refine
     = 1.
@@ -458,7 +458,7 @@ def _asymmetric_misfits(p: BladeRig) -> list[str]:
             ),
             (
                 p.damper == "none" or _right_edge(p) > margin,
-                "damper_cut: nothing of the right edge is left; shorten it or lengthen damper_left",
+                "damper_cut: nothing of the right edge remains; shorten it or lengthen damper_left",
             ),
         ]
     )

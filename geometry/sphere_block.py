@@ -405,7 +405,7 @@ def count(params: SphereBlock) -> dict[str, dict[str, int]]:
 def _count(p: SphereBlock, layers: int, radial: int) -> dict[str, int]:
     nx = p.divisions if p.symmetry != "quarter" else p.divisions // 2
     ny = p.divisions if p.symmetry == "full" else p.divisions // 2
-    # elements along that part of the patch edge the side blocks stand on; it closes on itself in
+    # elements along that part of the patch edge under the side blocks; it closes on itself in
     # the full model only
     rim = {"full": 2 * (nx + ny), "half": nx + 2 * ny, "quarter": nx + ny}[p.symmetry]
     cut = {"full": 0, "half": nx, "quarter": nx + ny}[p.symmetry]

@@ -18,7 +18,7 @@ below it, none in a circle; contracts in pyproject.toml hold this.
     runner      one run: plan, solve, check, write the run folder
     report      the run folder read back: page, comparison, notebook, figures
     analyses    contact, modal, seated, forced: each plans, solves, checks and describes its charts
-    vary        one scene with one thing changed, solved again: what that tells of its errors
+    vary        one scene with one thing changed, solved again: errors, effects, inputs
     plot        a Chart of arrays drawn by matplotlib or plotly; pictures of modes and surfaces
     scene       scene.toml -> frozen dataclasses
     matrices    K and M of other programs
@@ -85,17 +85,6 @@ _HOME = {
     "make_plan": "upd.analyses",
     "Plan": "upd.analyses.base",
 }
-_MODULES = (
-    "contact",
-    "dynamics",
-    "hbm",
-    "linalg",
-    "matrices",
-    "measured",
-    "own_matrices",
-    "reduction",
-    "reference",
-)
 
 __all__ = [
     "Plan",
@@ -125,12 +114,11 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name in _MODULES:
-        return import_module(f"upd.{name}")
     if name in _HOME:
-        value = getattr(import_module(_HOME[name]), name)
-        globals()[name] = value
+        globals()[name] = value = getattr(import_module(_HOME[name]), name)
         return value
+    if name in __all__:
+        return import_module(f"upd.{name}")
     raise AttributeError(f"module 'upd' has no attribute {name!r}")
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -44,13 +46,21 @@ class ConvergenceError(UpdError):
     """A solver or a self-check that did not reach its tolerance; the message carries the status."""
 
 
+def did_you_mean(word: object, known: Iterable[str], otherwise: str) -> str:
+    """What follows in a message about a name that is not known: the nearest that is, or
+    ``otherwise``.
+    """
+    near = difflib.get_close_matches(str(word), list(known), 1)
+    return f", did you mean {near[0]!r}?" if near else f"; {otherwise}"
+
+
 def one_line(error: BaseException) -> str:
-    """A fault in one line: what the system says of the disk, else the error."""
-    told = getattr(disk_fault(error) or error, "strerror", None) or f"{error}"
-    return " ".join(str(told or type(error).__name__).split())
+    """A fault in one line: the system's words for one of the disk, else the error."""
+    text = getattr(disk_fault(error) or error, "strerror", None) or f"{error}"
+    return " ".join(str(text or type(error).__name__).split())
 
 
 def disk_fault(error: BaseException) -> OSError | None:
-    """The fault of the disk that an error tells of; None when it is another."""
+    """The fault of the disk behind an error; None when it is another."""
     cause = error.__context__ if isinstance(error, UpdError) else error
     return cause if isinstance(cause, OSError) else None

@@ -22,11 +22,9 @@ _LABELS = {
     "compression_3a_sphere": "sphere beyond 3a",
     "compression_3a_block": "block beyond 3a",
     "approach_within_3a": "approach within 3a (thesis 6.5)",
-    "contact_area": "contact area",
     "contact_area_resolution": "contact area known to +-",
     "contact_area_nodes": "area, node count",
     "max_pressure": "maximum pressure",
-    "mean_pressure": "mean pressure",
     "K_N_tangent_raw": "K_N tangent, raw",
     "K_N_secant_raw": "K_N secant, raw",
     "K_T_initial_raw": "K_T initial, raw",
@@ -34,7 +32,6 @@ _LABELS = {
     "K_T_over_K_N": "K_T / K_N",
     "K_T_tangent_raw": "K_T tangent, raw",
     "K_T_secant_raw": "K_T secant, raw",
-    "stick_radius": "stick radius",
     "stick_area": "area in stick",
     "tangential_displacement_raw": "displacement, raw",
     "tangential_displacement": "displacement, bulk compliance removed",
@@ -107,7 +104,6 @@ _LABELS = {
     "stuck_in_phase": "stuck, blades in phase",
     "stuck_out_of_phase": "stuck, blades out of phase",
     "friction_energy": "friction loss per cycle",
-    "friction_power": "friction power",
     "face_K_N": "K_N of a face",
     "face_K_T": "K_T of a face",
     "face_K_T_along": "K_T of a face along the damper",
@@ -142,12 +138,11 @@ _LABELS = {
     "points_always_stuck": "points that always stick",
     "time_march_accelerance": "accelerance by time march",
     "damper_mass": "mass of the damper",
-    "contact_points": "contact points",
     **{
-        f"{blade}peak_{k}_{name}": f"{words}peak {k}, {said}"
+        f"{blade}peak_{k}_{name}": f"{words}peak {k}, {of}"
         for blade, words in (("", ""), ("left_", "left blade, "))
         for k in range(1, 6)
-        for name, said in (
+        for name, of in (
             ("frequency", "frequency"),
             ("accelerance", "accelerance"),
             ("frequency_change", "change of the frequency by an input"),
@@ -226,7 +221,7 @@ def check_number(check: Mapping[str, Any], key: str, digits: int = 2) -> str:
 
 
 def check_words(check: Mapping[str, Any]) -> str:
-    """What a check of summary.json says, its value and its limit."""
+    """The statement of a check of summary.json, its value and its limit."""
     value, limit = (check_number(check, key, 3) for key in ("value", "limit"))
     return f"{check['says']} = {value} (limit {limit})"
 

@@ -109,9 +109,9 @@ def unit_factor(unit: str, kinds: Sequence[str]) -> tuple[str, float]:
         if unit and unit in UNITS[kind]:
             return kind, UNITS[kind][unit]
     other = next((k for k, units in UNITS.items() if unit and unit in units), None)
-    told = f"is a unit of {other}" if other else "is not known"
+    fault = f"is a unit of {other}" if other else "is not known"
     known = "; ".join(f"of {kind} {', '.join(u for u in UNITS[kind] if u)}" for kind in kinds)
-    raise InputError(f"the unit {unit!r} {told}; understood are those {known}")
+    raise InputError(f"the unit {unit!r} {fault}; understood are those {known}")
 
 
 def unit_inside(kind: str) -> str:

@@ -384,7 +384,7 @@ def test_no_load() -> None:
             r"arms \(0, 0\) mm, 0.25 mm outside the nodes, beyond their side from .* tips "
             r"over. Move the load line",
         ),
-        ({"arms": "line"}, "stand on one line"),
+        ({"arms": "line"}, "lie on one line"),
         ({"arms": np.zeros((16, 3))}, r"arms has shape \(16, 3\)"),
         ({"load": -1.0}, "load is -1 N"),
         ({"load": 0.0, "moment": (1.0, 0.0)}, "under no load"),

@@ -13,8 +13,8 @@ from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.recipe_modules import READY, is_file
 from upd.scene import geometry_parameters, load_scene
-from upd.scene.overrides import read_overrides
 from upd.scene.read import ready_scenes
+from upd.scene.toml import read_overrides
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def _of_recipe(recipe: str, overrides: Sequence[str], element: str | None) -> Me
     if element is not None:
         problems += _element_problem(element, recipe, known)
         table["element_nodes"] = NODES.get(element, 8)
-    given, more = geometry_parameters(table, Path.cwd(), known)
+    given, more = geometry_parameters(table, known)
     problems += [problem.removeprefix("geometry.") for problem in more]
     if problems:
         raise InputError("\n".join(f"{recipe}: {problem}" for problem in problems))

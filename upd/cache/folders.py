@@ -54,7 +54,7 @@ class OwnFolder:
         Raises
         ------
         UpdError
-            When no name can be taken: the files are then where the message says.
+            When no name can be taken: the files are then where the message names.
         """
         try:
             with _turn(self.path.parent):

@@ -41,7 +41,7 @@ class Store:
     def remembered(self, kind: str, key: str, make: Callable[[], Found]) -> Found:
         """What `make` gives, kept in memory for the next point with the same `key`.
 
-        One object of each kind: another is let go before the new one is made, so that two never
+        One object of each kind: another is released before the new one is made, so that two never
         stand side by side.
         """
         held = self._memory.get(kind)

@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
-from rich.table import Table
 
 from upd import __version__
 from upd.cache.folders import numbered
 from upd.cli import terminal
-from upd.cli.terminal import Live, Notes, SetOption, plain
+from upd.cli.terminal import Live, Notes, SetOption, warn
 from upd.errors import InputError, UpdError
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 3
@@ -29,12 +28,10 @@ app = App(
         "that it does not take are a warning); 2 bad input; 3 interrupted."
     ),
     version=__version__,
+    # switches have no --no-... unless they say so
+    default_parameter=Parameter(negative=()),
     result_action="return_value",
     suppress_keyboard_interrupt=False,
-)
-_OUTPUT = (
-    "file to write: .msh, .vtu or .inp, by its ending; may be repeated; by default all three in "
-    "runs/mesh-NAME"
 )
 
 
@@ -44,8 +41,8 @@ def run(
     *,
     set: SetOption = None,
     out: Path | None = None,
-    report: bool = True,
-    full: Annotated[bool, Parameter(negative=())] = False,
+    report: Annotated[bool, Parameter(negative="--no-report")] = True,
+    full: bool = False,
 ) -> None:
     """Run a scene: mesh, solve, check, print the answer and write the run folder.
 
@@ -76,22 +73,23 @@ def run(
             )
         except UpdError as error:
             if error.folder is not None and error.result is None:
-                terminal.errors.print(f"The log and what converged are in {plain(error.folder)}")
+                terminal.errors.print(f"The log and what converged are in {error.folder}")
             if error.folder is None or error.result is None:
                 raise
             live.stop()
             print_result(terminal.console, error.result, full=full)
-            if report:
-                _print_missing_page(error.folder)
+            if report and not (error.folder / "report.html").exists():
+                terminal.console.print(f"Report: not written, see {error.folder / 'run.log'}")
             raise
-    # What went wrong with pictures is told once, beside the answer.
+    # faults of pictures are printed once, beside the answer
     print_result(terminal.console, replace(result, faults=()), full=full)
-    _print_faults(result.faults)
+    for fault in result.faults:
+        warn(fault, "yellow")
 
 
 @app.command
 def plan(scene: str, *, set: SetOption = None) -> None:
-    """Show what will be simulated, what is left out and why, and the predicted size, memory and
+    """Show what will be simulated, what is omitted and why, and the predicted size, memory and
     seconds. Nothing is solved.
     """
     from upd.analyses import make_plan
@@ -106,18 +104,16 @@ def plan(scene: str, *, set: SetOption = None) -> None:
 def mesh(
     scene: str,
     *,
-    output: Annotated[
-        list[Path] | None, Parameter(name=["--output", "-o"], negative=(), help=_OUTPUT)
-    ] = None,
+    output: Annotated[list[Path] | None, Parameter(alias="-o")] = None,
     set: SetOption = None,
     arrangement: Literal["symmetric", "asymmetric"] | None = None,
     damper: Literal["none", "glued", "free"] | None = None,
     symmetry: Literal["full", "half", "quarter"] | None = None,
     element: Literal["hex8", "hex20", "hex27"] | None = None,
-    split: Annotated[bool, Parameter(negative=())] = False,
+    split: bool = False,
     picture: Path | None = None,
-    no_picture: Annotated[bool, Parameter(negative=())] = False,
-    list: Annotated[bool, Parameter(negative=())] = False,
+    no_picture: bool = False,
+    list: bool = False,
 ) -> None:
     """Mesh a recipe or a scene, whole, and write it for other programs, with a picture.
 
@@ -128,6 +124,9 @@ def mesh(
     scene
         Ready recipe (sphere_block, wedge_platform, pads_platform, blade_rig), a .py recipe of your
         own, or a scene.
+    output
+        File to write: .msh, .vtu or .inp, by its ending; may be repeated; by default all three in
+        runs/mesh-NAME.
     arrangement
         Of a rig: which sides of the platforms face each other.
     damper
@@ -148,14 +147,8 @@ def mesh(
     from upd.analyses.meshing import mesh_request
     from upd.cli.mesh import mesh_files, picture_file, print_parameters, regenerate
 
-    request = mesh_request(
-        scene,
-        set or [],
-        arrangement=arrangement,
-        damper=damper,
-        symmetry=symmetry,
-        element=element,
-    )
+    chosen = {"arrangement": arrangement, "damper": damper, "symmetry": symmetry}
+    request = mesh_request(scene, set or [], element=element, **chosen)
     if list:
         print_parameters(terminal.console, request)
         return
@@ -173,7 +166,7 @@ def study(
     scene: str,
     *,
     vary: str = "mesh",
-    levels: Annotated[list[float] | None, Parameter(consume_multiple=True, negative=())] = None,
+    levels: Annotated[list[float] | None, Parameter(consume_multiple=True)] = None,
     at: str | None = None,
     set: SetOption = None,
     out: Path | None = None,
@@ -218,8 +211,7 @@ def study(
         upd[cluster].
     """
     from upd.batch.studies import plan_study, run_study, scene_at, study_workers
-    from upd.cli.progress import ProgressLine
-    from upd.cli.study import print_study, print_study_plan
+    from upd.cli.batch import print_study, print_study_plan
     from upd.labels import file_name
     from upd.scene import load_scene
 
@@ -230,14 +222,9 @@ def study(
         planned = plan_study(loaded, vary, tuple(levels) if levels else None)
         who = study_workers(loaded, planned, workers, threads, cluster)
     print_study_plan(terminal.console, f"{loaded.title or loaded.name}, {vary}", planned, who)
-    with ProgressLine(terminal.console) as watch:
-        result = run_study(
-            loaded,
-            planned,
-            out or Path("runs") / f"study-{loaded.name}-{vary}{load}",
-            workers=who,
-            watch=watch,
-        )
+    folder = out or Path("runs") / f"study-{loaded.name}-{vary}{load}"
+    with terminal.batch_progress() as watch:
+        result = run_study(loaded, planned, folder, workers=who, watch=watch)
     print_study(terminal.console, result)
     return OK if result.report.found else FAILED
 
@@ -246,13 +233,7 @@ def study(
 def sweep(
     scene: str,
     *,
-    vary: Annotated[
-        list[str] | None,
-        Parameter(
-            negative=(),
-            help="path=first:last:count[:log] or path=value,value,...; repeat for a grid",
-        ),
-    ] = None,
+    vary: list[str] | None = None,
     sample: int | None = None,
     seed: int | None = None,
     set: SetOption = None,
@@ -272,9 +253,11 @@ def sweep(
 
     Parameters
     ----------
+    vary
+        path=first:last:count[:log] or path=value,value,...; repeat for a grid.
     sample
         Points drawn evenly from the limits of all inputs with a half-width (0.6 +- 0.1), in place
-        of --vary: a check of the bands by the inputs, which runs tell to first order.
+        of --vary: a check of the bands by the inputs, which runs give to first order.
     seed
         Of the draw; without, that of the sample in the folder, else 0.
     out
@@ -294,8 +277,7 @@ def sweep(
     from upd.batch.plan import plan_sweep
     from upd.batch.store import PointStore
     from upd.batch.sweeps import run_sweep
-    from upd.cli.progress import ProgressLine
-    from upd.cli.sweep import print_sample, print_sweep, print_sweep_plan
+    from upd.cli.batch import print_sample, print_sweep, print_sweep_plan
     from upd.scene import load_scene
 
     loaded = load_scene(scene, set or [])
@@ -319,10 +301,11 @@ def sweep(
     if plan_only:
         return OK
     names = [name.strip() for name in follow.split(",") if name.strip()]
-    with ProgressLine(terminal.console) as watch:
+    with terminal.batch_progress() as watch:
         result = run_sweep(planned, folder, follow=names, watch=watch)
     (print_sweep if planned.sample is None else print_sample)(terminal.console, result)
-    _print_faults(result.faults)
+    for fault in result.faults:
+        warn(fault, "yellow")
     return OK if len(result.failed) < len(result.outcomes) else FAILED
 
 
@@ -338,26 +321,18 @@ def fit(
     scene: str,
     *,
     to: str,
-    vary: Annotated[
-        list[str],
-        Parameter(
-            consume_multiple=True,
-            negative=(),
-            help="path, path=low:high (quantities, or factors x0.1:x10), or path+path for one "
-            "factor of several; may be repeated",
-        ),
-    ],
+    vary: Annotated[list[str], Parameter(consume_multiple=True)],
     set: SetOption = None,
     starts: int | None = None,
-    profiles: bool | None = None,
+    profiles: Annotated[bool | None, Parameter(negative="--no-profiles")] = None,
     out: Path | None = None,
 ) -> int:
     """Find inputs of a forced response that give wanted numbers or measured curves.
 
-    Says what these leave unknown: directions, correlations, the family of inputs that fit equally
-    well, and which further measurement would tell them apart. Writes the scene with the fitted
-    values, figure, numbers and report.html. Ends with 1 when the targets are not reached; the files
-    then hold the nearest. Kill it at any moment; called again it goes on.
+    Reports what these leave unknown: directions, correlations, the family of inputs that fit
+    equally well, and which further measurement would distinguish them. Writes the scene with the
+    fitted values, figure, numbers and report.html. Ends with 1 when the targets are not reached;
+    the files then hold the nearest. Kill it at any moment; called again it continues.
 
     Parameters
     ----------
@@ -367,6 +342,9 @@ def fit(
         at an F_C/F_E "peak_1_frequency@194=335 Hz +- 1 Hz", measured curves "stuck=curve.csv +- 2
         %", "left_194=curve.csv", "measured" for all of the scene's. Half-widths for all numbers or
         for none; of curves without, the noise is estimated.
+    vary
+        path, path=low:high (quantities, or factors x0.1:x10), or path+path for one factor of
+        several; may be repeated.
     starts
         Of the search; by default 8 where only contact stiffnesses move, 4 with friction, 2 where
         new blades are made.
@@ -393,16 +371,12 @@ def fit(
             f"Figure: {folder / 'fit.png'}",
             f"Report: {folder / 'report.html'}",
         ):
-            terminal.console.print(plain(line), soft_wrap=True)
+            terminal.console.print(line, soft_wrap=True)
     return OK if found.status != "not reached" else FAILED
 
 
 @app.command
-def report(
-    runs: Annotated[list[Path], Parameter(negative=())],
-    *,
-    out: Path | None = None,
-) -> None:
+def report(runs: list[Path], *, out: Path | None = None) -> None:
     """Make the page of a run or a sweep again from its folder.
 
     Of several runs, one page that compares them.
@@ -421,22 +395,22 @@ def report(
             raise InputError(
                 "--out is for comparisons: the page of one run is report.html in its folder"
             )
-        terminal.console.print(f"Report: {plain(write_report(runs[0]))}")
+        terminal.console.print(f"Report: {write_report(runs[0])}")
         return
     page = write_comparison(runs, out or runs[0].resolve().parent / "comparison.html")
-    terminal.console.print(f"Comparison: {plain(page)}")
+    terminal.console.print(f"Comparison: {page}")
 
 
 @app.command
 def scenes() -> None:
     """List the ready scenes."""
+    from upd.cli.tables import columns_of, print_table
     from upd.scene import load_scene, ready_scenes
 
-    table = Table("scene", "what it is", "outputs")
-    for name in ready_scenes():
-        scene = load_scene(name)
-        table.add_row(name, scene.title, ", ".join(scene.want))
-    terminal.console.print(table)
+    loaded = map(load_scene, ready_scenes())
+    rows = ((one.name, one.title, ", ".join(one.want)) for one in loaded)
+    heads = {"scene": "text", "what it is": "words", "outputs": "words"}
+    print_table(terminal.console, columns_of(heads, rows))
 
 
 @app.command
@@ -459,7 +433,7 @@ def describe(
     found = described(what, set or [])
     print_keys(terminal.console, found, key)
     if drawing is not None:
-        terminal.console.print(f"Drawing: {plain(write_drawing(found, drawing))}")
+        terminal.console.print(f"Drawing: {write_drawing(found, drawing)}")
 
 
 @app.command
@@ -475,32 +449,20 @@ def new(scene: str, file: Path) -> None:
     """
     from upd.cli.describe import write_new
 
-    terminal.console.print(f"Written: {plain(write_new(scene, file))}")
+    terminal.console.print(f"Written: {write_new(scene, file)}")
 
 
 @app.command
 def doctor() -> int:
     """Show versions, BLAS, threads, the linear solver found and the libraries gmsh needs."""
     from upd.cli.doctor import examine
+    from upd.cli.tables import columns_of, print_table
 
-    table = Table("what", "found")
     rows = examine()
-    for what, found, fine in rows:
-        table.add_row(what, found if fine else f"[red]{found}[/red]")
-    terminal.console.print(table)
-    return OK if all(fine for *_, fine in rows) else FAILED
-
-
-def _print_faults(faults: tuple[str, ...]) -> None:
-    """Say on stderr what went wrong with figures or page."""
-    for fault in faults:
-        terminal.errors.print(f"[yellow]upd:[/yellow] {plain(fault)}")
-
-
-def _print_missing_page(folder: Path) -> None:
-    """Say that a run has no page; the answer names it where there is one."""
-    if not (folder / "report.html").exists():
-        terminal.console.print(f"Report: not written, see {plain(folder / 'run.log')}")
+    bad = {found: "red" for _, found, fine in rows if not fine}
+    table = columns_of({"what": "text", "found": "words"}, (row[:2] for row in rows))
+    print_table(terminal.console, table, styles=bad)
+    return FAILED if bad else OK
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -512,10 +474,10 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         code = app(arguments if arguments is not None else sys.argv[1:])
     except UpdError as error:
-        terminal.errors.print(f"[red]upd:[/red] {plain(error)}")
+        warn(error, "red")
         # A run that was solved and failed a self-check failed, whatever the remedy is.
         sys.exit(BAD_INPUT if isinstance(error, InputError) and not error.result else FAILED)
     except KeyboardInterrupt:
-        terminal.errors.print("upd: interrupted")
+        warn("interrupted")
         sys.exit(INTERRUPTED)
     sys.exit(code if isinstance(code, int) else OK)

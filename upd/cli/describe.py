@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby
@@ -11,26 +10,26 @@ from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
-from upd.cache.files import whole_file, write_text
+from upd.cache.files import placed_file
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.fields import table
 from upd.mesh.recipe_modules import READY, is_file
 from upd.scene import load_scene
 from upd.scene.keys import SceneKey, absent_keys, chosen_keys, params_of, recipe_keys, scene_keys
+from upd.scene.quantities import is_name
 from upd.scene.written import scene_to_start_from
 
 #: what an input may carry beside its value
 UNCERTAINTY = '"VALUE +- HALF-WIDTH" or "VALUE +- 10 %"'
-_NAME = re.compile(r"[\w.-]*\w[\w.-]*")
 
 
 @dataclass(frozen=True)
 class Described:
-    """What is told of a scene or a recipe.
+    """A scene or a recipe with its keys.
 
     Attributes
     ----------
@@ -61,67 +60,58 @@ def print_keys(console: Console, found: Described, asked: str) -> None:
     if asked and len(chosen) == 1:
         _print_one(console, chosen[0], found.params)
         return
-    console.print(f"[bold]{escape(found.title)}[/]")
+    console.print(Text(found.title, "bold"))
     for steps, mine in groupby(chosen, key=lambda k: k.steps[:-1]):
         console.print(_table(".".join(steps), list(mine)))
-    console.print(
-        "Bold: not the default. A key in full: upd describe SCENE KEY, for example "
-        f"{escape(chosen[-1].path)}.",
-        style="dim",
-    )
+    example = f"upd describe SCENE KEY, for example {chosen[-1].path}"
+    console.print(Text(f"Bold: not the default. A key in full: {example}.", "dim"))
 
 
 def _table(name: str, keys: Sequence[SceneKey]) -> Table:
-    out = Table(
-        box=SIMPLE_HEAD,
-        title=escape(f"[{name}]") if name else None,
-        title_justify="left",
-        title_style="bold",
-        padding=(0, 1, 0, 0),
-    )
+    title = Text(f"[{name}]", "bold") if name else None
+    out = Table(box=SIMPLE_HEAD, title=title, title_justify="left", padding=(0, 1, 0, 0))
     out.add_column("key", no_wrap=True)
     out.add_column("value", overflow="fold", max_width=28)
     out.add_column("unit", no_wrap=True)
     out.add_column("bounds", overflow="fold", max_width=30)
     out.add_column("what it is", overflow="fold", ratio=1)
     for key in keys:
-        value = escape(key.value or key.default)
-        changed = key.value != key.default and key.default != "must be given"
-        cost = "" if key.cost == "none" else f" [dim]Cost: {escape(key.cost)}.[/]"
+        changed = key.value and key.value != key.default != "must be given"
+        cost = "" if key.cost == "none" else f" Cost: {key.cost}."
         out.add_row(
-            escape(key.name),
-            f"[bold]{value}[/]" if changed and key.value else value,
+            Text(key.name),
+            Text(key.value or key.default, "bold" if changed else ""),
             key.unit,
-            escape(key.bounds),
-            f"{escape(key.meaning)}{cost}",
+            Text(key.bounds),
+            Text.assemble(key.meaning, (cost, "dim")),
         )
     return out
 
 
 def _print_one(console: Console, key: SceneKey, params: Any) -> None:
     """One key in full, with the bounds that the other parameters leave."""
-    rows = [("meaning", key.meaning)]
-    if key.value:
-        rows.append(("value", f"{key.value}{'' if key.given else ' (default)'}"))
-    rows.append(("default", key.default))
-    if key.unit:
-        understood = f"; understood: {', '.join(key.units)}" if len(key.units) > 1 else ""
-        rows.append(("unit", f"{key.unit}{understood}"))
-    rows.append(("bounds", key.bounds or "none"))
-    if key.uncertain:
-        rows.append(("uncertainty", UNCERTAINTY))
     # a recipe's key stands alone, in a scene it stands in its table
-    if key.steps[:-1] in ((), ("geometry",)) and key.name != "recipe":
-        here = next((row.here for row in table(params) if row.name == key.name), "")
-        if here:
-            rows.append(("here", f"{here} (what the other parameters leave)"))
-    rows.append(("cost", key.cost))
-    console.print(f"[bold]{escape(key.path)}[/]")
-    out = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    of_recipe = key.steps[:-1] in ((), ("geometry",)) and key.name != "recipe"
+    rows = table(params) if of_recipe else []
+    here = next((row.here for row in rows if row.name == key.name), "")
+    others = f"; understood: {', '.join(key.units)}" if len(key.units) > 1 else ""
+    texts = {
+        "meaning": key.meaning,
+        "value": f"{key.value}{'' if key.given else ' (default)'}" if key.value else "",
+        "default": key.default,
+        "unit": f"{key.unit}{others}" if key.unit else "",
+        "bounds": key.bounds or "none",
+        "uncertainty": UNCERTAINTY if key.uncertain else "",
+        "here": f"{here} (what the other parameters leave)" if here else "",
+        "cost": key.cost,
+    }
+    console.print(Text(key.path, "bold"))
+    out = Table.grid(padding=(0, 2, 0, 0))
     out.add_column(style="dim", no_wrap=True)
     out.add_column(overflow="fold")
-    for head, told in rows:
-        out.add_row(head, escape(told))
+    for head, text in texts.items():
+        if text:
+            out.add_row(head, Text(text))
     console.print(out)
 
 
@@ -133,13 +123,8 @@ def write_drawing(found: Described, path: Path) -> Path:
     from upd.plot.drawing import draw_sections
 
     meshes, views = recipes.drawing(found.recipe, asdict(found.params))
-    try:
-        with whole_file(path) as temporary:
-            draw_sections(meshes, views).savefig(temporary, format="png")
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be written ({error.strerror or error}); choose another place"
-        ) from None
+    with placed_file(path) as temporary:
+        draw_sections(meshes, views).savefig(temporary, format="png")
     return path
 
 
@@ -150,17 +135,13 @@ def write_new(source: str, file: Path) -> Path:
     """
     if file.suffix.lower() != ".toml":
         raise InputError(f"{file}: a scene is a .toml file; to fix it: name it {file.stem}.toml")
-    if not _NAME.fullmatch(file.stem):
+    if not is_name(file.stem):
         raise InputError(
             f"{file}: its name becomes the scene's: use letters, digits, '-', '_' and '.'"
         )
     if file.exists():
         raise InputError(f"{file}: is there already; to fix it: give another name")
     text = scene_to_start_from(load_scene(source), file.stem)
-    try:
-        write_text(file, text)
-    except OSError as error:
-        raise InputError(
-            f"{file}: cannot be written ({error.strerror or error}); choose another place"
-        ) from None
+    with placed_file(file) as temporary:
+        temporary.write_text(text, encoding="utf-8")
     return file

@@ -8,22 +8,20 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from upd.cli import terminal
-from upd.cli.terminal import Live, SetOption, plain
+from upd.cli.terminal import Live, SetOption
 from upd.errors import InputError
-
-RangeOption = Annotated[list[str] | None, Parameter(negative=())]
 
 
 def design(
     scene: str,
     *,
     minimise: Literal["peak", "acceleration"] | None = None,
-    over: RangeOption = None,
-    for_: Annotated[list[str] | None, Parameter(name="--for", negative=())] = None,
+    over: list[str] | None = None,
+    for_: Annotated[list[str] | None, Parameter(name="--for")] = None,
     set: SetOption = None,
     out: Path | None = None,
 ) -> None:
-    """Tell before any dynamics whether the damper jams, lifts off or tilts, in closed form; with
+    """Show before any dynamics whether the damper jams, lifts off or tilts, in closed form; with
     --minimise, find the damper whose worst resonance peak is lowest.
 
     Maps of its angles and friction with the damper marked, and the limits of the forces on both
@@ -57,10 +55,10 @@ def design(
     if over or for_:
         raise InputError("--over and --for belong to a choice: add --minimise peak")
     found = statics_of(loaded)
-    terminal.console.print(plain(found), soft_wrap=True)
+    terminal.console.print(str(found), soft_wrap=True)
     folder = out or Path("runs") / f"design-{loaded.name}"
     found.write(folder)
-    terminal.console.print(f"Figure: {plain(folder / 'design.png')}")
+    terminal.console.print(f"Figure: {folder / 'design.png'}")
 
 
 def _choice(
@@ -79,7 +77,7 @@ def _choice(
     terminal.console.print(f"Predicted: {predicted(ranges)}", soft_wrap=True)
     with Live() as live:
         found = best_of(loaded, minimise=minimise, over=over, for_=for_, progress=live)
-    terminal.console.print(plain(found), soft_wrap=True)
+    terminal.console.print(str(found), soft_wrap=True)
     found.write(folder)
-    terminal.console.print(f"Report: {plain(folder / 'report.html')}", soft_wrap=True)
-    terminal.console.print(f"Figure: {plain(folder / 'choice.png')}", soft_wrap=True)
+    terminal.console.print(f"Report: {folder / 'report.html'}", soft_wrap=True)
+    terminal.console.print(f"Figure: {folder / 'choice.png'}", soft_wrap=True)

@@ -8,20 +8,23 @@ from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
+from rich.text import Text
 
 from upd.analyses.meshing import MeshRequest
-from upd.cache.files import whole_file
+from upd.cache.files import placed_file
+from upd.cli.tables import columns_of, print_table
 from upd.errors import InputError
 from upd.labels import number
-from upd.mesh import FloatArray, Mesh, recipes
+from upd.mesh import Mesh, recipes
 from upd.mesh.export import ENDINGS, write_mesh
-from upd.mesh.fields import RecipeParameter, table
+from upd.mesh.fields import table
 from upd.mesh.pairing import Pairs, check_pairs
 from upd.mesh.quality import centre_of, quality
 from upd.progress import Listener, Stages
+from upd.report.columns import TextColumn
 
+#: characters to which bounds may be folded
+_WORDS = 16
 #: nodes per hexahedron that a .inp file can hold
 _ABAQUS = (8, 20)
 
@@ -72,8 +75,8 @@ def regenerate(
         size = f", {sum(body['hexes'] for body in counted)} hexahedra"
     with stages("mesh", f"{request.recipe}{size}"):
         meshes, cached = recipes.build_mesh(request.recipe, request.given)
-    with stages("pairs and shapes", ", ".join(meshes)):
-        pairs, shapes = check_pairs(meshes), _shapes(meshes)
+    with stages("pairs", ", ".join(meshes)):
+        pairs = check_pairs(meshes)
     for path in files:
         for part, bodies in _parts(path, meshes, split=split).items():
             with stages("write", str(part)):
@@ -82,8 +85,8 @@ def regenerate(
         with stages("picture", str(picture)):
             _draw(request, meshes, picture)
     console.print(_configuration(request, cached))
-    console.print(shapes)
-    console.print(_pairs(pairs, meshes))
+    _print_shapes(console, meshes)
+    _print_pairs(console, pairs, meshes)
     return meshes
 
 
@@ -103,57 +106,51 @@ def _draw(request: MeshRequest, meshes: Mapping[str, Mesh], path: Path) -> None:
     # matplotlib takes a while to import
     from upd.plot.mesh_picture import draw_meshes
 
-    try:
-        with whole_file(path) as temporary:
-            draw_meshes(meshes, request.name).savefig(temporary, format="png")
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be written ({error.strerror or error}); choose another place"
-        ) from error
+    with placed_file(path) as temporary:
+        draw_meshes(meshes, request.name).savefig(temporary, format="png")
 
 
 def _configuration(request: MeshRequest, cached: bool) -> str:
     """The parameters that differ from the recipe's defaults, in a line."""
     changed = [
-        f"{p.name} {_value(p, p.value)}"
-        for p in table(request.parameters)
+        f"{p.name} {_value(p.value)} {p.unit}".rstrip()
+        for p in table(request.parameters, here=False)
         if p.default is not None and p.value != p.default
     ]
-    told = ", ".join(changed) if changed else "all parameters at their defaults"
+    text = ", ".join(changed) if changed else "all parameters at their defaults"
     note = " (mesh from the cache)" if cached else ""
-    return escape(f"{request.recipe}{note}: {told}; --list shows all with their bounds")
+    return f"{request.recipe}{note}: {text}; --list shows all with their bounds"
 
 
-def _shapes(meshes: Mapping[str, Mesh]) -> Table:
+def _print_shapes(console: Console, meshes: Mapping[str, Mesh]) -> None:
     """Sizes and worst elements of the bodies."""
-    out = Table(
-        box=SIMPLE_HEAD,
-        title="Bodies and their worst elements",
-        title_justify="left",
-        title_style="bold",
-        padding=(0, 1, 0, 0),
-    )
-    out.add_column("body")
-    for head in ("nodes", "hexahedra"):
-        out.add_column(head, justify="right")
-    out.add_column("worst of")
-    out.add_column("value", justify="right")
-    out.add_column("at x, y, z, mm")
+    rows = []
     for name, mesh in meshes.items():
         found = quality(mesh)
-        sizes = escape(name), f"{mesh.n_node}", f"{mesh.n_hex}"
-        worst = _place(centre_of(mesh, found.worst))
-        out.add_row(*sizes, "scaled Jacobian", f"{found.min:.3f}", worst)
-        longest = _place(centre_of(mesh, found.longest))
-        out.add_row("", "", "", "aspect ratio", f"{found.aspect:.1f}", longest)
-    return out
+        for row, measure, value, worst in (
+            (
+                (name, f"{mesh.n_node}", f"{mesh.n_hex}"),
+                "scaled Jacobian",
+                f"{found.min:.3f}",
+                found.worst,
+            ),
+            (("", "", ""), "aspect ratio", f"{found.aspect:.1f}", found.longest),
+        ):
+            place = ", ".join(f"{x + 0.0:.3g}" for x in centre_of(mesh, worst))
+            rows.append((*row, measure, value, place))
+    heads = {
+        "body": "text",
+        "nodes": "number",
+        "hexahedra": "number",
+        "worst of": "text",
+        "value": "number",
+        "at x, y, z, mm": "text",
+    }
+    title = "Bodies and their worst elements"
+    print_table(console, columns_of(heads, rows), title=title, box=SIMPLE_HEAD)
 
 
-def _place(point: FloatArray) -> str:
-    return ", ".join(f"{x + 0.0:.3g}" for x in point)
-
-
-def _pairs(pairs: Sequence[Pairs], meshes: Mapping[str, Mesh]) -> str | Table:
+def _print_pairs(console: Console, pairs: Sequence[Pairs], meshes: Mapping[str, Mesh]) -> None:
     """Pairs of contact nodes and how well they face each other."""
     if not pairs:
         glued = [
@@ -162,23 +159,26 @@ def _pairs(pairs: Sequence[Pairs], meshes: Mapping[str, Mesh]) -> str | Table:
             for key, nodes in mesh.nodes.items()
             if len(meshes) == 1 and key.endswith("_patch")
         ]
-        return f"Glued in one body: {', '.join(glued)}" if glued else "No bodies touch"
-    out = Table(
-        box=SIMPLE_HEAD,
-        title="Pairs of contact nodes",
-        title_justify="left",
-        title_style="bold",
-        padding=(0, 1, 0, 0),
-    )
-    for head in ("bodies", "node sets"):
-        out.add_column(head)
-    for head in ("pairs", "largest offset, mm", "largest gap, mm"):
-        out.add_column(head, justify="right")
-    for p in pairs:
-        sets = p.sets[0] if p.sets[0] == p.sets[1] else f"{p.sets[0]}, {p.sets[1]}"
-        cells = (f"{p.bodies[0]}, {p.bodies[1]}", sets, f"{p.count}")
-        out.add_row(*map(escape, cells), number(p.offset), number(p.gap))
-    return out
+        console.print(f"Glued in one body: {', '.join(glued)}" if glued else "No bodies touch")
+        return
+    rows = [
+        (
+            ", ".join(p.bodies),
+            ", ".join(dict.fromkeys(p.sets)),
+            f"{p.count}",
+            number(p.offset),
+            number(p.gap),
+        )
+        for p in pairs
+    ]
+    heads = {
+        "bodies": "text",
+        "node sets": "text",
+        "pairs": "number",
+        "largest offset, mm": "number",
+        "largest gap, mm": "number",
+    }
+    print_table(console, columns_of(heads, rows), title="Pairs of contact nodes", box=SIMPLE_HEAD)
 
 
 def print_parameters(console: Console, request: MeshRequest) -> None:
@@ -186,42 +186,22 @@ def print_parameters(console: Console, request: MeshRequest) -> None:
     leave.
     """
     rows = table(request.parameters)
-    changed = any(p.value != p.default for p in rows)
-    out = Table(
-        box=SIMPLE_HEAD,
-        title=escape(f"Parameters of {request.recipe}"),
-        title_justify="left",
-        title_style="bold",
-        padding=(0, 1, 0, 0),
-    )
-    heads = [
-        "parameter",
-        "default",
-        *(["now"] if changed else []),
-        "unit",
-        "bounds",
-        "others allow",
+    now = tuple("" if p.value == p.default else _value(p.value) for p in rows)
+    columns = [
+        TextColumn("parameter", tuple(p.name for p in rows)),
+        TextColumn("default", tuple("" if p.default is None else _value(p.default) for p in rows)),
+        TextColumn("now", now, rank=1),
+        TextColumn("unit", tuple(p.unit for p in rows)),
+        TextColumn("bounds", tuple(p.bounds for p in rows), folds=_WORDS),
+        TextColumn("allowed by the others", tuple(p.here for p in rows), folds=_WORDS),
     ]
-    for head in heads:
-        out.add_column(head, overflow="fold", no_wrap=head == "parameter")
-    for p in rows:
-        now = [f"[bold]{escape(_value(p, p.value, unit=False))}[/]" if p.value != p.default else ""]
-        out.add_row(
-            p.name,
-            escape("" if p.default is None else _value(p, p.default, unit=False)),
-            *(now if changed else []),
-            p.unit,
-            p.bounds,
-            p.here,
-        )
-    console.print(out)
-    console.print(
-        "others allow: between which values the recipe's own checks pass while the other "
-        "parameters stay as they are.",
-        style="dim",
+    print_table(console, columns, title=f"Parameters of {request.recipe}", box=SIMPLE_HEAD)
+    meaning = (
+        "allowed by the others: between these values the recipe's own checks pass while the other "
+        "parameters stay as they are."
     )
+    console.print(Text(meaning, "dim"))
 
 
-def _value(p: RecipeParameter, value: Any, *, unit: bool = True) -> str:
-    told = f"{value:g}" if isinstance(value, float) else str(value)
-    return f"{told} {p.unit}" if unit and p.unit else told
+def _value(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

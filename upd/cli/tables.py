@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
+from rich.box import HEAVY_HEAD, Box
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
 from upd.analyses.base import Plan, fitting, memory_limit
-from upd.cli.progress import counted
+from upd.cli.terminal import counted
 from upd.labels import (
     check_number,
     effect_word,
@@ -39,13 +39,13 @@ _WORDS = 12
 
 def print_result(console: Console, result: RunResult, *, full: bool = False) -> None:
     """Print the answer of a run; everything between its verdict and its end when ``full``."""
-    told = answer(result, console.width)
-    _print_lines(console, told.verdict)
-    if told.has_tables or not full:
-        _print_lines(console, told.numbers)
+    found = answer(result, console.width)
+    _print_lines(console, found.verdict)
+    if found.has_tables or not full:
+        _print_lines(console, found.numbers)
     if full:
         _print_all(console, result)
-    _print_lines(console, told.end)
+    _print_lines(console, found.end)
 
 
 def _print_lines(console: Console, lines: Sequence[AnswerLine]) -> None:
@@ -64,16 +64,33 @@ def _print_all(console: Console, result: RunResult) -> None:
             print_table(console, _numbers(cases[group[0]]), title=group[0])
         else:
             print_table(console, _side_by_side({case: cases[case] for case in group}))
-    print_table(console, _effects(result.effects), title="What was simulated")
-    _print_checks(console, result)
-    cost = result.cost
-    stages = ", ".join(f"{k} {v:.1f} s" for k, v in cost["stages"].items())
-    sizes = ", ".join(f"{body} {n} dofs" for body, n in result.size["n_dof"].items())
-    pairs = (
-        "" if result.size.get("n_pairs") is None else f"{result.size['n_pairs']} contact pairs; "
+    effects = (
+        (str(e["name"]), effect_word(e), str(e["why"]), str(e.get("verdict", "")))
+        for e in result.effects
     )
+    print_table(console, _effects(effects, "check"), title="What was simulated")
+    _print_checks(console, result)
+    stages = ", ".join(f"{k} {v:.1f} s" for k, v in result.cost["stages"].items())
+    sizes = ", ".join(f"{body} {n} dofs" for body, n in result.size["n_dof"].items())
+    n_pairs = result.size.get("n_pairs")
+    pairs = "" if n_pairs is None else f"{n_pairs} contact pairs; "
     console.print(f"Size: {sizes}; {pairs}symmetry {result.size['symmetry']}")
     console.print(f"Stages: {stages}")
+
+
+def columns_of(heads: Mapping[str, str], rows: Iterable[Sequence[str]]) -> list[TextColumn]:
+    """Columns of rows of cells.
+
+    Parameters
+    ----------
+    heads
+        Head -> what its cells are: "text"; "words", which may be folded; "number", flush right.
+    """
+    cells = list(zip(*rows, strict=True)) or [()] * len(heads)
+    return [
+        TextColumn(head, mine, right=kind == "number", folds=_WORDS if kind == "words" else 0)
+        for (head, kind), mine in zip(heads.items(), cells, strict=True)
+    ]
 
 
 def print_table(
@@ -82,7 +99,8 @@ def print_table(
     *,
     title: str = "",
     styles: Mapping[str, str] | None = None,
-    told: bool = True,
+    note: bool = True,
+    box: Box = HEAVY_HEAD,
 ) -> list[TextColumn]:
     """Print a table as wide as the console, at most; returns the columns that did not fit.
 
@@ -92,14 +110,16 @@ def print_table(
     ----------
     styles
         Cell -> its style.
-    told
+    note
         Name the columns left out.
+    box
+        Its frame.
     """
     kept, left_out = fitted(columns, console.width - _SIDES, gap=_GAP)
-    table = Table(title=escape(title) or None, title_justify="left", title_style="bold")
+    table = Table(title=Text(title, "bold") if title else None, title_justify="left", box=box)
     for column in kept:
         table.add_column(
-            escape(column.head),
+            Text(column.head),
             justify="right" if column.right else "left",
             no_wrap=not column.folds,
             min_width=None if column.folds else column.width,
@@ -108,7 +128,7 @@ def print_table(
     for row in zip(*(column.cells for column in kept), strict=True):
         table.add_row(*(Text(cell, style=(styles or {}).get(cell, "")) for cell in row))
     console.print(table)
-    if left_out and told:
+    if left_out and note:
         names = ", ".join(column.head.replace("\n", " ") for column in left_out)
         console.print(Text(f"not shown at this width: {names}", style="dim"))
     return left_out
@@ -128,11 +148,10 @@ def _alike(cases: dict[str, list[Result]]) -> list[list[str]]:
 
 def _side_by_side(cases: dict[str, list[Result]]) -> list[TextColumn]:
     """A row per case, a column per number; the last numbers are the first to go."""
-    first = next(iter(cases.values()))
     columns = [TextColumn("case", tuple(cases))]
-    for k, r in enumerate(first):
-        head = number_label(r.name) + (f", {r.unit}" if r.unit else "")
-        entries = [rows[k].as_dict() for rows in cases.values()]
+    for k, rows in enumerate(zip(*cases.values(), strict=True)):
+        head = number_label(rows[0].name) + (f", {rows[0].unit}" if rows[0].unit else "")
+        entries = [r.as_dict() for r in rows]
         cells = tuple(f"{shown(e, unit=False)} {plus_minus(e)}".rstrip() for e in entries)
         columns.append(TextColumn(folded_head(head), cells, right=True, rank=k))
     return columns
@@ -156,13 +175,9 @@ def _numbers(rows: Sequence[Result]) -> list[TextColumn]:
     ]
 
 
-def _effects(effects: tuple[dict[str, object], ...]) -> list[TextColumn]:
-    return [
-        TextColumn("effect", tuple(str(e["name"]) for e in effects), folds=_WORDS),
-        TextColumn("simulated", tuple(effect_word(e) for e in effects)),
-        TextColumn("why", tuple(str(e["why"]) for e in effects), folds=_WORDS),
-        TextColumn("check", tuple(str(e.get("verdict", "")) for e in effects), folds=_WORDS),
-    ]
+def _effects(rows: Iterable[tuple[str, str, str, str]], last: str) -> list[TextColumn]:
+    """Effects: name, whether it is simulated, why, and its check."""
+    return columns_of({"effect": "words", "simulated": "text", "why": "words", last: "words"}, rows)
 
 
 def _print_checks(console: Console, result: RunResult) -> None:
@@ -179,106 +194,80 @@ def _print_checks(console: Console, result: RunResult) -> None:
     print_table(console, columns, title="Self-checks", styles=_VERDICTS)
     for c in result.checks:
         if not c.passed:
-            console.print(
-                Text(f"{c.verdict} {c.name} {c.case}: {c.remedy}", style=_VERDICTS[c.verdict])
-            )
+            line = f"{c.verdict} {c.name} {c.case}: {c.remedy}"
+            console.print(Text(line, style=_VERDICTS[c.verdict]))
 
 
-def _ways_table(plan: Plan[Any]) -> Table:
-    """What each way to see the bodies of a contact is predicted to cost, over all tasks."""
-    table = Table(
-        "way",
-        "set with",
-        "s",
-        "GB",
-        "for",
-        title="Ways to see the bodies (one thread, all bodies and families of loads)",
-        title_justify="left",
+def _way(plan: Plan[Any], ways: Sequence[Any]) -> tuple[str, ...]:
+    """A way to see the bodies of a contact, how to choose it, and its cost over all tasks."""
+    products = ways[0].name.startswith(PRODUCTS)
+    names = list(dict.fromkeys(way.name.removeprefix(PRODUCTS) for way in ways))
+    word = "products by factor" if products else "condensed"
+    multigrid = products and names == ["amg"]
+    what = "products by multigrid" if multigrid else f"{word} ({', '.join(names)})"
+    by = [
+        task
+        for task, way in zip(plan.ways, ways, strict=True)
+        if plan.solver[task].partition(":")[0] == way.name
+    ]
+    if by:
+        what += " (taken)" if len(by) == len(ways) else f" (taken for {', '.join(by)})"
+    choice = f'solver.route = "{"products" if products else "condensed"}"'
+    return (
+        what,
+        choice + (f', solver.name = "{names[0]}"' if len(names) == 1 else ""),
+        f"{sum(way.cost.seconds for way in ways):.2g}",
+        f"{sum(way.cost.bytes for way in ways) / 1e9:.2g}",
+        ", ".join(dict.fromkeys(way.why for way in ways)) if products else "",
     )
-    # each task lists its ways in one order: the condensing one, then those by products
-    for ways in zip(*plan.ways.values(), strict=True):
-        products = ways[0].name.startswith(PRODUCTS)
-        names = list(dict.fromkeys(way.name.removeprefix(PRODUCTS) for way in ways))
-        word = "products by factor" if products else "condensed"
-        what = (
-            "products by multigrid"
-            if products and names == ["amg"]
-            else f"{word} ({', '.join(names)})"
-        )
-        by = [
-            task
-            for task, way in zip(plan.ways, ways, strict=True)
-            if plan.solver[task].partition(":")[0] == way.name
-        ]
-        if by:
-            what += " (taken)" if len(by) == len(ways) else f" (taken for {', '.join(by)})"
-        table.add_row(
-            Text(what),
-            f'solver.route = "{"products" if products else "condensed"}"'
-            + (f', solver.name = "{names[0]}"' if len(names) == 1 else ""),
-            f"{sum(way.cost.seconds for way in ways):.2g}",
-            f"{sum(way.cost.bytes for way in ways) / 1e9:.2g}",
-            ", ".join(dict.fromkeys(way.why for way in ways)) if products else "",
-        )
-    return table
 
 
 def print_plan(console: Console, plan: Plan[Any]) -> None:
     """Print what a plan simulates, leaves out, and is predicted to cost."""
-    table = Table(
-        "effect",
-        "simulated",
-        "why",
-        "check after the solve",
-        title=escape(plan.scene.title or plan.scene.name),
-        title_justify="left",
-        title_style="bold",
+    effects = _effects(
+        ((e.name, e.word, e.why, e.check) for e in plan.effects), "check after the solve"
     )
-    for e in plan.effects:
-        table.add_row(e.name, e.word, e.why, e.check)
-    console.print(table)
-    table = Table(
-        "body",
-        "hexahedra",
-        "nodes",
-        "dofs",
-        "contact nodes",
-        "linear solver",
-        title=f"Size ({plan.symmetry} model)",
-        title_justify="left",
+    print_table(console, effects, title=plan.scene.title or plan.scene.name)
+    sizes = columns_of(
+        {
+            "body": "text",
+            **dict.fromkeys(("hexahedra", "nodes", "dofs", "contact nodes"), "number"),
+            "linear solver": "words",
+        },
+        (
+            (
+                body,
+                *(f"{n}" for n in (n["hexes"], n["nodes"], 3 * n["nodes"], n["contact"])),
+                "\n".join(
+                    f"{task.removeprefix(f'{body}, ')}: {solver}"
+                    for task, solver in plan.solver.items()
+                    if task.startswith(f"{body}, ")
+                ),
+            )
+            for body, n in plan.size.items()
+        ),
     )
-    for body, count in plan.size.items():
-        solvers = "\n".join(
-            f"{k.split(', ', 1)[1]}: {v}"
-            for k, v in plan.solver.items()
-            if k.startswith(f"{body}, ")
-        )
-        table.add_row(
-            body,
-            f"{count['hexes']}",
-            f"{count['nodes']}",
-            f"{3 * count['nodes']}",
-            f"{count['contact']}",
-            solvers,
-        )
-    console.print(table)
+    print_table(console, sizes, title=f"Size ({plan.symmetry} model)")
     if plan.ways:
-        console.print(_ways_table(plan))
-    parts = [
+        # each task lists its ways in one order: the condensing one, then those by products
+        ways = columns_of(
+            {"way": "words", "set with": "words", "s": "number", "GB": "number", "for": "words"},
+            (_way(plan, ways) for ways in zip(*plan.ways.values(), strict=True)),
+        )
+        title = "Ways to see the bodies (one thread, all bodies and families of loads)"
+        print_table(console, ways, title=title)
+    inputs = f"the bands by {counted(len(plan.scene.uncertain), 'uncertain input')}"
+    parts = " and ".join(
         f"{seconds:.2g} s ({100.0 * seconds / plan.seconds:.0f} %) for {what}"
         for seconds, what in (
             (plan.estimate_seconds, 'error estimates (accuracy = "unknown" saves them)'),
-            (
-                plan.input_seconds,
-                f"the bands by {counted(len(plan.scene.uncertain), 'uncertain input')}",
-            ),
+            (plan.input_seconds, inputs),
         )
         if seconds > 0.0
-    ]
-    part = f", of them {' and '.join(parts)}" if parts else ""
+    )
     console.print(
-        f"Predicted: {plan.seconds:.0f} s{part}, {plan.memory_bytes / 1e9:.1f} GB. "
-        "Nothing was solved."
+        f"Predicted: {plan.seconds:.0f} s{f', of them {parts}' if parts else ''}, "
+        f"{plan.memory_bytes / 1e9:.1f} GB. Nothing was solved."
     )
     limit = memory_limit(plan.scene)
     if plan.memory_bytes > limit:

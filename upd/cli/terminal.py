@@ -5,42 +5,48 @@ from __future__ import annotations
 import logging
 import sys
 import time
-from typing import Annotated, Any
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 from rich.console import Console
+from rich.text import Text
 
 from upd.report.columns import text_width
 
-console = Console(highlight=False, width=None if sys.stdout.isatty() else text_width())
-errors = Console(stderr=True, highlight=False, soft_wrap=True)
+if TYPE_CHECKING:
+    from upd.batch.engine import Progress
+
+#: square brackets are no markup: titles, paths and messages may hold them
+console = Console(
+    highlight=False, markup=False, width=None if sys.stdout.isatty() else text_width()
+)
+errors = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+
+#: least seconds between two lines of a batch's progress when the output is no terminal
+_PAUSE_S = 5.0
 
 SetOption = Annotated[
     list[str] | None,
-    Parameter(
-        name="--set",
-        negative=(),
-        help="path=value, for example contact.friction=0.3; may be repeated",
-    ),
+    Parameter(name="--set", help="path=value, for example contact.friction=0.3; may be repeated"),
 ]
 
 
-def plain(value: object) -> str:
-    """Text as it is: square brackets are no markup."""
-    from rich.markup import escape
-
-    return escape(str(value))
+def warn(message: object, style: str = "") -> None:
+    """A fault, a line on stderr."""
+    errors.print(Text.assemble(("upd:", style), f" {message}"))
 
 
 class Notes(logging.Handler):
     """Warnings that a user should see before anything else, on stderr."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        errors.print(f"upd: {plain(record.getMessage())}")
+        warn(record.getMessage())
 
 
 class Live:
-    """Progress on the terminal: the running stage with a clock, and a line per stage that is done
+    """Progress on the terminal: the running stage with a clock, and a line per finished stage
     unless ``stages`` is false.
 
     Plain lines when the output is no terminal.
@@ -67,10 +73,60 @@ class Live:
         self.stop()
         if seconds is None:
             if console.is_terminal:
-                self._status = console.status(f"{stage}: {plain(detail)}")
+                self._status = console.status(Text(f"{stage}: {detail}"))
                 self._status.start()
-            return
-        if not self._stages and stage != "folder":
-            return
-        elapsed = time.perf_counter() - self._begin
-        console.print(f"[dim]{elapsed:7.1f} s[/dim] {seconds:7.2f} s  {stage}: {plain(detail)}")
+        elif self._stages or stage == "folder":
+            elapsed = time.perf_counter() - self._begin
+            line = f" {seconds:7.2f} s  {stage}: {detail}"
+            console.print(Text.assemble((f"{elapsed:7.1f} s", "dim"), line))
+
+
+@contextmanager
+def batch_progress() -> Iterator[Callable[[Progress], None]]:
+    """How far a sweep or study is: one line that keeps moving on a terminal, a line every few
+    seconds elsewhere. Failures are always shown.
+    """
+    last = 0.0
+
+    def show(progress: Progress) -> None:
+        nonlocal last
+        if progress.failure:
+            console.print(f"failed: {progress.label}: {progress.failure}")
+        status.update(Text(progress_text(progress)))
+        done = progress.done == progress.total or time.monotonic() - last > _PAUSE_S
+        if not console.is_terminal and progress.label and done:
+            last = time.monotonic()
+            console.print(progress_text(progress))
+
+    status = console.status("starting")
+    if console.is_terminal:
+        status.start()
+    try:
+        yield show
+    finally:
+        status.stop()
+
+
+def progress_text(progress: Progress) -> str:
+    """Points done, rate, time left and the last point."""
+    text = f"{progress.done}/{progress.total} points"
+    if progress.failed:
+        text += f", {progress.failed} failed"
+    if progress.rate:
+        slow = progress.rate < 1.0
+        text += f", one in {1.0 / progress.rate:.2g} s" if slow else f", {progress.rate:.2g}/s"
+        text += f", {duration(progress.left_s)} left" if progress.left_s > 0.0 else ""
+    return text + (f"; last: {progress.label}, {progress.seconds:.2g} s" if progress.label else "")
+
+
+def counted(count: int, what: str) -> str:
+    """1 point, 2 points, 3 meshes."""
+    plural = "es" if what.endswith("sh") else "s"
+    return f"{count} {what}{plural if count != 1 else ''}"
+
+
+def duration(seconds: float) -> str:
+    """Seconds, minutes or hours."""
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"

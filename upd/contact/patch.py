@@ -30,7 +30,7 @@ class Patch:
     weights : (n,) ndarray
         Tributary areas of the model's nodes [mm2], in the order of the contact set.
     mirrored : tuple of two bool
-        Whether the lattice goes on beyond the mirror planes x = 0, y = 0.
+        Whether the lattice continues beyond the mirror planes x = 0, y = 0.
     """
 
     x: Array
@@ -118,7 +118,7 @@ def make_patch(
     weights : (n,) ndarray
         Tributary areas [mm2].
     mirrored : tuple of two bool
-        Whether the patch goes on beyond the mirror planes x = 0, y = 0.
+        Whether the patch continues beyond the mirror planes x = 0, y = 0.
     members : (k,) ndarray of int, optional
         The nodes of this patch among `points`; None takes all of them.
 
@@ -145,7 +145,7 @@ def make_patch(
     order = np.full(len(mine), -1, np.int64)
     order[i * len(y) + j] = members
     if (order < 0).any():
-        raise MeshError("contact nodes are no lattice: two nodes stand at one place")
+        raise MeshError("contact nodes are no lattice: two nodes are at one place")
     return Patch(x, y, order, weights, mirrored)
 
 

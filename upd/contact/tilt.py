@@ -233,7 +233,7 @@ class _Face:
 
 
 def _hull(problems: Problems, T: FloatArray) -> ConvexHull | None:
-    """Convex hull of the nodes; a problem when they stand on one line.
+    """Convex hull of the nodes; a problem when they lie on one line.
 
     A moment across that line would meet no resistance.
     """
@@ -241,7 +241,7 @@ def _hull(problems: Problems, T: FloatArray) -> ConvexHull | None:
     flat = len(T) < 3 or not spread[1] > HALF_THE_DIGITS * spread[0]
     if problems.add(
         flat,
-        f"arms: the {len(T)} nodes stand on one line, about which nothing resists a tilt: "
+        f"arms: the {len(T)} nodes lie on one line, about which nothing resists a tilt: "
         "add nodes beside it, or hold the tilt (normal_contact).",
     ):
         problems.raise_any()
@@ -377,7 +377,7 @@ def _solve(
     )
     if not unique:
         message += (
-            " They stand on one line, so that a further tilt about it meets no resistance as "
+            " They lie on one line, so that a further tilt about it meets no resistance as "
             "long as no gap closes."
         )
     status = "converged" if unique else "tilt not unique"

@@ -222,7 +222,7 @@ class TiltMinimiser:
         if self._size(at) > HALF_THE_DIGITS:
             raise ConvergenceError(
                 f"contact with tilt of {self.n} nodes: {self._size(at):.1e} of the moment "
-                "is left unbalanced by the last method. "
+                "stays unbalanced after the last method. "
                 "Look for nearly dependent rows in the compliance matrix."
             )
         return at

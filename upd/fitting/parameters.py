@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from upd.errors import InputError, one_line
 from upd.scene import ForcedScene, load_scene
-from upd.scene.keys import SceneKey, scene_keys
-from upd.scene.scalar_input import scalar_input
+from upd.scene.keys import SceneKey, scalar_input, scene_keys
 from upd.scene.uncertain import put_back
 from upd.units import parse_quantity, quantity_text, unit_inside
 

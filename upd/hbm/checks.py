@@ -13,7 +13,7 @@ from upd.hbm.friction import March
 
 FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
-#: answers marched at a time
+#: answers integrated at a time
 PORTION = 64
 
 

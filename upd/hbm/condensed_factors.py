@@ -299,7 +299,7 @@ class LowRank(Factors):
         n, c, size, U = self.n, self.c, self.size, self.U
         b = r[:n].reshape(c, size)
         inside = U.T @ b
-        # no mode moves what is left: it goes at once, and its forces move the rest
+        # no mode moves the rest: it goes at once, and its forces move the rest
         left = b - U @ inside
         f = U.T @ self.J.force(left)
         moved = by_harmonic(self.G, self.G0, self.J.offset == 1, f)

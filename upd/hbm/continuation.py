@@ -1,6 +1,6 @@
 """Pseudo-arclength continuation of r(x, p) = 0.
 
-It passes folds, lands on wanted parameter values, and its message says where and why it stops.
+It passes folds, lands on wanted parameter values, and its message gives place and reason of a stop.
 
 References
 ----------
@@ -153,7 +153,7 @@ def follow(
         counts,
         state,
         "step limit",
-        f"{s.most_points} points used before p = {end:.9g}; it stands at p = {state.p:.9g}",
+        f"{s.most_points} points used before p = {end:.9g}; it is at p = {state.p:.9g}",
     )
 
 

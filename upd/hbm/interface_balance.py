@@ -114,7 +114,7 @@ def interface_response(
 ) -> InterfaceResponse:
     """Follow the curve from the first to the last frequency, through all of them.
 
-    At the first one the load is raised from rest; from a start that moves it is marched in time.
+    At the first one the load is raised from rest; from a start that moves it is integrated in time.
     Where the curve folds the motion jumps, to what a march from there ends in.
 
     Parameters

@@ -152,7 +152,7 @@ class InterfaceCorrector:
                 if count > s.iterations:
                     return None
             sizes.append(float(np.linalg.norm(step)))
-            # nodes that change their states to and fro: a shorter step tells them apart
+            # nodes that change their states to and fro: a shorter step separates them
             wavers = all(sizes[k] > WAVERS * sizes[k - 1] for k in (-1, -2))
             assert steps is not None
             # Newton's own that grow near a known point: there is a shorter step to be taken
@@ -162,7 +162,7 @@ class InterfaceCorrector:
             slip = x[first:].reshape(2, -1)
             x, p = x + step[:-1] * D, p + float(step[-1]) * self.p_scale
             if self._stay(x[first:].reshape(2, -1), slip, before, found.period):
-                # the step taken is not the one that was told
+                # the step taken is not the one that was asked for
                 steps = self._steps(steps.known, normal, D)
             if float(np.abs(step).max()) * len(step) ** 0.5 <= s.tolerance:
                 # the way on is that of the answer, not of the point whose factors led to it
@@ -174,9 +174,9 @@ class InterfaceCorrector:
     def widened(self, at: InterfacePlace) -> InterfacePlace:
         """The same place with the unknowns that there are now."""
         e = self.equations
-        told = e.places_of(at.mobile)
-        tangent = np.append(e.widened(at.tangent[:-1], told, 0.0), at.tangent[-1])
-        return replace(at, x=e.widened(at.x, told), tangent=tangent, mobile=e.mobile)
+        places = e.places_of(at.mobile)
+        tangent = np.append(e.widened(at.tangent[:-1], places, 0.0), at.tangent[-1])
+        return replace(at, x=e.widened(at.x, places), tangent=tangent, mobile=e.mobile)
 
     def across(self, rate: float, x: FloatArray) -> FloatArray:
         """Across the plane of one frequency, in the direction of travel, (u + 1,)."""
@@ -224,11 +224,11 @@ class InterfaceCorrector:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Unknowns, their units and a direction with the slips of more nodes among the unknowns."""
         e = self.equations
-        told = e.let_move(moving)
-        more = e.widened(x, told)
+        places = e.let_move(moving)
+        more = e.widened(x, places)
         units = self.scale(more)
-        units[told] = D
-        return more, units, np.append(e.widened(normal[:-1], told, 0.0), normal[-1])
+        units[places] = D
+        return more, units, np.append(e.widened(normal[:-1], places, 0.0), normal[-1])
 
     def _factors(
         self, found: InterfaceEvaluation, normal: FloatArray, D: FloatArray

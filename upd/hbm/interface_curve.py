@@ -4,7 +4,7 @@ Arc length over all unknowns, with a corrector of its own, `upd.hbm.interface_co
 sticks has a memory, so that the curve depends on the way along it, and every sample of every node
 puts a kink into it. A node's slips are taken among the unknowns from the first time it moves. Where
 the curve folds, or no step leads on, a motion whose frequency changes on must jump; the walk then
-marches in time at the next frequency, as a sweep would, and goes on from the motion found there.
+marches in time at the next frequency, as a sweep would, and continues from the motion found there.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from upd.hbm.residuals import FREQUENCY_SHARE
 
 #: shortest step of the load on the way from rest to the first frequency's answer
 LEAST_LOAD = 1.0 / 64.0
-#: tolerances to which a motion is marched before the balance is tried on it
+#: tolerances to which a motion is integrated before the balance is tried on it
 MARCHED = (1e-2, 1e-3)
 MOST_PERIODS = 2000
 #: difference of the blades' motions, relative, up to which balance and march are the same motion
@@ -133,15 +133,15 @@ class InterfaceCurve:
 
     def _told(self, missed: list[float]) -> str:
         """Where it jumped, and where nothing was found."""
-        told = [
+        lists = [
             (self.jumps, "after a jump, found by time march, at"),
             (missed, "no periodic motion found at"),
         ]
-        parts = [f"; {words} {', '.join(f'{p:.6g}' for p in at)} Hz" for at, words in told if at]
+        parts = [f"; {words} {', '.join(f'{p:.6g}' for p in at)} Hz" for at, words in lists if at]
         return "".join(parts)
 
     def _jump(self, f: float) -> InterfacePlace | None:
-        """March in time from the last point until the balance finds the motion marched.
+        """March in time from the last point until the balance finds that motion.
 
         Parameters
         ----------
@@ -160,8 +160,8 @@ class InterfaceCurve:
                 settled = settle(
                     march, self.moving, tolerance, MOST_PERIODS, accelerate=True
                 ).settled
-                marched = self.moving.copy()
-                q = e.Q @ march.period(marched).output
+                moving = self.moving.copy()
+                q = e.Q @ march.period(moving).output
             except ConvergenceError:
                 return None
             dt, at = march.dt, self.moving
@@ -243,7 +243,7 @@ class InterfaceCurve:
     def _first(self, f: float) -> InterfacePlace | None:
         """The load raised from rest in steps as long as Newton's method takes them.
 
-        A start that moves is marched in time.
+        A start that moves is integrated in time.
         """
         e = self.equations
         moves = bool(e.start.v.any())

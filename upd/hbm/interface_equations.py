@@ -2,7 +2,8 @@ r"""Equations of the balance of blades in frequency with contact and damper in t
 
 Unknowns are the harmonics 0 to H of the blades' modes q(t), coefficients as in `upd.hbm.fourier`,
 the damper's state and the slips before the period. Under q(t) one period of contact and damper is
-marched (`upd.hbm.interface_samples`), which gives the forces f at N samples and the state after it:
+integrated (`upd.hbm.interface_samples`): this gives the forces f at N samples and the state after
+it:
 
     (omega^2 - (k w)^2 + 2 i zeta omega k w) q_k = (Phi' f)_k + P F_k,      state after = before.
 
@@ -167,7 +168,7 @@ class InterfaceEquations:
         except np.linalg.LinAlgError as error:
             raise ConvergenceError(
                 "interface balance: the compliance of the faces is not positive definite: more "
-                "modes were taken off than the static compliance holds; use fewer modes a blade"
+                "modes were removed than the static compliance holds; use fewer modes a blade"
             ) from error
         self.inverse = cho_solve(factor, np.eye(3 * model.n))
         self.moves = np.hstack([model.shapes, model.columns, model.pushed])
@@ -232,13 +233,15 @@ class InterfaceEquations:
         slips = self.others + np.searchsorted(self.tangents, before)
         return np.concatenate([np.arange(self.others), slips])
 
-    def widened(self, values: FloatArray, told: IntArray, more: float | None = None) -> FloatArray:
+    def widened(
+        self, values: FloatArray, places: IntArray, more: float | None = None
+    ) -> FloatArray:
         """Values of the unknowns so far among those with more nodes that may move.
 
         Parameters
         ----------
         values : (u,) ndarray
-        told : (u,) ndarray of int
+        places : (u,) ndarray of int
             Their places.
         more : float, optional
             Of the others; by itself the slips they have.
@@ -249,7 +252,7 @@ class InterfaceEquations:
         """
         out = np.empty(self.size)
         out[self.others :] = self.slip[self.tangents - self.model.n] if more is None else more
-        out[told] = values
+        out[places] = values
         return out
 
     def joined(self, q: FloatArray, rigid: FloatArray, slip: FloatArray) -> FloatArray:

@@ -3,7 +3,7 @@
 From period to period a sample changes little: most often the same nodes are open, stick and slip,
 and slips turn by a little. The rows of `upd.hbm.interface_step.contact_step` are the same then but
 for that, and the inverse of their matrix from an earlier period takes most of what the laws lack
-away, at k^2 for k rows instead of k^3. What is left of the laws tells how far each of these chord
+away, at k^2 for k rows instead of k^3. The residual of the laws shows how far each of these chord
 steps leads, so that the answer is as exact as that of Newton's method. Where nodes have changed
 their states, or slips turned too far, the matrix is formed and inverted anew.
 """
@@ -18,7 +18,7 @@ from upd.linalg.compiled import compiled, inlined
 
 #: a chord step must take at least this share of the misfit away; it only weighs costs
 CONTRACTS = 0.75
-#: inverses formed in a step, and chord steps, after which it is left to Newton's method
+#: inverses formed in a step, and chord steps, after which Newton's method
 MOST_FORMED, MOST_CHORDS = 8, 60
 #: rows of the largest matrix that is kept: 128 samples of them would take 370 MB
 MOST_ROWS = 600
@@ -175,7 +175,7 @@ def _unknowns(sample, base, one, state, kept, cols, sign):  # type: ignore[no-un
 
 @compiled
 def _split(x, z, base, one, cols, k, f, y):  # type: ignore[no-untyped-def]
-    """Forces and relative motions by what the base says and the unknowns; f, y overwritten."""
+    """Forces and relative motions by what the base fixes and the unknowns; f, y overwritten."""
     n = base.shape[1]
     for d in range(3 * n):
         f[d], y[d] = x[d], 0.0
@@ -321,7 +321,7 @@ def border(  # type: ignore[no-untyped-def]
 
 @compiled
 def _weights(d, f, y, n, mu, rho_n, rho_t, state, open_, w, o):  # type: ignore[no-untyped-def]
-    """Row of a dof: weights of what the base says of its node, and of the node's unknowns."""
+    """Row of a dof: weights of what the base fixes of its node, and of the node's unknowns."""
     i, a = d % n, d // n
     w[:], o[:] = 0.0, 0.0
     if state[i] != SLIP or a == 0:

@@ -17,7 +17,7 @@ from upd.hbm.interface_state import FloatArray
 from upd.hbm.interface_step import OPEN, SLIP, STICK
 from upd.linalg.compiled_lu import PIVOT
 
-#: most directions that are marched together, and those below which they are not split; samples
+#: most directions that are integrated together, and those below which they are not split; samples
 #: factored together. They weigh costs only: what many share against all threads being busy
 DIRECTIONS, FEW, SAMPLES = 400, 32, 16
 

@@ -149,7 +149,7 @@ class InterfaceMarch:
         except np.linalg.LinAlgError as error:
             raise ConvergenceError(
                 "interface march: the compliance of the step is not positive definite: more modes "
-                "were taken off than the static compliance holds; use fewer modes a blade"
+                "were removed than the static compliance holds; use fewer modes a blade"
             ) from error
         W = cho_solve(factor, np.eye(3 * model.n))
         self.W = np.ascontiguousarray(0.5 * (W + W.T))
@@ -208,12 +208,12 @@ class InterfaceMarch:
 
     @property
     def Z(self) -> FloatArray:
-        """(r + m + L, 3 n) what the first base says by motions and excitation."""
+        """(r + m + L, 3 n) what the first base gives by motions and excitation."""
         return np.asarray(self.bases.Z[0])
 
     @property
     def L(self) -> FloatArray:
-        """(3 n, 3 n) from forces of everything stuck and closed to what the first base says."""
+        """(3 n, 3 n) from forces of everything stuck and closed to what the first base gives."""
         O = np.tile(self.base, 3)
         L = np.eye(len(O))
         if O.any():
@@ -301,12 +301,12 @@ class InterfaceMarch:
                 fallbacks += 1
         self.known = True
         self.suit()
-        return self.told(out, sums, fallbacks, record=record)
+        return self.period_of(out, sums, fallbacks, record=record)
 
-    def told(
+    def period_of(
         self, out: FloatArray, sums: FloatArray, fallbacks: int, *, record: bool = False
     ) -> InterfacePeriod:
-        """The last period as its outputs and sums tell it.
+        """The last period from its outputs and sums.
 
         Parameters
         ----------

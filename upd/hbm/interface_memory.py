@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 WINDOW = 8
 #: states of which a jump is made: what 10 modes take, and one
 MOST_STATES = 21
-#: places in the counters: sample where the period goes on and whether its step was solved
+#: places in the counters: sample where the period continues and whether its step was solved
 #: elsewhere, whether the past holds a period; periods, jumps kept and taken back; states held for a
 #: jump, periods until one may be made and the pause after one that did not pay, whether the last
 #: period was a trial, whether it was one that was kept, whether the states of a period before are

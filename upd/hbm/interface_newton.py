@@ -5,7 +5,7 @@ kinds of nodes need more than that on the way to an answer. A node whose slips i
 instead of taking each other back, is on its way to a place from which it does not slip any more:
 the verge of slipping, at one sample. There its slip has vanished, so that the derivative does not
 see it, although any motion that is larger makes it slip on. So a node that sticks away from the
-place of its past is asked to stand on that verge, and one that slips for good, or stands there, is
+place of its past is asked to lie on that verge, and one that slips for good, or stands there, is
 not asked where it ends up across its slip, which vanishes with the slip.
 
 References
@@ -176,7 +176,7 @@ class InterfaceEvaluation:
     def _hold_across(self, out: FloatArray, dx: FloatArray) -> None:
         """Nodes that slip out of the way for good do not slip across that way; out overwritten.
 
-        What is left of such a slip vanishes as the equations are solved, and with it what tells
+        The rest of such a slip vanishes as the equations are solved, and with it what decides
         where the node ends up across: the derivative of that is of the order of the slip itself,
         and no direction for Newton's method.
         """

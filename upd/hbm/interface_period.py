@@ -74,7 +74,7 @@ class Bases(NamedTuple):
     Tt : (B, 3 n, 3 n) ndarray
         As `upd.hbm.interface_step.contact_step`, of each.
     Z : (B, r + m + L, 3 n) ndarray
-        What each says by predicted rigid motions, modes and excitation.
+        What each gives by predicted rigid motions, modes and excitation.
     """
 
     open: NDArray[np.bool_]
@@ -167,7 +167,7 @@ def march_steps(  # type: ignore[no-untyped-def]
     past : Past
         Overwritten.
     x0, work : ndarray
-        Scratch (3 n,) and (3 n, 3 n); x0 is what the base said of the last step.
+        Scratch (3 n,) and (3 n, 3 n); x0 is what the base gave of the last step.
     out : (N, K) ndarray
         Outputs, overwritten from `first` on.
     sums : (4,) ndarray
@@ -207,7 +207,7 @@ def march_steps(  # type: ignore[no-untyped-def]
     seen, carried, weights = seen_modes.T.copy(), np.empty(3 * n, np.int64), np.empty(3 * n)
     moved, total_of, every = np.empty(3 * n), np.empty(K), np.arange(r + m + L)
     taken_by = taken.reshape(1, 3 * n, wide)
-    zq, p1, told = np.empty(m), np.empty(m), np.empty(r + m + L)
+    zq, p1, inputs = np.empty(m), np.empty(m), np.empty(r + m + L)
     back, felt = np.zeros(m + r + K + L), np.zeros(L)
     before, pull = np.empty(3 * n), np.empty(r)
     slid, was = np.empty(3 * n), np.empty(n, np.int64)
@@ -222,13 +222,13 @@ def march_steps(  # type: ignore[no-untyped-def]
             for place in range(L):
                 p1[j] += places[j, place] * drive[step + 1, place]
             zq[j] += blades[3, j] * p1[j]
-            told[r + j] = zq[j]
+            inputs[r + j] = zq[j]
         for j in range(r):
-            told[j] = s[j] + dt * sv[j]
+            inputs[j] = s[j] + dt * sv[j]
             for i in range(r):
-                told[j] += 0.5 * dt * dt * inverse_mass[j, i] * load[i]
+                inputs[j] += 0.5 * dt * dt * inverse_mass[j, i] * load[i]
         for place in range(L):
-            told[r + m + place] = drive[step + 1, place]
+            inputs[r + m + place] = drive[step + 1, place]
         put(f, before, 0)
         if given and step == first:
             put(x0, f, 0)
@@ -239,7 +239,7 @@ def march_steps(  # type: ignore[no-untyped-def]
             one = which[step]
             bring_up(c, w, slip, Tt, bases_open, one)
             fetch_row(c, one, x0)
-            add_rows(x0, 1.0, told, every, len(told), Z, one)
+            add_rows(x0, 1.0, inputs, every, len(inputs), Z, one)
             put(y, slid, 0)
             put(state, was, 0)
             used = -1

@@ -1,6 +1,6 @@
 """Periods at one frequency until the motion repeats, with jumps ahead, compiled.
 
-See `upd.hbm.interface_settle`, which tells when a motion has settled and where jumps lead to. A
+See `upd.hbm.interface_settle`, which decides when a motion has settled and where jumps lead to. A
 motion is the tuple of `upd.hbm.interface_state.InterfaceState.arrays`.
 """
 
@@ -45,7 +45,7 @@ RANK = 1e-8
 #: in which light damping alone leaves about a half; one that lands near where it was to lands far
 #: below, and one that does not may have left the motion that the past leads to.
 LEFT, KEPT = 0.05, 0.3
-#: how `march_periods` ends: nothing is left to do, a step has no answer, a new base would pay
+#: how `march_periods` ends: all is done, a step has no answer, a new base would pay
 ENDED, UNSOLVED, NEW_BASE = 0, 1, 2
 
 

@@ -41,7 +41,7 @@ class InterfacePoint(NamedTuple):
     unresolved : float
         Motion of the faces by blades' harmonics above H over that by those up to H.
     residual : float
-        What is left of the equations: of the blades' forces over the forces, of slips and the
+        The residual of the equations: of the blades' forces over the forces, of slips and the
         damper's motion after the period over the motion of the faces, whichever is larger.
     """
 
@@ -123,7 +123,7 @@ def _residual(
     slip: FloatArray,
     w: float,
 ) -> float:
-    """The largest of what is left of the equations, over what they are made of."""
+    """The largest of the residual of the equations, over what they are made of."""
     model = e.model
     forces = np.abs(e.Q @ period.modal).max() + np.abs(e.drive @ model.places.T).max()
     blades = float(np.abs(e.misfit(period, q, w)).max() / forces) if forces > 0.0 else 0.0

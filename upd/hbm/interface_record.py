@@ -111,7 +111,7 @@ def _motion(
 
 
 def period_of_sweep(found: SteppedSine, point: int, fallback: Fallback | None) -> RecordedPeriod:
-    """The last period at a point of a sweep, marched again.
+    """The last period at a point of a sweep, integrated again.
 
     Twice: the steps then start from the samples of a period before, as those of the sweep did, and
     end where these ended to their rounding.

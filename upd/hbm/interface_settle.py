@@ -13,7 +13,7 @@ Where several steady motions exist the jump must not leave the one that the past
 periods in a row in which the same nodes are open, stick and slip at one time or another are summed,
 and a jump is tried out by one period: if that still changes by more than a part of what the period
 before the jump did, the map is not linear enough, the state goes back to what it was, and so many
-more periods are marched plainly, twice as many each time. What a jump changed is not taken for
+more periods are integrated plainly, twice as many each time. What a jump changed is not taken for
 decay: both windows hold plain periods only. Changes from which all that can be left is less than
 the tolerance are left to decay.
 
@@ -149,7 +149,7 @@ def settle(
     march.known = True
     seen = known.seen[: min(int(count[SEEN]), WINDOW)]
     return SteadyPoint(
-        march.told(out, sums, fallbacks),
+        march.period_of(out, sums, fallbacks),
         known.harmonic[0],
         np.min(seen, axis=0),
         np.max(seen, axis=0),

@@ -191,7 +191,7 @@ def resting(
     p = model.shapes.T @ f
     q = p / model.omega**2
     w = model.columns @ motion - model.compliance @ f - model.shapes @ q
-    told = np.concatenate([model.gap - gap, np.ascontiguousarray(slip.T).ravel()])
+    wanted = np.concatenate([model.gap - gap, np.ascontiguousarray(slip.T).ravel()])
     reach = (
         np.abs(model.columns) @ np.abs(motion)
         + np.abs(model.compliance) @ np.abs(f)
@@ -202,7 +202,7 @@ def resting(
     # a direction in which nothing pulls is in balance to the rounding of the nodes' whole forces
     whole = np.tile(np.linalg.norm(force, axis=1), 3)
     most = np.abs(model.columns.T) @ whole + np.abs(model.load)
-    if (np.abs(w - told) > fine * reach.max(initial=0.0)).any() or (pull > fine * most).any():
+    if (np.abs(w - wanted) > fine * reach.max(initial=0.0)).any() or (pull > fine * most).any():
         raise InputError(
             "interface march: the static state belongs to another contact (its forces, gaps, slips "
             "and motion do not balance here): seat the damper with this model's faces and load"

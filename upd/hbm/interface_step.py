@@ -6,8 +6,8 @@ of everything stuck and closed, forces f, gaps g and slips dw of the step are
 
     f = F - W y,   y = (-g, dw).
 
-A base tells which nodes are open for the most part of a period, O, and which are closed, C; its
-principal pivot swaps f and y of O. What the base then says of the state, x = (f_C, y_O), follows
+A base fixes which nodes are open for the most part of a period, O, and which are closed, C; its
+principal pivot swaps f and y of O. What follows from the base of the state, x = (f_C, y_O), follows
 from what it takes for zero, (y_C, f_O):
 
     x = L F - T (y_C, f_O),   S = W_OO^-1,   L = [[1, -W_CO S], [0, S]],

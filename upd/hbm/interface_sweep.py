@@ -1,7 +1,7 @@
 """Stepped sine by time march: at every frequency until the motion repeats, the state carried on.
 
 Up and down a list of frequencies the answers need not agree: where friction leaves several steady
-motions, each sweep tells the one that its past leads to.
+motions, each sweep finds the one that its past leads to.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ __all__ = ["SteadyPoint", "SteppedSine", "settle", "stepped_sine"]
 
 @dataclass(frozen=True)
 class SteppedSine:
-    """Steady motions along a list of frequencies, in the order marched.
+    """Steady motions along a list of frequencies, in the order of the sweep.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class SteppedSine:
         Estimate of what still separates it from the steady motion, over the amplitude, or of the
         contact forces, over those, whichever is more.
     periods : (k,) ndarray of int
-        Periods marched.
+        Periods integrated.
     energy : (k, 3) ndarray
         In the last period: work of the excitation, lost by damping, lost by friction [N mm].
     newton : (k,) ndarray
@@ -162,7 +162,7 @@ def stepped_sine(
             break
     missed = sum(not p.settled for p in points)
     status = "stopped" if message else "not settled" if missed else "settled"
-    told = f"{missed} of {len(points)} frequencies did not settle in {most_periods} periods"
+    unsettled = f"{missed} of {len(points)} frequencies did not settle in {most_periods} periods"
     k, K = len(points), len(model.seen_modes)
     return SteppedSine(
         f[:k],
@@ -180,7 +180,7 @@ def stepped_sine(
         np.array([p.seconds for p in points]),
         at,
         status,
-        message or (told if missed else "All frequencies settled."),
+        message or (unsettled if missed else "All frequencies settled."),
         np.array([p.accepted for p in points], int),
         np.array([p.rejected for p in points], int),
         np.array([p.harmonics for p in points]).reshape((k, -1, K) if k else (0, 1, K)),

@@ -40,7 +40,7 @@ class SteadyState:
     displacement, force : (n_point, 1 + d, n) ndarray
         Relative contact displacements [mm] and contact forces [N].
     periods : int
-        Periods marched.
+        Periods integrated.
     change : float
         Change of the last period relative to its size.
     status : {"periodic", "period limit", "no convergence"}

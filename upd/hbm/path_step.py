@@ -191,7 +191,7 @@ def advance(
                     s,
                 )
                 # at a wanted p the border does not tell the side: the path goes straight on, or as
-                # the determinant says
+                # the determinant decides
                 side = 1.0 if cosine > np.cos(s.angle) or hit is None else found.sign * state.sign
                 return found, State(
                     found.x,

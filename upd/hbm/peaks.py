@@ -2,7 +2,7 @@
 
 The path is cut by planes across its tangent; on each the corrector finds the solution, and the
 slope of the amplitude along the path shows the side of the peak. Folds do not matter, since no
-plane stands at a fixed frequency. Compare the peak continuation of M. Krack and J. Gross,
+plane lies at a fixed frequency. Compare the peak continuation of M. Krack and J. Gross,
 Harmonic Balance for Nonlinear Vibration Problems (2019), ch. 4, which adds the condition as an
 equation and needs second derivatives.
 """

@@ -154,7 +154,7 @@ def march_point(  # type: ignore[no-untyped-def]
     """March one point until its traction repeats.
 
     Sliding along one line, a point that slips or opens forgets: where a period comes to the same
-    traction as the one before, slipping, the rest of it is the same and is not marched again. A
+    traction as the one before, slipping, the rest of it is the same and is not integrated again. A
     point that sticks or is open through its first period does so through all.
 
     Fills force, weighed (1 + d, n), state (n,), slope (3, n), tangent (d, n, (1 + d) size).

@@ -22,7 +22,7 @@ from upd.linalg.conjugate import STALL, UNSEEN, LowestRitz, bound, stopped
 
 # Iterations between looks at the Ritz values as long as none is known.
 _LOOK = 10
-#: a product with M in single precision tells directions apart whose squares differ by this share
+#: a product with M in single precision distinguishes directions whose squares differ by this share
 _SINGLE = float(np.finfo(np.float32).eps)
 
 
@@ -163,7 +163,7 @@ def block_conjugate_gradients(
                     best, best_at = held, count
                 if count - best_at >= STALL or count >= max_iterations:
                     raise stopped(count, errors[worst], sizes[worst], accuracy, "it stalls")
-            # What is left of each column against what it may have left; both in the norm of M.
+            # Residual of each column against the largest allowed; both in the norm of M.
             if 0.0 < lowest.below < np.inf and (sizes > 0.0).all():
                 allowed = accuracy * sizes * np.sqrt(lowest.below)
                 U, s, _ = np.linalg.svd((S @ C) / allowed)

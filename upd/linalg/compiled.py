@@ -147,7 +147,7 @@ def sources_digest(file: Path, root: Path) -> str:
     for name in sorted(seen):
         # a module of the user's may lie anywhere
         at = Path(name)
-        told = at.relative_to(root) if at.is_relative_to(root) else Path(at.name)
-        digest.update(told.as_posix().encode() + b"\0")
+        path = at.relative_to(root) if at.is_relative_to(root) else Path(at.name)
+        digest.update(path.as_posix().encode() + b"\0")
         digest.update(hashlib.sha256(seen[name]).digest())
     return digest.hexdigest()

@@ -74,8 +74,8 @@ def conjugate_gradients(
     lambda_min(M K). The smallest eigenvalue is the smallest Ritz value of the iteration itself,
     which comes down to it while the residual still has a part along that eigenvector, or of an
     iteration before with the same M that came lower, less the norm of its residual: that much it
-    may still come down. r' M r is at hand in every step. Where the recurrence says that it is done,
-    r is formed again and the iteration goes on from there if it is not.
+    may still come down. r' M r is at hand in every step. Where the recurrence reports convergence,
+    r is formed again and the iteration continues from there if it is not.
 
     Parameters
     ----------

@@ -289,7 +289,7 @@ class Eigenproblem:
             theta, X = eigh(whole(self.M).toarray(), A.toarray(), driver="gvd")
         except np.linalg.LinAlgError as error:
             raise _not_definite(sigma) from error
-        # A singular matrix can pass LAPACK's test by rounding: the softest motion tells.
+        # A singular matrix can pass LAPACK's test by rounding: the softest motion shows it.
         if Motion(
             X[:, -1], float(X[:, -1] @ (A @ X[:, -1]) / (X[:, -1] @ (A.diagonal() * X[:, -1])))
         ).is_free:
@@ -323,7 +323,7 @@ class Eigenproblem:
         return ritz(self.K, self.M, X, inverse.factor.solver, inverse.sigma, self._size)
 
     def _complete(self, found: Modes, wanted: int, below_hz: float | None) -> Modes:
-        """With what the run missed: as many modes below a shift as the inertia there says.
+        """With what the run missed: as many modes below a shift as the inertia there counts.
 
         Where there is no count, a search.
         """

@@ -128,7 +128,7 @@ def _orthonormal(
     Directions that are rounding of columns of M norm `size` (b,) leave.
     """
     own = np.sqrt(np.maximum(np.einsum("ij,ij->j", U, MU), 0.0))
-    # What is left after cancelling all but eps of a column is noise, not a direction.
+    # The rest after cancelling all but eps of a column is noise, not a direction.
     alive = own > (0.0 if size is None else 100 * EPS * np.sqrt(len(U)) * size)
     if not alive.any():
         return U[:, :0], U[:, :0], np.zeros((0, U.shape[1]))

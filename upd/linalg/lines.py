@@ -10,7 +10,7 @@ negative. Nodes that couple so are put on one line and solved for at once, which
 that displacement, as the lines beside see none of it.
 
 An element that is short one way only is long two ways, and a node is on one line. What changes its
-sign along the other long edges is left by these lines. So nodes that still couple so, across the
+sign along the other long edges stays beside these lines. So nodes that still couple so, across the
 lines, are put on cross lines and solved for once more.
 
 References

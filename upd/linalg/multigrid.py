@@ -72,14 +72,14 @@ class Hierarchy:
     """
 
     def __init__(
-        self, levels: list[AggregationLevel], coarsest: FloatArray, told: NDArray[np.bool_], n: int
+        self, levels: list[AggregationLevel], coarsest: FloatArray, real: NDArray[np.bool_], n: int
     ) -> None:
-        """Dofs of the coarsest level that are not ``told`` stand for nothing: an aggregate of a few
+        """Dofs of the coarsest level that are not ``real`` stand for nothing: an aggregate of a few
         dofs does not tell all six modes apart.
         """
-        self._levels, self.n, self._told = levels, n, told
+        self._levels, self.n, self._real = levels, n, real
         try:
-            self._coarsest = cho_factor(coarsest[np.ix_(told, told)], lower=True)
+            self._coarsest = cho_factor(coarsest[np.ix_(real, real)], lower=True)
         except np.linalg.LinAlgError as error:
             raise ConvergenceError(
                 f"Multigrid: the coarsest level failed ({error}): the body floats, hold "
@@ -116,7 +116,7 @@ class Hierarchy:
         """One right-hand side (n,), or (n, WIDTH)."""
         if depth == len(self._levels):
             x = np.zeros_like(b)
-            x[self._told] = cho_solve(self._coarsest, b[self._told].astype(np.float64))
+            x[self._real] = cho_solve(self._coarsest, b[self._real].astype(np.float64))
             return x
         level = self._levels[depth]
         order = level.smoother.order

@@ -348,7 +348,7 @@ def _schur(A: Matrix, kept: IntArray) -> tuple[_Pardiso, FloatArray]:
     """PARDISO after its factorisation, and S in the order of `kept`.
 
     PARDISO factorises S too, hence refuses a singular one. A spring on every kept dof makes it
-    definite and is taken off S exactly afterwards; K_ii and the recovery know nothing of it. So
+    definite and is subtracted from S exactly afterwards; K_ii and the recovery do not see it. So
     what fails with the spring is a singular K_ii.
     """
     motion = None

@@ -1,7 +1,7 @@
 """Independent pieces of interpreted work on both processors: this process and others beside it.
 
 Threads do not help where Python itself is busy, as in a continuation on small matrices. A process
-beside this one is started once, imports while this one goes on, and takes jobs from the same list.
+beside this one is started once, imports while this one works, and takes jobs from the same list.
 It runs ``python -m upd.linalg.processes``, so that a script that calls the library needs no guard.
 """
 
@@ -165,7 +165,7 @@ def main() -> None:
     # whatever is printed must not lie between the answers
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     for name in sys.argv[1:]:
-        # what the jobs will need, while the first process still goes on
+        # what the jobs will need, while the first process still works
         import_module(name)
     while True:
         try:

@@ -120,7 +120,7 @@ def threads() -> int:
 
 
 def threads_used() -> int:
-    """Threads that the libraries may use: fewer than the processors where the environment says."""
+    """Threads that the libraries may use: fewer than the processors where limited."""
     asked = os.environ.get("MKL_NUM_THREADS") or os.environ.get("OMP_NUM_THREADS") or ""
     return min(threads(), int(asked)) if asked.isdigit() and int(asked) > 0 else threads()
 

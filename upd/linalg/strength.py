@@ -5,7 +5,7 @@ ones, where the coarse level has to see it: only neighbours about as near as the
 joined there. Entries of K do not tell, as those of 8-node hexahedra at long edges are no smaller.
 
 An aggregate is a node and its near neighbours, all free before. That leaves nodes over, which would
-go to any aggregate beside them. Where a whole row of nodes is left over, a fourth row comes into
+go to any aggregate beside them. Where a whole row of nodes remains, a fourth row comes into
 aggregates of three so, at up to `FAR` times the step along the row: sweeps hardly see a
 displacement of that row against the others, at the share of 1 / FAR^2 of the diagonal, and one
 aggregate of all four does not have it. So nodes that are left over go to an aggregate only by a
@@ -16,7 +16,7 @@ References
 .. [1] M. W. Gee, C. M. Siefert, J. J. Hu, R. S. Tuminaro, M. G. Sala, ML 5.0 Smoothed Aggregation
    User's Guide, SAND2006-2649, section 6.4 (dropping by the distance of nodes).
 .. [2] P. Vanek, J. Mandel, M. Brezina, Computing 56 (1996) 179, eq. (13), the threshold of 0.08,
-   halved from level to level; algorithm 2 (aggregates and what is left over).
+   halved from level to level; algorithm 2 (aggregates and the remaining nodes).
 .. [3] U. Trottenberg, C. Oosterlee, A. Schueller, Multigrid (2001), section A.7.1.1: couplings are
    strong above a quarter of the strongest.
 """

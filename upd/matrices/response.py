@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -113,7 +113,7 @@ class OwnResponse:
 
     @property
     def status(self) -> str:
-        """ "complete", or what it lacks: see `upd.hbm.FrequencyResponse`, its message says why."""
+        """ "complete", or what it lacks: see `upd.hbm.FrequencyResponse` and its message."""
         return self.response.status
 
     def amplitude(self, name: str, harmonic: int | None = None) -> FloatArray:
@@ -145,6 +145,25 @@ class OwnResponse:
         return self.watched[name]
 
 
+class ResponseOptions(TypedDict, total=False):
+    """What `forced_response` may be given besides; the last ones go to
+    `upd.hbm.frequency_response`.
+    """
+
+    C: Any
+    zeta: ArrayLike | None
+    dofs: DofMap | Path | str | None
+    static_force: Mapping[Any, float] | None
+    modes: int | None
+    harmonics: Iterable[int] | Literal["adaptive"]
+    samples: int | None
+    start: Any
+    slider: ArrayLike | None
+    sweep_down: bool
+    fast_exits: bool
+    settings: Any
+
+
 def forced_response(
     K: Any,
     M: Any,
@@ -153,13 +172,7 @@ def forced_response(
     force: Mapping[Any, complex],
     watch: Mapping[str, Motion],
     frequencies: ArrayLike,
-    C: Any = None,
-    zeta: ArrayLike | None = None,
-    dofs: DofMap | Path | str | None = None,
-    static_force: Mapping[Any, float] | None = None,
-    modes: int | None = None,
-    harmonics: Iterable[int] | Literal["adaptive"] = (0, 1),
-    **settings: Any,
+    **options: Unpack[ResponseOptions],
 ) -> OwnResponse:
     """Free, stuck and nonlinear forced response of K and M with friction joints, by multi-harmonic
     balance.
@@ -189,9 +202,10 @@ def forced_response(
         Bampton). None: the matrices are taken whole up to 600 dofs unless rounding blurs their low
         modes, and else reduced to the modes below ten times the highest harmonic of interest.
     harmonics
-        Harmonics of the balance, or "adaptive".
-    settings
-        Further arguments of `upd.hbm.frequency_response` (samples, start, sweep_down, ...).
+        Harmonics of the balance, (0, 1) by default, or "adaptive".
+    options
+        C, zeta, dofs, static_force, modes and harmonics, as above; further arguments of
+        `upd.hbm.frequency_response` (samples, start, sweep_down, ...).
 
     Returns
     -------
@@ -203,19 +217,20 @@ def forced_response(
         For unreadable or unfit matrices, unknown dofs and bad numbers, all problems at once.
     """
     problems: list[str] = []
+    settings: dict[str, Any] = dict(options)
+    C, zeta, dofs, static_force, modes = (
+        settings.pop(name, None) for name in ("C", "zeta", "dofs", "static_force", "modes")
+    )
+    harmonics = settings.pop("harmonics", (0, 1))
     model, damping = _read(K, M, C, zeta, dofs)
     n = model.K.shape[0]
     orders: Any = harmonics if isinstance(harmonics, str) else hbm.harmonics(harmonics).numbers
     f = np.atleast_1d(np.asarray(frequencies, dtype=float))
     rows = _Rows.collected(model.dofs, n, problems)
-    closing, sliding = (
-        [rows.motion("joint", j.closing) for j in joints],
-        _sliding(joints, rows, problems),
-    )
-    constant, harmonic = (
-        rows.motion("static_force", static_force or {}),
-        rows.motion("force", force),
-    )
+    closing = [rows.motion("joint", j.closing) for j in joints]
+    sliding = _sliding(joints, rows, problems)
+    constant = rows.motion("static_force", static_force or {})
+    harmonic = rows.motion("force", force)
     watched = [rows.motion(f"watch {name!r}", motion) for name, motion in watch.items()]
     problems += [] if joints else ["joints: give at least one"]
     problems += [] if watch else ["watch: name at least one motion"]
@@ -227,16 +242,12 @@ def forced_response(
     ]
     if problems:
         raise InputError("forced_response: " + "; ".join(problems))
-    reduced = _reduced(
-        model,
-        rows.used,
-        modes,
-        _BEYOND * _highest(orders) * float(f.max(initial=0.0)),
-        whole=damping is not None,
-    )
-    Kd, Md = (
-        (model.K.toarray(), _mass(model).toarray()) if reduced is None else (reduced.K, reduced.M)
-    )
+    below = _BEYOND * _highest(orders) * float(f.max(initial=0.0))
+    reduced = _reduced(model, rows.used, modes, below, whole=damping is not None)
+    if reduced is None:
+        Kd, Md = model.K.toarray(), _mass(model).toarray()
+    else:
+        Kd, Md = reduced.K, reduced.M
     _refuse_blurred(Kd, Md)
     at = np.eye(n)[rows.used] if reduced is None else reduced.at(rows.used)
     points = _contacts(joints, rows.matrix(closing) @ at, [rows.matrix(s) @ at for s in sliding])
@@ -297,7 +308,7 @@ def _mass(model: Matrices) -> csr_array:
 class _Rows:
     """Rows of the matrices that joints, forces and watched motions use.
 
-    Unknown ones are message in ``problems``.
+    Unknown ones are messages in ``problems``.
     """
 
     dofs: DofMap | None

@@ -86,7 +86,7 @@ def as_accelerance(
     values : (n,) ndarray
         Complex or magnitudes, in ``unit``.
     unit : str
-        Of accelerance, mobility or receptance; it tells which.
+        Of accelerance, mobility or receptance; it gives which.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Which curve of a file: blade, linear limit or F_C/F_E that the file itself says."""
+"""Which curve of a file: blade, linear limit or F_C/F_E that the file itself gives."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, get_args
 from upd.errors import InputError
 from upd.measured.curve import Blade, State
 
-#: names of a column, or of an attribute, that says what a curve is -> what it says
+#: names of a column, or of an attribute, that gives what a curve is -> what it gives
 LABELS = {
     "blade": "blade",
     "state": "state",
@@ -25,7 +25,7 @@ _WORDS = {"blade": get_args(Blade), "state": get_args(State)}
 
 @dataclass(frozen=True)
 class CurveLabel:
-    """What a curve is, each None where nothing says it.
+    """What a curve is, each None where it is not given.
 
     Attributes
     ----------
@@ -42,17 +42,17 @@ class CurveLabel:
     @property
     def words(self) -> str:
         """As messages show it."""
-        told = [(name, getattr(self, name)) for name in _SHOWN]
-        return ", ".join(f"{_SHOWN[k]} {_shown(v)}" for k, v in told if v is not None)
+        given = [(name, getattr(self, name)) for name in _SHOWN]
+        return ", ".join(f"{_SHOWN[k]} {_shown(v)}" for k, v in given if v is not None)
 
     @property
     def condition(self) -> str | None:
         """A linear limit or F_C/F_E: the one excludes the other."""
-        told = self.state if self.force_ratio is None else self.force_ratio
-        return None if told is None else _shown(told)
+        given = self.state if self.force_ratio is None else self.force_ratio
+        return None if given is None else _shown(given)
 
     def agrees(self, wanted: CurveLabel) -> bool:
-        """Whether nothing it says is other than what is wanted."""
+        """Whether nothing it gives is other than what is wanted."""
         pairs = ((self.blade, wanted.blade), (self.condition, wanted.condition))
         return all(None in pair or pair[0] == pair[1] for pair in pairs)
 
@@ -68,7 +68,7 @@ class AskedCurve(NamedTuple):
     unit : str or None
         Of the response, where the file names none.
     label : CurveLabel
-        Which curve, where the file says it.
+        Which curve, where the file gives it.
     """
 
     column: str | None = None
@@ -76,7 +76,7 @@ class AskedCurve(NamedTuple):
     label: CurveLabel = CurveLabel()
 
 
-#: nothing said, nothing wanted
+#: nothing given, nothing wanted
 ANY = CurveLabel()
 
 
@@ -85,46 +85,46 @@ def _shown(value: Any) -> str:
     return str(value) if isinstance(value, str) else f"{value:.6g}"
 
 
-def read_label(name: str, said: Any) -> Any:
-    """What a cell or an attribute says of a curve.
+def read_label(name: str, given: Any) -> Any:
+    """What a cell or an attribute gives of a curve.
 
     Parameters
     ----------
     name
         "blade", "state" or "force_ratio".
-    said
-        Words or a number; nothing said is None.
+    given
+        Words or a number; nothing given is None.
 
     Raises
     ------
     InputError
-        Where it says something else.
+        Where it gives something else.
     """
-    if said is None or not str(said).strip():
+    if given is None or not str(given).strip():
         return None
     if name in _WORDS:
-        word = str(said).strip().casefold()
+        word = str(given).strip().casefold()
         if word not in _WORDS[name]:
-            raise InputError(f"{said!r} is no {name}; write {' or '.join(_WORDS[name])}")
+            raise InputError(f"{given!r} is no {name}; write {' or '.join(_WORDS[name])}")
         return word
     try:
-        ratio = float(said)
+        ratio = float(given)
     except (TypeError, ValueError):
         ratio = math.nan
     if not (math.isfinite(ratio) and ratio > 0.0):
-        raise InputError(f"{said!r} is no F_C/F_E; give a number above 0, or leave it empty")
+        raise InputError(f"{given!r} is no F_C/F_E; give a number above 0, or leave it empty")
     return ratio
 
 
-def label_of(said: Mapping[str, Any]) -> CurveLabel:
-    """A curve's label from what is said under names of `LABELS`.
+def label_of(given: Mapping[str, Any]) -> CurveLabel:
+    """A curve's label from what is given under names of `LABELS`.
 
     Raises
     ------
     InputError
         As `read_label` does.
     """
-    known = {LABELS[key]: value for key, value in said.items() if key in LABELS}
+    known = {LABELS[key]: value for key, value in given.items() if key in LABELS}
     return CurveLabel(**{name: read_label(name, value) for name, value in known.items()})
 
 

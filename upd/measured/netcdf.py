@@ -46,8 +46,8 @@ def read_variables(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, lis
         with h5netcdf.File(path, "r") as file:
             return _read(file, *asked)
     except OSError as error:
-        told = str(error).splitlines()[0]
-        return None, [f"is no netCDF-4 file ({told}); write it as netCDF-4, or as CSV"]
+        reason = str(error).splitlines()[0]
+        return None, [f"is no netCDF-4 file ({reason}); write it as netCDF-4, or as CSV"]
 
 
 def _read(
@@ -97,11 +97,11 @@ def _read(
 
 def _said(group: Any, variable: Any) -> dict[str, Any]:
     """What the attributes say of a curve, the variable's own before its group's."""
-    said = {str(key).casefold(): value for key, value in group.attrs.items()}
-    if said.get("kind") in get_args(State):
+    given = {str(key).casefold(): value for key, value in group.attrs.items()}
+    if given.get("kind") in get_args(State):
         # as a run writes its own groups
-        said.setdefault("state", said["kind"])
-    return said | {str(key).casefold(): value for key, value in variable.attrs.items()}
+        given.setdefault("state", given["kind"])
+    return given | {str(key).casefold(): value for key, value in variable.attrs.items()}
 
 
 def _units(variable: Any) -> str:
@@ -116,8 +116,8 @@ def _responses(group: Any, path: str, unit: str | None) -> Iterator[tuple[str, t
         for name, variable in group.variables.items():
             dims, shape = variable.dimensions, variable.shape
             over = dims == (along,) or (len(dims) == 2 and dims[0] == along and shape[1] == 2)
-            told = unit is not None or _units(variable) in _RESPONSE_UNITS
-            if name != _AXIS and over and told:
+            known = unit is not None or _units(variable) in _RESPONSE_UNITS
+            if name != _AXIS and over and known:
                 yield f"{path}{name}", (group, variable)
     for name, inner in group.groups.items():
         yield from _responses(inner, f"{path}{name}/", unit)

@@ -12,7 +12,7 @@ from upd.measured.netcdf import read_variables
 from upd.measured.text import TextCurve, read_text
 
 _NETCDF = (".nc", ".nc4", ".cdf", ".h5")
-#: faults of one file that are told
+#: faults of one file that are reported
 MOST_TOLD = 20
 
 
@@ -27,7 +27,7 @@ def read_measured(
 ) -> MeasuredCurve:
     """Read a measured frequency response from a CSV or netCDF file.
 
-    Accelerance, mobility or receptance, told by the unit, becomes an accelerance in (m/s2)/N:
+    Accelerance, mobility or receptance, known by the unit, becomes an accelerance in (m/s2)/N:
     complex, or magnitudes where no phase was measured.
 
     Parameters
@@ -35,12 +35,12 @@ def read_measured(
     path : str or Path
         A text file, see `upd.measured.text`, or a netCDF-4 file (.nc), see `upd.measured.netcdf`.
     blade : {"right", "left"}, optional
-        Whose acceleration along x it is; where neither this nor the file says it, the right one's.
+        Whose acceleration along x it is; where neither this nor the file gives it, the right one's.
     state : {"free", "stuck"}, optional
         Without the damper, or with every contact point sticking.
     force_ratio : float, optional
         F_C/F_E of a curve with friction. Like blade and state it chooses a curve of a file that
-        says which curves it has.
+        gives the curves it has.
     column : str, optional
         Name of the response where the file holds several.
     unit : str, optional
@@ -72,19 +72,19 @@ def read_measured(
     found, faults = found_in(place, asked)
     if found is None:
         more = len(faults) - MOST_TOLD
-        told = faults[:MOST_TOLD] + ([f"and {more} more"] if more > 0 else [])
+        shown = faults[:MOST_TOLD] + ([f"and {more} more"] if more > 0 else [])
         raise InputError(
             f"{place}: {len(faults)} problem{'s' * (len(faults) != 1)}\n"
-            + "\n".join(f"  {one}" for one in told)
+            + "\n".join(f"  {one}" for one in shown)
         )
     H, quantity = as_accelerance(found.frequency, found.values, found.unit)
-    said = found.label
+    label = found.label
     return MeasuredCurve(
         found.frequency,
         H,
-        blade or said.blade or "right",
-        state or said.state,
-        said.force_ratio if force_ratio is None else force_ratio,
+        blade or label.blade or "right",
+        state or label.state,
+        label.force_ratio if force_ratio is None else force_ratio,
         quantity,
         found.unit,
         place,
@@ -102,8 +102,8 @@ def found_in(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, list[str]
         Which response.
     """
     try:
-        told = path.stat()
-        return _found(path, told.st_mtime_ns, told.st_size, asked)
+        file = path.stat()
+        return _found(path, file.st_mtime_ns, file.st_size, asked)
     except OSError as error:
         return None, [f"cannot be read ({error.strerror}); give the file of a measured curve"]
 

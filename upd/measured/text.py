@@ -74,7 +74,7 @@ class Faults:
 @dataclass(frozen=True)
 class TextCurve:
     """Frequency (n,) in Hz, rising, and the response (n,), complex or magnitudes, in ``unit``;
-    ``label`` is what the file says of it.
+    ``label`` is what the file gives of it.
     """
 
     frequency: FloatArray
@@ -112,7 +112,7 @@ def read_text(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, list[str
     chosen = _chosen(columns, asked.column, asked.unit, head, faults)
     if chosen is None:
         return None, faults.found
-    parts, scale, told = chosen
+    parts, scale, own_unit = chosen
     label, body = _labelled(columns, body, asked.label, separator, head, faults)
     rows = _numbers(body, parts, separator, faults, max(c.place for c in columns) + 1)
     if faults.found:
@@ -139,7 +139,7 @@ def read_text(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, list[str
     if faults.found:
         return None, faults.found
     way = slice(None) if f[-1] > f[0] else slice(None, None, -1)
-    return TextCurve(f[way], values[way], told, label), []
+    return TextCurve(f[way], values[way], own_unit, label), []
 
 
 def _lines(path: Path, faults: Faults) -> list[tuple[int, str]]:
@@ -226,7 +226,7 @@ def _chosen(
         faults.add(_without_unit(axis[0].unit, error), line, axis[0].place + 1, "frequency")
     names = list(dict.fromkeys(c.name for c in columns if c.name and _is_response(c, unit)))
     if not names and wanted is None:
-        # its unit is what is wrong: told below
+        # its unit is what is wrong: reported below
         names = list(dict.fromkeys(c.name for c in columns if c.name))[:1]
     try:
         name = the_one(names, wanted, "columns")
@@ -234,9 +234,9 @@ def _chosen(
         faults.add(str(error), line)
         return None
     parts = _parts([c for c in columns if c.name == name], name, line, faults)
-    told = [c for kind, c in parts.items() if kind not in ("frequency", "phase")]
-    units = {unit or c.unit for c in told}
-    for c in told:
+    responses = [c for kind, c in parts.items() if kind not in ("frequency", "phase")]
+    units = {unit or c.unit for c in responses}
+    for c in responses:
         try:
             unit_factor(unit or c.unit, QUANTITIES)
         except InputError as error:
@@ -251,7 +251,7 @@ def _chosen(
             faults.add(_without_unit(c.unit, error), line, c.place + 1, f"{c.name} phase")
     if faults.found:
         return None
-    return {"frequency": axis[0], **parts}, scale, unit or told[0].unit
+    return {"frequency": axis[0], **parts}, scale, unit or responses[0].unit
 
 
 def _is_response(c: FileColumn, unit: str | None) -> bool:
@@ -294,22 +294,22 @@ def _labelled(
     line: int,
     faults: Faults,
 ) -> tuple[CurveLabel, list[tuple[int, list[str]]]]:
-    """The label of the wanted curve and its lines; all lines where no column says which."""
+    """The label of the wanted curve and its lines; all lines where no column gives it."""
     mine = [c for c in columns if c.part in LABELS.values()]
     if not mine:
         return ANY, body
     labels = []
     for at, cells in body:
-        said = {}
+        given = {}
         for c in mine:
             cell = cells[c.place] if c.place < len(cells) else ""
             if c.part == "force_ratio":
                 cell = cell.replace(",", ".") if separator != "," else cell
             try:
-                said[c.part] = read_label(c.part, cell)
+                given[c.part] = read_label(c.part, cell)
             except InputError as error:
                 faults.add(str(error), at, c.place + 1, c.part)
-        labels.append(CurveLabel(**said))
+        labels.append(CurveLabel(**given))
     if faults.found:
         return ANY, body
     try:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upd.cache.files import whole_file
+from upd.cache.files import placed_file
 from upd.errors import InputError
 from upd.mesh import FloatArray, IntArray, Mesh
-from upd.mesh.sides import owners
+from upd.mesh.boundary import owners
 
 _CELL = {8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"}
 _QUAD = {4: "quad", 8: "quad8", 9: "quad9"}
@@ -44,7 +43,7 @@ def write_mesh(meshes: Mapping[str, Mesh], path: Path | str, *, element: str | N
     path = Path(path)
     writer = _writer(path, element)
     _check(meshes)
-    with _atomic(path) as temporary:
+    with placed_file(path) as temporary:
         writer(meshes, temporary)
 
 
@@ -61,7 +60,7 @@ def write_fields(path: Path | str, meshes: Mapping[str, Mesh], point_data: Field
         raise InputError(f"{path}: fields are written as .vtu; choose that ending")
     _check(meshes)
     data = _merged(meshes, point_data)
-    with _atomic(path) as temporary:
+    with placed_file(path) as temporary:
         _write_vtu(meshes, temporary, data)
 
 
@@ -83,18 +82,6 @@ def _writer(path: Path, element: str | None) -> Callable[[Mapping[str, Mesh], Pa
 def _check(meshes: Mapping[str, Mesh]) -> None:
     if not meshes:
         raise InputError("export: there is no mesh to write")
-
-
-@contextmanager
-def _atomic(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path` that takes its place once it is complete."""
-    try:
-        with whole_file(path) as temporary:
-            yield temporary
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be written ({error.strerror or error}); choose another place"
-        ) from error
 
 
 def _offsets(meshes: Mapping[str, Mesh]) -> IntArray:
@@ -237,7 +224,7 @@ def _type(mesh: Mesh, element: str | None) -> str:
 def _lines(numbers: Iterable[int], *, continued: bool = True) -> Iterator[str]:
     """Data lines of at most 16 numbers.
 
-    A comma at the end tells that an element goes on in the next line.
+    A comma at the end: the element continues in the next line.
     """
     items = [str(n) for n in numbers]
     for begin in range(0, len(items), _PER_LINE):

@@ -1,7 +1,7 @@
 """Fields of a recipe's dataclass: unit, bounds and choices as data, checked by one function.
 
 A recipe writes ``radius: float = in_mm(5.0)`` and asks `field_faults` for what is out of bounds;
-bounds that depend on other parameters stay in the recipe's own checks. `table` tells all of them,
+bounds that depend on other parameters stay in the recipe's own checks. `table` gives all of them,
 the latter by asking the recipe itself.
 """
 
@@ -129,15 +129,15 @@ def _fault(f: Field[Any], value: Any) -> str:
     if bounds.above == 0.0 and bounds.most is None:
         return f"{value!r} is not a positive number; give one"
     unit = UNITS_INSIDE.get(str(f.metadata.get("quantity")), "")
-    told = f"{value:g}{unit and ' '}{unit}"
+    shown = f"{value:g}{unit and ' '}{unit}"
     if bounds.most is None:
-        return f"{told} is less than {bounds.least:g}"
-    return f"{told} is outside {bounds.text}"
+        return f"{shown} is less than {bounds.least:g}"
+    return f"{shown} is outside {bounds.text}"
 
 
 def _either(choices: Sequence[Any]) -> str:
-    told = [f'"{c}"' if isinstance(c, str) else str(c) for c in choices]
-    return f"{', '.join(told[:-1])} or {told[-1]}" if len(told) > 1 else told[0]
+    texts = [f'"{c}"' if isinstance(c, str) else str(c) for c in choices]
+    return f"{', '.join(texts[:-1])} or {texts[-1]}" if len(texts) > 1 else texts[0]
 
 
 @dataclass(frozen=True)
@@ -183,11 +183,13 @@ def _row(params: Any, f: Field[Any], kind: Any, *, here: bool) -> RecipeParamete
     unit = UNITS_INSIDE.get(str(f.metadata.get("quantity")), "")
     if choices:
         sound = [c for c in choices if not here or _passes(params, f.name, c)]
-        told = ", ".join(map(str, sound)) if len(sound) < len(choices) else ""
-        return RecipeParameter(f.name, value, default, unit, ", ".join(map(str, choices)), told)
+        bounds_here = ", ".join(map(str, sound)) if len(sound) < len(choices) else ""
+        return RecipeParameter(
+            f.name, value, default, unit, ", ".join(map(str, choices)), bounds_here
+        )
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    told = _interval(params, f.name, bounds) if number and here else ""
-    return RecipeParameter(f.name, value, default, unit, bounds.text, told)
+    bounds_here = _interval(params, f.name, bounds) if number and here else ""
+    return RecipeParameter(f.name, value, default, unit, bounds.text, bounds_here)
 
 
 def _chosen(f: Field[Any], kind: Any) -> bool:

@@ -16,6 +16,17 @@ FloatArray = NDArray[np.float64]
 
 #: nodes per hexahedron -> nodes per face
 FACE_SIZE = {8: 4, 20: 8, 27: 9}
+#: corners of the sides of a hexahedron, seen from outside counter-clockwise; the order is that of
+#: S1 ... S6 (Abaqus Analysis User's Guide, "Three-dimensional solid element library")
+SIDES = np.array(
+    [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+)
+#: corners of its edges, in the order of the mid-edge nodes 8, 9 ...
+EDGES = np.array(
+    [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+)
+#: corners of an edge -> its mid-edge node
+MIDDLES = {frozenset(map(int, edge)): 8 + k for k, edge in enumerate(EDGES)}
 
 
 @dataclass(frozen=True)

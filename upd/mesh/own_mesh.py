@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -103,12 +103,8 @@ def recipe_of(path: Path) -> ModuleType:
     def build(params: MeshFile) -> dict[str, Mesh]:
         return _scaled(meshes, params)
 
-    made: dict[str, Any] = {
-        "build": build_rig if rig else build,
-        "ANALYSIS": "rig" if rig else _contact_analysis(meshes),
-    }
-    for name, value in made.items():
-        setattr(module, name, value)
+    vars(module)["build"] = build_rig if rig else build
+    vars(module)["ANALYSIS"] = "rig" if rig else _contact_analysis(meshes)
     return module
 
 

@@ -59,7 +59,7 @@ def in_pairs(meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
     """The meshes with every facing node set of a second body in the order of the first's.
 
     Each node of the one goes to the nearest of the other along the contact; where that is no
-    bijection the order stays, and `check_pairs` says what is wrong.
+    bijection the order stays, and `check_pairs` reports what is wrong.
     """
     out = dict(meshes)
     for bodies in combinations(meshes, 2):

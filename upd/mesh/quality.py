@@ -7,13 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from upd.mesh import FloatArray, Mesh
+from upd.mesh.hexmesh import EDGES, MIDDLES
 
 # corner -> its neighbours along the three edges, right-handed (Verdict, hex scaled Jacobian)
 _NEIGHBOURS = np.array(
     [[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]]
-)
-_EDGES = np.array(
-    [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
 )
 # opposite faces, for the axes through the centre
 _FACES = (((1, 2, 6, 5), (0, 3, 7, 4)), ((2, 3, 7, 6), (1, 0, 4, 5)), ((4, 5, 6, 7), (0, 1, 2, 3)))
@@ -76,20 +74,16 @@ def scaled_jacobian(mesh: Mesh) -> FloatArray:
 
 def _middles() -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
     """Local number of the middle node between each corner and its three neighbours, (8, 3)."""
-    number = {frozenset(map(int, edge)): 8 + k for k, edge in enumerate(_EDGES)}
-    return np.array(
-        [
-            [number[frozenset((corner, int(other)))] for other in row]
-            for corner, row in enumerate(_NEIGHBOURS)
-        ],
-        dtype=np.int64,
-    )
+    rows = [
+        [MIDDLES[frozenset((k, other))] for other in r] for k, r in enumerate(_NEIGHBOURS.tolist())
+    ]
+    return np.array(rows, dtype=np.int64)
 
 
 def edge_ratio(mesh: Mesh) -> FloatArray:
     """Longest over shortest edge (between corners) of every hexahedron, (n_hex,)."""
     corner = mesh.points[mesh.hexes[:, :8]]
-    length = np.linalg.norm(corner[:, _EDGES[:, 1]] - corner[:, _EDGES[:, 0]], axis=2)
+    length = np.linalg.norm(corner[:, EDGES[:, 1]] - corner[:, EDGES[:, 0]], axis=2)
     shortest = length.min(axis=1)
     ratio: FloatArray = np.divide(
         length.max(axis=1), shortest, out=np.full(len(length), np.inf), where=shortest > 0.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import functools
 import hashlib
 import importlib
@@ -15,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 
 from upd.cache.arrays import cache_folder
-from upd.errors import InputError
+from upd.errors import InputError, did_you_mean
 from upd.mesh.own_mesh import ENDINGS as MESH_ENDINGS
 from upd.mesh.own_mesh import recipe_of
 
@@ -45,16 +44,8 @@ def module_of(recipe: str) -> ModuleType:
     if is_mesh(recipe):
         return _mesh_module(Path(recipe))
     if recipe not in READY:
-        near = difflib.get_close_matches(recipe, READY, 1)
-        raise InputError(
-            f"recipe {recipe!r}: is not known"
-            + (
-                f", did you mean {near[0]!r}?"
-                if near
-                else f"; ready: {', '.join(READY)}, or the path of a .py file or of a mesh "
-                "(.msh, .inp)"
-            )
-        )
+        ready = f"ready: {', '.join(READY)}, or the path of a .py file or of a mesh (.msh, .inp)"
+        raise InputError(f"recipe {recipe!r}: is not known{did_you_mean(recipe, READY, ready)}")
     return geometry_module(recipe)
 
 
@@ -132,7 +123,7 @@ def _tell_first(path: Path, name: str) -> None:
         return
     log.warning(
         "the scene runs the Python code of %s, which may do whatever you may: read it when it is "
-        "not your own (said once, until the file changes)",
+        "not your own (printed once, until the file changes)",
         path,
     )
     with suppress(OSError):

@@ -6,7 +6,6 @@ a recipe's name (or .py file) and its parameters become checked meshes, made onl
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import hashlib
 import json
 import logging
@@ -20,7 +19,7 @@ import numpy as np
 
 from upd.cache.arrays import cache_folder
 from upd.cache.sources import source_digest
-from upd.errors import InputError, MeshError, OwnMeshError, UpdError
+from upd.errors import InputError, MeshError, OwnMeshError, UpdError, did_you_mean
 from upd.mesh import FloatArray, Mesh
 from upd.mesh.checks import check_mesh
 from upd.mesh.damper import DamperSizes
@@ -72,11 +71,11 @@ def build_mesh(
     try:
         _check(recipe, meshes)
     except MeshError as problem:
-        if not _is_own(recipe):
+        if not is_file(recipe):
             raise
         raise OwnMeshError(f"recipe {recipe!r}: {problem}") from None
     save_meshes(folder, key, meshes)
-    if _is_own(recipe) and load_meshes(folder, key) is None:
+    if is_file(recipe) and load_meshes(folder, key) is None:
         while len(_not_kept) >= _MOST_NOT_KEPT:
             del _not_kept[next(iter(_not_kept))]
         _not_kept[key] = meshes
@@ -147,14 +146,12 @@ def distant_sets(recipe: str, params: Mapping[str, Any]) -> dict[str, tuple[str,
 
     From the recipe's DISTANT, or by meshing when it declares none.
     """
-    declared = getattr(module_of(recipe), "DISTANT", None)
-    if isinstance(declared, Mapping):
-        return {str(body): tuple(map(str, names)) for body, names in declared.items()}
+    declared = _declared_sets(recipe, "DISTANT")
+    if declared is not None:
+        return declared
     meshes, _ = build_mesh(recipe, params)
     return {
-        body: tuple(
-            name.removeprefix("distant_") for name in mesh.nodes if name.startswith("distant_")
-        )
+        body: tuple(n.removeprefix("distant_") for n in mesh.nodes if n.startswith("distant_"))
         for body, mesh in meshes.items()
     }
 
@@ -164,13 +161,19 @@ def weighted_sets(recipe: str, params: Mapping[str, Any]) -> dict[str, tuple[str
 
     From the recipe's WEIGHTED, or the mesh of one that is counted by its mesh.
     """
-    declared = getattr(module_of(recipe), "WEIGHTED", None)
-    if isinstance(declared, Mapping):
-        return {str(body): tuple(map(str, names)) for body, names in declared.items()}
-    if not counted_by_mesh(recipe):
-        return {}
+    declared = _declared_sets(recipe, "WEIGHTED")
+    if declared is not None or not counted_by_mesh(recipe):
+        return declared or {}
     meshes, _ = build_mesh(recipe, params)
     return {body: tuple(mesh.weights) for body, mesh in meshes.items()}
+
+
+def _declared_sets(recipe: str, name: str) -> dict[str, tuple[str, ...]] | None:
+    """Body -> names of sets that a recipe declares; None when it does not."""
+    declared = getattr(module_of(recipe), name, None)
+    if not isinstance(declared, Mapping):
+        return None
+    return {str(body): tuple(map(str, names)) for body, names in declared.items()}
 
 
 def closed_form(recipe: str) -> str:
@@ -181,7 +184,7 @@ def closed_form(recipe: str) -> str:
 def analysis(recipe: str) -> str:
     """The analysis a recipe declares its geometry is for (its ANALYSIS).
 
-    A curved contact when it says nothing.
+    A curved contact when it declares none.
     """
     return str(getattr(module_of(recipe), "ANALYSIS", "curved contact"))
 
@@ -208,11 +211,11 @@ def inclination(recipe: str, params: Mapping[str, Any]) -> tuple[float, float]:
 def drawing(recipe: str, params: Mapping[str, Any]) -> tuple[dict[str, Mesh], list[SectionView]]:
     """Meshes with few elements, and sections through them with the recipe's dimensions.
 
-    A recipe of the user's own tells its sections by a function views(params); without one they
+    A recipe of the user's own gives its sections by a function views(params); without one they
     show the extents.
     """
     chosen = _chosen(recipe, params)
-    if _is_own(recipe):
+    if is_file(recipe):
         meshes, _ = build_mesh(recipe, params)
         views = getattr(module_of(recipe), "views", None)
         return meshes, plain_views(meshes) if views is None else _called(
@@ -273,14 +276,12 @@ def _chosen(recipe: str, params: Mapping[str, Any]) -> Any:
     """The parameter object; raises InputError naming every unknown or missing key."""
     cls = parameters(recipe)
     fields = {f.name: f for f in dataclasses.fields(cls) if f.init}
-    problems = []
-    for key in params:
-        if key not in fields:
-            near = difflib.get_close_matches(key, fields, 1)
-            problems.append(
-                f"{key}: unknown parameter"
-                + (f", did you mean {near[0]!r}?" if near else f"; known: {', '.join(fields)}")
-            )
+    known = f"known: {', '.join(fields)}"
+    problems = [
+        f"{key}: unknown parameter{did_you_mean(key, fields, known)}"
+        for key in params
+        if key not in fields
+    ]
     for name, f in fields.items():
         if (
             name not in params
@@ -296,14 +297,9 @@ def _chosen(recipe: str, params: Mapping[str, Any]) -> Any:
 def made(recipe: str, params: Mapping[str, Any]) -> Any:
     """The parameter object from its known keys.
 
-    Raises InputError with what it says about their values.
+    Raises InputError with what is wrong with their values.
     """
     return _called(recipe, "the parameters", parameters(recipe), **params)
-
-
-def _is_own(recipe: str) -> bool:
-    """Whether the user wrote the recipe or made the mesh."""
-    return is_file(recipe)
 
 
 def _called(recipe: str, what: str, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
@@ -316,7 +312,7 @@ def _called(recipe: str, what: str, function: Callable[..., Any], *args: Any, **
     except UpdError:
         raise
     except (Exception, SystemExit) as problem:
-        if not _is_own(recipe):
+        if not is_file(recipe):
             raise
         raise InputError(
             f"recipe {recipe!r}: {what} failed{line_of(recipe, problem)}: "
@@ -353,7 +349,7 @@ def _check(recipe: str, meshes: Mapping[str, Mesh]) -> None:
             f"recipe {recipe!r}: build() must return a dictionary body name -> upd.mesh.Mesh"
         )
     for name, mesh in meshes.items():
-        if _is_own(recipe):
+        if is_file(recipe):
             check_mesh(name, mesh)
         found = quality(mesh)
         if not found.min > LEAST_JACOBIAN:

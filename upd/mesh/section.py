@@ -9,16 +9,8 @@ from typing import Literal
 import numpy as np
 
 from upd.mesh.boundary import boundary_quads
-from upd.mesh.hexmesh import FloatArray, IntArray, Mesh
+from upd.mesh.hexmesh import EDGES, FloatArray, IntArray, Mesh
 
-#: corners of a hexahedron's edges
-_EDGES = np.array(
-    [
-        *((0, 1), (1, 2), (2, 3), (3, 0)),
-        *((4, 5), (5, 6), (6, 7), (7, 4)),
-        *((0, 4), (1, 5), (2, 6), (3, 7)),
-    ]
-)
 #: distance by which the plane of a section is moved off lattice planes, relative to the meshes
 _BESIDE = 1e-5
 Point = tuple[float, float]
@@ -66,7 +58,7 @@ class Opening:
         The parameter.
     vertex, one, two
         In the view's axes; less than 180 degrees from ``one`` to ``two``.
-    told
+    label_at
         Where its name stands, inches from the vertex; beside the arc when None.
     """
 
@@ -74,7 +66,7 @@ class Opening:
     vertex: Point
     one: Point
     two: Point
-    told: Point | None = None
+    label_at: Point | None = None
 
     @property
     def value(self) -> float:
@@ -169,7 +161,7 @@ def _cut(mesh: Mesh, axes: tuple[int, int], normal: int, level: float) -> CutBod
     above = height[hexes] > 0.0
     cells = []
     for nodes in hexes[above.any(axis=1) & ~above.all(axis=1)]:
-        ends = nodes[_EDGES]
+        ends = nodes[EDGES]
         found = _crossings(flat, height, ends[(height[ends] > 0.0).sum(axis=1) == 1])
         middle = found - found.mean(axis=0)
         cells.append(found[np.argsort(np.arctan2(middle[:, 1], middle[:, 0]))])

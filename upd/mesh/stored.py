@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.cache.arrays import load_arrays, save_arrays, unreadable
 from upd.mesh.hexmesh import Mesh
+
+#: sets of a mesh by name -> what their arrays hold
+_SETS = {"faces": np.int64, "nodes": np.int64, "weights": np.float64}
 
 
 def load_meshes(where: Path, key: str) -> dict[str, Mesh] | None:
@@ -38,27 +42,22 @@ def _arrays(meshes: Mapping[str, Mesh]) -> dict[str, NDArray[np.generic]]:
     arrays: dict[str, NDArray[np.generic]] = {"bodies": np.array(list(meshes), dtype=np.str_)}
     for b, mesh in enumerate(meshes.values()):
         arrays |= {f"{b}.points": mesh.points, f"{b}.hexes": mesh.hexes}
-        for kind, sets in (("faces", mesh.faces), ("nodes", mesh.nodes)):
+        for kind in _SETS:
+            sets = getattr(mesh, kind)
             arrays[f"{b}.{kind}"] = np.array(list(sets), dtype=np.str_)
-            arrays |= {f"{b}.{kind}.{k}": numbers for k, numbers in enumerate(sets.values())}
-        arrays[f"{b}.weights"] = np.array(list(mesh.weights), dtype=np.str_)
-        arrays |= {f"{b}.weights.{k}": own for k, own in enumerate(mesh.weights.values())}
+            arrays |= {f"{b}.{kind}.{k}": one for k, one in enumerate(sets.values())}
     return arrays
 
 
 def _meshes(arrays: Mapping[str, NDArray[np.generic]]) -> dict[str, Mesh]:
     meshes = {}
     for b, name in enumerate(arrays["bodies"].tolist()):
-        faces, nodes = (
-            {
-                str(key): arrays[f"{b}.{kind}.{k}"].astype(np.int64, copy=False)
+        sets: dict[str, Any] = {
+            kind: {
+                str(key): arrays[f"{b}.{kind}.{k}"].astype(dtype, copy=False)
                 for k, key in enumerate(arrays[f"{b}.{kind}"].tolist())
             }
-            for kind in ("faces", "nodes")
-        )
-        weights = {
-            str(key): arrays[f"{b}.weights.{k}"].astype(np.float64, copy=False)
-            for k, key in enumerate(arrays[f"{b}.weights"].tolist())
+            for kind, dtype in _SETS.items()
         }
         points = arrays[f"{b}.points"].astype(np.float64, copy=False)
         hexes = arrays[f"{b}.hexes"].astype(np.int64, copy=False)
@@ -68,5 +67,5 @@ def _meshes(arrays: Mapping[str, NDArray[np.generic]]) -> dict[str, Mesh]:
             or (hexes.size and not 0 <= hexes.min() <= hexes.max() < len(points))
         ):
             raise ValueError("the arrays are not those of a mesh")
-        meshes[str(name)] = Mesh(points, hexes, faces, nodes, weights)
+        meshes[str(name)] = Mesh(points, hexes, **sets)
     return meshes

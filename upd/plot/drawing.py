@@ -159,8 +159,8 @@ def _label(mark: Length | Opening, scale: float) -> _Label:
 def _label_of_angle(mark: Opening, scale: float) -> _Label:
     text = f"{mark.name} {mark.value:.4g}°"
     vertex, radius = np.array(mark.vertex), _RADIUS * scale
-    if mark.told is not None:
-        place = np.array(mark.told)
+    if mark.label_at is not None:
+        place = np.array(mark.label_at)
         side: Literal["left", "right"] = "left" if place[0] > 0.0 else "right"
         return _Label(text, vertex + scale * place, side, 0.0, False)
     middle = math.radians(sum(_turns(mark)) / 2.0)

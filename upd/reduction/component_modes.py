@@ -162,7 +162,7 @@ class _Inner:
         if self.problem is None or count == 0:
             if count:
                 raise InputError(
-                    f"{count} modes are wanted, but no dof with mass is left when the "
+                    f"{count} modes are wanted, but no dof with mass remains when the "
                     "boundary is held: ask for 0."
                 )
             return np.zeros(0), np.zeros((self.n, 0))

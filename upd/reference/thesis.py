@@ -216,7 +216,7 @@ THESIS_CONTACT_STIFFNESS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     }
 )
 
-#: Tables II to VI: natural frequencies (Hz); the caption of Table V says "forced" for the glued
+#: Tables II to VI: natural frequencies (Hz); the caption of Table V has "forced" for the glued
 #: condition
 THESIS_FREQUENCIES: Mapping[str, tuple[float, ...]] = MappingProxyType(
     {

@@ -4,7 +4,7 @@ the file.
 
 from __future__ import annotations
 
-from upd.scene.contact import FRICTION_WANTS, STATIC_WANTS, WANTS, Scene, friction_on
+from upd.scene.contact import FRICTION_WANTS, WANTS, Scene, friction_on
 from upd.scene.forced import FORCED_WANTS, ForcedScene
 from upd.scene.modal import MODAL_WANTS, ModalScene
 from upd.scene.read import AnyScene, as_scene, load_scene, ready_scenes
@@ -21,7 +21,6 @@ __all__ = [
     "MODAL_WANTS",
     "RIG_WANTS",
     "SEATED_WANTS",
-    "STATIC_WANTS",
     "WANTS",
     "AnyScene",
     "ForcedScene",

@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal
 
 from pydantic import AfterValidator, ConfigDict
 
-from upd.mesh import recipes
-from upd.scene.quantities import (
-    UNKNOWN,
-    Density,
-    Memory,
-    Poisson,
-    Share,
-    Stress,
-    Uncertainty,
-)
+from upd.errors import did_you_mean
+from upd.scene import quantities as q
 
-#: fields a scene has inside, which no file gives: its text with the values alone, what it says of
-#: how well it knows its inputs, and damping fitted to measured curves
+#: fields of a scene that no file gives: its text with the values alone, its uncertain inputs, and
+#: damping fitted to measured curves
 INSIDE = ("text", "uncertain", "fitted")
 STRICT = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
 
@@ -36,11 +27,9 @@ class OutputNames:
 
     def __call__(self, value: str) -> str:
         if value not in self.outputs:
-            near = difflib.get_close_matches(value, self.outputs, 1)
-            known = ", ".join(self.outputs)
+            known = f"known: {', '.join(self.outputs)}"
             raise ValueError(
-                f"{value!r} is not an output"
-                + (f", did you mean {near[0]!r}?" if near else f"; known: {known}")
+                f"{value!r} is not an output{did_you_mean(value, self.outputs, known)}"
             )
         return value
 
@@ -68,10 +57,10 @@ class MaterialData:
     """
 
     __pydantic_config__ = STRICT
-    E: Stress
-    nu: Poisson
-    density: Density = 7.8e-9
-    yield_stress: Stress | None = None
+    E: q.Stress
+    nu: q.Poisson
+    density: q.Density = 7.8e-9
+    yield_stress: q.Stress | None = None
 
 
 @dataclass(frozen=True)
@@ -117,7 +106,7 @@ class SolverChoice:
     __pydantic_config__ = STRICT
     name: Literal["auto", "pardiso", "superlu", "amg"] = "auto"
     route: Literal["auto", "condensed", "products"] = "auto"
-    memory: Memory | None = None
+    memory: q.Memory | None = None
 
 
 @dataclass(frozen=True)
@@ -140,9 +129,9 @@ class LeftOut:
 
     __pydantic_config__ = STRICT
     solve: Literal["yes", "no"] = "yes"
-    stiffness: Share = 0.05
-    frequency: Share = 0.01
-    peak: Share = 0.05
+    stiffness: q.Share = 0.05
+    frequency: q.Share = 0.01
+    peak: q.Share = 0.05
 
     def limit(self, unit: str) -> float:
         """The limit of a number with this unit."""
@@ -154,18 +143,62 @@ class LeftOut:
         return self.solve == "yes"
 
 
-class SceneBase:
-    """Questions that every scene answers; its class has the fields ``geometry`` and ``want``."""
+@dataclass(frozen=True, kw_only=True)
+class Rotation:
+    """The centrifugal force on a damper, F_C, or what gives it: F_C = m r w^2.
 
-    geometry: Mapping[str, Any]
-    want: tuple[str, ...]
-    material: MaterialData
-    accuracy: Any
-    mesh: MeshChoice
-    #: path -> what the scene says of how well it knows this input
-    uncertain: Mapping[str, Uncertainty]
+    Attributes
+    ----------
+    radius
+        Of the damper's centre of mass from the axis of rotation.
+    speed
+        Of the rotation.
+    """
+
+    __pydantic_config__ = STRICT
+    centrifugal: q.Centrifugal | None = None
+    mass: q.Mass | None = None
+    radius: q.Radius | None = None
+    speed: q.Speed | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneBase:
+    """What every scene has. ``geometry`` holds the recipe's name under "recipe" and its parameters
+    beside it, in mm.
+
+    Attributes
+    ----------
+    name
+        Of the run folder.
+    title
+        Heading of the page.
+    want
+        Outputs; all else follows from them. Cost: upd plan shows what each brings with it.
+    accuracy
+        Largest estimated error wanted, of all main numbers or of some by their names: the run
+        chooses the cheapest levels that reach it. "unknown" leaves all errors unknown; when none,
+        they are estimated on the scene's own levels. Cost: the companions of an estimate take up to
+        a third of the run; half the error of a mesh takes about eight times the elements.
+    geometry
+        The recipe and its parameters.
+    """
+
+    __pydantic_config__ = STRICT
     #: whether masses count
     moves: ClassVar[bool] = True
+
+    name: q.Name
+    title: str = ""
+    want: tuple[str, ...]
+    accuracy: q.Accuracy = None
+    geometry: q.Geometry
+    mesh: MeshChoice = field(default_factory=MeshChoice)
+    solver: SolverChoice = field(default_factory=SolverChoice)
+    left_out: LeftOut = field(default_factory=LeftOut)
+    text: str = field(default="", repr=False)
+    #: path -> input that is known within limits
+    uncertain: Mapping[str, q.Uncertainty] = field(default_factory=dict, repr=False)
 
     @property
     def recipe(self) -> str:
@@ -173,31 +206,26 @@ class SceneBase:
         return str(self.geometry["recipe"])
 
     @property
-    def body_materials(self) -> Mapping[str, MaterialData]:
-        """Material of every body; "all" where they share one."""
-        return {"all": self.material}
-
-    @property
     def estimates(self) -> bool:
         """Whether errors are estimated."""
-        return bool(self.accuracy != UNKNOWN)
+        return bool(self.accuracy != q.UNKNOWN)
 
     @property
     def wanted_accuracy(self) -> float | Mapping[str, float] | None:
         """Largest estimated error of all main numbers, or of some by their names; None: the scene
         gives its levels itself.
         """
-        return None if self.accuracy == UNKNOWN else self.accuracy
+        return None if self.accuracy == q.UNKNOWN else self.accuracy
 
     def wants(self, *names: str) -> bool:
         """True when at least one of the outputs is asked for."""
         return any(name in self.want for name in names)
 
 
-class RecipeScene(SceneBase):
-    """A scene whose recipe says which analysis it is for."""
-
-    @property
-    def analysis(self) -> str:
-        """Name of the analysis."""
-        return recipes.analysis(self.recipe)
+def repeated(path: str, values: Sequence[float | str]) -> list[str]:
+    """Values that are in a list twice, numbers to six digits."""
+    labels = [v if isinstance(v, str) else f"{v:g}" for v in values]
+    return [
+        f"{path}: {label} is duplicated (numbers are compared to six digits)"
+        for label in sorted({x for x in labels if labels.count(x) > 1})
+    ]

@@ -1,4 +1,4 @@
-"""A scene's tables as frozen dataclasses."""
+"""The scene of one contact: its tables as frozen dataclasses, and what does not fit together."""
 
 from __future__ import annotations
 
@@ -6,35 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
+from upd.errors import InputError
 from upd.mesh import recipes
+from upd.scene import quantities as q
 from upd.scene.base import (
     STRICT,
-    LeftOut,
     MaterialData,
-    MeshChoice,
-    RecipeScene,
-    SolverChoice,
+    Rotation,
+    SceneBase,
     known_output,
-)
-from upd.scene.quantities import (
-    FILLED,
-    Accuracy,
-    Centrifugal,
-    Coefficient,
-    Direction,
-    Example,
-    Force,
-    Geometry,
-    Length,
-    LoadRatio,
-    Mass,
-    Name,
-    NormalLoad,
-    Radius,
-    Share,
-    Speed,
-    Uncertainty,
-    at_least,
+    repeated,
 )
 
 #: Outputs a scene can ask for, and what each one is.
@@ -73,11 +54,9 @@ CONTACT_WANTS = {
 }
 #: Outputs that call for friction when there is some.
 FRICTION_WANTS = ("stiffness", "tangential", "cycle", "contact_law")
-#: Outputs that need no mass matrix.
-STATIC_WANTS = tuple(WANTS)
 
 
-Want = Annotated[str, known_output(WANTS), Example.of('"normal"', '"stiffness"')]
+Want = Annotated[str, known_output(WANTS), q.Example('"normal"', '"stiffness"')]
 
 
 #: words of contact.coupling
@@ -118,19 +97,19 @@ class ContactData:
     """
 
     __pydantic_config__ = STRICT
-    friction: Coefficient = 0.0
+    friction: q.Coefficient = 0.0
     directions: Literal[1, 2] = 1
     tilt: Literal["held", "free"] = "held"
-    load_point: tuple[Length, Length] | None = None
+    load_point: tuple[q.Length, q.Length] | None = None
     coupling: Coupling = "uncoupled"
     distant: Annotated[
-        Mapping[str, Annotated[str, Example.of('"wires"')]], Example.of('{ damper = "wires" }')
+        Mapping[str, Annotated[str, q.Example('"wires"')]], q.Example('{ damper = "wires" }')
     ] = field(default_factory=dict)
-    coupling_limit: Coefficient = 0.1
+    coupling_limit: q.Coefficient = 0.1
 
 
-@dataclass(frozen=True)
-class Loads:
+@dataclass(frozen=True, kw_only=True)
+class Loads(Rotation):
     """Normal forces, tangential forces as fractions of mu N, amplitude of the cycle likewise.
 
     Attributes
@@ -143,10 +122,6 @@ class Loads:
         F_C = m r w^2.
     mass
         Of the damper; its material's density times its volume when None.
-    radius
-        Of the damper's centre of mass from the axis of rotation.
-    speed
-        Of the rotation.
     tangential
         Forces along the face, relative to friction times normal force. Cost: every one is solved,
         for every normal load and direction.
@@ -162,18 +137,13 @@ class Loads:
         Largest force of the force-approach curve; the largest normal load when None.
     """
 
-    __pydantic_config__ = STRICT
-    normal: Annotated[tuple[NormalLoad, ...], FILLED]
-    centrifugal: Centrifugal | None = None
-    mass: Mass | None = None
-    radius: Radius | None = None
-    speed: Speed | None = None
-    tangential: tuple[LoadRatio, ...] = ()
-    directions: Annotated[tuple[Direction, ...], FILLED] = (0.0,)
-    cycle_amplitude: Share = 0.75
-    cycle_steps: Annotated[int, at_least(8)] = 300
-    curve_points: Annotated[int, at_least(2)] = 12
-    curve_to: Force | None = None
+    normal: Annotated[tuple[q.NormalLoad, ...], q.FILLED]
+    tangential: tuple[q.LoadRatio, ...] = ()
+    directions: Annotated[tuple[q.Direction, ...], q.FILLED] = (0.0,)
+    cycle_amplitude: q.Share = 0.75
+    cycle_steps: Annotated[int, q.at_least(8)] = 300
+    curve_points: Annotated[int, q.at_least(2)] = 12
+    curve_to: q.Force | None = None
 
     @property
     def forces(self) -> tuple[float, ...]:
@@ -200,56 +170,36 @@ class LawChoice:
     """
 
     __pydantic_config__ = STRICT
-    rows: Annotated[int, at_least(1)] = 4
-    columns: Annotated[int, at_least(1)] = 6
+    rows: Annotated[int, q.at_least(1)] = 4
+    columns: Annotated[int, q.at_least(1)] = 6
     weight: Literal["stiffness", "area"] = "stiffness"
     bodies: Literal["both", "upper"] = "both"
 
 
-@dataclass(frozen=True)
-class Scene(RecipeScene):
+@dataclass(frozen=True, kw_only=True)
+class Scene(SceneBase):
     """One contact of two bodies.
-
-    ``geometry`` holds the recipe's name under "recipe" and its parameters beside it, in mm.
 
     Attributes
     ----------
-    name
-        Of the run folder.
-    title
-        Heading of the page.
-    want
-        Outputs; all else follows from them. Cost: upd plan shows what each brings with it.
-    geometry
-        The recipe and its parameters.
     materials
         One per body of the recipe.
-    accuracy
-        Largest estimated error wanted, of all main numbers or of some by their names: the run
-        chooses the cheapest levels that reach it. "unknown" leaves all errors unknown; when none,
-        they are estimated on the scene's own levels. Cost: the companions of an estimate take up to
-        a third of the run; half the error of a mesh takes about eight times the elements.
     """
 
-    __pydantic_config__ = STRICT
-    name: Name
-    want: Annotated[tuple[Want, ...], FILLED]
-    geometry: Geometry
+    moves: ClassVar[bool] = False
+
+    want: Annotated[tuple[Want, ...], q.FILLED]
     materials: Annotated[
-        Mapping[str, MaterialData], Example.of('{ damper = { E = "200 GPa", nu = 0.3 } }')
+        Mapping[str, MaterialData], q.Example('{ damper = { E = "200 GPa", nu = 0.3 } }')
     ]
     loads: Loads
-    title: str = ""
-    mesh: MeshChoice = field(default_factory=MeshChoice)
     contact: ContactData = field(default_factory=ContactData)
-    solver: SolverChoice = field(default_factory=SolverChoice)
-    left_out: LeftOut = field(default_factory=LeftOut)
     law: LawChoice = field(default_factory=LawChoice)
-    accuracy: Accuracy = None
-    text: str = field(default="", repr=False)
-    uncertain: Mapping[str, Uncertainty] = field(default_factory=dict, repr=False)
 
-    moves: ClassVar[bool] = False
+    @property
+    def analysis(self) -> str:
+        """Name of the analysis, which the recipe declares."""
+        return recipes.analysis(self.recipe)
 
     @property
     def body_materials(self) -> Mapping[str, MaterialData]:
@@ -281,3 +231,62 @@ class Scene(RecipeScene):
 def friction_on(scene: Scene) -> bool:
     """True when an output needs friction and there is some."""
     return scene.contact.friction > 0.0 and scene.wants(*FRICTION_WANTS)
+
+
+def contact_problems(scene: Scene) -> list[str]:
+    """What does not fit together."""
+    loads, contact = scene.loads, scene.contact
+    problems = repeated("loads.normal", loads.normal) + repeated(
+        "loads.tangential", loads.tangential
+    )
+    if scene.wanted_accuracy is None and scene.geometry.get("divisions") == "auto":
+        problems.append('geometry.divisions: "auto" needs an accuracy, for example "1 %"')
+    try:
+        kind = scene.analysis
+    except InputError:
+        # a problem of geometry.recipe, found there
+        return problems
+    if kind not in CONTACT_WANTS:
+        known = ", ".join(CONTACT_WANTS)
+        return [*problems, f"geometry.recipe: its ANALYSIS is {kind!r}; write one of {known}, rig"]
+    known = ", ".join(CONTACT_WANTS[kind])
+    problems += [
+        f"want: {w!r} is no output of a {kind}; choose among {known}"
+        for w in scene.want
+        if w not in CONTACT_WANTS[kind]
+    ]
+    add = problems.append
+    word = next((v for v in loads.normal if isinstance(v, str)), "")
+    if kind == "flat contact":
+        problems += repeated("loads.directions", [f"{d % 360.0:g} deg" for d in loads.directions])
+        if word and loads.centrifugal == 0.0:
+            add(
+                f"loads.centrifugal: 0 N presses nothing together, so {word!r} has no answer; "
+                'give the force at speed, for example "350 N"'
+            )
+        if 0.0 in loads.normal:
+            add("loads.normal: 0 N presses nothing together; give a positive force")
+        if loads.curve_to == 0.0:
+            add("loads.curve_to: 0 N gives no curve; give a positive force")
+        if word and loads.centrifugal is None:
+            add(
+                f"loads.normal: {word!r} needs loads.centrifugal, the centrifugal force on the "
+                "damper"
+            )
+    else:
+        only_flat = {
+            "loads.centrifugal": loads.centrifugal is not None,
+            "loads.speed": loads.speed is not None,
+            "loads.directions": loads.directions != (0.0,),
+            "loads.curve_to": loads.curve_to is not None,
+            "contact.tilt": contact.tilt != "held",
+            "contact.load_point": contact.load_point is not None,
+            "contact.distant": bool(contact.distant),
+            "law": scene.law != LawChoice(),
+        }
+        if word:
+            add(f"loads.normal: {word!r} is for flat damper faces; give a force with its unit")
+        for where, given in only_flat.items():
+            if given:
+                add(f"{where}: has no meaning for a {kind}; remove it")
+    return problems

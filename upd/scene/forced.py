@@ -10,59 +10,22 @@ import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator
 
-from upd.scene.base import (
-    STRICT,
-    LeftOut,
-    MaterialData,
-    MeshChoice,
-    SceneBase,
-    SolverChoice,
-    known_output,
-)
+from upd.scene import quantities as q
+from upd.scene.base import STRICT, MeshChoice, known_output
 from upd.scene.forced_contact import FrictionChoice, Side, StiffnessChoice
-from upd.scene.forced_values import (
-    checked_harmonics,
-    checked_samples,
-    harmonic_number,
-)
 from upd.scene.measured import (
     FROM_MEASURED,
     UNTIL_READ,
     FittedMode,
     MeasuredChoice,
     modal_ratios,
-    settle_measured,
 )
-from upd.scene.quantities import (
-    FILLED,
-    Accuracy,
-    Centrifugal,
-    Density,
-    Example,
-    Force,
-    Frequency,
-    Geometry,
-    Mass,
-    Name,
-    Noted,
-    Phase,
-    Radius,
-    Ratio,
-    Ratios,
-    Share,
-    Speed,
-    Uncertainty,
-    at_least,
-    not_negative,
-    or_from,
-)
+from upd.scene.rig import DamperChoice, RigBase
 
 #: Outputs a forced response can give, and what each one is.
 FORCED_WANTS = {
@@ -87,30 +50,27 @@ WHOLE_FACES_WANTS = ("response", "contact_state", "hysteresis", "damper_motion")
 MARCHED_WANTS = ("hysteresis", "damper_motion")
 
 
-@dataclass(frozen=True)
-class DamperChoice:
-    """The rigid damper; mass and inertia come from its mesh.
-
-    Attributes
-    ----------
-    centrifugal
-        Force through its centre of mass, upwards, F_C; or "from speed": F_C = m r w^2.
-    density
-        Of the damper, where it is not of the blades' material; the density or the mass.
-    mass
-        Of the damper, spread evenly over its volume, instead of its density.
-    radius
-        Of its centre of mass from the axis of rotation.
-    speed
-        Of the rotation.
-    """
-
-    __pydantic_config__ = STRICT
-    centrifugal: Centrifugal = 350.0
-    density: Density | None = None
-    mass: Mass | None = None
-    radius: Radius | None = None
-    speed: Speed | None = None
+#: highest harmonic of a force and of the balance
+MOST_HARMONICS = 31
+HarmonicNumber = Annotated[
+    int, q.must(lambda v: 1 <= v <= MOST_HARMONICS, "is no harmonic, 1 to 31", "1 to 31")
+]
+Harmonics = Annotated[
+    Any,
+    q.must(
+        lambda v: v == "adaptive" or (q.is_whole(v) and 1 <= v <= MOST_HARMONICS),
+        'is no number of harmonics; give the highest, 1 to 31, or "adaptive"',
+        "1 to 31, or adaptive",
+    ),
+]
+Samples = Annotated[
+    Any,
+    q.must(
+        lambda v: v == "auto" or (q.is_whole(v) and v >= 8),
+        'is no number of samples; give 8 or more per period, or "auto"',
+        ">= 8, or auto",
+    ),
+]
 
 
 @dataclass(frozen=True)
@@ -125,7 +85,7 @@ class BladeReduction:
     """
 
     __pydantic_config__ = STRICT
-    modes: Annotated[int, not_negative] = 10
+    modes: Annotated[int, q.not_negative] = 10
 
 
 @dataclass(frozen=True)
@@ -146,9 +106,9 @@ class HarmonicForce:
 
     __pydantic_config__ = STRICT
     blade: Side = "right"
-    amplitude: Ratio = 1.0
-    phase: Phase = 0.0
-    harmonic: Annotated[int, harmonic_number] = 1
+    amplitude: q.Ratio = 1.0
+    phase: q.Phase = 0.0
+    harmonic: HarmonicNumber = 1
 
 
 @dataclass(frozen=True)
@@ -177,16 +137,16 @@ class ExcitationChoice:
     """
 
     __pydantic_config__ = STRICT
-    centrifugal_to_force: Ratios = (194.0,)
-    force: tuple[Force, ...] = ()
-    start: Frequency = 280.0
-    stop: Frequency = 500.0
-    points: Annotated[int, at_least(10)] = 400
-    damping: Annotated[Share, or_from(FROM_MEASURED, UNTIL_READ)] = 0.005
+    centrifugal_to_force: q.Ratios = (194.0,)
+    force: tuple[q.Force, ...] = ()
+    start: q.Frequency = 280.0
+    stop: q.Frequency = 500.0
+    points: Annotated[int, q.at_least(10)] = 400
+    damping: Annotated[q.Share, q.or_from(FROM_MEASURED, UNTIL_READ)] = 0.005
     forces: Annotated[
         tuple[HarmonicForce, ...],
-        FILLED,
-        Example.of('[{ blade = "left", amplitude = 0.5, phase = "180 deg" }]'),
+        q.FILLED,
+        q.Example('[{ blade = "left", amplitude = 0.5, phase = "180 deg" }]'),
     ] = (HarmonicForce(),)
 
     @property
@@ -220,14 +180,10 @@ class BalanceChoice:
 
     __pydantic_config__ = STRICT
     method: Literal["balance", "march"] = "balance"
-    harmonics: Annotated[
-        Any, BeforeValidator(checked_harmonics), Noted(bounds="1 to 31, or adaptive")
-    ] = 7
-    samples: Annotated[Any, BeforeValidator(checked_samples), Noted(bounds=">= 8, or auto")] = (
-        "auto"
-    )
+    harmonics: Harmonics = 7
+    samples: Samples = "auto"
     slider: Literal["zero", "static", "mid", "upper", "lower"] = "zero"
-    time_march: tuple[Frequency, ...] = ()
+    time_march: tuple[q.Frequency, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -246,56 +202,35 @@ class PerformanceChoice:
     """
 
     __pydantic_config__ = STRICT
-    lowest: Ratio = 5.0
-    highest: Ratio = 1000.0
-    points: Annotated[int, at_least(3)] = 12
-    harmonics: Annotated[int, harmonic_number] | None = None
+    lowest: q.Ratio = 5.0
+    highest: q.Ratio = 1000.0
+    points: Annotated[int, q.at_least(3)] = 12
+    harmonics: HarmonicNumber | None = None
 
 
-@dataclass(frozen=True)
-class ForcedScene(SceneBase):
-    """One forced response. ``geometry`` holds the recipe's name under "recipe" and its parameters
-    beside it, in mm.
+@dataclass(frozen=True, kw_only=True)
+class ForcedScene(RigBase):
+    """One forced response.
 
     Attributes
     ----------
-    name
-        Of the run folder.
-    title
-        Heading of the page.
     analysis
-        What tells this scene from one of the rig's modes.
-    want
-        Outputs; all else follows from them. Cost: upd plan shows what each brings with it.
-    geometry
-        The recipe and its parameters.
-    material
-        Of blades, bases and damper.
+        What distinguishes this scene from one of the rig's modes.
     stiffness
         Contact stiffnesses by name.
     measured
         Measured responses by name.
-    accuracy
-        Largest estimated error wanted, of all main numbers or of some by their names: the run
-        chooses the cheapest levels that reach it. "unknown" leaves all errors unknown; when none,
-        they are estimated on the scene's own levels. Cost: the companions of an estimate take up to
-        a third of the run; half the error of a mesh takes about eight times the elements.
     """
 
-    __pydantic_config__ = STRICT
-    name: Name
     analysis: Literal["forced response"]
     want: Annotated[
-        tuple[Annotated[str, known_output(FORCED_WANTS), Example.of('"response"')], ...], FILLED
+        tuple[Annotated[str, known_output(FORCED_WANTS), q.Example('"response"')], ...], q.FILLED
     ]
-    geometry: Geometry
-    material: MaterialData
     stiffness: Annotated[
-        Mapping[Name, StiffnessChoice],
-        FILLED,
-        Example.of('{ own = { K_N = "1e6 N/mm", K_T = "5e5 N/mm" } }'),
+        Mapping[q.Name, StiffnessChoice],
+        q.FILLED,
+        q.Example('{ own = { K_N = "1e6 N/mm", K_T = "5e5 N/mm" } }'),
     ]
-    title: str = ""
     mesh: MeshChoice = field(default_factory=lambda: MeshChoice(element="hex20"))
     reduction: BladeReduction = field(default_factory=BladeReduction)
     damper: DamperChoice = field(default_factory=DamperChoice)
@@ -303,12 +238,7 @@ class ForcedScene(SceneBase):
     excitation: ExcitationChoice = field(default_factory=ExcitationChoice)
     balance: BalanceChoice = field(default_factory=BalanceChoice)
     performance: PerformanceChoice = field(default_factory=PerformanceChoice)
-    measured: Mapping[Name, MeasuredChoice] = field(default_factory=dict)
-    solver: SolverChoice = field(default_factory=SolverChoice)
-    left_out: LeftOut = field(default_factory=LeftOut)
-    accuracy: Accuracy = None
-    text: str = field(default="", repr=False)
-    uncertain: Mapping[str, Uncertainty] = field(default_factory=dict, repr=False)
+    measured: Mapping[q.Name, MeasuredChoice] = field(default_factory=dict)
     fitted: tuple[FittedMode, ...] = field(default=(), repr=False)
 
     def modal_damping(self, frequency: Array, share: Array) -> Array:
@@ -324,11 +254,6 @@ class ForcedScene(SceneBase):
         return modal_ratios(self.fitted, self.excitation.damping, frequency, share)
 
     @property
-    def arrangement(self) -> str:
-        """Which sides of the platforms face each other."""
-        return str(self.geometry.get("arrangement", "symmetric"))
-
-    @property
     def stiffnesses(self) -> dict[str, StiffnessChoice]:
         """The contact stiffnesses to run, by name."""
         return {name: self.stiffness[name] for name in self.contact.stiffness or self.stiffness}
@@ -336,16 +261,13 @@ class ForcedScene(SceneBase):
     @property
     def harmonic_numbers(self) -> range | Literal["adaptive"]:
         """Harmonics of the balance, the static one included."""
-        return (
-            "adaptive"
-            if self.balance.harmonics == "adaptive"
-            else range(self.balance.harmonics + 1)
-        )
+        highest = self.balance.harmonics
+        return "adaptive" if highest == "adaptive" else range(highest + 1)
 
 
 def combined_forces(e: ExcitationChoice) -> dict[tuple[Side, int], complex]:
     """Complex amplitudes over F_E by blade and harmonic, those of one place and harmonic added;
-    what cancels to rounding is left out.
+    what cancels to rounding is omitted.
     """
     parts: dict[tuple[Side, int], list[complex]] = {}
     for one in e.forces:
@@ -356,15 +278,3 @@ def combined_forces(e: ExcitationChoice) -> dict[tuple[Side, int], complex]:
         for at, values in parts.items()
         if abs(sum(values)) > math.sqrt(sys.float_info.epsilon) * sum(map(abs, values))
     }
-
-
-def settle_paths(data: dict[str, Any], folder: Path) -> None:
-    """Paths of contact scenes, runs and measured curves made absolute."""
-    tables = data.get("stiffness")
-    for table in tables.values() if isinstance(tables, dict) else ():
-        if isinstance(table, dict):
-            for key in ("scene", "run"):
-                value = table.get(key)
-                if isinstance(value, str) and (key == "run" or value.endswith(".toml")):
-                    table[key] = str((folder / value).resolve())
-    settle_measured(data, folder)

@@ -9,17 +9,18 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BeforeValidator
 
 from upd.errors import InputError
+from upd.scene import quantities as q
 from upd.scene.base import STRICT
-from upd.scene.forced_values import FITS, Lines, Stiffness, checked_fit
-from upd.scene.quantities import EQUILIBRIA, Coefficient, Example, Noted
+from upd.scene.rig import FaceFriction, Fit
 from upd.units import parse_quantity
 
+Stiffness = Annotated[float, q.quantity("stiffness"), q.positive, q.Example('"1e6 N/mm"')]
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
 #: contact.rule of points by polynomials
 GAUSS: Final = "gauss"
 #: named static states before vibration
-STATES = ("seated", *EQUILIBRIA)
+STATES = ("seated", *q.EQUILIBRIA)
 
 
 def _static(value: Any) -> Any:
@@ -52,8 +53,35 @@ def _static_face(side: str, value: Any) -> Any:
 Static = Annotated[
     Any,
     BeforeValidator(_static),
-    Noted(bounds=f"{', '.join(STATES)}, or T/N or N and T of the left and the right face"),
-    Example.of('"frictionless"'),
+    q.Noted(bounds=f"{', '.join(STATES)}, or T/N or N and T of the left and the right face"),
+    q.Example('"frictionless"'),
+]
+
+
+def _lines(value: Any) -> Any:
+    """All lines, a number of groups, or numbers of lines, rising."""
+    if value == "all" or (q.is_whole(value) and value >= 1):
+        return value
+    if (
+        isinstance(value, (list, tuple))
+        and value
+        and all(q.is_whole(v) and v >= 0 for v in value)
+        and len(set(value)) == len(value)
+    ):
+        return tuple(sorted(value))
+    raise ValueError(
+        f'{value!r} chooses no lattice lines; write "all", a number of groups of lines, or '
+        "a list of line numbers from 0"
+    )
+
+
+#: Lattice lines of a contact patch: "all", a number of groups of neighbours, or their numbers from
+#: 0.
+Lines = Annotated[
+    Any,
+    BeforeValidator(_lines),
+    q.Noted(bounds="all, a number of groups, or a list of line numbers from 0"),
+    q.Example('"all"'),
 ]
 
 
@@ -72,14 +100,12 @@ class FaceLines:
     columns: Lines = None
 
 
-@dataclass(frozen=True)
-class FrictionChoice:
+@dataclass(frozen=True, kw_only=True)
+class FrictionChoice(FaceFriction):
     """Coulomb friction and the contact points.
 
     Attributes
     ----------
-    friction
-        Coulomb's coefficient.
     model
         "springs": a rigid damper on contact points with stiffnesses; "interface": elastic blades
         and damper, every matching node of both faces, no stiffness of contact (mesh.element =
@@ -119,26 +145,17 @@ class FrictionChoice:
         curves of its own.
     """
 
-    __pydantic_config__ = STRICT
-    friction: Coefficient = 0.6
     model: Literal["springs", "interface"] = "springs"
     rows: Lines = "all"
     columns: Lines = "all"
     rule: Literal["lines", "gauss"] = "lines"
     left: FaceLines = field(default_factory=FaceLines)
     right: FaceLines = field(default_factory=FaceLines)
-    fit: Annotated[
-        Any, BeforeValidator(checked_fit), Noted(bounds="loaded, unloaded, worn, new, or 0 to 1")
-    ] = "loaded"
+    fit: Fit = "loaded"
     static: Static = "frictionless"
     directions: Literal["auto", "one", "two"] = "auto"
     share: Literal["area", "equal"] = "area"
-    stiffness: tuple[Annotated[str, Example.of('"thesis"')], ...] = ()
-
-    @property
-    def worn(self) -> float:
-        """How far the faces are worn in, 0 to 1."""
-        return FITS[self.fit] if isinstance(self.fit, str) else float(self.fit)
+    stiffness: tuple[Annotated[str, q.Example('"thesis"')], ...] = ()
 
     @property
     def loaded(self) -> bool:

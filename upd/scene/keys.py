@@ -1,8 +1,8 @@
 """Every key of a scene with its meaning, unit, default, bounds and effect on cost.
 
-Nothing is said twice: a meaning is the entry of the dataclass's docstring, its last sentence
+Every text exists once: a meaning is the entry of the dataclass's docstring, its last sentence
 "Cost: ..." the effect on cost; unit and bounds are those of the annotation that checks the value.
-A recipe's parameters are told the same way, from its own dataclass.
+A recipe's parameters are described by its own dataclass in the same way.
 """
 
 from __future__ import annotations
@@ -12,22 +12,20 @@ import inspect
 import math
 import re
 import tomllib
-import types
-import typing
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, fields, is_dataclass, replace
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
-
-from pydantic import AfterValidator, BeforeValidator
+from dataclasses import MISSING, dataclass, fields, is_dataclass, replace
+from typing import Any, Literal, get_args, get_origin
 
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.fields import table
 from upd.mesh.recipe_modules import READY
 from upd.scene.base import INSIDE, OutputNames
-from upd.scene.quantities import Noted, QuantityReader, Rule
+from upd.scene.hints import hint_at, hints, named_table, notes, quantity_kind, without_notes
+from upd.scene.quantities import Noted, Rule
+from upd.scene.rotation import damper_mass
 from upd.scene.toml import toml_key, toml_value
-from upd.units import UNITS, quantity_text, unit_inside
+from upd.units import UNITS, parse_quantity, quantity_text, unit_inside
 
 #: tables of physical inputs, and such inputs of other tables: what may be known within limits
 _INPUT_TABLES = ("material", "materials", "stiffness", "damper", "geometry")
@@ -37,10 +35,14 @@ _INPUTS = (
     *(f"excitation.{name}" for name in ("force", "damping")),
     "response.damping",
 )
+#: tables at the end: of all scenes alike, and not physical
+_LAST = ("mesh", "solver", "left_out")
+#: values of inputs that follow from others
+_NO_VALUE = ("none", '"auto"', '"from speed"')
 _MUST = "must be given"
 _NONE = "none"
-#: value of a key of no scene
-_UNKNOWN = object()
+#: stands for the names of tables
+_NAME = "NAME"
 Steps = tuple[str, ...]
 _UNIT = re.compile(r", (?:mm|degrees)(?=[.;:]|$)")
 _SECTION = re.compile(
@@ -58,10 +60,9 @@ class SceneKey:
         Its tables in the file and its name.
     meaning
         From the docstring.
-    unit
-        Inside; "" for texts, counts and ratios.
-    units
-        All that are understood.
+    kind
+        Of its quantity, as in `upd.units.UNITS`, or the unit of a bare number; "" for texts, counts
+        and ratios.
     default
         As TOML, "none", or "must be given".
     bounds
@@ -80,8 +81,7 @@ class SceneKey:
 
     steps: tuple[str, ...]
     meaning: str
-    unit: str
-    units: tuple[str, ...]
+    kind: str
     default: str
     bounds: str
     cost: str
@@ -91,14 +91,19 @@ class SceneKey:
     uncertain: bool = False
 
     @property
+    def unit(self) -> str:
+        """Inside; "" for texts, counts and ratios."""
+        return unit_inside(self.kind) if self.kind in UNITS else self.kind
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """All that are understood."""
+        return tuple(u for u in UNITS.get(self.kind, {}) if u)
+
+    @property
     def path(self) -> str:
         """In the file, with its tables: "contact.friction"."""
         return ".".join(self.steps)
-
-    @property
-    def table(self) -> str:
-        """The table it stands in, "" for the scene itself."""
-        return ".".join(self.steps[:-1])
 
     @property
     def name(self) -> str:
@@ -118,19 +123,15 @@ def scene_keys(scene: Any) -> list[SceneKey]:
 
 def absent_keys(scene: Any) -> list[SceneKey]:
     """The keys of tables by name, [measured.NAME], of which a loaded scene has none."""
-    empty = {
-        name
-        for name, hint in typing.get_type_hints(type(scene), include_extras=True).items()
-        if name not in INSIDE
-        and get_origin(inner := _plain(hint)) is Mapping
-        and is_dataclass(_plain(get_args(inner)[1]))
-        and not getattr(scene, name)
-    }
-    return [key for key in class_keys(type(scene)) if key.steps[0] in empty]
+    return [
+        key
+        for key in class_keys(type(scene))
+        if _NAME in key.steps and not getattr(scene, key.steps[0])
+    ]
 
 
 def class_keys(scene: type[Any]) -> list[SceneKey]:
-    """The keys of a kind of scene; those of its recipe are told by `recipe_keys`."""
+    """The keys of a kind of scene; those of its recipe are in `recipe_keys`."""
     return list(_walk(scene, None, None, (), {}))
 
 
@@ -147,12 +148,12 @@ def recipe_keys(recipe: str, params: Any = None, path: Steps = ()) -> list[Scene
         Tables in front of every name: of a scene, "geometry".
     """
     cls = recipes.parameters(recipe)
-    told = entries(cls)
+    texts = entries(cls)
     known = {f.name: f for f in fields(cls)}
     out = []
     for row in table(recipes.made(recipe, {}) if params is None else params, here=False):
         f = known[row.name]
-        meaning, cost = _parted(told.get(row.name, ""))
+        meaning, cost = _parted(texts.get(row.name, ""))
         # the unit has a column of its own
         meaning = _UNIT.sub("", meaning)
         kind = str(f.metadata.get("quantity") or "")
@@ -160,8 +161,7 @@ def recipe_keys(recipe: str, params: Any = None, path: Steps = ()) -> list[Scene
             SceneKey(
                 (*path, row.name),
                 meaning,
-                row.unit,
-                _units(kind),
+                kind,
                 _MUST if f.default is MISSING else _text(f.default, kind),
                 row.bounds,
                 cost,
@@ -179,13 +179,16 @@ def params_of(scene: Any) -> Any:
 
 
 def entries(cls: type[Any]) -> dict[str, str]:
-    """Entries of the sections Attributes and Parameters of a class's docstring, by name."""
-    out: dict[str, str] = {}
-    for _, section in _SECTION.findall(inspect.getdoc(cls) or ""):
+    """Entries of the sections Attributes and Parameters of a class's docstring, by name; those of
+    the classes it is derived from too.
+    """
+    out = entries(cls.__base__) if cls.__base__ not in (None, object) else {}
+    for _, section in _SECTION.findall(inspect.cleandoc(cls.__doc__ or "")):
         names: list[str] = []
         for line in section.splitlines():
             if line and not line.startswith(" "):
                 names = [name.strip() for name in line.partition(" : ")[0].split(",")]
+                out |= dict.fromkeys(names, "")
             for name in names if line.startswith(" ") else ():
                 out[name] = f"{out.get(name, '')} {line.strip()}".strip()
     return out
@@ -197,28 +200,63 @@ def is_input(steps: Sequence[str | int]) -> bool:
     return steps[0] in _INPUT_TABLES or path in _INPUTS
 
 
-def quantity_kind(scene: type[Any], steps: Sequence[str | int]) -> str:
-    """Kind of the quantity at a place of a kind of scene, "" for what is none.
+def input_kind(scene: type[Any], recipe: str, steps: Sequence[str | int]) -> str:
+    """Kind of the quantity of a physical input, as in `upd.units.UNITS`; "" for what is none.
 
     Parameters
     ----------
     scene
-        Its class.
+        Class of the scene.
+    recipe
+        Name or path.
     steps
         Tables, the name of the key, and its place in a list.
     """
-    wanted: Any = scene
-    for step in steps:
-        inner = _plain(wanted)
-        if is_dataclass(inner):
-            hints = typing.get_type_hints(inner, include_extras=True)
-            wanted = hints.get(str(step), Any)
-        elif get_origin(inner) is Mapping or get_origin(inner) is tuple:
-            # of a list, that of its items
-            wanted = get_args(inner)[get_origin(inner) is Mapping]
-        else:
-            return ""
-    return "" if get_origin(_plain(wanted)) is tuple else _kind(wanted)
+    if steps[0] == "geometry":
+        known = {("geometry", f.name): f for f in fields(recipes.parameters(recipe))}
+        found = known.get(tuple(steps))  # type: ignore[arg-type]
+        return "" if found is None else str(found.metadata.get("quantity") or "")
+    hint = hint_at(scene, steps)
+    scalar = is_input(steps) and get_origin(without_notes(hint)) is not tuple
+    return quantity_kind(hint) if scalar else ""
+
+
+def scalar_input(
+    scene: Any, keys: Mapping[str, SceneKey], path: str, others: Sequence[str] = ()
+) -> tuple[str, float]:
+    """Kind of the quantity of an input, as in `upd.units.UNITS`, and value in the unit inside.
+
+    Parameters
+    ----------
+    scene
+        Whose input it is: a forced response.
+    keys
+        Of the scene, by their paths.
+    path
+        Of the input.
+    others
+        Paths that may be meant beside the scene's own inputs.
+
+    Raises
+    ------
+    InputError
+        Where it is no scalar input, or has no value.
+    """
+    key = keys.get(path)
+    kind = "" if key is None else input_kind(type(scene), scene.recipe, key.steps)
+    if key is None or kind not in UNITS:
+        inputs = list(dict.fromkeys([*others, *(k.path for k in keys.values() if k.uncertain)]))
+        near = difflib.get_close_matches(path, inputs, 3)
+        meant = f"; did you mean {' or '.join(near)}?" if near else ""
+        raise InputError(f"is no scalar input of the scene{meant}. Inputs: {', '.join(inputs)}")
+    if path in scene.uncertain:
+        return kind, scene.uncertain[path].value
+    if key.value in _NO_VALUE:
+        value = damper_mass(scene) if path == "damper.mass" else None
+        if value is None:
+            raise InputError(f"has no value to begin with ({key.value}); give it one in the scene")
+        return kind, value
+    return kind, parse_quantity(tomllib.loads(f"v = {key.value}")["v"], kind)
 
 
 def chosen_keys(keys: Sequence[SceneKey], asked: str) -> list[SceneKey]:
@@ -244,78 +282,41 @@ def _walk(cls: type[Any], value: Any, usual: Any, path: Steps, given: Any) -> It
 
     ``usual`` is the table that a scene without it has, if any.
     """
-    told, hints = entries(cls), typing.get_type_hints(cls, include_extras=True)
+    texts, types = entries(cls), hints(cls)
+    tables: list[Iterator[SceneKey]] = []
     known = [f for f in fields(cls) if f.name not in INSIDE]
-    for f in sorted(known, key=lambda f: _is_table(f, hints[f.name], value)):
+    for f in sorted(known, key=lambda f: f.name in _LAST):
         here = getattr(value, f.name) if value is not None else None
         mine = given.get(f.name, {}) if isinstance(given, Mapping) else {}
-        where = (*path, f.name)
-        inner = _plain(hints[f.name])
-        default = _default(f) if usual is None else getattr(usual, f.name)
+        hint, where = types[f.name], (*path, f.name)
+        inner: Any = without_notes(hint)
+        default = f.default_factory() if f.default_factory is not MISSING else f.default
+        default = default if usual is None else getattr(usual, f.name)
         if f.name == "geometry" and value is not None:
-            yield from _geometry(value, mine)
+            tables.append(_geometry(value, mine))
         elif is_dataclass(inner) and (here is not None or value is None):
             table_default = default if is_dataclass(default) else None
-            yield from _walk(inner, here, table_default, where, mine)  # type: ignore[arg-type]
-        elif get_origin(inner) is Mapping and is_dataclass(item := _plain(get_args(inner)[1])):
-            for name, one in ({"NAME": None} if here is None else here).items():
-                yield from _walk(
-                    item,  # type: ignore[arg-type]
-                    one,
-                    None,
-                    (*where, name),
-                    mine.get(name, {}) if isinstance(mine, Mapping) else {},
-                )
+            tables.append(_walk(inner, here, table_default, where, mine))  # type: ignore[arg-type]
+        elif item := named_table(hint):
+            for name, one in ({_NAME: None} if here is None else here).items():
+                own = mine.get(name, {}) if isinstance(mine, Mapping) else {}
+                tables.append(_walk(item, one, None, (*where, name), own))
         else:
-            has = isinstance(given, Mapping) and f.name in given
-            yield _leaf(
+            kind = quantity_kind(hint)
+            meaning, cost = _parted(texts.get(f.name, ""))
+            yield SceneKey(
                 where,
-                told.get(f.name, ""),
-                hints[f.name],
-                default,
-                _UNKNOWN if value is None else here,
-                given=has,
+                meaning,
+                kind,
+                _MUST if default is MISSING else _text(default, kind),
+                _bounds(hint),
+                cost,
+                "" if value is None else _text(here, kind),
+                isinstance(given, Mapping) and f.name in given,
+                uncertain=kind in UNITS and is_input(where),
             )
-
-
-def _is_table(f: Field[Any], hint: Any, value: Any) -> bool:
-    inner = _plain(hint)
-    if is_dataclass(inner):
-        return value is None or getattr(value, f.name) is not None
-    return f.name == "geometry" or (
-        get_origin(inner) is Mapping and is_dataclass(_plain(get_args(inner)[1]))
-    )
-
-
-def _default(f: Field[Any]) -> Any:
-    return f.default_factory() if f.default_factory is not MISSING else f.default
-
-
-def _leaf(
-    steps: Steps, entry: str, hint: Any, default: Any, value: Any, *, given: bool
-) -> SceneKey:
-    meaning, cost = _parted(entry)
-    notes, kind = list(_notes(hint)), _kind(hint)
-    return SceneKey(
-        steps,
-        meaning,
-        unit_inside(kind) if kind in UNITS else kind,
-        _units(kind),
-        _MUST if default is MISSING else _text(default, kind),
-        _bounds(hint, notes),
-        cost,
-        "" if value is _UNKNOWN else _text(value, kind),
-        given,
-        uncertain=kind in UNITS and is_input(steps),
-    )
-
-
-def _kind(hint: Any) -> str:
-    """Of the quantity, "" of what is none."""
-    notes = list(_notes(hint))
-    kinds = [reader.kind for n in notes if isinstance(reader := _func(n), QuantityReader)]
-    kinds += [n.kind for n in notes if isinstance(n, Noted) and n.kind]
-    return kinds[0] if kinds else ""
+    for inside in tables:
+        yield from inside
 
 
 def _geometry(scene: Any, given: Mapping[str, Any]) -> Iterator[SceneKey]:
@@ -324,7 +325,6 @@ def _geometry(scene: Any, given: Mapping[str, Any]) -> Iterator[SceneKey]:
         ("geometry", "recipe"),
         "Name of a ready recipe, or the path of a .py file of your own.",
         "",
-        (),
         _MUST,
         f"{', '.join(READY)}, or a .py file",
         "none",
@@ -342,7 +342,7 @@ def _geometry(scene: Any, given: Mapping[str, Any]) -> Iterator[SceneKey]:
             value='"auto"' if auto else key.value,
             given=key.name in given,
             writable=_writable(values[key.name]),
-            uncertain=bool(key.unit),
+            uncertain=key.kind in UNITS,
         )
 
 
@@ -353,20 +353,19 @@ def _writable(value: Any) -> bool:
     return isinstance(value, (str, int)) and value != "auto"
 
 
-def _bounds(hint: Any, notes: Sequence[Any]) -> str:
+def _bounds(hint: Any) -> str:
     """In a few words: a list, choices, rules."""
-    inner = _plain(hint)
+    inner = without_notes(hint)
     out = []
     if get_origin(inner) is tuple:
         inside = get_args(inner)
         out.append("a list" if inside[-1] is Ellipsis else f"a list of {len(inside)}")
     choices = [c for choice in _choices(hint) for c in get_args(choice)]
     out += [", ".join(map(str, choices))] if choices else []
-    whole = inner is int
-    rules = [_func(n) for n in notes]
-    out += [f"{'whole number ' * whole}{r.bounds}" for r in rules if isinstance(r, Rule)]
-    out += [n.bounds for n in notes if isinstance(n, Noted) and n.bounds]
-    out += [", ".join(r.outputs) for r in rules if isinstance(r, OutputNames)]
+    noted, whole = list(notes(hint)), "whole number " * (inner is int)
+    out += [f"{whole}{n.bounds}" for n in noted if isinstance(n, Rule)]
+    out += [n.bounds for n in noted if isinstance(n, Noted) and n.bounds]
+    out += [", ".join(n.outputs) for n in noted if isinstance(n, OutputNames)]
     return "; ".join(out)
 
 
@@ -378,35 +377,10 @@ def _choices(hint: Any) -> Iterator[Any]:
             yield from _choices(inside)
 
 
-def _notes(hint: Any) -> Iterator[Any]:
-    """Everything noted in an annotation and in what it is made of."""
-    if get_origin(hint) is Annotated:
-        yield from hint.__metadata__
-        yield from _notes(get_args(hint)[0])
-    elif get_origin(hint) is not None and get_origin(hint) is not Literal:
-        for inside in get_args(hint):
-            yield from _notes(inside)
-
-
-def _func(note: Any) -> Any:
-    return note.func if isinstance(note, (AfterValidator, BeforeValidator)) else None
-
-
-def _plain(wanted: Any) -> Any:
-    """The annotation without its notes, and of what may be None the other."""
-    while get_origin(wanted) in (Annotated, Union, types.UnionType):
-        wanted = next(kind for kind in get_args(wanted) if kind is not type(None))
-    return wanted
-
-
 def _parted(entry: str) -> tuple[str, str]:
     """Meaning and effect on cost."""
     meaning, _, cost = entry.replace("``", "").partition("Cost:")
     return meaning.strip(), cost.strip().rstrip(".") or _NONE
-
-
-def _units(kind: str) -> tuple[str, ...]:
-    return tuple(u for u in UNITS.get(kind, {}) if u)
 
 
 def _text(value: Any, kind: str) -> str:
@@ -416,9 +390,9 @@ def _text(value: Any, kind: str) -> str:
     if isinstance(value, (tuple, list)):
         return f"[{', '.join(_text(v, kind) for v in value)}]"
     if is_dataclass(value):
-        hints = typing.get_type_hints(type(value), include_extras=True)
+        types = hints(type(value))
         inside = (
-            f"{toml_key(f.name)} = {_text(getattr(value, f.name), _kind(hints[f.name]))}"
+            f"{toml_key(f.name)} = {_text(getattr(value, f.name), quantity_kind(types[f.name]))}"
             for f in fields(value)
         )
         return f"{{ {', '.join(inside)} }}"

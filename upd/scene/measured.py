@@ -16,23 +16,22 @@ from upd.measured.curve import QUANTITIES, MeasuredCurve
 from upd.measured.damping import DampingFit, fit_damping
 from upd.measured.label import AskedCurve, CurveLabel, label_of
 from upd.measured.read import MOST_TOLD, found_in, read_measured
+from upd.scene import quantities as q
 from upd.scene.base import STRICT
-from upd.scene.quantities import Example, Noted, Ratio, must
 from upd.units import UNITS
 
 Array = NDArray[np.float64]
-#: what excitation.damping says when the measured free curves give it, and what stands for it until
-#: they are read
+#: excitation.damping where the measured free curves give it, and its value until they are read
 FROM_MEASURED, UNTIL_READ = "measured", "0.5 %"
 _UNITS = tuple(unit for kind in QUANTITIES for unit in UNITS[kind])
 ResponseUnit = Annotated[
     str,
-    must(
+    q.must(
         lambda v: v in _UNITS,
         f"is no unit of a response; use one of {', '.join(_UNITS)}",
         "of accelerance, mobility or receptance",
     ),
-    Example.of('"(m/s2)/N"'),
+    q.Example('"(m/s2)/N"'),
 ]
 
 
@@ -58,17 +57,17 @@ class MeasuredChoice:
         Name of the response without its unit where the file holds several; in netCDF the variable,
         its groups in front: "linear own/accelerance_free_right".
     unit
-        Of the response where the file does not say it; tells accelerance, mobility and receptance
-        apart.
+        Of the response where the file does not give it; distinguishes accelerance, mobility and
+        receptance.
     digest
         SHA-256 of the file, which a run writes into its own scene: another file is then refused.
     """
 
     __pydantic_config__ = STRICT
-    file: Annotated[str, Noted(bounds="a .csv, text or .nc file"), Example.of('"free.csv"')]
+    file: Annotated[str, q.Noted(bounds="a .csv, text or .nc file"), q.Example('"free.csv"')]
     blade: Literal["right", "left"] = "right"
     state: Literal["free", "stuck"] | None = None
-    centrifugal_to_force: Ratio | None = None
+    centrifugal_to_force: q.Ratio | None = None
     column: str | None = None
     unit: ResponseUnit | None = None
     digest: str | None = None
@@ -119,39 +118,32 @@ class FittedMode:
     height: float
 
 
-def settle_measured(data: Mapping[str, Any], folder: Path) -> None:
-    """Files of measured curves made absolute; the digests of those that are there put in, and what
-    a file of one curve says of it: blade, state, F_C/F_E.
-    """
-    tables = data.get("measured")
-    for table in tables.values() if isinstance(tables, dict) else ():
-        if isinstance(table, dict) and isinstance(table.get("file"), str):
-            path = (folder / table["file"]).resolve()
-            table["file"] = str(path)
-            found = digest_of_file(path)
-            if found:
-                table.setdefault("digest", found)
-                _take_label(table, path)
+def note_files(data: Mapping[str, Any]) -> None:
+    """Put in the digests of the files of measured curves, and what a file of one curve gives of it:
+    blade, state, F_C/F_E.
 
-
-def _take_label(table: dict[str, Any], path: Path) -> None:
-    """What the file says of the curve that the table chooses, put into the table.
-
-    A table that is wrong is left as it is: its faults are told later, all at once.
+    A table that is wrong stays as it is: its faults are found later, all at once.
     """
     keys = {"blade": "blade", "state": "state", "force_ratio": "centrifugal_to_force"}
-    try:
-        wanted = label_of({key: table[key] for key in keys.values() if key in table})
+    tables = data.get("measured")
+    for table in tables.values() if isinstance(tables, dict) else ():
+        file = table.get("file") if isinstance(table, dict) else None
+        path = Path(file) if isinstance(file, str) else Path()
+        digest = digest_of_file(path)
+        if not digest:
+            continue
+        table.setdefault("digest", digest)
         column, unit = (
-            said if isinstance(said := table.get(key), str) else None for key in ("column", "unit")
+            text if isinstance(text := table.get(key), str) else None for key in ("column", "unit")
         )
-        found, _ = found_in(path, AskedCurve(column, unit, wanted))
-    except InputError:
-        return
-    if found is not None:
+        try:
+            wanted = label_of({key: table[key] for key in keys.values() if key in table})
+            found, _ = found_in(path, AskedCurve(column, unit, wanted))
+        except InputError:
+            continue
         for name, key in keys.items():
-            if (said := getattr(found.label, name)) is not None:
-                table.setdefault(key, said)
+            if found is not None and (given := getattr(found.label, name)) is not None:
+                table.setdefault(key, given)
 
 
 def digest_of_file(path: Path) -> str:
@@ -180,12 +172,10 @@ def measured_problems(measured: Mapping[str, MeasuredChoice]) -> list[str]:
                 "give that file, or remove digest to take this one"
             )
             continue
-        found, faults = found_in(path, AskedCurve(one.column, one.unit, one.label))
-        more = len(faults) - MOST_TOLD
+        _, faults = found_in(path, AskedCurve(one.column, one.unit, one.label))
         problems += [f"{where}.file: {path.name}, {fault}" for fault in faults[:MOST_TOLD]]
-        if more > 0:
-            problems.append(f"{where}.file: {path.name}: and {more} more")
-        del found
+        if len(faults) > MOST_TOLD:
+            problems.append(f"{where}.file: {path.name}: and {len(faults) - MOST_TOLD} more")
     return problems
 
 
@@ -237,13 +227,7 @@ def fit_of(choice: MeasuredChoice) -> DampingFit:
     InputError
         As `upd.measured.fit_damping` does.
     """
-    key = (
-        choice.file,
-        digest_of_file(Path(choice.file)),
-        choice.column,
-        choice.unit,
-        choice.label,
-    )
+    key = (digest_of_file(Path(choice.file)), choice)
     if key not in _fits:
         _fits[key] = fit_damping(choice.read())
     return _fits[key]

@@ -6,34 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
-from upd.scene.base import (
-    STRICT,
-    LeftOut,
-    MaterialData,
-    MeshChoice,
-    RecipeScene,
-    SolverChoice,
-    known_output,
-)
+from upd.scene import quantities as q
+from upd.scene.base import STRICT, MeshChoice, known_output, repeated
 from upd.scene.measured import FROM_MEASURED, UNTIL_READ, MeasuredChoice, measured_problems
-from upd.scene.quantities import (
-    FILLED,
-    Accuracy,
-    Example,
-    Frequency,
-    Geometry,
-    Name,
-    Noted,
-    Share,
-    Uncertainty,
-    at_least,
-    not_negative,
-    or_from,
-    positive,
-)
-from upd.scene.rig import rig_problems
+from upd.scene.rig import RigBase, rig_problems
 
 #: Outputs a rig scene can ask for, and what each one is.
 MODAL_WANTS = {
@@ -59,8 +37,10 @@ class ModesChoice:
     """
 
     __pydantic_config__ = STRICT
-    below: Frequency = 1100.0
-    arrangements: Annotated[tuple[Literal["symmetric", "asymmetric"], ...], FILLED] = ("symmetric",)
+    below: q.Frequency = 1100.0
+    arrangements: Annotated[tuple[Literal["symmetric", "asymmetric"], ...], q.FILLED] = (
+        "symmetric",
+    )
 
 
 @dataclass(frozen=True)
@@ -80,9 +60,9 @@ class ReductionChoice:
     """
 
     __pydantic_config__ = STRICT
-    modes: Annotated[int, not_negative] | None = None
-    below: Frequency | None = None
-    error: Share | None = None
+    modes: Annotated[int, q.not_negative] | None = None
+    below: q.Frequency | None = None
+    error: q.Share | None = None
 
     @property
     def words(self) -> str:
@@ -119,99 +99,61 @@ class ResponseChoice:
     """
 
     __pydantic_config__ = STRICT
-    start: Frequency = 200.0
-    stop: Frequency = 600.0
-    points: Annotated[int, at_least(10)] = 2000
-    damping: Annotated[Share, or_from(FROM_MEASURED, UNTIL_READ)] = 0.005
-    peak: Annotated[float, positive, Noted("(m/s2)/N"), Example.of("120.0")] | None = None
+    start: q.Frequency = 200.0
+    stop: q.Frequency = 600.0
+    points: Annotated[int, q.at_least(10)] = 2000
+    damping: Annotated[q.Share, q.or_from(FROM_MEASURED, UNTIL_READ)] = 0.005
+    peak: Annotated[float, q.positive, q.Noted("(m/s2)/N"), q.Example("120.0")] | None = None
 
 
-@dataclass(frozen=True)
-class ModalScene(RecipeScene):
-    """One simulation of the rig.
-
-    ``geometry`` holds the recipe's name under "recipe" and its parameters beside it, in mm.
+@dataclass(frozen=True, kw_only=True)
+class ModalScene(RigBase):
+    """Natural frequencies, reduction and linear response of the rig.
 
     Attributes
     ----------
-    name
-        Of the run folder.
-    title
-        Heading of the page.
-    want
-        Outputs; all else follows from them. Cost: upd plan shows what each brings with it.
-    geometry
-        The recipe and its parameters.
-    material
-        Of blades, bases and damper.
     measured
         Measured responses by name, beside the computed one: "free" of the right blade, "stuck" of
         both with the damper glued.
-    accuracy
-        Largest estimated error wanted, of all main numbers or of some by their names: the run
-        chooses the cheapest levels that reach it. "unknown" leaves all errors unknown; when none,
-        they are estimated on the scene's own levels. Cost: the companions of an estimate take up to
-        a third of the run; half the error of a mesh takes about eight times the elements.
     """
 
-    __pydantic_config__ = STRICT
-    name: Name
+    analysis: ClassVar[str] = "rig"
+
     want: Annotated[
-        tuple[Annotated[str, known_output(MODAL_WANTS), Example.of('"free"', '"glued"')], ...],
-        FILLED,
+        tuple[Annotated[str, known_output(MODAL_WANTS), q.Example('"free"', '"glued"')], ...],
+        q.FILLED,
     ]
-    geometry: Geometry
-    material: MaterialData
-    title: str = ""
     mesh: MeshChoice = field(default_factory=lambda: MeshChoice(element="hex20"))
     modes: ModesChoice = field(default_factory=ModesChoice)
     reduction: ReductionChoice = field(default_factory=ReductionChoice)
     response: ResponseChoice = field(default_factory=ResponseChoice)
-    measured: Mapping[Name, MeasuredChoice] = field(default_factory=dict)
-    solver: SolverChoice = field(default_factory=SolverChoice)
-    left_out: LeftOut = field(default_factory=LeftOut)
-    accuracy: Accuracy = None
-    text: str = field(default="", repr=False)
-    uncertain: Mapping[str, Uncertainty] = field(default_factory=dict, repr=False)
+    measured: Mapping[q.Name, MeasuredChoice] = field(default_factory=dict)
 
 
 def modal_problems(scene: ModalScene) -> list[str]:
     """What does not fit together."""
-    problems = []
-    if not scene.response.start < scene.response.stop:
-        problems.append(
-            f"response.start: {scene.response.start:g} Hz is not below response.stop, "
-            f"{scene.response.stop:g} Hz"
-        )
-    if scene.wants("response") and scene.modes.below < scene.response.stop:
-        problems.append(
-            f"modes.below: {scene.modes.below:g} Hz is below response.stop, "
-            f"{scene.response.stop:g} Hz; the response needs its modes"
-        )
-    if scene.measured and not scene.wants("response"):
-        problems.append('measured: nothing is computed beside it; add "response" to want')
-    problems += measured_problems(scene.measured)
-    problems += [
-        f"measured.{name}: centrifugal_to_force: a rig has no friction; give state, or make it a "
-        'forced response (analysis = "forced response")'
-        for name, one in scene.measured.items()
-        if one.centrifugal_to_force is not None
-    ]
-    problems += rig_problems(
-        scene.mesh,
-        scene.solver,
-        None,
-        of="a rig",
-        instead="geometry.refine, and see upd study SCENE --vary mesh",
-    )
-    if len(set(scene.modes.arrangements)) < len(scene.modes.arrangements):
-        problems.append("modes.arrangements: one is duplicated")
+    response, below = scene.response, scene.modes.below
     given = [
         name for name in ("modes", "below", "error") if getattr(scene.reduction, name) is not None
     ]
+    problems = repeated("modes.arrangements", scene.modes.arrangements)
+    problems += measured_problems(scene.measured) + rig_problems(scene)
+    add = problems.append
+    stop = f"response.stop, {response.stop:g} Hz"
+    if not response.start < response.stop:
+        add(f"response.start: {response.start:g} Hz is not below {stop}")
+    if scene.wants("response") and below < response.stop:
+        add(f"modes.below: {below:g} Hz is below {stop}; the response needs its modes")
+    if scene.measured and not scene.wants("response"):
+        add('measured: nothing is computed beside it; add "response" to want')
+    for name, one in scene.measured.items():
+        if one.centrifugal_to_force is not None:
+            add(
+                f"measured.{name}: centrifugal_to_force: a rig has no friction; give state, or "
+                'make it a forced response (analysis = "forced response")'
+            )
     if len(given) > 1:
-        problems.append(
-            f"reduction: {' and '.join(given)} are given; give one of modes, below, error"
-        )
-    needs = [w for w in ("matrices",) if w in scene.want and "reduction" not in scene.want]
-    return problems + [f'want: {w!r} needs "reduction" too' for w in needs]
+        add(f"reduction: {' and '.join(given)} are given; give one of modes, below, error")
+    if scene.wants("matrices") and not scene.wants("reduction"):
+        add("want: 'matrices' needs \"reduction\" too")
+    return problems

@@ -16,24 +16,19 @@ from upd.units import parse_quantity, quantity_text
 Steps = tuple[str | int, ...]
 
 
-@dataclass(frozen=True)
 class Example:
-    """Values that would do, as TOML: what the message about a bad one tells to write.
+    """Values that would do, as TOML: what the message about a bad one proposes.
 
     Several are the items of a list of such values.
     """
 
-    values: tuple[str, ...]
-
-    @classmethod
-    def of(cls, *values: str) -> Example:
-        """An example from its TOML texts."""
-        return cls(values)
+    def __init__(self, *values: str) -> None:
+        self.values = values
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """What a scene says of how well it knows an input.
+    """An input that is known within limits.
 
     Attributes
     ----------
@@ -70,7 +65,7 @@ class Uncertainty:
 
 @dataclass(frozen=True)
 class Noted:
-    """What a reference of the keys says of a value whose own validator reads it.
+    """Unit and bounds, for a reference of the keys, of a value whose own validator reads it.
 
     Attributes
     ----------
@@ -124,9 +119,19 @@ def must(rule: Callable[[Any], bool], message: str, bounds: str = "") -> AfterVa
     """A value that breaks ``rule`` is a problem.
 
     ``message`` ends the sentence that begins with the value; ``bounds`` are the rule in a few
-    words, for the reference of the keys (without them it says what the message forbids).
+    words, for the reference of the keys (without them what the message forbids).
     """
     return AfterValidator(Rule(rule, message, bounds or f"none that {message.partition(';')[0]}"))
+
+
+def is_whole(value: Any) -> bool:
+    """Whether a value is a whole number."""
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def is_name(value: str) -> bool:
+    """Whether a text can name a scene or a table."""
+    return bool(re.fullmatch(r"[\w.-]*\w[\w.-]*", value))
 
 
 def at_least(least: int) -> AfterValidator:
@@ -150,27 +155,25 @@ share = must(
     "between 0 and 1",
 )
 
-Stress = Annotated[float, quantity("stress"), positive, Example.of('"200 GPa"')]
-Density = Annotated[float, quantity("density"), positive, Example.of('"7800 kg/m3"')]
+_PULLS = "N pulls the bodies apart; a contact carries only pressure, give a positive force"
+
+Stress = Annotated[float, quantity("stress"), positive, Example('"200 GPa"')]
+Density = Annotated[float, quantity("density"), positive, Example('"7800 kg/m3"')]
 Poisson = Annotated[
     float,
     quantity("fraction"),
     must(lambda v: -1.0 < v < 0.5, "is outside (-1, 0.5)", "between -1 and 0.5"),
-    Example.of("0.3"),
+    Example("0.3"),
 ]
 Force = Annotated[
     float,
     quantity("force"),
-    must(
-        lambda v: v >= 0.0,
-        "N pulls the bodies apart; a contact carries only pressure, give a positive force",
-        ">= 0",
-    ),
-    Example.of('"350 N"'),
+    must(lambda v: v >= 0.0, _PULLS, ">= 0"),
+    Example('"350 N"'),
 ]
-Mass = Annotated[float, quantity("mass"), positive, Example.of('"72 g"')]
-Speed = Annotated[float, quantity("speed"), positive, Example.of('"6000 rpm"')]
-Radius = Annotated[float, quantity("length"), positive, Example.of('"300 mm"')]
+Mass = Annotated[float, quantity("mass"), positive, Example('"72 g"')]
+Speed = Annotated[float, quantity("speed"), positive, Example('"6000 rpm"')]
+Radius = Annotated[float, quantity("length"), positive, Example('"300 mm"')]
 #: What a centrifugal force and ratios of forces say when other keys give them.
 FROM_SPEED, FROM_FORCE = "from speed", "from force"
 
@@ -198,10 +201,7 @@ def _force_or_equilibrium(value: Any) -> Any:
             f"{error}; or one of {known} (equilibrium under loads.centrifugal)"
         ) from None
     if number < 0.0:
-        raise ValueError(
-            f"{number:g} N pulls the bodies apart; a contact carries only pressure, give a "
-            "positive force"
-        )
+        raise ValueError(f"{number:g} {_PULLS}")
     return number
 
 
@@ -210,7 +210,7 @@ NormalLoad = Annotated[
     float | str,
     BeforeValidator(_force_or_equilibrium),
     Noted("force", f">= 0, or {', '.join(EQUILIBRIA)}"),
-    Example.of('"50 N"', '"200 N"'),
+    Example('"50 N"', '"200 N"'),
 ]
 
 
@@ -230,12 +230,12 @@ Direction = Annotated[
     float,
     BeforeValidator(_direction),
     Noted("angle", "an angle, x or y"),
-    Example.of('"x"', '"30 deg"'),
+    Example('"x"', '"30 deg"'),
 ]
-Phase = Annotated[float, quantity("angle"), Example.of('"180 deg"')]
-Length = Annotated[float, quantity("length"), Example.of('"5 mm"')]
-Frequency = Annotated[float, quantity("frequency"), positive, Example.of('"340 Hz"')]
-Ratio = Annotated[float, quantity("fraction"), positive, Example.of("60.0", "194.0")]
+Phase = Annotated[float, quantity("angle"), Example('"180 deg"')]
+Length = Annotated[float, quantity("length"), Example('"5 mm"')]
+Frequency = Annotated[float, quantity("frequency"), positive, Example('"340 Hz"')]
+Ratio = Annotated[float, quantity("fraction"), positive, Example("60.0", "194.0")]
 #: Ratios of centrifugal to exciting force, or "from force".
 Ratios = Annotated[tuple[Ratio, ...], FILLED, or_from(FROM_FORCE, (1.0,))]
 LoadRatio = Annotated[
@@ -247,22 +247,22 @@ LoadRatio = Annotated[
         "times mu N is gross slip (T >= mu N has no static answer); stay below 1",
         "< 1",
     ),
-    Example.of("0.5", "0.75"),
+    Example("0.5", "0.75"),
 ]
-Coefficient = Annotated[float, quantity("fraction"), not_negative, Example.of("0.3")]
-Share = Annotated[float, quantity("fraction"), share, Example.of('"1 %"')]
-Memory = Annotated[float, quantity("memory"), positive, Example.of('"4 GB"')]
+Coefficient = Annotated[float, quantity("fraction"), not_negative, Example("0.3")]
+Share = Annotated[float, quantity("fraction"), share, Example('"1 %"')]
+Memory = Annotated[float, quantity("memory"), positive, Example('"4 GB"')]
 Name = Annotated[
     str,
     must(
-        lambda v: bool(re.fullmatch(r"[\w.-]*\w[\w.-]*", v)),
+        is_name,
         "is no name: use letters, digits, '-', '_' and '.'",
         "letters, digits, -, _ and .",
     ),
-    Example.of('"my_damper"'),
+    Example('"my_damper"'),
 ]
 #: The recipe and its parameters.
-Geometry = Annotated[Mapping[str, Any], Example.of('{ recipe = "sphere_block", radius = "5 mm" }')]
+Geometry = Annotated[Mapping[str, Any], Example('{ recipe = "sphere_block", radius = "5 mm" }')]
 
 #: the accuracy of a scene whose errors are not estimated
 UNKNOWN = "unknown"
@@ -294,5 +294,5 @@ Accuracy = Annotated[
     Any,
     BeforeValidator(_accuracy),
     Noted(bounds=f'"{UNKNOWN}"; between 0 and 1; or a table of these by the names of numbers'),
-    Example.of('"1 %"'),
+    Example('"1 %"'),
 ]

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from dataclasses import Field, fields
 from typing import Any
 
-from upd.errors import InputError
+from upd.errors import InputError, did_you_mean
 from upd.mesh import recipes
-from upd.mesh.recipe_modules import is_file
 from upd.units import parse_quantity
 
 #: Parameters of a recipe that may be "auto".
@@ -26,15 +23,8 @@ CHOSEN_BY_MESH = {
 _MOST = 100_000
 
 
-def recipe_path(recipe: str, folder: Path) -> str:
-    """A ready recipe's name, or the absolute path of the user's file, which the scene gives
-    relative to its own folder.
-    """
-    return str((folder / recipe).resolve()) if is_file(recipe) else recipe
-
-
 def geometry_parameters(
-    table: Mapping[str, Any], folder: Path, own: Sequence[str] = ()
+    table: Mapping[str, Any], own: Sequence[str] = ()
 ) -> tuple[dict[str, Any], list[str]]:
     """Parameters of the recipe in mm from the scene's [geometry] table, and the problems found.
 
@@ -44,7 +34,7 @@ def geometry_parameters(
     if not isinstance(recipe, str):
         return {}, ["geometry.recipe: is missing: name a recipe or a .py file"]
     try:
-        cls = recipes.parameters(recipe_path(recipe, folder))
+        cls = recipes.parameters(recipe)
     except InputError as error:
         return {}, [f"geometry.recipe: {error}"]
     known = {f.name: f for f in fields(cls)}
@@ -57,20 +47,13 @@ def geometry_parameters(
         if key in CHOSEN_BY_MESH and key not in own:
             problems.append(f"{where}: set {CHOSEN_BY_MESH[key]} instead")
         elif key not in known:
-            near = difflib.get_close_matches(key, known, 1)
-            problems.append(
-                f"{where}: unknown key"
-                + (f", did you mean {near[0]!r}?" if near else f"; known here: {', '.join(known)}")
-            )
-        elif value == "auto":
-            if key in _AUTO:
-                out[key] = value
-            else:
-                problems.append(f'{where}: cannot be "auto"; give it a value')
+            others = f"known here: {', '.join(known)}"
+            problems.append(f"{where}: unknown key{did_you_mean(key, known, others)}")
+        elif value == "auto" and key not in _AUTO:
+            problems.append(f'{where}: cannot be "auto"; give it a value')
         else:
-            read = _reader(known[key].metadata.get("quantity"), known[key].type)
             try:
-                out[key] = read(value)
+                out[key] = value if value == "auto" else _read(value, known[key])
             except InputError as error:
                 problems.append(f"{where}: {error}")
     if not problems:
@@ -78,10 +61,7 @@ def geometry_parameters(
         # user's.
         chosen = {key for key, value in out.items() if value == "auto"}
         try:
-            recipes.made(
-                recipe_path(recipe, folder),
-                {key: value for key, value in out.items() if key not in chosen},
-            )
+            recipes.made(recipe, {key: value for key, value in out.items() if key not in chosen})
         except InputError as error:
             message = [line.strip() for line in str(error).splitlines()]
             problems += [
@@ -92,23 +72,20 @@ def geometry_parameters(
     return out, problems
 
 
-def _reader(quantity: str | None, kind: Any) -> Callable[[Any], Any]:
-    def read(value: Any) -> Any:
-        if quantity is not None:
-            return parse_quantity(value, quantity)
-        if "int" in str(kind) and "float" not in str(kind):
-            if isinstance(value, bool) or not isinstance(value, int):
-                raise InputError(
-                    f"{value!r} is not a whole number; write digits without quotes, for example 12"
-                )
-            if message := never(value):
-                raise InputError(message)
-            return value
-        if "float" in str(kind):
-            return parse_quantity(value, "fraction")
+def _read(value: Any, parameter: Field[Any]) -> Any:
+    """A value of a recipe's parameter, quantities in the unit inside. Raises InputError."""
+    quantity, kind = parameter.metadata.get("quantity"), str(parameter.type)
+    if quantity is not None or "float" in kind:
+        return parse_quantity(value, quantity or "fraction")
+    if "int" not in kind:
         return value
-
-    return read
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise InputError(
+            f"{value!r} is not a whole number; write digits without quotes, for example 12"
+        )
+    if message := never(value):
+        raise InputError(message)
+    return value
 
 
 def never(value: Any) -> str:

@@ -2,38 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BeforeValidator
-
-from upd.scene.base import (
-    STRICT,
-    LeftOut,
-    MaterialData,
-    MeshChoice,
-    SceneBase,
-    SolverChoice,
-    known_output,
+from upd.scene import quantities as q
+from upd.scene.base import STRICT, known_output, repeated
+from upd.scene.rig import (
+    DamperChoice,
+    FaceFriction,
+    Fit,
+    RigBase,
+    rig_problems,
+    unreachable_accuracy,
 )
-from upd.scene.forced import DamperChoice
-from upd.scene.quantities import (
-    FILLED,
-    Accuracy,
-    Coefficient,
-    Example,
-    Geometry,
-    Name,
-    Noted,
-    Share,
-    Uncertainty,
-    at_least,
-    must,
-    positive,
-    quantity,
-)
-from upd.scene.rig import rig_problems
 
 #: Outputs of a seated damper, and what each one is.
 SEATED_WANTS = {
@@ -48,44 +29,25 @@ SEATED = "seated damper"
 #: tables that only this scene has
 SEATED_ONLY = ("seating", "moved", "blades")
 
-Way = Annotated[float, quantity("length"), positive, Example.of('"20 um"')]
-Over = Annotated[float, must(lambda v: v > 1.0, "is not above 1", "> 1"), Example.of("1.5")]
-whole_quarters = must(
+Way = Annotated[float, q.quantity("length"), q.positive, q.Example('"20 um"')]
+Over = Annotated[float, q.must(lambda v: v > 1.0, "is not above 1", "> 1"), q.Example("1.5")]
+whole_quarters = q.must(
     lambda v: v >= 4 and v % 4 == 0, "is not 4, 8, 12 and so on", "4, 8, 12 and so on"
 )
-#: words of contact.fit and how far the faces are worn in
-FITS = {"new": 0.0, "worn": 1.0}
 
 
-def _fit(value: Any) -> Any:
-    if isinstance(value, str) and value in FITS:
-        return value
-    if isinstance(value, (int, float)) and not isinstance(value, bool) and 0.0 <= value <= 1.0:
-        return float(value)
-    raise ValueError(f'{value!r} is no fit of the faces; write "new", "worn" or a number 0 to 1')
-
-
-@dataclass(frozen=True)
-class SeatedContact:
+@dataclass(frozen=True, kw_only=True)
+class SeatedContact(FaceFriction):
     """Coulomb friction on every matching node of both faces.
 
     Attributes
     ----------
-    friction
-        Coulomb's coefficient.
     fit
         How well the faces fit each other: "new" (flat, they touch everywhere without load), "worn"
         (worn in under F_C, which then presses evenly), or a number between, 0 new to 1 worn.
     """
 
-    __pydantic_config__ = STRICT
-    friction: Coefficient = 0.6
-    fit: Annotated[Any, BeforeValidator(_fit), Noted(bounds="new, worn, or 0 to 1")] = "new"
-
-    @property
-    def worn(self) -> float:
-        """How far the faces are worn in, 0 to 1."""
-        return FITS[self.fit] if isinstance(self.fit, str) else float(self.fit)
+    fit: Fit = "new"
 
 
 @dataclass(frozen=True)
@@ -114,7 +76,7 @@ class SeatingChoice:
     lowest
         To which share of F_C it is lowered.
     over
-        Over-pressed: raised to so many times F_C and let go to it.
+        Over-pressed: raised to so many times F_C and lowered to it.
     shake
         Vibrated in: first amplitude of the right blade under F_C, along x, dying away to nothing.
     cycles
@@ -125,11 +87,11 @@ class SeatingChoice:
     """
 
     __pydantic_config__ = STRICT
-    steps: Annotated[int, at_least(2)] = 20
-    lowest: Share = 0.1
+    steps: Annotated[int, q.at_least(2)] = 20
+    lowest: q.Share = 0.1
     over: Over = 1.5
     shake: Way = 0.05
-    cycles: Annotated[int, at_least(1)] = 6
+    cycles: Annotated[int, q.at_least(1)] = 6
     cycle_steps: Annotated[int, whole_quarters] = 8
 
 
@@ -151,63 +113,31 @@ class MovedChoice:
     """
 
     __pydantic_config__ = STRICT
-    directions: Annotated[tuple[Literal["x", "y", "z"], ...], FILLED] = ("x", "z")
+    directions: Annotated[tuple[Literal["x", "y", "z"], ...], q.FILLED] = ("x", "z")
     amplitude: Way = 0.05
-    cycles: Annotated[int, at_least(1)] = 2
-    steps: Annotated[int, at_least(2)] = 8
+    cycles: Annotated[int, q.at_least(1)] = 2
+    steps: Annotated[int, q.at_least(2)] = 8
 
 
-@dataclass(frozen=True)
-class SeatedScene(SceneBase):
-    """A damper seated between two blades. ``geometry`` holds the recipe's name under "recipe" and
-    its parameters beside it, in mm.
+@dataclass(frozen=True, kw_only=True)
+class SeatedScene(RigBase):
+    """A damper seated between two blades.
 
     Attributes
     ----------
-    name
-        Of the run folder.
-    title
-        Heading of the page.
     analysis
-        What tells this scene from the rig's others.
-    want
-        Outputs; all else follows from them. Cost: upd plan shows what each brings with it.
-    geometry
-        The recipe and its parameters.
-    material
-        Of blades, bases and damper.
-    accuracy
-        Largest estimated error wanted, of all main numbers or of some by their names: the run
-        chooses the cheapest levels that reach it. "unknown" leaves all errors unknown; when none,
-        they are estimated on the scene's own levels. Cost: the companions of an estimate take up to
-        a third of the run; half the error of a mesh takes about eight times the elements.
+        What distinguishes this scene from the rig's others.
     """
 
-    __pydantic_config__ = STRICT
-    name: Name
     analysis: Literal["seated damper"]
     want: Annotated[
-        tuple[Annotated[str, known_output(SEATED_WANTS), Example.of('"seating"')], ...], FILLED
+        tuple[Annotated[str, known_output(SEATED_WANTS), q.Example('"seating"')], ...], q.FILLED
     ]
-    geometry: Geometry
-    material: MaterialData
-    title: str = ""
-    mesh: MeshChoice = field(default_factory=MeshChoice)
     blades: BladesChoice = field(default_factory=BladesChoice)
     damper: DamperChoice = field(default_factory=DamperChoice)
     contact: SeatedContact = field(default_factory=SeatedContact)
     seating: SeatingChoice = field(default_factory=SeatingChoice)
     moved: MovedChoice = field(default_factory=MovedChoice)
-    solver: SolverChoice = field(default_factory=SolverChoice)
-    left_out: LeftOut = field(default_factory=LeftOut)
-    accuracy: Accuracy = None
-    text: str = field(default="", repr=False)
-    uncertain: Mapping[str, Uncertainty] = field(default_factory=dict, repr=False)
-
-    @property
-    def arrangement(self) -> str:
-        """Which sides of the platforms face each other."""
-        return str(self.geometry.get("arrangement", "symmetric"))
 
     @property
     def whole(self) -> bool:
@@ -218,26 +148,21 @@ class SeatedScene(SceneBase):
 
 def seated_problems(scene: SeatedScene) -> list[str]:
     """What does not fit together."""
-    problems = []
+    directions = scene.moved.directions
+    levels = "geometry.refine, geometry.patch_along_slope or pad_along_slope"
+    problems = repeated("moved.directions", directions) + rig_problems(scene)
+    problems += unreachable_accuracy(scene, "a seated damper", levels)
+    add = problems.append
     if scene.damper.centrifugal <= 0.0:
-        problems.append("damper.centrifugal: 0 N leaves the damper loose; give a positive force")
+        add("damper.centrifugal: 0 N leaves the damper loose; give a positive force")
     if scene.mesh.element not in ("hex8", "hex8i"):
-        problems.append(
+        add(
             f"mesh.element: the seated damper needs faces of four nodes, not those of "
             f'"{scene.mesh.element}"; use "hex8i"'
         )
-    problems += rig_problems(
-        scene.mesh,
-        scene.solver,
-        scene.accuracy,
-        of="a seated damper",
-        instead="geometry.refine, geometry.patch_along_slope or pad_along_slope",
-    )
-    if scene.mesh.symmetry == "half" and "y" in scene.moved.directions:
-        problems.append(
-            'moved.directions: a motion along "y" is not symmetric; set mesh.symmetry = "auto" '
-            'or "full"'
+    if scene.mesh.symmetry == "half" and "y" in directions:
+        add(
+            'moved.directions: a motion along "y" is not symmetric; set mesh.symmetry = "auto" or '
+            '"full"'
         )
-    if len(set(scene.moved.directions)) < len(scene.moved.directions):
-        problems.append("moved.directions: one is duplicated")
     return problems

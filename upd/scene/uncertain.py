@@ -19,12 +19,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 from upd.errors import InputError
-from upd.mesh import recipes
-from upd.scene.keys import is_input, quantity_kind
+from upd.scene.keys import input_kind
 from upd.scene.quantities import Steps, Uncertainty
 from upd.units import parse_quantity
 
@@ -91,7 +90,7 @@ def uncertainties(
     recipe: str,
     problems_of: Callable[[dict[str, Any]], list[str]],
 ) -> tuple[dict[str, Uncertainty], list[str]]:
-    """What the scene says of its inputs, by path, and what is wrong with it.
+    """The uncertain inputs of the scene, by path, and what is wrong with it.
 
     Parameters
     ----------
@@ -120,7 +119,7 @@ def uncertainties(
 
 
 def _read(scene: type[Any], one: GivenBand, recipe: str) -> Uncertainty:
-    kind = _kind(scene, one.steps, recipe)
+    kind = input_kind(scene, recipe, one.steps)
     if not kind:
         raise InputError(
             "is no physical quantity known within limits, but chosen; to fix it: write it "
@@ -185,15 +184,6 @@ def read_band(text: str, kind: str) -> tuple[float, float | None]:
     return value, _half_width(bands[0], kind, value) if bands else None
 
 
-def _kind(scene: type[Any], steps: Steps, recipe: str) -> str:
-    """Kind of an input's quantity, "" for what is none."""
-    if steps[0] != "geometry":
-        return quantity_kind(scene, steps) if is_input(steps) else ""
-    known = {f.name: f for f in fields(recipes.parameters(recipe))} if len(steps) == 2 else {}
-    parameter = known.get(str(steps[1]))
-    return "" if parameter is None else str(parameter.metadata.get("quantity") or "")
-
-
 def _check_ends(
     one: Uncertainty, data: dict[str, Any], problems_of: Callable[[dict[str, Any]], list[str]]
 ) -> None:
@@ -201,9 +191,9 @@ def _check_ends(
         end = one.at(shift)
         problems = problems_of(put_back(data, one.steps, end))
         if problems:
-            told = problems[0].removeprefix(f"{one.path}: ").removeprefix("geometry: ")
+            reason = problems[0].removeprefix(f"{one.path}: ").removeprefix("geometry: ")
             shown = f"{end:.6g}" if isinstance(end, float) else end
             raise InputError(
-                f"reaches {shown}, which the scene does not allow ({told}); to fix it: give a "
+                f"reaches {shown}, which the scene does not allow ({reason}); to fix it: give a "
                 "smaller half-width"
             )

@@ -59,7 +59,7 @@ def comment(key: SceneKey) -> list[str]:
     facts = "; ".join(fact for fact in (key.unit, key.bounds) if fact)
     # a sign and its number stay on one line
     facts = re.sub(r"([<>]=?) ", "\\1\u00a0", facts)
-    told = " ".join(
+    text = " ".join(
         part
         for part in (
             key.meaning,
@@ -68,7 +68,7 @@ def comment(key: SceneKey) -> list[str]:
         )
         if part
     )
-    lines = wrap(told, _WIDTH, initial_indent="# ", subsequent_indent="# ")
+    lines = wrap(text, _WIDTH, initial_indent="# ", subsequent_indent="# ")
     return [line.replace("\u00a0", " ") for line in lines]
 
 

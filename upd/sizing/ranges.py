@@ -11,8 +11,7 @@ from typing import Any
 from upd.errors import InputError, one_line
 from upd.scene import ForcedScene, load_scene
 from upd.scene.forced import FORCED
-from upd.scene.keys import scene_keys
-from upd.scene.scalar_input import scalar_input
+from upd.scene.keys import scalar_input, scene_keys
 from upd.units import parse_quantity, quantity_text, unit_inside
 
 FORCE, CENTRIFUGAL = "excitation.force", "damper.centrifugal"

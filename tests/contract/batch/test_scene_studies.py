@@ -23,7 +23,7 @@ from upd.batch.studies import plan_study, run_study, scene_at, variations
 from upd.batch.study_point import SolvedPoint, StudyPoint
 from upd.batch.study_tables import markdown_table
 from upd.cli import main
-from upd.cli.study import _columns
+from upd.cli.batch import study_columns
 from upd.cli.tables import print_table
 from upd.errors import InputError
 from upd.mesh.recipes import build_mesh
@@ -368,7 +368,7 @@ def test_a_narrow_terminal_keeps_order_and_estimate() -> None:
     report = study.present(levels)
     assert report.notes == ("n",)
     console = Console(width=100, file=io.StringIO())
-    print_table(console, _columns(report.tables[-1]), title="Error")
+    print_table(console, study_columns(report.tables[-1]), title="Error")
     printed = console.file.getvalue()  # type: ignore[attr-defined]
     assert "estimated" in printed
     assert "order" in printed

@@ -17,7 +17,7 @@ from upd.batch.point import Outcome, PointResult, read_outcome
 from upd.batch.studies import plan_study, run_study
 from upd.batch.study_point import SolvedPoint, StudyPoint
 from upd.batch.whole_faces import change_curves, whole_faces_points
-from upd.cli.study import print_study
+from upd.cli.batch import print_study
 from upd.errors import InputError
 from upd.results import Case
 

@@ -13,7 +13,7 @@ import pytest
 
 from upd.errors import InputError
 from upd.scene import ForcedScene, RigScene, Scene, SeatedScene, load_scene
-from upd.scene.overrides import toml_value
+from upd.scene.toml import value_of
 
 SCENES: dict[str, Any] = {
     "hertz": Scene,
@@ -113,7 +113,7 @@ def test_no_sentence_is_raw_and_what_it_asks_for_is_taken(name: str) -> None:
                 example = example_in(line, path)
                 if example not in taken:
                     taken.add(example)
-                    after = problems(name, path, toml_value(example))
+                    after = problems(name, path, value_of(example))
                     again = [b for b in after if b.strip().startswith(f"{path}: ")]
                     assert not [b for b in again if "; write " in b], (value, line, after)
 

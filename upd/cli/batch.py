@@ -1,0 +1,205 @@
+"""What sweeps and studies show on a terminal: the plan, the tables, where the files are."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections import Counter
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+
+from upd.batch.engine import Workers
+from upd.batch.ladder import Study
+from upd.batch.output import SweepResult
+from upd.batch.plan import SweepPlan
+from upd.batch.studies import StudyResult
+from upd.batch.study_tables import TextTable
+from upd.cli.tables import print_table
+from upd.cli.terminal import counted, duration
+from upd.labels import number, number_label, percent_of
+from upd.report.columns import TextColumn
+from upd.results.sampled import SampledNumber, sample_sentence
+
+#: rows shown, and characters of a line of a head; the files hold all
+_ROWS, _WIDTH = 30, 14
+#: characters to which a column of words of a study may be folded
+_WORDS = 16
+#: most different reasons of failures that are shown
+_REASONS = 5
+#: ending of a study's file -> what it is
+_KINDS = {".md": "Table", ".csv": "Rows", ".json": "Numbers", ".png": "Figure"}
+
+
+def print_sweep_plan(console: Console, plan: SweepPlan) -> None:
+    """The plan in a few lines."""
+    grid = " x ".join(f"{len(axis.values)} {axis.header}" for axis in plan.axes)
+    if plan.sample is not None:
+        grid = f"a sample of {plan.sample.count} with seed {plan.sample.seed}, and the scene itself"
+    lines = [
+        f"{plan.scene.title or plan.scene.name}: {counted(len(plan.places), 'point')} ({grid})"
+    ]
+    for one in () if plan.sample is None else plan.sample.inputs:
+        lines.append(f"{one.path}: {one.given}, evenly between these limits")
+    if plan.kept:
+        lines.append(f"{counted(len(plan.kept), 'point')} kept from an earlier call")
+    if plan.refused:
+        refused = counted(len(plan.refused), "point")
+        lines.append(f"{refused} not allowed by the scene: rows with their reason")
+    if plan.groups:
+        who, models = plan.workers, counted(len(set(plan.groups.values())), "contact model")
+        text = f"{counted(len(plan.groups), 'point')} to solve, from {counted(plan.meshes, 'mesh')}"
+        if plan.condensations:
+            text += f", {counted(plan.condensations, 'condensation')} ({models})"
+        here = f"{counted(max(who.count, 1), 'worker')}, {counted(who.threads, 'thread')} each"
+        where = f"workers of {who.cluster}" if who.cluster else here
+        lines.append(f"{text}; {where}, up to {plan.memory_bytes / 1e9:.2g} GB each")
+    for line in lines:
+        console.print(line)
+    for note in plan.notes:
+        console.print(note, style="dim")
+
+
+def print_sweep(console: Console, result: SweepResult) -> None:
+    """The table, as far as it fits, and where the rest is."""
+    plan = result.plan
+    places = plan.places[:_ROWS]
+    columns = [
+        TextColumn(
+            _head(axis.path.rpartition(".")[2], "", axis.unit),
+            tuple(
+                v if isinstance(v := axis.shown(place[k]), str) else f"{v:.6g}" for place in places
+            ),
+        )
+        for k, axis in enumerate(plan.axes)
+    ]
+    for k, column in enumerate(result.columns):
+        values = (_shown(result, number, column.values, k) for number in range(len(places)))
+        head = _head(column.name, column.case, column.unit)
+        columns.append(TextColumn(head, tuple(values), right=True, rank=k))
+    left_out = print_table(console, columns, note=False)
+    points = max(len(plan.places) - _ROWS, 0)
+    if points or left_out:
+        hidden = f"{counted(points, 'point')}, {counted(len(left_out), 'number')}"
+        console.print(f"Not shown: {hidden}; see the table's file")
+    _print_end(console, result)
+
+
+def print_sample(console: Console, result: SweepResult) -> None:
+    """What the sample makes of every number, and where the rest is."""
+    rows = result.sampled
+    span = "middle\n95 %" if all(one.resolved for one in rows) else "least to\nlargest"
+
+    def numbers(head: str, text: Callable[[SampledNumber], str], rank: int = 0) -> TextColumn:
+        return TextColumn(head, tuple(map(text, rows)), right=True, rank=rank)
+
+    columns = [
+        TextColumn("number", tuple(number_label(one.name) for one in rows), folds=_WIDTH),
+        TextColumn("case", tuple(one.case for one in rows), rank=1, folds=_WIDTH),
+        numbers("as given", lambda one: number(one.nominal)),
+        numbers("first\norder", lambda one: _band(one.first_order)),
+        numbers("sample", _sample_band),
+        numbers("mean", lambda one: number(one.mean), 3),
+        numbers("standard\ndeviation", lambda one: number(one.deviation), 4),
+        numbers(
+            span,
+            lambda one: "" if one.low is None else f"{number(one.low)} to {number(one.high)}",
+            2,
+        ),
+        TextColumn("unit", tuple(one.unit for one in rows)),
+        TextColumn("compared", tuple(one.verdict for one in rows), folds=2 * _WIDTH),
+    ]
+    print_table(console, columns, title="Bands by the inputs, to first order and sampled")
+    console.print(sample_sentence(rows))
+    _print_end(console, result)
+
+
+def _band(band: float | None) -> str:
+    return "" if band is None else f"±{percent_of(band)}"
+
+
+def _sample_band(one: SampledNumber) -> str:
+    """The sample's band and its sampling error."""
+    if one.band_low is None or one.band_high is None:
+        return _band(one.band)
+    return f"{_band(one.band)} ({100.0 * one.band_low:.2g} to {100.0 * one.band_high:.2g})"
+
+
+def _print_end(console: Console, result: SweepResult) -> None:
+    """Failures, warnings, files and seconds."""
+    reasons = Counter(result.outcomes[k].failure for k in result.failed)
+    lines = [
+        f"{counted(count, 'point')} failed: {reason}"
+        for reason, count in list(reasons.items())[:_REASONS]
+    ]
+    if len(reasons) > _REASONS:
+        lines.append(f"and {len(reasons) - _REASONS} other reasons, in the table's column reason")
+    warned = [outcome.warnings for outcome in result.outcomes if outcome.warnings]
+    if warned:
+        names = ", ".join(sorted({name for names in warned for name in names}))
+        points = counted(len(warned), "point")
+        lines.append(f"{points} with warnings ({names}): see the table's column warnings")
+    lines += [f"{'Figure' if p.suffix == '.png' else 'File'}: {p}" for p in result.files]
+    fine, total = len(result.plan.places) - len(result.failed), len(result.plan.places)
+    for line in (*lines, f"{fine} of {total} points ok, {duration(result.seconds)}"):
+        console.print(line)
+
+
+def _shown(result: SweepResult, place: int, values: NDArray[np.float64], column: int) -> str:
+    """A number of a point; the first column shows that it failed."""
+    if result.outcomes[place].failure:
+        return "" if column else "failed"
+    value = float(values[place])
+    return "" if math.isnan(value) else f"{value:.4g}"
+
+
+def _head(name: str, case: str, unit: str) -> str:
+    """A head on narrow lines, long names broken at their underscores."""
+    broken = textwrap.wrap(name.replace("_", "_ "), _WIDTH)
+    lines = [*(line.replace("_ ", "_") for line in broken), *textwrap.wrap(case, _WIDTH)]
+    return "\n".join([*lines, f"[{unit}]"] if unit else lines)
+
+
+def print_study_plan(console: Console, title: str, study: Study, workers: Workers) -> None:
+    """How many points, and who solves them."""
+    threads = counted(workers.threads, "thread") if workers.threads else "all threads"
+    points, who = counted(len(study.points), "point"), f"one at a time with {threads}"
+    if workers.cluster:
+        who = f"workers of {workers.cluster}, {threads} each"
+    elif workers.count > 1:
+        side = counted(workers.count, "point")
+        who = f"{side} at a time with {threads} each: seconds are not those of a single run"
+    what = f"{points}, {who}" if study.points else "from one set of modes, no other runs"
+    console.print(f"{title}: {what}")
+
+
+def print_study(console: Console, result: StudyResult) -> None:
+    """The study's tables, and where its files are."""
+    if result.kept:
+        console.print(f"{counted(len(result.kept), 'point')} kept from an earlier call")
+    for table in result.report.tables:
+        print_table(console, study_columns(table), title=table.title)
+    files = [f"{_KINDS.get(path.suffix, 'File')}: {path}" for path in result.files]
+    fine = sum(not one.outcome.failure for one in result.solved)
+    many = f"{fine} of {counted(len(result.solved), 'point')} ok, " if result.solved else ""
+    for line in (*result.report.notes, *files, f"{many}{duration(result.seconds)}"):
+        console.print(line)
+
+
+def study_columns(table: TextTable) -> list[TextColumn]:
+    """The columns of a study's table; the last numbers are left out where it is too wide."""
+    cells = list(zip(*table.rows, strict=True)) or [()] * len(table.columns)
+    words = "r" in table.align
+    heads = zip(table.columns, table.align, cells, strict=True)
+    return [
+        TextColumn(
+            head,
+            tuple(mine),
+            right=letter == "r",
+            rank=0 if words and letter == "l" and head not in table.spare else k,
+            folds=_WORDS if letter == "l" else 0,
+        )
+        for k, (head, letter, mine) in enumerate(heads)
+    ]
