@@ -16,8 +16,9 @@ from upd.batch.output import SweepResult
 from upd.batch.plan import SweepPlan
 from upd.cli.progress import counted, duration
 from upd.cli.tables import print_table
-from upd.labels import number, number_label, percent_of
+from upd.labels import number, percent_of
 from upd.report.columns import TextColumn
+from upd.results.quantities import number_label
 from upd.results.sampled import SampledNumber, sample_sentence
 
 #: Rows shown, and characters of a line of a head; the files hold all.

@@ -5,9 +5,12 @@ Pressure, opening, stick and slip, contact stiffness, and the contact points of 
 
 from __future__ import annotations
 
+from functools import partial
+
 from upd.analyses.base import Analysis
 from upd.analyses.contact.bodies import needs
 from upd.analyses.contact.levels import coarsened
+from upd.analyses.contact.results import pick
 from upd.analyses.flat import accuracy, charts, checks, left_out, output, results
 
 ANALYSIS = Analysis(
@@ -23,7 +26,7 @@ ANALYSIS = Analysis(
     sizes=output.sizes,
     write_files=output.write_files,
     charts=charts.charts,
-    headline=results.headline,
+    headline=partial(pick, names=results.HEADLINE),
     estimate=accuracy.estimate,
     verdict_names=("max_pressure",),
     coarsened=coarsened,

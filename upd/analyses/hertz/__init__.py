@@ -5,9 +5,12 @@ Hertz's and Mindlin's problem.
 
 from __future__ import annotations
 
+from functools import partial
+
 from upd.analyses.base import Analysis
 from upd.analyses.contact.bodies import needs
 from upd.analyses.contact.levels import coarsened
+from upd.analyses.contact.results import pick
 from upd.analyses.hertz import accuracy, charts, checks, left_out, output, results
 
 ANALYSIS = Analysis(
@@ -28,7 +31,7 @@ ANALYSIS = Analysis(
     sizes=output.sizes,
     write_files=output.write_files,
     charts=charts.charts,
-    headline=results.headline,
+    headline=partial(pick, names=results.HEADLINE, last=True),
     estimate=accuracy.estimate,
     coarsened=coarsened,
 )
