@@ -5,10 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from upd.analyses.forced.model import Model
     from upd.analyses.forced.spring_march import SpringMarch
     from upd.hbm import FrequencyResponse
     from upd.hbm.interface_state import InterfaceState
+    from upd.results import Result
 
 #: keys over a ready response
 LINES: dict[str, Any] = {
@@ -21,6 +24,8 @@ LINES: dict[str, Any] = {
     "contact.rows": "all",
     "contact.columns": 3,
 }
+#: unit -> those that some analyses have in its place
+_OTHER_UNITS = {"mm2": ("um2",), "mrad": ("urad",)}
 #: the same as overrides
 SET_LINES = tuple(f"{key}={value}" for key, value in LINES.items())
 
@@ -33,3 +38,21 @@ def state_of(
 
     f = float(answer.frequency[i])
     return state_at(springs, model, answer.balance, answer.x[i], f, force)
+
+
+def undeclared(results: Iterable[Result]) -> list[str]:
+    """Names that are not one declared number's, and those with a unit that it has not."""
+    from upd.results.quantities import DECLARED, quantity_of
+
+    found = []
+    for one in results:
+        name = one.name.removeprefix("left_")
+        alike = [
+            q for q in DECLARED.values() if name in (q.name, q.named(q.number_of(name) or "-"))
+        ]
+        exact = [q for q in alike if q.name == name]
+        quantity, _ = quantity_of(one.name)
+        units = {quantity.unit, *_OTHER_UNITS.get(quantity.unit, ())}
+        if len(exact or alike) != 1 or one.unit not in units:
+            found.append(f"{one.name}, {one.unit}")
+    return found

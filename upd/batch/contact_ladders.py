@@ -19,8 +19,8 @@ from upd.batch.ladder import Counts, Ladder, Levels, StudyReport, even, shown
 from upd.batch.study_point import Key, Settings, SolvedPoint, StudyPoint, matching
 from upd.batch.study_tables import TextTable, cost_columns, make_table
 from upd.errors import InputError
-from upd.labels import number_label
 from upd.linalg import select
+from upd.results.quantities import number_label
 from upd.scene import Scene
 
 #: numbers a ladder follows beside those the analysis names first

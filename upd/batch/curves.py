@@ -4,7 +4,6 @@ level.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.batch.study_point import Key, SolvedPoint, matching, solved_alone
+from upd.results.quantities import quantity_of
 from upd.vary.orders import (
     ErrorEstimate,
     Extrapolation,
@@ -24,11 +24,6 @@ from upd.vary.orders import (
 
 Array = NDArray[np.float64]
 
-#: Numbers of the raw bodies: their error is taken against the converged value on the same bodies,
-#: not against the half-space.
-_SAME_BODIES = re.compile(r"approach|f\d+_(free|glued)")
-#: raw number -> the same without the finite bodies' share, which has a closed form
-_WITHOUT_BODIES = {"approach": "approach_contact"}
 #: order of change below which a number does not converge: a logarithm has 0, the edge of a
 #: punch less
 _CONVERGES = 0.2
@@ -134,11 +129,12 @@ def closed_form(key: Key, points: Sequence[SolvedPoint]) -> Array | None:
     That of a raw number is the half-space's plus the finite bodies' share, which is solved on the
     level itself.
     """
-    if not _SAME_BODIES.fullmatch(key[0]):
+    quantity, _ = quantity_of(key[0])
+    if not quantity.same_bodies:
         if not all(key in p.errors for p in points):
             return None
         return np.array([p.values[key] / (1.0 + p.errors[key]) for p in points])
-    contact = (_WITHOUT_BODIES.get(key[0], ""), key[1])
+    contact = (quantity.full, key[1])
     if not all(contact in p.errors for p in points):
         return None
     return np.array(
@@ -156,7 +152,7 @@ def _curve(key: Key, points: Sequence[SolvedPoint], finer: SolvedPoint | None) -
     own = extrapolate(h, values) if len(set(h)) >= 3 else None
     change, closed = change_order(h, values), closed_form(key, points)
     # An approach and a frequency have a limit, whatever few coarse levels show.
-    same = _SAME_BODIES.fullmatch(key[0]) is not None
+    same = quantity_of(key[0])[0].same_bodies
     no_limit = closed is None and not same and change < _CONVERGES
     if closed is not None:
         reference, against = closed, "reference"

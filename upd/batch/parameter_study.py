@@ -14,8 +14,8 @@ from upd.analyses.flat.printed import printed_of
 from upd.batch.ladder import Ladder, Levels, StudyReport, no_levels
 from upd.batch.study_point import Settings, SolvedPoint, StudyPoint, solved_alone
 from upd.batch.study_tables import TextTable
-from upd.labels import number_label
 from upd.mesh import recipes
+from upd.results.quantities import number_label
 from upd.scene import Scene
 
 #: numbers of the table, in its order

@@ -11,7 +11,8 @@ import numpy as np
 
 from upd.batch.curves import ConvergenceCurve, with_friction
 from upd.batch.study_point import SolvedPoint, matching
-from upd.labels import number_label, percent
+from upd.labels import percent
+from upd.results.quantities import number_label
 
 #: head, "l" or "r", and what makes the cell of a row
 TableColumn = tuple[str, str, Callable[[Any], str]]

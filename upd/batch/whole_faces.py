@@ -7,7 +7,6 @@ mesh of the faces.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -23,6 +22,8 @@ from upd.errors import InputError
 from upd.labels import percent
 from upd.plot.work_precision import change_charts
 from upd.results import Case
+from upd.results.quantities import PEAK_ACCELERANCE, PEAK_FREQUENCY, quantity_of
+from upd.results.quantity import Quantity
 from upd.scene import ForcedScene
 
 #: meshes of both faces: 60, 198 and 468 nodes of the symmetric damper's half (the last has the
@@ -39,10 +40,9 @@ _NODE_BY_NODE = ("hex8i", "hex8")
 #: curve of the levels on springs
 SPRINGS = "springs"
 #: numbers of a peak, their heads in a table, and the digits it shows
-_KINDS = {"frequency": ("frequency\nHz", 5), "accelerance": ("height\n(m/s2)/N", 4)}
-_PEAK = re.compile(rf"peak_(\d+)_({'|'.join(_KINDS)})")
+_KINDS = {PEAK_FREQUENCY: ("frequency\nHz", 5), PEAK_ACCELERANCE: ("height\n(m/s2)/N", 4)}
 #: number of a peak, and which number of it
-PeakKey = tuple[int, str]
+PeakKey = tuple[int, Quantity]
 
 
 def whole_faces_points(scene: ForcedScene, levels: Levels = None) -> list[StudyPoint]:
@@ -174,17 +174,17 @@ def finest(solved: Sequence[SolvedPoint]) -> SolvedPoint | None:
 
 
 def peak_numbers(one: SolvedPoint) -> dict[PeakKey, LevelNumber]:
-    """Number of the peak and "frequency" or "accelerance" -> what the level has of it.
+    """Number of the peak and its frequency or accelerance -> what the level has of it.
 
     Peaks are numbered by the mode in which the blades move, so that numbers of levels whose
     contacts have other names belong together.
     """
     found: dict[PeakKey, list[PointResult]] = {}
     for result in one.outcome.results:
-        named = _PEAK.fullmatch(result.name)
+        quantity, n = quantity_of(result.name)
         # curves of linear limits have no F_C/F_E
-        if named is not None and result.case.force_ratio is not None:
-            found.setdefault((int(named[1]), named[2]), []).append(result)
+        if quantity in _KINDS and result.case.force_ratio is not None:
+            found.setdefault((int(n), quantity), []).append(result)
     return {key: _level_number(results) for key, results in found.items()}
 
 
@@ -211,7 +211,7 @@ def change_curves(solved: Sequence[SolvedPoint]) -> list[ConvergenceCurve]:
     for key, reference in peak_numbers(fine).items():
         if reference.ends is None:
             continue
-        name = (f"peak_{key[0]}_{key[1]}", Case(mode=reference.mode))
+        name = (key[1].named(key[0]), Case(mode=reference.mode))
         for curve, points in ladders.items():
             found = [(p, n.change(reference)) for p in points if (n := peak_numbers(p).get(key))]
             changes = {p.name: change for p, change in found if change is not None}

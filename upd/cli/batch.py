@@ -19,8 +19,9 @@ from upd.batch.studies import StudyResult
 from upd.batch.study_tables import TextTable
 from upd.cli.tables import print_table
 from upd.cli.terminal import counted, duration
-from upd.labels import number, number_label, percent_of
+from upd.labels import number, percent_of
 from upd.report.columns import TextColumn
+from upd.results.quantities import number_label
 from upd.results.sampled import SampledNumber, sample_sentence
 
 #: rows shown, and characters of a line of a head; the files hold all

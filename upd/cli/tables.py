@@ -13,20 +13,13 @@ from rich.text import Text
 
 from upd.analyses.base import Plan, fitting, memory_limit
 from upd.cli.terminal import counted
-from upd.labels import (
-    check_number,
-    effect_word,
-    number,
-    number_label,
-    percent,
-    plus_minus,
-    shown,
-)
+from upd.labels import check_number, effect_word, number, percent, plus_minus, shown
 from upd.linalg.select import PRODUCTS
 from upd.report.answer import TITLE, AnswerLine, answer
 from upd.report.columns import TextColumn, fitted, folded_head
 from upd.report.notebook import RunResult
 from upd.results import FAILED, OK, WARNED, Result, worst_checks
+from upd.results.quantities import number_label
 
 #: mood of a line -> how it looks
 _STYLES = {OK: "green", WARNED: "yellow", FAILED: "red", TITLE: "bold"}

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.forced.mode_peaks import LEFT
 from upd.errors import InputError
 from upd.measured import MeasuredCurve, read_measured
+from upd.results.quantity import LEFT
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import SIDES, Side
 from upd.scene.uncertain import read_band

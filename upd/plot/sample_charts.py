@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from upd.labels import number_label, unit_label
+from upd.labels import unit_label
 from upd.plot.chart import Area, Array, Axis, Band, Chart, Trace
 from upd.plot.sweep_charts import MOST_PANELS, SAMPLE_FIGURE
+from upd.results.quantities import number_label
 from upd.results.sampled import SampledNumber
 
 

@@ -9,8 +9,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from upd.labels import file_name, number_label, unit_label
+from upd.labels import file_name, unit_label
 from upd.plot.chart import Array, Axis, Chart, Map, Trace
+from upd.results.quantities import number_label
 
 #: charts on one sheet, and sheets, at most: more is no figure any more
 MOST_PANELS, MOST_SHEETS = 24, 24

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from upd.labels import number_label
 from upd.plot.chart import Array, Axis, Band, Chart, Mark, Trace
+from upd.results.quantities import number_label
 
 _COSTS = (
     ("seconds", Axis("seconds", log=True)),

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 from upd.analyses import analysis_named
 from upd.analyses.base import CHOSEN_BY_ACCURACY
-from upd.labels import check_number, number, number_label, percent, plus_minus, shown, unit_label
+from upd.labels import check_number, number, percent, plus_minus, shown, unit_label
 from upd.plot.chart import Entry
 from upd.report import generic
 from upd.report.columns import (
@@ -30,6 +30,7 @@ from upd.report.error_budget import budget_line
 from upd.report.notes import MOST_NOTES, short_notes
 from upd.results import FAILED, WARNED, Check, Result, warning_details, worst_check
 from upd.results.answer_table import AnswerTable
+from upd.results.quantities import number_label
 
 #: lines that fit on a screen
 LINES = 40

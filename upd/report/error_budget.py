@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from upd.labels import number_label, percent_of
+from upd.labels import percent_of
 from upd.plot.chart import Axis, Bars, Chart, Entry
 from upd.results import read_part
+from upd.results.quantities import number_label
 
 #: most numbers of the figure
 _MOST = 12

@@ -17,13 +17,14 @@ import numpy as np
 
 from upd.analyses import analysis_named
 from upd.errors import ConvergenceError, InputError
-from upd.labels import number, number_label, percent, plus_minus, shown, unit_label
+from upd.labels import number, percent, plus_minus, shown, unit_label
 from upd.report import generic
 from upd.report.answer import answer_tables, as_text
 from upd.report.answer import headline as main_numbers
 from upd.report.error_budget import budget_charts
 from upd.results import FAILED, OK, WARNED, Case, Check, Result, outcome_of
 from upd.results.answer_table import AnswerTable
+from upd.results.quantities import number_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,9 +6,10 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from upd.labels import check_words, number_label
+from upd.labels import check_words
 from upd.plot.chart import Entry
 from upd.results import worst_checks
+from upd.results.quantities import number_label
 
 #: notes that stand beside an answer; what matters less is told elsewhere
 MOST_NOTES = 3

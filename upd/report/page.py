@@ -19,15 +19,7 @@ from markupsafe import Markup, escape
 
 from upd.cache.files import write_text
 from upd.errors import InputError
-from upd.labels import (
-    check_number,
-    effect_word,
-    number,
-    number_label,
-    percent,
-    plus_minus,
-    unit_label,
-)
+from upd.labels import check_number, effect_word, number, percent, plus_minus, unit_label
 from upd.plot.chart import Entry
 from upd.plot.png import png_uri
 from upd.report import generic
@@ -40,6 +32,7 @@ from upd.report.scene_sentences import sentences
 from upd.report.surfaces import Surface, fitting, packed, picture, run_surfaces
 from upd.report.told import warnings
 from upd.results import FAILED, outcome_of, worst_checks
+from upd.results.quantities import number_label
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -11,12 +11,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from upd.labels import number_label, percent_of, unit_label
+from upd.labels import percent_of, unit_label
 from upd.plot.sample_charts import sample_charts
 from upd.plot.sweep_charts import Followed, sheet_name, sweep_charts
 from upd.report.page import render, save, stages
 from upd.report.panels import Panel, make_panels
 from upd.report.sweep_folder import SweepFolder, read_sweep
+from upd.results.quantities import number_label
 from upd.results.sampled import SampledNumber, sample_sentence
 
 #: rows of the table on the page; all of them are in table.csv

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from upd.labels import check_words, number_label
+from upd.labels import check_words
 from upd.plot.chart import Entry
 from upd.report.folder import LogLine, RunFolder
 from upd.results import worst_check
+from upd.results.quantities import number_label
 
 #: records of the solvers, whose faults stand in the checks
 _SOLVER = "upd.hbm"

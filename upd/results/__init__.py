@@ -15,7 +15,6 @@ from upd.results.number import (
     with_estimates,
     with_inputs,
     with_parts,
-    withheld,
 )
 from upd.results.status import (
     FAILED,
@@ -57,7 +56,6 @@ __all__ = [
     "with_fault",
     "with_inputs",
     "with_parts",
-    "withheld",
     "worst_check",
     "worst_checks",
     "write_netcdf",

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from upd.labels import check_words, number, number_label
+from upd.labels import check_words, number
 from upd.results.case import Case
+from upd.results.quantities import number_label
 
 
 @dataclass(frozen=True)

@@ -254,11 +254,6 @@ def with_inputs(results: Iterable[Result], found: InputParts) -> tuple[Result, .
     )
 
 
-def withheld(name: str, case: Case, unit: str, reason: str) -> Result:
-    """A number that was asked for and not reached: no value, and the reason."""
-    return Result(name, case, float("nan"), unit, withheld=reason)
-
-
 #: name that scripts know
 Row = Result
 

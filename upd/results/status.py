@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from upd.labels import check_words, number_label
+from upd.labels import check_words
 from upd.results.check import Check, worst_check
 from upd.results.number import Result
+from upd.results.quantities import number_label
 
 OK, WARNED, FAILED = "ok", "ok with warnings", "failed"
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from fnmatch import fnmatchcase
 from functools import cache, partial
 from typing import Any
 
 from upd.errors import InputError, one_line
 from upd.progress import Stages
 from upd.results import ErrorPart, Estimates, Result
+from upd.results.quantities import quantity_of
 from upd.vary.orders import (
     ASSUMED,
     UNCONFIRMED,
@@ -24,8 +24,6 @@ from upd.vary.scatter import sampled_error
 from upd.vary.solve import solve
 from upd.vary.variation import COARSER, RUN, Key, Problem, SolvedVariation, Variation
 
-#: numbers that are errors themselves
-_ERRORS = ("*misfit*", "*_error", "*_mac", "*_difference")
 _NONE, _LACKING = "not estimated: ", "no companion has this number"
 
 
@@ -216,7 +214,7 @@ def _half(half_cost: Callable[[float], float], order: float) -> tuple[float | No
 def _judged(numbers: Iterable[Result]) -> Iterator[Result]:
     """Those that were reached and are no errors themselves."""
     for one in numbers:
-        if not one.withheld and not any(fnmatchcase(one.name, pattern) for pattern in _ERRORS):
+        if not one.withheld and not quantity_of(one.name)[0].is_error:
             yield one
 
 

@@ -17,7 +17,8 @@ from upd.analyses import make_plan
 from upd.analyses.base import CHOSEN_BY_ACCURACY, Plan, chosen_by_accuracy, refuse_oversize
 from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages
-from upd.results import Case, ErrorPart, Estimates, Result, withheld
+from upd.results import Case, ErrorPart, Estimates, Result
+from upd.results.quantity import Quantity
 from upd.scene import load_scene
 from upd.vary.wanted import LevelChoice, LevelSearch, Wanted, require_named, shares_of, solve_wanted
 
@@ -126,7 +127,7 @@ def test_the_cheapest_levels_are_solved_whole_and_say_what_was_not_needed() -> N
 def test_a_wanted_number_that_a_run_withholds_is_not_reached() -> None:
     """Its error has no parts; the others are brought to theirs, and the run says what it lacks."""
     made = MadeUp()
-    lost = withheld("number_2", CASE, "N", "no steady motion")
+    lost = Quantity("number_2", "N").withheld(CASE, "no steady motion")
     made.wanted = replace(
         made.wanted,
         governing={"all": "number*"},

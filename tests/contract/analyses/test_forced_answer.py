@@ -11,8 +11,9 @@ import pytest
 
 from upd.analyses.forced.answer import answer, headline
 from upd.plot.chart import Entry
-from upd.results import Case, Result, withheld
+from upd.results import Case, Result
 from upd.results.answer_table import AnswerTable
+from upd.results.quantity import Quantity
 
 OWN = Case(stiffness="own")
 MODES = {1: "in phase", 2: "out of phase"}
@@ -113,8 +114,8 @@ def test_a_sweep_without_a_free_peak_compares_with_none() -> None:
 
 def test_peaks_that_were_not_reached_are_counted() -> None:
     at = replace(ratio(60.0), mode=MODES[2])
-    lost = withheld("peak_2_frequency", at, "Hz", "the path stopped at 300 Hz")
-    high = withheld("peak_2_accelerance", at, "(m/s2)/N", "the path stopped at 300 Hz")
+    lost = Quantity("peak_2_frequency", "Hz").withheld(at, "the path stopped at 300 Hz")
+    high = Quantity("peak_2_accelerance", "(m/s2)/N").withheld(at, "the path stopped at 300 Hz")
     table = told(*RUN, lost, high)["Peaks"]
     assert len(table.rows) == 4
     assert table.note.endswith("1 peaks were not reached: see the notes.")
@@ -210,7 +211,7 @@ def test_inputs_are_ranked_by_what_an_engineer_asks_for() -> None:
 
 def test_what_is_not_known_has_no_table() -> None:
     assert told() == {}
-    assert told(withheld("peak_1_frequency", ratio(60.0), "Hz", "lost")) == {}
+    assert told(Quantity("peak_1_frequency", "Hz").withheld(ratio(60.0), "lost")) == {}
     assert set(told(*RUN)) == {"Peaks"}
 
 

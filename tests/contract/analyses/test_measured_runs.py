@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rigs import undeclared
 
 import upd
 from upd.errors import InputError
@@ -39,6 +40,7 @@ def numbers(run: upd.RunResult, measured: str) -> dict[str, Result]:
 def test_free_curve(run: upd.RunResult) -> None:
     """Made with 0.4 % and 2 % noise, which the file says."""
     found = numbers(run, "free")
+    assert undeclared(run.results) == []
     assert found["frac"].value > 0.998
     assert abs(found["peak_frequency_difference"].value) < 0.05
     assert found["computed_peak_accelerance"].error == pytest.approx(0.0, abs=0.03)

@@ -14,14 +14,14 @@ from upd.results import (
     outcome_of,
     status_of,
     warnings_of,
-    withheld,
 )
+from upd.results.quantities import PEAK_FREQUENCY
 
 GOOD = Check("balance", NO_CASE, 0.0, 1e-9, "misfit", "report this")
 WARNS = replace(GOOD, name="truncation", case=Case(force_ratio=194.0), value=1.0, fatal=False)
 FATAL = replace(GOOD, value=1.0)
 NUMBER = Result("peak_1_frequency", Case(force_ratio=600.0), 400.0, "Hz")
-MISSING = withheld("peak_2_frequency", Case(force_ratio=194.0), "Hz", "the path stopped at 330 Hz")
+MISSING = PEAK_FREQUENCY.withheld(Case(force_ratio=194.0), "the path stopped at 330 Hz", n=2)
 
 
 @pytest.mark.parametrize(

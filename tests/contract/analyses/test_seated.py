@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs import undeclared
 
 import upd
 from upd.analyses import make_plan, seated
@@ -355,6 +356,7 @@ def test_run_folder_of_a_seating(tmp_path: Path) -> None:
     names = {p.name for p in (tmp_path / "run").iterdir()}
     assert {"seating.png", "pressure.png", "stick_slip.png", "hysteresis.png"} <= names
     assert {"report.html", "mesh.vtu", "damper_motion.png"} <= names
+    assert undeclared(result.results) == []
     again = upd.load(tmp_path / "run")
     assert [r.value for r in again.results] == [r.value for r in result.results]
     assert read_state(tmp_path / "run").history.force.shape[1] == 3

@@ -29,8 +29,8 @@ from upd.results import (
     outcome_of,
     status_of,
     warning_details,
-    withheld,
 )
+from upd.results.quantity import Quantity
 from upd.scene import ready_scenes
 
 _RESPONSE: Mapping[str, Any] = {
@@ -164,7 +164,8 @@ def test_many_warnings_leave_room_for_the_numbers(toy: Callable[[str], RunResult
         Check(f"check {k}", Case(force_ratio=float(k)), 2.0, 1.0, "word " * 40, "do " * 60, False)
         for k in range(30)
     ]
-    lost = [withheld(f"number_{k}", NO_CASE, "Hz", "the path stopped " * 20) for k in range(9)]
+    why = "the path stopped " * 20
+    lost = [Quantity(f"number_{k}", "Hz").withheld(NO_CASE, why) for k in range(9)]
     results = (*result.results, *lost)
     bad = replace(
         result, checks=tuple(many), results=results, status=status_of(many, results), title="t"

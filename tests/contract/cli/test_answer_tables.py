@@ -17,8 +17,9 @@ from upd.report.answer import answer_tables
 from upd.report.columns import whole_table
 from upd.report.notebook import RunResult
 from upd.report.notes import short_notes
-from upd.results import NO_CASE, Case, Check, Result, status_of, withheld
+from upd.results import NO_CASE, Case, Check, Result, status_of
 from upd.results.answer_table import AnswerTable
+from upd.results.quantity import Quantity
 
 PEAKS = AnswerTable(
     "Peaks",
@@ -108,7 +109,7 @@ def test_the_terminal_shows_the_tables_and_then_what_warns(told: RunResult, widt
         for k in range(5)
         for r in (2.0, 3.0)
     ]
-    lost = [withheld(f"number_{k}", NO_CASE, "Hz", "the path ended") for k in range(3)]
+    lost = [Quantity(f"number_{k}", "Hz").withheld(NO_CASE, "the path ended") for k in range(3)]
     results = (*told.results, *lost)
     bad = replace(
         told,

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from fnmatch import fnmatchcase
 
-from upd.analyses.contact.loading import LoadPath
 from upd.plot.chart import Entry
 from upd.results import Case, Result
+from upd.results import quantities as q
 
-UM = 1e3
+#: sources of numbers of a contact whose edge is located between nodes
+LOCATED = {
+    q.CONTACT_AREA.name: "edge located between nodes",
+    q.MEAN_PRESSURE.name: "load over the located area",
+    q.CONTACT_AREA_NODES.name: "tributary areas of the nodes in contact",
+}
 _MOST, _FEWEST = 8, 5
 _RAW = "_raw"
 
@@ -19,43 +23,10 @@ def shear_stiffness(case: Case, load: float, displacement: float, tangent: float
     """Tangent stiffness in N/mm under a tangential load in N, and the secant where there is a
     load.
     """
-    out = [Result("K_T_tangent_raw", case, tangent, "N/mm")]
+    out = [q.K_T_TANGENT_RAW.of(tangent, case)]
     if load > 0.0:
-        out.append(Result("K_T_secant_raw", case, load / displacement, "N/mm"))
+        out.append(q.K_T_SECANT_RAW.of(load / displacement, case))
     return out
-
-
-def stick_area(case: Case, value: float, unit: str) -> Result:
-    """Tributary area of the nodes that stick."""
-    return Result("stick_area", case, value, unit, source="tributary areas of the nodes that stick")
-
-
-def located_results(
-    results: Sequence[Result], case: Case, resolution: float, unit: str
-) -> list[Result]:
-    """The numbers, those of a located edge saying so, and what the lattice leaves open of the
-    area.
-    """
-    named = {
-        "contact_area": "edge located between nodes",
-        "mean_pressure": "load over the located area",
-        "contact_area_nodes": "tributary areas of the nodes in contact",
-    }
-    return [
-        *(replace(r, source=r.source or named.get(r.name, "")) for r in results),
-        Result(
-            "contact_area_resolution",
-            case,
-            resolution,
-            unit,
-            source="half the area of the cells that the edge crosses",
-        ),
-    ]
-
-
-def cycle_energy(path: LoadPath, reference: float | None = None, source: str = "") -> Result:
-    """Energy a cycle dissipates."""
-    return Result("cycle_energy", path.case, path.slip_work, "mJ", reference, source)
 
 
 def pick(results: Sequence[Entry], names: Sequence[str], *, last: bool = False) -> list[Entry]:

@@ -12,6 +12,7 @@ from upd.analyses.contact import effects
 from upd.analyses.contact.bodies import needs
 from upd.analyses.contact.effects import SolvedAgain
 from upd.analyses.contact.levels import coarsened, plan_with_estimates
+from upd.analyses.contact.results import pick
 from upd.analyses.flat import accuracy, charts, checks, output, results
 from upd.analyses.flat.solve import note_moved, solve_companion
 from upd.vary import errors
@@ -31,7 +32,7 @@ ANALYSIS = Analysis(
     sizes=output.sizes,
     write_files=output.write_files,
     charts=charts.charts,
-    headline=results.headline,
+    headline=partial(pick, names=results.HEADLINE),
     estimate=partial(errors.estimate, accuracy.PROBLEM),
     verdict_names=("max_pressure",),
     coarsened=coarsened,

@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from upd.analyses.contact.plan import direction_name
-from upd.analyses.contact.results import (
-    UM,
-    cycle_energy,
-    located_results,
-    pick,
-    shear_stiffness,
-    stick_area,
-)
+from upd.analyses.contact.results import LOCATED, shear_stiffness
 from upd.analyses.flat.maps import (
     contact_law,
     corner,
@@ -30,8 +21,8 @@ from upd.analyses.flat.printed import printed_of
 from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.analyses.printed import with_printed
 from upd.mesh import IntArray, Mesh
-from upd.plot.chart import Entry
 from upd.results import Case, Result
+from upd.results import quantities as q
 
 #: the numbers that matter, most important first
 HEADLINE = (
@@ -57,11 +48,6 @@ HEADLINE = (
 _WORKING = (50.0, 300.0)
 
 
-def headline(results: Sequence[Entry]) -> list[Entry]:
-    """The numbers an engineer asks for first, at the first load."""
-    return pick(results, HEADLINE)
-
-
 def make_results(solution: FlatSolution) -> list[Result]:
     """All numbers of a run, case by case."""
     out, scene = _equilibrium(solution), solution.plan.scene
@@ -76,7 +62,9 @@ def make_results(solution: FlatSolution) -> list[Result]:
             r for t in solution.tangential if t.normal is case for r in _tangential(solution, t)
         ]
         out += [
-            cycle_energy(path) for path in solution.paths if path.normal == case.case and path.cycle
+            q.CYCLE_ENERGY.of(path.slip_work, path.case)
+            for path in solution.paths
+            if path.normal == case.case and path.cycle
         ]
     return with_printed(out + _curve(solution), printed_of(scene))
 
@@ -87,62 +75,59 @@ def _equilibrium(solution: FlatSolution) -> list[Result]:
         if load.faces is not None:
             case = Case(name="equilibrium", friction=load.state)
             out += [
-                Result("F_N", case, load.faces.normal_right, "N"),
-                Result("F_T", case, load.faces.tangential_right, "N"),
-                Result("F_N_other_face", case, load.faces.normal_left, "N"),
+                q.F_N.of(load.faces.normal_right, case),
+                q.F_T.of(load.faces.tangential_right, case),
+                q.F_N_OTHER_FACE.of(load.faces.normal_left, case),
             ]
     return out
 
 
 def _normal(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
-    force = case.solution.force
+    force, at = case.solution.force, case.case
     pressure = solution.model.multipliers.pressure(force)
     closed = sum(float(k.area()[k.field(force) > 0.0].sum()) for k in lattices(solution))
     whole = sum(float(k.area().sum()) for k in lattices(solution))
     located = whole_area(solution, case.solution)
     mean = case.force / located.area if located.area else 0.0
     out = [
-        Result("max_pressure", case.case, float(pressure.max()), "MPa"),
-        Result("mean_pressure", case.case, mean, "MPa"),
-        Result("contact_area", case.case, located.area, "mm2"),
-        Result("contact_area_nodes", case.case, closed, "mm2"),
-        Result("closed_share", case.case, 100.0 * closed / whole, "%"),
-        Result("approach", case.case, case.solution.approach * UM, "um"),
-    ]
-    out = located_results(out, case.case, located.resolution, "mm2")
-    out += [
-        Result(f"approach_{body}", case.case, value * UM, "um")
-        for body, value in case.approach_of.items()
+        q.MAX_PRESSURE.of(pressure.max(), at),
+        *(
+            quantity.of(value, at, source=LOCATED[quantity.name])
+            for quantity, value in (
+                (q.MEAN_PRESSURE, mean),
+                (q.CONTACT_AREA, located.area),
+                (q.CONTACT_AREA_NODES, closed),
+            )
+        ),
+        q.CLOSED_SHARE.of(100.0 * closed / whole, at),
+        q.APPROACH.of(case.solution.approach, at),
+        q.CONTACT_AREA_RESOLUTION.of(located.resolution, at),
+        *(q.APPROACH_OF.of(value, at, n=body) for body, value in case.approach_of.items()),
     ]
     if case.tilt is not None:
-        out += [
-            Result("tilt_about_y", case.case, float(case.tilt[0]) * 1e6, "urad"),
-            Result("tilt_about_x", case.case, float(case.tilt[1]) * 1e6, "urad"),
-        ]
+        out += [q.TILT_ABOUT_Y.of(case.tilt[0], at), q.TILT_ABOUT_X.of(case.tilt[1], at)]
     if solution.plan.effect("friction"):
-        out.append(stick_area(case.case, _area(solution, case.stick), "mm2"))
+        out.append(q.STICK_AREA.of(_area(solution, case.stick), at))
     return out
 
 
 def _stiffness(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
     if not solution.plan.scene.wants("stiffness") or case.force <= 0.0:
         return []
+    at = case.case
     out = [
-        Result("K_N_secant_raw", case.case, case.force / case.solution.approach, "N/mm"),
-        Result("K_N_tangent_raw", case.case, case.stiffness, "N/mm"),
-        Result("K_N_bonded", case.case, solution.bonded, "N/mm"),
+        q.K_N_SECANT_RAW.of(case.force / case.solution.approach, at),
+        q.K_N_TANGENT_RAW.of(case.stiffness, at),
+        q.K_N_BONDED.of(solution.bonded, at),
         *(
-            Result(f"K_N_{body}_alone", case.case, case.force / alone.approach, "N/mm")
-            for body, alone in case.alone.items()
+            q.K_N_ALONE.of(case.force / one.approach, at, n=body)
+            for body, one in case.alone.items()
         ),
     ]
-    for stuck in (s for s in solution.stuck if s.normal == case.case):
-        name = f"K_T{direction_name(stuck.direction)}"
-        out.append(Result(f"{name}_initial_raw", case.case, stuck.total, "N/mm"))
-        out += [
-            Result(f"{name}_{body}_alone", case.case, value, "N/mm")
-            for body, value in stuck.of.items()
-        ]
+    for stuck in (s for s in solution.stuck if s.normal == at):
+        way = direction_name(stuck.direction)
+        out.append(q.K_T_ALL_STUCK.of(stuck.total, at, n=way))
+        out += [q.K_T_ALONE.of(value, at, n=f"{way}_{body}") for body, value in stuck.of.items()]
     return out + _per_pad(solution, case)
 
 
@@ -151,13 +136,17 @@ def _per_pad(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
 
     That is each pad's own when they carry equal forces; otherwise their mean.
     """
-    n = len(lattices(solution))
+    n, at = len(lattices(solution)), case.case
     if n < 2:
         return []
-    found = {"N": case.force / case.solution.approach} | {
-        f"T{direction_name(s.direction)}": s.total for s in solution.stuck if s.normal == case.case
-    }
-    return [Result(f"K_{k}_per_pad", case.case, value / n, "N/mm") for k, value in found.items()]
+    return [
+        q.K_N_PER_PAD.of(case.force / case.solution.approach / n, at),
+        *(
+            q.K_T_PER_PAD.of(s.total / n, at, n=direction_name(s.direction))
+            for s in solution.stuck
+            if s.normal == at
+        ),
+    ]
 
 
 def band_centres(solution: FlatSolution) -> list[float]:
@@ -208,49 +197,30 @@ def _worn_zones(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
     if case.force <= 0.0:
         return []
     peaks, bands = pressure_peaks(solution, case), band_middles(solution)
-    out = [Result("pressure_peaks", case.case, float(len(peaks)), "")]
+    out = [q.PRESSURE_PEAKS.of(len(peaks), case.case)]
     for i, (x, y) in enumerate(peaks):
         nearest = min(bands, key=lambda c: abs(c - x)) if len(bands) == len(peaks) else None
-        out.append(
-            Result(
-                f"peak_{i + 1}_x",
-                case.case,
-                x,
-                "mm",
-                nearest,
-                "middle of the scene's loaded band" if nearest else "",
-                exact=False,
-            )
-        )
-        out.append(Result(f"peak_{i + 1}_y", case.case, y, "mm"))
+        source = "middle of the scene's loaded band" if nearest else ""
+        out.append(q.PRESSURE_PEAK_X.of(x, case.case, nearest, source, n=i + 1, exact=False))
+        out.append(q.PRESSURE_PEAK_Y.of(y, case.case, n=i + 1))
     return out
 
 
 def _law(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
-    law = contact_law(solution, case)
+    law, at = contact_law(solution, case), case.case
     if law is None:
         return []
     out = [
-        Result("law_points", case.case, float(law.n_point), ""),
-        Result("law_k_n", case.case, float(law.k_n.sum()), "N/mm"),
-        *(
-            Result(f"law_k_t{a}", case.case, float(law.k_t[:, i].sum()), "N/mm")
-            for i, a in enumerate("xy")
-        ),
-        Result("law_preload", case.case, float(law.preload.sum()), "N"),
-        *(
-            Result(f"law_lumping_{a}", case.case, 100.0 * float(law.tilt_error()[i]), "%")
-            for i, a in enumerate("xy")
-        ),
+        q.LAW_POINTS.of(law.n_point, at),
+        q.LAW_K_N.of(law.k_n.sum(), at),
+        *(q.LAW_K_T.of(law.k_t[:, i].sum(), at, n=axis) for i, axis in enumerate("xy")),
+        q.LAW_PRELOAD.of(law.preload.sum(), at),
+        *(q.LAW_LUMPING.of(law.tilt_error()[i], at, n=axis) for i, axis in enumerate("xy")),
     ]
     own = dict(zip("xy", law.tilt_stiffness(), strict=True))
     if solution.plan.scene.law.bodies == "both":
         for axis, true in tilt_stiffness(solution, case).items():
-            out.append(
-                Result(
-                    f"law_tilt_{axis}", case.case, float(own[axis]), "N mm", true, "contact's own"
-                )
-            )
+            out.append(q.LAW_TILT.of(own[axis], at, true, "contact's own", n=axis))
     return out
 
 
@@ -263,10 +233,10 @@ def _area(solution: FlatSolution, nodes: NDArray[np.bool_]) -> float:
 def _tangential(solution: FlatSolution, t: FlatTangentialCase) -> list[Result]:
     loaded = t.pressed > 0.0
     return [
-        Result("tangential_load", t.case, t.load, "N"),
-        Result("displacement", t.case, t.displacement * UM, "um"),
-        Result("stick_share", t.case, 100.0 * float(t.stick.sum() / max(1, loaded.sum())), "%"),
-        stick_area(t.case, _area(solution, t.stick), "mm2"),
+        q.TANGENTIAL_LOAD.of(t.load, t.case),
+        q.DISPLACEMENT.of(t.displacement, t.case),
+        q.STICK_SHARE.of(t.stick.sum() / max(1, loaded.sum()), t.case),
+        q.STICK_AREA.of(_area(solution, t.stick), t.case),
         *shear_stiffness(t.case, t.load, t.displacement, t.stiffness),
     ]
 
@@ -280,4 +250,4 @@ def _curve(solution: FlatSolution) -> list[Result]:
     F, d = np.array(inside).T
     slope = np.diff(F) / np.diff(d)
     case = Case(name=f"F_N from {low:g} to {high:g} N")
-    return [Result("slope_spread", case, 100.0 * float(np.ptp(slope) / slope.mean()), "%")]
+    return [q.SLOPE_SPREAD.of(np.ptp(slope) / slope.mean(), case)]

@@ -12,7 +12,10 @@ from typing import Any
 
 from upd.labels import plus_minus
 from upd.plot.chart import Entry
+from upd.results import quantities as q
 from upd.results.answer_table import AnswerTable
+from upd.results.quantities import quantity_of
+from upd.results.quantity import Quantity
 
 #: the numbers that matter, most important first (shell patterns), in tables of sweeps and studies
 MAIN = (
@@ -36,7 +39,9 @@ _FACES = ("static_N", "static_T")
 #: inputs that are shown
 _INPUTS = 3
 #: changes that weigh alike: an accuracy of frequency and of height that an engineer asks for
-_FREQUENCY, _HEIGHT = 1.5, 10.0
+_WEIGHTS = {q.FREQUENCY_CHANGE: 1.5, q.ACCELERANCE_CHANGE: 10.0}
+#: end of an input, which number it changes, and by how many per cent
+_Change = tuple[str, Quantity, float]
 Fields = Mapping[str, Any]
 
 
@@ -126,11 +131,7 @@ def _static(results: Sequence[Entry]) -> AnswerTable | None:
 
 def _peaks(results: Sequence[Entry], every: Sequence[Entry]) -> AnswerTable | None:
     """One row for every F_C/F_E and mode of the right blade."""
-    found = [
-        e
-        for e in results
-        if fnmatchcase(e["name"], "peak_?_frequency") and _fields(e).get("kind") != "stuck"
-    ]
+    found = [e for e in results if _is(e, q.PEAK_FREQUENCY) and _fields(e).get("kind") != "stuck"]
     if not found:
         return None
     at = {(e["name"], _key(e)): e for e in results}
@@ -139,14 +140,14 @@ def _peaks(results: Sequence[Entry], every: Sequence[Entry]) -> AnswerTable | No
         (
             e["value"]
             for e in results
-            if fnmatchcase(e["name"], "peak_?_accelerance") and _fields(e).get("kind") == "free"
+            if _is(e, q.PEAK_ACCELERANCE) and _fields(e).get("kind") == "free"
         ),
         default=math.nan,
     )
     folds = False
     for e in sorted(found, key=lambda one: _order(one)):
-        fields, number = _fields(e), e["name"][5]
-        height = at.get((f"peak_{number}_accelerance", _key(e)))
+        fields, number = _fields(e), quantity_of(e["name"])[1]
+        height = at.get((q.PEAK_ACCELERANCE.named(number), _key(e)))
         if height is None:
             continue
         ratio, kind = fields.get("force_ratio"), fields.get("kind", "")
@@ -156,9 +157,9 @@ def _peaks(results: Sequence[Entry], every: Sequence[Entry]) -> AnswerTable | No
         if fields.get("choice"):
             case += f", {fields['choice']}"
         peak = {**fields, "peak": int(number)}
-        moved = [_of(results, f"contact_{name}", peak) for name in ("slip", "lift")]
-        fold = _of(results, f"peak_{number}_sweep_up_accelerance", fields)
-        up = _of(results, f"peak_{number}_sweep_up_frequency", fields)
+        moved = [_of(results, one.name, peak) for one in (q.CONTACT_SLIP, q.CONTACT_LIFT)]
+        fold = _of(results, q.SWEEP_UP_ACCELERANCE.named(number), fields)
+        up = _of(results, q.SWEEP_UP_FREQUENCY.named(number), fields)
         folds |= fold is not None
         reference = e.get("reference")
         rows.append(
@@ -194,11 +195,15 @@ def _peaks(results: Sequence[Entry], every: Sequence[Entry]) -> AnswerTable | No
     )
     if not folds:
         heads, rows = heads[:-1], [row[:-1] for row in rows]
-    lost = [e for e in every if e["value"] is None and fnmatchcase(e["name"], "peak_?_frequency")]
+    lost = [e for e in every if e["value"] is None and _is(e, q.PEAK_FREQUENCY)]
     note = "Right blade; shares of all contact points and of the cycle."
     if lost:
         note += f" {len(lost)} peaks were not reached: see the notes."
     return AnswerTable("Peaks", heads, tuple(rows), note)
+
+
+def _is(entry: Entry, quantity: Quantity) -> bool:
+    return quantity_of(entry["name"])[0] == quantity
 
 
 def _key(entry: Entry) -> tuple[Any, ...]:
@@ -232,16 +237,12 @@ def _height(value: float) -> str:
 
 
 def _best(results: Sequence[Entry]) -> AnswerTable | None:
-    found = {
-        e["name"]: e
-        for e in results
-        if e["name"].startswith("best_") or e["name"].endswith("best_ratio")
-    }
-    if "best_ratio" not in found or "best_peak" not in found:
+    found = {quantity_of(e["name"])[0]: e for e in results}
+    if q.BEST_RATIO not in found or q.BEST_PEAK not in found:
         return None
-    ratio, peak = found["best_ratio"], found["best_peak"]
+    ratio, peak = found[q.BEST_RATIO], found[q.BEST_PEAK]
     fields = _fields(peak)
-    down = found.get("best_reduction")
+    down = found.get(q.BEST_REDUCTION)
     row = (
         f"{ratio['value']:.3g}",
         f"{_height(peak['value'])}",
@@ -249,8 +250,8 @@ def _best(results: Sequence[Entry]) -> AnswerTable | None:
         "" if down is None else f"{-down['value']:+.0f} %",
         ", ".join(filter(None, (f"{fields.get('blade')} blade", str(fields.get("mode", ""))))),
         *(
-            f"{found[name]['value']:+.0f} %" if name in found else ""
-            for name in ("half_of_best_ratio", "twice_the_best_ratio")
+            f"{found[one]['value']:+.0f} %" if one in found else ""
+            for one in (q.HALF_OF_BEST, q.TWICE_THE_BEST)
         ),
     )
     heads = (
@@ -263,7 +264,7 @@ def _best(results: Sequence[Entry]) -> AnswerTable | None:
         "#with twice F_C",
     )
     note = "The highest peak of both blades and all modes is lowest here."
-    inside = next((e for e in results if e["name"] == "best_inside"), None)
+    inside = found.get(q.BEST_INSIDE)
     if inside is not None and not inside["value"]:
         note = "The highest peak of both blades and all modes still falls at this end of the curve."
     return AnswerTable("Best F_C/F_E", heads, (row,), note)
@@ -274,13 +275,13 @@ def _best(results: Sequence[Entry]) -> AnswerTable | None:
 
 def _inputs(results: Sequence[Entry]) -> AnswerTable | None:
     """The inputs that change the peaks most, beside the numerical error."""
-    changes: dict[str, list[tuple[str, str, str, float]]] = {}
+    changes: dict[str, list[_Change]] = {}
+    ratios = []
     for e in results:
-        if e["name"].endswith("_change") and _fields(e).get("choice"):
+        if (quantity := quantity_of(e["name"])[0]) in _WEIGHTS:
             name, _, end = str(_fields(e)["choice"]).partition(": ")
-            kind = e["name"].split("_")[-2]
-            mode = str(_fields(e).get("mode", ""))
-            changes.setdefault(name, []).append((end, mode, kind, e["value"]))
+            changes.setdefault(name, []).append((end, quantity, e["value"]))
+            ratios.append(float(_fields(e)["force_ratio"]))
     if not changes:
         return None
     ranked = sorted(changes.items(), key=lambda pair: -_weight(pair[1]))
@@ -288,32 +289,29 @@ def _inputs(results: Sequence[Entry]) -> AnswerTable | None:
         (
             name,
             " or ".join(dict.fromkeys(end for end, *_ in told)),
-            _span(told, "frequency"),
-            _span(told, "accelerance"),
+            _span(told, q.FREQUENCY_CHANGE, 1),
+            _span(told, q.ACCELERANCE_CHANGE, 0),
         )
         for name, told in ranked[:_INPUTS]
     ]
     rows += list(_numerical(results))
     others = ", ".join(name for name, _ in ranked[_INPUTS:])
-    ratio = min(float(_fields(e)["force_ratio"]) for e in results if e["name"].endswith("_change"))
-    note = f"Changes of the right blade's peaks at F_C/F_E {ratio:g}."
+    note = f"Changes of the right blade's peaks at F_C/F_E {min(ratios):g}."
     if others:
         note += f" Less than these: {others}."
     heads = ("input", "changed to", "#frequency", "#height")
     return AnswerTable("What the answer depends on most", heads, tuple(rows), note)
 
 
-def _weight(told: Sequence[tuple[str, str, str, float]]) -> float:
-    scale = {"frequency": _FREQUENCY, "accelerance": _HEIGHT}
-    return max(abs(value) / scale[kind] for _, _, kind, value in told)
+def _weight(told: Sequence[_Change]) -> float:
+    return max(abs(value) / _WEIGHTS[quantity] for _, quantity, value in told)
 
 
-def _span(told: Sequence[tuple[str, str, str, float]], kind: str) -> str:
-    values = [value for _, _, k, value in told if k == kind]
+def _span(told: Sequence[_Change], quantity: Quantity, digits: int) -> str:
+    values = [value for _, of, value in told if of == quantity]
     if not values:
         return ""
     low, high = min(values), max(values)
-    digits = 1 if kind == "frequency" else 0
     if len(values) == 1 or low == high:
         return f"{low:+.{digits}f} %"
     return f"{low:+.{digits}f} to {high:+.{digits}f} %"
@@ -322,11 +320,11 @@ def _span(told: Sequence[tuple[str, str, str, float]], kind: str) -> str:
 def _numerical(results: Sequence[Entry]) -> Iterator[tuple[str, ...]]:
     """The largest estimated errors of peaks with friction."""
     worst = []
-    for kind in ("frequency", "accelerance"):
+    for quantity in (q.PEAK_FREQUENCY, q.PEAK_ACCELERANCE):
         errors = [
             e["estimated_error"]
             for e in results
-            if fnmatchcase(e["name"], f"peak_?_{kind}")
+            if _is(e, quantity)
             and _fields(e).get("force_ratio") is not None
             and e.get("estimated_error") is not None
         ]

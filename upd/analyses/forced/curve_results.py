@@ -12,19 +12,18 @@ from upd.analyses import printed
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, SweptCurve
 from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.mode_peaks import LEFT, peak_name, reduction_name
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import ForcedSolution, MarchedPeak
 from upd.analyses.forced.sweeps import marched_damper, marched_shares
 from upd.reference.printed import Lookup, Printed
-from upd.results import Case, Result, withheld
+from upd.results import Case, Result
+from upd.results import quantities as q
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import SIDES, Side
 
 #: name under which measured peaks are printed: which of a run's peaks each is stands nowhere
-MEASURED_PEAK = "peak_frequency"
-_DAMPER = ("x", "y", "z")
+MEASURED_PEAK = q.FREE_PEAK_FREQUENCY.name
 #: by how much lower than the peak a sweep ends that is reported
 _LOWER = 0.01
 AnyCurve = ForcedCurve | FacesCurve | SweptCurve
@@ -38,9 +37,8 @@ def _more_harmonics(curve: AnyCurve) -> Iterator[Result]:
             top = max(measures.path_maxima(f, size), key=lambda p: p.height, default=None)
             i = int(size.argmax())
             at, height = (float(f[i]), float(size[i])) if top is None else top[:2]
-            name = f"{LEFT * (blade == 'left')}harmonic_{k}"
-            yield Result(f"{name}_frequency", curve.case, at, "Hz")
-            yield Result(f"{name}_accelerance", curve.case, height, "(m/s2)/N")
+            yield q.HARMONIC_FREQUENCY.on(blade).of(at, curve.case, n=k)
+            yield q.HARMONIC_ACCELERANCE.on(blade).of(height, curve.case, n=k)
 
 
 def curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:
@@ -69,9 +67,8 @@ def _folds(curve: ForcedCurve) -> Iterator[Result]:
         if jumps:
             fold = max(jumps, key=lambda one: one.reached - one.before)
             case = replace(curve.case, mode=peak.mode)
-            name = f"peak_{peak.number}_sweep_up"
-            yield Result(f"{name}_frequency", case, fold.at, "Hz")
-            yield Result(f"{name}_accelerance", case, fold.reached, "(m/s2)/N")
+            yield q.SWEEP_UP_FREQUENCY.of(fold.at, case, n=peak.number)
+            yield q.SWEEP_UP_ACCELERANCE.of(fold.reached, case, n=peak.number)
 
 
 def balanced_results(solution: ForcedSolution, curve: FacesCurve) -> list[Result]:
@@ -79,7 +76,7 @@ def balanced_results(solution: ForcedSolution, curve: FacesCurve) -> list[Result
     case = curve.case
     results = [
         *_of_curve(solution, curve),
-        Result("path_jumps", case, float(len(curve.answer.jumps)), ""),
+        q.PATH_JUMPS.of(len(curve.answer.jumps), case),
         *_more_harmonics(curve),
     ]
     for peak in curve.peaks["right"]:
@@ -107,9 +104,9 @@ def _of_curve(solution: ForcedSolution, curve: AnyCurve) -> list[Result]:
     """What every curve has: its size, peaks of both blades, those not reached, the reduction."""
     case = curve.case
     return [
-        Result("excitation_force", case, curve.force, "N"),
-        Result("path_points", case, float(len(curve.frequency)), ""),
-        Result("curve_seconds", case, curve.seconds, "s"),
+        q.EXCITATION_FORCE.of(curve.force, case),
+        q.PATH_POINTS.of(len(curve.frequency), case),
+        q.CURVE_SECONDS.of(curve.seconds, case),
         *(
             one
             for blade in SIDES[::-1]
@@ -134,10 +131,10 @@ def _not_reached(solution: ForcedSolution, curve: AnyCurve) -> list[Result]:
         # two modes may have grown into one peak: the curve shows all there are
         return []
     return [
-        withheld(f"peak_{number}_{kind}", replace(curve.case, mode=mode), unit, reason)
+        quantity.withheld(replace(curve.case, mode=mode), reason, n=number)
         for number, mode in modes.items()
         if number not in found
-        for kind, unit in (("frequency", "Hz"), ("accelerance", "(m/s2)/N"))
+        for quantity in (q.PEAK_FREQUENCY, q.PEAK_ACCELERANCE)
     ]
 
 
@@ -147,7 +144,7 @@ def _reduction(solution: ForcedSolution, curve: AnyCurve, blade: Side) -> list[R
     free = linear.free_peaks[blade] if linear else []
     if not free or curve.empty:
         return []
-    name, case = reduction_name(blade), curve.case
+    quantity, case = q.REDUCTION.on(blade), curve.case
     top = max(peak.height for peak in free)
     size = np.abs(curve.accelerance[blade])
     f, peaks = curve.frequency, [peak.height for peak in curve.peaks[blade]]
@@ -158,9 +155,9 @@ def _reduction(solution: ForcedSolution, curve: AnyCurve, blade: Side) -> list[R
             "excitation.start and excitation.stop"
         )
     if reason:
-        return [withheld(name, case, "%", reason)]
+        return [quantity.withheld(case, reason)]
     highest = max(peaks) if peaks else float(size.max())
-    return [Result(name, case, 100.0 * (1.0 - highest / top), "%")]
+    return [quantity.of(1.0 - highest / top, case)]
 
 
 def _at_point(
@@ -171,14 +168,12 @@ def _at_point(
     mean = answer.state[i].mean(axis=0)
     results = [
         *(
-            Result("static_normal", replace(at, side=side), N, "N")
+            q.STATIC_NORMAL.of(N, replace(at, side=side))
             for side, N in measures.static_normal(answer, model, i).items()
         ),
         *_shares(at, {side: one[i] for side, one in measures.shares(answer, model).items()}),
-        *(
-            Result(f"contact_{name}", at, 100.0 * float(value), "%")
-            for name, value in zip(("slip", "lift"), mean[1:], strict=True)
-        ),
+        q.CONTACT_SLIP.of(mean[1], at),
+        q.CONTACT_LIFT.of(mean[2], at),
         *_losses(
             scene,
             at,
@@ -206,20 +201,20 @@ def _at_marched(solution: ForcedSolution, one: MarchedPeak) -> list[Result]:
 def _shares(at: Case, shares: Mapping[Side, Array]) -> Iterator[Result]:
     """Shares (3,) of the cycle of each face."""
     for side, share in shares.items():
-        for name, value in zip(("stick", "slip", "lift"), share, strict=True):
-            yield Result(f"share_{name}", replace(at, side=side), 100.0 * float(value), "%")
+        for quantity, value in zip(q.SHARES, share, strict=True):
+            yield quantity.of(value, replace(at, side=side))
 
 
 def _losses(
     scene: ForcedScene, at: Case, state: Array, energy: float, power: float
 ) -> Iterator[Result]:
     """Loss of all points, N mm and mW, and how many of them stick all the time."""
-    yield Result("friction_energy", at, energy, "N mm")
+    yield q.FRICTION_ENERGY.of(energy, at)
     if scene.wants("contact_state"):
         # Their mean traction remembers where the sliders began.
-        yield Result("points_always_stuck", at, float((state[:, 0] == 1.0).sum()), "")
+        yield q.POINTS_ALWAYS_STUCK.of((state[:, 0] == 1.0).sum(), at)
     if scene.wants("hysteresis"):
-        yield Result("friction_power", at, power, "mW")
+        yield q.FRICTION_POWER.of(power, at)
 
 
 # -- numbers of peaks and of the damper's motion ---------------------------------------------------
@@ -239,18 +234,15 @@ def peak_results(
     )
     results = []
     for k, peak in enumerate(peaks):
-        one, name, mine = (
-            nearest.get(k),
-            peak_name(blade, peak.number),
-            replace(case, mode=peak.mode),
-        )
+        one, n, mine = nearest.get(k), peak.number, replace(case, mode=peak.mode)
         reference, source = (one.value, one.source) if one is not None else (None, "")
+        frequency, height = q.PEAK_FREQUENCY.on(blade), q.PEAK_ACCELERANCE.on(blade)
         results += [
-            Result(f"{name}_frequency", mine, peak.frequency, "Hz", reference, source, exact=False),
-            Result(f"{name}_accelerance", mine, peak.height, "(m/s2)/N"),
+            frequency.of(peak.frequency, mine, reference, source, n=n, exact=False),
+            height.of(peak.height, mine, n=n),
         ]
         if not case.kind and blade == "right":
-            results.append(Result(f"{name}_mac", mine, peak.mac, ""))
+            results.append(q.PEAK_MAC.of(peak.mac, mine, n=n))
     return results
 
 
@@ -264,27 +256,26 @@ def whole_contact_results(case: Case, share: Array, energy: float) -> list[Resul
     energy
         N mm a period.
     """
-    told = dict(zip(("lift", "stick", "slip"), share, strict=True))
+    lift, stick, slip = share
     return [
-        *(
-            Result(f"share_{name}", case, 100.0 * float(told[name]), "%")
-            for name in ("stick", "slip", "lift")
-        ),
-        Result("friction_energy", case, float(energy), "N mm"),
+        *(one.of(value, case) for one, value in zip(q.SHARES, (stick, slip, lift), strict=True)),
+        q.FRICTION_ENERGY.of(energy, case),
     ]
 
 
 def motion_results(case: Case, static: Array, amplitude: Array) -> list[Result]:
     """Translations and rotations of the damper, (6,) mm and rad each: mean and amplitude."""
-    results, names = [], [f"damper_{kind}{axis}" for kind in "ur" for axis in _DAMPER]
+    results = []
     both = np.maximum(np.abs(static), np.abs(amplitude))
     # motions that symmetry forbids are rounding
     least = np.repeat([both[:3].max(), both[3:].max()], 3) * np.sqrt(np.finfo(float).eps)
-    for part, values in (("", amplitude), ("_static", static)):
-        shown = np.flatnonzero(np.abs(values) > least)
+    for shift, turn, values in (
+        (q.DAMPER_SHIFT, q.DAMPER_TURN, amplitude),
+        (q.SHIFT_STATIC, q.TURN_STATIC, static),
+    ):
         results += [
-            Result(f"{names[k]}{part}", case, 1e3 * float(values[k]), "um" if k < 3 else "mrad")
-            for k in shown
+            (shift if k < 3 else turn).of(values[k], case, n="xyz"[k % 3])
+            for k in np.flatnonzero(np.abs(values) > least)
         ]
     return results
 

@@ -32,10 +32,12 @@ from upd.analyses.forced.levels import (
     linear_numbers,
 )
 from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.mode_peaks import LEFT, peak_name, reduction_name
 from upd.analyses.forced.solution import ForcedSolution
 from upd.progress import Stages
 from upd.results import Case, ErrorPart, Estimates, Result
+from upd.results import quantities as q
+from upd.results.quantities import quantity_of
+from upd.results.quantity import Quantity
 from upd.scene.forced_contact import SIDES, Side
 from upd.vary.orders import observed_order, two_level_error
 
@@ -48,7 +50,7 @@ _ORDER = 2.0 * 0.5445
 #: order below which levels show none
 _LEAST = 0.5
 #: numbers of the performance curve: their error is that of the peaks beside
-_BEST = ("best_ratio", "best_peak", "best_frequency", "best_reduction")
+_BEST = (q.BEST_RATIO, q.BEST_PEAK, q.BEST_FREQUENCY, q.BEST_REDUCTION)
 
 
 def estimate(solution: ForcedSolution, numbers: Sequence[Result], stages: Stages) -> Estimates:
@@ -75,8 +77,8 @@ def estimate(solution: ForcedSolution, numbers: Sequence[Result], stages: Stages
     for side in SIDES:
         out |= _reductions(wanted, out, side)
     for key, one in wanted.items():
-        if one.name in _BEST:
-            out[key] = _of_best(solution, one, out)
+        if (quantity := quantity_of(one.name)[0]) in _BEST:
+            out[key] = _of_best(solution, quantity, one, out)
     return {key: parts for key, parts in out.items() if parts}
 
 
@@ -95,12 +97,12 @@ def _linear_numbers(
                 case = Case(stiffness=name, kind=kind, mode=modes.get(number, ""))
                 mine = peak._replace(number=number)
                 out |= _of_peak(solution, levels, case, kind, side, mine)
-    for k, word in enumerate(("in_phase", "out_of_phase")):
-        in_phase = word == "in_phase"
+    for k, stuck in enumerate((q.STUCK_IN_PHASE, q.STUCK_OUT_OF_PHASE)):
+        in_phase = stuck == q.STUCK_IN_PHASE
         own_f = [m.frequency for m in linear.modes if m.axis == "x" and m.in_phase == in_phase]
         if own_f:
-            key, first = (f"stuck_{word}", Case(stiffness=name)), own_f[0]
-            out[key] = _parts(levels, partial(_stuck_ratio, k, first))
+            parts = _parts(levels, partial(_stuck_ratio, k, own_f[0]))
+            out[stuck.name, Case(stiffness=name)] = parts
     return out
 
 
@@ -121,7 +123,6 @@ def _of_peak(
     peak: CurvePeak,
 ) -> dict[Key, tuple[ErrorPart, ...]]:
     """Errors of a peak's frequency and height."""
-    name = peak_name(side, peak.number)
     place: Place = (at, side, peak.number)
     case = replace(case, mode=peak.mode or case.mode)
     own = peak.frequency, peak.height
@@ -133,7 +134,7 @@ def _of_peak(
         check = mine[0] if mine else None
     out: dict[Key, tuple[ErrorPart, ...]] = {}
     mesh = 0.0
-    for k, word in enumerate(("frequency", "accelerance")):
+    for k, quantity in enumerate((q.PEAK_FREQUENCY, q.PEAK_ACCELERANCE)):
         parts = list(_parts(levels, partial(_peak_ratio, place, k, own[k]), place))
         # of a height that the meshes show by chance: no better known than its frequency
         known = [one.error for one in parts if one.source == MESH and one.known]
@@ -145,19 +146,19 @@ def _of_peak(
         ]
         mesh = max(known, default=0.0)
         if check is not None:
-            parts = _with_time(parts, check, word)
-        out[f"{name}_{word}", case] = tuple(parts)
+            parts = _with_time(parts, check, quantity)
+        out[quantity.on(side).named(peak.number), case] = tuple(parts)
     return out
 
 
-def _with_time(parts: Sequence[ErrorPart], check: TimeCheck, word: str) -> list[ErrorPart]:
+def _with_time(parts: Sequence[ErrorPart], check: TimeCheck, of: Quantity) -> list[ErrorPart]:
     """The parts with what time integration shows: it holds all harmonics, so that where it gives
     the reported motion no more are missing.
     """
     if check.at_top:
         return list(parts)
     kept = [one for one in parts if one.source not in (HARMONICS, SAMPLES)]
-    error = check.step if word == "accelerance" else check.apart
+    error = check.step if of == q.PEAK_ACCELERANCE else check.apart
     if not math.isfinite(check.difference):
         error = math.nan
     why = "the highest motion that stays, and the next towards the top, which leaves"
@@ -251,34 +252,18 @@ def _reductions(
     """Of 100 (1 - h / free), the errors of the highest peak h and of the free one, times
     (h / free) / (1 - h / free).
     """
-    out, prefix = {}, LEFT * (side == "left")
+    out, height = {}, q.PEAK_ACCELERANCE.on(side)
+    peaks = [one for one in wanted.values() if quantity_of(one.name)[0] == height]
     for key, one in wanted.items():
-        if one.name != reduction_name(side) or not one.value:
+        if one.name != q.REDUCTION.on(side).name or not one.value:
             continue
-        heights = [
-            other
-            for (name, at), other in wanted.items()
-            if name.startswith(f"{prefix}peak_")
-            and name.endswith("_accelerance")
-            and replace(at, mode="") == one.case
-        ]
-        free = _free(wanted, one.case.stiffness, prefix)
-        if heights and free is not None:
-            top = max(heights, key=lambda r: r.value)
-            both = (parts.get((r.name, r.case), ()) for r in (top, free))
-            out[key] = _reduction(one, *both)
+        mine = [peak for peak in peaks if replace(peak.case, mode="") == one.case]
+        of_free = Case(stiffness=one.case.stiffness, kind="free")
+        free = [peak for peak in peaks if peak.case == of_free]
+        if mine and free:
+            both = (max(found, key=lambda r: r.value) for found in (mine, free))
+            out[key] = _reduction(one, *(parts.get((r.name, r.case), ()) for r in both))
     return out
-
-
-def _free(wanted: Mapping[Key, Result], stiffness: str, prefix: str = "") -> Result | None:
-    found = [
-        one
-        for (name, at), one in wanted.items()
-        if name.startswith(f"{prefix}peak_")
-        and name.endswith("_accelerance")
-        and at == Case(stiffness=stiffness, kind="free")
-    ]
-    return max(found, key=lambda r: r.value, default=None)
 
 
 def _reduction(
@@ -295,7 +280,10 @@ def _reduction(
 
 
 def _of_best(
-    solution: ForcedSolution, one: Result, parts: Mapping[Key, tuple[ErrorPart, ...]]
+    solution: ForcedSolution,
+    quantity: Quantity,
+    one: Result,
+    parts: Mapping[Key, tuple[ErrorPart, ...]],
 ) -> tuple[ErrorPart, ...]:
     """The best F_C/F_E lies between its neighbours on the curve; its peak is as well known as the
     worst known one of the run's curves, beside what more harmonics change there.
@@ -305,7 +293,7 @@ def _of_best(
     best = performance.best
     if best is None:
         return ()
-    if one.name == "best_ratio":
+    if quantity == q.BEST_RATIO:
         known = [p.ratio for p in performance.known]
         k = known.index(best.ratio)
         beside = [known[i] for i in (k - 1, k + 1) if 0 <= i < len(known)]
@@ -313,11 +301,13 @@ def _of_best(
             return ()
         error = max(max(r / best.ratio, best.ratio / r) for r in beside) - 1.0
         return (ErrorPart("points of the curve", error, "the next F_C/F_E on either side"),)
-    kind = "frequency" if one.name == "best_frequency" else "accelerance"
+    of = q.PEAK_FREQUENCY if quantity == q.BEST_FREQUENCY else q.PEAK_ACCELERANCE
     mine = {
         key: told
         for key, told in parts.items()
-        if key[0].endswith(kind) and key[1].stiffness == name and key[1].force_ratio is not None
+        if quantity_of(key[0])[0] in (of, of.on("left"))
+        and key[1].stiffness == name
+        and key[1].force_ratio is not None
     }
     if not mine:
         return ()
@@ -331,13 +321,13 @@ def _of_best(
         )
         if few is not None and more is not None:
             here, there = (few.frequency, more.frequency)
-            if kind == "accelerance":
+            if of == q.PEAK_ACCELERANCE:
                 here, there = few.height, more.height
             out = [part for part in out if part.source != HARMONICS]
             change = abs(there / here - 1.0)
             basis = f"change with the harmonics of the run, at F_C/F_E {again[0].ratio:.3g}"
             out.append(ErrorPart(HARMONICS, change, basis))
-    if one.name == "best_reduction" and one.value:
+    if quantity == q.BEST_REDUCTION and one.value:
         factor = abs((100.0 - one.value) / one.value)
         out = [replace(p, error=factor * p.error) for p in out]
     return tuple(out)

@@ -18,7 +18,7 @@ import numpy as np
 from upd.analyses.forced.curves import ForcedCurve
 from upd.analyses.forced.linear_sensitivity import limit_peak, stuck_frequencies
 from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.mode_peaks import CANDIDATES, peak_name, reduction_name, unmoved
+from upd.analyses.forced.mode_peaks import CANDIDATES, unmoved
 from upd.analyses.forced.model import Array, Model, preloaded
 from upd.analyses.forced.plan import ForcedPlan, newton_seconds
 from upd.analyses.forced.solution import ForcedSolution
@@ -32,6 +32,7 @@ from upd.hbm.starts import newton
 from upd.linalg.parallel import threads_for
 from upd.progress import Stages
 from upd.results import Case, Result
+from upd.results import quantities as q
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import SIDES, Side, StiffnessChoice
 from upd.vary.inputs import InputChange, InputEnds
@@ -118,9 +119,8 @@ def _of_model(
 
 
 def _named(side: Side, number: int, case: Case, change: PeakChange, basis: str) -> Iterator[Told]:
-    name = peak_name(side, number)
-    yield (f"{name}_frequency", case), change.frequency, basis
-    yield (f"{name}_accelerance", case), change.height, basis
+    yield (q.PEAK_FREQUENCY.on(side).named(number), case), change.frequency, basis
+    yield (q.PEAK_ACCELERANCE.on(side).named(number), case), change.height, basis
 
 
 def _at_rest(name: str, model: Model, data: Sequence[DataChange]) -> Iterator[Told]:
@@ -130,8 +130,8 @@ def _at_rest(name: str, model: Model, data: Sequence[DataChange]) -> Iterator[To
         assert state is not None
         case = Case(stiffness=name, side=side, choice=state.name)
         for number, size, of in (
-            ("static_N", state.N[k], "state_N"),
-            ("static_T", state.T[k], "state_T"),
+            (q.STATIC_N.name, state.N[k], "state_N"),
+            (q.STATIC_T.name, state.T[k], "state_T"),
         ):
             if size:
                 change = np.array([getattr(one, of)[k] for one in data]) / size
@@ -195,8 +195,8 @@ def _of_curve(
             yield from _named(side, peak.number, case, change, PEAK)
             if side == "right" and change.loss is not None:
                 at = replace(case, peak=peak.number)
-                yield ("friction_energy", at), change.loss, PEAK
-        name = reduction_name(side)
+                yield (q.FRICTION_ENERGY.name, at), change.loss, PEAK
+        name = q.REDUCTION.on(side).name
         value = next((r.value for r in numbers if (r.name, r.case) == (name, curve.case)), 0.0)
         if highest is not None and side in free and value:
             left = 100.0 - value

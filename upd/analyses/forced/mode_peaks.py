@@ -21,24 +21,11 @@ from upd.hbm import FrequencyResponse
 from upd.hbm.contact_points import stuck_stiffness
 from upd.hbm.damper import attach
 from upd.hbm.fourier import to_complex
-from upd.scene.forced_contact import Side
 
 #: share of the motion above which a mode has more than all others together
 MAJORITY = 0.5
 #: modes up to so many times the highest frequency of a sweep are told in it
 CANDIDATES = 2.0
-#: how numbers of the left blade begin
-LEFT = "left_"
-
-
-def peak_name(blade: Side, number: int) -> str:
-    """How the names of a peak's numbers begin."""
-    return f"{LEFT * (blade == 'left')}peak_{number}"
-
-
-def reduction_name(blade: Side) -> str:
-    """Name of the number that tells how far a blade's highest peak is below its free one."""
-    return f"{LEFT * (blade == 'left')}reduction_of_free_peak"
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,8 @@ from upd.analyses.forced.statics import StaticState
 from upd.analyses.measured import FREE, STUCK, Computed
 from upd.measured.compare import on_path
 from upd.measured.curve import LEAST_POINTS
-from upd.results import Case, Result, withheld
+from upd.results import Case, Result
+from upd.results import quantities as q
 from upd.scene.forced_contact import SIDES, Side
 from upd.scene.measured import MeasuredChoice
 
@@ -59,17 +60,7 @@ def make_results(solution: ForcedSolution) -> list[Result]:
     for march in (march for march in solution.marches if march.verifies):
         value = march.accelerance(solution.models[march.curve.stiffness])
         case = replace(march.curve.case, frequency=march.frequency)
-        results.append(
-            Result(
-                "time_march_accelerance",
-                case,
-                value,
-                "(m/s2)/N",
-                march.height,
-                "harmonic balance",
-                exact=False,
-            )
-        )
+        results.append(q.TIME_MARCH.of(value, case, march.height, "harmonic balance", exact=False))
     results += _band_results(solution)
     for name, performance in solution.performances.items():
         results += _performance_results(name, performance)
@@ -81,13 +72,12 @@ def make_results(solution: ForcedSolution) -> list[Result]:
 def _model_results(name: str, model: Model) -> list[Result]:
     case, law = Case(stiffness=name), model.contacts.law
     results = [
-        Result("damper_mass", case, 1e6 * model.damper.mass, "g"),
-        Result("contact_points", case, float(model.contacts.n_point), ""),
+        q.DAMPER_MASS.of(model.damper.mass, case),
+        q.CONTACT_POINTS.of(model.contacts.n_point, case),
     ]
     for k, side in enumerate(SIDES):
         on, face = model.face == k, replace(case, side=side)
-        results += [Result("face_K_N", face, float(law.k_n[on].sum()), "N/mm")]
-        results += [Result("face_K_T", face, float(law.k_t[on].sum()), "N/mm")]
+        results += [q.FACE_K_N.of(law.k_n[on].sum(), face), q.FACE_K_T.of(law.k_t[on].sum(), face)]
     return results + _static_results(case, model)
 
 
@@ -96,8 +86,8 @@ def _faces_results(solution: ForcedSolution, name: str, faces: WholeFaces) -> li
     case = Case(stiffness=name)
     assert solution.bodies is not None
     return [
-        Result("damper_mass", case, 1e6 * solution.plan.copies * solution.bodies.damper.mass, "g"),
-        Result("contact_points", case, float(faces.of.n), ""),
+        q.DAMPER_MASS.of(solution.plan.copies * solution.bodies.damper.mass, case),
+        q.CONTACT_POINTS.of(faces.of.n, case),
         *_static_forces(case, faces.state, faces.state.N, faces.state.T),
     ]
 
@@ -117,27 +107,19 @@ def _static_forces(case: Case, state: StaticState, N: Array, T: Array) -> list[R
     """Normal and tangential force of each face, (2,) N."""
     results = []
     for k, side in enumerate(SIDES):
-        for letter, values in (("N", N), ("T", T)):
-            word = {"N": "normal", "T": "tangential"}[letter]
-            known = None if state.known is None else getattr(state.known, f"{word}_{side}")
-            results.append(
-                Result(
-                    f"static_{letter}",
-                    replace(case, side=side, choice=state.name),
-                    float(values[k]),
-                    "N",
-                    known,
-                    _SAID.get(state.name, "") if known is not None else "",
-                    exact=state.name != "seated",
-                )
-            )
+        at = replace(case, side=side, choice=state.name)
+        for quantity, values, way in ((q.STATIC_N, N, "normal"), (q.STATIC_T, T, "tangential")):
+            known = None if state.known is None else getattr(state.known, f"{way}_{side}")
+            source = _SAID.get(state.name, "") if known is not None else ""
+            exact = state.name != "seated"
+            results.append(quantity.of(values[k], at, known, source, exact=exact))
     return results
 
 
 def _band_results(solution: ForcedSolution) -> list[Result]:
     """Peaks of the right blade from other static states and slider starts."""
     return [
-        Result(f"band_peak_{p.number}_{kind}", case, value, unit)
+        quantity.of(value, case, n=p.number)
         for one in solution.band
         for p in one.point.peaks
         if p.blade == "right"
@@ -149,20 +131,16 @@ def _band_results(solution: ForcedSolution) -> list[Result]:
                 choice=one.choice,
             ),
         )
-        for kind, value, unit in (
-            ("frequency", p.frequency, "Hz"),
-            ("accelerance", p.height, "(m/s2)/N"),
-        )
+        for quantity, value in ((q.BAND_FREQUENCY, p.frequency), (q.BAND_ACCELERANCE, p.height))
     ]
 
 
 def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -> list[Result]:
     results, case = [], Case(stiffness=name)
-    phase = {True: "in_phase", False: "out_of_phase"}
-    for in_phase in (True, False):
+    for in_phase, quantity in ((True, q.STUCK_IN_PHASE), (False, q.STUCK_OUT_OF_PHASE)):
         found = next((m for m in linear.modes if m.axis == "x" and m.in_phase == in_phase), None)
         if found is not None:
-            results.append(Result(f"stuck_{phase[in_phase]}", case, found.frequency, "Hz"))
+            results.append(quantity.of(found.frequency, case))
     # Without a damper a blade that is not excited, on a base of its own, stays at rest.
     for blade in SIDES[::-1]:
         for kind, peaks in (
@@ -179,34 +157,26 @@ def _performance_results(name: str, found: Performance) -> list[Result]:
     results = []
     if known:
         results = [
-            Result("lowest_ratio_reached", case, known[0].ratio, ""),
-            Result("highest_ratio_reached", case, known[-1].ratio, ""),
+            q.LOWEST_RATIO.of(known[0].ratio, case),
+            q.HIGHEST_RATIO.of(known[-1].ratio, case),
         ]
     best, twice = found.best, found.factor_two()
-    names = (
-        ("best_ratio", ""),
-        ("best_peak", "(m/s2)/N"),
-        ("best_frequency", "Hz"),
-        ("best_reduction", "%"),
-        ("half_of_best_ratio", "%"),
-        ("twice_the_best_ratio", "%"),
-    )
     if best is None or best.worst is None or twice is None:
         reason = "no curve has a peak: widen excitation.start and stop"
-        return results + [withheld(number, case, unit, reason) for number, unit in names]
-    results.append(Result("best_inside", case, float(found.inside), ""))
+        return results + [quantity.withheld(case, reason) for quantity in q.BEST]
+    results.append(q.BEST_INSIDE.of(found.inside, case))
     worst = best.worst
     at = replace(case, mode=worst.mode, blade=worst.blade)
     values = (
         best.ratio,
         worst.height,
         worst.frequency,
-        100.0 * (1.0 - worst.height / found.free),
-        *(100.0 * (one - 1.0) for one in twice),
+        1.0 - worst.height / found.free,
+        *(one - 1.0 for one in twice),
     )
     return results + [
-        Result(number, at, value, unit)
-        for (number, unit), value in zip(names, values, strict=True)
+        quantity.of(value, at)
+        for quantity, value in zip(q.BEST, values, strict=True)
         if np.isfinite(value)
     ]
 
@@ -223,11 +193,15 @@ def _input_results(
         case = Case(
             stiffness=name, force_ratio=ratio, mode=one.mode, choice=f"{one.name}: {one.label}"
         )
-        for kind, value in (("frequency", one.frequency), ("accelerance", one.height)):
-            number = f"peak_{one.number}_{kind}_change"
-            # without such a peak near there is no change to tell
-            if np.isfinite(value):
-                out.append(Result(number, case, 100.0 * value, "%"))
+        # without such a peak near there is no change to report
+        out += [
+            quantity.of(value, case, n=one.number)
+            for quantity, value in (
+                (q.FREQUENCY_CHANGE, one.frequency),
+                (q.ACCELERANCE_CHANGE, one.height),
+            )
+            if np.isfinite(value)
+        ]
     return out
 
 

@@ -12,6 +12,7 @@ from upd.analyses.contact import effects
 from upd.analyses.contact.bodies import needs
 from upd.analyses.contact.effects import SolvedAgain
 from upd.analyses.contact.levels import coarsened, plan_with_estimates
+from upd.analyses.contact.results import pick
 from upd.analyses.hertz import accuracy, charts, checks, output, results
 from upd.analyses.hertz.solve import solve_on
 from upd.progress import Stages
@@ -37,7 +38,7 @@ ANALYSIS = Analysis(
     sizes=output.sizes,
     write_files=output.write_files,
     charts=charts.charts,
-    headline=results.headline,
+    headline=partial(pick, names=results.HEADLINE, last=True),
     estimate=partial(errors.estimate, accuracy.PROBLEM),
     coarsened=coarsened,
 )

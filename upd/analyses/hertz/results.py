@@ -4,25 +4,17 @@ it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.contact.results import (
-    UM,
-    cycle_energy,
-    located_results,
-    pick,
-    shear_stiffness,
-    stick_area,
-)
+from upd.analyses.contact.results import LOCATED, shear_stiffness
 from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.analyses.printed import printed_of, with_printed
 from upd.contact.patch import consistent_average
 from upd.contact.stiffness import without_body
 from upd.mesh import recipes
-from upd.plot.chart import Entry
 from upd.reference import (
     HertzPoint,
     hertz_axial_displacement,
@@ -31,21 +23,19 @@ from upd.reference import (
     mindlin,
     tangential_compliance_modulus,
 )
-from upd.results import ErrorPart, Result, with_parts, withheld
+from upd.results import ErrorPart, Result, with_parts
+from upd.results import quantities as q
+from upd.results.quantity import Quantity
 
-UM2 = 1e6
 _HERTZ, _MINDLIN = "Hertz", "Cattaneo-Mindlin"
 _HERTZ_3A = "Hertz, within 3a"
-# Beside numbers that have no reference: where they come from.
-_SOLVED = "solved for, without the mesh's error"
-_FAR = "fitted along the axis less solved"
 # How errors were estimated.
 _BETTI = "Betti's theorem: displacements less those of half-spaces and of the bodies' share"
 
 Array = NDArray[np.float64]
 
 # Raw, and with the bulk compliance removed: one mesh's error is in both.
-_OF_APPROACH = ("approach", "approach_contact")
+_OF_APPROACH = (q.APPROACH.name, q.APPROACH_CONTACT.name)
 
 #: the numbers that matter, most important first
 HEADLINE = (
@@ -60,11 +50,6 @@ HEADLINE = (
     "approach",
     "mean_pressure",
 )
-
-
-def headline(results: Sequence[Entry]) -> list[Entry]:
-    """The numbers an engineer asks for first, at the largest load."""
-    return pick(results, HEADLINE, last=True)
 
 
 def make_results(solution: HertzSolution, *, misfits: bool = True) -> list[Result]:
@@ -82,7 +67,9 @@ def make_results(solution: HertzSolution, *, misfits: bool = True) -> list[Resul
             for r in _tangential(solution, t, misfits=misfits)
         ]
         out += [
-            cycle_energy(c, _loop_energy(solution, case), "Mindlin-Deresiewicz")
+            q.CYCLE_ENERGY.of(
+                c.slip_work, c.case, _loop_energy(solution, case), "Mindlin-Deresiewicz"
+            )
             for c in solution.cycles
             if c.normal == case.case
         ]
@@ -99,7 +86,7 @@ def _with_estimate(result: Result, solution: HertzSolution) -> Result:
     known = next(c.mesh_error for c in solution.normal if c.case == result.case)
     if known is None:
         return result
-    near, far = (abs(error) * UM / abs(result.value) for error in known)
+    near, far = (abs(error) * q.APPROACH.scale / abs(result.value) for error in known)
     parts = (
         ErrorPart("mesh at the contact", near, _BETTI),
         ErrorPart("mesh far away", far, _BETTI),
@@ -145,33 +132,40 @@ def closed_form_traction(
     return lambda r: mindlin.traction(r, hertz.radius, c, mu, N)
 
 
-def _of(hertz: HertzPoint[float] | None, name: str, factor: float = 1.0) -> float | None:
-    return None if hertz is None else factor * float(getattr(hertz, name))
+def _of(hertz: HertzPoint[float] | None, name: str) -> float | None:
+    return None if hertz is None else float(getattr(hertz, name))
 
 
 def _normal(solution: HertzSolution, case: HertzNormalCase) -> list[Result]:
-    m, hertz = case.measures, hertz_of(solution, case.load)
+    m, hertz, at = case.measures, hertz_of(solution, case.load), case.case
     table = [
-        ("radius_moment", m.radius_moment * UM, "um", _of(hertz, "radius", UM)),
-        ("radius_area", m.radius_area * UM, "um", _of(hertz, "radius", UM)),
-        ("radius_outermost", m.radius_outermost * UM, "um", _of(hertz, "radius", UM)),
-        ("approach", case.approach * UM, "um", _of(hertz, "approach", UM)),
-        ("contact_area", m.area * UM2, "um2", _of(hertz, "area", UM2)),
-        ("contact_area_nodes", m.area_nodes * UM2, "um2", _of(hertz, "area", UM2)),
-        ("max_pressure", m.max_pressure, "MPa", _of(hertz, "max_pressure")),
-        ("mean_pressure", m.mean_pressure, "MPa", _of(hertz, "mean_pressure")),
+        (q.RADIUS_MOMENT, m.radius_moment, "radius"),
+        (q.RADIUS_AREA, m.radius_area, "radius"),
+        (q.RADIUS_OUTERMOST, m.radius_outermost, "radius"),
+        (q.APPROACH, case.approach, "approach"),
+        (_in_um2(q.CONTACT_AREA), m.area, "area"),
+        (_in_um2(q.CONTACT_AREA_NODES), m.area_nodes, "area"),
+        (q.MAX_PRESSURE, m.max_pressure, "max_pressure"),
+        (q.MEAN_PRESSURE, m.mean_pressure, "mean_pressure"),
     ]
+    located = LOCATED if m.area_resolution is not None else {}
     out = [
-        Result(name, case.case, float(value), unit, reference, _HERTZ if reference else "")
-        for name, value, unit, reference in table
+        quantity.of(value, at, closed, _HERTZ)
+        if (closed := _of(hertz, name)) is not None
+        else quantity.of(value, at, source=located.get(quantity.name, ""))
+        for quantity, value, name in table
     ]
     if solution.plan.effect("friction"):
         patch = solution.model.patch
         sticks = patch.whole(case.stick.astype(float)) > 0.0
-        out.append(stick_area(case.case, float(patch.area()[sticks].sum()) * UM2, "um2"))
+        out.append(_in_um2(q.STICK_AREA).of(patch.area()[sticks].sum(), at))
     if m.area_resolution is not None:
-        out = located_results(out, case.case, m.area_resolution * UM2, "um2")
+        out.append(_in_um2(q.CONTACT_AREA_RESOLUTION).of(m.area_resolution, at))
     return out + _approach_split(case, hertz, sum(beyond_3a(solution, case.load).values()))
+
+
+def _in_um2(area: Quantity) -> Quantity:
+    return area.in_unit("um2")
 
 
 def _approach_split(
@@ -182,71 +176,49 @@ def _approach_split(
     """
     if not case.shares:
         return []
-    phi = {body: s.compression for body, s in case.shares.items()}
+    at, phi = case.case, {body: s.compression for body, s in case.shares.items()}
     far = sum(s.far_mesh for s in case.shares.values())
-    within = None if hertz is None else (hertz.approach - beyond) * UM
+    whole = _of(hertz, "approach")
+    within = None if hertz is None else hertz.approach - beyond
+    left = case.approach - sum(phi.values())
     return [
-        Result(
-            "approach_contact",
-            case.case,
-            (case.approach - case.finite_body) * UM,
-            "um",
-            _of(hertz, "approach", UM),
-            _HERTZ,
-        ),
-        Result("approach_finite_body", case.case, case.finite_body * UM, "um", None, _SOLVED),
-        Result("approach_far_mesh", case.case, far * UM, "um", None, _FAR),
-        *(
-            Result(f"compression_3a_{body}", case.case, value * UM, "um")
-            for body, value in phi.items()
-        ),
-        Result(
-            "approach_within_3a",
-            case.case,
-            (case.approach - sum(phi.values())) * UM,
-            "um",
-            within,
-            _HERTZ_3A if within else "",
-        ),
+        q.APPROACH_CONTACT.of(case.approach - case.finite_body, at, whole, _HERTZ),
+        q.APPROACH_FINITE_BODY.of(case.finite_body, at),
+        q.APPROACH_FAR_MESH.of(far, at),
+        *(q.COMPRESSION_3A.of(value, at, n=body) for body, value in phi.items()),
+        q.APPROACH_WITHIN_3A.of(left, at, within, _HERTZ_3A if within else ""),
     ]
 
 
 def _stiffness(solution: HertzSolution, case: HertzNormalCase) -> list[Result]:
-    hertz = hertz_of(solution, case.load)
+    hertz, at = hertz_of(solution, case.load), case.case
     if not solution.plan.scene.wants("stiffness") or case.load <= 0.0:
         return []
     body, secant = case.finite_body / case.load, case.load / case.approach
     tangent_of, secant_of = _of(hertz, "tangent_stiffness"), _of(hertz, "secant_stiffness")
     K_N = without_body(case.stiffness, body)
     out = [
-        Result("K_N_tangent_raw", case.case, case.stiffness, "N/mm", tangent_of, _HERTZ),
-        Result("K_N_secant_raw", case.case, secant, "N/mm", secant_of, _HERTZ),
+        q.K_N_TANGENT_RAW.of(case.stiffness, at, tangent_of, _HERTZ),
+        q.K_N_SECANT_RAW.of(secant, at, secant_of, _HERTZ),
     ]
     if case.shares:
-        out.append(_within_3a(solution, case, hertz))
-        out.append(Result("K_N_tangent", case.case, K_N, "N/mm", tangent_of, _HERTZ))
-        out.append(
-            Result("K_N_secant", case.case, without_body(secant, body), "N/mm", secant_of, _HERTZ)
-        )
+        K_N_secant = without_body(secant, body)
+        out += [
+            _within_3a(solution, case, hertz),
+            q.K_N_TANGENT.of(K_N, at, tangent_of, _HERTZ),
+            q.K_N_SECANT.of(K_N_secant, at, secant_of, _HERTZ),
+        ]
     if case.shear_stiffness is None or hertz is None:
         return out
-    reference = mindlin.initial_tangential_stiffness(hertz.radius, shear_compliance(solution))
-    out.append(
-        Result("K_T_initial_raw", case.case, case.shear_stiffness, "N/mm", reference, _MINDLIN)
-    )
+    closed = mindlin.initial_tangential_stiffness(hertz.radius, shear_compliance(solution))
+    out.append(q.K_T_INITIAL_RAW.of(case.shear_stiffness, at, closed, _MINDLIN))
     if case.shear_shares:
         K_T = without_body(case.shear_stiffness, case.finite_body_shear)
-        out.append(Result("K_T_initial", case.case, K_T, "N/mm", reference, _MINDLIN))
-        out.append(
-            Result(
-                "K_T_over_K_N",
-                case.case,
-                K_T / K_N,
-                "",
-                reference / hertz.tangent_stiffness,
-                "Mindlin",
-            )
-        )
+        ratio = closed / hertz.tangent_stiffness
+        out += [
+            q.K_T_INITIAL.of(K_T, at, closed, _MINDLIN),
+            q.K_T_OVER_K_N.of(K_T / K_N, at, ratio, "Mindlin"),
+        ]
     return out
 
 
@@ -283,54 +255,35 @@ def _within_3a(
     # The rounding of a sum of three: nothing of the approach is left within 3a.
     if within <= 4.0 * np.finfo(float).eps * case.approach:
         reason = "the depth 3a lies within the first element under the contact"
-        return withheld("K_N_tangent_3a", case.case, "N/mm", f"{reason}; {_finer(solution)}")
+        return q.K_N_TANGENT_3A.withheld(case.case, f"{reason}; {_finer(solution)}")
     beyond = sum(beyond_3a(solution, case.load).values())
     closed = None if hertz is None else 1.5 * case.load / (hertz.approach - beyond)
-    return Result(
-        "K_N_tangent_3a",
-        case.case,
-        1.5 * case.load / within,
-        "N/mm",
-        closed,
-        _HERTZ_3A if closed else "",
-    )
+    source = _HERTZ_3A if closed else ""
+    return q.K_N_TANGENT_3A.of(1.5 * case.load / within, case.case, closed, source)
 
 
 def _tangential(solution: HertzSolution, t: HertzTangentialCase, *, misfits: bool) -> list[Result]:
     mu, N, c = solution.plan.scene.contact.friction, t.normal.load, stick_radius(solution, t)
-    hertz = hertz_of(solution, N)
-    stick = float(np.sqrt(solution.model.patch.area()[t.stick].sum() / np.pi))
+    hertz, area = hertz_of(solution, N), float(solution.model.patch.area()[t.stick].sum())
+    stick = float(np.sqrt(area / np.pi))
     stiffness = [
-        stick_area(t.case, float(solution.model.patch.area()[t.stick].sum()) * UM2, "um2"),
+        _in_um2(q.STICK_AREA).of(area, t.case),
         *shear_stiffness(t.case, t.load, t.displacement, t.stiffness),
     ]
     if hertz is None or c is None:
         return [
-            Result("stick_radius", t.case, stick * UM, "um"),
-            Result("tangential_displacement_raw", t.case, t.displacement * UM, "um"),
+            q.STICK_RADIUS.of(stick, t.case),
+            q.SHEAR_RAW.of(t.displacement, t.case),
             *stiffness,
         ]
-    reference = (
-        float(mindlin.displacement(t.load, mu, N, hertz.radius, shear_compliance(solution))) * UM
-    )
+    closed = float(mindlin.displacement(t.load, mu, N, hertz.radius, shear_compliance(solution)))
     out = [
-        Result("stick_radius", t.case, stick * UM, "um", c * UM, _MINDLIN),
-        Result(
-            "tangential_displacement_raw", t.case, t.displacement * UM, "um", reference, _MINDLIN
-        ),
+        q.STICK_RADIUS.of(stick, t.case, c, _MINDLIN),
+        q.SHEAR_RAW.of(t.displacement, t.case, closed, _MINDLIN),
     ]
     if t.normal.shear_shares:
         bodies = t.load * t.normal.finite_body_shear
-        out.append(
-            Result(
-                "tangential_displacement",
-                t.case,
-                (t.displacement - bodies) * UM,
-                "um",
-                reference,
-                _MINDLIN,
-            )
-        )
+        out.append(q.SHEAR.of(t.displacement - bodies, t.case, closed, _MINDLIN))
     return out + (_misfits(solution, t, hertz) if misfits else []) + stiffness
 
 
@@ -349,13 +302,12 @@ def _misfits(
         patch, lambda r: mu * hertz_pressure(r, hertz.radius, hertz.max_pressure)
     )
     misfit = np.sqrt((area * (t.traction_along - theirs) ** 2).sum())
-    scales = {"traction_misfit_L2": theirs, "traction_misfit_of_limit_L2": limit}
-    sizes = {name: float(np.sqrt((area * scale**2).sum())) for name, scale in scales.items()}
+    lost = f"the contact lies between the nodes; {_finer(solution)}"
     return [
-        Result(name, t.case, float(misfit / size), "", None, _MINDLIN)
-        if size > 0.0
-        else withheld(name, t.case, "", f"the contact lies between the nodes; {_finer(solution)}")
-        for name, size in sizes.items()
+        quantity.of(misfit / size, t.case, source=_MINDLIN)
+        if (size := float(np.sqrt((area * scale**2).sum()))) > 0.0
+        else quantity.withheld(t.case, lost)
+        for quantity, scale in ((q.MISFIT, theirs), (q.MISFIT_OF_LIMIT, limit))
     ]
 
 

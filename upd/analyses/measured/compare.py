@@ -23,7 +23,9 @@ from upd.measured import (
 )
 from upd.measured.compare import paired, within
 from upd.measured.curve import LEAST_POINTS
-from upd.results import ArrayGroup, Case, Check, ErrorPart, Result, with_parts, withheld
+from upd.results import ArrayGroup, Case, Check, ErrorPart, Result, with_parts
+from upd.results import quantities as q
+from upd.results.quantity import Quantity
 from upd.scene.measured import MeasuredChoice, fit_of
 
 Array = NDArray[np.float64]
@@ -95,7 +97,8 @@ def measured_results(
         if not found:
             reason = missing(choice)
             case = _case(name, choice)
-            results += [withheld(one, case, unit, reason) for one, unit in _asked(curve)]
+            asked = (q.COMPUTED_FREQUENCY, _criterion(curve))
+            results += [quantity.withheld(case, reason) for quantity in asked]
         peaks = noisy_peaks(curve.frequency, curve.magnitude)
         for one in found:
             results += _correlation(name, curve, one) + _differences(name, curve, peaks, one)
@@ -113,13 +116,8 @@ def _case(name: str, choice: MeasuredChoice) -> Case:
     )
 
 
-def _asked(curve: MeasuredCurve) -> tuple[tuple[str, str], ...]:
-    """Names and units of what a comparison begins with."""
-    return (("computed_peak_frequency", "Hz"), (_criterion(curve), ""))
-
-
-def _criterion(curve: MeasuredCurve) -> str:
-    return "frac" if curve.is_complex else "magnitude_correlation"
+def _criterion(curve: MeasuredCurve) -> Quantity:
+    return q.FRAC if curve.is_complex else q.MAGNITUDE_CORRELATION
 
 
 def _correlation(name: str, curve: MeasuredCurve, one: Computed) -> list[Result]:
@@ -127,7 +125,7 @@ def _correlation(name: str, curve: MeasuredCurve, one: Computed) -> list[Result]
     case, what = replace(one.case, name=name), _criterion(curve)
     on = within(curve.frequency, *one.band)
     if on.sum() < LEAST_POINTS:
-        return [withheld(what, case, "", _apart(curve, one))]
+        return [what.withheld(case, _apart(curve, one))]
     H, mine = one.at(curve.frequency[on]), curve.accelerance[on]
     lost = int(np.isnan(H).sum())
     if lost:
@@ -135,13 +133,11 @@ def _correlation(name: str, curve: MeasuredCurve, one: Computed) -> list[Result]
             f"the computed path turns back and has several motions at {lost} of {len(H)} measured "
             "frequencies"
         )
-        return [withheld(what, case, "", reason)]
+        return [what.withheld(case, reason)]
     try:
-        return [
-            Result(what, case, (frac if curve.is_complex else magnitude_correlation)(mine, H), "")
-        ]
+        return [what.of((frac if curve.is_complex else magnitude_correlation)(mine, H), case)]
     except InputError as error:
-        return [withheld(what, case, "", str(error))]
+        return [what.withheld(case, str(error))]
 
 
 def _apart(curve: MeasuredCurve, one: Computed) -> str:
@@ -156,37 +152,29 @@ def _differences(
     name: str, curve: MeasuredCurve, peaks: Sequence[MeasuredPeak], one: Computed
 ) -> list[Result]:
     """Frequencies and heights of peaks, computed beside measured ones."""
-    case, asked = replace(one.case, name=name), "computed_peak_frequency"
+    case, asked = replace(one.case, name=name), q.COMPUTED_FREQUENCY
     low, high = max(one.band[0], curve.band[0]), min(one.band[1], curve.band[1])
     if low >= high:
-        return [withheld(asked, case, "Hz", _apart(curve, one))]
+        return [asked.withheld(case, _apart(curve, one))]
     seen = [p for p in peaks if low <= p.frequency <= high]
     mine = [p for p in one.peaks if low <= p.frequency <= high]
     if not seen or not mine:
         whose = "measured" if not seen else "computed"
         reason = f"the {whose} curve has no peak within the common band, {low:g} to {high:g} Hz"
-        return [withheld(asked, case, "Hz", reason)]
+        return [asked.withheld(case, reason)]
     pairs = paired([p.frequency for p in seen], [p.frequency for p in mine])
     results: list[Result] = []
     for k, c in enumerate(mine):
         at = replace(case, peak=c.number, mode=c.mode)
         if k not in pairs:
             reason = "the measured curve has fewer peaks in the common band"
-            results.append(withheld(asked, at, "Hz", reason))
+            results.append(asked.withheld(at, reason))
             continue
         m, source = seen[pairs[k]], f"measured, {name}"
         results += [
-            Result(asked, at, c.frequency, "Hz", m.frequency, source, exact=False),
-            Result("peak_frequency_difference", at, c.frequency - m.frequency, "Hz"),
-            Result(
-                "computed_peak_accelerance",
-                at,
-                c.height,
-                "(m/s2)/N",
-                m.height,
-                source,
-                exact=False,
-            ),
+            asked.of(c.frequency, at, m.frequency, source, exact=False),
+            q.FREQUENCY_DIFFERENCE.of(c.frequency - m.frequency, at),
+            q.COMPUTED_ACCELERANCE.of(c.height, at, m.height, source, exact=False),
         ]
     return results
 
@@ -207,20 +195,20 @@ def _damping(
     try:
         fit = fit_of(choice)
     except InputError as error:
-        return [*results, withheld("fitted_damping", case, "%", str(error))]
+        return [*results, q.FITTED_DAMPING.withheld(case, str(error))]
     for k in range(len(fit.zeta)):
         at = replace(case, peak=k + 1)
         zeta, f = float(fit.zeta[k]), float(fit.frequency[k])
         errors = float(fit.zeta_error[k]), float(fit.frequency_error[k])
         results += [
-            _within(Result("fitted_damping", at, 100.0 * zeta, "%"), errors[0] / zeta),
-            Result("fitted_damping_error", at, 100.0 * errors[0], "%"),
-            _within(Result("fitted_frequency", at, f, "Hz"), errors[1] / f),
-            Result("fitted_frequency_error", at, errors[1], "Hz"),
+            _within(q.FITTED_DAMPING.of(zeta, at), errors[0] / zeta),
+            q.DAMPING_ERROR.of(errors[0], at),
+            _within(q.FITTED_FREQUENCY.of(f, at), errors[1] / f),
+            q.FREQUENCY_ERROR.of(errors[1], at),
         ]
     results += [
-        Result("fitted_noise", case, 100.0 * fit.noise.relative, "%"),
-        Result("fitted_noise_constant", case, fit.noise.constant, "(m/s2)/N"),
+        q.FITTED_NOISE.of(fit.noise.relative, case),
+        q.NOISE_CONSTANT.of(fit.noise.constant, case),
     ]
     # of all stiffnesses: without the damper they are one
     return results + (_scales(case, curve, fit.constant, found[0]) if found else [])
@@ -247,19 +235,10 @@ def _half_power(
         case = replace(one.case, name=name, peak=c.number, mode=c.mode)
         if not len(near.zeta) or not np.isfinite([near.zeta[0], peaks[j].zeta]).all():
             reason = "a side of the peak does not fall to half power"
-            out.append(withheld("half_power_damping", case, "%", reason))
+            out.append(q.HALF_POWER_DAMPING.withheld(case, reason))
             continue
-        out.append(
-            Result(
-                "half_power_damping",
-                case,
-                100.0 * float(near.zeta[0]),
-                "%",
-                100.0 * peaks[j].zeta,
-                f"measured, {name}",
-                exact=False,
-            )
-        )
+        source = f"measured, {name}"
+        out.append(q.HALF_POWER_DAMPING.of(near.zeta[0], case, peaks[j].zeta, source, exact=False))
     return out
 
 
@@ -268,12 +247,12 @@ def _scales(case: Case, curve: MeasuredCurve, constant: Array, one: Computed) ->
     try:
         like = fit_damping(replace(curve, accelerance=one.at(curve.frequency)))
     except InputError as error:
-        return [withheld("fitted_scale", case, "", f"computed curve: {error}")]
+        return [q.FITTED_SCALE.withheld(case, f"computed curve: {error}")]
     if len(like.constant) != len(constant):
         reason = "the computed curve has another number of peaks in the measured band"
-        return [withheld("fitted_scale", case, "", reason)]
+        return [q.FITTED_SCALE.withheld(case, reason)]
     return [
-        Result("fitted_scale", replace(case, peak=k), float(abs(a / b)), "")
+        q.FITTED_SCALE.of(abs(a / b), replace(case, peak=k))
         for k, (a, b) in enumerate(zip(constant, like.constant, strict=True), 1)
     ]
 

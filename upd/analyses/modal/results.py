@@ -14,7 +14,8 @@ from upd.analyses.printed import printed_of, with_printed
 from upd.dynamics import find_peaks
 from upd.measured.compare import on_path
 from upd.plot.chart import Entry
-from upd.results import Case, Result, withheld
+from upd.results import Case, Result
+from upd.results import quantities as q
 from upd.scene.measured import MeasuredChoice
 
 #: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables
@@ -73,10 +74,10 @@ def mode_results(solution: ModalSolution, found: ModeSet) -> list[Result]:
     if not found.modes:
         below = solution.plan.scene.modes.below
         reason = f"no mode lies below modes.below = {below:g} Hz; raise it"
-        return [withheld(f"f1_{found.kind}", found.case, "Hz", reason)]
+        return [q.NATURAL[found.kind].withheld(found.case, reason, n=1)]
     modes = [
-        Result(f"f{k + 1}_{found.kind}", found.case, mode.frequency, "Hz", exact=False)
-        for k, mode in enumerate(found.modes)
+        q.NATURAL[found.kind].of(mode.frequency, found.case, n=k, exact=False)
+        for k, mode in enumerate(found.modes, 1)
     ]
     return with_printed(modes, printed_of(solution.plan.scene))
 
@@ -91,62 +92,41 @@ def reduced_frequencies(reductions: Sequence[ReducedBlade]) -> list[tuple[float,
 
 
 def _reduction_results(reductions: Sequence[ReducedBlade]) -> list[Result]:
-    results = [
-        Result("reduction_modes", REDUCED, float(sum(r.model.n_modes for r in reductions)), "")
-    ]
-    results += [
-        Result(
-            "reduction_boundary",
-            REDUCED,
-            float(sum(r.model.n_boundary for r in reductions)),
-            "dofs",
-        )
-    ]
-    pairs = enumerate(reduced_frequencies(reductions))
-    return results + [
-        Result(f"f{k + 1}_reduced", REDUCED, f, "Hz", full, "full model") for k, (full, f) in pairs
+    return [
+        q.REDUCTION_MODES.of(sum(r.model.n_modes for r in reductions), REDUCED),
+        q.REDUCTION_BOUNDARY.of(sum(r.model.n_boundary for r in reductions), REDUCED),
+        *(
+            q.F_REDUCED.of(f, REDUCED, full, "full model", n=k)
+            for k, (full, f) in enumerate(reduced_frequencies(reductions), 1)
+        ),
     ]
 
 
 def _response_results(response: RigResponse) -> list[Result]:
     case = Case(kind="free", blade="right")
-    results = [Result("damping", case, 100.0 * response.damping, "%")]
+    results = [q.DAMPING.of(response.damping, case)]
     if response.peak is None:
         reason = (
             "the free right blade has no mode between response.start and response.stop; widen them"
         )
-        results += [
-            withheld("peak_frequency", case, "Hz", reason),
-            withheld("peak_accelerance", case, "(m/s2)/N", reason),
-        ]
+        peak = (q.FREE_PEAK_FREQUENCY, q.FREE_PEAK_ACCELERANCE)
+        results += [quantity.withheld(case, reason) for quantity in peak]
     else:
         at, height = response.peak
         alone = response.participation / (2.0 * response.damping)
         results += [
-            Result("peak_frequency", case, at, "Hz"),
-            Result(
-                "peak_accelerance", case, height, "(m/s2)/N", alone, "phi phi / (2 zeta), one mode"
-            ),
-            Result("participation", case, response.participation, "1/kg"),
+            q.FREE_PEAK_FREQUENCY.of(at, case),
+            q.FREE_PEAK_ACCELERANCE.of(height, case, alone, "phi phi / (2 zeta), one mode"),
+            q.PARTICIPATION.of(response.participation, case),
         ]
-        if response.half_power == response.half_power:
-            results.append(
-                Result(
-                    "half_power_damping",
-                    case,
-                    100.0 * response.half_power,
-                    "%",
-                    100.0 * response.damping,
-                    "damping given",
-                )
-            )
-    for (part, (reduced, full)), name in zip(
-        response.against_full.items(), ("below", "above"), strict=False
+        half = response.half_power
+        if half == half:
+            results.append(q.HALF_POWER_DAMPING.of(half, case, response.damping, "damping given"))
+    for (part, (reduced, full)), quantity in zip(
+        response.against_full.items(), (q.RESPONSE_BELOW, q.RESPONSE_ABOVE), strict=False
     ):
         at_part = Case(blade="right", name="undamped", part=part)
-        results.append(
-            Result(f"response_{name}", at_part, reduced, "(m/s2)/N", full, "full model, direct")
-        )
+        results.append(quantity.of(reduced, at_part, full, "full model, direct"))
     return results
 
 

@@ -4,7 +4,6 @@ full model.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -15,6 +14,8 @@ from upd.analyses.modal.solve import ModalSolution, solve
 from upd.errors import InputError
 from upd.progress import Stages
 from upd.results import ErrorPart, Estimates, Result
+from upd.results import quantities as q
+from upd.results.quantities import quantity_of
 from upd.scene import RigScene
 from upd.scene.quantities import UNKNOWN
 from upd.vary.errors import estimate, estimate_in_round, merged
@@ -33,7 +34,6 @@ _QUADRATIC, _BETWEEN = ("hex20", "hex27"), 2.0
 #: outputs a companion has, where the run has them: the reduced model has the mesh of the full one
 _WANTED = ("free", "glued", "response")
 _COARSEST = "the rig cannot be meshed coarser: its recipe has no smaller refinement"
-_REDUCED = re.compile(r"f(\d+)_reduced")
 
 
 def bare(scene: RigScene) -> Overrides:
@@ -105,10 +105,8 @@ def _corrected(
 
 def _full(reduced: Result, numbers: Sequence[Result]) -> Result | None:
     """The frequency of the full model that a reduced one stands for."""
-    found = _REDUCED.fullmatch(reduced.name)
-    if found is None:
-        return None
-    wanted = f"f{found[1]}_free"
+    quantity, n = quantity_of(reduced.name)
+    wanted = quantity.full.format(n=n)
     return next((r for r in numbers if r.name == wanted), None)
 
 
@@ -120,7 +118,7 @@ def _by_modes(solution: ModalSolution, numbers: Sequence[Result]) -> Estimates:
         if full is not None:
             error = abs(one.value / full.value - 1.0)
             out[one.name, one.case] = (ErrorPart(KEPT, error, "against the full model"),)
-        if one.name == "peak_accelerance" and solution.again.peak is not None:
+        if one.name == q.FREE_PEAK_ACCELERANCE.name and solution.again.peak is not None:
             error = abs(solution.again.peak / one.value - 1.0)
             basis = "solved again with the modes up to twice the limit"
             out[one.name, one.case] = (ErrorPart(KEPT, error, basis),)

@@ -21,6 +21,7 @@ from upd.analyses.seated.solve import (
 from upd.contact.coulomb_conditions import OPEN, SLIP
 from upd.plot.chart import Entry
 from upd.results import Case, Result
+from upd.results import quantities as q
 from upd.scene.forced_contact import SIDES
 
 #: the numbers that matter, most important first (shell patterns): terminal, page, notebook, tables
@@ -38,9 +39,9 @@ HEADLINE = (
 #: platforms are held: what stiffnesses belong to
 HELD = Case(name="platforms held")
 #: by the axis along which a platform is moved: away from the other, along the damper, up
-_FACE = ("face_K_N", "face_K_T_along", "face_K_T")
-_LEG = ("leg_K_N", "leg_K_T_along", "leg_K_T")
-UM, URAD = 1e3, 1e6
+_FACE = (q.FACE_K_N, q.FACE_K_T_ALONG, q.FACE_K_T)
+_LEG = (q.LEG_K_N, q.LEG_K_T_ALONG, q.LEG_K_T)
+_STIFFNESSES = {one.name for one in (*_FACE, *_LEG)}
 #: rigid damper that slips on both faces, and in which sense friction acts, by phase
 _BALANCES = {RAISED: "opposing", LOWERED: "reversed", AGAIN: "opposing", SMOOTH: "frictionless"}
 _SAID = {
@@ -57,7 +58,7 @@ def headline(results: Sequence[Entry]) -> list[Entry]:
     first: dict[str, tuple[str, str]] = {}
     for entry in results:
         # nothing touches on a face that F_C empties
-        if entry["value"] or entry["name"] not in (*_FACE, *_LEG):
+        if entry["value"] or entry["name"] not in _STIFFNESSES:
             first.setdefault(entry["name"], _group(entry))
     mine = [
         entry
@@ -101,19 +102,12 @@ def _forces(solution: SeatedSolution, phase: Phase) -> Iterator[Result]:
         side = SIDES[k]
         case = replace(phase.case, side=side)
         normal, along, up = solution.forces(phase.name)[k]
-        for name, value, letter in (("face_N", normal, "normal"), ("face_T", up, "tangential")):
-            reference = None if known is None else getattr(known, f"{letter}_{side}")
-            yield Result(
-                name,
-                case,
-                float(value),
-                "N",
-                reference,
-                _SAID[mode] if mode else "",
-                exact=mode == "frictionless",
-            )
+        for quantity, value, way in ((q.FACE_N, normal, "normal"), (q.FACE_T, up, "tangential")):
+            reference = None if known is None else getattr(known, f"{way}_{side}")
+            source, exact = _SAID.get(mode, ""), mode == "frictionless"
+            yield quantity.of(value, case, reference, source, exact=exact)
         if solution.interface.copies == 1:
-            yield Result("face_T_along", case, float(along), "N")
+            yield q.FACE_T_ALONG.of(along, case)
 
 
 def _band(solution: SeatedSolution) -> Iterator[Result]:
@@ -123,10 +117,13 @@ def _band(solution: SeatedSolution) -> Iterator[Result]:
         return
     for k, side in enumerate(SIDES):
         case = Case(name="ways of loading", side=side)
-        for j, letter in ((0, "N"), (2, "T")):
+        for j, lowest, highest in (
+            (0, q.LOWEST_FACE_N, q.HIGHEST_FACE_N),
+            (2, q.LOWEST_FACE_T, q.HIGHEST_FACE_T),
+        ):
             found = [float(solution.forces(name)[k, j]) for name in ways]
-            yield Result(f"lowest_face_{letter}", case, min(found), "N")
-            yield Result(f"highest_face_{letter}", case, max(found), "N")
+            yield lowest.of(min(found), case)
+            yield highest.of(max(found), case)
 
 
 def _contact(solution: SeatedSolution) -> Iterator[Result]:
@@ -137,13 +134,13 @@ def _contact(solution: SeatedSolution) -> Iterator[Result]:
         mine, case = of.face == k, Case(name=RAISED, side=side)
         whole = float(of.area[mine].sum())
         closed, slips = (float(of.area[mine & on].sum()) for on in (state != OPEN, state == SLIP))
-        yield Result("closed_share", case, 100.0 * closed / whole, "%")
-        yield Result("slip_share", case, 100.0 * slips / closed if closed else 0.0, "%")
-        yield Result("contact_area", case, of.copies * closed, "mm2")
-        yield Result("max_pressure", case, float(pressure[mine].max()), "MPa")
+        yield q.CLOSED_SHARE.of(100.0 * closed / whole, case)
+        yield q.SLIP_SHARE.of(100.0 * slips / closed if closed else 0.0, case)
+        yield q.CONTACT_AREA.of(of.copies * closed, case)
+        yield q.MAX_PRESSURE.of(pressure[mine].max(), case)
         if closed:
             mean = float(solution.forces(RAISED)[k, 0]) / (of.copies * closed)
-            yield Result("mean_pressure", case, mean, "MPa")
+            yield q.MEAN_PRESSURE.of(mean, case)
 
 
 def _stiffness(solution: SeatedSolution) -> Iterator[Result]:
@@ -162,15 +159,15 @@ def _stiffness(solution: SeatedSolution) -> Iterator[Result]:
     for choice, closed in stuck.items():
         for k, side in enumerate(SIDES):
             case = replace(HELD, choice=choice, side=side)
-            for name, value in zip(_FACE, held.face_stiffness(k, closed), strict=True):
+            for quantity, value in zip(_FACE, held.face_stiffness(k, closed), strict=True):
                 if np.isfinite(value):
-                    yield Result(name, case, float(value), "N/mm")
+                    yield quantity.of(value, case)
         contacts = {HELD: held} if of is held else {HELD: held, Case(name="bases held"): of}
         for one, contact in contacts.items():
             K = contact.leg_stiffness(closed)
             for j, axis in enumerate(contact.directions):
                 case = replace(one, choice=choice)
-                yield Result(_LEG[axis], case, float(K[j, j]), "N/mm")
+                yield _LEG[axis].of(K[j, j], case)
 
 
 def _damper(solution: SeatedSolution) -> Iterator[Result]:
@@ -178,15 +175,11 @@ def _damper(solution: SeatedSolution) -> Iterator[Result]:
     of = solution.interface
     case = Case(name=RAISED)
     assert solution.bodies is not None
-    yield Result("damper_mass", case, 1e6 * of.copies * solution.bodies.damper.mass, "g")
+    yield q.DAMPER_MASS.of(of.copies * solution.bodies.damper.mass, case)
     motion = of.motions(solution.phases[RAISED].found)[-1]
     for k in of.kept:
-        axis = "xyz"[k % 3]
-        yield (
-            Result(f"damper_u{axis}", case, UM * float(motion[k]), "um")
-            if k < 3
-            else Result(f"damper_r{axis}", case, URAD * float(motion[k]), "urad")
-        )
+        quantity = q.DAMPER_SHIFT if k < 3 else q.DAMPER_TURN.in_unit("urad")
+        yield quantity.of(motion[k], case, n="xyz"[k % 3])
 
 
 def _losses(solution: SeatedSolution) -> Iterator[Result]:
@@ -194,15 +187,15 @@ def _losses(solution: SeatedSolution) -> Iterator[Result]:
     of = solution.interface
     loop = [solution.phases[name] for name in (LOWERED, AGAIN)]
     loss = of.copies * sum(float(one.friction_loss.sum()) for one in loop)
-    yield Result("seating_loss", Case(name=f"{LOWERED} and {AGAIN}"), loss, "N mm")
+    yield q.SEATING_LOSS.of(loss, Case(name=f"{LOWERED} and {AGAIN}"))
     for phase in _moved(solution):
         last = 4 * solution.plan.scene.moved.steps
         axis = int(np.flatnonzero(phase.moved.any(axis=0))[0])
         cycle = phase.friction_loss[-last:]
-        yield Result("friction_energy", phase.case, of.copies * float(cycle.sum()), "N mm")
+        yield q.FRICTION_ENERGY.of(of.copies * float(cycle.sum()), phase.case)
         force = platform_force(solution, phase)[-last:, axis]
         way = phase.moved[-last:, axis]
-        yield Result("moved_stiffness", phase.case, float(np.ptp(force) / np.ptp(way)), "N/mm")
+        yield q.MOVED_STIFFNESS.of(np.ptp(force) / np.ptp(way), phase.case)
 
 
 def _moved(solution: SeatedSolution) -> list[Phase]:
