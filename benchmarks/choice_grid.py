@@ -16,11 +16,11 @@ from upd.batch.plan import plan_sweep
 from upd.batch.point import Outcome
 from upd.batch.sweeps import run_sweep
 from upd.errors import InputError
+from upd.hbm.peaks_over import SAME
 from upd.scene import ForcedScene
 from upd.scene.quantities import FROM_FORCE, UNKNOWN
 from upd.sizing.choice import ChosenDamper
 from upd.sizing.ranges import InputRange, with_values
-from upd.sizing.ratio_curves import SAME
 from upd.sizing.rig_peaks import RigPeaks
 
 Array = NDArray[np.float64]
@@ -149,7 +149,7 @@ def grid_scene(found: ChosenDamper) -> ForcedScene:
 def _fine_points(rig: RigPeaks) -> int:
     """Frequencies of a sweep that are a quarter of the narrowest stuck peak's width apart."""
     e, k = rig.scene.excitation, rig.model.excitation.lowest
-    modes, width = (v / k for v in linear_modes(rig.found.balance, True))
+    modes, width = (v / k for v in linear_modes(rig.balance, True))
     inside = width[(modes > e.start) & (modes < e.stop) & (width > 0.0)]
     if not inside.size:
         return int(e.points)

@@ -13,6 +13,7 @@ import numpy as np
 
 import upd
 from upd.fitting import Fit, FitResponses, Residuals, read_parameters, read_targets
+from upd.fitting.tables import interval
 
 RIGHT, LEFT = "stiffness.thesis.right", "stiffness.thesis.left"
 BOTH = f"{RIGHT}.K_N+{RIGHT}.K_T"
@@ -147,11 +148,11 @@ def run() -> Iterator[dict[str, Any]]:
             }
     yield from members(scene, fits)
     found = family(scene)
-    for one in found.as_dict()["parameters"]:
-        low, high = one["factor_fits_as_well"]
+    for k, one in enumerate(found.parameters):
+        low, high = np.exp(interval(found, k))
         yield {
             "name": "family_span",
-            "case": f"377 / 440.2 Hz +- 0.5 Hz, {one['inputs'][0]}",
+            "case": f"377 / 440.2 Hz +- 0.5 Hz, {one.paths[0]}",
             "value": high / low,
             "unit": "",
             "note": f"{found.status}; factors {low:.3g} to {high:.3g}",

@@ -8,19 +8,18 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import replace
-from typing import Any, cast
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
 from upd.hbm import FrequencyResponse, contacts, frequency_response
-from upd.hbm.curve_peaks import CurvePeaks, PeakPoint, SeenPeak
+from upd.hbm.peaks_over import AGREES, JUMP_STEP, Deciding, PeakPoint, PeaksOver, peak_point
 from upd.reference.friction import jenkins_peak
-from upd.sizing import LowestWorst, PeaksOverRatio, WorstPeak, least_worst, lowest_worst
+from upd.sizing import LowestWorst, WorstPeak, least_worst, lowest_worst
 from upd.sizing.margins import STILL_AT, how_far, how_far_force
-from upd.sizing.ratio_curves import AGREES, JUMP_STEP, Deciding
 
 #: limit of the slider per unit of "F_C", spring, and F_C/F_E between which peaks are asked for
 MU, K_T = 0.5, 1.3
@@ -33,9 +32,8 @@ def closed(ratio: float) -> float:
 
 
 @pytest.fixture(scope="module")
-def peaks() -> PeaksOverRatio:
+def peaks() -> PeaksOver:
     slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=K_T, mu=MU, preload=1.0)
-    force = 0.3
     # peaks are between the frequencies of the free and of the stuck mass
     f = np.linspace(0.98, 1.02 * math.sqrt(1.0 + K_T), 60) / (2.0 * math.pi)
 
@@ -51,22 +49,20 @@ def peaks() -> PeaksOverRatio:
             samples=2048,
         )
 
-    def search(ratio: float) -> list[SeenPeak]:
+    def curve_at(s: float) -> dict[str, PeakPoint]:
+        ratio = math.exp(s)
         answer = curve(1.0 / ratio)
         height = ratio * np.abs(answer.amplitude([1.0]))
         k = int(height.argmax())
-        at, beside = float(answer.frequency[k]), answer.frequency[k - 2 : k + 3]
-        between = float(beside.min()), float(beside.max())
-        return [SeenPeak("peak", at, float(height[k]), between, answer.x[k], at)]
+        seen = k, float(answer.frequency[k]), float(height[k])
+        return {"peak": peak_point(answer, [1.0], seen, unit=ratio, power=0.0)}
 
-    balance = curve(force).balance
-    found = CurvePeaks(balance, [1.0], 1.0 / force, search, unit=1.0 / force, power=0.0)
-    return PeaksOverRatio(found, math.log(LOW), math.log(HIGH))
+    return PeaksOver(curve_at, math.log(LOW), math.log(HIGH))
 
 
-def test_heights_and_slopes(peaks: PeaksOverRatio) -> None:
+def test_heights_and_slopes(peaks: PeaksOver) -> None:
     """Every solved point and its derivative by ln(F_C/F_E), of the closed form."""
-    points = peaks.found.points
+    points = peaks.points
     assert len(points) >= 4
     for s, told in points.items():
         point = told["peak"]
@@ -76,7 +72,7 @@ def test_heights_and_slopes(peaks: PeaksOverRatio) -> None:
         assert point.slope == pytest.approx(slope, abs=2e-3)
 
 
-def test_the_best_damper_of_one_force(peaks: PeaksOverRatio) -> None:
+def test_the_best_damper_of_one_force(peaks: PeaksOver) -> None:
     """mu N = pi F/2 and A = pi F/k_t, to 1e-3."""
     found = lowest_worst(WorstPeak([peaks], (0.7, 0.7)), 1.6, 6.0)
     assert found.status == "found"
@@ -86,7 +82,7 @@ def test_the_best_damper_of_one_force(peaks: PeaksOverRatio) -> None:
     assert amplitude == pytest.approx(math.pi * 0.7 / K_T, rel=1e-3)
 
 
-def test_the_best_damper_over_a_range_of_forces(peaks: PeaksOverRatio) -> None:
+def test_the_best_damper_over_a_range_of_forces(peaks: PeaksOver) -> None:
     """The F_C at which the peaks of the least and of the largest force are alike; how the shares of
     both make its slope none.
     """
@@ -119,12 +115,8 @@ class _Jumps:
     where s reaches 2.5 and rises half as fast from there.
     """
 
-    changes = ()
-
     def __init__(self, known_slopes: bool) -> None:
         self.known_slopes = known_slopes
-        self.points: dict[float, dict[str, PeakPoint]] = {}
-        self.failed: set[float] = set()
 
     @staticmethod
     def heights(s: np.ndarray) -> np.ndarray:
@@ -134,11 +126,10 @@ class _Jumps:
         y = float(self.heights(np.array(s)))
         slope = (1.0 if s < 2.5 else 0.5) if self.known_slopes else math.nan
         none = np.zeros(0)
-        self.points[s] = {
+        return {
             "low": PeakPoint(300.0, 1.0 - 2.0 * s, -2.0, none),
             "high": PeakPoint(440.0, y, slope, none),
         }
-        return self.points[s]
 
 
 @pytest.mark.parametrize("known_slopes", [True, False])
@@ -147,8 +138,7 @@ def test_ranges_end_at_a_higher_peak_on_the_way(known_slopes: bool) -> None:
     ln h = 1/3. The rising peak is 1/2 at most before it drops and is 1/3 again at 3.37 only: the
     worst peak, in whose window the maximum stays, is above 1/3 + ln(1.1) up to there.
     """
-    found: Any = _Jumps(known_slopes)
-    peaks = PeaksOverRatio(found, -2.0, 5.0, step=1.0)
+    peaks = PeaksOver(_Jumps(known_slopes).at, -2.0, 5.0, step=1.0)
     worst = WorstPeak([peaks], (1.0, math.exp(2.0)))
     best = lowest_worst(worst, math.exp(0.5), math.exp(5.0))
     assert best.log_centrifugal == pytest.approx(7.0 / 3.0, abs=2e-3)
@@ -161,25 +151,22 @@ def test_ranges_end_at_a_higher_peak_on_the_way(known_slopes: bool) -> None:
     far = worst.solved_worst(4.0)
     assert far == pytest.approx(max(0.65, 0.5), abs=2e-2)
     # no more whole curves than an even grid as fine as a jump is told has by far
-    assert len(found.points) < 40
+    assert len(peaks.points) < 40
+
+
+def losing(lost: Callable[[float], bool]) -> Callable[[float], dict[str, PeakPoint] | None]:
+    """The same with curves that are not followed through."""
+    whole = _Jumps(True).at
+    return lambda s: None if lost(s) else whole(s)
 
 
 @pytest.mark.parametrize(("high", "told"), [(2.405, True), (2.44, False)])
 def test_a_curve_that_fails(high: float, told: bool) -> None:
     """One next to it does as well; else what rests on it is withheld."""
-    found: Any = _Jumps(True)
-    whole = found.at
-
-    def lost(s: float) -> dict[str, PeakPoint]:
-        if 2.395 < s < high or (2.36 < s < high and not told):
-            found.failed.add(s)
-            return {}
-        return dict(whole(s))
-
-    found.at = lost
-    worst = WorstPeak([PeaksOverRatio(found, -2.0, 5.0, step=1.0)], (1.0, math.exp(2.0)))
+    found = losing(lambda s: 2.395 < s < high or (2.36 < s < high and not told))
+    worst = WorstPeak([PeaksOver(found, -2.0, 5.0, step=1.0)], (1.0, math.exp(2.0)))
     worst.peaks[0].look(2.4)
-    assert found.failed
+    assert worst.peaks[0].missed
     best = lowest_worst(worst, math.exp(0.5), math.exp(5.0))
     reach = how_far(worst, best, 1.1, math.exp(5.0))
     assert math.isfinite(reach.end) == told
@@ -188,22 +175,29 @@ def test_a_curve_that_fails(high: float, told: bool) -> None:
 
 def test_beside_a_curve_that_fails_the_one_next_to_it_tells() -> None:
     """Also a little beside the place that was asked for first."""
-    found: Any = _Jumps(True)
-    whole = found.at
-
-    def lost(s: float) -> dict[str, PeakPoint]:
-        if 2.495 < s < 2.505:
-            found.failed.add(s)
-            return {}
-        return dict(whole(s))
-
-    found.at = lost
-    peaks = PeaksOverRatio(found, -2.0, 5.0, step=1.0)
+    peaks = PeaksOver(losing(lambda s: 2.495 < s < 2.505), -2.0, 5.0, step=1.0)
     assert peaks.solve(2.5).node == pytest.approx(2.51)
     for s in (2.4997, 2.5003):
         told = peaks.solve(s)
         assert told.node == pytest.approx(2.51)
         assert told.y == pytest.approx(0.5 * s - 1.35)
+
+
+def test_curves_are_kept_for_a_search_that_is_begun_again(tmp_path: Path) -> None:
+    """Also those that were not followed through."""
+    found = losing(lambda s: 0.4 < s < 0.6)
+    first = PeaksOver(found, 0.0, 2.0, step=1.0, kept=tmp_path / "kept.npz")
+    first.look(0.5)
+
+    def none(_: float) -> None:
+        raise AssertionError
+
+    again = PeaksOver(none, 0.0, 2.0, step=1.0, kept=tmp_path / "kept.npz")
+    assert again.resumed == len(first.points) == 3
+    assert again.missed == first.missed and len(first.missed) == 3
+    for s, peaks in first.points.items():
+        for name, p in peaks.items():
+            assert again.points[s][name][:3] == p[:3]
 
 
 @pytest.mark.parametrize("known_slopes", [True, False])
@@ -214,7 +208,7 @@ def test_a_search_that_ends_early_tells_no_less_than_its_curves(
     early = 0
     for rounds, step in itertools.product((4, 6), (0.8, 1.0, 1.3, 3.0)):
         monkeypatch.setattr(least_worst, "ROUNDS", rounds)
-        peaks = PeaksOverRatio(cast(CurvePeaks, _Jumps(known_slopes)), -2.0, 5.0, step=step)
+        peaks = PeaksOver(_Jumps(known_slopes).at, -2.0, 5.0, step=step)
         best = lowest_worst(WorstPeak([peaks], (1.0, math.exp(2.5))), math.exp(0.5), math.exp(5.0))
         early += best.status == "bracketed"
         c = best.log_centrifugal
@@ -223,20 +217,20 @@ def test_a_search_that_ends_early_tells_no_less_than_its_curves(
     assert early
 
 
-def test_accelerations_count_the_strongest_force(peaks: PeaksOverRatio) -> None:
+def test_accelerations_count_the_strongest_force(peaks: PeaksOver) -> None:
     """Of amplitudes themselves the largest force has the worst: its own optimum."""
     found = lowest_worst(WorstPeak([peaks], (0.6, 1.1), weight=1.0), 2.2, 5.0)
     assert MU * math.exp(found.log_centrifugal) == pytest.approx(math.pi * 1.1 / 2.0, rel=1e-3)
     assert math.exp(found.log_worst) == pytest.approx(math.pi * 1.1 / K_T, rel=1e-3)
 
 
-def test_scaled_forces_need_no_new_peaks(peaks: PeaksOverRatio) -> None:
+def test_scaled_forces_need_no_new_peaks(peaks: PeaksOver) -> None:
     """All loads scaled by s scale the answer by s: the same points, F_C times s."""
     one = lowest_worst(WorstPeak([peaks], (0.6, 1.1)), 2.2, 5.0)
-    solved = peaks.found.solved
+    solved = len(peaks.points)
     other = lowest_worst(WorstPeak([peaks], (6.0, 11.0)), 22.0, 50.0)
     # but for those between which both searches stop
-    assert peaks.found.solved - solved <= 4
+    assert len(peaks.points) - solved <= 4
     shift = other.log_centrifugal - one.log_centrifugal
     assert shift == pytest.approx(math.log(10.0), abs=1e-3)
     assert other.log_worst == pytest.approx(one.log_worst, abs=1e-3)
@@ -255,9 +249,7 @@ def test_an_optimum_at_a_jump() -> None:
 @pytest.mark.parametrize(
     ("low", "high", "status"), [(1.6, 2.0, "at the upper bound"), (3.0, 5.0, "at the lower bound")]
 )
-def test_an_optimum_at_its_bound(
-    peaks: PeaksOverRatio, low: float, high: float, status: str
-) -> None:
+def test_an_optimum_at_its_bound(peaks: PeaksOver, low: float, high: float, status: str) -> None:
     found = lowest_worst(WorstPeak([peaks], (0.7, 0.7)), low, high)
     assert found.status == status
     bound = low if status == "at the lower bound" else high
@@ -272,29 +264,19 @@ def test_what_is_told_is_no_lower_than_whole_curves_in_the_window() -> None:
     """
     for step in (0.6, 0.8, 1.0, 1.3):
         for c in np.linspace(2.9, 3.1, 41):
-            peaks = PeaksOverRatio(cast(CurvePeaks, _Jumps(True)), -2.0, 5.0, step=step)
+            peaks = PeaksOver(_Jumps(True).at, -2.0, 5.0, step=step)
             told = WorstPeak([peaks], (1.0, math.exp(0.7))).solved_worst(c)
             known = [peaks.top(s) for s in peaks.nodes if c - 0.7 <= s <= c]
             assert told >= max(known) - AGREES
 
 
-class _Smooth:
+def smooth(s: float) -> dict[str, PeakPoint]:
     """Curves with one peak, ln h = sinh s."""
-
-    changes = ()
-
-    def __init__(self) -> None:
-        self.points: dict[float, dict[str, PeakPoint]] = {}
-        self.failed: set[float] = set()
-
-    def at(self, s: float) -> dict[str, PeakPoint]:
-        self.points[s] = {"peak": PeakPoint(300.0, math.sinh(s), math.cosh(s), np.zeros(0))}
-        return self.points[s]
+    return {"peak": PeakPoint(300.0, math.sinh(s), math.cosh(s), np.zeros(0))}
 
 
 def test_a_whole_curve_tells_what_is_beside_it_where_a_neighbour_confirms_its_slope() -> None:
-    found: Any = _Smooth()
-    peaks = PeaksOverRatio(found, 0.0, 1.0, step=0.2)
+    peaks = PeaksOver(smooth, 0.0, 1.0, step=0.2)
     known = len(peaks.nodes)
     read = peaks.solve(0.41)
     assert len(peaks.nodes) == known
@@ -303,18 +285,16 @@ def test_a_whole_curve_tells_what_is_beside_it_where_a_neighbour_confirms_its_sl
     # not where a jump may lie between
     assert peaks.solve(0.44).node == pytest.approx(0.44)
     at = read.node
-    kinked = found.points[at]["peak"]
-    found.points[at]["peak"] = replace(kinked, slope=kinked.slope - 1.0)
+    kinked = peaks.points[at]["peak"]
+    peaks.points[at] = {"peak": kinked._replace(slope=kinked.slope - 1.0)}
     peaks.look(0.8 + 1e-3)
     assert peaks.solve(0.39).node == pytest.approx(0.39)
 
 
 def test_neighbours_of_one_branch_tell_a_place_between_and_others_do_not() -> None:
-    found: Any = _Smooth()
-    smooth = PeaksOverRatio(found, 0.0, 1.0, step=0.2)
-    assert not smooth.look_unless_known(0.5, 1e-3)
-    found = _Jumps(True)
-    jumps = PeaksOverRatio(found, 2.0, 3.0, step=0.25)
+    known = PeaksOver(smooth, 0.0, 1.0, step=0.2)
+    assert not known.look_unless_known(0.5, 1e-3)
+    jumps = PeaksOver(_Jumps(True).at, 2.0, 3.0, step=0.25)
     assert jumps.look_unless_known(2.4, 1e-3)
 
 
@@ -322,25 +302,21 @@ def test_places_of_new_curves() -> None:
     """A third of an interval of three steps, on the side of the higher peak; none beyond what is
     asked for, and none where a window ends next to a curve.
     """
-    found: Any = _Smooth()
-    peaks = PeaksOverRatio(found, -0.2, 1.0, step=2.0)
+    peaks = PeaksOver(smooth, -0.2, 1.0, step=2.0)
     worst = WorstPeak([peaks], (1.0, math.exp(1.2)))
     assert worst.settle((1.0, 1.0), 0.0)
     assert peaks.nodes == pytest.approx([-0.2, 0.6, 1.0])
-    found = _Smooth()
-    peaks = PeaksOverRatio(found, -1.0, 1.0, step=2.0)
+    peaks = PeaksOver(smooth, -1.0, 1.0, step=2.0)
     worst = WorstPeak([peaks], (1.0, math.exp(0.3)))
     assert worst.settle((1.0, 1.0), 0.0)
     assert peaks.nodes == pytest.approx([-1.0, 0.7, 1.0])
-    found = _Smooth()
-    peaks = PeaksOverRatio(found, -1.0, 1.0, step=2.0)
+    peaks = PeaksOver(smooth, -1.0, 1.0, step=2.0)
     peaks.look(0.71)
     assert not WorstPeak([peaks], (1.0, math.exp(0.3))).settle((1.0, 1.0), 0.0)
 
 
 def test_a_lower_worst_peak_is_not_sought_where_all_that_is_read_is_below_it() -> None:
-    found: Any = _Jumps(True)
-    peaks = PeaksOverRatio(found, 2.0, 3.0, step=1.0)
+    peaks = PeaksOver(_Jumps(True).at, 2.0, 3.0, step=1.0)
     worst = WorstPeak([peaks], (1.0, math.exp(0.5)))
     # ln h of both ends: 0 and 0.15
     assert not worst.explore((2.5, 3.0), 0.2)
@@ -363,7 +339,7 @@ class _Hump(_Jumps):
         told = super().at(s)
         beside = self.heights(np.array([s, s + 1e-7]))
         slope = float(np.diff(beside)[0]) / 1e-7 if self.known_slopes else math.nan
-        told["high"] = replace(told["high"], slope=slope)
+        told["high"] = told["high"]._replace(slope=slope)
         return told
 
 
@@ -378,30 +354,28 @@ def test_a_range_ends_at_a_hump_between_curves(
     """
     for left in np.linspace(2.41, 2.0 + limit - 0.005, 6):
         for right in (2.51, 2.52, 2.54):
-            found: Any = _Hump(known_slopes)
-            peaks = PeaksOverRatio(found, -2.0, 5.0, step=scan)
+            peaks = PeaksOver(_Hump(known_slopes).at, -2.0, 5.0, step=scan)
             worst = WorstPeak([peaks], (1.0, math.exp(2.0)))
             best = lowest_worst(worst, math.exp(0.5), math.exp(5.0))
             for s in (left, right):
                 peaks.look(float(s))
-            before = len(found.points)
+            before = len(peaks.points)
             reach = how_far(worst, best, math.exp(limit - best.log_worst), math.exp(5.0))
             assert math.log(reach.end) == pytest.approx(2.0 + limit, abs=STILL_AT)
-            assert len(found.points) - before <= (8 if known_slopes else 12)
+            assert len(peaks.points) - before <= (8 if known_slopes else 12)
 
 
 def test_a_hump_below_a_growth_ends_no_range() -> None:
     """One curve tells that the rising peak is lost before it passes a limit above the hump."""
-    found: Any = _Hump(True)
-    peaks = PeaksOverRatio(found, -2.0, 5.0, step=1.0)
+    peaks = PeaksOver(_Hump(True).at, -2.0, 5.0, step=1.0)
     worst = WorstPeak([peaks], (1.0, math.exp(2.0)))
     best = lowest_worst(worst, math.exp(0.5), math.exp(5.0))
     for s in (2.49, 2.54):
         peaks.look(s)
-    limit, before = 0.52, len(found.points)
+    limit, before = 0.52, len(peaks.points)
     ends = best.log_centrifugal, 2.6
     assert worst.clear(ends, limit)
     assert not worst.clear(ends, limit)
-    assert len(found.points) == before + 1
+    assert len(peaks.points) == before + 1
     reach = how_far(worst, best, math.exp(limit - best.log_worst), math.exp(5.0))
     assert math.log(reach.end) == pytest.approx(2.5475 + 2.0 * (limit - 0.35975), abs=STILL_AT)

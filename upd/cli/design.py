@@ -25,8 +25,8 @@ def design(
     --minimise, find the damper whose worst resonance peak is lowest.
 
     Maps of its angles and friction with the damper marked, and the limits of the forces on both
-    faces under F_C: design.png and design.json. Of a choice choice.png, choice.json and
-    report.html. Kill a choice at any moment: called again it continues from the peaks it has.
+    faces under F_C: design.png, summary.json and report.html. Of a choice choice.png instead. Kill
+    a choice at any moment: called again it continues from the peaks it has.
 
     Parameters
     ----------
@@ -69,12 +69,8 @@ def _choice(
     out: Path | None,
 ) -> None:
     from upd.sizing import design as best_of
-    from upd.sizing.answer import predicted
-    from upd.sizing.ranges import read_ranges
 
     folder = out or Path("runs") / f"choice-{loaded.name}"
-    ranges = read_ranges(loaded, over, for_)
-    terminal.console.print(f"Predicted: {predicted(ranges)}", soft_wrap=True)
     with Live() as live:
         found = best_of(loaded, minimise=minimise, over=over, for_=for_, progress=live)
     terminal.console.print(str(found), soft_wrap=True)

@@ -4,7 +4,6 @@ left unknown.
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,7 +21,6 @@ from upd.fitting.first_order import KEPT, Knowledge, is_bent, knowledge, misfit_
 from upd.fitting.fitted_inputs import FittedCurve, FittedInputs
 from upd.fitting.journal import Journal
 from upd.fitting.next_measurement import rank_measurements
-from upd.fitting.numbers import plain_numbers, summary
 from upd.fitting.parameters import VariedInput, fitted_scene, read_parameters
 from upd.fitting.profile import Profile, profile
 from upd.fitting.residuals import Residuals
@@ -35,12 +33,10 @@ from upd.measured import MeasuredCurve
 from upd.plot.chart import Chart
 from upd.progress import Listener, Stages, silent
 from upd.report.answer_folder import FigureAnswer
-from upd.report.answer_page import answer_page
 from upd.results.answer_table import AnswerTable
 from upd.scene import AnyScene, ForcedScene
 from upd.scene.forced import FORCED
 from upd.scene.read import as_scene
-from upd.scene.written import scene_as_run
 
 Array = NDArray[np.float64]
 #: starts where evaluations take milliseconds, where something is followed with friction, and where
@@ -61,11 +57,15 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, repr=False)
 class Fit(FigureAnswer, FittedInputs):
-    """What `upd.fit` found, in report.html, summary.json, fit.json (all numbers), fit.png and the
-    scene with the fitted values.
-    """
+    """What `upd.fit` found."""
 
+    source: ForcedScene
     figure = FIGURE
+
+    @property
+    def outcome(self) -> tuple[str, str]:
+        """How the fit ended."""
+        return _OUTCOMES[self.status]
 
     @property
     def verdict(self) -> str:
@@ -98,10 +98,6 @@ class Fit(FigureAnswer, FittedInputs):
         """The charts of its figure."""
         return fit_charts(self)
 
-    def as_dict(self) -> dict[str, Any]:
-        """What stands in fit.json: numbers with their units; what is not known is null."""
-        return plain_numbers(self)
-
     @property
     def tables(self) -> tuple[AnswerTable, ...]:
         """Inputs with their intervals, targets, and what to measure next."""
@@ -111,17 +107,6 @@ class Fit(FigureAnswer, FittedInputs):
     def notes(self) -> tuple[str, ...]:
         """What the targets leave unknown, and the cost."""
         return notes(self)
-
-    def texts(self, numbers: Mapping[str, Any], charts: Sequence[Chart]) -> dict[str, str]:
-        """The scene with the fitted values, the summary and the page."""
-        toml = f"# {self.verdict}\n{scene_as_run(self.scene)}"
-        title = f"Fit: {self.source.title or self.source.name}"
-        written = (toml, "The scene with the fitted values.")
-        return {
-            f"{self.scene.name}.toml": toml,
-            "summary.json": f"{json.dumps(summary(self, numbers), indent=1, allow_nan=False)}\n",
-            "report.html": answer_page(self, charts, title, _OUTCOMES[self.status], written),
-        }
 
 
 def fit(

@@ -12,7 +12,7 @@ from upd.fitting.first_order import TOLD, is_bent
 from upd.fitting.fitted_inputs import FittedInputs
 from upd.fitting.profile import Profile
 from upd.fitting.weights import CurveNoise
-from upd.results.answer_table import AnswerTable
+from upd.results.answer_table import AnswerTable, Rounded
 
 Array = NDArray[np.float64]
 #: growth of the input that moves most along a direction that is printed
@@ -76,14 +76,14 @@ def tables(found: FittedInputs) -> tuple[AnswerTable, ...]:
 
 
 def _inputs(found: FittedInputs) -> AnswerTable:
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for k, one in enumerate(found.parameters):
         factor, ends = math.exp(found.answers[0][k]), interval(found, k)
         for path, value in zip(one.paths, one.values, strict=True):
             span = ("-", "-") if ends is None else _distinct(*(value * math.exp(z) for z in ends))
             bound = " (bound)" if on_bound(found, k) else ""
-            fitted = f"{value * factor:.5g}{bound}"
-            rows.append((path, one.unit, f"{value:.5g}", fitted, *span))
+            fitted = Rounded(value * factor, ".5g", f"{{}}{bound}")
+            rows.append((path, one.unit, Rounded(value, ".5g"), fitted, *span))
     heads = ("input", "unit", "#scene", "#fitted", "#from", "#to")
     return AnswerTable("Inputs", heads, tuple(rows), _interval_note(found))
 
@@ -112,7 +112,7 @@ def _sets(heading: str, found: FittedInputs, sets: Sequence[Array]) -> AnswerTab
     """Sets of inputs beside each other."""
     shown = sets[:_MEMBERS]
     rows = tuple(
-        (one.name, *(f"{math.exp(z[k]):.4g}" for z in shown))
+        (one.name, *(Rounded(math.exp(z[k])) for z in shown))
         for k, one in enumerate(found.parameters)
         if shown
     )
@@ -120,16 +120,18 @@ def _sets(heading: str, found: FittedInputs, sets: Sequence[Array]) -> AnswerTab
 
 
 def _targets(found: FittedInputs) -> AnswerTable:
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for i, one in enumerate(found.targets):
         none = one.half_width is None
-        off = f"{100.0 * _off(found, i):+.2g} %" if none else f"{_off(found, i):+.2g} half-widths"
-        half = "" if one.half_width is None else f"{one.half_width:.3g}"
-        rows.append((one.name, one.unit, f"{one.value:.8g}", f"{found.numbers[i]:.7g}", off, half))
+        size, text = (100.0, "{} %") if none else (1.0, "{} half-widths")
+        off = Rounded(size * _off(found, i), "+.2g", text)
+        half = "" if one.half_width is None else Rounded(one.half_width, ".3g")
+        wanted, fitted = Rounded(one.value, ".8g"), Rounded(found.numbers[i], ".7g")
+        rows.append((one.name, one.unit, wanted, fitted, off, half))
     for curve in found.measured:
         of = curve.target.curve
         values = f"{len(of.frequency)} {'complex' if of.is_complex else 'magnitudes'}"
-        off = f"{100.0 * curve.off:.2g} % rms"
+        off = Rounded(100.0 * curve.off, ".2g", "{} % rms")
         rows.append((curve.target.name, "(m/s2)/N", values, "", off, _half_width(curve.noise)))
     heads = ("target", "unit", "#wanted", "#fitted", "#off", "half-width")
     return AnswerTable("Targets", heads, tuple(rows))
@@ -148,9 +150,9 @@ def _measurements(found: FittedInputs) -> AnswerTable:
         (
             one.name,
             one.unit,
-            f"{one.half_width:.2g}",
+            Rounded(one.half_width, ".2g"),
             *_distinct(one.low, one.high),
-            f"{one.then:.4g}",
+            Rounded(one.then),
         )
         for one in found.further
         if one.then < one.widest**_GAIN
@@ -238,7 +240,7 @@ def interval(found: FittedInputs, k: int) -> tuple[float, float] | None:
 def _distinct(low: float, high: float) -> tuple[str, str]:
     """Both ends of an interval, with so many digits that they differ."""
     for digits in range(4, 10):
-        ends = f"{low:.{digits}g}", f"{high:.{digits}g}"
+        ends = Rounded(low, f".{digits}g"), Rounded(high, f".{digits}g")
         if ends[0] != ends[1]:
             break
     return ends

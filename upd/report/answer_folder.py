@@ -1,23 +1,30 @@
-"""Answers of one figure and a few tables: their text, their folder, and what a notebook shows."""
+"""Answers of one figure and a few tables: their text, their page, their folder, and what a notebook
+shows.
+"""
 
 from __future__ import annotations
 
 import json
 import textwrap
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
 from typing import Any, Self
 
 from upd.cache.files import whole_files
+from upd.cache.sources import versions
 from upd.errors import InputError, one_line
 from upd.plot.chart import Chart
 from upd.plot.matplotlib import chart_png, write_sheet
 from upd.plot.png import png_uri
 from upd.report.columns import whole_table
+from upd.report.page import render
+from upd.report.panels import make_panels
 from upd.results.answer_table import AnswerTable
+from upd.scene import AnyScene
+from upd.scene.written import scene_as_run
 
 #: characters of a line of an answer: a terminal of 80 columns shows it whole
 WIDTH = 79
@@ -49,10 +56,13 @@ class FigureAnswer(ABC):
 
     Attributes
     ----------
+    source : AnyScene
+        The scene that the question was about.
     folder : Path, optional
         Where its files lie; None when nothing was written.
     """
 
+    source: AnyScene
     folder: Path | None = field(default=None, kw_only=True)
 
     @property
@@ -62,17 +72,18 @@ class FigureAnswer(ABC):
 
     @property
     @abstractmethod
+    def outcome(self) -> tuple[str, str]:
+        """Its first word, and its kind: passed, warning or failed."""
+
+    @property
+    @abstractmethod
     def charts(self) -> list[Chart]:
         """The charts of its figure."""
 
     @property
     @abstractmethod
     def figure(self) -> str:
-        """Name of the figure and of the numbers, without ending."""
-
-    @abstractmethod
-    def as_dict(self) -> dict[str, Any]:
-        """All numbers with their units, as JSON takes them; what is not known is null."""
+        """Name of the figure, without ending."""
 
     @property
     @abstractmethod
@@ -84,20 +95,44 @@ class FigureAnswer(ABC):
     def notes(self) -> tuple[str, ...]:
         """What a reader has to know beside the tables, a sentence each."""
 
-    def texts(self, numbers: Mapping[str, Any], charts: Sequence[Chart]) -> dict[str, str]:
-        """Name of a further file -> its text.
+    @property
+    def scene(self) -> AnyScene:
+        """The scene on its page; one that is not that of the question is a file too."""
+        return self.source
+
+    def as_dict(self) -> dict[str, Any]:
+        """Verdict, tables and notes as JSON takes them: numbers have all their digits."""
+        return {
+            "scene": self.source.name,
+            "title": self.source.title,
+            "outcome": self.outcome[0],
+            "verdict": self.verdict,
+            "tables": [table.as_dict() for table in self.tables if table.rows],
+            "notes": self.notes,
+            "versions": versions(),
+        }
+
+    def page(self, charts: Sequence[Chart]) -> str:
+        """Its page as HTML that needs nothing beside it.
 
         Parameters
         ----------
-        numbers, charts
-            Of the answer.
+        charts
+            Those of its figure.
         """
-        del numbers, charts
-        return {}
+        title = self.source.title or self.source.name
+        context = {"answer": self, "title": title, "text": self._scene_file}
+        return render(
+            "answer.html.j2", make_panels(charts, {}), [], context | {"versions": versions()}
+        )
+
+    @property
+    def _scene_file(self) -> str:
+        return f"# {self.verdict}\n{scene_as_run(self.scene)}"
 
     def write(self, out: str | Path) -> Self:
-        """Write the numbers, the figure and further files into a folder, all of them or none; the
-        same with it.
+        """Write figure, page, numbers and a new scene into a folder, all of them or none; the same
+        with it.
 
         Parameters
         ----------
@@ -109,9 +144,11 @@ class FigureAnswer(ABC):
         InputError
             When it cannot be written.
         """
-        numbers, charts, folder = self.as_dict(), self.charts, Path(out)
-        text = json.dumps(numbers, indent=1, allow_nan=False) + "\n"
-        files = {f"{self.figure}.json": text, **self.texts(numbers, charts)}
+        charts, folder = self.charts, Path(out)
+        summary = json.dumps(self.as_dict(), indent=1, allow_nan=False) + "\n"
+        files = {"summary.json": summary, "report.html": self.page(charts)}
+        if self.scene is not self.source:
+            files[f"{self.scene.name}.toml"] = self._scene_file
         try:
             folder.parent.mkdir(parents=True, exist_ok=True)
             with whole_files(folder) as stage:

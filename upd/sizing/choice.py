@@ -180,7 +180,7 @@ class ChosenDamper:
     @property
     def resumed(self) -> int:
         """Points kept of earlier calls."""
-        return sum(rig.resumed for one in self.tried for _, rig in one.rigs)
+        return sum(rig.peaks.resumed for one in self.tried for _, rig in one.rigs)
 
     @property
     def gaps(self) -> list[tuple[float, float]]:

@@ -28,6 +28,7 @@ from scipy.optimize import minimize_scalar
 from upd.analyses.forced.paths import quiet
 from upd.analyses.seated.bodies import Bodies
 from upd.errors import ConvergenceError, InputError, one_line
+from upd.hbm.peaks_over import AGREES, SCAN_STEP
 from upd.linalg.parallel import threads_for
 from upd.progress import Listener, Stages
 from upd.scene import ForcedScene
@@ -35,7 +36,6 @@ from upd.sizing.choice import GROWTHS, ChosenDamper, Objective, Reaches, Tried, 
 from upd.sizing.least_worst import LowestWorst, has_moved, lowest_worst
 from upd.sizing.margins import Reach, how_far, how_far_force
 from upd.sizing.ranges import FORCE, InputRange, Ranges, with_values
-from upd.sizing.ratio_curves import AGREES, SCAN_STEP
 from upd.sizing.rig_peaks import RigPeaks, bare
 from upd.sizing.worst_peak import COMPARED_STEP, WorstPeak
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from upd.errors import InputError, one_line
+from upd.results.answer_table import Rounded
 from upd.scene import ForcedScene, load_scene
 from upd.scene.forced import FORCED
 from upd.scene.keys import scalar_input, scene_keys
@@ -59,6 +60,10 @@ class InputRange:
     def shown(self, value: float) -> str:
         """A value with its unit, four digits of it."""
         return str(self.text(float(f"{value:.4g}")))
+
+    def cell(self, value: float) -> str:
+        """A value as a table has it."""
+        return Rounded(value, text=self.shown(value))
 
     def centrifugal(self, value: float, scene: ForcedScene) -> float:
         """F_C [N] with a value of an input that changes F_C and nothing else."""

@@ -368,32 +368,3 @@ def outcomes(
         [JAMS, EITHER_LIFTS, LEFT_LIFTS, RIGHT_LIFTS, TILTS],
         CARRIES,
     )
-
-
-def ratio_outcomes(section: DamperSection, left: ArrayLike, right: ArrayLike) -> NDArray[np.int64]:
-    """What holds a damper at given mobilised friction.
-
-    Parameters
-    ----------
-    section : DamperSection
-        Its faces.
-    left, right : array_like
-        T/N of each face; both broadcast together.
-
-    Returns
-    -------
-    ndarray of int
-        Numbers into `OUTCOMES`: a face that would have to pull lifts off; where no forces are in
-        balance with F_C, it jams.
-    """
-    t, s = np.broadcast_arrays(np.asarray(left, float), np.asarray(right, float))
-    N, share = eccentricity(section, t, s)
-    alpha = section.left.angle - np.degrees(np.arctan(t))
-    beta = section.right.angle - np.degrees(np.arctan(s))
-    # of leans of both signs, the face of the one against the sum is that which would pull
-    pulls_left = np.sign(np.sin(np.radians(beta))) != np.sign(alpha + beta)
-    return np.select(
-        [alpha + beta >= 180.0, ~np.isfinite(N).all(axis=0) & pulls_left, ~np.isfinite(N[0])],
-        [JAMS, LEFT_LIFTS, RIGHT_LIFTS],
-        np.where(share > 1.0, TILTS, CARRIES),
-    )

@@ -1,7 +1,7 @@
 r"""The worst peak over a range of F_E, as a function of F_C.
 
 Peaks h per unit of F_E depend on s = ln r = c - f alone, with c = ln F_C and f = ln F_E (see
-`upd.hbm.curve_peaks`). The worst over f_1 <= f <= f_2,
+`upd.hbm.peaks_over`). The worst over f_1 <= f <= f_2,
 
     W(c) = max over s in [c - f_2, c - f_1] of y(s) + k (c - s),   y = ln h,
 
@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 
 from upd.errors import ConvergenceError
 from upd.hbm.peaks import JUMP_HEIGHT
-from upd.sizing.ratio_curves import (
+from upd.hbm.peaks_over import (
     AGREES,
+    ANSWER_STEP,
     BESIDE,
     JUMP_STEP,
     SAME,
-    TOLD_STEP,
     Deciding,
-    PeaksOverRatio,
+    PeaksOver,
 )
 
 Array = NDArray[np.float64]
@@ -57,7 +57,7 @@ class WorstPeak:
     """
 
     def __init__(
-        self, peaks: Sequence[PeaksOverRatio], forces: tuple[float, float], weight: float = 0.0
+        self, peaks: Sequence[PeaksOver], forces: tuple[float, float], weight: float = 0.0
     ) -> None:
         self.peaks, self.weight = tuple(peaks), weight
         self.f = (math.log(forces[0]), math.log(forces[1]))
@@ -177,7 +177,7 @@ class WorstPeak:
         """Solve the whole curve that is wanted most where neighbours are too far apart for the
         worst peaks between two ln F_C.
 
-        Neighbours are too far apart with more than `TOLD_STEP` between them, unless tangents of
+        Neighbours are too far apart with more than `ANSWER_STEP` between them, unless tangents of
         both stay below a limit by the factor that makes another peak (`upd.hbm.peaks`); and with
         more than a jump where tangents may reach the limit, if the neighbours are not of one branch
         or their tangents meet above it.
@@ -218,7 +218,7 @@ class WorstPeak:
             Whether one was.
         """
         low, high = ends[0] - self.f[1], ends[1] - self.f[0]
-        found: list[tuple[float, float, PeaksOverRatio]] = []
+        found: list[tuple[float, float, PeaksOver]] = []
         for one in self.peaks:
             for a, b in one.intervals(low, high):
                 more = self._more(a, ends, most)
@@ -237,14 +237,14 @@ class WorstPeak:
 
     def _wanted(
         self, ends: tuple[float, float], limit: float, most: float | None, jump: float
-    ) -> list[tuple[float, float, PeaksOverRatio]]:
+    ) -> list[tuple[float, float, PeaksOver]]:
         """Heights that may be reached, places and of which peaks whole curves are wanted, the
         highest first; see `settle`. What is asked for has more of an interval than the step of
         a jump, else the neighbour shows it.
         """
         low, high = ends[0] - self.f[1], ends[1] - self.f[0]
         over, far = limit + AGREES, limit - math.log(JUMP_HEIGHT)
-        found: list[tuple[float, float, PeaksOverRatio]] = []
+        found: list[tuple[float, float, PeaksOver]] = []
         for one in self.peaks:
             for a, b in one.intervals(low, high):
                 if min(b, high) - max(a, low) <= JUMP_STEP:
@@ -253,7 +253,7 @@ class WorstPeak:
                 top = one.may_reach(a, b) + more
                 hidden = max(one.top(a), one.top(b)) + more <= over < one.kink(a, b) + more
                 jumps = b - a > jump and top > over and (hidden or not one.agree(a, b))
-                if jumps or (b - a > TOLD_STEP + SAME and top > far):
+                if jumps or (b - a > ANSWER_STEP + SAME and top > far):
                     found.append((top, _between(one, a, b, (low, high)), one))
         return sorted(found, key=lambda p: -p[0])
 
@@ -285,7 +285,7 @@ class WorstPeak:
             one.look(_between(one, a, b, (low, high)))
             for one in self.peaks
             for a, b in one.intervals(low, high)
-            if b - a > TOLD_STEP + SAME
+            if b - a > ANSWER_STEP + SAME
             and not one.agree(a, b)
             and (
                 below
@@ -308,11 +308,11 @@ class WorstPeak:
         return point.y + self.weight * (c - point.s)
 
 
-def _between(one: PeaksOverRatio, a: float, b: float, ends: tuple[float, float]) -> float:
+def _between(one: PeaksOver, a: float, b: float, ends: tuple[float, float]) -> float:
     """ln(F_C/F_E) of the next whole curve between neighbours: of the places that divide them into
-    the fewest parts of `TOLD_STEP` one in the middle, next to the higher peak; within what is asked
-    for.
+    the fewest parts of `ANSWER_STEP` one in the middle, next to the higher peak; within what is
+    asked for.
     """
-    n = max(2, math.ceil((b - a) / TOLD_STEP - SAME))
+    n = max(2, math.ceil((b - a) / ANSWER_STEP - SAME))
     k = n // 2 if one.top(a) > one.top(b) else (n + 1) // 2
     return min(max(a + (b - a) * k / n, ends[0]), ends[1])

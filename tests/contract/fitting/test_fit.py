@@ -57,9 +57,9 @@ def test_determined_targets_are_recovered_and_the_written_scene_has_them(
     result = upd.run(tmp_path / "fit" / "asymmetric-response-fitted.toml")
     run = [result.value(name, "thesis") for name in ("stuck_in_phase", "stuck_out_of_phase")]
     assert run == pytest.approx(made, rel=1e-9)
-    data = json.loads((tmp_path / "fit" / "fit.json").read_text("utf-8"))
-    assert data["status"] == "found"
-    assert data["parameters"][0]["fitted"][0] == pytest.approx(found.value(RIGHT))
+    data = json.loads((tmp_path / "fit" / "summary.json").read_text("utf-8"))
+    assert data["outcome"] == "Found"
+    assert data["tables"][0]["rows"][0][3] == found.value(RIGHT)
     assert min(png_size((tmp_path / "fit" / "fit.png").read_bytes())) > 300
     assert max(map(len, str(found).splitlines())) <= 80
 

@@ -148,10 +148,11 @@ def test_noise_is_estimated_and_the_intervals_are_its_own(
 def test_the_folder_has_page_summary_and_scene(noisy: Fit) -> None:
     assert noisy.folder is not None
     summary = json.loads((noisy.folder / "summary.json").read_text("utf-8"))
-    assert [one["name"] for one in summary["results"]] == VARY
-    first = summary["results"][0]
-    assert first["low"] < first["value"] < first["high"]
-    assert first["value"] == pytest.approx(noisy.value(RIGHT))
+    inputs = summary["tables"][0]["rows"]
+    assert [row[0] for row in inputs] == VARY
+    fitted, low, high = inputs[0][3:]
+    assert low < fitted < high
+    assert fitted == noisy.value(RIGHT)
     page = (noisy.folder / "report.html").read_text("utf-8")
     for part in ("Inputs", "Next measurement", "Scene file"):
         assert f"<h2>{part}</h2>" in page

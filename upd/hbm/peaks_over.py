@@ -1,22 +1,38 @@
-"""Peaks of whole curves over F_C/F_E, and what is read between them: cubics of their values and
-slopes, not beyond the values of both ends where the peaks there are not of one branch.
+r"""Peaks of whole response curves over F_C/F_E, solved where they are asked for, and what is read
+between them: cubics of their values and slopes, not beyond the values of both ends where the peaks
+there are not of one branch.
+
+With every gap closed at rest, static and dynamic loads scaled by c scale the answer by c: peaks per
+newton of F_E depend on r = F_C/F_E alone, and one curve serves every pair of forces. With the
+factor q on the dynamic loads r is proportional to 1/q, and
+
+    d ln(h/q) / d ln r = 1 - d ln h / d ln q,
+
+from the exact derivative of the peak (`upd.hbm.peak_sensitivity`).
+
+A peak that is followed from one r to the next may leave the curve that runs from the lowest to the
+highest frequency: where a loop of it closes, its solutions continue as a closed curve beside it,
+which no sweep of the frequency reaches. Peaks are therefore taken from the whole curve at every r.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicHermiteSpline
 
+from upd.cache.arrays import load_arrays, save_arrays
 from upd.errors import ConvergenceError
-from upd.hbm.curve_peaks import CurvePeaks, PeakPoint
-from upd.hbm.peaks import JUMP_FREQUENCY
+from upd.hbm.parameter_change import ParameterChange
+from upd.hbm.peak_sensitivity import peak_derivatives
+from upd.hbm.peaks import JUMP_FREQUENCY, climb
+from upd.hbm.response import FrequencyResponse
 
 Array = NDArray[np.float64]
 #: ln(F_C/F_E): points that are one
@@ -27,7 +43,7 @@ MISS = 0.02
 _STEP = 2e-3
 #: ln(F_C/F_E) between the whole curves of the first scan, between those of an answer, and how
 #: closely a jump is located
-SCAN_STEP, TOLD_STEP, JUMP_STEP = 0.7, 0.5, 0.02
+SCAN_STEP, ANSWER_STEP, JUMP_STEP = 0.7, 0.5, 0.02
 #: how closely heights are known, as logarithms: tops have ripples of a thousandth, by the samples
 #: of a period
 AGREES = 2e-3
@@ -37,6 +53,23 @@ BESIDE = 1e-3
 ASIDE = 0.01
 #: below the highest peak of a curve beyond which another one does not count, as a logarithm
 _FAR = 0.1
+#: points of a path on either side of one of its peaks beside which the top is
+_TOP = 2
+
+
+class PeakPoint(NamedTuple):
+    """A peak at one F_C/F_E: frequency [Hz], ln of its height per unit of F_E, the derivative of
+    that by ln(F_C/F_E), and (n,) by the parameters; nan where they were not found.
+    """
+
+    frequency: float
+    log_height: float
+    slope: float
+    by: Array
+
+
+#: the peaks of the whole curve at one F_C/F_E, by their names
+Peaks = Mapping[str, PeakPoint]
 
 
 class Deciding(NamedTuple):
@@ -55,31 +88,47 @@ class Deciding(NamedTuple):
     node: float = math.nan
 
 
-class PeaksOverRatio:
+class PeaksOver:
     """Peaks of whole curves over s = ln(F_C/F_E), and what is read between them.
 
     Parameters
     ----------
-    found
-        Peaks of the whole curve at one F_C/F_E.
+    curve_at
+        s -> the peaks of the whole curve there; None where it was not followed through.
     low, high
-        ln(F_C/F_E) that may be asked for.
+        s that may be asked for.
     step
-        ln(F_C/F_E) between the first curves.
+        s between the first curves.
+    kept
+        File that keeps them, for a search that is begun again.
+
+    Attributes
+    ----------
+    points : dict
+        s -> its peaks; empty where the curve has none.
+    missed : set of float
+        s whose curve was not followed through.
+    resumed : int
+        Curves of an earlier call.
     """
 
     def __init__(
         self,
-        found: CurvePeaks,
+        curve_at: Callable[[float], Peaks | None],
         low: float,
         high: float,
         step: float = SCAN_STEP,
+        kept: Path | None = None,
     ) -> None:
-        self.found, self.low, self.high = found, low, high
+        self.curve_at, self.low, self.high, self._kept = curve_at, low, high, kept
+        self.points: dict[float, Peaks] = {}
+        self.missed: set[float] = set()
         self._curves: dict[str, Callable[[Array], Array]] = {}
         #: nodes with what is known there, slopes that are not from the nodes beside
-        self._peaks: dict[float, dict[str, PeakPoint]] = {}
+        self._peaks: dict[float, Peaks] = {}
         self._curves_of = -1
+        self._load()
+        self.resumed = len(self.points)
         for s in np.linspace(high, low, math.ceil((high - low) / step) + 1):
             self.look(float(s))
 
@@ -87,14 +136,45 @@ class PeaksOverRatio:
 
     def look(self, s: float, near: float = SAME) -> bool:
         """Solve the whole curve at ln(F_C/F_E) unless one so near is known; whether that is new."""
-        known = [*self.found.points, *self.found.failed]
-        if any(abs(t - s) <= near for t in known):
+        if self._is_near(s, near):
             return False
         for at in (s, s + ASIDE, s - ASIDE):
-            self.found.at(at)
-            if at in self.found.points:
+            if not self._is_near(at, SAME):
+                found = self.curve_at(at)
+                if found is None:
+                    self.missed.add(at)
+                else:
+                    self.points[at] = found
+                self._save()
+            if any(abs(t - at) <= SAME for t in self.points):
                 break
         return True
+
+    def _is_near(self, s: float, near: float) -> bool:
+        return any(abs(t - s) <= near for t in (*self.points, *self.missed))
+
+    def _save(self) -> None:
+        if self._kept is None:
+            return
+        each = [(s, name, p) for s, peaks in self.points.items() for name, p in peaks.items()]
+        rows = [(s, p.frequency, p.log_height, p.slope, *p.by) for s, _, p in each]
+        arrays: dict[str, NDArray[np.generic]] = {
+            "curves": np.array([*self.points]),
+            "missed": np.array([*self.missed]),
+            "names": np.array([name for _, name, _ in each], str),
+            "peaks": np.array(rows),
+        }
+        save_arrays(self._kept, arrays)
+
+    def _load(self) -> None:
+        kept = None if self._kept is None else load_arrays(self._kept)
+        if kept is None:
+            return
+        found: dict[float, dict[str, PeakPoint]] = {float(s): {} for s in kept["curves"]}
+        for name, (s, f, y, slope, *by) in zip(kept["names"], kept["peaks"], strict=True):
+            found[float(s)][str(name)] = PeakPoint(f, y, slope, np.array(by))
+        self.points.update(found)
+        self.missed.update(map(float, kept["missed"]))
 
     def look_unless_known(self, s: float, near: float) -> bool:
         """As `look`, unless neighbours tell the peak there."""
@@ -104,15 +184,13 @@ class PeaksOverRatio:
     def failed(self) -> list[float]:
         """ln(F_C/F_E) at which no curve went through, and none next to it either, rising."""
         return sorted(
-            s
-            for s in self.found.failed
-            if not any(abs(t - s) <= 1.5 * ASIDE for t in self.found.points)
+            s for s in self.missed if not any(abs(t - s) <= 1.5 * ASIDE for t in self.points)
         )
 
     @property
     def nodes(self) -> list[float]:
         """ln(F_C/F_E) at which the highest peak is known, rising."""
-        return sorted(s for s, peaks in self.found.points.items() if peaks)
+        return sorted(s for s, peaks in self.points.items() if peaks)
 
     @property
     def holes(self) -> list[tuple[float, float]]:
@@ -165,7 +243,9 @@ class PeaksOverRatio:
         """Whether neighbours of one branch tell the highest peak between them as closely as heights
         are known: their cubic is a parabola to that.
         """
-        return any(b - a <= TOLD_STEP and self.agree(a, b, AGREES) for a, b in self.intervals(s, s))
+        return any(
+            b - a <= ANSWER_STEP and self.agree(a, b, AGREES) for a, b in self.intervals(s, s)
+        )
 
     def may_reach(self, a: float, b: float) -> float:
         """ln of the height that a peak may have between neighbouring nodes, on the tangents; of a
@@ -176,7 +256,7 @@ class PeaksOverRatio:
         top = -math.inf
         for end, way in ((a, 1.0), (b, -1.0)):
             for name, p in self._peaks[end].items():
-                raw = self._at(end).get(name)
+                raw = self.points[end].get(name)
                 known = raw is not None and not math.isnan(raw.slope)
                 rise = max(way * p.slope, 0.0 if known else max(way, 0.0))
                 top = max(top, p.log_height + rise * (b - a))
@@ -217,7 +297,7 @@ class PeaksOverRatio:
 
     def _may_have_summit(self, a: float, b: float) -> bool:
         """Whether a peak may rise from one node and fall to the next, as slopes are known."""
-        ends = self._at(a), self._at(b)
+        ends = self.points[a], self.points[b]
         return any(
             not (ends[0][name].slope <= 0.0 or ends[1][name].slope >= 0.0)
             for name in ends[0].keys() & ends[1].keys()
@@ -238,27 +318,23 @@ class PeaksOverRatio:
 
     def top(self, s: float) -> float:
         """ln of the highest peak at a node."""
-        return max(p.log_height for p in self._at(s).values())
+        return max(p.log_height for p in self.points[s].values())
 
     def highest(self, a: float, b: float) -> float:
         """ln of the highest peak that is read between two places."""
         s = np.linspace(a, b, max(2, math.ceil((b - a) / JUMP_STEP) + 1))
         return float(np.max([curve(s) for curve in self.curves().values()]))
 
-    def _at(self, s: float) -> dict[str, PeakPoint]:
-        """What is known at a node."""
-        return self.found.points[s]
-
     def curves(self) -> dict[str, Callable[[Array], Array]]:
         """Name -> ln height over ln r; -inf where nothing is known."""
-        count = len(self.found.points)
+        count = len(self.points)
         if self._curves_of != count:
             self._curves, self._curves_of = self._all_curves(), count
         return self._curves
 
     def _all_curves(self) -> dict[str, Callable[[Array], Array]]:
         nodes = self.nodes
-        peaks = {s: dict(self._at(s)) for s in nodes}
+        peaks: dict[float, dict[str, PeakPoint]] = {s: dict(self.points[s]) for s in nodes}
         out = {}
         for name in dict.fromkeys(name for s in nodes for name in peaks[s]):
             here = [s for s in nodes if name in peaks[s]]
@@ -272,7 +348,8 @@ class PeaksOverRatio:
                 for a, b in pairwise(here)
             ]
             out[name] = joined_cubics(np.array(here), points, np.array(joined, bool))
-        self._peaks = peaks
+        self._peaks.clear()
+        self._peaks.update(peaks)
         return out
 
     def distance(self, s: float) -> float:
@@ -296,19 +373,19 @@ class PeaksOverRatio:
         if at not in nodes:
             return None
         name = max(curves, key=lambda one: float(curves[one](np.array(s))))
-        y, p = float(curves[name](np.array(s))), self._at(at).get(name)
+        y, p = float(curves[name](np.array(s))), self.points[at].get(name)
         if p is None or not abs(y - p.log_height - p.slope * (s - at)) <= AGREES:
             return None
         if not self._is_confirmed(name, at):
             return None
-        slope = slope_of(curves[name], s, nodes[0], nodes[-1])
+        slope = _slope_of(curves[name], s, nodes[0], nodes[-1])
         return Deciding(
             s, y, p.slope if math.isnan(slope) else slope, p.by, p.frequency, name, node=at
         )
 
     def _is_confirmed(self, name: str, at: float) -> bool:
         """Whether a neighbour confirms the slope of a peak, known at a node."""
-        raw = self._at(at).get(name)
+        raw = self.points[at].get(name)
         if raw is None or math.isnan(raw.slope):
             return False
         ends = [
@@ -330,20 +407,70 @@ class PeaksOverRatio:
         if read is not None:
             return read
         self.look(s, BESIDE)
-        lost = any(abs(t - s) <= BESIDE for t in self.found.failed)
+        lost = any(abs(t - s) <= BESIDE for t in self.missed)
         at = self.node(s, 1.5 * ASIDE if lost else BESIDE)
-        if at not in self.found.points:
+        if at not in self.points:
             raise ConvergenceError(
                 f"no whole curve was followed at F_C/F_E {math.exp(s):.4g}; to fix it: other ranges"
                 " of F_C and F_E"
             )
-        peaks = self._at(at)
+        peaks = self.points[at]
         name = max(peaks, key=lambda one: peaks[one].log_height)
         p, slope = peaks[name], peaks[name].slope
         if math.isnan(slope):
-            slope = slope_of(self.curves()[name], at, self.nodes[0], self.nodes[-1])
+            slope = _slope_of(self.curves()[name], at, self.nodes[0], self.nodes[-1])
         y = p.log_height + (0.0 if math.isnan(slope) else slope * (s - at))
         return Deciding(s, y, slope, p.by, p.frequency, name, node=at)
+
+
+def peak_point(
+    answer: FrequencyResponse,
+    row: ArrayLike,
+    seen: tuple[int, float, float],
+    changes: Sequence[ParameterChange] = (),
+    *,
+    unit: float = 1.0,
+    harmonic: int | None = None,
+    power: float = 2.0,
+) -> PeakPoint:
+    """The top next to a maximum of |row @ q| w^power along a path, with its derivatives; the
+    maximum as it was seen where there is none.
+
+    Parameters
+    ----------
+    answer
+        The whole curve, without gaps at rest.
+    row : (n_dof,) array_like
+        Weighs the displacements.
+    seen
+        Number of its point, its frequency [Hz] and its height in units of the point's.
+    changes
+        One for the logarithm of each parameter, at the same F_C and F_E.
+    unit
+        Height per w^power mm: 1/F_E, and factors of units.
+    harmonic
+        Its number; the lowest above 0 by default.
+    power
+        Of the angular frequency: 2 for accelerations.
+    """
+    (k, frequency, height), b = seen, answer.balance
+    none, at = np.full(len(changes), math.nan), float(answer.frequency[k])
+    beside = answer.frequency[max(k - _TOP, 0) : k + _TOP + 1]
+    top = climb(b, row, answer.x[k], at, harmonic=harmonic, power=power)
+    if not (top.found and beside.min() <= top.frequency <= beside.max()):
+        return PeakPoint(frequency, math.log(height), math.nan, none)
+    number = int(b.harmonics.dynamic[b.harmonics.place(harmonic)])
+    omega = 2.0 * np.pi * number * top.frequency
+    y = math.log(unit * omega**power * top.amplitude)
+    given = [ParameterChange(dynamic=b.dynamic), *changes]
+    try:
+        found = peak_derivatives(
+            b, row, top.x, top.frequency, given, harmonic=harmonic, power=power
+        )
+    except ConvergenceError:
+        return PeakPoint(top.frequency, y, math.nan, none)
+    relative = found.by_height / found.height
+    return PeakPoint(top.frequency, y, float(1.0 - relative[0]), relative[1:])
 
 
 def of_one_branch(h: float, a: PeakPoint, b: PeakPoint, miss: float = MISS) -> bool:
@@ -360,20 +487,20 @@ def of_one_branch(h: float, a: PeakPoint, b: PeakPoint, miss: float = MISS) -> b
 def with_slopes(s: Sequence[float], points: Sequence[PeakPoint]) -> list[PeakPoint]:
     """Points of one peak, slopes that are not known by differences to second order."""
     if len(s) < 2:
-        return [replace(p, slope=0.0 if math.isnan(p.slope) else p.slope) for p in points]
+        return [p._replace(slope=0.0 if math.isnan(p.slope) else p.slope) for p in points]
     y = np.array([p.log_height for p in points])
     read = np.gradient(y, np.array(s), edge_order=2 if len(s) > 2 else 1)
     return [
-        replace(p, slope=float(g)) if math.isnan(p.slope) else p
+        p._replace(slope=float(g)) if math.isnan(p.slope) else p
         for p, g in zip(points, read, strict=True)
     ]
 
 
-def slope_of(curve: Callable[[Array], Array], s: float, low: float, high: float) -> float:
+def _slope_of(curve: Callable[[Array], Array], s: float, low: float, high: float) -> float:
+    """Of a curve at a place between two others; nan at the rim of what is known."""
     ends = np.clip([s - _STEP, s + _STEP], low, high)
     values = curve(ends)
     if not ends[1] > ends[0] or not np.isfinite(values).all():
-        # at the rim of what is known
         return math.nan
     return float((values[1] - values[0]) / (ends[1] - ends[0]))
 

@@ -1,9 +1,12 @@
-"""Charts of the statics of a damper: maps of angles and friction, limits of its forces."""
+"""The statics of a damper as an answer: verdict, tables, notes, and charts: maps of angles and
+friction, limits of its forces.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -11,14 +14,14 @@ from numpy.typing import NDArray
 
 from upd.contact.damper_section import admissible_forces
 from upd.contact.equilibrium import face_forces
-from upd.contact.rigid_damper import SLIDINGS
 from upd.errors import InputError
-from upd.plot.chart import Area, Axis, Band, Chart, Map, Mark, Trace
+from upd.plot.chart import Area, Axis, Band, Chart, Map, Trace
+from upd.report.answer_folder import FigureAnswer
+from upd.results.answer_table import AnswerTable, Rounded
 from upd.scene.forced_contact import SIDES, Side
-from upd.sizing.statics import OUTCOMES, DamperStatics, outcomes, ratio_outcomes
+from upd.sizing.statics import JAMS, OUTCOMES, DamperStatics, MotionState, outcomes
 
 Array = NDArray[np.float64]
-FIGURE = "design"
 #: points of a map along one axis, of a curve over friction
 _MAP, _CURVE = 121, 97
 #: least angle of a map [deg]; friction to which maps reach at least, and beyond that of the scene
@@ -27,17 +30,129 @@ _LEAST, _FRICTION, _BEYOND = 1.0, 1.2, 1.6
 _EDGE = 95.0
 #: forces are shown to so many times those without friction
 _TIMES = 4.0
-#: axes of mobilised friction reach to so many times the friction coefficient
-_ROOM = 1.25
 _SIZE = (6.0, 5.0)
 #: rounding of angles measured on a mesh [deg]
 _SAME = 1e-6
 _STATE = Axis("state")
 
 
+@dataclass(frozen=True, repr=False)
+class DamperDesign(FigureAnswer):
+    """What `upd.design` found of a damper.
+
+    Attributes
+    ----------
+    statics : DamperStatics
+        Its numbers.
+    """
+
+    statics: DamperStatics
+    figure = "design"
+
+    @property
+    def outcome(self) -> tuple[str, str]:
+        """Whether both faces carry."""
+        return ("Warning", "warning") if self.statics.problems else ("Carries", "passed")
+
+    @property
+    def verdict(self) -> str:
+        """What the damper does, and the friction below which it carries on both faces."""
+        found = self.statics
+        text = f"{found.scene}: at mu = {found.friction:g} {_does(found.problems)}"
+        if found.sound_below == 0.0:
+            return f"{text}; no friction is low enough"
+        below = f"below mu = {found.sound_below:.4g}"
+        return (
+            f"{text}; both faces always carry {below}" if found.problems else f"{text}, as {below}"
+        )
+
+    @property
+    def tables(self) -> tuple[AnswerTable, ...]:
+        """Friction from which it jams, lifts off or tilts; forces of the faces in every motion, and
+        their limits.
+        """
+        found = self.statics
+        limits = (
+            ("jams: blades that approach are held by friction alone", found.limits.jams),
+            ("left face lifts off: the right one can hold the damper", found.limits.left_lifts),
+            ("right face lifts off: the left one can hold the damper", found.limits.right_lifts),
+            ("tilts: a force would act beyond the end of its face", found.tilts),
+        )
+        # a damper that jams or lifts off is not followed further
+        friction = tuple((what, _number(mu, "not before", ".4g")) for what, mu in limits)
+        motions = tuple((one.motion.name, *_forces(one), _outcome(one)) for one in found.states)
+        bounds = tuple(
+            (side, *(_number(v, "no limit") for v in found.force_limits[:, k].ravel()))
+            for k, side in enumerate(SIDES)
+        )
+        return (
+            AnswerTable("Friction", ("the damper", "#from mu"), friction),
+            AnswerTable(
+                "Forces while it slides, N",
+                ("motion", "#left N", "#T", "#right N", "#T", "#off middle", "outcome"),
+                motions,
+            ),
+            AnswerTable(
+                "Forces with any friction up to its limit, without tilting, N",
+                ("face", "#N from", "#to", "#T from", "#to"),
+                () if math.isnan(found.force_limits[0, 0, 0]) else bounds,
+            ),
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Angles, friction, F_C and mass."""
+        found = self.statics
+        left, right = found.section.faces
+        phi = math.degrees(math.atan(found.friction))
+        within = "; ".join(f"at {mu:g} {_does(problems)}" for mu, problems in found.known_within)
+        tilted = math.isnan(found.force_limits[0, 0, 0])
+        return (
+            *([f"mu is known within limits: {within}."] if within else []),
+            *(["No forces hold the damper against F_C without tilting it."] if tilted else []),
+            f"Left face {left.angle:.4g} deg, right face {right.angle:.4g} deg to the horizontal; "
+            f"friction angle {phi:.4g} deg; contacts {2.0 * left.half_length:.4g} and "
+            f"{2.0 * right.half_length:.4g} mm up the slopes.",
+            f"F_C {found.pressed}.",
+        )
+
+    @property
+    def charts(self) -> list[Chart]:
+        """Maps of its angles and friction, and limits of its forces."""
+        return statics_charts(self.statics)
+
+
+def _does(problems: Sequence[str]) -> str:
+    return ", ".join(problems) or "both faces carry in every motion"
+
+
+def _number(value: float, infinite: str, digits: str = ".5g") -> str:
+    return Rounded(value, digits, "{}" if math.isfinite(value) else infinite)
+
+
+def _forces(state: MotionState) -> list[str]:
+    """N and T of both faces, and how far off the middle of a face they must act."""
+    if not math.isfinite(state.N[0]):
+        return ["-"] * 5
+    pairs = zip(state.N, state.T, strict=True)
+    # what cancels to rounding is nothing
+    small = 1e-9 * float(state.N.max())
+    forces = [Rounded(v if abs(v) > small else 0.0, ".5g") for pair in pairs for v in pair]
+    return [*forces, Rounded(100.0 * state.eccentricity, ".0f", "{} %")]
+
+
+def _outcome(state: MotionState) -> str:
+    stuck = [side for side, s in zip(SIDES, state.slides, strict=True) if s == 0.0]
+    if state.outcome == OUTCOMES[JAMS] or len(stuck) != 1:
+        return state.outcome
+    return f"{state.outcome}, {stuck[0]} face does not slide"
+
+
+# -- charts ---------------------------------------------------------------------------------------
+
+
 def statics_charts(found: DamperStatics) -> list[Chart]:
-    """Maps of angles and friction with the damper marked, limits of its forces, and what holds it
-    at which mobilised friction.
+    """Maps of angles and friction with the damper marked, and limits of its forces.
 
     Parameters
     ----------
@@ -55,9 +170,11 @@ def statics_charts(found: DamperStatics) -> list[Chart]:
         ]
     )
     sides = SIDES[:1] if tied and _mirrored(found) else SIDES
-    charts = [_angles(found), *over, _ratios(found), *(_limits(found, s, sides) for s in sides)]
+    charts = [_angles(found), *over, *(_limits(found, s, sides) for s in sides)]
     columns = 3 if len(charts) > 4 else 2
-    return [replace(chart, figure=FIGURE, size=_SIZE, columns=columns) for chart in charts]
+    return [
+        replace(chart, figure=DamperDesign.figure, size=_SIZE, columns=columns) for chart in charts
+    ]
 
 
 def _mirrored(found: DamperStatics) -> bool:
@@ -131,25 +248,6 @@ def _known(found: DamperStatics, axis: Literal["x", "y"]) -> tuple[Band, ...]:
         return ()
     low, high = (mu for mu, _ in found.known_within)
     return (Band("friction, known within", axis, low, high, dashed=axis == "y"),)
-
-
-def _ratios(found: DamperStatics) -> Chart:
-    """What holds the damper, over the mobilised friction of both faces."""
-    mu = found.friction
-    # without friction one state is all there is
-    reach = mu or 1.0
-    at, room = np.linspace(-reach, reach, _MAP), _ROOM * reach
-    ends = {motion.name: (motion.left * mu, motion.right * mu) for motion in SLIDINGS}
-    return Chart(
-        "What holds the damper, by mobilised friction",
-        Axis("T/N of the left face", low=-room, high=room),
-        Axis("T/N of the right face", low=-room, high=room),
-        maps=(_map(at, at, ratio_outcomes(found.section, at[:, None], at)),),
-        traces=(Trace("without friction", np.zeros(1), np.zeros(1), "points", outline=True),),
-        marks=tuple(Mark(x, y, name, 7) for name, (x, y) in ends.items()) if mu else (),
-        equal=True,
-        note="T is positive when it opposes F_C; at the corners both faces slide.",
-    )
 
 
 def _limits(found: DamperStatics, side: Side, sides: tuple[Side, ...]) -> Chart:

@@ -1,0 +1,336 @@
+"""A chosen damper as an answer: verdict, tables, notes, and charts of worst peaks over F_C, of
+peaks over F_C/F_E, and over what else is chosen.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.hbm.peaks_over import SAME
+from upd.plot.chart import Axis, Band, Chart, Mark, Trace
+from upd.report.answer_folder import FigureAnswer
+from upd.results.answer_table import AnswerTable, Rounded
+from upd.scene.rotation import damper_mass
+from upd.sizing.choice import GROWTHS, UNITS_OF, ChosenDamper
+from upd.sizing.sensitivity import Sensitivity, sensitivities
+from upd.sizing.worst_peak import WorstPeak
+
+Array = NDArray[np.float64]
+#: points of a curve
+_CURVE = 301
+_SIZE = (6.4, 4.8)
+#: room above and below the curves, as a factor
+_ROOM = 1.25
+#: relative difference of F_C up to which two are one
+ALIKE = 0.03
+
+
+@dataclass(frozen=True, repr=False)
+class BestDamper(FigureAnswer):
+    """What `upd.design(..., minimise=...)` found.
+
+    Attributes
+    ----------
+    found : ChosenDamper
+        Its numbers.
+    """
+
+    found: ChosenDamper
+    figure = "choice"
+
+    @property
+    def outcome(self) -> tuple[str, str]:
+        """Whether the optimum lies within its bounds and what is known."""
+        status = self.found.best.best.status
+        return status.capitalize(), "passed" if status == "found" else "warning"
+
+    @property
+    def verdict(self) -> str:
+        """One sentence: the optimum and its worst peak."""
+        found = self.found
+        place = ", ".join(
+            f"{one.path} {one.of.shown(one.value)}{f' (its {one.bound} bound)' * bool(one.bound)}"
+            for one in _chosen(found)
+        )
+        worst = f"{found.worst:.4g} {UNITS_OF[found.objective]}"
+        return f"{found.ranges.scene.name}: worst peak {worst} at {place}"
+
+    @property
+    def tables(self) -> tuple[AnswerTable, ...]:
+        """Both optima, what decides, and how far parameters may move."""
+        found = self.found
+        unit, best = UNITS_OF[found.objective], found.best.best
+        shapes = found.ranges.shapes
+        robust = ("over the ranges", found.centrifugal, found.best.values)
+        nominal = ("the scene's values", found.nominal_centrifugal, found.plain.values)
+        heights = (
+            (_height(found.worst), _height(found.robust_at_nominal, found.settled[0])),
+            (_height(found.nominal_at_worst, found.settled[1]), _height(found.nominal_peak)),
+        )
+        optima = tuple(
+            (name, Rounded(F), *(of.cell(v) for of, v in zip(shapes, values, strict=True)), *both)
+            for (name, F, values), both in zip((robust, nominal), heights, strict=True)
+        )
+        deciding = tuple(
+            (
+                peak_of(p.name),
+                Rounded(math.exp(best.log_centrifugal - p.s)),
+                Rounded(math.exp(p.s)),
+                Rounded(p.frequency, ".2f"),
+                Rounded(math.exp(p.y)),
+            )
+            for p in best.deciding
+            if p.share > 0.0
+        )
+        moved = tuple(
+            (
+                one.path,
+                one.of.cell(one.value),
+                _slopes(one),
+                *(_span(one, ends) for ends in one.within),
+            )
+            for one in sensitivities(found)
+        )
+        heads = ("best for", "#F_C, N", *(f"#{of.path}" for of in shapes))
+        within = tuple(f"+{100.0 * (g - 1.0):.0f} % within" for g in GROWTHS)
+        return (
+            AnswerTable(
+                f"Worst peak, {unit}", (*heads, "#over the ranges", "#the scene's values"), optima
+            ),
+            AnswerTable(
+                "What decides",
+                ("peak", "#F_E, N", "#F_C/F_E", "#Hz", f"#height, {UNITS_OF['peak']}"),
+                deciding,
+            ),
+            AnswerTable(
+                "How far parameters may move",
+                ("parameter", "#value", "#slope", *within),
+                moved,
+                "Slope: d ln(peak) / d ln(parameter), below and above the optimum where both "
+                "differ. Within: the worst peak stays below so many per cent more, by whole "
+                "curves.",
+            ),
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was asked, what limits the answer, and the cost."""
+        found = self.found
+        e, best = found.ranges.scene.excitation, found.best.best
+        counted = ", ".join(
+            f"{one.path} {one.shown(one.low)} to {one.shown(one.high)}"
+            for one in found.ranges.during
+        )
+        per = " per N of F_E" if found.objective == "peak" else ""
+        kept = f", {found.resumed} kept of earlier calls" if found.resumed else ""
+        return (
+            f"Right blade, {UNITS_OF['acceleration']}{per}, {e.start:g} to {e.stop:g} Hz, "
+            f"stiffness {found.stiffness}{', over ' * bool(counted)}{counted}; {_mass(found)}.",
+            *warnings(found),
+            *(["The curve between solved points did not agree."] * (best.status == "bracketed")),
+            f"{found.curves} whole curves by harmonic balance{kept}: {found.seconds:.1f} s.",
+        )
+
+    @property
+    def charts(self) -> list[Chart]:
+        """Worst peaks over F_C, and peaks over F_C/F_E."""
+        return choice_charts(self.found)
+
+
+def _chosen(found: ChosenDamper) -> list[Sensitivity]:
+    """The sensitivities of what was chosen."""
+    paths = [one.path for one in found.ranges.over]
+    return [one for one in sensitivities(found) if one.path in paths]
+
+
+def _height(value: float, exact: bool = True) -> str:
+    if not math.isfinite(value):
+        return "not known"
+    return Rounded(value, text="{}" if exact else "at least {}")
+
+
+def peak_of(name: str) -> str:
+    """The mode of a branch, without the frequency that distinguishes it from others."""
+    return name.partition(",")[0]
+
+
+def _slopes(one: Sensitivity) -> str:
+    """d ln(peak)/d ln(parameter), below and above where they differ."""
+    same = math.isclose(one.below, one.above, abs_tol=5e-3) or not math.isfinite(one.above)
+    return " / ".join(map(_signed, (one.below,) if same else (one.below, one.above)))
+
+
+def _signed(value: float) -> str:
+    if not math.isfinite(value):
+        return "-"
+    return f"{value:+.2f}" if abs(value) >= 5e-3 else "0"
+
+
+def _span(one: Sensitivity, ends: tuple[float, float]) -> str:
+    """Between which values the worst peak grows no further."""
+    low, high = (one.of.shown(end) if math.isfinite(end) else "" for end in ends)
+    if low and high:
+        return f"{low.split()[0]} to {high}"
+    return f"from {low}" if low else f"to {high}" if high else "-"
+
+
+def _mass(found: ChosenDamper) -> str:
+    """The mass that gives F_C at the scene's radius and speed, or the mesh's."""
+    damper, own = found.ranges.scene.damper, damper_mass(found.ranges.scene)
+    if damper.radius is not None and damper.speed is not None:
+        mass = found.centrifugal / (damper.radius * damper.speed**2)
+        moved = next((one for one in found.ranges.over if one.path.startswith("damper.")), None)
+        if moved is None or moved.path == "damper.mass":
+            return f"F_C = m r w^2 of {1e6 * mass:.4g} g"
+    return "mass not known" if own is None else f"damper of {1e6 * own:.4g} g as meshed"
+
+
+def warnings(found: ChosenDamper) -> list[str]:
+    """What limits the answer."""
+    out = [f"Not solved: {why}." for why in found.refused]
+    for one in sensitivities(found):
+        out += [f"How far {one.path} may move is withheld: {why}." for why in one.withheld]
+    for low, high in found.gaps:
+        between = f"between F_C/F_E {low:.4g} and {high:.4g}"
+        out.append(f"Not known {between}: no whole curve reaches its end there.")
+    if found.best.best.at_jump and found.best.ends[0] < found.best.ends[1]:
+        out.append("At a jump of the worst peak over F_C: beyond it another peak decides, higher.")
+    low = math.exp(found.best.best.reached[0])
+    if low > found.best.ends[0] * (1.0 + ALIKE):
+        out.append(
+            f"Not known for F_C below {low:.4g} N: no whole curve reaches its end at F_C/F_E "
+            f"{', '.join(f'{r:.4g}' for r in found.unreached)}."
+        )
+    return out
+
+
+# -- charts ---------------------------------------------------------------------------------------
+
+
+def choice_charts(found: ChosenDamper) -> list[Chart]:
+    """Worst peaks over F_C with the optimum, all peaks over F_C/F_E with the points solved, and the
+    least worst peak over what else is chosen.
+
+    Parameters
+    ----------
+    found : ChosenDamper
+        The optimum.
+    """
+    charts = [_over_centrifugal(found), _over_ratio(found)]
+    charts += [_over_shape(found, k) for k in range(len(found.ranges.shapes))]
+    return [
+        replace(one, figure=BestDamper.figure, size=_SIZE, columns=len(charts)) for one in charts
+    ]
+
+
+def _height_axis(found: ChosenDamper, name: str, *values: Array) -> Axis:
+    known = np.concatenate([v[np.isfinite(v) & (v > 0.0)] for v in values])
+    ends = (known.min() / _ROOM, known.max() * _ROOM) if known.size else (None, None)
+    return Axis(name, UNITS_OF[found.objective], log=True, low=ends[0], high=ends[1])
+
+
+def _curve(worst: WorstPeak, low: float, high: float) -> tuple[Array, Array]:
+    """F_C [N] from end to end and heights, nan where they are not known."""
+    c, y = worst.over(math.log(low), math.log(high))
+    every = slice(None, None, max(1, len(c) // _CURVE))
+    c, y = c[every], y[every]
+    return np.exp(c), np.where(c >= worst.known_from() - SAME, np.exp(y), math.nan)
+
+
+def _over_centrifugal(found: ChosenDamper) -> Chart:
+    best, press = found.best, found.ranges.pressing
+    low, high = best.ends
+    scene = found.ranges.scene
+    if low == high:
+        low, high = low / 2.0, high * 2.0
+
+    def shown(F: Array) -> Array:
+        return np.array([F_C if press is None else press.value_at(F_C, scene) for F_C in F])
+
+    (F, robust), (G, plain) = (_curve(w, low, high) for w in (best.worst, found.plain.plain))
+    solved = np.array([math.log(found.centrifugal), math.log(found.nominal_centrifugal)])
+    at = shown(np.exp(solved))
+    name = "F_C" if press is None or press.path.endswith("centrifugal") else press.path
+    return Chart(
+        f"{scene.name}: worst peak",
+        Axis(name, "N" if press is None else press.unit, log=True),
+        _height_axis(found, "worst peak", robust, plain, np.array([found.worst])),
+        traces=(
+            Trace("over the ranges", shown(F), robust, "line", 0),
+            Trace("the scene's own values", shown(G), plain, "dashed", 1),
+            Trace("robust optimum", at[:1], np.array([found.worst]), "star", 0, outline=True),
+            Trace("nominal optimum", at[1:], np.array([found.nominal_peak]), "star", 1),
+        ),
+        note="Between whole curves the cubic of their peaks and exact slopes.",
+    )
+
+
+def _over_ratio(found: ChosenDamper) -> Chart:
+    """Every peak of the rigs of the optimum."""
+    best = found.best
+    traces: list[Trace] = []
+    heights: list[Array] = []
+    for w, rig in best.rigs:
+        word = "".join(f", {of.shown(v)}" for of, v in zip(found.ranges.unsure, w, strict=True))
+        s = np.linspace(rig.peaks.low, rig.peaks.high, _CURVE)
+        curves = rig.peaks.curves()
+        for name, curve in curves.items():
+            y = curve(s)
+            heights.append(np.exp(y[np.isfinite(y)]))
+            values = np.where(np.isfinite(y), np.exp(y), math.nan)
+            colour = len({t.colour for t in traces})
+            label = f"{name}{word}"
+            traces.append(Trace(label, np.exp(s), values, "line", colour))
+            solved = sorted(
+                (t, p[name].log_height) for t, p in rig.peaks.points.items() if name in p
+            )
+            x, v = np.exp(np.array(solved)).T
+            inside = (np.log(x) >= rig.peaks.low - SAME) & (np.log(x) <= rig.peaks.high + SAME)
+            traces.append(
+                Trace(f"{label}, solved", x[inside], v[inside], "points", colour, entry=label)
+            )
+    c, f = best.best.log_centrifugal, best.worst.f
+    marks = tuple(
+        Mark(math.exp(p.s), math.exp(p.y), f"F_E {math.exp(c - p.s):.3g} N", 0)
+        for p in best.best.deciding
+        if p.share > 0.0
+    )
+    return Chart(
+        "Peaks over F_C/F_E",
+        Axis("F_C/F_E", log=True),
+        _height_axis(replace(found, objective="peak"), "peak accelerance", *heights),
+        traces=tuple(traces),
+        marks=marks,
+        bands=(Band("F_E of the optimum", "x", math.exp(c - f[1]), math.exp(c - f[0])),),
+        note="Scaling F_C and F_E alike changes nothing: one curve serves all pairs of forces.",
+    )
+
+
+def _over_shape(found: ChosenDamper, k: int) -> Chart:
+    shape = found.ranges.shapes[k]
+    x, tried = (np.array(column) for column in zip(*found.along(k), strict=True))
+    robust = np.exp([one.best.log_worst for one in tried])
+    plain = np.exp([one.nominal.log_worst for one in tried])
+    return Chart(
+        f"Least worst peak over {shape.path}",
+        Axis(shape.path, shape.unit),
+        _height_axis(found, "worst peak at its best F_C", robust, plain),
+        traces=(
+            Trace("over the ranges", x, robust, "both", 0),
+            Trace("the scene's own values", x, plain, "both", 1),
+            Trace(
+                "robust optimum",
+                np.array([found.best.values[k]]),
+                np.array([found.worst]),
+                "star",
+                0,
+                outline=True,
+            ),
+        ),
+        note="Every point is a rig of its own, at the F_C that is best for it"
+        + (", all else as at the optimum." if len(found.ranges.shapes) > 1 else "."),
+    )
