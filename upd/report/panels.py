@@ -1,5 +1,5 @@
-"""Figures of a page: the run's PNG files beside the charts that show the same, each with a picture
-that needs no script.
+"""Figures of a page: the PNG files of a folder beside the charts that show the same, each with a
+picture that needs no script, and as many surfaces as the page has room for.
 """
 
 from __future__ import annotations
@@ -9,16 +9,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-from upd.analyses import analysis_named
-from upd.plot.chart import Chart, Charts
+from upd.plot.chart import Chart
 from upd.plot.matplotlib import chart_png
 from upd.plot.plotly import figure
 from upd.plot.png import png_size, png_uri, small_png
-from upd.report import generic
-from upd.report.error_budget import budget_charts
-from upd.report.folder import RunFolder
+from upd.plot.surface import Surface, n_bytes, with_fields
 
 #: PNG file -> heading, for those that have no chart
 _HEADINGS = {
@@ -65,19 +62,6 @@ class Panel:
     def alt(self) -> str:
         """Words for those who do not see the picture."""
         return self.heading
-
-
-def charts_of(run: RunFolder) -> Charts:
-    """The analysis that knows the charts of the run; the generic one when it is not known."""
-    return analysis_named(str(run.summary["size"].get("analysis", ""))) or cast(Charts, generic)
-
-
-def run_panels(run: RunFolder) -> list[Panel]:
-    """All figures of a run, in the order of its charts; PNG files without a chart last."""
-    of, results = charts_of(run), run.summary["results"]
-    charts = of.charts(run.arrays, run.summary)
-    budget = budget_charts(of.headline(results) or generic.headline(results))
-    return make_panels([*charts, *budget], run.figures)
 
 
 def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Panel]:
@@ -151,3 +135,22 @@ def data(panels: Iterable[Panel]) -> dict[str, Any]:
         for p in panels
         if p.charts
     }
+
+
+def fitting(surfaces: Iterable[Surface], room: int) -> tuple[list[Surface], list[str]]:
+    """Surfaces that fit into ``room`` bytes, with as many of their fields as fit, and what had to
+    be left out, in words.
+    """
+    shown, left_out = [], []
+    for surface in surfaces:
+        n = len(surface.fields)
+        while n > 0 and n_bytes(with_fields(surface, n)) > room:
+            n -= 1
+        part = with_fields(surface, n)
+        if n_bytes(part) > room:
+            left_out.append(f"{surface.label}: too large for this page")
+            continue
+        left_out += [f"{f.label}: too large for this page" for f in surface.fields[n:]]
+        room -= n_bytes(part)
+        shown.append(part)
+    return shown, left_out

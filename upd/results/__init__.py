@@ -23,7 +23,6 @@ from upd.results.status import (
     outcome_of,
     status_of,
     warned,
-    warning_details,
     warnings_of,
     with_fault,
 )
@@ -50,7 +49,6 @@ __all__ = [
     "shared_label",
     "status_of",
     "warned",
-    "warning_details",
     "warnings_of",
     "with_estimates",
     "with_fault",

@@ -248,11 +248,9 @@
   }
 
   // ------------------------------------------------------------------ the rest of the page
-  function addCopy() {
-    const button = document.getElementById("copy-scene");
-    if (!button) return;
+  function addCopy(button) {
+    const text = button.parentElement.nextElementSibling;
     button.addEventListener("click", function () {
-      const text = document.getElementById("scene-text");
       const done = () => { button.textContent = "Copied"; };
       const byHand = () => { getSelection().selectAllChildren(text); };
       if (navigator.clipboard) navigator.clipboard.writeText(text.textContent).then(done, byHand); else byHand();
@@ -272,6 +270,6 @@
     waiting = setTimeout(() => drawn.filter((state) => state.place.clientWidth).forEach((state) => drawChart(state.place, state.figure)), 150);
   });
 
-  addCopy();
+  document.querySelectorAll("button.copy").forEach(addCopy);
   addPanels().then(addView).then(() => root.classList.add("ready"));
 })();
