@@ -28,6 +28,14 @@ settings.load_profile("same")
 #: Workers of a plain ``pytest``. More need more memory than a laptop has; ``pytest -n 8`` is
 #: obeyed.
 WORKERS = 2
+#: Files of tens of seconds: begun first, no worker is left with one of them at the end.
+LONG = {
+    *("test_choice", "test_readme", "test_fit", "test_measured_fit", "test_sweep_faults"),
+    *("test_default_estimates", "test_response_estimates", "test_input_effects", "test_answer"),
+    *("test_study_faults", "test_scene_studies", "test_report", "test_report_browser"),
+    *("test_interface_march", "test_forced_scene", "test_contact_left_out", "test_doctests"),
+    *("test_confirmed_peaks", "test_seated_estimates", "test_accuracy_rounds"),
+}
 #: Read by the libraries when they are loaded, which in a worker is after this file.
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 _OWN_CACHE = "UPD_TESTS_CACHE"
@@ -71,6 +79,13 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
         and option.dist == "no"
     ):
         option.numprocesses, option.dist = min(WORKERS, _cores()), "loadfile"
+        option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Workers take the long files first."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        items.sort(key=lambda item: item.path.stem not in LONG)
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -140,20 +140,9 @@ def test_a_failed_mesh_does_not_spoil_the_next() -> None:
             bad = blocks.Blocks(gmsh)
             for k, corner in enumerate(hexahedron.REFERENCE[:8]):
                 bad.point(str(k), corner)
-            for a, b in (
-                (0, 1),
-                (1, 2),
-                (2, 3),
-                (3, 0),
-                (4, 5),
-                (5, 6),
-                (6, 7),
-                (7, 4),
-                (0, 4),
-                (1, 5),
-                (2, 6),
-                (3, 7),
-            ):
+            sides = [(k, (k + 1) % 4) for k in range(4)]
+            sides += [(a + 4, b + 4) for a, b in sides] + [(k, k + 4) for k in range(4)]
+            for a, b in sides:
                 bad.curve(str(a), str(b), 3 if (a, b) == (4, 5) else 2)  # opposite edges disagree
             bad.volume("broken", [str(k) for k in range(8)])
             bad.mesh(8)

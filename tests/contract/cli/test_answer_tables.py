@@ -178,16 +178,16 @@ def test_what_warns_is_named_with_its_worst_case_first() -> None:
     ]
 
 
-def test_a_notebook_shows_the_tables(told: RunResult) -> None:
-    evil = replace(BEST, heading="<b>", rows=(("<i>", "1"),))
+def test_a_notebook_shows_the_tables(told: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:
     html = told._repr_html_()
     for table in (PEAKS, BEST, DEPENDS):
         assert table.heading in html and table.note in unescape(html)
         assert all(cell in unescape(html) for row in table.rows for cell in row)
     assert "maximum pressure" not in html
-    from upd.report.notebook import _table_html
-
-    assert "<i>" not in _table_html(evil) and "<b><b>" not in _table_html(evil)
+    evil = replace(BEST, heading="<b>", rows=(("<i>", "1"),))
+    monkeypatch.setattr(hertz, "ANALYSIS", replace(hertz.ANALYSIS, answer=lambda _: [evil]))
+    html = told._repr_html_()
+    assert "<i>" not in html and "<b><b>" not in html and "&lt;i&gt;" in html
 
 
 def test_the_levels_that_an_accuracy_chose_stand_beside_the_tables(told: RunResult) -> None:

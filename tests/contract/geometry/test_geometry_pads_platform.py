@@ -27,7 +27,6 @@ from upd.fem.inertia import MassProperties, mass_properties
 from upd.mesh import Mesh
 from upd.mesh.pairing import check_pairs
 from upd.mesh.quality import quality
-from upd.mesh.recipes import build_mesh
 
 EPS = np.finfo(float).eps
 SMALL: dict[str, Any] = {"divisions": 3, "divisions_long": 5, "growth": 1.8}
@@ -394,11 +393,3 @@ def test_all_faults_come_at_once() -> None:
 def test_faults_name_the_remedy(changes: dict[str, Any], word: str) -> None:
     with pytest.raises(InputError, match=word):
         PadsPlatform(**changes)
-
-
-def test_ready_recipe(tmp_path: Any) -> None:
-    meshes, cached = build_mesh(
-        "pads_platform", {"divisions": 2, "divisions_long": 4}, cache_dir=tmp_path
-    )
-    assert not cached
-    assert len(meshes["damper"].nodes["contact"]) == 30

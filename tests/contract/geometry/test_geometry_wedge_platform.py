@@ -20,7 +20,6 @@ from upd.fem.inertia import MassProperties, mass_properties
 from upd.mesh import FloatArray, Mesh
 from upd.mesh.pairing import check_pairs
 from upd.mesh.quality import quality
-from upd.mesh.recipes import build_mesh
 from upd.mesh.stored import load_meshes, save_meshes
 
 EPS = np.finfo(float).eps
@@ -423,11 +422,3 @@ def test_all_faults_come_at_once() -> None:
 def test_faults_name_the_remedy(changes: dict[str, Any], word: str) -> None:
     with pytest.raises(InputError, match=word):
         WedgePlatform(**changes)
-
-
-def test_ready_recipe(tmp_path: Any) -> None:
-    meshes, cached = build_mesh(
-        "wedge_platform", {"divisions": 2, "divisions_long": 4}, cache_dir=tmp_path
-    )
-    assert not cached
-    assert len(meshes["damper"].nodes["contact"]) == 15

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,6 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.text import Text
 
-from upd.plot import matplotlib as backend
 from upd.plot.chart import (
     STATES,
     Area,
@@ -198,13 +196,24 @@ def _crowd() -> Chart:
     )
 
 
+def written_figure(charts: list[Chart], folder: Path) -> Figure:
+    """The figure of a sheet as it is written."""
+    kept: list[Figure] = []
+    save = Figure.savefig
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", lambda s, *a, **k: kept.append(s) or save(s, *a, **k))
+        write_sheet(charts, folder / "a.png")
+    (made,) = kept
+    return made
+
+
 @pytest.mark.parametrize("log", [False, True])
-def test_labels_and_legends_of_a_sheet_cover_nothing(log: bool) -> None:
+def test_labels_and_legends_of_a_sheet_cover_nothing(log: bool, tmp_path: Path) -> None:
     crowd = replace(_crowd(), y=replace(Y, log=log))
     names = [f"F_C/F_E 2000, static reversed, sweep {k}" for k in range(30)]
     many = tuple(replace(crowd.traces[0], label=name) for name in names)
     charts = [crowd, replace(crowd, traces=many), _bars(), _pies(), _map(), crowd]
-    sheet = backend._sheet(charts, 110)
+    sheet = written_figure(charts, tmp_path)
     sheet.draw_without_rendering()
     axes = [ax for ax in sheet.axes if ax.get_title()]
     assert len(axes) == len(charts)
@@ -764,13 +773,8 @@ LONG = (
 )
 @pytest.mark.parametrize("columns", [2, 4])
 def test_titles_do_not_run_into_the_neighbour(
-    title: str, case: str, columns: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    title: str, case: str, columns: int, tmp_path: Path
 ) -> None:
-    kept: list[Figure] = []
-    sheet: Callable[..., Figure] = backend._sheet
-    monkeypatch.setattr(
-        backend, "_sheet", lambda charts, dpi: kept.append(sheet(charts, dpi)) or kept[0]
-    )
     charts = [
         Chart(
             title,
@@ -782,8 +786,7 @@ def test_titles_do_not_run_into_the_neighbour(
             size=(3.6, 3.6) if columns == 4 else (5.6, 4.4),
         )
     ] * (2 * columns)
-    write_sheet([*charts[1:], replace(charts[0], maps=_map().maps, traces=())], tmp_path / "a.png")
-    (made,) = kept
+    made = written_figure([*charts[1:], replace(charts[0], maps=_map().maps, traces=())], tmp_path)
     axes = [ax for ax in made.axes if ax.get_title()]
     boxes = [ax.title.get_window_extent() for ax in axes]
     whole = made.bbox

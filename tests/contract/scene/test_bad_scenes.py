@@ -28,7 +28,7 @@ from upd.scene import ForcedScene, RigScene, Scene, SeatedScene, ready_scenes
 #: what the whole set must hold
 WANTED = 300
 #: examples per ready scene and kind of fault
-EACH = 17
+EACH = 10
 #: keys that take any text in quotes, the second ones because only the mesh knows its sets
 FREE_TEXT = ("title", "contact.distant.damper", "contact.distant.platform")
 SCHEMAS: dict[str, Any] = {
