@@ -20,7 +20,7 @@ from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.fields import table
 from upd.mesh.recipe_modules import READY
-from upd.scene.base import INSIDE, OutputNames
+from upd.scene.base import INSIDE
 from upd.scene.hints import hint_at, hints, named_table, notes, quantity_kind, without_notes
 from upd.scene.quantities import Noted, Rule
 from upd.scene.rotation import damper_mass
@@ -365,7 +365,6 @@ def _bounds(hint: Any) -> str:
     noted, whole = list(notes(hint)), "whole number " * (inner is int)
     out += [f"{whole}{n.bounds}" for n in noted if isinstance(n, Rule)]
     out += [n.bounds for n in noted if isinstance(n, Noted) and n.bounds]
-    out += [", ".join(n.outputs) for n in noted if isinstance(n, OutputNames)]
     return "; ".join(out)
 
 
