@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 import upd
 from upd import load_scene
-from upd.analyses.contact.neighbours import PLACES
+from upd.analyses.contact.varied import PLACES
 from upd.batch.studies import plan_study
 from upd.hbm import contacts
 from upd.hbm.fourier import analysis, harmonics, synthesis
