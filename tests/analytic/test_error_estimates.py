@@ -11,8 +11,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from upd.analyses.contact.levels import half_cost
 from upd.analyses.contact.plans import make_plan
+from upd.analyses.contact.varied import half_cost
 from upd.errors import InputError
 from upd.progress import Stages
 from upd.results import Case, ErrorPart, Result, with_estimates, with_parts

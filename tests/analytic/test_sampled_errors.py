@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from upd.analyses.contact.neighbours import neighbours
+from upd.analyses.contact.varied import neighbours
 from upd.vary.orders import ladder_error
 from upd.vary.scatter import sampled_error
 

@@ -99,9 +99,7 @@ def _told(basis: str) -> str:
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_parts_of_errors_stay(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    # what a seated damper is compared with depends on predicted seconds
-    monkeypatch.setattr("upd.linalg.select.threads_used", lambda: 1)
+def test_parts_of_errors_stay(name: str) -> None:
     found, kept = rows(name), json.loads(FILE.read_text(encoding="utf-8"))[name]
     assert [one[:2] for one in found] == [one[:2] for one in kept]
     for one, other in zip(found, kept, strict=True):

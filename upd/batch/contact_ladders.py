@@ -12,8 +12,7 @@ from typing import Any
 from upd.analyses import analysis_of
 from upd.analyses.base import Plan
 from upd.analyses.contact.plan import refined_growth
-from upd.analyses.flat import accuracy as flat
-from upd.analyses.hertz import accuracy as hertz
+from upd.analyses.contact.varied import CURVED_GOVERNING, FLAT_GOVERNING
 from upd.batch.curves import accuracy_curves, true_errors
 from upd.batch.ladder import Counts, Ladder, Levels, StudyReport, even, shown
 from upd.batch.study_point import Key, Settings, SolvedPoint, StudyPoint, matching
@@ -52,8 +51,8 @@ _EDGES = ("patch", "patch_length", "pad_length")
 #: analysis -> numbers an accuracy is asked of, and the usual ones in per cent: 3 % takes 7 GB on
 #: the ready sphere, 2 % 24 GB
 _ASKED: Mapping[str, tuple[tuple[str, ...], tuple[float, ...]]] = {
-    "hertz": (hertz.GOVERNING, (40.0, 10.0, 3.0)),
-    "flat": (flat.GOVERNING, (20.0, 10.0, 5.0)),
+    "hertz": (CURVED_GOVERNING, (40.0, 10.0, 3.0)),
+    "flat": (FLAT_GOVERNING, (20.0, 10.0, 5.0)),
 }
 _ACCURACY_NOTES = (
     "estimated: by the run itself, a bound; true: against the closed form, where a number has one",

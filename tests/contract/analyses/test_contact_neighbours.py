@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from upd.analyses.contact.levels import levels
-from upd.analyses.contact.neighbours import neighbours_seconds
 from upd.analyses.contact.plans import make_plan
+from upd.analyses.contact.varied import levels, neighbours_seconds
 from upd.analyses.hertz.results import make_results
 from upd.analyses.hertz.samples import sample
 from upd.analyses.hertz.solve import solve_plan

@@ -10,7 +10,7 @@ import pytest
 
 import upd
 from upd.analyses import analysis_of, make_plan
-from upd.analyses.flat.accuracy import WANTED
+from upd.analyses.contact.varied import choices
 from upd.errors import InputError
 from upd.plot.chart import Entry
 from upd.plot.matplotlib import draw
@@ -116,7 +116,7 @@ def test_companions_that_fail_leave_a_reason(monkeypatch: pytest.MonkeyPatch) ->
         raise InputError("cannot be meshed")
 
     monkeypatch.setattr("upd.vary.solve.changed", refuse)
-    monkeypatch.setattr("upd.analyses.contact.levels._seconds", lambda *_: 1.0)
+    monkeypatch.setattr("upd.analyses.contact.varied._seconds", lambda *_: 1.0)
     found = upd.run("symmetric", overrides=WEDGE)
     row = next(r for r in found.results if r.name == "K_N_secant_raw")
     assert row.estimated_error is None
@@ -138,7 +138,7 @@ def test_an_accuracy_is_reached_on_the_cheapest_level() -> None:
 
 
 def _levels(scene: Any) -> list[Any]:
-    (mesh,) = WANTED.choices(scene)
+    (mesh,) = choices(scene)
     return [mesh.at(scene, k) for k in range(len(mesh.labels))]
 
 

@@ -13,8 +13,8 @@ import pytest
 
 from upd import load_scene, make_plan, run
 from upd.analyses.base import Plan
-from upd.analyses.contact.levels import level_of
-from upd.analyses.hertz.accuracy import PROBLEM, WANTED
+from upd.analyses.contact.varied import level_of
+from upd.analyses.hertz import PROBLEM, WANTED
 from upd.batch.curves import make_curves
 from upd.batch.engine import Progress, Workers
 from upd.batch.parameter_study import parameter_points, parameter_rows

@@ -11,21 +11,29 @@ from upd.analyses.base import Analysis
 from upd.analyses.contact import effects
 from upd.analyses.contact.bodies import needs
 from upd.analyses.contact.effects import SolvedAgain
-from upd.analyses.contact.levels import coarsened, plan_with_estimates
 from upd.analyses.contact.results import pick
-from upd.analyses.flat import accuracy, charts, checks, output, results
-from upd.analyses.flat.solve import note_moved, solve_companion
+from upd.analyses.contact.varied import (
+    FLAT_GOVERNING,
+    coarsened,
+    make_wanted,
+    mesh_problem,
+    plan_with_estimates,
+)
+from upd.analyses.flat import charts, checks, output, results
+from upd.analyses.flat.solve import note_moved, solve_companion, solve_plan
 from upd.vary import errors
 from upd.vary.wanted import plan_wanted
 
+PROBLEM = mesh_problem(solve_plan, results.make_results)
+WANTED = make_wanted(PROBLEM, FLAT_GOVERNING)
 _AGAIN = SolvedAgain(solve_companion, results.make_results, note_moved)
 ANALYSIS = Analysis(
     name="flat",
     headline_names=results.HEADLINE,
     input_checks=("Dundurs beta",),
-    make_plan=partial(plan_wanted, accuracy.WANTED, partial(plan_with_estimates, accuracy.PROBLEM)),
+    make_plan=partial(plan_wanted, WANTED, partial(plan_with_estimates, PROBLEM)),
     needs=needs,
-    solve=partial(effects.solve, accuracy.WANTED, _AGAIN),
+    solve=partial(effects.solve, WANTED, _AGAIN),
     make_results=results.make_results,
     check_solution=checks.check_solution,
     arrays=output.arrays,
@@ -33,7 +41,7 @@ ANALYSIS = Analysis(
     write_files=output.write_files,
     charts=charts.charts,
     headline=partial(pick, names=results.HEADLINE),
-    estimate=partial(errors.estimate, accuracy.PROBLEM),
+    estimate=partial(errors.estimate, PROBLEM),
     verdict_names=("max_pressure",),
     coarsened=coarsened,
 )

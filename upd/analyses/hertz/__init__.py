@@ -11,14 +11,23 @@ from upd.analyses.base import Analysis
 from upd.analyses.contact import effects
 from upd.analyses.contact.bodies import needs
 from upd.analyses.contact.effects import SolvedAgain
-from upd.analyses.contact.levels import coarsened, plan_with_estimates
 from upd.analyses.contact.results import pick
-from upd.analyses.hertz import accuracy, charts, checks, output, results
-from upd.analyses.hertz.solve import solve_on
+from upd.analyses.contact.varied import (
+    CURVED_GOVERNING,
+    coarsened,
+    make_wanted,
+    mesh_problem,
+    plan_with_estimates,
+)
+from upd.analyses.hertz import charts, checks, output, results
+from upd.analyses.hertz.samples import sample
+from upd.analyses.hertz.solve import solve_on, solve_plan
 from upd.progress import Stages
 from upd.vary import errors
 from upd.vary.wanted import plan_wanted
 
+PROBLEM = mesh_problem(solve_plan, results.make_results, sample)
+WANTED = make_wanted(PROBLEM, CURVED_GOVERNING)
 _AGAIN = SolvedAgain(lambda plan, model: solve_on(plan, model, Stages()), results.make_results)
 ANALYSIS = Analysis(
     name="hertz",
@@ -29,9 +38,9 @@ ANALYSIS = Analysis(
         "contact radius against sphere",
         "slope in the contact",
     ),
-    make_plan=partial(plan_wanted, accuracy.WANTED, partial(plan_with_estimates, accuracy.PROBLEM)),
+    make_plan=partial(plan_wanted, WANTED, partial(plan_with_estimates, PROBLEM)),
     needs=needs,
-    solve=partial(effects.solve, accuracy.WANTED, _AGAIN),
+    solve=partial(effects.solve, WANTED, _AGAIN),
     make_results=results.make_results,
     check_solution=checks.check_solution,
     arrays=output.arrays,
@@ -39,7 +48,7 @@ ANALYSIS = Analysis(
     write_files=output.write_files,
     charts=charts.charts,
     headline=partial(pick, names=results.HEADLINE, last=True),
-    estimate=partial(errors.estimate, accuracy.PROBLEM),
+    estimate=partial(errors.estimate, PROBLEM),
     coarsened=coarsened,
 )
 

@@ -37,7 +37,7 @@ def corrected(
     and says so.
     """
     known = dict(merged(found, _by_solver(solution, run.numbers)))
-    for key, parts in _by_edges(solution).items():
+    for key, parts in by_edges(solution).items():
         known[key] = _larger(known.get(key, ()), parts[0])
     return {
         key: _rounding(parts) or of_one_sign(run.values[key], key, solved) or parts
@@ -97,7 +97,7 @@ def _by_solver(solution: SeatedSolution, numbers: Iterable[Result]) -> Estimates
     return out
 
 
-def _by_edges(solution: SeatedSolution) -> Estimates:
+def by_edges(solution: SeatedSolution) -> Estimates:
     """Of shares of the faces, what a lattice leaves open: their edges are known to one spacing.
 
     A share counts whole nodes, and levels may agree by chance.

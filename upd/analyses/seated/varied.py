@@ -32,87 +32,58 @@ PATCH = {
 }
 #: elements along an edge, or load steps, of a finer level over those of its base
 _FINER = 2
-#: largest share of the run, variations included, that these take
-_SHARE = 0.35
+_NOT = "not estimated:"
+#: nodes that finer bodies may have where the run has fewer
+_FEW_NODES = 20_000
 _Counts = Mapping[str, int]
 
 
 def plan_with_estimates(scene: SeatedScene) -> SeatedPlan:
     """The plan of ``scene`` with what its variations cost. Raises InputError as `make_plan`."""
-    plan = make_plan(scene)
-    again = sum(_chosen(plan)[0].values())
+    plan, again = make_plan(scene), 0.0
+    for one in levels(plan).variations:
+        # what the recipe does not take is the reason that the run gives
+        with suppress(InputError):
+            again += solve_seconds(varied_plan(PROBLEM, scene, one))
     return replace(plan, seconds=plan.seconds + again, estimate_seconds=again)
 
 
 def levels(plan: SeatedPlan) -> Levels:
-    """The variations of a plan, as `_chosen`: lattices first, the coarsest before the others."""
-    taken, reasons = _chosen(plan)
-    variations = sorted(taken, key=lambda one: PROBLEM.sources.index(one.source))
-    told = {source: f"not estimated: {why}" for source, why in reasons.items() if source != NODES}
-    return Levels(variations, {NODES: "no coarser lattice"} | reasons | told)
+    """The variations of a plan: lattices first, the coarsest before the others.
 
-
-def _chosen(plan: SeatedPlan) -> tuple[dict[Variation, float], dict[str, str]]:
-    """Variations of a plan with their predicted seconds, and why a source has none.
-
-    Coarser lattices of the faces tell what the contact's nodes leave. On the coarsest, where a
+    Coarser lattices of the faces show what the contact's nodes leave. On the coarsest, where a
     seating costs a few hundredths, all bodies get twice the elements along every edge and the
     faces' nodes stay; and every load step is halved. What these change there is taken for what they
-    change in the run. All of them take at most 35 % of the run: where they would take more the
-    bodies get half the elements instead, and lattices between are left out.
+    change in the run. Bodies that would have more nodes than the run, and many, are not refined.
     """
-    made, taken, reasons = (dict[Variation, float](), dict[Variation, float](), dict[str, str]())
-    scene = plan.scene
+    scene, made = plan.scene, dict[float, Variation]()
     if not scene.estimates:
-        return taken, reasons
+        return Levels(())
     own = lattice_counts(scene)
     coarsest, keeps = _coarsest(scene, own)
-    base = RUN if coarsest == own else _on_lattice(own, coarsest)
-    budget = _SHARE / (1.0 - _SHARE) * (plan.seconds - plan.estimate_seconds)
-
-    def make(one: Variation) -> bool:
-        try:
-            made[one] = _seconds(scene, one)
-        except InputError as error:
-            reasons[one.source] = one_line(error)
-        return one in made
-
-    def take(one: Variation, seconds: float) -> None:
-        if sum(taken.values()) + seconds > budget:
-            share = f"{100.0 * _SHARE:.0f} % of the run"
-            reasons.setdefault(one.source, f"{one.label}: {seconds:.2g} s, beyond {share}")
-        else:
-            taken[one] = seconds
-
-    if base is RUN:
-        reasons[NODES] = "the lattice of the faces cannot be made coarser"
-    else:
-        make(base)
-    make(_shorter_steps(scene, coarsest, base))
+    if coarsest != own:
+        between = [_coarser(scene, own, ratio) for ratio in COARSER[1::-1]]
+        for counts in (coarsest, *(one for one in between if one != own)):
+            lattice = _on_lattice(own, counts)
+            made.setdefault(lattice.size, lattice)
+    lattices = list(made.values())
+    base = lattices[0] if lattices else RUN
+    steps, bodies = _shorter_steps(scene, coarsest, base), list[Variation]()
+    why = "the bodies cannot be refined with the lattice of the faces kept"
     if keeps:
-        finer = _other_bodies(scene, coarsest, base, _FINER)
-        make(finer)
-        over = sum(made.values()) > budget
-        if over and make(_other_bodies(scene, coarsest, base, 1.0 / _FINER)):
-            made.pop(finer, None)
-    else:
-        reasons[MESH] = "the bodies cannot be refined with the lattice of the faces kept"
-    for one, seconds in made.items():
-        if one.base not in (None, RUN, *taken):
-            reasons[one.source] = f"{base.label}, which it stands on: {reasons[NODES]}"
-        else:
-            take(one, seconds)
-    between = [_coarser(scene, own, ratio) for ratio in COARSER[1::-1]] if base in taken else []
-    for counts in between:
-        one = _on_lattice(own, counts)
-        if counts != own and one.overrides not in [other.overrides for other in taken]:
-            with suppress(InputError):
-                take(one, _seconds(scene, one))
-    return taken, reasons
+        finer, most = _finer_bodies(scene, coarsest, base), max(_FEW_NODES, _nodes(plan))
+        try:
+            count = _nodes(varied_plan(PROBLEM, scene, finer))
+            bodies = [finer] if count <= most else []
+            why = f"{finer.label}: {count} nodes, above {most}"
+        except InputError as error:
+            why = one_line(error)
+    reasons = {NODES: "the lattice of the faces cannot be made coarser", MESH: f"{_NOT} {why}"}
+    return Levels([*lattices, *bodies, steps], reasons)
 
 
-def _seconds(scene: SeatedScene, one: Variation) -> float:
-    return solve_seconds(varied_plan(PROBLEM, scene, one))
+def _nodes(plan: SeatedPlan) -> int:
+    return sum(count["nodes"] for count in plan.size.values())
 
 
 # -- lattices --------------------------------------------------------------------------------------
@@ -185,12 +156,11 @@ def _on_lattice(own: _Counts, counts: _Counts) -> Variation:
     return Variation(NODES, _label(counts), _geometry(counts), size)
 
 
-def _other_bodies(scene: SeatedScene, counts: _Counts, base: Variation, factor: float) -> Variation:
-    """The base's faces on bodies with so many times the elements along every edge."""
-    kept = _geometry({name: round(n / factor) for name, n in counts.items()})
-    word = "twice" if factor > 1.0 else "half"
-    label = f"{word} the elements along every edge, {_label(counts)} kept"
-    return Variation(MESH, label, (*kept, *_refined(scene, factor)), 1.0 / factor, base)
+def _finer_bodies(scene: SeatedScene, counts: _Counts, base: Variation) -> Variation:
+    """The base's faces on bodies with twice the elements along every edge."""
+    kept = _geometry({name: round(n / _FINER) for name, n in counts.items()})
+    label = f"twice the elements along every edge, {_label(counts)} kept"
+    return Variation(MESH, label, (*kept, *_refined(scene, _FINER)), 1.0 / _FINER, base)
 
 
 def _shorter_steps(scene: SeatedScene, counts: _Counts, base: Variation) -> Variation:

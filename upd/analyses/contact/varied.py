@@ -1,0 +1,432 @@
+"""What varies in a contact: its mesh, coarser for the errors of its numbers and finer for a wanted
+accuracy, and loads near a curved contact's own, which move its edge between the nodes.
+
+Of a curved contact the meshes of an accuracy are sized from the load. Those of a flat one have
+elements of 20 nodes. At the edges of flat faces pressure grows without a limit, so a stiffness
+converges with order 1 in the end on any element; but what 8 nodes leave of bodies and of the bands
+that hold them is larger for long: K_N of the ready wedge is 4.421e6 N/mm on 8 divisions of 20 nodes
+(7 s), 4.455e6 on 16 of 8 nodes (12 s), about 4.40e6 in the limit.
+
+A damper that wires press along narrow bands across its length (`pads_platform`) needs elements as
+short along it as the bands, and as thin under them as at the contact, but longer ones across: of
+K_N of a ready pad (about 7.91e5 N/mm in the limit) 18 x 8 elements leave 1.0 %, of which 36 x 8
+take 0.5; 28 x 6 leave 0.8 % on fewer dofs. Its levels have twice as many elements along the contact
+to those across as the scene has, half as thick as they are long, so that the layers of the pads are
+in proportion too. With sizes that grow from the contact to the wires, what those leave falls in no
+order beside what the contact leaves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.analyses.base import chosen_by_accuracy, refuse_oversize, require_memory
+from upd.analyses.contact.plan import (
+    ContactPlan,
+    add_loads,
+    contact_plan,
+    is_curved,
+    refined_growth,
+)
+from upd.analyses.contact.plans import auto_patch, make_plan
+from upd.analyses.cost import CostModel
+from upd.errors import InputError
+from upd.mesh import recipes
+from upd.progress import Stages
+from upd.reference import contact_modulus, hertz_sphere
+from upd.results import Result
+from upd.scene import Scene
+from upd.scene.contact import Loads
+from upd.vary.errors import estimate_in_round
+from upd.vary.scatter import RADIUS, Samples
+from upd.vary.solve import varied_plan
+from upd.vary.variation import ALONE, COARSER, POWER, Levels, Overrides, Problem, Variation
+from upd.vary.wanted import LevelChoice, Wanted
+
+#: fewest divisions of a level
+FEWEST = 4
+#: source of error
+MESH = "mesh"
+_COARSEST = "the mesh cannot be made coarser: its recipe has no divisions to lower"
+#: outputs that a level need not give: no number of them is estimated, and they cost
+_SPARED = ("fields", "curve")
+#: power of the divisions that the memory of a level grows with: the entries of a factor by nested
+#: dissection, n^(4/3) (A. George, 1973)
+MEMORY_POWER = 4.0
+#: parameters of a recipe that the load may size
+SIZED_BY_LOAD = ("patch", "core_depth")
+#: Numbers that one accuracy for all is asked of, of a curved contact: those of the normal contact.
+#: The others carry their estimate beside them; a slip annulus thinner than an element converges
+#: late and would multiply the cost of every run.
+CURVED_GOVERNING = ("radius_moment", "max_pressure", "mean_pressure", "approach")
+#: Nodes along the contact radius of the smallest load, level by level (ratio about sqrt 2).
+_NODES = (3.0, 4.2, 6.0, 8.5, 12.0, 17.0, 24.0)
+#: Growth of neighbouring elements (when the scene gives none) on a level with that many nodes along
+#: the radius.
+_GROWTH, _GROWTH_AT = 1.5, 6.0
+#: Largest error estimate of a level over (1 / nodes along the contact radius)^1.5, measured on the
+#: Hertz scene (0.45 with 8.5 nodes, 0.38 with 12): what to expect of a level before it has run.
+_SCATTER, _SCATTER_POWER = 0.4, 1.5
+#: And of a flat one: stiffnesses. The pressure at the edges of flat faces
+#: grows under refinement without a limit.
+FLAT_GOVERNING = ("K_N_secant_raw", "K_Tx_initial_raw", "K_Ty_initial_raw", "K_*_per_pad")
+#: shares of the scene's divisions, ratio about sqrt 2
+_SHARES = (0.35, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0)
+#: likewise where wires press, nearer to each other: with half the elements along each edge a level
+#: takes a fifteenth of the seconds, and only four show whether an order holds
+_SHARES_OF_WIRES = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0)
+#: the level a plan predicts: the first with two before it, which show an order
+_PREDICTED = 2
+#: thickness of the elements under wires and at the contact, where wires press
+_UNDER_WIRES, _AT_CONTACT = 1.0, 0.5
+#: element of the levels of a scene with one of 8 nodes
+_ELEMENT: Final = "hex20"
+#: places of the edge, in spacings from its own. What an edge between nodes leaves is periodic in it
+#: with one spacing (a sphere's deviations correlate by 0.3 to 0.7 one spacing on, by -0.3 to -0.7
+#: half of one): two places a period are the fewest that show it (Nyquist), whole spacings alone
+#: show one phase of it and bound 3 of 4. Over how many periods is a matter of cost: one each way
+#: bounds as well and overrates more, further ones overrate little less (``benchmarks/run.py
+#: accuracy/estimates``)
+PLACES = np.array([-2.0, -1.5, -1.0, -0.5, 0.5, 1.0, 1.5, 2.0])
+#: most steps of a neighbour's cycle, the fewest there are: its energy is the same but for rounding
+_FEWEST_STEPS = 8
+#: effects of a run that its neighbours go without
+_SPARED_NEARBY = ("internal displacement", "load curve")
+
+
+def level_geometry(
+    parameters: Mapping[str, Any], divisions: int, *, step: int = 2
+) -> dict[str, Any]:
+    """Parameters of the recipe that change with the divisions of its contact.
+
+    Parameters
+    ----------
+    parameters
+        Of the plan.
+    divisions
+        Of the level, even.
+    step
+        Of the numbers of elements along the contact: 2 for recipes that take even ones only.
+
+    Returns
+    -------
+    dict
+        "divisions", and "divisions_long" and "growth" of recipes that have them: elements along
+        the contact in proportion, the far mesh refined with it.
+    """
+    usual = int(parameters["divisions"])
+    out: dict[str, Any] = {"divisions": divisions}
+    if "divisions_long" in parameters:
+        long = divisions * int(parameters["divisions_long"]) / (step * usual)
+        out["divisions_long"] = step * max(1, round(long))
+    if "growth" in parameters:
+        out["growth"] = round(refined_growth(float(parameters["growth"]), usual / divisions), 4)
+    return out
+
+
+def coarser_divisions(plan: ContactPlan, ratios: Sequence[float]) -> list[int]:
+    """Divisions of the levels about so many times coarser, each different from the others.
+
+    Even ones about the middle of a curved contact. Where the coarsest would have too few, the
+    levels stand closer together.
+    """
+    usual = plan.parameters.get("divisions")
+    if not isinstance(usual, int) or usual <= FEWEST:
+        return []
+    step = 2 if is_curved(plan.scene) else 1
+    first, last = min(ratios), min(max(ratios), usual / FEWEST)
+    found: list[int] = []
+    for ratio in np.geomspace(first, max(first, last), len(ratios)):
+        n = max(FEWEST, step * round(usual / ratio / step))
+        if n < min((usual, *found)):
+            found.append(n)
+    return found
+
+
+def spacing(parameters: Mapping[str, Any]) -> float:
+    """Size of the contact's elements, but for a factor of its size: of both directions the
+    geometric mean.
+    """
+    counts = [float(parameters[n]) for n in ("divisions", "divisions_long") if n in parameters]
+    return float(np.prod(counts) ** (-1.0 / len(counts)))
+
+
+def bare(scene: Scene) -> Overrides:
+    """What takes off a scene what costs and shows no number; of a cycle no more steps than usual,
+    which only its drawing needs.
+    """
+    steps = min(scene.loads.cycle_steps, Loads.cycle_steps)
+    want = tuple(w for w in scene.want if w not in _SPARED) or scene.want
+    return (("loads.cycle_steps", steps), ("want", want), *ALONE)
+
+
+def coarsened(plan: ContactPlan) -> Overrides:
+    """What makes scenes into the level with half the divisions of the plan.
+
+    A patch that the load may size follows the contact from one end of an input to the other, so
+    that the same nodes touch: a tangent stiffness changes as the contact does, not by whole nodes.
+    """
+    half = coarser_divisions(plan, (2.0,))
+    geometry = level_geometry(plan.parameters, half[0]) if half else {}
+    names = SIZED_BY_LOAD if plan.scene.sphere_radius is not None else ()
+    sized = {name: "auto" for name in names if name in plan.scene.geometry}
+    return (*bare(plan.scene), *_geometry(sized | geometry))
+
+
+def _geometry(parameters: Mapping[str, Any]) -> Overrides:
+    return tuple((f"geometry.{name}", value) for name, value in parameters.items())
+
+
+def levels(plan: ContactPlan) -> Levels:
+    """The coarser meshes that the errors of the plan's numbers are estimated with.
+
+    None where the scene wants none, and for a recipe without divisions.
+    """
+    scene = plan.scene
+    if not scene.estimates:
+        return Levels(())
+    # Neighbouring loads show on half the divisions what the dearest level would.
+    ratios = COARSER[1:] if has_neighbours(scene) else COARSER
+    return Levels([_coarser(plan, n) for n in coarser_divisions(plan, ratios)], {MESH: _COARSEST})
+
+
+def _coarser(plan: ContactPlan, divisions: int) -> Variation:
+    geometry = level_geometry(plan.parameters, divisions)
+    size = spacing({**plan.parameters, **geometry}) / spacing(plan.parameters)
+    label = " x ".join(
+        str(geometry[key]) for key in ("divisions_long", "divisions") if key in geometry
+    )
+    return Variation(MESH, f"{label} divisions", _geometry(geometry), size)
+
+
+def mesh_problem(
+    solve: Callable[[ContactPlan, Stages], Any],
+    make_results: Callable[[Any], Sequence[Result]],
+    sample: Callable[[Any], Samples] | None = None,
+) -> Problem:
+    """A contact whose mesh varies; of plans, what is solved on them, its numbers, and these at
+    neighbouring loads.
+    """
+    return Problem(make_plan, solve, make_results, bare, (MESH,), levels, half_cost, sample)
+
+
+def plan_with_estimates(problem: Problem, scene: Scene) -> ContactPlan:
+    """The plan of a scene with what its levels cost."""
+    plan: ContactPlan = problem.make_plan(scene)
+    made = levels(plan).variations
+    again = sum(_seconds(problem, plan, one) for one in made)
+    again += neighbours_seconds(plan) if made else 0.0
+    return replace(
+        plan,
+        seconds=plan.seconds + again,
+        solve_seconds=plan.solve_seconds + again,
+        estimate_seconds=again,
+    )
+
+
+def _seconds(problem: Problem, plan: ContactPlan, one: Variation) -> float:
+    """Predicted for a level and its neighbouring loads."""
+    if recipes.counted_by_mesh(plan.scene.recipe):
+        # A plan runs a user's recipe once: the run makes these meshes.
+        return plan.solve_seconds * float(one.size**-POWER) + neighbours_seconds(plan)
+    level: ContactPlan = varied_plan(problem, plan.scene, one)
+    return level.solve_seconds + neighbours_seconds(level)
+
+
+def make_wanted(problem: Problem, governing: Sequence[str]) -> Wanted:
+    """A contact whose mesh is chosen by an accuracy; ``governing``: names of the numbers (shell
+    patterns) that one accuracy for all is asked of.
+    """
+    return Wanted(
+        choices,
+        {name: name for name in governing},
+        problem.make_plan,
+        problem.solve,
+        problem.make_results,
+        partial(estimate_in_round, problem, level_of),
+        refuse_oversize,
+        chosen_by_accuracy,
+        predicted=_predicted,
+    )
+
+
+def choices(scene: Scene) -> list[LevelChoice]:
+    """The meshes that an accuracy chooses from."""
+    if is_curved(scene):
+        labels = [f"with {nodes:g} nodes along the radius" for nodes in _NODES]
+        return [LevelChoice(MESH, "mesh", labels, _curved_level)]
+    found = _flat_levels(scene)
+    labels, scenes = [f"{n} divisions" for n in found], list(found.values())
+    return [LevelChoice(MESH, "mesh", labels, lambda _, k: scenes[k])]
+
+
+def _predicted(scene: Scene) -> list[Scene]:
+    """Levels up to the one that the scatter measured suggests, or to the first that shows an
+    order.
+    """
+    asked, last = scene.wanted_accuracy, _PREDICTED
+    assert asked is not None
+    if is_curved(scene):
+        least = min(asked.values()) if isinstance(asked, Mapping) else asked
+        enough = [_SCATTER / nodes**_SCATTER_POWER <= least for nodes in _NODES]
+        last = enough.index(True) if any(enough) else len(_NODES) - 1
+    (mesh,) = choices(scene)
+    return [mesh.at(scene, k) for k in range(min(last + 1, len(mesh.labels)))]
+
+
+def _curved_level(scene: Scene, level: int) -> Scene:
+    """``scene`` with patch and divisions for ``level``.
+
+    A patch sized from the largest load, no larger than the scene's, spacing from the smallest.
+    """
+    if scene.sphere_radius is None:
+        raise InputError(
+            f"accuracy: the recipe {scene.recipe!r} has no contact radius to size the "
+            'mesh from; give geometry.divisions, and no accuracy or "unknown"'
+        )
+    loads = [F for F in scene.loads.forces if F > 0.0]
+    if not loads:
+        raise InputError("accuracy: needs a positive normal load to size the mesh")
+    m1, m2 = list(scene.materials.values())[:2]
+    E = contact_modulus(m1.E, m1.nu, m2.E, m2.nu)
+    radius = hertz_sphere(min(loads), scene.sphere_radius, E).radius
+    patch = auto_patch(scene, max(loads))
+    if scene.geometry.get("patch", "auto") != "auto":
+        patch = min(patch, float(scene.geometry["patch"]))
+    divisions = 2 * math.ceil(0.5 * patch / radius * _NODES[level])
+    if scene.mesh.element in ("hex20", "hex27"):
+        divisions = 2 * math.ceil(divisions / 4)
+    geometry = {**scene.geometry, "patch": patch, "divisions": max(4, divisions)}
+    if "growth" in recipes.parameters(scene.recipe).__dataclass_fields__:
+        # The far mesh is refined with the patch.
+        geometry["growth"] = round(
+            refined_growth(
+                float(scene.geometry.get("growth", _GROWTH)), _GROWTH_AT / _NODES[level]
+            ),
+            4,
+        )
+    return replace(scene, geometry=geometry, accuracy=None)
+
+
+def _flat_levels(scene: Scene) -> dict[int, Scene]:
+    """Divisions -> the scene with a share of its own, and more."""
+    if not isinstance(scene.geometry.get("divisions"), int):
+        raise InputError(
+            f"accuracy: the recipe {scene.recipe!r} has no divisions to choose; leave it out"
+        )
+    element = _ELEMENT if scene.mesh.element in ("hex8", "hex8i") else scene.mesh.element
+    mesh = replace(scene.mesh, element=element)
+    wires = recipes.has_parameter(scene.recipe, "bottom_layer")
+    geometry = _for_wires(scene.geometry) if wires else scene.geometry
+    plain = replace(scene, mesh=mesh, accuracy=None, geometry=geometry)
+    usual, fewest = geometry["divisions"], 2 if wires else FEWEST
+    shares = _SHARES_OF_WIRES if wires else _SHARES
+    counts = dict.fromkeys(max(fewest, 2 * round(0.5 * share * usual)) for share in shares)
+    return {n: _flat_level(plain, n, 1 if wires else 2) for n in counts}
+
+
+def _for_wires(geometry: Mapping[str, Any]) -> dict[str, Any]:
+    """The geometry with half of its divisions across, and thin elements under the wires."""
+    under = geometry.get("bottom_layer")
+    return {
+        **geometry,
+        "divisions": 2 * max(1, round(0.25 * geometry["divisions"])),
+        "bottom_layer": _UNDER_WIRES if under is None else under,
+        "first_layer": min(_AT_CONTACT, geometry["first_layer"]),
+    }
+
+
+def _flat_level(scene: Scene, divisions: int, step: int) -> Scene:
+    """The scene with so many divisions, those along the contact in proportion in such steps."""
+    own = level_geometry(scene.geometry, divisions, step=step)
+    return replace(scene, geometry={**scene.geometry, **own})
+
+
+def level_of(plan: ContactPlan) -> Variation:
+    known = plan.parameters
+    counts = (str(known[n]) for n in ("divisions_long", "divisions") if n in known)
+    edge = next((n for n in ("patch", "patch_length", "pad_length") if n in known), None)
+    size = spacing(known) * (1.0 if edge is None else float(known[edge]))
+    return Variation(MESH, " x ".join(counts) + " divisions", size=size)
+
+
+def half_cost(plan: ContactPlan, source: str, seconds: float, order: float) -> float:
+    """Seconds that a mesh with half of an error of the order adds.
+
+    Parameters
+    ----------
+    seconds
+        Measured, of the plan.
+
+    Raises
+    ------
+    InputError
+        When the mesh does not fit the memory.
+    """
+    del source
+    finer = 2.0 ** (1.0 / order)
+    if recipes.counted_by_mesh(plan.scene.recipe) or "divisions" not in plan.parameters:
+        require_memory(plan.scene, plan.memory_bytes * finer**MEMORY_POWER)
+        return seconds * float(finer**POWER - 1.0)
+    divisions = 2 * max(1, round(0.5 * finer * int(plan.parameters["divisions"])))
+    now, more = (
+        contact_plan(plan.scene, plan.symmetry, plan.families, plan.effects, parameters)
+        for parameters in (
+            plan.parameters,
+            {**plan.parameters, **level_geometry(plan.parameters, divisions)},
+        )
+    )
+    require_memory(plan.scene, more.memory_bytes)
+    return max(0.0, seconds * (more.solve_seconds / now.solve_seconds - 1.0))
+
+
+# -- neighbouring loads ----------------------------------------------------------------------------
+
+
+def has_neighbours(scene: Scene) -> bool:
+    """Whether neighbouring loads are cheap: not where the pressure follows the shear, as every load
+    then is the end of a march.
+    """
+    return is_curved(scene) and not scene.coupled and max(scene.loads.forces) > 0
+
+
+def neighbours(touching: int) -> list[float]:
+    """Logarithms of neighbouring loads over a load.
+
+    Parameters
+    ----------
+    touching
+        Nodes in contact, N: its radius is sqrt(N / pi) spacings. Neighbours have a radius of one at
+        least.
+    """
+    if touching <= np.pi:
+        return []
+    spacing = float(np.sqrt(np.pi / touching))
+    steps: NDArray[np.float64] = np.sign(PLACES) * np.log1p(np.abs(PLACES) * spacing) / RADIUS
+    return [float(t) for t in steps if np.exp(RADIUS * t) >= spacing]
+
+
+def plan_at(plan: ContactPlan, loads: Sequence[float]) -> ContactPlan:
+    """The plan with other loads in N, without what they go without, cycles in fewer steps."""
+    own = plan.scene.loads
+    near = replace(own, normal=tuple(loads), cycle_steps=min(own.cycle_steps, _FEWEST_STEPS))
+    scene = replace(plan.scene, loads=near)
+    effects = tuple(replace(e, on=False) if e.name in _SPARED_NEARBY else e for e in plan.effects)
+    return replace(plan, scene=scene, effects=effects)
+
+
+def neighbours_seconds(plan: ContactPlan) -> float:
+    """Predicted for the neighbours of all loads."""
+    if not has_neighbours(plan.scene):
+        return 0.0
+    near = plan_at(plan, [F for F in plan.scene.loads.forces if F > 0.0] * len(PLACES))
+    cost = CostModel(near.scene)
+    add_loads(cost, near.scene, near.size, near.effects, 0.0)
+    return cost.seconds
