@@ -35,14 +35,10 @@ def number(value: float | None, unit: str = "") -> str:
 
 
 def shown(entry: Mapping[str, Any], *, unit: bool = True) -> str:
-    """The value of a result of summary.json with its unit, the ends of one that is a range, or that
-    it was not reached.
-    """
+    """The value of a result of summary.json with its unit, or that it was not reached."""
     if entry.get("withheld"):
         return "not reached"
     text = number(entry["value"])
-    if entry.get("low") is not None:
-        text = f"{number(entry['low'])} to {number(entry['high'])}"
     return f"{text} {unit_label(entry['unit'])}".rstrip() if unit else text
 
 
@@ -55,7 +51,7 @@ def check_number(check: Mapping[str, Any], key: str, digits: int = 2) -> str:
 
 
 def check_words(check: Mapping[str, Any]) -> str:
-    """What a check of summary.json says, its value and its limit."""
+    """The words of a check of summary.json, its value and its limit."""
     value, limit = (check_number(check, key, 3) for key in ("value", "limit"))
     return f"{check['says']} = {value} (limit {limit})"
 

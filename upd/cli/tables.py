@@ -134,7 +134,7 @@ def _side_by_side(cases: dict[str, list[Result]]) -> list[TextColumn]:
 def _numbers(rows: Sequence[Result]) -> list[TextColumn]:
     """A row per number."""
     entries = [r.as_dict() for r in rows]
-    costs = (r.half_told for r in rows)
+    costs = (r.half_words for r in rows)
     return [
         TextColumn("number", tuple(number_label(r.name) for r in rows), folds=2 * _WORDS),
         TextColumn("value", tuple(map(shown, entries)), right=True),
@@ -143,9 +143,7 @@ def _numbers(rows: Sequence[Result]) -> list[TextColumn]:
         TextColumn("difference", tuple(percent(r.error) for r in rows), right=True, rank=2),
         TextColumn("thesis", tuple(percent(r.printed_error) for r in rows), right=True, rank=4),
         TextColumn("half of it costs", tuple(costs), right=True, rank=5),
-        TextColumn(
-            "source", tuple(r.withheld or r.why or r.source for r in rows), rank=6, folds=_WORDS
-        ),
+        TextColumn("source", tuple(r.withheld or r.source for r in rows), rank=6, folds=_WORDS),
     ]
 
 

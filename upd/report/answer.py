@@ -283,7 +283,7 @@ def _listed(main: Sequence[Entry], width: int) -> list[AnswerLine]:
         TextColumn("reference", tuple(number(e["reference"]) for e in main), right=True, rank=3),
         TextColumn("difference", tuple(percent(e["error"]) for e in main), right=True, rank=2),
         TextColumn("thesis", tuple(percent(e["thesis_error"]) for e in main), right=True, rank=4),
-        TextColumn("source", tuple(e.get("why") or e["source"] for e in main), rank=5),
+        TextColumn("source", tuple(e["source"] for e in main), rank=5),
     ]
     heads, rows = text_lines(fitted(columns, width - len(_INDENT))[0])
     lines = [AnswerLine(_INDENT + head, TITLE) for head in heads]

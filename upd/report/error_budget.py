@@ -69,7 +69,7 @@ def budget_rows(entries: Sequence[Entry]) -> list[BudgetRow]:
                     part["source"],
                     percent_of(error),
                     100.0 * error / total if total and error is not None else None,
-                    read_part(part).half_told,
+                    read_part(part).half_words,
                     part["basis"],
                 )
             )
@@ -99,7 +99,7 @@ def budget_line(entry: Entry) -> str:
         return alone[:1].upper() + alone[1:]
     told = []
     for part in parts:
-        half = read_part(part).half_told
+        half = read_part(part).half_words
         cost = f" (half of it: {half})" if half else ""
         told.append(f"{part['source']} {percent_of(part['error'])}{cost}")
     line = f"Error of the {name}: {', '.join(told)}"

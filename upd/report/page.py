@@ -196,7 +196,7 @@ def filled(rows: Iterable[Entry]) -> dict[str, bool]:
         "case": any(row.get("case") for row in told),
         "estimate": any(row.get("estimated_error") is not None for row in told),
         "reference": any(row.get("reference") is not None for row in told),
-        "source": any(row.get("source") or row.get("why") for row in told),
+        "source": any(row.get("source") for row in told),
     }
 
 

@@ -29,12 +29,12 @@ def status_of(checks: Sequence[Check], results: Sequence[Result]) -> str:
     missing = [r for r in results if r.withheld]
     if missing and len(missing) == len(results):
         return f"{FAILED}: no number was reached; {missing[0].withheld}"
-    told = warnings_of(checks, results)
-    return f"{WARNED}: " + "; ".join(told) if told else OK
+    warnings = warnings_of(checks, results)
+    return f"{WARNED}: " + "; ".join(warnings) if warnings else OK
 
 
 def with_fault(status: str, fault: str) -> str:
-    """A status that also tells what went wrong with the pictures of a run."""
+    """A status with what went wrong with the pictures of a run."""
     return f"{WARNED}: {fault}" if status == OK else f"{status}; {fault}"
 
 
@@ -65,16 +65,16 @@ def warning_details(checks: Sequence[Check], results: Sequence[Result]) -> list[
 
     What matters less stands later.
     """
-    told = []
+    details = []
     for name, (mine, labels) in warned(checks, results).items():
         first = mine[0]
         if isinstance(first, Result):
-            told.append(f"{_named(name, labels)}: {first.withheld}")
+            details.append(f"{_named(name, labels)}: {first.withheld}")
             continue
         worst = worst_check(c.as_dict() for c in mine if isinstance(c, Check))
         remedy = f"; {worst['remedy']}" if worst["remedy"] else ""
-        told.append(f"{_named(f'{name}: {check_words(worst)}', labels)}{remedy}")
-    return told
+        details.append(f"{_named(f'{name}: {check_words(worst)}', labels)}{remedy}")
+    return details
 
 
 def _named(name: str, labels: Sequence[str]) -> str:
