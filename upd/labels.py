@@ -35,14 +35,10 @@ def number(value: float | None, unit: str = "") -> str:
 
 
 def shown(entry: Mapping[str, Any], *, unit: bool = True) -> str:
-    """The value of a result of summary.json with its unit, the ends of one that is a range, or that
-    it was not reached.
-    """
+    """The value of a result of summary.json with its unit, or that it was not reached."""
     if entry.get("withheld"):
         return "not reached"
     text = number(entry["value"])
-    if entry.get("low") is not None:
-        text = f"{number(entry['low'])} to {number(entry['high'])}"
     return f"{text} {unit_label(entry['unit'])}".rstrip() if unit else text
 
 

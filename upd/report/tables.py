@@ -103,7 +103,7 @@ def number_table(heading: str, entries: Iterable[Entry], case: str = "") -> Answ
             "# reference": column(lambda e: number(e["reference"])),
             "# difference": column(lambda e: percent(e.get("error"))),
             "# thesis": column(lambda e: percent(e.get("thesis_error"))),
-            "source": column(lambda e: e.get("why") or e.get("source", "")),
+            "source": column(lambda e: e.get("source", "")),
         },
     )
 
@@ -184,7 +184,7 @@ def error_parts(entry: Entry) -> list[tuple[str, float | None, float | None, str
             part["source"],
             part["error"],
             part["error"] / total if total and part["error"] is not None else None,
-            read_part(part).half_told,
+            read_part(part).half_words,
             part["basis"],
         )
         for part in entry.get("error_parts", ())

@@ -2,7 +2,7 @@
 
 from upd.results.case import NO_CASE, Case, shared_label
 from upd.results.check import Check, left_out_check, worst_check, worst_checks
-from upd.results.netcdf import ArrayGroup, read_netcdf, write_netcdf
+from upd.results.netcdf import ArrayGroup, read_netcdf, variable, write_netcdf
 from upd.results.number import (
     ErrorPart,
     Estimates,
@@ -48,6 +48,7 @@ __all__ = [
     "read_part",
     "shared_label",
     "status_of",
+    "variable",
     "warned",
     "warnings_of",
     "with_estimates",

@@ -18,7 +18,7 @@ class Case:
     Attributes
     ----------
     name
-        Words for a case that no number tells: "Craig-Bampton", "equilibrium", "performance".
+        Words for a case that no number identifies: "Craig-Bampton", "equilibrium", "performance".
     stiffness
         Name of the contact stiffness, a table of the scene.
     body

@@ -105,10 +105,10 @@ def left_out_check(
         change = abs(included - without) / over[0] if over[0] else math.inf
         note = note or f"part of the {over[1]}"
     after = number(included, unit) if math.isfinite(included) else "a value not found"
-    says = f"change of {number_label(quantity)}, {number(without)} to {after}"
-    says += f" ({note})" if note else ""
+    words = f"change of {number_label(quantity)}, {number(without)} to {after}"
+    words += f" ({note})" if note else ""
     return Check(
-        name, case, change, limit, says, remedy, False, quantity, float(without), float(included)
+        name, case, change, limit, words, remedy, False, quantity, float(without), float(included)
     )
 
 

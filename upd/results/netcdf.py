@@ -37,6 +37,15 @@ class ArrayGroup(dict[str, Any]):
         )
 
 
+def variable(
+    dims: str, data: Any, units: str = "", long_name: str = "", **attributes: Any
+) -> tuple[tuple[str, ...], np.ndarray[Any, Any], dict[str, Any]]:
+    """A variable of result.nc: its dimensions, with blanks between, its array, unit and words."""
+    known = {"units": units, "long_name": long_name}
+    about = {key: text for key, text in known.items() if text} | attributes
+    return tuple(dims.split()), np.asarray(data), about
+
+
 def write_netcdf(path: Path, arrays: Mapping[str, Mapping[str, Any]]) -> None:
     """Write arrays as one netCDF-4 file, whole or not at all.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from upd.results.case import Case
@@ -40,7 +40,7 @@ class ErrorPart:
     half_why: str = ""
 
     @property
-    def half_told(self) -> str:
+    def half_words(self) -> str:
         """What half of it adds, in words; "" where that is not known or there is no error."""
         if not self.known or not self.error:
             return ""
@@ -53,14 +53,7 @@ class ErrorPart:
 
     def as_dict(self) -> dict[str, Any]:
         """The part as it stands in summary.json; an error that was not found is null."""
-        return {
-            "source": self.source,
-            "error": self.error if self.known else None,
-            "basis": self.basis,
-            "half_cost_s": self.half_cost_s,
-            "companion_s": self.companion_s,
-            "half_why": self.half_why,
-        }
+        return asdict(self) | {"error": self.error if self.known else None}
 
 
 def largest(parts: Iterable[ErrorPart]) -> ErrorPart:
@@ -135,7 +128,7 @@ class Result:
     Attributes
     ----------
     reference
-        Value it is compared with, in the same unit; ``source`` says where that comes from.
+        Value it is compared with, in the same unit; ``source`` is where that comes from.
     printed_error
         Relative difference of a published value from the reference.
     estimated_error, half_error_cost_s
@@ -147,11 +140,6 @@ class Result:
     withheld
         Why the number was not reached; ``value`` is then NaN, and no smaller one stands in its
         place.
-    low, high
-        Ends of a number that is a range, as of a peak that several steady motions have; ``value``
-        is then one of the two. None for a single number.
-    why
-        Why it is a range.
     parts
         Of the estimated error, by source.
     inputs
@@ -169,19 +157,16 @@ class Result:
     half_error_cost_s: float | None = None
     exact: bool = True
     withheld: str = ""
-    low: float | None = None
-    high: float | None = None
-    why: str = ""
     parts: tuple[ErrorPart, ...] = ()
     inputs: tuple[InputPart, ...] = ()
 
     @property
-    def half_told(self) -> str:
+    def half_words(self) -> str:
         """What half of the error adds, by its largest part; "" where that is not known."""
         if not self.parts:
             half = self.half_error_cost_s
             return "" if half is None else f"{half:+.3g} s"
-        return "" if self.estimated_error is None else largest(self.parts).half_told
+        return "" if self.estimated_error is None else largest(self.parts).half_words
 
     @property
     def input_error(self) -> float | None:
@@ -215,8 +200,6 @@ class Result:
             "case": self.case.label,
             "value": None if self.withheld else self.value,
             "unit": self.unit,
-        }
-        out |= {
             "reference": self.reference,
             "source": self.source,
             "error": self.error,
@@ -232,11 +215,6 @@ class Result:
             | ({"error_parts": [p.as_dict() for p in self.parts]} if self.parts else {})
             | self._inputs_as_dict()
             | ({"withheld": self.withheld} if self.withheld else {})
-            | (
-                {"low": self.low, "high": self.high, "why": self.why}
-                if self.low is not None
-                else {}
-            )
             | {"case_fields": self.case.given()}
         )
 
@@ -275,14 +253,7 @@ def with_parts(result: Result, parts: Iterable[ErrorPart]) -> Result:
 def read_part(data: Mapping[str, Any]) -> ErrorPart:
     """The part that `ErrorPart.as_dict` wrote."""
     error = data["error"]
-    return ErrorPart(
-        str(data["source"]),
-        math.nan if error is None else float(error),
-        str(data["basis"]),
-        data.get("half_cost_s"),
-        data.get("companion_s"),
-        data.get("half_why", ""),
-    )
+    return ErrorPart(**{**data, "error": math.nan if error is None else error})
 
 
 def with_estimates(results: Iterable[Result], estimates: Estimates) -> tuple[Result, ...]:

@@ -1,4 +1,4 @@
-"""Every number that runs give, by what it belongs to; which are asked for first says each analysis.
+"""Every number that runs give, by what it belongs to; each analysis lists its main ones.
 
 Names are those of summary.json and of `result.value`; no unit: a count or a ratio.
 """

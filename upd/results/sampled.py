@@ -39,8 +39,8 @@ Array = NDArray[np.float64]
 
 #: half-widths of limits over the standard deviation of what lies evenly between them
 LIMITS = math.sqrt(3.0)
-#: part of the sample beyond either end that is told, and of its distribution beyond either end of
-#: a comparison's 95 % interval
+#: part of the sample beyond either end that is reported, and of its distribution beyond either end
+#: of a comparison's 95 % interval
 TAIL = 0.025
 #: verdicts
 AGREES, DIFFERS, UNKNOWN_BAND = "agrees", "differs", "unknown"
@@ -140,31 +140,31 @@ def sampled_number(
         "nominal": nominal,
         "first_order": None,
         "count": len(drawn),
-        **_told(drawn),
+        **_moments(drawn),
         **dict.fromkeys(("band", "band_low", "band_high", "shift", "shift_error")),
         "outcome": UNKNOWN_BAND,
     }
 
-    def told(verdict: str, **more: Any) -> SampledNumber:
+    def compared(verdict: str, **more: Any) -> SampledNumber:
         missing = len(values) - 1 - len(drawn)
         lost = f"; {missing} of {len(values) - 1} points have no such number" if missing else ""
         return SampledNumber(**out | more, verdict=verdict + lost)
 
     if nominal is None:
-        return told("no number with the inputs at their values")
+        return compared("no number with the inputs at their values")
     if nominal == 0.0:
-        return told("the number is 0: nothing is relative to it")
+        return compared("the number is 0: nothing is relative to it")
     if out["deviation"] is None:
-        return told("too few points have it for a standard deviation")
+        return compared("too few points have it for a standard deviation")
     out["band"] = LIMITS * out["deviation"] / abs(nominal)
     why = _unknown(inputs, paths)
     if why:
-        return told(why)
+        return compared(why)
     changes = _changes(inputs)
     c = np.array([changes[path] for path in paths])
     out["first_order"] = float(np.linalg.norm(c))
     predicted = nominal * (1.0 + shifts[1:][known[1:]] @ c)
-    return told(**_compared(drawn, predicted, nominal, float(out["first_order"]), out["band"]))
+    return compared(**_compared(drawn, predicted, nominal, float(out["first_order"]), out["band"]))
 
 
 def _changes(inputs: Sequence[InputPart]) -> Mapping[str, float]:
@@ -181,7 +181,7 @@ def _unknown(inputs: Sequence[InputPart], paths: Sequence[str]) -> str:
     return f"no first-order band ({'; '.join(lost)})" if lost else ""
 
 
-def _told(drawn: Array) -> dict[str, float | None]:
+def _moments(drawn: Array) -> dict[str, float | None]:
     """Mean, deviation and ends of the sample."""
     names = ("mean", "deviation", "low", "high")
     if not len(drawn):
@@ -214,7 +214,7 @@ def _compared(
         "shift": shift,
         "shift_error": shift_error,
     }
-    # two digits are what a band is told in: closer is the same
+    # a band is reported with two digits: closer is the same
     digit = 0.5 * 10.0 ** (math.floor(math.log10(band)) - 1)
     same_band = ends[0] <= band + digit and ends[1] >= band - digit
     same_mean = abs(shift) <= shift_error + digit

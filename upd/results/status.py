@@ -28,12 +28,12 @@ def status_of(checks: Sequence[Check], results: Sequence[Result]) -> str:
     missing = [r for r in results if r.withheld]
     if missing and len(missing) == len(results):
         return f"{FAILED}: no number was reached; {missing[0].withheld}"
-    told = warnings_of(checks, results)
-    return f"{WARNED}: " + "; ".join(told) if told else OK
+    warnings = warnings_of(checks, results)
+    return f"{WARNED}: " + "; ".join(warnings) if warnings else OK
 
 
 def with_fault(status: str, fault: str) -> str:
-    """A status that also tells what went wrong with the pictures of a run."""
+    """A status with what went wrong with the pictures of a run."""
     return f"{WARNED}: {fault}" if status == OK else f"{status}; {fault}"
 
 

@@ -11,23 +11,16 @@ from numpy.typing import NDArray
 
 from upd.analyses.contact.loading import LoadPath
 from upd.contact.model import ContactModel
-from upd.results import ArrayGroup
+from upd.results import ArrayGroup, variable
 
 Array = NDArray[np.float64]
 Variables = dict[str, Any]
-XY = ("x", "y")
-
-
-def scalar(
-    value: float, units: str, **attributes: str
-) -> tuple[tuple[str, ...], Array, dict[str, str]]:
-    """A number as a variable without dimensions."""
-    return (), np.asarray(float(value)), {"units": units, **attributes}
+XY = "x y"
 
 
 def lattice(x: Array, y: Array) -> Variables:
     """Lattice lines in mm."""
-    return {"x": (("x",), x, {"units": "mm"}), "y": (("y",), y, {"units": "mm"})}
+    return {"x": variable("x", x, "mm"), "y": variable("y", y, "mm")}
 
 
 def normal_fields(
@@ -35,34 +28,34 @@ def normal_fields(
 ) -> Variables:
     """Fields under a normal load, (n_x, n_y) in MPa, N and mm."""
     return {
-        "pressure": (XY, pressure, {"units": "MPa"}),
-        "normal_force": (XY, force, {"units": "N"}),
-        "gap": (XY, gap, {"units": "mm"}),
-        "contact": (XY, closed, {"flag_meanings": "open contact"}),
+        "pressure": variable(XY, pressure, "MPa"),
+        "normal_force": variable(XY, force, "N"),
+        "gap": variable(XY, gap, "mm"),
+        "contact": variable(XY, closed, flag_meanings="open contact"),
     }
 
 
 def tangential_fields(traction: Array, slip: Array, stick: NDArray[np.bool_]) -> Variables:
     """Fields under a tangential load, (n_x, n_y) or (n_x, n_y, n_direction) in MPa and mm."""
-    dims = (*XY, "direction") if traction.ndim == 3 else XY
+    dims = f"{XY} direction" if traction.ndim == 3 else XY
     return {
-        "traction": (dims, traction, {"units": "MPa"}),
-        "slip": (dims, slip, {"units": "mm"}),
-        "stick": (XY, stick, {"flag_meanings": "slip_or_open stick"}),
+        "traction": variable(dims, traction, "MPa"),
+        "slip": variable(dims, slip, "mm"),
+        "stick": variable(XY, stick, flag_meanings="slip_or_open stick"),
     }
 
 
 def together_fields(pressure: Array) -> Variables:
     """The pressure (n_x, n_y) in MPa under a tangential load, which coupled contact moves."""
-    return {"pressure": (XY, pressure, {"units": "MPa"})}
+    return {"pressure": variable(XY, pressure, "MPa")}
 
 
 def path_group(path: LoadPath) -> tuple[str, ArrayGroup]:
     """Name and variables of a tangential path."""
     content = "cycle" if path.cycle else "path"
     variables = {
-        "displacement": (("step",), path.displacement, {"units": "mm"}),
-        "tangential_force": (("step",), path.load, {"units": "N"}),
+        "displacement": variable("step", path.displacement, "mm"),
+        "tangential_force": variable("step", path.load, "N"),
     }
     return f"{content} {path.case.label}", ArrayGroup(variables, content=content, case=path.case)
 
@@ -70,8 +63,8 @@ def path_group(path: LoadPath) -> tuple[str, ArrayGroup]:
 def curve_group(approach: Iterable[float], force: Iterable[float]) -> ArrayGroup:
     """The force-approach curve in mm and N."""
     variables = {
-        "approach": (("point",), np.array(list(approach)), {"units": "mm"}),
-        "normal_force": (("point",), np.array(list(force)), {"units": "N"}),
+        "approach": variable("point", list(approach), "mm"),
+        "normal_force": variable("point", list(force), "N"),
     }
     return ArrayGroup(variables, content="force-approach")
 

@@ -13,7 +13,6 @@ from upd.analyses.contact.output import (
     lattice,
     normal_fields,
     path_group,
-    scalar,
     tangential_fields,
     together_fields,
     write_meshes,
@@ -24,7 +23,7 @@ from upd.analyses.flat.results import band_middles
 from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.contact.law import ContactLaw
 from upd.mesh import recipes
-from upd.results import ArrayGroup, Case
+from upd.results import ArrayGroup, Case, variable
 
 
 def sizes(solution: FlatSolution) -> dict[str, int]:
@@ -54,8 +53,8 @@ def arrays(solution: FlatSolution) -> dict[str, ArrayGroup]:
             )
     for path in solution.paths:
         title, group = path_group(path)
-        group["friction_limit"] = scalar(
-            solution.plan.scene.contact.friction * (path.normal.load or 0.0), "N"
+        group["friction_limit"] = variable(
+            "", solution.plan.scene.contact.friction * (path.normal.load or 0.0), "N"
         )
         group.update(_printed(solution, f"K_T{path.case.direction}", "_initial_raw", path.case))
         out[title] = group
@@ -82,20 +81,17 @@ def _normal(solution: FlatSolution, k: FaceLattice, case: FlatNormalCase) -> Var
         traction = np.stack([k.field(pressure(c, on)) for c in case.state.force[:, 1:].T], -1)
         slip = np.stack([k.field(c) for c in case.state.found.slip[-1].T], -1)
         out |= tangential_fields(traction, slip, k.field(case.stick) > 0.0)
-    out["worn_zone_middle"] = (
-        ("worn_zone",),
-        np.array(band_middles(solution)),
-        {"units": "mm", "long_name": "middle of the bands of the damper that the load comes from"},
+    out["worn_zone_middle"] = variable(
+        "worn_zone",
+        band_middles(solution),
+        "mm",
+        "middle of the bands of the damper that the load comes from",
     )
     upper = case.displacement.get(model.upper.name)
     if upper is not None:
         # How far the contact nodes stay behind the distant set.
         u = model.multipliers.spread.T @ upper[model.upper.contact, 2]
-        out["surface_displacement"] = (
-            ("x", "y"),
-            k.field(u),
-            {"units": "mm", "body": model.upper.name},
-        )
+        out["surface_displacement"] = variable("x y", k.field(u), "mm", body=model.upper.name)
     return out
 
 
@@ -118,9 +114,9 @@ def _curve(solution: FlatSolution) -> ArrayGroup:
     group = curve_group([s.approach for s in answers], [F for F, _ in solution.curve])
     highest = [float(pressure(s.force).max()) for s in answers]
     mean = [F / whole_area(solution, s).area for F, s in solution.curve]
-    group["max_pressure"] = (("point",), np.array(highest), {"units": "MPa"})
-    group["mean_pressure"] = (("point",), np.array(mean), {"units": "MPa"})
-    group["stiffness"] = scalar(solution.normal[0].stiffness, "N/mm")
+    group["max_pressure"] = variable("point", highest, "MPa")
+    group["mean_pressure"] = variable("point", mean, "MPa")
+    group["stiffness"] = variable("", solution.normal[0].stiffness, "N/mm")
     group.update(_printed(solution, "K_N", "_tangent_raw", solution.normal[0].case))
     return group
 
@@ -132,11 +128,11 @@ def _printed(solution: FlatSolution, name: str, total: str, case: Case) -> Varia
     look_up = printed_of(solution.plan.scene)
     whole, pad = (look_up(name + suffix, case.given()) for suffix in (total, "_per_pad"))
     if whole:
-        return {"printed_stiffness": scalar(whole[0].value, "N/mm", source=whole[0].source)}
+        return {"printed_stiffness": variable("", whole[0].value, "N/mm", source=whole[0].source)}
     if pad:
         n = len(lattices(solution))
         source = f"{pad[0].source}, {n} pads"
-        return {"printed_stiffness": scalar(n * pad[0].value, "N/mm", source=source)}
+        return {"printed_stiffness": variable("", n * pad[0].value, "N/mm", source=source)}
     return {}
 
 
@@ -171,7 +167,7 @@ def _report_places(solution: FlatSolution, law: ContactLaw) -> dict[str, Any]:
     """Places of the contact points in report axes, mm."""
     places = law.position[:, :2] - corner(solution)
     return {
-        f"report_{axis}": (("contact_point",), places[:, k], {"units": "mm"})
+        f"report_{axis}": variable("contact_point", places[:, k], "mm")
         for k, axis in enumerate("xy")
     }
 

@@ -21,6 +21,8 @@ from upd.analyses.forced.model import Array
 from upd.analyses.forced.performance import Performance
 from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
 from upd.analyses.forced.sweeps import face_shares, marched_damper, marched_loops
+from upd.analyses.measured import accelerance_array
+from upd.results import variable
 from upd.scene.forced_contact import SIDES
 
 Variables = dict[str, Any]
@@ -29,22 +31,12 @@ POINTS, LINEAR, FRICTION, MEASURED = "points", "linear", "friction", "measured"
 PERFORMANCE, SWEEP, MARCHED = "performance", "sweep", "marched peaks"
 #: loops kept of a peak
 N_LOOPS = 4
-HZ, PER_N = {"units": "Hz"}, {"units": "(m/s2)/N"}
-
-
-def complex_array(H: Any) -> tuple[tuple[str, str], Any, dict[str, str]]:
-    """Real and imaginary part of an accelerance along a curve."""
-    return (
-        ("frequency", "part"),
-        np.stack([H.real, H.imag], axis=-1),
-        {"units": "(m/s2)/N", "part": "real imaginary"},
-    )
 
 
 def _accelerances(curve: FrictionCurve) -> Variables:
     """Both blades in every harmonic that is excited."""
-    return {f"accelerance_{side}": complex_array(curve.accelerance[side]) for side in SIDES} | {
-        f"accelerance_{side}_harmonic_{k}": complex_array(H[side])
+    return {f"accelerance_{side}": accelerance_array(curve.accelerance[side]) for side in SIDES} | {
+        f"accelerance_{side}_harmonic_{k}": accelerance_array(H[side])
         for k, H in curve.more.items()
         for side in SIDES
     }
@@ -52,15 +44,11 @@ def _accelerances(curve: FrictionCurve) -> Variables:
 
 def _contact(state: Array, energy: Array, power: Array) -> Variables:
     """States (frequency, point, 3) and losses (frequency, point) of contact points."""
-    at = ("frequency", "contact_point")
+    at = "frequency contact_point"
     return {
-        "state": (
-            (*at, "state"),
-            state,
-            {"units": "1", "state": "stick slip lift, shares of the cycle"},
-        ),
-        "energy": (at, energy, {"units": "N mm", "long_name": "friction loss per cycle"}),
-        "power": (at, power, {"units": "W"}),
+        "state": variable(f"{at} state", state, "1", state="stick slip lift, shares of the cycle"),
+        "energy": variable(at, energy, "N mm", "friction loss per cycle"),
+        "power": variable(at, power, "W"),
     }
 
 
@@ -68,54 +56,46 @@ def peak_arrays(name: str, peaks: Sequence[CurvePeak]) -> Variables:
     """Frequencies and heights of the peaks of a curve, no variables when it has none."""
     if not peaks:
         return {}
-    at = (f"peak_{name}",)
+    at = f"peak_{name}"
     return {
-        f"peak_frequency_{name}": (at, np.array([p.frequency for p in peaks]), HZ),
-        f"peak_accelerance_{name}": (at, np.array([p.height for p in peaks]), PER_N),
+        f"peak_frequency_{name}": variable(at, [p.frequency for p in peaks], "Hz"),
+        f"peak_accelerance_{name}": variable(at, [p.height for p in peaks], "(m/s2)/N"),
     }
 
 
 def marked_peaks(at: Sequence[tuple[int, str, int]]) -> Variables:
     """Which points of a curve are its peaks."""
     return {
-        "peak": (
-            ("peak",),
-            np.array([number for number, *_ in at]),
-            {
-                "long_name": "number of the peak's mode; 0 is the highest point of a curve without",
-                # which mode each is, in the same order
-                "modes": ", ".join(mode for _, mode, _ in at),
-            },
+        "peak": variable(
+            "peak",
+            [number for number, *_ in at],
+            long_name="number of the peak's mode; 0 is the highest point of a curve without",
+            # which mode each is, in the same order
+            modes=", ".join(mode for _, mode, _ in at),
         ),
-        "peak_index": (
-            ("peak",),
-            np.array([i for *_, i in at]),
-            {"long_name": "place of the peak in frequency, from 0"},
+        "peak_index": variable(
+            "peak", [i for *_, i in at], "", "place of the peak in frequency, from 0"
         ),
     }
 
 
-def share_array(
-    values: Any, mean: str = "stiffness"
-) -> tuple[tuple[str, ...], Any, dict[str, str]]:
+def share_array(values: Any, mean: str = "stiffness") -> tuple[Any, ...]:
     """(frequency, side, state) of the cycle."""
     words = f"stick slip lift, mean over the face by {mean}"
-    about = {"units": "1", "side": " ".join(SIDES), "state": words}
-    return ("frequency", "side", "state"), values, about
+    return variable("frequency side state", values, "1", side=" ".join(SIDES), state=words)
 
 
-def shares_by_face(
-    state: Array, places: ContactPlaces
-) -> tuple[tuple[str, ...], Any, dict[str, str]]:
+def shares_by_face(state: Array, places: ContactPlaces) -> tuple[Any, ...]:
     """Shares of the cycle of each face from those of its points, (frequency, points, state)."""
     share = np.stack([face_shares(one, places) for one in state])
     return share_array(share, "stiffness, or area without springs")
 
 
-def amplitude_words(solution: ForcedSolution) -> str:
-    """Which harmonic the damper's amplitudes are of."""
+def damper_array(solution: ForcedSolution, amplitude: Any) -> tuple[Any, ...]:
+    """Amplitudes of the damper along a curve, of the harmonic that is read."""
     k = excitation_of(solution.plan.scene.excitation).lowest
-    return f"amplitude of {'the first harmonic' if k == 1 else f'harmonic {k}'}"
+    words = f"amplitude of {'the first harmonic' if k == 1 else f'harmonic {k}'}"
+    return variable("frequency damper_dof", amplitude, "mm, rad", words)
 
 
 def loop_arrays(
@@ -137,40 +117,18 @@ def loop_arrays(
     loops = [one for *_, one in found]
     point = np.array([one.point for one in loops])
     return {
-        "loop_frequency": (
-            ("loop",),
-            np.array([f for _, f, _ in found]),
-            HZ | {"long_name": "the peak each loop belongs to"},
+        "loop_frequency": variable(
+            "loop", [f for _, f, _ in found], "Hz", "the peak each loop belongs to"
         ),
-        "loop_point": (("loop",), point, {"long_name": "contact point of each loop"}),
-        "loop_displacement": (
-            ("loop", "sample"),
-            np.array([one.displacement for one in loops]),
-            {"units": "mm"},
-        ),
-        "loop_traction": (
-            ("loop", "sample"),
-            np.array([one.traction for one in loops]),
-            {"units": "N"},
-        ),
-        "loop_limit": (("loop", "sample"), np.array([one.limit for one in loops]), {"units": "N"}),
-        "loop_peak": (
-            ("loop",),
-            np.array([number for number, *_ in found]),
-            {"long_name": "number of the peak"},
-        ),
-        "loop_side": (("loop",), face[point], {"flag_meanings": "left right"}),
-        "loop_along": (
-            ("loop",),
-            along[point],
-            {"units": "mm", "long_name": "place along the damper"},
-        ),
-        "loop_up": (("loop",), up[point], {"units": "mm", "long_name": "place up the slope"}),
-        "loop_energy": (
-            ("loop",),
-            np.array([one.energy for one in loops]),
-            {"units": "N mm", "long_name": "loss per cycle"},
-        ),
+        "loop_point": variable("loop", point, "", "contact point of each loop"),
+        "loop_displacement": variable("loop sample", [one.displacement for one in loops], "mm"),
+        "loop_traction": variable("loop sample", [one.traction for one in loops], "N"),
+        "loop_limit": variable("loop sample", [one.limit for one in loops], "N"),
+        "loop_peak": variable("loop", [number for number, *_ in found], "", "number of the peak"),
+        "loop_side": variable("loop", face[point], flag_meanings="left right"),
+        "loop_along": variable("loop", along[point], "mm", "place along the damper"),
+        "loop_up": variable("loop", up[point], "mm", "place up the slope"),
+        "loop_energy": variable("loop", [one.energy for one in loops], "N mm", "loss per cycle"),
     }
 
 
@@ -178,22 +136,18 @@ def linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:
     """Accelerance of both blades free and stuck, their peaks, the stuck modes, the damping."""
     excited = excitation_of(solution.plan.scene.excitation)
     told = {} if excited.usual else {"excitation": excited.words}
-    out: Variables = {"frequency": (("frequency",), linear.frequency, HZ | told)}
+    out: Variables = {"frequency": variable("frequency", linear.frequency, "Hz", **told)}
     for kind, curves, peaks in (
         ("free", linear.free, linear.free_peaks),
         ("stuck", linear.stuck, linear.stuck_peaks),
     ):
         for side in SIDES:
-            out |= {f"accelerance_{kind}_{side}": complex_array(curves[side])}
+            out |= {f"accelerance_{kind}_{side}": accelerance_array(curves[side])}
             out |= peak_arrays(f"{kind}_{side}", peaks[side])
     x = [m for m in linear.modes if m.axis == "x"]
-    damping = (
-        (),
-        np.array(solution.plan.scene.excitation.damping),
-        {"units": "1", "long_name": "modal damping ratio"},
-    )
+    damping = variable("", solution.plan.scene.excitation.damping, "1", "modal damping ratio")
     return out | {
-        "stuck_mode": (("mode",), np.array([m.frequency for m in x]), HZ),
+        "stuck_mode": variable("mode", [m.frequency for m in x], "Hz"),
         "damping": damping,
     }
 
@@ -203,33 +157,34 @@ def friction_arrays(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
     answer, model, scene = curve.answer, solution.models[curve.stiffness], solution.plan.scene
     at = solution.marked_points(curve)
     out: Variables = {
-        "frequency": (
-            ("frequency",),
-            answer.frequency,
-            HZ | {"status": answer.status, "message": answer.message},
+        "frequency": variable(
+            "frequency", answer.frequency, "Hz", status=answer.status, message=answer.message
         ),
-        "excitation_force": ((), np.array(curve.force), {"units": "N"}),
-        "stable": (
-            ("frequency",),
+        "excitation_force": variable("", curve.force, "N"),
+        "stable": variable(
+            "frequency",
             curve.rising.astype(np.int8),
-            {"units": "1", "long_name": "0 between two folds, where the frequency falls"},
+            "1",
+            "0 between two folds, where the frequency falls",
         ),
         **_fold_arrays(curve),
         **_accelerances(curve),
         **_contact(answer.state, answer.energy, measures.power(answer)),
-        "truncation": (("frequency",), answer.truncation, {"units": "1"}),
-        "highest_harmonic": (("frequency",), answer.highest_harmonic, {"units": "1"}),
-        "periodic": (
-            ("frequency",),
+        "truncation": variable("frequency", answer.truncation, "1"),
+        "highest_harmonic": variable("frequency", answer.highest_harmonic, "1"),
+        "periodic": variable(
+            "frequency",
             answer.periodic.astype(np.int8),
-            {"units": "1", "long_name": "whether the contact forces came back to their start"},
+            "1",
+            "whether the contact forces came back to their start",
         ),
-        "aliasing": (("frequency",), answer.aliasing, {"units": "1"}),
-        "energy_balance": (("frequency",), answer.energy_balance, {"units": "1"}),
-        "damper": (
-            ("frequency", "damper_dof", "coefficient"),
+        "aliasing": variable("frequency", answer.aliasing, "1"),
+        "energy_balance": variable("frequency", answer.energy_balance, "1"),
+        "damper": variable(
+            "frequency damper_dof coefficient",
             model.damper_dofs(answer.coefficients),
-            {"units": "mm, rad", "coefficient": "a0 a1 b1 ..."},
+            "mm, rad",
+            coefficient="a0 a1 b1 ...",
         ),
         **{
             key: value
@@ -242,12 +197,7 @@ def friction_arrays(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
         share = measures.shares(answer, model)
         out["share"] = share_array(np.stack([share[side] for side in SIDES], axis=1))
     if scene.wants("damper_motion"):
-        attributes = {"units": "mm, rad", "long_name": amplitude_words(solution)}
-        out["damper_amplitude"] = (
-            ("frequency", "damper_dof"),
-            measures.damper_amplitude(answer, model),
-            attributes,
-        )
+        out["damper_amplitude"] = damper_array(solution, measures.damper_amplitude(answer, model))
     if not scene.wants("hysteresis"):
         return out
     loops = [
@@ -262,12 +212,12 @@ def _fold_arrays(curve: ForcedCurve) -> Variables:
     """Where slow sweeps jump, and the heights of the right blade before and after."""
     if not curve.folds:
         return {}
-    at, folds = ("fold",), curve.folds
+    at, folds = "fold", curve.folds
     return {
-        "fold_frequency": (at, np.array([one.frequency for one in folds]), HZ),
-        "fold_up": (at, np.array([one.up for one in folds], np.int8), {"units": "1"}),
-        "fold_before": (at, np.array([one.before for one in folds]), PER_N),
-        "fold_reached": (at, np.array([one.reached for one in folds]), PER_N),
+        "fold_frequency": variable(at, [one.frequency for one in folds], "Hz"),
+        "fold_up": variable(at, np.array([one.up for one in folds], np.int8), "1"),
+        "fold_before": variable(at, [one.before for one in folds], "(m/s2)/N"),
+        "fold_reached": variable(at, [one.reached for one in folds], "(m/s2)/N"),
     }
 
 
@@ -279,29 +229,26 @@ def faces_friction(curve: FacesCurve, at: Sequence[tuple[int, str, int]]) -> Var
     at
         Number, mode and point of its peaks.
     """
-    answer, on = curve.answer, ("frequency",)
+    answer, on = curve.answer, "frequency"
     jumped = np.zeros(len(curve.frequency), np.int8)
     jumped[list(answer.jumps)] = 1
     loss = np.array([one.loss for one in answer.points])
     out: Variables = {
-        "frequency": (on, answer.frequency, HZ | {"status": answer.status}),
-        "excitation_force": ((), np.array(curve.force), {"units": "N"}),
+        "frequency": variable(on, answer.frequency, "Hz", status=answer.status),
+        "excitation_force": variable("", curve.force, "N"),
         **_accelerances(curve),
         **_contact(
             np.array([one.nodes for one in answer.points])[:, :, [1, 2, 0]],
             loss,
             1e-3 * loss * answer.frequency[:, None],
         ),
-        "truncation": (
+        "truncation": variable(
             on,
-            np.array([one.unresolved for one in answer.points]),
-            {"units": "1", "long_name": "motion of the faces by harmonics left out, relative"},
+            [one.unresolved for one in answer.points],
+            "1",
+            "motion of the faces by harmonics left out, relative",
         ),
-        "jump": (
-            on,
-            jumped,
-            {"units": "1", "long_name": "whether the motion jumps to another after this point"},
-        ),
+        "jump": variable(on, jumped, "1", "whether the motion jumps to another after this point"),
         **marked_peaks(at),
     }
     for side in SIDES:
@@ -311,18 +258,19 @@ def faces_friction(curve: FacesCurve, at: Sequence[tuple[int, str, int]]) -> Var
 
 def performance_arrays(found: Performance) -> Variables:
     """Peaks of both blades over F_C/F_E, nan where a mode has none; the highest, and the limits."""
-    points, at = found.known, ("point",)
+    points, at = found.known, "point"
     ratio = np.array([one.ratio for one in points])
     modes = {(p.blade, p.number): p.mode for one in points for p in one.peaks}
     out: Variables = {
-        "ratio": (at, ratio, {"units": "1", "long_name": "F_C/F_E"}),
-        "highest_accelerance": (
+        "ratio": variable(at, ratio, "1", "F_C/F_E"),
+        "highest_accelerance": variable(
             at,
-            np.array([one.worst.height for one in points if one.worst is not None]),
-            PER_N | {"long_name": "highest peak of both blades and all modes"},
+            [one.worst.height for one in points if one.worst is not None],
+            "(m/s2)/N",
+            "highest peak of both blades and all modes",
         ),
-        "free_peak": ((), np.array(found.free), PER_N),
-        "stuck_peak": ((), np.array(found.stuck), PER_N),
+        "free_peak": variable("", found.free, "(m/s2)/N"),
+        "stuck_peak": variable("", found.stuck, "(m/s2)/N"),
     }
     for (blade, number), mode in sorted(modes.items()):
         rows = np.full((2, len(points)), np.nan)
@@ -331,41 +279,43 @@ def performance_arrays(found: Performance) -> Variables:
                 if (p.blade, p.number) == (blade, number):
                     rows[:, k] = p.frequency, p.height
         about = {"mode": mode, "blade": blade}
-        out[f"peak_{number}_frequency_{blade}"] = (at, rows[0], HZ | about)
-        out[f"peak_{number}_accelerance_{blade}"] = (at, rows[1], PER_N | about)
+        out[f"peak_{number}_frequency_{blade}"] = variable(at, rows[0], "Hz", **about)
+        out[f"peak_{number}_accelerance_{blade}"] = variable(at, rows[1], "(m/s2)/N", **about)
     best = found.best
     if best is not None and best.worst is not None:
         out |= {
-            "best_ratio": ((), np.array(best.ratio), {"units": "1", "long_name": "F_C/F_E"}),
-            "best_accelerance": ((), np.array(best.worst.height), PER_N),
+            "best_ratio": variable("", best.ratio, "1", "F_C/F_E"),
+            "best_accelerance": variable("", best.worst.height, "(m/s2)/N"),
         }
     return out
 
 
 def swept_arrays(one: SweptCurve, excited: Excitation) -> Variables:
     """Accelerance of both blades along a sweep, its states, losses and cost."""
-    found, at = one.found, ("frequency",)
+    found, at = one.found, "frequency"
     scale = (2.0 * np.pi * excited.lowest * found.frequency) ** 2 * 1e-3 / one.force
     out: Variables = {
-        "frequency": (at, found.frequency, HZ | {"status": found.status}),
-        "excitation_force": ((), np.array(one.force), {"units": "N"}),
+        "frequency": variable(at, found.frequency, "Hz", status=found.status),
+        "excitation_force": variable("", one.force, "N"),
         **_accelerances(one),
-        "share": (
-            ("frequency", "state"),
+        "share": variable(
+            "frequency state",
             found.share[:, [1, 2, 0]],
-            {"units": "1", "state": "stick slip lift, mean over all points of both faces"},
+            "1",
+            state="stick slip lift, mean over all points of both faces",
         ),
-        "energy": (
-            ("frequency", "kind"),
+        "energy": variable(
+            "frequency kind",
             found.energy,
-            {"units": "N mm", "kind": "work of the excitation, lost by damping, by friction"},
+            "N mm",
+            kind="work of the excitation, lost by damping, by friction",
         ),
-        "settled": (at, found.settled.astype(np.int8), {"units": "1"}),
-        "periods": (at, found.periods, {"units": "1"}),
+        "settled": variable(at, found.settled.astype(np.int8), "1"),
+        "periods": variable(at, found.periods, "1"),
     }
     for k, side in enumerate(SIDES):
-        out[f"lowest_{side}"] = (at, scale * found.lowest[:, k], PER_N)
-        out[f"highest_{side}"] = (at, scale * found.highest[:, k], PER_N)
+        out[f"lowest_{side}"] = variable(at, scale * found.lowest[:, k], "(m/s2)/N")
+        out[f"highest_{side}"] = variable(at, scale * found.highest[:, k], "(m/s2)/N")
         out |= peak_arrays(side, one.peaks[side])
     return out
 
@@ -381,14 +331,14 @@ def marched_arrays(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Va
     """States, losses, loops and the damper's motion at peaks of a sweep, in the variables of a path
     by the balance with these points.
     """
-    scene, at = solution.plan.scene, ("frequency",)
+    scene, at = solution.plan.scene, "frequency"
     f = np.array([one.frequency for one in found])
     # of a half model each node stands for its image too
     copies = np.array([one.period.copies for one in found])[:, None]
     energy = copies * np.array([one.period.loss for one in found])
     out: Variables = {
-        "frequency": (at, f, HZ),
-        "excitation_force": ((), np.array(found[0].sweep.force), {"units": "N"}),
+        "frequency": variable(at, f, "Hz"),
+        "excitation_force": variable("", found[0].sweep.force, "N"),
         **_contact(
             np.array([one.period.share for one in found]), energy, 1e-3 * energy * f[:, None]
         ),
@@ -398,23 +348,14 @@ def marched_arrays(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Va
         out["share"] = shares_by_face(out["state"][1], found[0].places)
     if scene.wants("damper_motion"):
         both = [marched_damper(solution, one) for one in found]
-        dofs = {"units": "mm, rad"}
+        motion = [one.motion.T for one in found]
+        static, rest = [mean for mean, _ in both], "mean, from the damper at rest"
+        along = "over the period, from the damper at rest"
+        on = f"{at} damper_dof"
         out |= {
-            "damper_motion": (
-                ("frequency", "damper_dof", "sample"),
-                np.array([one.motion.T for one in found]),
-                dofs | {"long_name": "over the period, from the damper at rest"},
-            ),
-            "damper_static": (
-                ("frequency", "damper_dof"),
-                np.array([static for static, _ in both]),
-                dofs | {"long_name": "mean, from the damper at rest"},
-            ),
-            "damper_amplitude": (
-                ("frequency", "damper_dof"),
-                np.array([amplitude for _, amplitude in both]),
-                dofs | {"long_name": amplitude_words(solution)},
-            ),
+            "damper_motion": variable(f"{on} sample", motion, "mm, rad", along),
+            "damper_static": variable(on, static, "mm, rad", rest),
+            "damper_amplitude": damper_array(solution, [amplitude for _, amplitude in both]),
         }
     if not scene.wants("hysteresis"):
         return out

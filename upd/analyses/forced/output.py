@@ -12,7 +12,6 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.curve_arrays import (
     FRICTION,
-    HZ,
     LINEAR,
     MARCHED,
     MEASURED,
@@ -36,7 +35,7 @@ from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.sweeps import faces_places
 from upd.analyses.measured import measured_arrays
 from upd.mesh import IntArray
-from upd.results import ArrayGroup, Case
+from upd.results import ArrayGroup, Case, variable
 
 
 def sizes(solution: ForcedSolution) -> dict[str, int]:
@@ -98,24 +97,21 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
     measured = measured_peaks(solution.plan)
     if measured and out:
         source = ", ".join(dict.fromkeys(one.source for one in measured))
-        frequency = (
-            ("peak",),
-            np.array([one.value for one in measured]),
-            {**HZ, "source": source},
-        )
+        frequency = variable("peak", [one.value for one in measured], "Hz", source=source)
         out["measured peaks"] = ArrayGroup({"frequency": frequency}, content=MEASURED)
     return out
 
 
 def _points(model: Model) -> Variables:
-    law, at = model.contacts.law, ("contact_point",)
+    law, at = model.contacts.law, "contact_point"
     return _places(model.position, model.face, *measures.place(model)) | {
-        "k_n": (at, law.k_n, {"units": "N/mm"}),
-        "k_t": (at, law.k_t, {"units": "N/mm"}),
-        "static_force": (
-            (*at, "static_component"),
+        "k_n": variable(at, law.k_n, "N/mm"),
+        "k_t": variable(at, law.k_t, "N/mm"),
+        "static_force": variable(
+            f"{at} static_component",
             np.column_stack([law.preload, model.traction]),
-            {"units": "N", "long_name": "before vibration: normal force, then tractions"},
+            "N",
+            "before vibration: normal force, then tractions",
         ),
     }
 
@@ -123,19 +119,18 @@ def _points(model: Model) -> Variables:
 def _nodes(solution: ForcedSolution, name: str) -> Variables:
     """Nodes of whole faces, in the variables of contact points without springs."""
     of, places = solution.faces[name].of, faces_places(solution, name)
-    area = {"area": (("contact_point",), places.weight, {"units": "mm2"})}
+    area = {"area": variable("contact_point", places.weight, "mm2")}
     return _places(of.position, places.face, places.along, places.up) | area
 
 
 def _places(position: Array, face: IntArray, along: Array, up: Array) -> Variables:
     """Where contact points lie: in space, and in the frames of their faces."""
-    mm, at = {"units": "mm"}, ("contact_point",)
-    low = "place up the slope, from the lowest point of the face"
+    at, low = "contact_point", "place up the slope, from the lowest point of the face"
     return {
-        "position": ((*at, "component"), position, mm),
-        "face": (at, face, {"flag_meanings": "left right"}),
-        "along": (at, along, mm | {"long_name": "place along the damper"}),
-        "up": (at, up, mm | {"long_name": low}),
+        "position": variable(f"{at} component", position, "mm"),
+        "face": variable(at, face, flag_meanings="left right"),
+        "along": variable(at, along, "mm", "place along the damper"),
+        "up": variable(at, up, "mm", low),
     }
 
 

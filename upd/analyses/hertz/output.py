@@ -17,7 +17,6 @@ from upd.analyses.contact.output import (
     lattice,
     normal_fields,
     path_group,
-    scalar,
     tangential_fields,
     together_fields,
     write_meshes,
@@ -32,7 +31,7 @@ from upd.analyses.hertz.results import (
 from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.labels import file_name
 from upd.reference import hertz_pressure, mindlin
-from upd.results import ArrayGroup
+from upd.results import ArrayGroup, variable
 
 # Points of a closed form: across a contact (its ends are steep), along a curve.
 _ACROSS, _ALONG = 801, 201
@@ -85,14 +84,14 @@ def _sheared_by_pressure(
 
 def _approach_split(case: HertzNormalCase) -> Variables:
     """The approach, what the bodies add to it, and what of it lies beyond depth 3a in each."""
-    out: Variables = {"approach": scalar(case.approach, "mm")}
+    out: Variables = {"approach": variable("", case.approach, "mm")}
     if case.shares:
-        out["finite_body"] = scalar(
-            case.finite_body, "mm", long_name="approach of the finite, held bodies"
+        out["finite_body"] = variable(
+            "", case.finite_body, "mm", "approach of the finite, held bodies"
         )
         for body, share in case.shares.items():
-            out[f"compression_{file_name(body)}"] = scalar(
-                share.compression, "mm", long_name="approach beyond depth 3a", body=body
+            out[f"compression_{file_name(body)}"] = variable(
+                "", share.compression, "mm", "approach beyond depth 3a", body=body
             )
     return out
 
@@ -103,14 +102,12 @@ def _hertz(solution: HertzSolution, case: HertzNormalCase) -> Variables:
         return {}
     x = np.linspace(-hertz.radius, hertz.radius, _ACROSS)
     return {
-        "hertz_radius": scalar(hertz.radius, "mm"),
-        "hertz_approach": scalar(hertz.approach, "mm"),
-        "hertz_max_pressure": scalar(hertz.max_pressure, "MPa"),
-        "hertz_x": (("hertz_x",), x, {"units": "mm"}),
-        "hertz_pressure": (
-            ("hertz_x",),
-            hertz_pressure(np.abs(x), hertz.radius, hertz.max_pressure),
-            {"units": "MPa"},
+        "hertz_radius": variable("", hertz.radius, "mm"),
+        "hertz_approach": variable("", hertz.approach, "mm"),
+        "hertz_max_pressure": variable("", hertz.max_pressure, "MPa"),
+        "hertz_x": variable("hertz_x", x, "mm"),
+        "hertz_pressure": variable(
+            "hertz_x", hertz_pressure(np.abs(x), hertz.radius, hertz.max_pressure), "MPa"
         ),
     }
 
@@ -120,14 +117,14 @@ def _cattaneo(solution: HertzSolution, t: HertzTangentialCase) -> Variables:
     if hertz is None or c is None:
         return {}
     out: Variables = {
-        "hertz_radius": scalar(hertz.radius, "mm"),
-        "mindlin_stick_radius": scalar(c, "mm"),
+        "hertz_radius": variable("", hertz.radius, "mm"),
+        "mindlin_stick_radius": variable("", c, "mm"),
     }
     closed = closed_form_traction(solution, t)
     if closed is not None:
         x = np.linspace(-_BEYOND * hertz.radius, _BEYOND * hertz.radius, _ACROSS)
-        out["mindlin_x"] = (("mindlin_x",), x, {"units": "mm"})
-        out["mindlin_traction"] = (("mindlin_x",), closed(np.abs(x)), {"units": "MPa"})
+        out["mindlin_x"] = variable("mindlin_x", x, "mm")
+        out["mindlin_traction"] = variable("mindlin_x", closed(np.abs(x)), "MPa")
     return out
 
 
@@ -136,8 +133,8 @@ def _deresiewicz(solution: HertzSolution, cycle: LoadPath) -> Variables:
     normal = next(case for case in solution.normal if case.case == cycle.normal)
     out: Variables = {}
     if normal.shear_shares:
-        out["finite_body_compliance"] = scalar(
-            normal.finite_body_shear, "mm/N", long_name="shear of the finite, held bodies"
+        out["finite_body_compliance"] = variable(
+            "", normal.finite_body_shear, "mm/N", "shear of the finite, held bodies"
         )
     hertz, ratio, mu = (
         hertz_of(solution, normal.load),
@@ -150,8 +147,8 @@ def _deresiewicz(solution: HertzSolution, cycle: LoadPath) -> Variables:
     T = np.linspace(peak, -peak, _ALONG)
     d = mindlin.unloading(T, peak, mu, normal.load, hertz.radius, shear_compliance(solution))
     # Reloading is unloading seen from the other side.
-    out["mindlin_displacement"] = (("mindlin_step",), np.concatenate([d, -d]), {"units": "mm"})
-    out["mindlin_force"] = (("mindlin_step",), np.concatenate([T, -T]), {"units": "N"})
+    out["mindlin_displacement"] = variable("mindlin_step", np.concatenate([d, -d]), "mm")
+    out["mindlin_force"] = variable("mindlin_step", np.concatenate([T, -T]), "N")
     return out
 
 
@@ -161,10 +158,8 @@ def _curve(solution: HertzSolution) -> ArrayGroup:
     split = [case for case in solution.normal if case.shares]
     if split:
         # What the bodies add goes with the load.
-        group["approach_contact"] = (
-            ("point",),
-            d - split[-1].finite_body / split[-1].load * F,
-            {"units": "mm"},
+        group["approach_contact"] = variable(
+            "point", d - split[-1].finite_body / split[-1].load * F, "mm"
         )
     group.update(_along(solution))
     force = np.linspace(0.0, float(F[-1]), _ALONG)
@@ -172,12 +167,10 @@ def _curve(solution: HertzSolution) -> ArrayGroup:
     if all(h is not None for h in hertz):
         for name, unit in (("area", "mm2"), ("max_pressure", "MPa")):
             closed = np.array([0.0, *(getattr(h, name) for h in hertz if h)])
-            group[f"hertz_{name}"] = (("hertz_point",), closed, {"units": unit})
-        group["hertz_normal_force"] = (("hertz_point",), force, {"units": "N"})
-        group["hertz_approach"] = (
-            ("hertz_point",),
-            np.array([0.0, *(h.approach for h in hertz if h)]),
-            {"units": "mm"},
+            group[f"hertz_{name}"] = variable("hertz_point", closed, unit)
+        group["hertz_normal_force"] = variable("hertz_point", force, "N")
+        group["hertz_approach"] = variable(
+            "hertz_point", [0.0, *(h.approach for h in hertz if h)], "mm"
         )
     return group
 
@@ -187,25 +180,21 @@ def _along(solution: HertzSolution) -> Variables:
     points = solution.along
     if not points:
         return {}
-    dims = ("loaded_point",)
+    dims = "loaded_point"
     out: Variables = {
-        "load": (dims, np.array([p.load for p in points]), {"units": "N"}),
-        "contact_area": (dims, np.array([p.measures.area for p in points]), {"units": "mm2"}),
-        "max_pressure": (
-            dims,
-            np.array([p.measures.max_pressure for p in points]),
-            {"units": "MPa"},
-        ),
-        "loaded_approach": (dims, np.array([p.approach for p in points]), {"units": "mm"}),
+        "load": variable(dims, [p.load for p in points], "N"),
+        "contact_area": variable(dims, [p.measures.area for p in points], "mm2"),
+        "max_pressure": variable(dims, [p.measures.max_pressure for p in points], "MPa"),
+        "loaded_approach": variable(dims, [p.approach for p in points], "mm"),
     }
     closed = [beyond_3a(solution, p.load) for p in points]
     for body in points[0].compression:
         name = f"compression_{file_name(body)}"
-        beyond = np.array([p.compression[body] for p in points])
-        text = {"units": "mm", "long_name": "approach beyond depth 3a", "body": body}
-        out[name] = (dims, beyond, text)
+        beyond = [p.compression[body] for p in points]
+        words = "approach beyond depth 3a"
+        out[name] = variable(dims, beyond, "mm", words, body=body)
         if all(closed):
-            out[f"hertz_{name}"] = (dims, np.array([c[body] for c in closed]), {"units": "mm"})
+            out[f"hertz_{name}"] = variable(dims, [c[body] for c in closed], "mm")
     return out
 
 

@@ -23,7 +23,7 @@ from upd.measured import (
 )
 from upd.measured.compare import paired, within
 from upd.measured.curve import LEAST_POINTS
-from upd.results import ArrayGroup, Case, Check, ErrorPart, Result, with_parts
+from upd.results import ArrayGroup, Case, Check, ErrorPart, Result, variable, with_parts
 from upd.results import quantities as q
 from upd.results.quantity import Quantity
 from upd.scene.measured import MeasuredChoice, fit_of
@@ -34,7 +34,6 @@ MeasuredChoices = Mapping[str, MeasuredChoice]
 FREE, STUCK = "free", "stuck"
 #: what the groups of measured curves in result.nc hold, their attribute ``content``
 MEASURED_CURVE = "measured curve"
-_HZ, _PER_N = {"units": "Hz"}, {"units": "(m/s2)/N"}
 #: half-power widths on each side of a computed peak, and points in one, for its damping
 _WIDTHS, _POINTS = 4, 25
 
@@ -282,12 +281,10 @@ def fit_checks(measured: MeasuredChoices) -> list[Check]:
     return checks
 
 
-def _parts(H: Any) -> tuple[tuple[str, str], Any, dict[str, str]]:
+def accelerance_array(H: Any) -> tuple[Any, ...]:
     """Real and imaginary part along a curve."""
-    return (
-        ("frequency", "part"),
-        np.stack([H.real, H.imag], axis=-1),
-        _PER_N | {"part": "real imaginary"},
+    return variable(
+        "frequency part", np.stack([H.real, H.imag], axis=-1), "(m/s2)/N", part="real imaginary"
     )
 
 
@@ -298,15 +295,15 @@ def measured_arrays(measured: MeasuredChoices) -> dict[str, ArrayGroup]:
         curve = choice.read()
         H = curve.accelerance
         variables: dict[str, Any] = {
-            "frequency": (("frequency",), curve.frequency, _HZ),
-            f"accelerance_{choice.blade}": _parts(H)
+            "frequency": variable("frequency", curve.frequency, "Hz"),
+            f"accelerance_{choice.blade}": accelerance_array(H)
             if curve.is_complex
-            else (("frequency",), H, _PER_N),
+            else variable("frequency", H, "(m/s2)/N"),
         }
         if choice.state == FREE:
             # where there is none, its number is withheld with the reason
             with suppress(InputError):
-                variables["fitted"] = _parts(fit_of(choice).response(curve.frequency))
+                variables["fitted"] = accelerance_array(fit_of(choice).response(curve.frequency))
         out[f"measured {name}"] = ArrayGroup(
             variables,
             content=MEASURED_CURVE,

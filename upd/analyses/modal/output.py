@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
-from upd.analyses.measured import measured_arrays
+from upd.analyses.measured import accelerance_array, measured_arrays
 from upd.analyses.modal.results import REDUCED, mode_results, reduced_frequencies
 from upd.analyses.modal.shapes import whole
 from upd.analyses.modal.solve import Array, ModalSolution, ModeSet, RigResponse
 from upd.matrices import DofMap, Matrices, write_dof_map, write_matrices
-from upd.results import ArrayGroup, Case
+from upd.results import ArrayGroup, Case, variable
 
 #: what the groups of result.nc hold, their attribute ``content``
 MODES, RESPONSE, REDUCTION = "modes", "response", "reduction"
@@ -49,8 +49,8 @@ def arrays(solution: ModalSolution) -> dict[str, ArrayGroup]:
     if solution.reductions:
         full, reduced = np.array(reduced_frequencies(solution.reductions)).T
         variables = {
-            "frequency": (("mode",), reduced, {"units": "Hz"}),
-            "full": (("mode",), full, {"units": "Hz", "source": "full model"}),
+            "frequency": variable("mode", reduced, "Hz"),
+            "full": variable("mode", full, "Hz", source="full model"),
         }
         out["reduction"] = ArrayGroup(variables, content=REDUCTION, case=REDUCED)
     return out
@@ -58,48 +58,31 @@ def arrays(solution: ModalSolution) -> dict[str, ArrayGroup]:
 
 def _modes(solution: ModalSolution, found: ModeSet) -> ArrayGroup:
     variables: dict[str, Any] = {
-        "frequency": (("mode",), np.array([m.frequency for m in found.modes]), {"units": "Hz"}),
-        "family": (
-            ("mode",),
-            np.array([{"x": 0, "y": 1}.get(m.family, -1) for m in found.modes]),
-            {"flag_meanings": "x y"},
+        "frequency": variable("mode", [m.frequency for m in found.modes], "Hz"),
+        "family": variable(
+            "mode", [{"x": 0, "y": 1}.get(m.family, -1) for m in found.modes], flag_meanings="x y"
         ),
     }
     printed = mode_results(solution, found)
     references = np.array([np.nan if r.reference is None else r.reference for r in printed])
     if np.isfinite(references).any():
         source = ", ".join(dict.fromkeys(r.source for r in printed if r.source))
-        variables["reference"] = (
-            ("mode",),
-            references,
-            {"units": "Hz", "source": source, "long_name": "printed frequency"},
+        variables["reference"] = variable(
+            "mode", references, "Hz", "printed frequency", source=source
         )
     return ArrayGroup(variables, content=MODES, case=found.case)
 
 
 def _response(response: RigResponse, kind: str) -> ArrayGroup:
     """Accelerance of both blades, modal damping, and the marked peak of the free right blade."""
-    group: dict[str, Any] = {"frequency": (("frequency",), response.frequency, {"units": "Hz"})}
+    group: dict[str, Any] = {"frequency": variable("frequency", response.frequency, "Hz")}
     for blade, H in response.accelerance[kind].items():
-        parts = np.stack([H.real, H.imag], axis=-1)
-        group[f"accelerance_{blade}"] = (
-            ("frequency", "part"),
-            parts,
-            {"units": "(m/s2)/N", "part": "real imaginary"},
-        )
-    group["damping"] = (
-        (),
-        np.array(response.damping),
-        {"units": "1", "long_name": "modal damping ratio"},
-    )
+        group[f"accelerance_{blade}"] = accelerance_array(H)
+    group["damping"] = variable("", response.damping, "1", "modal damping ratio")
     if kind == "free" and response.peak is not None:
         at, height = response.peak
-        group["peak_frequency_right"] = (("peak_right",), np.array([at]), {"units": "Hz"})
-        group["peak_accelerance_right"] = (
-            ("peak_right",),
-            np.array([height]),
-            {"units": "(m/s2)/N"},
-        )
+        group["peak_frequency_right"] = variable("peak_right", [at], "Hz")
+        group["peak_accelerance_right"] = variable("peak_right", [height], "(m/s2)/N")
     return ArrayGroup(
         group, content=RESPONSE, case=Case(kind=kind, arrangement=response.arrangement)
     )

@@ -20,7 +20,7 @@ from upd.analyses.seated.solve import (
 )
 from upd.analyses.seated.state import faces_group, state_group, state_name
 from upd.contact.coulomb_conditions import OPEN, STICK
-from upd.results import ArrayGroup
+from upd.results import ArrayGroup, variable
 from upd.scene.forced_contact import SIDES
 
 Variables = dict[str, Any]
@@ -28,7 +28,6 @@ Variables = dict[str, Any]
 HISTORY, FACE, MOVED = "seating", "face", "moved"
 #: the phases that are one history
 SEATING = (RAISED, LOWERED, AGAIN)
-_N, _MM, _RAD, _MPA = ({"units": unit} for unit in ("N", "mm", "rad", "MPa"))
 
 
 def sizes(solution: SeatedSolution) -> dict[str, int]:
@@ -79,54 +78,54 @@ def arrays(solution: SeatedSolution) -> dict[str, ArrayGroup]:
 
 def _history(solution: SeatedSolution, phase: Phase) -> Variables:
     """Forces, motions, shares and loss after each load step."""
-    of, found, step = solution.interface, phase.found, ("load_step",)
+    of, found, step = solution.interface, phase.found, "load_step"
     forces, motion = of.face_forces(found), of.motions(found)
-    out: Variables = {"centrifugal": (step, phase.centrifugal, _N)}
+    out: Variables = {"centrifugal": variable(step, phase.centrifugal, "N")}
     if phase.moved.any():
         axis = int(np.flatnonzero(phase.moved.any(axis=0))[0])
-        out["shift"] = (step, phase.moved[:, axis], {**_MM, "long_name": f"along {'xyz'[axis]}"})
-        out["platform_force"] = (step, platform_force(solution, phase)[:, axis], _N)
+        out["shift"] = variable(step, phase.moved[:, axis], "mm", f"along {'xyz'[axis]}")
+        out["platform_force"] = variable(step, platform_force(solution, phase)[:, axis], "N")
     for k, side in enumerate(SIDES):
         mine = of.face == k
         area = of.area[mine] / of.area[mine].sum()
         out |= {
-            f"normal_{side}": (step, forces[:, k, 0], _N),
-            f"along_{side}": (step, forces[:, k, 1], _N),
-            f"tangential_{side}": (step, forces[:, k, 2], _N),
-            f"closed_{side}": (step, (found.state[:, mine] != OPEN) @ area, {"units": "1"}),
-            f"stick_{side}": (step, (found.state[:, mine] == STICK) @ area, {"units": "1"}),
+            f"normal_{side}": variable(step, forces[:, k, 0], "N"),
+            f"along_{side}": variable(step, forces[:, k, 1], "N"),
+            f"tangential_{side}": variable(step, forces[:, k, 2], "N"),
+            f"closed_{side}": variable(step, (found.state[:, mine] != OPEN) @ area, "1"),
+            f"stick_{side}": variable(step, (found.state[:, mine] == STICK) @ area, "1"),
         }
     for j in of.kept:
         axis_name = "xyz"[j % 3]
         out |= (
-            {f"damper_u{axis_name}": (step, motion[:, j], _MM)}
+            {f"damper_u{axis_name}": variable(step, motion[:, j], "mm")}
             if j < 3
-            else {f"damper_r{axis_name}": (step, motion[:, j], _RAD)}
+            else {f"damper_r{axis_name}": variable(step, motion[:, j], "rad")}
         )
     loss = of.copies * np.cumsum(phase.friction_loss)
-    out["friction_loss"] = (step, loss, {"units": "N mm", "long_name": "since the first step"})
+    out["friction_loss"] = variable(step, loss, "N mm", "since the first step")
     return out
 
 
 def _face(solution: SeatedSolution, patch: FacePatch, phase: Phase) -> Variables:
     """Pressure, traction, slip and state on a face's lattice after a phase."""
-    of, found, place = solution.interface, phase.found, ("x", "y")
+    of, found, place = solution.interface, phase.found, "x y"
     force, slip = found.force[-1], found.slip[-1]
     area = patch.field(of.area, extensive=True)
     normal = patch.field(force[:, 0], extensive=True)
     out: Variables = {
-        "x": (("x",), patch.x, {**_MM, "long_name": "along the damper, from its middle"}),
-        "y": (("y",), patch.y, {**_MM, "long_name": "up the slope, from the lower edge"}),
-        "normal_force": (place, normal, _N),
-        "pressure": (place, normal / area, _MPA),
-        "gap": (place, patch.field(found.gap[-1]), _MM),
-        "state": (place, patch.field(found.state[-1]), {"flag_meanings": "open stick slip"}),
+        "x": variable("x", patch.x, "mm", "along the damper, from its middle"),
+        "y": variable("y", patch.y, "mm", "up the slope, from the lower edge"),
+        "normal_force": variable(place, normal, "N"),
+        "pressure": variable(place, normal / area, "MPa"),
+        "gap": variable(place, patch.field(found.gap[-1]), "mm"),
+        "state": variable(place, patch.field(found.state[-1]), flag_meanings="open stick slip"),
     }
     for j, name in ((0, "along"), (1, "up")):
         odd = j == 0
         shear = patch.field(force[:, 1 + j], extensive=True, odd=odd)
-        out[f"traction_{name}"] = (place, shear / area, _MPA)
-        out[f"slip_{name}"] = (place, patch.field(slip[:, j], odd=odd), _MM)
+        out[f"traction_{name}"] = variable(place, shear / area, "MPa")
+        out[f"slip_{name}"] = variable(place, patch.field(slip[:, j], odd=odd), "mm")
     return out
 
 

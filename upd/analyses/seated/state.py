@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from upd.analyses.seated.interface import Interface
 from upd.contact import CoupledHistory
 from upd.errors import InputError
-from upd.results import ArrayGroup, Case, read_netcdf
+from upd.results import ArrayGroup, Case, read_netcdf, variable
 
 Array = NDArray[np.float64]
 #: what the groups hold, their attribute ``content``
@@ -25,13 +25,13 @@ FACES, STATE = "seated faces", "seated state"
 _FACES, _STATE = "faces", "state"
 #: relative distance up to which nodes are the same
 _SAME = 1e-9
-_DIMS: dict[str, tuple[tuple[str, ...], str]] = {
-    "force": (("contact_node", "component"), "N"),
-    "slip": (("contact_node", "tangent"), "mm"),
-    "gap": (("contact_node",), "mm"),
-    "motion": (("motion",), "mm"),
-    "step": (("contact_node", "tangent"), "mm"),
-    "load": (("motion",), "N"),
+_DIMS: dict[str, tuple[str, str]] = {
+    "force": ("contact_node component", "N"),
+    "slip": ("contact_node tangent", "mm"),
+    "gap": ("contact_node", "mm"),
+    "motion": ("motion", "mm"),
+    "step": ("contact_node tangent", "mm"),
+    "load": ("motion", "N"),
 }
 
 
@@ -96,19 +96,20 @@ def _part(copies: int) -> str:
 
 def faces_group(of: Interface, gap: Array) -> ArrayGroup:
     """The nodes of both faces."""
-    node = ("contact_node",)
+    node = "contact_node"
     return ArrayGroup(
         {
-            "position": (("contact_node", "axis"), of.position, {"units": "mm"}),
-            "face": (node, of.face, {"flag_meanings": "left right"}),
-            "area": (node, of.area, {"units": "mm2"}),
-            "gap": (node, gap, {"units": "mm", "long_name": "gap before any load"}),
-            "frame": (
-                ("side", "component", "axis"),
+            "position": variable("contact_node axis", of.position, "mm"),
+            "face": variable(node, of.face, flag_meanings="left right"),
+            "area": variable(node, of.area, "mm2"),
+            "gap": variable(node, gap, "mm", "gap before any load"),
+            "frame": variable(
+                "side component axis",
                 of.frame,
-                {"long_name": "normal into the blade, along the damper, up the slope"},
+                "",
+                "normal into the blade, along the damper, up the slope",
             ),
-            "copies": ((), np.array(of.copies), {"long_name": "models that make the whole"}),
+            "copies": variable("", of.copies, "", "models that make the whole"),
         },
         content=FACES,
     )
@@ -119,12 +120,11 @@ def state_group(
 ) -> ArrayGroup:
     """The state after a way of loading."""
     variables: dict[str, Any] = {
-        name: (dims, getattr(history, name), {"units": unit})
-        for name, (dims, unit) in _DIMS.items()
+        name: variable(dims, getattr(history, name), unit) for name, (dims, unit) in _DIMS.items()
     }
-    variables["state"] = (("contact_node",), state, {"flag_meanings": "open stick slip"})
-    variables["centrifugal"] = ((), np.array(centrifugal), {"units": "N"})
-    variables["friction"] = ((), np.array(mu), {"units": "1"})
+    variables["state"] = variable("contact_node", state, flag_meanings="open stick slip")
+    variables["centrifugal"] = variable("", centrifugal, "N")
+    variables["friction"] = variable("", mu, "1")
     return ArrayGroup(variables, content=STATE, case=case)
 
 
