@@ -213,9 +213,6 @@ class BalanceChoice:
         the harmonics need, and 128 steps. Cost: seconds grow in proportion where points slip.
     slider
         Start position of the sliders, within what friction allows.
-    time_march
-        Frequencies at which the answer is checked by time integration. Cost: seconds to minutes
-        each.
     """
 
     __pydantic_config__ = STRICT
@@ -227,7 +224,6 @@ class BalanceChoice:
         "auto"
     )
     slider: Literal["zero", "static", "mid", "upper", "lower"] = "zero"
-    time_march: tuple[Frequency, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -41,11 +41,6 @@ def forced_problems(scene: ForcedScene) -> list[str]:
             f"balance.samples: {b.samples} cannot carry harmonic {b.harmonics}; take more "
             f"than {2 * b.harmonics}"
         )
-    problems += [
-        f"balance.time_march: {f:g} Hz lies outside the sweep, {e.start:g} to {e.stop:g} Hz"
-        for f in b.time_march
-        if not e.start <= f <= e.stop
-    ]
     if scene.performance.lowest >= scene.performance.highest:
         problems.append("performance.lowest: is not below performance.highest")
     problems += [
@@ -126,10 +121,6 @@ def _model_problems(scene: ForcedScene) -> list[str]:
         problems.append(
             f"want: {', '.join(marched)} of whole faces {'is' if len(marched) == 1 else 'are'} "
             'read from the sweeps: write balance.method = "march"'
-        )
-    if scene.balance.time_march:
-        problems.append(
-            "balance.time_march: whole faces are marched at every frequency: leave it empty"
         )
     return problems
 

@@ -12,7 +12,17 @@ from dataclasses import replace
 from upd.analyses import accuracy_rounds
 from upd.analyses.accuracy_rounds import AT_BEST, Rounds, Setting, mesh_falls
 from upd.analyses.forced.estimates import estimate
-from upd.analyses.forced.levels import HARMONICS, MESH, MODES, POINTS, RECIPE, SAMPLES, graded
+from upd.analyses.forced.levels import (
+    HARMONICS,
+    MESH,
+    MODES,
+    POINTS,
+    RECIPE,
+    SAMPLES,
+    graded,
+    lines_named,
+    with_gauss,
+)
 from upd.analyses.forced.plan import ForcedPlan, make_plan, time_steps
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution
@@ -21,12 +31,12 @@ from upd.analyses.levels_choice import Knob, Levels
 from upd.hbm.fourier import harmonics, sample_count
 from upd.progress import Stages
 from upd.scene import ForcedScene
-from upd.scene.forced_contact import GAUSS, SIDES, FaceLines
+from upd.scene.forced_contact import GAUSS
 
 #: names of accuracies -> numbers they are asked of
 ASKED = {"peak_frequency": "peak_?_frequency", "peak": "peak_?_accelerance"}
 #: times the elements of the coarsest graded mesh; of the first level, the scene's own mesh, at best
-#: so much is left by that one
+#: that one leaves so much
 _FINER, _GRADED = (1, 1.5, 2, 2.5, 3), 0.5
 #: times the samples
 _MORE_SAMPLES = (1, 2, 4, 8)
@@ -78,11 +88,10 @@ def _raisable(scene: ForcedScene) -> bool:
     """Whether Gauss points can stand for the scene's: not for lines that it names, nor for the
     points of a contact law.
     """
-    lines = [one for side in SIDES for one in scene.contact.lines(side)]
     return (
         scene.contact.rule != GAUSS
         and scene.contact.share == "area"
-        and all(one == "all" or isinstance(one, int) for one in lines)
+        and not lines_named(scene.contact)
         and all(one.points != "law" for one in scene.stiffnesses.values())
     )
 
@@ -96,15 +105,7 @@ def _with_mesh(scene: ForcedScene, level: int) -> ForcedScene:
 def _with_points(scene: ForcedScene, level: int) -> ForcedScene:
     if level == 0:
         return scene
-    contact = replace(
-        scene.contact,
-        rule=GAUSS,
-        rows=_GAUSS[level - 1],
-        columns=_COLUMNS,
-        left=FaceLines(),
-        right=FaceLines(),
-    )
-    return replace(scene, contact=contact)
+    return replace(scene, contact=with_gauss(scene.contact, _GAUSS[level - 1], _COLUMNS))
 
 
 def _with_modes(scene: ForcedScene, count: int) -> ForcedScene:
