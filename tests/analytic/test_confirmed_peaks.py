@@ -60,7 +60,7 @@ def stays(
 ) -> np.ndarray | None:
     model, curve = solution.models["thesis"], solution.curves[0]
     springs = make_springs(solution.plan, model)
-    return peaks._stays(springs, model, curve.answer.balance, x, f, curve.force, steps)
+    return peaks._stays(springs, model, curve, steps, x, f)
 
 
 def test_the_motion_of_a_slipping_peak_stays(slipping: ForcedSolution) -> None:
@@ -152,7 +152,7 @@ def test_a_spoiled_top_is_replaced_by_a_motion_down_the_path(slipping: ForcedSol
 
 
 def confirm(
-    monkeypatch: pytest.MonkeyPatch, good: Callable[[int], bool], size: np.ndarray
+    good: Callable[[int], bool], size: np.ndarray, like: TimeCheck | None = None
 ) -> tuple[TimeCheck, list[int]]:
     """The check of a peak at the middle of a path whose motions stay or leave by their place."""
     f, tried = 100.0 + np.arange(len(size)) / 10.0, list[int]()
@@ -164,17 +164,15 @@ def confirm(
     )
     top = int(size.argmax())
 
-    def motion(*args: Any) -> np.ndarray | None:
-        (i,) = args[3]
+    def motion(x: np.ndarray, _: float) -> np.ndarray | None:
+        (i,) = x
         tried.append(int(i))
         height = float(size[min(int(i), len(size) - 1)]) if i >= 0 else float(size[top])
         return np.array([[height, height], [height, 0.99 * height]]) if good(int(i)) else None
 
-    monkeypatch.setattr(peaks, "_stays", motion)
     peak = CurvePeak(float(f[top]), float(size[top]), top, 1)
     very_top = Top(float(f[top]), float(size[top]), np.array([-1.0]), True)
-    nothing: Any = None
-    found = peaks._confirmed(nothing, nothing, curve, "right", peak, very_top, 256)
+    found = peaks._confirmed(motion, curve, "right", peak, very_top, like)
     return found, tried
 
 
@@ -182,8 +180,8 @@ def confirm(
 SLOPES = 2.0 - 0.02 * np.abs(np.arange(81) - 40.0)
 
 
-def test_a_top_that_stays_is_the_peak(monkeypatch: pytest.MonkeyPatch) -> None:
-    found, tried = confirm(monkeypatch, lambda i: True, SLOPES)
+def test_a_top_that_stays_is_the_peak() -> None:
+    found, tried = confirm(lambda i: True, SLOPES)
     assert found.at_top and found.stays and found.starts == 1
     assert tried == [-1]
     assert (found.balance, found.integrated) == (2.0, pytest.approx(1.98))
@@ -192,11 +190,9 @@ def test_a_top_that_stays_is_the_peak(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("last", [41, 45, 50, 54])
-def test_bisection_ends_at_the_last_motion_that_leaves(
-    monkeypatch: pytest.MonkeyPatch, last: int
-) -> None:
+def test_bisection_ends_at_the_last_motion_that_leaves(last: int) -> None:
     """Up to it all leave on the right, and everything on the left."""
-    found, tried = confirm(monkeypatch, lambda i: i > last, SLOPES)
+    found, tried = confirm(lambda i: i > last, SLOPES)
     assert found.stays and not found.at_top
     assert found.sample == last + 1
     assert found.balance == SLOPES[last + 1]
@@ -205,15 +201,30 @@ def test_bisection_ends_at_the_last_motion_that_leaves(
     assert found.starts == len(tried) <= 2 * peaks._MOST_BISECTIONS
 
 
-def test_the_higher_of_both_flanks_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
-    found, _ = confirm(monkeypatch, lambda i: i > 52 or 0 <= i < 35, SLOPES)
-    assert found.sample == 34
-    found, _ = confirm(monkeypatch, lambda i: i > 42 or 0 <= i < 30, SLOPES)
-    assert found.sample == 43
+def test_the_higher_of_both_flanks_is_taken() -> None:
+    found, _ = confirm(lambda i: i > 52 or 0 <= i < 35, SLOPES)
+    assert (found.sample, found.way) == (34, -1)
+    found, _ = confirm(lambda i: i > 42 or 0 <= i < 30, SLOPES)
+    assert (found.sample, found.way) == (43, 1)
 
 
-def test_a_peak_that_nothing_confirms_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    found, tried = confirm(monkeypatch, lambda i: False, SLOPES)
+@pytest.mark.parametrize("last", [41, 44, 47, 50, 54, 69])
+def test_on_another_model_the_border_is_looked_for_from_that_of_the_run(last: int) -> None:
+    """The same border as without, in few integrations where it is near; the other flank is not
+    asked.
+    """
+    run, _ = confirm(lambda i: i > 46, SLOPES)
+    alone, _ = confirm(lambda i: i > last, SLOPES)
+    found, tried = confirm(lambda i: i > last, SLOPES, run)
+    assert found == replace(alone, starts=found.starts)
+    assert found.starts == len(tried) <= 2 + 2 * np.log2(2 + abs(last - 46))
+    assert min(tried) > 40
+    nothing, _ = confirm(lambda i: False, SLOPES, run)
+    assert not nothing.stays
+
+
+def test_a_peak_that_nothing_confirms_is_told() -> None:
+    found, tried = confirm(lambda i: False, SLOPES)
     assert not found.stays
     assert found.difference == float("inf")
     # the top, and the end of either flank at half the power

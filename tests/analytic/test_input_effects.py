@@ -9,8 +9,14 @@ import pytest
 from rigs import LINES
 
 from upd.analyses import forced, make_plan
-from upd.analyses.forced.inputs import INPUTS, InputEffect, few_harmonics, input_effects
-from upd.analyses.forced.peaks_again import FoundPeaks, linear_of
+from upd.analyses.forced.inputs import (
+    INPUTS,
+    InputEffect,
+    effects_of,
+    few_harmonics,
+    input_variants,
+)
+from upd.analyses.forced.peaks_again import FoundPeaks, linear_of, solve_again
 from upd.analyses.forced.solution import ForcedSolution
 from upd.progress import Stages, silent
 from upd.scene import load_scene
@@ -50,8 +56,10 @@ def effects(ratio: float, name: str, **more: Any) -> dict[tuple[str, int], Input
     """End and number of the mode -> what it does."""
     s = solved(ratio, **more)
     peaks = FoundPeaks(s.plan, s.models["thesis"], s.linear["thesis"], tuple(s.curves))
-    found = input_effects(peaks.bare, few_harmonics(peaks), name)
-    assert {one.name for one in found} <= {name}
+    few = few_harmonics(peaks)
+    assert few is not None
+    mine = [one for one in input_variants(few) if one.of.source == name]
+    found = [one for variant in mine for one in effects_of(few, solve_again(few, variant))]
     return {(one.label, one.number): one for one in found}
 
 
@@ -140,7 +148,7 @@ def test_faces_that_are_new_or_carry_friction_at_rest() -> None:
 def test_without_friction_what_is_of_friction_does_not_apply() -> None:
     smooth = {"contact__friction": 0.0}
     assert effects(STICKS, "modal damping", **smooth)
-    for name in ("friction", "static friction before vibration", "start of the sliders"):
+    for name in ("friction", "static friction before vibration"):
         assert effects(STICKS, name, **smooth) == {}
 
 

@@ -13,14 +13,21 @@ import pytest
 from rigs import LINES
 
 from upd.analyses import forced, make_plan
-from upd.analyses.forced import levels, peaks_again
+from upd.analyses.forced import peaks_again
 from upd.analyses.forced import solve as solving
 from upd.analyses.forced.curves import ForcedCurve, Top
 from upd.analyses.forced.estimates import bound, estimate
-from upd.analyses.forced.levels import HARMONICS, MESH, MODES, POINTS, SAMPLES, PeakLevel
+from upd.analyses.forced.levels import HARMONICS, MESH, MODES, POINTS, SAMPLES
 from upd.analyses.forced.model import make_model
 from upd.analyses.forced.peaks import climbed
-from upd.analyses.forced.peaks_again import RunPeak, carried, moved_points, peak_on
+from upd.analyses.forced.peaks_again import (
+    RunPeak,
+    Variant,
+    carried,
+    moved_points,
+    peak_on,
+    solve_again,
+)
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import make_bodies
@@ -31,6 +38,7 @@ from upd.results import ErrorPart, Estimates, Result
 from upd.results.number import with_estimates
 from upd.scene import load_scene
 from upd.scene.forced_contact import SIDES
+from upd.vary.variation import Variation
 
 pytestmark = pytest.mark.estimated
 
@@ -98,8 +106,8 @@ def bounded(part: ErrorPart, true: float, most: float) -> bool:
 # -- bounds ----------------------------------------------------------------------------------------
 
 
-def level(source: str, size: float) -> PeakLevel:
-    return PeakLevel(source, f"size {size:g}", size, {}, (math.nan, math.nan), 0.0)
+def level(source: str, size: float) -> Variation:
+    return Variation(source, f"size {size:g}", size=size)
 
 
 def meshes(q: Any) -> tuple[float, str]:
@@ -250,7 +258,7 @@ def test_where_a_top_leaves_levels_are_taken_to_the_border(
     assert leaves.compared("right", 2) == (check.frequency, check.integrated)
     seen: list[ForcedCurve] = []
 
-    def confirmed(plan: Any, model: Any, path: ForcedCurve) -> ForcedCurve:
+    def confirmed(plan: Any, model: Any, path: ForcedCurve, like: Any) -> ForcedCurve:
         """Half of every height."""
         seen.append(path)
         lower = {s: tuple(p._replace(height=0.5 * p.height) for p in path.peaks[s]) for s in SIDES}
@@ -293,13 +301,13 @@ def test_a_level_that_fails_leaves_only_its_part(
     solution, numbers, estimates = slipping
     (name, known), (peaks, *_) = next(iter(solution.levels.items())), solution.searched.values()
     for function in ("found_again", "peak_on"):
-        monkeypatch.setattr(levels, function, fails)
-    model = levels.MadeModel(MODES, "2 modes a blade", 2.0, peaks.model, 0.0)
-    failed = {
-        HARMONICS: levels.balance_level(peaks, HARMONICS, 2, 1),
-        MODES: levels.model_level(peaks, model),
-    }
-    mixed = [failed.get(one.source, one) for one in known]
+        monkeypatch.setattr(peaks_again, function, fails)
+    variants = (
+        Variant(Variation(HARMONICS, "2 harmonics more"), more=2),
+        Variant(Variation(MODES, "2 modes a blade", size=2.0), peaks.model),
+    )
+    failed = {one.of.source: solve_again(peaks, one) for one in variants}
+    mixed = [failed.get(one.of.source, one) for one in known]
     again = estimate(replace(solution, levels={name: mixed}), numbers, Stages(silent))
     one = number(slipping, "peak_2_accelerance")
     was, now = ({p.source: p for p in found[one.name, one.case]} for found in (estimates, again))
@@ -316,7 +324,7 @@ def test_a_wanted_accuracy_unknown_solves_no_level(monkeypatch: pytest.MonkeyPat
     def never(*args: Any) -> Any:
         raise AssertionError("solved")
 
-    for name in ("coarse_model", "other_models", "model_level", "balance_level"):
+    for name in ("coarse_model", "other_levels", "solve_again"):
         monkeypatch.setattr(solving, name, never)
     plan = make_plan(load_scene("symmetric-response", RIG))
     assert plan.estimate_seconds > 0.0

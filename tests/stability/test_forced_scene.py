@@ -270,18 +270,6 @@ def test_a_stopped_path_is_a_warning_with_its_partial_curve(
     assert frequency.max() < scene.excitation.stop
 
 
-def test_time_march_agrees_where_all_stick() -> None:
-    result = run(
-        excitation__centrifugal_to_force=[1e5],
-        balance__time_march=["430 Hz"],
-        excitation__points=20,
-        want=["response"],
-    )
-    # average acceleration with 1024 steps a period
-    march = next(r for r in result.rows if r.name == "time_march_accelerance")
-    assert march.value == pytest.approx(march.reference, rel=5e-3)
-
-
 def test_faults_are_told_together() -> None:
     bad = {
         "want": ["respons"],
@@ -314,7 +302,6 @@ def test_faults_are_told_together() -> None:
         ({"stiffness.own.scene": "symmetric", "stiffness.own.run": "runs/a"}, "both given"),
         ({"stiffness.thesis.points": "law"}, '"law" needs'),
         ({"excitation.start": "600 Hz"}, "not below"),
-        ({"balance.time_march": ["900 Hz"]}, "outside the sweep"),
         ({"damper.centrifugal": "0 N"}, "loose"),
         ({"geometry.arrangement": "asymmetric"}, "left face needs"),
     ],

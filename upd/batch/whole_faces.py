@@ -80,7 +80,6 @@ def _of_faces(scene: ForcedScene) -> Settings:
         ("contact.model", INTERFACE),
         ("mesh.element", mine if mine in _NODE_BY_NODE else _NODE_BY_NODE[0]),
         ("balance.method", "march"),
-        ("balance.time_march", []),
     )
 
 

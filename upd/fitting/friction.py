@@ -168,7 +168,7 @@ class CurveWithFriction:
         value = np.zeros((2, len(points)), complex)
         slope = np.zeros((2, len(points), len(whole)), complex)
         for i, (f, x) in enumerate(zip(self.frequencies, points, strict=True)):
-            moved, by, _ = displacement_derivatives(b, rows, x, float(f), whole, harmonic=k)
+            moved, by = displacement_derivatives(b, rows, x, float(f), whole, harmonic=k)
             scale = -((2.0 * np.pi * k * f) ** 2) * _M / force
             value[:, i] = scale * moved
             slope[:, i] = scale * (by - moved[:, None] * forces)

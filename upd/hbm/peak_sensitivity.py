@@ -98,7 +98,7 @@ def displacement_derivatives(
     changes: Sequence[ParameterChange],
     *,
     harmonic: int | None = None,
-) -> tuple[ComplexArray, ComplexArray, FloatArray]:
+) -> tuple[ComplexArray, ComplexArray]:
     """Complex amplitudes row @ q of a solved point and their derivatives at fixed frequency.
 
     Parameters
@@ -120,12 +120,10 @@ def displacement_derivatives(
     value : (n_row,) ndarray of complex
         [mm]
     by_parameter : (n_row, n) ndarray of complex
-    unknowns : (n_unknown, n) ndarray
-        dx/dp.
     """
     found = _moved(b, x, frequency, changes, harmonic)
     weights = np.column_stack([b.modal_row(row) for row in rows])
-    return found.eta @ weights, (found.d_eta[1:] @ weights).T, found.dx[:, 1:]
+    return found.eta @ weights, (found.d_eta[1:] @ weights).T
 
 
 def peak_derivatives(

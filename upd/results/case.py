@@ -33,8 +33,6 @@ class Case:
         State of the damper's equilibrium: "opposing", "frictionless", "reversed".
     force_ratio
         F_C/F_E, centrifugal over excitation force.
-    reversed
-        The path was followed from the highest frequency downwards.
     kind
         Kind of linear curve or of modes: "free", "stuck", "glued".
     arrangement
@@ -63,7 +61,6 @@ class Case:
     ratio: float | None = None
     friction: str = ""
     force_ratio: float | None = None
-    reversed: bool = False
     kind: str = ""
     arrangement: str = ""
     peak: int | None = None
@@ -102,7 +99,6 @@ class Case:
             shown("arrangement"),
             shown("body"),
             shown("force_ratio", "F_C/F_E {}"),
-            "downwards" * self.reversed,
             "at the highest point" if self.peak == 0 else shown("peak", "at peak {}"),
             shown("mode"),
             shown("choice"),

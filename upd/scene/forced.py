@@ -174,9 +174,6 @@ class BalanceChoice:
         the harmonics need, and 128 steps. Cost: seconds grow in proportion where points slip.
     slider
         Start position of the sliders, within what friction allows.
-    time_march
-        Frequencies at which the answer is checked by time integration. Cost: seconds to minutes
-        each.
     """
 
     __pydantic_config__ = STRICT
@@ -184,7 +181,6 @@ class BalanceChoice:
     harmonics: Harmonics = 7
     samples: Samples = "auto"
     slider: Literal["zero", "static", "mid", "upper", "lower"] = "zero"
-    time_march: tuple[q.Frequency, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -28,11 +28,6 @@ def forced_problems(scene: ForcedScene) -> list[str]:
             f"balance.samples: {b.samples} cannot carry harmonic {highest}; take more than "
             f"{2 * highest}"
         )
-    for f in b.time_march:
-        if not e.start <= f <= e.stop:
-            add(
-                f"balance.time_march: {f:g} Hz lies outside the sweep, {e.start:g} to {e.stop:g} Hz"
-            )
     if scene.performance.lowest >= scene.performance.highest:
         add("performance.lowest: is not below performance.highest")
     for name in scene.contact.stiffness:
@@ -111,8 +106,6 @@ def _whole_faces_problems(scene: ForcedScene) -> list[str]:
             f"want: {', '.join(integrated)}: of whole faces from the sweeps alone: write "
             'balance.method = "march"'
         )
-    if scene.balance.time_march:
-        add("balance.time_march: whole faces are integrated at every frequency: leave it empty")
     return problems
 
 

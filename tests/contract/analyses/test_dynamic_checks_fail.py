@@ -15,12 +15,11 @@ from upd.analyses.base import Resolved
 from upd.analyses.forced.levels import HARMONICS, SAMPLES
 from upd.analyses.forced.measures import accelerance, residual_error
 from upd.analyses.forced.performance import Performance, RatioPoint, of_curve
-from upd.analyses.forced.solution import ForcedSolution, TimeMarch
+from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.spring_march import make_springs
 from upd.analyses.forced.statics import StaticState
 from upd.analyses.forced.sweeps import both_ways, marched_peak
 from upd.analyses.modal.solve import ModalSolution, modal_error
-from upd.hbm.march import steady_state
 from upd.progress import Stages, silent
 from upd.results import Check
 from upd.scene import load_scene
@@ -64,11 +63,7 @@ def response(forced_scene: list[str]) -> ForcedSolution:
     assert isinstance(solution, ForcedSolution)
     curve = solution.curves[0]
     i = int(np.abs(curve.accelerance["right"]).argmax())
-    f = float(curve.answer.frequency[i])
-    height = float(abs(curve.accelerance["right"][i]))
-    steady = steady_state(curve.answer.balance, f, curve.answer.x[i])
-    solution.marches = [TimeMarch(curve, f, height, steady)]
-    _add_sweeps(solution, f)
+    _add_sweeps(solution, float(curve.answer.frequency[i]))
     solution.performances = {"thesis": Performance((of_curve(curve),), 300.0, 190.0, 3)}
     return solution
 
@@ -141,7 +136,7 @@ def _level(source: str, factor: float) -> Callable[[ForcedSolution], ForcedSolut
             one._replace(
                 peaks={at: p._replace(height=factor * p.height) for at, p in one.peaks.items()}
             )
-            if one.source == source
+            if one.of.source == source
             else one
             for one in s.levels["thesis"]
         ]
@@ -201,9 +196,6 @@ SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
     ),
     "confirmed by time integration, none stays": lambda s: _checked(s, integrated=np.nan),
     "performance complete": _cut_performance,
-    "time march": lambda s: replace(
-        s, marches=[replace(s.marches[0], height=1.01 * s.marches[0].height)]
-    ),
     "sweep complete": lambda s: _swept(s, status="stopped"),
     "sweep settled": lambda s: _swept(s, settled=s.sweeps[0].found.settled & False),
     "sweep energy": lambda s: _swept(s, energy=s.sweeps[0].found.energy * [1.05, 1.0, 1.0]),

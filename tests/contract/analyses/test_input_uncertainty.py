@@ -151,11 +151,18 @@ def sampled(wedge: ForcedSolution) -> dict[int, Changes]:
 
 
 def _with_samples(solution: ForcedSolution, samples: int) -> ForcedSolution:
-    """The run with its curves on balances with other samples: its peaks are climbed to on these."""
-    curves = [
-        replace(c, answer=replace(c.answer, balance=_balance(c.answer.balance, samples=samples)))
-        for c in solution.curves
-    ]
+    """The run with its curves on balances with other samples, on which its peaks are climbed to."""
+    curves, model = [], solution.models["thesis"]
+    for c in solution.curves:
+        b = _balance(c.answer.balance, samples=samples)
+        tops = {}
+        for at, top in c.tops.items():
+            near = newton(b, top.x, top.frequency)
+            assert near is not None
+            found = climb(b, model.row(at[0]), near, top.frequency, power=2.0)
+            assert found.found
+            tops[at] = top._replace(frequency=found.frequency, x=found.x)
+        curves.append(replace(c, answer=replace(c.answer, balance=b), tops=tops))
     return replace(solution, curves=curves)
 
 
@@ -219,7 +226,7 @@ def test_peak_of_a_changed_balance(
     curve, peak = next(
         (curve, one) for curve in solution.curves for one in curve.peaks["right"] if one.number == 2
     )
-    x, f = curve.answer.x[peak.sample], float(curve.frequency[peak.sample])
+    x, f = curve.tops["right", 2].x, curve.tops["right", 2].frequency
 
     def top(scale: float) -> np.ndarray:
         b = changed(curve.answer.balance, scale)

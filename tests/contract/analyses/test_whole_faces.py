@@ -186,7 +186,6 @@ def test_balance_and_sweeps_agree_where_nodes_slip_and_open() -> None:
             {"balance.method": "balance", "want": ["response", "hysteresis"]},
             "want: hysteresis of whole faces",
         ),
-        ({"balance.time_march": ["440 Hz"]}, "marched at every frequency"),
         ({"contact.model": "springs", "contact.fit": 0.5}, "is for whole faces"),
         ({"contact.fit": 1.5}, "is no fit of the faces"),
     ],

@@ -52,7 +52,7 @@ def test_levels_are_springs_of_every_stiffness_then_finer_faces(
     name: str, nodes: list[int]
 ) -> None:
     both = {"contact.stiffness": ["thesis", "own"]}
-    scene = load_scene(name, both | {"balance.time_march": ["330 Hz"]})
+    scene = load_scene(name, both)
     usual = whole_faces_points(scene)
     assert [p.label for p in usual[2:]] == USUAL[name]
     points = whole_faces_points(scene, ASKED[name])

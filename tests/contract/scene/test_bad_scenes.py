@@ -140,7 +140,6 @@ CONTRADICTORY: dict[str, tuple[dict[str, str], ...]] = {
         {"damper.centrifugal": '"0 N"'},
         {"mesh.symmetry": '"quarter"'},
         {"balance.samples": "8", "balance.harmonics": "7"},
-        {"balance.time_march": '["900 Hz"]'},
         {"performance.lowest": "2000.0"},
         {"contact.stiffness": '["none"]'},
         {"stiffness.own.run": '"runs/none"'},

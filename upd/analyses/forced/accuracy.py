@@ -11,7 +11,17 @@ from dataclasses import replace
 
 from upd.analyses.base import chosen_by_accuracy, refuse_oversize
 from upd.analyses.forced.estimates import estimate
-from upd.analyses.forced.levels import HARMONICS, MESH, MODES, POINTS, RECIPE, SAMPLES, graded
+from upd.analyses.forced.levels import (
+    HARMONICS,
+    MESH,
+    MODES,
+    POINTS,
+    RECIPE,
+    SAMPLES,
+    graded,
+    lines_named,
+    with_gauss,
+)
 from upd.analyses.forced.plan import ForcedPlan, make_plan, time_steps
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution
@@ -20,7 +30,7 @@ from upd.hbm.fourier import harmonics, sample_count
 from upd.progress import Stages
 from upd.results import Estimates, Result
 from upd.scene import ForcedScene
-from upd.scene.forced_contact import GAUSS, SIDES, FaceLines
+from upd.scene.forced_contact import GAUSS
 from upd.vary.variation import SolvedVariation
 from upd.vary.wanted import LevelChoice, Wanted, plan_wanted, solve_wanted
 
@@ -73,11 +83,10 @@ def _raisable(scene: ForcedScene) -> bool:
     """Whether Gauss points can stand for the scene's: not for lines that it names, nor for the
     points of a contact law.
     """
-    lines = [one for side in SIDES for one in scene.contact.lines(side)]
     return (
         scene.contact.rule != GAUSS
         and scene.contact.share == "area"
-        and all(one == "all" or isinstance(one, int) for one in lines)
+        and not lines_named(scene.contact)
         and all(one.points != "law" for one in scene.stiffnesses.values())
     )
 
@@ -91,15 +100,7 @@ def _with_mesh(scene: ForcedScene, level: int) -> ForcedScene:
 def _with_points(scene: ForcedScene, level: int) -> ForcedScene:
     if level == 0:
         return scene
-    contact = replace(
-        scene.contact,
-        rule=GAUSS,
-        rows=_GAUSS[level - 1],
-        columns=_COLUMNS,
-        left=FaceLines(),
-        right=FaceLines(),
-    )
-    return replace(scene, contact=contact)
+    return replace(scene, contact=with_gauss(scene.contact, _GAUSS[level - 1], _COLUMNS))
 
 
 def _with_modes(scene: ForcedScene, count: int) -> ForcedScene:

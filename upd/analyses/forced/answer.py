@@ -85,8 +85,8 @@ def _rank_of(entry: Entry, slipping: set[tuple[Any, Any]]) -> tuple[bool, float]
 
 def answer(results: Sequence[Entry]) -> list[AnswerTable]:
     """Static state, peaks, the best damper, what the answer depends on most."""
-    told = [one for one in results if one["value"] is not None]
-    tables = [_static(told), _peaks(told, results), _best(told), _inputs(told)]
+    known = [one for one in results if one["value"] is not None]
+    tables = [_static(known), _peaks(known, results), _best(known), _inputs(known)]
     return [table for table in tables if table is not None]
 
 
@@ -207,7 +207,7 @@ def _is(entry: Entry, quantity: Quantity) -> bool:
 
 
 def _key(entry: Entry) -> tuple[Any, ...]:
-    """What tells a peak apart from others."""
+    """What distinguishes a peak from others."""
     fields = _fields(entry)
     return tuple(fields.get(n) for n in ("stiffness", "kind", "force_ratio", "mode", "choice"))
 
@@ -288,11 +288,11 @@ def _inputs(results: Sequence[Entry]) -> AnswerTable | None:
     rows: list[tuple[str, ...]] = [
         (
             name,
-            " or ".join(dict.fromkeys(end for end, *_ in told)),
-            _span(told, q.FREQUENCY_CHANGE, 1),
-            _span(told, q.ACCELERANCE_CHANGE, 0),
+            " or ".join(dict.fromkeys(end for end, *_ in changes)),
+            _span(changes, q.FREQUENCY_CHANGE, 1),
+            _span(changes, q.ACCELERANCE_CHANGE, 0),
         )
-        for name, told in ranked[:_INPUTS]
+        for name, changes in ranked[:_INPUTS]
     ]
     rows += list(_numerical(results))
     others = ", ".join(name for name, _ in ranked[_INPUTS:])
@@ -303,12 +303,12 @@ def _inputs(results: Sequence[Entry]) -> AnswerTable | None:
     return AnswerTable("What the answer depends on most", heads, tuple(rows), note)
 
 
-def _weight(told: Sequence[_Change]) -> float:
-    return max(abs(value) / _WEIGHTS[quantity] for _, quantity, value in told)
+def _weight(found: Sequence[_Change]) -> float:
+    return max(abs(value) / _WEIGHTS[quantity] for _, quantity, value in found)
 
 
-def _span(told: Sequence[_Change], quantity: Quantity, digits: int) -> str:
-    values = [value for _, of, value in told if of == quantity]
+def _span(found: Sequence[_Change], quantity: Quantity, digits: int) -> str:
+    values = [value for _, of, value in found if of == quantity]
     if not values:
         return ""
     low, high = min(values), max(values)

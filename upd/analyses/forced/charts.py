@@ -31,7 +31,7 @@ SHARES = ("stick", "slip", "lift-off")
 STICK_SHARE, SLIP_SHARE = 0, 1
 PER_N = "(m/s²)/N"
 HZ_AXIS = Axis("frequency", "Hz")
-SHEET: dict[str, Any] = {"columns": 2, "size": (6.4, 4.4)}
+_HEIGHT = Axis("accelerance", PER_N, log=True)
 #: name, unit, scale, first degree of freedom and names of the damper's motions
 MOTIONS = (
     ("translation", "µm", 1e3, 0, ("x, across the blades", "y, along the damper", "z, radial")),
@@ -39,6 +39,14 @@ MOTIONS = (
 )
 #: ticks of a path that turns back
 PATH_TICKS = 6
+
+
+Axes = tuple[Axis, Axis]
+
+
+def _sheet(figure: str, title: str, axes: Axes, **parts: Any) -> Chart:
+    """A chart on a sheet of the run folder."""
+    return Chart(title, *axes, figure=figure, columns=2, size=(6.4, 4.4), **parts)
 
 
 @dataclass(frozen=True)
@@ -68,15 +76,14 @@ class ChartedCurve:
         """Whether a contact point slips or lifts off anywhere on it."""
         return bool(self.data("state")[..., STICK_SHARE].min() < 1.0)
 
-    @property
-    def told(self) -> tuple[str, float | None]:
-        """Stiffness and F_C/F_E."""
-        return self.case.stiffness, self.case.force_ratio
+    def sheet(self, figure: str, title: str, axes: Axes, **parts: Any) -> Chart:
+        """A chart of the curve on a sheet of the run folder."""
+        return _sheet(figure, title, axes, **({"case": self.case.label} | parts))
 
 
 @dataclass(frozen=True)
 class ChartedPeak:
-    """A peak of a curve: its number and its place on the path, its mode where it is told."""
+    """A peak of a curve: its number, its place on the path, its mode where it is known."""
 
     curve: ChartedCurve
     number: int
@@ -89,6 +96,11 @@ class ChartedPeak:
         given = self.curve.case.given() | {"peak": self.number, "mode": self.mode}
         return replace(Case(**given), choice="")
 
+    def sheet(self, figure: str, title: str, axes: Axes, **parts: Any) -> Chart:
+        """A chart of the peak on a sheet of the run folder."""
+        given = {"case": self.case.label, "detail": self.detail} | parts
+        return _sheet(figure, title, axes, **given)
+
     def moves(self, points: Group, side: int) -> bool:
         """Whether a contact point of a face slips or lifts off."""
         stick = self.curve.data("state")[self.index, :, STICK_SHARE]
@@ -96,7 +108,7 @@ class ChartedPeak:
 
     @property
     def detail(self) -> str:
-        """Where it lies, and the sweep that tells it where that is no balance."""
+        """Where it lies, and the sweep that found it where that is no balance."""
         words = [f"{self.curve.frequency[self.index]:.1f} Hz"]
         if self.curve.case.choice:
             words = ["time integration", self.curve.case.choice, *words]
@@ -106,8 +118,8 @@ class ChartedPeak:
 def charted_peaks(curve: ChartedCurve) -> list[ChartedPeak]:
     """The peaks of a curve."""
     numbers, index = curve.data("peak"), curve.data("peak_index")
-    told = str(curve.group["peak"].attributes.get("modes", ""))
-    modes = told.split(", ") if told else [""] * len(numbers)
+    words = str(curve.group["peak"].attributes.get("modes", ""))
+    modes = words.split(", ") if words else [""] * len(numbers)
     return [
         ChartedPeak(curve, int(number), int(i), mode)
         for number, i, mode in zip(numbers, index, modes, strict=True)
@@ -137,8 +149,9 @@ def shares_chart(curve: ChartedCurve, k: int) -> Chart:
         Area(state, x, top[:, j] - share[:, j], top[:, j], j, state)
         for j, state in enumerate(SHARES)
     )
-    y, case = Axis("share of the cycle", "%", low=0.0, high=100.0), f"{curve.case}, {SIDES[k]} face"
-    return Chart("Contact state", axis, y, areas=areas, case=case, figure="contact_state", **SHEET)
+    axes = axis, Axis("share of the cycle", "%", low=0.0, high=100.0)
+    case = f"{curve.case}, {SIDES[k]} face"
+    return curve.sheet("contact_state", "Contact state", axes, areas=areas, case=case)
 
 
 def contact_map(at: ChartedPeak, points: Group, k: int) -> Chart:
@@ -154,15 +167,7 @@ def contact_map(at: ChartedPeak, points: Group, k: int) -> Chart:
     pies = Pies(y, up, at.curve.data("state")[at.index][on], size, SHARES, "friction loss")
     axes = (Axis("along the damper y", "mm"), Axis("up the slope", "mm"))
     case = f"{at.case}, {SIDES[k]} face"
-    return Chart(
-        "Contact points at the peak",
-        *axes,
-        pies=(pies,),
-        case=case,
-        figure="contact_map",
-        detail=at.detail,
-        **SHEET,
-    )
+    return at.sheet("contact_map", "Contact points at the peak", axes, pies=(pies,), case=case)
 
 
 def loops_chart(at: ChartedPeak) -> Chart:
@@ -180,15 +185,7 @@ def loops_chart(at: ChartedPeak) -> Chart:
         )
         traces.append(Trace(label, UM * d, T, "line", len(traces)))
     axes = (Axis("sliding displacement", "µm"), Axis("friction force", "N"))
-    return Chart(
-        "Hysteresis",
-        *axes,
-        tuple(traces),
-        case=at.case.label,
-        figure="hysteresis",
-        detail=at.detail,
-        **SHEET,
-    )
+    return at.sheet("hysteresis", "Hysteresis", axes, traces=tuple(traces))
 
 
 def loss_chart(curves: Sequence[ChartedCurve]) -> Chart:
@@ -202,47 +199,29 @@ def loss_chart(curves: Sequence[ChartedCurve]) -> Chart:
 
 def motion_chart(curve: ChartedCurve, kind: int) -> Chart:
     """The damper's degrees of freedom over frequency: amplitudes of the first harmonic."""
-    name, unit, scale, first, names = MOTIONS[kind]
-    amplitude = scale * curve.data("damper_amplitude")[:, first : first + 3]
-    # Motions that symmetry forbids are rounding.
-    shown = [
-        k
-        for k in range(3)
-        if amplitude[:, k].max() > np.sqrt(np.finfo(float).eps) * amplitude.max()
-    ]
-    traces = tuple(Trace(names[k], curve.frequency, amplitude[:, k], "line", k) for k in shown)
-    y = Axis(f"{name}, first harmonic", unit)
-    return Chart(
-        f"Damper motion: {name}",
-        HZ_AXIS,
-        y,
-        traces,
-        case=curve.case.label,
-        figure="damper_motion",
-        **SHEET,
-    )
+    name, unit, scale, first, _ = MOTIONS[kind]
+    amplitude = scale * curve.data("damper_amplitude")[:, first : first + 3].T
+    axes = HZ_AXIS, Axis(f"{name}, first harmonic", unit)
+    traces = _motions(kind, curve.frequency, amplitude, amplitude.max(axis=1))
+    return curve.sheet("damper_motion", f"Damper motion: {name}", axes, traces=traces)
 
 
 def turn_chart(at: ChartedPeak, kind: int) -> Chart:
     """The damper's degrees of freedom over a period at a peak, about their means."""
-    name, unit, scale, first, names = MOTIONS[kind]
+    name, unit, scale, first, _ = MOTIONS[kind]
     motion = scale * at.curve.data("damper_motion")[at.index, first : first + 3]
     motion = motion - motion.mean(axis=1, keepdims=True)
-    size = np.abs(motion).max(axis=1)
-    # Motions that symmetry forbids are rounding.
-    shown = np.flatnonzero(size > np.sqrt(np.finfo(float).eps) * size.max())
     turn = np.arange(1, motion.shape[1] + 1) / motion.shape[1]
-    traces = tuple(Trace(names[k], turn, motion[k], "line", int(k)) for k in shown)
-    return Chart(
-        f"Damper motion over a period: {name}",
-        Axis("time in periods", low=0.0, high=1.0),
-        Axis(f"{name} about its mean", unit),
-        traces,
-        case=at.case.label,
-        figure="damper_period",
-        detail=at.detail,
-        **SHEET,
-    )
+    axes = Axis("time in periods", low=0.0, high=1.0), Axis(f"{name} about its mean", unit)
+    traces = _motions(kind, turn, motion, np.abs(motion).max(axis=1))
+    title = f"Damper motion over a period: {name}"
+    return at.sheet("damper_period", title, axes, traces=traces)
+
+
+def _motions(kind: int, x: Array, values: Array, size: Array) -> tuple[Trace, ...]:
+    """Three motions of one kind; those that symmetry forbids are rounding."""
+    shown = np.flatnonzero(size > np.sqrt(np.finfo(float).eps) * size.max())
+    return tuple(Trace(MOTIONS[kind][-1][k], x, values[k], "line", int(k)) for k in shown)
 
 
 _STAR = 5
@@ -281,10 +260,9 @@ def _chart(group: Group) -> Chart:
         best, least = (float(group[f"best_{name}"].data) for name in ("ratio", "accelerance"))
         label = f"best, F_C/F_E {best:.3g}"
         traces.append(Trace(label, np.array([best]), np.array([least]), "star", _STAR))
-    axis = Axis("F_C/F_E", log=True)
+    axes = Axis("F_C/F_E", log=True), Axis("peak accelerance", PER_N, log=True)
     case = f"stiffness {group.attributes['stiffness']}"
-    y = Axis("peak accelerance", PER_N, log=True)
-    return Chart("Performance", axis, y, tuple(traces), case=case, figure="performance", **SHEET)
+    return _sheet("performance", "Performance", axes, traces=tuple(traces), case=case)
 
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
@@ -295,13 +273,15 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     groups, others = with_content(arrays, FRICTION), with_content(arrays, MARCHED)
     swept = with_content(arrays, SWEEP)
     ratios = list(dict.fromkeys(g.attributes["force_ratio"] for g in [*groups, *swept, *others]))
-    curves, marched = (
+    curves, recorded = (
         [ChartedCurve(g, case_of(g), ratios.index(g.attributes["force_ratio"])) for g in some]
         for some in (groups, others)
     )
     # the page opens on the lowest F_C/F_E on which something slips
-    shown, shown_marched = (sorted(some, key=_rank) for some in (curves, marched))
-    peaks = [one for c in (*shown, *shown_marched) if "peak" in c.group for one in charted_peaks(c)]
+    shown, shown_recorded = (sorted(some, key=_rank) for some in (curves, recorded))
+    peaks = [
+        one for c in (*shown, *shown_recorded) if "peak" in c.group for one in charted_peaks(c)
+    ]
     moving = [c for c in shown if c.moves] or shown[:1]
     sliding = [
         one for one in peaks if one.curve.data("state")[one.index, :, SLIP_SHARE].max() > 0.0
@@ -351,7 +331,7 @@ def _responses(
     arrays: Arrays, curves: Sequence[ChartedCurve], colours: Mapping[float | None, int]
 ) -> list[Chart]:
     """Both blades for every stiffness: free, stuck, every curve with friction, measured peaks."""
-    out = []
+    out, bands = [], tuple(_measured(arrays))
     for linear in with_content(arrays, LINEAR):
         name = str(linear.attributes["stiffness"])
         f = frequency_of(linear)
@@ -371,21 +351,9 @@ def _responses(
                 *(one for group in sweeps for one in _sweep(group, blade, colours)),
             ]
             marks = [one for c in mine for one in _marks(c, blade)]
-            out.append(
-                Chart(
-                    "Frequency response",
-                    x,
-                    Axis("accelerance", PER_N, log=True),
-                    tuple(traces),
-                    (),
-                    f"{blade} blade, stiffness {name}",
-                    "response",
-                    marks=tuple(marks),
-                    bands=tuple(_measured(arrays)),
-                    detail=detail,
-                    **SHEET,
-                )
-            )
+            parts = {"traces": tuple(traces), "marks": tuple(marks), "detail": detail}
+            parts |= {"bands": bands, "case": f"{blade} blade, stiffness {name}"}
+            out.append(_sheet("response", "Frequency response", (x, _HEIGHT), **parts))
     return out
 
 
@@ -410,7 +378,7 @@ def _curve(curve: ChartedCurve, blade: str) -> Iterator[Trace]:
     H, f = magnitude(curve.group[f"accelerance_{blade}"]), curve.frequency
     if not H.max() > 0.0:
         return
-    label = _words(curve.case)
+    label = Case(force_ratio=curve.case.force_ratio).label
     stable = np.ones(len(f), bool)
     if "stable" in curve.group:
         stable = curve.data("stable") > 0
@@ -463,18 +431,12 @@ def _more_harmonics(arrays: Arrays, curves: Sequence[ChartedCurve]) -> list[Char
                 trace = Trace(label, frequency_of(group), magnitude(group[name]), "line", colour)
                 at = (str(case.stiffness), blade, name.removeprefix(begins))
                 found.setdefault(at, []).append(trace)
-    return [
-        Chart(
-            f"Frequency response, harmonic {k}",
-            Axis("frequency of the first harmonic", "Hz"),
-            Axis("accelerance", PER_N, log=True),
-            tuple(traces),
-            case=f"{blade} blade, stiffness {name}",
-            figure="response_harmonics",
-            **SHEET,
-        )
-        for (name, blade, k), traces in found.items()
-    ]
+    axes, parts = (Axis("frequency of the first harmonic", "Hz"), _HEIGHT), []
+    for (name, blade, k), traces in found.items():
+        given = {"traces": tuple(traces), "case": f"{blade} blade, stiffness {name}"}
+        title = f"Frequency response, harmonic {k}"
+        parts.append(_sheet("response_harmonics", title, axes, **given))
+    return parts
 
 
 def _sweep(group: Group, blade: str, colours: Mapping[float | None, int]) -> Iterator[Trace]:
@@ -484,8 +446,3 @@ def _sweep(group: Group, blade: str, colours: Mapping[float | None, int]) -> Ite
         label = Case(force_ratio=case.force_ratio, choice=case.choice).label
         style: Style = "crosses" if f[-1] < f[0] else "points"
         yield Trace(label, f, H, style, colours.get(case.force_ratio, 0))
-
-
-def _words(case: Case) -> str:
-    """A curve within its stiffness."""
-    return Case(force_ratio=case.force_ratio, reversed=case.reversed).label

@@ -6,18 +6,20 @@ Each recomputes what it checks from unprocessed quantities, so that it can fail.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, SweptCurve, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
-from upd.analyses.forced.levels import HARMONICS, SAMPLES, PeakLevel
+from upd.analyses.forced.levels import HARMONICS, SAMPLES
 from upd.analyses.forced.model import Model
+from upd.analyses.forced.peaks_again import PeaksAgain
 from upd.analyses.forced.performance import Performance
-from upd.analyses.forced.solution import ForcedSolution, MarchedPeak, TimeMarch
+from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import BALANCE, StaticState
 from upd.analyses.forced.sweeps import TOLERANCE
 from upd.analyses.measured import fit_checks
@@ -25,33 +27,151 @@ from upd.hbm.adaptive import TRUNCATION
 from upd.results import Case, Check
 from upd.scene.forced_contact import SIDES
 
-#: what may be left of the equations, over what they are made of: the corrections of Newton's method
-#: end at 1e-6 of the unknowns, and what they leave is of their square
-_RESIDUAL = 1e-6
-#: what the samples of a period may lose of its energy: slips are weighted with the mean of the
-#: forces at the ends of a step, so that it closes with the square of the step
-_ENERGY = 1e-2
-#: motion of the faces by blades' harmonics left out before a warning
-_LEFT_OUT = 10.0 * TRUNCATION
 #: largest step of a path at a peak, in half-power widths: of one mode two points or more then lie
 #: within them, and the highest is at most 1 - 1/sqrt(1 + 1/4), 11 %, below the peak between them
 WIDEST_STEP = 0.5
 #: largest imbalance of work and losses over a cycle, and of static forces on the damper: far above
 #: the solver's tolerance
 _BALANCE = 1e-6
-#: difference of a time integration from harmonic balance, at a frequency that a scene names
-_MARCH = 5e-3
-#: largest change of a reported height by more harmonics, and by twice the samples; of a reported
-#: height by time integration from its own motion. A tenth is what an engineer can use.
-_HARMONICS, _SAMPLES, _INTEGRATED = 0.1, 0.01, 0.05
 CONFIRMED = "confirmed by time integration"
-#: what the steps of a sweep may lose of a period's energy, which they damp where the damper
-#: rattles, see `upd.hbm.interface_march`: ten times what a settled motion may still change
-_SWEEP_ENERGY = 10.0 * TOLERANCE
-#: difference of the sum of the nodes' losses from that of the sweep: the rounding of its steps
-_NODES = 1e-9
-#: a curve that stopped early or misses a check is kept: none ends the run
-_warning = partial(Check, fatal=False)
+
+
+class _Rule(NamedTuple):
+    """Limit of a check, what its value is, and the remedy, a template."""
+
+    limit: float
+    says: str
+    remedy: str = "report this scene"
+
+
+_AT_REST = _Rule(BALANCE, "|static contact forces - F_C| / F_C, moments by their arms")
+_PERIOD = "|work - damping - friction| / their sum, of a period"
+_PATH = "curves that stopped early, or points that are not periodic"
+_CONFIRMED = "|time integration from the peak's own motion / harmonic balance - 1|"
+_RULES = {
+    "static balance": _AT_REST,
+    "preloaded contact": _Rule(
+        0,
+        "faces without preload, or whose friction is mobilised everywhere",
+        "{what} before vibration, so that the response depends on how the damper came to rest and "
+        "does not tend to the stuck one: upd design shows whether this damper hangs or jams; set "
+        'contact.static = "frictionless", or N and T of both faces',
+    ),
+    "path stopped": _Rule(
+        0,
+        _PATH,
+        "{message}, so that peaks beyond are missing: fewer contact points, another "
+        "balance.slider or a lower start may go further",
+    ),
+    "path periodic": _Rule(
+        0,
+        _PATH,
+        "at {count} points the contact forces do not come back to their start, so that they are no "
+        'steady state: balance.slider = "mid", or contact.directions = "one"',
+    ),
+    "residual of points": _Rule(
+        _BALANCE,
+        "misfit of contact motion and force at the worst point, evaluated again, relative",
+        "that point is off by about this share, beside a contact that changes its state: read the "
+        "curve there from its neighbours",
+    ),
+    # corrections of Newton's method end at 1e-6 of the unknowns, and their square remains
+    "residual of nodes": _Rule(
+        1e-6, "misfit of blades' forces, slips and damper's motion of a period, relative"
+    ),
+    "energy of points": _Rule(_BALANCE, "|work - viscous loss - friction| / work"),
+    # slips are weighted with the mean of the forces at the ends of a step: of the step's square
+    "energy of nodes": _Rule(1e-2, _PERIOD, "take more samples: balance.samples"),
+    "damper at rest": _Rule(_BALANCE, "|mean contact forces - F_C| / F_C"),
+    "truncation": _Rule(
+        10.0 * TRUNCATION,
+        "motion of the faces by blades' harmonics above {highest}, relative",
+        "take more: balance.harmonics = {more}",
+    ),
+    "frequency step": _Rule(
+        WIDEST_STEP,
+        "largest step at a peak over its half-power width",
+        "peak {number} at {frequency:.4g} Hz lies between points too far apart for its height; "
+        "take more: excitation.points = {more}",
+    ),
+    # a tenth of a height is what an engineer can use
+    "more harmonics": _Rule(
+        0.1,
+        "largest change of a peak's height with {level}",
+        "the peak needs more: balance.harmonics = {harmonics}",
+    ),
+    "twice the samples": _Rule(
+        0.01,
+        "largest change of a peak's height with {level}",
+        "the peak needs more: balance.samples = {samples}",
+    ),
+    "top not reached": _Rule(
+        0.05,
+        "the top of a peak that was not reached",
+        "of peak {number} of the {blade} blade near {frequency:.5g} Hz only a point is known, its "
+        "top was not reached: take more excitation.points",
+    ),
+    "confirmed": _Rule(
+        0.05,
+        _CONFIRMED,
+        "peak {number} of the {blade} blade at {frequency:.5g} Hz is not confirmed (it gives "
+        "{integrated:.4g}), so that a test may not show it: take more balance.harmonics, or sweep "
+        'as a test does: balance.method = "march"',
+    ),
+    "none stable": _Rule(
+        0.05,
+        _CONFIRMED,
+        "peak {number} of the {blade} blade at {frequency:.5g} Hz is not confirmed (no motion near "
+        "it is stable), so that a test may not show it: take more balance.harmonics, or sweep as a "
+        'test does: balance.method = "march"',
+    ),
+    "performance complete": _Rule(
+        0,
+        "of {count} curves that ended early",
+        "the curves at F_C/F_E {at} ended early, so that a higher peak may be missing: raise "
+        "performance.lowest",
+    ),
+    "sweep complete": _Rule(0, "sweeps that stopped early", "{message}. What was found is kept"),
+    "sweep settled": _Rule(
+        0,
+        "of {count} frequencies that did not settle",
+        "{lost} of {count} frequencies did not settle: their amplitudes are those of the last "
+        "period",
+    ),
+    # steps damp where the damper rattles, see `upd.hbm.interface_march`: ten times what a settled
+    # motion may still change
+    "sweep energy": _Rule(
+        10.0 * TOLERANCE,
+        _PERIOD,
+        "the damper rattles on its faces faster than the steps resolve, which damps it: take more "
+        "balance.samples",
+    ),
+    # the rounding of a sweep's steps
+    "loss by nodes": _Rule(
+        1e-9,
+        "|sum over nodes - friction| / work and losses, at {frequency:.5g} Hz",
+        "a step has two answers there: take more steps (balance.samples)",
+    ),
+}
+#: rules that are one check under another name
+_NAMES = {
+    "path stopped": "path complete",
+    "path periodic": "path complete",
+    "residual of points": "balance residual",
+    "residual of nodes": "balance residual",
+    "energy of points": "energy balance",
+    "energy of nodes": "energy balance",
+    "top not reached": CONFIRMED,
+    "confirmed": CONFIRMED,
+    "none stable": CONFIRMED,
+}
+
+
+def _check(rule: str, case: Case, value: float, **words: Any) -> Check:
+    """A check by its rule; none ends the run: a curve that stopped early is kept."""
+    limit, says, remedy = _RULES[rule]
+    says, remedy = says.format(**words), remedy.format(**words)
+    return Check(_NAMES.get(rule, rule), case, value, limit, says, remedy, fatal=False)
 
 
 def check_solution(solution: ForcedSolution) -> list[Check]:
@@ -60,326 +180,146 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
     scene = solution.plan.scene
     least = scene.damper.centrifugal / max(scene.excitation.centrifugal_to_force, default=np.inf)
     for name, model in solution.models.items():
-        checks += _model_checks(name, model, least)
+        if model.state is not None:
+            case = Case(stiffness=name, choice=model.state.name)
+            mu = float(model.contacts.law.mu.max(initial=0.0))
+            checks.append(_check("static balance", case, measures.static_error(model)))
+            checks.append(_preloaded(case, model.state, mu, least))
     for name, faces in solution.faces.items():
-        checks.append(_faces_balance(name, faces))
-        checks.append(_preloaded(name, faces.state, faces_mu(faces), least))
+        case = Case(stiffness=name, choice=faces.state.name)
+        mu = float(faces.march.friction.max(initial=0.0))
+        checks.append(_check("static balance", case, _off_balance(faces)))
+        checks.append(_preloaded(case, faces.state, mu, least))
     for curve in solution.curves:
         checks.append(_path(curve))
         if not curve.empty:
-            checks += _curve_checks(solution, curve)
+            levels = solution.levels.get(curve.stiffness, [])
+            checks += _curve_checks(curve, solution.models[curve.stiffness], levels)
     for path in solution.balanced:
-        read = excitation_of(solution.plan.scene.excitation).lowest
+        read = excitation_of(scene.excitation).lowest
         checks.append(_path(path))
         if not path.empty:
-            checks += check_faces_curve(path, solution.plan.scene.excitation.points, read)
-    checks += [_march(solution, march) for march in solution.marches]
+            checks += check_faces_curve(path, scene.excitation.points, read)
     for one in solution.sweeps:
         checks += _sweep_checks(one)
-    checks += [_loss_by_nodes(one) for one in solution.marched]
-    checks += [_complete(name, one) for name, one in solution.performances.items()]
-    checks += fit_checks(solution.plan.scene.measured)
-    limits = solution.plan.scene.left_out
-    return checks + [one.check(limits) for one in solution.omissions]
-
-
-def faces_mu(faces: WholeFaces) -> float:
-    """Friction of whole faces."""
-    return float(faces.march.friction.max(initial=0.0))
-
-
-def _model_checks(name: str, model: Model, least: float) -> list[Check]:
-    """Static forces of the points in balance, and away from the limits of contact."""
-    if model.state is None:
-        return []
-    mu = float(model.contacts.law.mu.max(initial=0.0))
-    return [
-        _warning(
-            "static balance",
-            Case(stiffness=name, choice=model.state.name),
-            measures.static_error(model),
-            BALANCE,
-            "|static contact forces - F_C| / F_C, moments by their arms",
-            "report this scene",
-        ),
-        _preloaded(name, model.state, mu, least),
+    checks += [
+        _check("loss by nodes", one.case, one.off, frequency=one.frequency)
+        for one in solution.marched
     ]
+    checks += [_complete(name, one) for name, one in solution.performances.items()]
+    checks += fit_checks(scene.measured)
+    return checks + [one.check(scene.left_out) for one in solution.omissions]
 
 
-def _preloaded(name: str, state: StaticState, mu: float, least: float) -> Check:
-    """A face that carries nothing, or whose friction is all mobilised, before vibration: what is
-    left of it is below the least F_E of the run, in N.
+def _preloaded(case: Case, state: StaticState, mu: float, least: float) -> Check:
+    """A face that carries nothing, or whose friction is all mobilised, before vibration: the rest
+    is below the least F_E of the run, in N.
 
     A stiff unilateral spring without preload, or a slider at its limit, has no amplitude scale: the
     response then does not tend to the stuck one as F_C/F_E grows, and motions are not unique.
     """
-    empty = " and the ".join(state.empty)
-    left = (mu * state.N - np.abs(state.T))[state.N > 0.0]
-    mobilised = mu > 0.0 and bool((left < least).any())
-    worst = 1.0 if state.empty or mobilised else 0.0
-    what = (
-        f"the {empty} face carries nothing before vibration"
-        if state.empty
-        else "every point of a face carries mu N before vibration"
-    )
-    remedy = (
-        f"{what}, so that the response depends on how the damper came to rest and does not tend to "
-        "the stuck one: upd design tells whether this damper hangs or jams; set contact.static = "
-        '"frictionless", or N and T of both faces'
-    )
-    return _warning(
-        "preloaded contact",
-        Case(stiffness=name, choice=state.name),
-        worst,
-        0,
-        "faces without preload, or whose friction is mobilised everywhere",
-        remedy,
-    )
+    rest = (mu * state.N - np.abs(state.T))[state.N > 0.0]
+    mobilised = mu > 0.0 and bool((rest < least).any())
+    what = "every point of a face carries mu N"
+    if state.empty:
+        what = f"the {' and the '.join(state.empty)} face carries nothing"
+    return _check("preloaded contact", case, float(bool(state.empty) or mobilised), what=what)
 
 
 def _path(curve: ForcedCurve | FacesCurve) -> Check:
+    if curve.stopped:
+        return _check("path stopped", curve.case, 1.0, message=curve.answer.message)
     astray = 0
     if isinstance(curve, ForcedCurve):
         astray = int((~curve.answer.periodic).sum())
-    if curve.stopped:
-        remedy = (
-            f"{curve.answer.message}, so that peaks beyond are missing: fewer contact points, "
-            "another balance.slider or a lower start may go further"
-        )
-    else:
-        remedy = (
-            f"at {astray} points the contact forces do not come back to their start, so that "
-            'they are no steady state: balance.slider = "mid", or contact.directions = "one"'
-        )
-    return _warning(
-        "path complete",
-        curve.case,
-        float(curve.stopped) or float(astray),
-        0,
-        "curves that stopped early, or points that are not periodic",
-        remedy,
-    )
+    return _check("path periodic", curve.case, float(astray), count=astray)
 
 
-def _curve_checks(solution: ForcedSolution, curve: ForcedCurve) -> list[Check]:
+def _curve_checks(
+    curve: ForcedCurve, model: Model, levels: Sequence[PeaksAgain]
+) -> Iterator[Check]:
     answer, case = curve.answer, curve.case
-    balance = float(np.abs(answer.energy_balance).max())
-    rest = measures.rest_error(answer, solution.models[curve.stiffness])
-    levels = solution.levels.get(curve.stiffness, [])
-    return [
-        _warning(
-            "balance residual",
-            case,
-            measures.residual_error(answer),
-            _BALANCE,
-            "misfit of contact motion and force at the worst point, evaluated again, relative",
-            "that point is off by about this share, beside a contact that changes its state: read "
-            "the curve there from its neighbours",
-        ),
-        _warning(
-            "energy balance",
-            case,
-            balance,
-            _BALANCE,
-            "|work - viscous loss - friction| / work",
-            "report this scene",
-        ),
-        _warning(
-            "damper at rest",
-            case,
-            rest,
-            _BALANCE,
-            "|mean contact forces - F_C| / F_C",
-            "report this scene",
-        ),
-        *_by_level(curve, levels),
-        *_integrated(curve),
-    ]
+    yield _check("residual of points", case, measures.residual_error(answer))
+    yield _check("energy of points", case, float(np.abs(answer.energy_balance).max()))
+    yield _check("damper at rest", case, measures.rest_error(answer, model))
+    yield from _by_level(curve, levels)
+    yield from _integrated(curve)
 
 
-def _by_level(curve: ForcedCurve, levels: list[PeakLevel]) -> list[Check]:
+def _by_level(curve: ForcedCurve, levels: Sequence[PeaksAgain]) -> Iterator[Check]:
     """Reported heights with more harmonics and with twice the samples."""
-    highest = curve.answer.harmonics.highest
-    bisected = {(c.blade, c.number) for c in curve.checked if c.stays and not c.at_top}
-    out = []
-    for source, name, limit, remedy in (
-        (
-            HARMONICS,
-            "more harmonics",
-            _HARMONICS,
-            f"the peak needs more: balance.harmonics = {highest + 4}",
-        ),
-        (
-            SAMPLES,
-            "twice the samples",
-            _SAMPLES,
-            f"the peak needs more: balance.samples = {2 * curve.answer.balance.samples}",
-        ),
-    ):
-        mine = [one for one in levels if one.source == source]
-        # the farthest level is the judge; a height by time integration holds all harmonics
-        last = mine[-1] if mine else None
+    more = {
+        "harmonics": curve.answer.harmonics.highest + 4,
+        "samples": 2 * curve.answer.balance.samples,
+    }
+    for source, rule in ((HARMONICS, "more harmonics"), (SAMPLES, "twice the samples")):
+        # the farthest level is the judge
+        last = next((one for one in reversed(levels) if one.of.source == source), None)
         changes = []
         for key, top in curve.tops.items():
-            if last is None or not top.slips or key in bisected:
+            # a height by time integration holds all harmonics
+            if last is None or not top.slips or curve.stayed(*key) is not None:
                 continue
             found = last.peaks.get((curve.ratio, *key))
             if found is not None:
                 change = abs(found.height / top.height - 1.0)
                 changes.append(change if math.isfinite(change) else math.inf)
-        if changes:
-            says = f"largest change of a peak's height with {last.label}" if last else ""
-            out.append(_warning(name, curve.case, max(changes), limit, says, remedy))
-    return out
+        if last is not None and changes:
+            yield _check(rule, curve.case, max(changes), level=last.of.label, **more)
 
 
-def _integrated(curve: ForcedCurve) -> list[Check]:
-    """Reported peaks from which time integration leaves, or that no climb reached."""
+def _integrated(curve: ForcedCurve) -> Iterator[Check]:
+    """Reported peaks that no climb reached, or the one that time integration confirms worst."""
     for side in SIDES:
         for peak in curve.peaks.get(side, ()):
             if (side, peak.number) not in curve.tops:
-                remedy = (
-                    f"of peak {peak.number} of the {side} blade near {peak.frequency:.5g} Hz only "
-                    "a point is known, its top was not reached: take more excitation.points"
-                )
-                says = "the top of a peak that was not reached"
+                where = {"number": peak.number, "blade": side, "frequency": peak.frequency}
                 case = replace(curve.case, mode=peak.mode)
-                return [_warning(CONFIRMED, case, math.inf, _INTEGRATED, says, remedy)]
-    if not curve.checked:
-        return []
-    worst = max(curve.checked, key=lambda one: one.difference)
-    goes = "no motion near it stays" if not worst.stays else f"it gives {worst.integrated:.4g}"
-    remedy = (
-        f"peak {worst.number} of the {worst.blade} blade at {worst.frequency:.5g} Hz is not "
-        f"confirmed ({goes}), so that a test may not show it: take more balance.harmonics, or "
-        'sweep as a test does: balance.method = "march"'
-    )
-    return [
-        _warning(
-            CONFIRMED,
-            replace(curve.case, mode=worst.mode),
-            worst.difference,
-            _INTEGRATED,
-            "|time integration from the peak's own motion / harmonic balance - 1|",
-            remedy,
-        )
-    ]
+                yield _check("top not reached", case, math.inf, **where)
+                return
+    if curve.checked:
+        worst = max(curve.checked, key=lambda one: one.difference)
+        rule = "confirmed" if worst.stays else "none stable"
+        yield _check(rule, replace(curve.case, mode=worst.mode), worst.difference, **vars(worst))
 
 
 def _complete(name: str, found: Performance) -> Check:
     lost = [one.ratio for one in found.points if not one.arrived]
-    at = ", ".join(f"{one:.3g}" for one in lost)
-    remedy = (
-        f"the curves at F_C/F_E {at} ended early, so that a higher peak may be missing: raise "
-        "performance.lowest"
-    )
-    return _warning(
-        "performance complete",
-        Case(stiffness=name, name="performance"),
-        float(len(lost)),
-        0,
-        f"of {len(found.points)} curves that ended early",
-        remedy,
-    )
+    case, at = Case(stiffness=name, name="performance"), ", ".join(f"{one:.3g}" for one in lost)
+    return _check("performance complete", case, float(len(lost)), count=len(found.points), at=at)
 
 
-def _march(solution: ForcedSolution, march: TimeMarch) -> Check:
-    case = replace(march.curve.case, frequency=march.frequency)
-    if not march.verifies:
-        return _warning(
-            "time march",
-            case,
-            1.0,
-            0,
-            "time integrations that found no period to compare with",
-            f"{march.steady.message}: it verifies nothing; choose another frequency",
-        )
-    marched = march.accelerance(solution.models[march.curve.stiffness])
-    remedy = (
-        f"{march.steady.message}; take more harmonics (balance.harmonics), or points that stay "
-        "stuck remember another slider start"
-    )
-    return _warning(
-        "time march",
-        case,
-        abs(marched / march.height - 1.0),
-        _MARCH,
-        "|time integration / harmonic balance - 1|",
-        remedy,
-    )
-
-
-def _faces_balance(name: str, faces: WholeFaces) -> Check:
-    """Forces of all nodes at rest against F_C, turns by their arms."""
+def _off_balance(faces: WholeFaces) -> float:
+    """Forces of all nodes at rest against F_C, relative to it, turns by their arms."""
     march = faces.march
     off = march.columns.T @ faces.start.f - march.load
     turns = np.array(faces.of.kept) >= 3
     arm = float(np.abs(march.columns[: march.n, turns]).max(initial=1.0))
     size = float(np.abs(march.load).max())
-    return _warning(
-        "static balance",
-        Case(stiffness=name, choice=faces.state.name),
-        float(np.abs(off / np.where(turns, arm, 1.0)).max() / size),
-        BALANCE,
-        "|static contact forces - F_C| / F_C, moments by their arms",
-        "report this scene",
-    )
+    return float(np.abs(off / np.where(turns, arm, 1.0)).max() / size)
 
 
-def _sweep_checks(one: SweptCurve) -> list[Check]:
+def _open_energy(energy: np.ndarray[Any, np.dtype[np.float64]]) -> Any:
+    """(n,) what is missing of work (n, 0) and losses (n, 1:) of periods, over their sum."""
+    work = np.abs(energy).sum(axis=1)
+    return np.abs(energy[:, 0] - energy[:, 1:].sum(axis=1)) / np.where(work > 0.0, work, 1.0)
+
+
+def _sweep_checks(one: SweptCurve) -> Iterator[Check]:
     """A sweep that came to its end, whose motions settled, and whose energy closes."""
-    found = one.found
-    work = np.abs(found.energy).sum(axis=1)
-    off = np.abs(found.energy[:, 0] - found.energy[:, 1:].sum(axis=1))[found.settled]
-    loss = off / np.where(work > 0.0, work, 1.0)[found.settled]
-    lost = int((~found.settled).sum())
-    return [
-        _warning(
-            "sweep complete",
-            one.case,
-            float(found.status == "stopped"),
-            0,
-            "sweeps that stopped early",
-            f"{found.message}. What was found is kept",
-        ),
-        _warning(
-            "sweep settled",
-            one.case,
-            float(lost),
-            0,
-            f"of {len(found.settled)} frequencies that did not settle",
-            f"{lost} of {len(found.settled)} frequencies did not settle: their amplitudes are "
-            "those of the last period",
-        ),
-        _warning(
-            "sweep energy",
-            one.case,
-            float(loss.max(initial=0.0)),
-            _SWEEP_ENERGY,
-            "|work - damping - friction| / their sum, of a period",
-            "the damper rattles on its faces faster than the steps resolve, which damps it: take "
-            "more balance.samples",
-        ),
-    ]
-
-
-def _loss_by_nodes(one: MarchedPeak) -> Check:
-    """The losses of all nodes are that of the sweep where the period was read."""
-    return _warning(
-        "loss by nodes",
-        one.case,
-        one.off,
-        _NODES,
-        f"|sum over nodes - friction| / work and losses, at {one.frequency:.5g} Hz",
-        "a step has two answers there: take more steps (balance.samples)",
-    )
+    found, count = one.found, len(one.found.settled)
+    lost, loss = int((~found.settled).sum()), _open_energy(found.energy)[found.settled]
+    stopped = float(found.status == "stopped")
+    yield _check("sweep complete", one.case, stopped, message=found.message)
+    yield _check("sweep settled", one.case, float(lost), lost=lost, count=count)
+    yield _check("sweep energy", one.case, float(loss.max(initial=0.0)))
 
 
 # -- whole faces by harmonic balance ---------------------------------------------------------------
 
 
-def check_faces_curve(curve: FacesCurve, points: int, harmonic: int) -> list[Check]:
-    """What is left of the equations and of a period's energy, harmonics left out, steps at peaks.
+def check_faces_curve(curve: FacesCurve, points: int, harmonic: int) -> Iterator[Check]:
+    """What remains of the equations and of a period's energy, harmonics left out, steps at peaks.
 
     Parameters
     ----------
@@ -388,65 +328,24 @@ def check_faces_curve(curve: FacesCurve, points: int, harmonic: int) -> list[Che
     harmonic
         That is read.
     """
-    answer, case = curve.answer, curve.case
-    work = np.abs(answer.energy).sum(axis=1)
-    off = np.abs(answer.energy[:, 0] - answer.energy[:, 1:].sum(axis=1))
-    loss = off / np.where(work > 0.0, work, 1.0)
-    residual = [one.residual for one in answer.points]
-    left_out = [one.unresolved for one in answer.points]
-    highest = answer.equations.highest
-    return [
-        _warning(
-            "balance residual",
-            case,
-            float(max(residual)),
-            _RESIDUAL,
-            "misfit of blades' forces, slips and damper's motion of a period, relative",
-            "report this scene",
-        ),
-        _warning(
-            "energy balance",
-            case,
-            float(loss.max()),
-            _ENERGY,
-            "|work - damping - friction| / their sum, of a period",
-            "take more samples: balance.samples",
-        ),
-        _warning(
-            "truncation",
-            case,
-            float(max(left_out)),
-            _LEFT_OUT,
-            f"motion of the faces by blades' harmonics above {highest}, relative",
-            f"take more: balance.harmonics = {highest + 2}",
-        ),
-        *_step(curve, points, harmonic),
-    ]
-
-
-def _step(curve: FacesCurve, points: int, harmonic: int) -> list[Check]:
-    """The steps beside the right blade's peaks against their widths."""
+    answer, case, highest = curve.answer, curve.case, curve.answer.equations.highest
+    residual = max(one.residual for one in answer.points)
+    truncated = max(one.unresolved for one in answer.points)
+    yield _check("residual of nodes", case, float(residual))
+    yield _check("energy of nodes", case, float(_open_energy(answer.energy).max()))
+    yield _check("truncation", case, float(truncated), highest=highest, more=highest + 2)
+    # the steps beside the right blade's peaks against their widths
     f, steps = curve.frequency, {}
     for peak in curve.peaks["right"]:
         beside = np.diff(f[max(peak.sample - 1, 0) : peak.sample + 2])
         # one that a jump ends lies on its point
-        if len(beside) == 2 and not {peak.sample - 1, peak.sample} & set(curve.answer.jumps):
+        if len(beside) == 2 and not {peak.sample - 1, peak.sample} & set(answer.jumps):
             steps[peak] = float(beside.max()) / half_power_width(curve, peak.sample, harmonic)
-    if not steps:
-        return []
-    widest = max(steps, key=lambda peak: steps[peak])
-    more = math.ceil((points - 1) * steps[widest] / WIDEST_STEP) + 1
-    return [
-        _warning(
-            "frequency step",
-            curve.case,
-            steps[widest],
-            WIDEST_STEP,
-            "largest step at a peak over its half-power width",
-            f"peak {widest.number} at {widest.frequency:.4g} Hz lies between points too far apart "
-            f"for its height; take more: excitation.points = {more}",
-        )
-    ]
+    if steps:
+        widest = max(steps, key=lambda peak: steps[peak])
+        more = math.ceil((points - 1) * steps[widest] / WIDEST_STEP) + 1
+        where = {"number": widest.number, "frequency": widest.frequency, "more": more}
+        yield _check("frequency step", case, steps[widest], **where)
 
 
 def half_power_width(curve: FacesCurve, i: int, harmonic: int) -> float:

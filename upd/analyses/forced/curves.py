@@ -89,6 +89,13 @@ class FrictionCurve:
         """Whether not one point was found."""
         return not len(self.frequency)
 
+    @property
+    def where(self) -> str:
+        """How far a curve that stopped came, in words."""
+        if self.empty:
+            return "the path found no point"
+        return f"the path stopped at {self.frequency.max():.4g} Hz"
+
 
 class Top(NamedTuple):
     """The very top of a peak on the path by harmonic balance, between its points.
@@ -135,6 +142,9 @@ class TimeCheck:
         which leaves; 0 at the top.
     starts
         Time integrations.
+    way, share
+        Direction along the path from the top to it, 1 or -1; its height over that of the top, by
+        harmonic balance. 0 and 1 at the top.
     """
 
     blade: Side
@@ -147,6 +157,8 @@ class TimeCheck:
     step: float = 0.0
     apart: float = 0.0
     starts: int = 0
+    way: int = 0
+    share: float = 1.0
 
     @property
     def stays(self) -> bool:
@@ -235,13 +247,6 @@ class ForcedCurve(FrictionCurve):
         return not self.answer.arrived
 
     @property
-    def where(self) -> str:
-        """How far a path that stopped came, in words."""
-        if self.empty:
-            return "the path found no point"
-        return f"the path stopped at {self.answer.frequency.max():.4g} Hz"
-
-    @property
     def rising(self) -> NDArray[np.bool_]:
         """(n,) whether the frequency rises along the path: between two folds, where it falls, the
         motion is unstable.
@@ -323,12 +328,10 @@ class FacesCurve(FrictionCurve):
     @property
     def where(self) -> str:
         """How far it came, in words."""
-        if self.empty:
-            return "the path found no point"
-        if self.answer.arrived:
-            at = ", ".join(f"{f:.4g}" for f in self.answer.missed)
-            return f"the path has no motion at {at} Hz"
-        return f"the path stopped at {self.answer.frequency[-1]:.4g} Hz"
+        if self.empty or not self.answer.arrived:
+            return super().where
+        at = ", ".join(f"{f:.4g}" for f in self.answer.missed)
+        return f"the path has no motion at {at} Hz"
 
 
 #: ways along which a curve is swept

@@ -14,24 +14,18 @@ L. Eca, M. Hoekstra, J. Comput. Phys. 262 (2014) 104: the range of data as the s
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 
 from upd.analyses.forced.curves import TimeCheck
-from upd.analyses.forced.levels import (
-    HARMONICS,
-    MESH,
-    MODES,
-    POINTS,
-    SAMPLES,
-    TIME,
-    PeakLevel,
+from upd.analyses.forced.levels import HARMONICS, MESH, MODES, POINTS, SAMPLES, TIME
+from upd.analyses.forced.peaks_again import (
+    STUCK_MODE,
+    PeaksAgain,
     Place,
-    at_place,
-    linear_numbers,
+    limit_peaks,
+    stuck_places,
 )
-from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.solution import ForcedSolution
 from upd.progress import Stages
 from upd.results import Case, ErrorPart, Estimates, Result
@@ -40,6 +34,7 @@ from upd.results.quantities import quantity_of
 from upd.results.quantity import Quantity
 from upd.scene.forced_contact import SIDES, Side
 from upd.vary.orders import observed_order, two_level_error
+from upd.vary.variation import Variation
 
 Key = tuple[str, Case]
 #: factor of safety of three levels that show an order
@@ -68,11 +63,13 @@ def estimate(solution: ForcedSolution, numbers: Sequence[Result], stages: Stages
     del stages
     out: dict[Key, tuple[ErrorPart, ...]] = {}
     for name, levels in solution.levels.items():
-        out |= _linear_numbers(solution, name, levels)
-        for curve in (c for c in solution.curves if c.stiffness == name):
-            for side in SIDES:
-                for peak in curve.peaks[side]:
-                    out |= _of_peak(solution, levels, curve.case, curve.ratio, side, peak)
+        for place, case, own, check in _own(solution, name):
+            out |= _of_peak(levels, place, case, own, check)
+        for (_, _, number), found in stuck_places(solution.linear[name].modes).items():
+            stuck = q.STUCK_IN_PHASE if number == 1 else q.STUCK_OUT_OF_PHASE
+            key = stuck.name, Case(stiffness=name)
+            if math.isfinite(found.frequency):
+                out[key] = _parts(levels, (STUCK_MODE, "right", number), 0, found.frequency)
     wanted = {(one.name, one.case): one for one in numbers if not one.withheld}
     for side in SIDES:
         out |= _reductions(wanted, out, side)
@@ -82,60 +79,40 @@ def estimate(solution: ForcedSolution, numbers: Sequence[Result], stages: Stages
     return {key: parts for key, parts in out.items() if parts}
 
 
-def _linear_numbers(
-    solution: ForcedSolution, name: str, levels: Sequence[PeakLevel]
-) -> dict[Key, tuple[ErrorPart, ...]]:
-    """Peaks of both limits, and the stuck frequencies."""
-    out: dict[Key, tuple[ErrorPart, ...]] = {}
-    linear, peaks = solution.linear[name], solution.searched[name]
+def _own(
+    solution: ForcedSolution, name: str
+) -> Iterator[tuple[Place, Case, tuple[float, float], TimeCheck | None]]:
+    """Place, case, frequency and height of every peak that levels are compared with, and what time
+    integration makes of it.
+    """
+    peaks = solution.searched[name]
     for kind in ("free", "stuck"):
         for side in SIDES:
-            own = sorted(getattr(linear, f"{kind}_peaks")[side], key=lambda p: p.frequency)
-            told = solution.stuck_peaks(name, side) if kind == "stuck" else []
-            modes = {one.number: one.mode for one in told}
-            for number, peak in zip(linear_numbers(peaks, kind, side), own, strict=False):
-                case = Case(stiffness=name, kind=kind, mode=modes.get(number, ""))
-                mine = peak._replace(number=number)
-                out |= _of_peak(solution, levels, case, kind, side, mine)
-    for k, stuck in enumerate((q.STUCK_IN_PHASE, q.STUCK_OUT_OF_PHASE)):
-        in_phase = stuck == q.STUCK_IN_PHASE
-        own_f = [m.frequency for m in linear.modes if m.axis == "x" and m.in_phase == in_phase]
-        if own_f:
-            parts = _parts(levels, partial(_stuck_ratio, k, own_f[0]))
-            out[stuck.name, Case(stiffness=name)] = parts
-    return out
-
-
-def _stuck_ratio(k: int, own: float, level: PeakLevel) -> float:
-    return level.stuck[k] / own
-
-
-def _peak_ratio(place: Place, k: int, own: float, level: PeakLevel) -> float:
-    return level.peaks[place][k] / own
+            for peak in limit_peaks(peaks, kind, side):
+                case = Case(stiffness=name, kind=kind, mode=peak.mode)
+                yield (kind, side, peak.number), case, (peak.frequency, peak.height), None
+    for curve in (c for c in solution.curves if c.stiffness == name):
+        for side in SIDES:
+            for peak in curve.peaks[side]:
+                mine = [c for c in curve.checked if (c.blade, c.number) == (side, peak.number)]
+                case = replace(curve.case, mode=peak.mode)
+                own = curve.compared(side, peak.number) or (peak.frequency, peak.height)
+                yield (curve.ratio, side, peak.number), case, own, next(iter(mine), None)
 
 
 def _of_peak(
-    solution: ForcedSolution,
-    levels: Sequence[PeakLevel],
+    levels: Sequence[PeaksAgain],
+    place: Place,
     case: Case,
-    at: float | str,
-    side: Side,
-    peak: CurvePeak,
+    own: tuple[float, float],
+    check: TimeCheck | None,
 ) -> dict[Key, tuple[ErrorPart, ...]]:
     """Errors of a peak's frequency and height."""
-    place: Place = (at, side, peak.number)
-    case = replace(case, mode=peak.mode or case.mode)
-    own = peak.frequency, peak.height
-    check = None
-    if not isinstance(at, str):
-        curve = next(c for c in solution.curves if c.case == replace(case, mode=""))
-        own = curve.compared(side, peak.number) or own
-        mine = [one for one in curve.checked if (one.blade, one.number) == (side, peak.number)]
-        check = mine[0] if mine else None
+    _, side, number = place
     out: dict[Key, tuple[ErrorPart, ...]] = {}
     mesh = 0.0
     for k, quantity in enumerate((q.PEAK_FREQUENCY, q.PEAK_ACCELERANCE)):
-        parts = list(_parts(levels, partial(_peak_ratio, place, k, own[k]), place))
+        parts = list(_parts(levels, place, k, own[k]))
         # of a height that the meshes show by chance: no better known than its frequency
         known = [one.error for one in parts if one.source == MESH and one.known]
         parts = [
@@ -147,7 +124,7 @@ def _of_peak(
         mesh = max(known, default=0.0)
         if check is not None:
             parts = _with_time(parts, check, quantity)
-        out[quantity.on(side).named(peak.number), case] = tuple(parts)
+        out[quantity.on(side).named(number), case] = tuple(parts)
     return out
 
 
@@ -165,35 +142,26 @@ def _with_time(parts: Sequence[ErrorPart], check: TimeCheck, of: Quantity) -> li
     return [*kept, ErrorPart(TIME, error, why)]
 
 
-def _parts(
-    levels: Sequence[PeakLevel], ratio: Callable[[PeakLevel], float], place: Place | None = None
-) -> tuple[ErrorPart, ...]:
+def _parts(levels: Sequence[PeaksAgain], place: Place, k: int, own: float) -> tuple[ErrorPart, ...]:
     """Parts of one number's error.
 
     Parameters
     ----------
-    ratio
-        Level -> the number there over that of the run.
-    place
-        Where the number is, for peaks.
+    place, k
+        Of its peak; 0 its frequency, 1 its height.
+    own
+        The number of the run.
     """
     out = []
     for source in (MESH, MODES, POINTS, HARMONICS, SAMPLES):
-        mine = [one for one in levels if one.source == source]
-        if place is not None and source in (HARMONICS, SAMPLES):
-            mine = [one for one, _ in at_place(levels, source, place)]
-        elif place is None:
-            mine = [one for one in mine if source not in (HARMONICS, SAMPLES)]
-        if place is not None and place[0] == "free":
-            mine = [one for one in mine if source != POINTS]
-        if not mine:
+        mine = [one for one in levels if one.of.source == source]
+        if source in (HARMONICS, SAMPLES):
+            # solved where something slips
+            mine = [one for one in mine if place in one.peaks]
+        if not mine or (source == POINTS and place[0] == "free"):
             continue
-        found = [
-            (one, ratio(one))
-            for one in mine
-            if (one.peaks or not one.why) and (place is None or place in one.peaks)
-        ]
-        good = [(one, r) for one, r in found if math.isfinite(r)]
+        ratios = [(one.of, one.peaks[place][k] / own) for one in mine if place in one.peaks]
+        good = [(of, ratio) for of, ratio in ratios if math.isfinite(ratio)]
         seconds = math.fsum(one.seconds for one in mine)
         if not good:
             why = next((one.why for one in mine if one.why), "not found on the level")
@@ -204,7 +172,7 @@ def _parts(
     return tuple(out)
 
 
-def bound(source: str, found: Sequence[tuple[PeakLevel, float]]) -> tuple[float, str]:
+def bound(source: str, found: Sequence[tuple[Variation, float]]) -> tuple[float, str]:
     """Bound of a number's relative error from its other levels, and how it was found.
 
     Parameters
@@ -219,7 +187,7 @@ def bound(source: str, found: Sequence[tuple[PeakLevel, float]]) -> tuple[float,
         error, words = _of_meshes(found)
         return error, f"against {names}: {words}"
     if source == SAMPLES:
-        # the rule is of second order: a quarter of the change is left
+        # the rule is of second order: a quarter of the change remains
         return spread / (1.0 - 0.25), f"change with {names}, order 2"
     if source == MODES:
         return spread, f"change from {names}: what more modes change is less"
@@ -229,21 +197,18 @@ def bound(source: str, found: Sequence[tuple[PeakLevel, float]]) -> tuple[float,
     return _SAFETY * spread, f"range with {names}, factor {_SAFETY:g}"
 
 
-def _of_meshes(found: Sequence[tuple[PeakLevel, float]]) -> tuple[float, str]:
+def _of_meshes(found: Sequence[tuple[Variation, float]]) -> tuple[float, str]:
     """Richardson's error of the run from coarser meshes; their range where they show no order."""
-    near = sorted(found, key=lambda one: one[0].size)
-    ratios = [1.0, *(r for _, r in near[:2])]
+    near = sorted(found, key=lambda one: one[0].size)[:2]
+    ratios, size = [1.0, *(r for _, r in near)], near[0][0].size
+    error = _SAFETY * two_level_error(ratios[1], 1.0, size, _ORDER)
     if len(near) < 2:
-        return _SAFETY * two_level_error(ratios[1], 1.0, near[0][0].size, _ORDER), (
-            f"order {_ORDER:.2g} of re-entrant edges, two levels, factor {_SAFETY:g}"
-        )
-    shown = observed_order([1.0, *(one.size for one, _ in near[:2])], ratios)
+        return error, f"order {_ORDER:.2g} of re-entrant edges, two levels, factor {_SAFETY:g}"
+    shown = observed_order([1.0, *(one.size for one, _ in near)], ratios)
     if not shown >= _LEAST:
         return _SAFETY * (max(ratios) - min(ratios)), f"range, in no order, factor {_SAFETY:g}"
-    error = _SAFETY * two_level_error(ratios[1], 1.0, near[0][0].size, _ORDER)
-    return error, (
-        f"order {shown:.1f}, taken as {_ORDER:.2g} of re-entrant edges, factor {_SAFETY:g}"
-    )
+    words = f"order {shown:.1f}, taken as {_ORDER:.2g} of re-entrant edges, factor {_SAFETY:g}"
+    return error, words
 
 
 def _reductions(
@@ -253,15 +218,15 @@ def _reductions(
     (h / free) / (1 - h / free).
     """
     out, height = {}, q.PEAK_ACCELERANCE.on(side)
-    peaks = [one for one in wanted.values() if quantity_of(one.name)[0] == height]
+    heights = [one for one in wanted.values() if quantity_of(one.name)[0] == height]
     for key, one in wanted.items():
         if one.name != q.REDUCTION.on(side).name or not one.value:
             continue
-        mine = [peak for peak in peaks if replace(peak.case, mode="") == one.case]
-        of_free = Case(stiffness=one.case.stiffness, kind="free")
-        free = [peak for peak in peaks if peak.case == of_free]
-        if mine and free:
-            both = (max(found, key=lambda r: r.value) for found in (mine, free))
+        free_case = Case(stiffness=one.case.stiffness, kind="free")
+        own = [h for h in heights if replace(h.case, mode="") == one.case]
+        free = [h for h in heights if h.case == free_case]
+        if own and free:
+            both = (max(some, key=lambda r: r.value) for some in (own, free))
             out[key] = _reduction(one, *(parts.get((r.name, r.case), ()) for r in both))
     return out
 
@@ -303,15 +268,15 @@ def _of_best(
         return (ErrorPart("points of the curve", error, "the next F_C/F_E on either side"),)
     of = q.PEAK_FREQUENCY if quantity == q.BEST_FREQUENCY else q.PEAK_ACCELERANCE
     mine = {
-        key: told
-        for key, told in parts.items()
+        key: found
+        for key, found in parts.items()
         if quantity_of(key[0])[0] in (of, of.on("left"))
         and key[1].stiffness == name
         and key[1].force_ratio is not None
     }
     if not mine:
         return ()
-    worst = max(mine.values(), key=lambda told: math.fsum(p.error for p in told if p.known))
+    worst = max(mine.values(), key=lambda found: math.fsum(p.error for p in found if p.known))
     out = [replace(p, basis=f"as of the run's peaks: {p.basis}") for p in worst]
     again, top = performance.again, best.worst
     if again is not None and top is not None:

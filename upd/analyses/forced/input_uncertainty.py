@@ -25,7 +25,6 @@ from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import StaticState, static_state
 from upd.analyses.seated.bodies import Bodies
 from upd.errors import ConvergenceError, UpdError, one_line
-from upd.hbm import climb
 from upd.hbm.parameter_change import ParameterChange
 from upd.hbm.peak_sensitivity import peak_derivatives
 from upd.hbm.starts import newton
@@ -40,12 +39,10 @@ from upd.vary.inputs import InputChange, InputEnds
 log = logging.getLogger(__name__)
 #: peaks of a curve, of both blades
 _PEAKS = 4.0
-#: timed on the ready scenes: Newton steps of a peak climbed to and differentiated (15 symmetric, 22
+#: timed on the ready scenes: Newton steps of a peak that is differentiated (15 symmetric, 22
 #: asymmetric), and seconds of a seating at one end of an interval
 _CLIMB, _SEATING_S = 20.0, 0.2
 Key = tuple[str, Case]
-#: relative distance from a curve's peak within which the one climbed to is the same
-SAME = 5e-3
 PEAK = "implicit derivative of the balance at the peak"
 LINEAR = "derivative of the linear answer"
 RAYLEIGH = "Rayleigh's quotient of the stuck mode"
@@ -156,10 +153,10 @@ def _linear_peaks(
     for side in SIDES if linear is not None else ():
         assert linear is not None
         if kind == "free":
-            told = unmoved(linear.free_peaks[side])
+            found = unmoved(linear.free_peaks[side])
         else:
-            told = solution.stuck_peaks(name, side)
-        for peak in told:
+            found = solution.stuck_peaks(name, side)
+        for peak in found:
             yield side, peak
 
 
@@ -185,7 +182,7 @@ def _of_curve(
         highest: PeakChange | None = None
         for peak in curve.peaks[side]:
             try:
-                change = _followed(solution, curve, data, side, peak)
+                change = _at_top(solution, curve, data, side, peak)
             except UpdError as error:
                 log.info("%s, peak %d: no derivative: %s", curve.case, peak.number, one_line(error))
                 continue
@@ -203,36 +200,33 @@ def _of_curve(
             yield (name, curve.case), left / value * (free[side].height - highest.height), PEAK
 
 
-def _followed(
+def _at_top(
     solution: ForcedSolution,
     curve: ForcedCurve,
     data: Sequence[DataChange],
     side: Side,
     peak: CurvePeak,
 ) -> PeakChange:
-    """The derivatives of a peak of a curve, per newton of F_E.
+    """The derivatives of a peak of a curve, per newton of F_E: those of its top, also where this is
+    unstable and the peak is the highest stable motion beside it.
 
     Raises
     ------
     ConvergenceError
-        Where no such peak is found from its point of the path.
+        Where its top is not known.
     """
-    model, answer = solution.models[curve.stiffness], curve.answer
-    b, row, i = answer.balance, model.row(side), peak.sample
-    k, f = model.excitation.lowest, float(answer.frequency[i])
-    x: Array | None = answer.x[i]
-    if answer.highest_harmonic[i] < answer.harmonics.highest:
-        x = newton(b, answer.x[i], f)
-    top = None if x is None else climb(b, row, x, f, harmonic=k, power=2.0)
-    if top is None or not top.found or abs(top.frequency / peak.frequency - 1.0) > SAME:
-        raise ConvergenceError(f"the peak at {peak.frequency:.6g} Hz was not found again")
+    model, b = solution.models[curve.stiffness], curve.answer.balance
+    top, row, k = curve.tops.get((side, peak.number)), model.row(side), model.excitation.lowest
+    x = None if top is None else newton(b, top.x, top.frequency)
+    if top is None or x is None:
+        raise ConvergenceError(f"the top of the peak at {peak.frequency:.6g} Hz was not found")
     place = solution.plan.scene.excitation.centrifugal_to_force.index(curve.ratio)
     forces = np.array([one.forces[place] for one in data])
     changes = [
         one.whole(model) + ParameterChange(dynamic=each * b.dynamic)
         for one, each in zip(data, forces, strict=True)
     ]
-    found = peak_derivatives(b, row, top.x, top.frequency, changes, harmonic=k, power=2.0)
+    found = peak_derivatives(b, row, x, top.frequency, changes, harmonic=k, power=2.0)
     return PeakChange(
         found.by_frequency / found.frequency,
         found.by_height / found.height - forces,

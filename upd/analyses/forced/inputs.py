@@ -8,23 +8,30 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from upd.analyses.forced.curves import ForcedCurve, Top
-from upd.analyses.forced.measures import CurvePeak, stuck_modes
-from upd.analyses.forced.mode_peaks import CANDIDATES
+from upd.analyses.forced.curves import Top
 from upd.analyses.forced.model import Model, preloaded
 from upd.analyses.forced.paths import balance_of
-from upd.analyses.forced.peaks_again import FoundPeaks, RunPeak, found_again, moved
+from upd.analyses.forced.peaks_again import (
+    NOT_FOUND,
+    FoundPeaks,
+    PeaksAgain,
+    RunPeak,
+    Variant,
+    found_again,
+    moved,
+)
 from upd.analyses.forced.statics import StaticState, state_of_ratio
-from upd.errors import InputError, UpdError, one_line
+from upd.errors import InputError, one_line
 from upd.linalg.parallel import threads_for
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import SIDES, Side
+from upd.vary.variation import Variation
 
 log = logging.getLogger(__name__)
 #: factors on stiffnesses, the height of the patch, friction, damping
@@ -35,22 +42,8 @@ _MOBILISED = (-0.5, 0.5)
 FEW_HARMONICS = 3
 
 
-class Changed(NamedTuple):
-    """One end of an input.
-
-    Attributes
-    ----------
-    label
-        The value in words.
-    model
-        With it.
-    changes
-        Of the balance, as `respond` takes them.
-    """
-
-    label: str
-    model: Model
-    changes: Mapping[str, Any]
+#: value of an input in words, and the model with it
+Changed = tuple[str, Model]
 
 
 @dataclass(frozen=True)
@@ -82,7 +75,7 @@ def _stiffness(side: Side | None, of: str, plan: FoundPeaks) -> Iterator[Changed
     for factor in _STIFFNESS:
         changed = replace(law, **{of: np.where(on, factor, 1.0) * getattr(law, of)})
         made = replace(model, contacts=replace(model.contacts, law=changed))
-        yield Changed(f"x {factor:g}", made, {})
+        yield f"x {factor:g}", made
 
 
 def _patch(peaks: FoundPeaks) -> Iterator[Changed]:
@@ -95,7 +88,7 @@ def _patch(peaks: FoundPeaks) -> Iterator[Changed]:
     except InputError as error:
         log.info("patch: %s", one_line(error))
         return
-    yield Changed(f"{_PATCH:g} of its height", made, {})
+    yield f"{_PATCH:g} of its height", made
 
 
 def _friction(peaks: FoundPeaks) -> Iterator[Changed]:
@@ -103,7 +96,7 @@ def _friction(peaks: FoundPeaks) -> Iterator[Changed]:
     for factor in _FRICTION:
         mu = factor * law.mu
         made = replace(peaks.model.contacts, law=replace(law, mu=mu))
-        yield Changed(f"mu {float(mu.max()):g}", replace(peaks.model, contacts=made), {})
+        yield f"mu {float(mu.max()):g}", replace(peaks.model, contacts=made)
 
 
 def _static(peaks: FoundPeaks) -> Iterator[Changed]:
@@ -120,7 +113,7 @@ def _static(peaks: FoundPeaks) -> Iterator[Changed]:
         except InputError as error:
             log.info("static state T/N %g: %s", ratio, one_line(error))
             continue
-        yield Changed(f"T/N {ratio:g} on both faces", made, {})
+        yield f"T/N {ratio:g} on both faces", made
 
 
 def _fit(peaks: FoundPeaks) -> Iterator[Changed]:
@@ -136,19 +129,14 @@ def _fit(peaks: FoundPeaks) -> Iterator[Changed]:
         traction=np.zeros_like(model.traction),
         state=None,
     )
-    yield Changed("new, not worn in", made, {})
-
-
-def _start(peaks: FoundPeaks) -> Iterator[Changed]:
-    for start in ("lower", "upper"):
-        yield Changed(start, peaks.model, {"start": start})
+    yield "new, not worn in", made
 
 
 def _damping(peaks: FoundPeaks) -> Iterator[Changed]:
     for factor in _DAMPING:
         model = peaks.model
         made = replace(model, C=factor * model.C, damping=factor * model.damping)
-        yield Changed(f"x {factor:g}", made, {})
+        yield f"x {factor:g}", made
 
 
 class Input(NamedTuple):
@@ -175,109 +163,79 @@ INPUTS = (
     Input("friction", _rubs, _friction),
     Input("static friction before vibration", _rubs, _static),
     Input("fit of the faces", _always, _fit),
-    Input("start of the sliders", _rubs, _start),
     Input("modal damping", _always, _damping),
 )
 
 
-def input_effects(peaks: FoundPeaks, tops: Mapping[CurvePeak, Top], name: str) -> list[InputEffect]:
-    """What one input does to the peaks of the curve with the lowest F_C/F_E.
+def input_variants(few: FoundPeaks) -> list[Variant]:
+    """Both ends of every input that applies."""
+    return [
+        Variant(Variation(one.name, label), model, any_height=True)
+        for one in INPUTS
+        if one.applies(few.plan.scene)
+        for label, model in one.ends(few)
+    ]
+
+
+def effects_of(few: FoundPeaks, found: PeaksAgain) -> list[InputEffect]:
+    """What one end of an input does to the right blade's peaks.
 
     Parameters
     ----------
-    peaks
-        With that curve.
-    tops
-        Its peaks with few harmonics, which the changes are compared with.
-    name
-        Of the input.
+    few
+        Of `few_harmonics`.
+    found
+        The peaks with that end.
     """
-    one = next(x for x in INPUTS if x.name == name)
-    if not one.applies(peaks.plan.scene) or not tops:
-        return []
-    curve, out = min(peaks.curves, key=lambda c: c.ratio), []
-    with threads_for(len(peaks.model.M)):
-        for end in one.ends(peaks):
-            out += list(_effects(peaks, curve, name, end, tops))
+    (curve,) = few.curves
+    out = []
+    for peak in curve.peaks["right"]:
+        again = found.peaks.get((curve.ratio, "right", peak.number), NOT_FOUND)
+        out.append(
+            InputEffect(
+                found.of.source,
+                found.of.label,
+                peak.number,
+                peak.mode,
+                again.frequency / peak.frequency - 1.0,
+                again.height / peak.height - 1.0,
+            )
+        )
     return out
 
 
-def few(peaks: FoundPeaks, highest: int) -> range:
-    """Few harmonics, those excited among them.
-
-    Parameters
-    ----------
-    highest
-        Of the run.
+def few_harmonics(peaks: FoundPeaks) -> FoundPeaks | None:
+    """The curve with the lowest F_C/F_E and its right blade's peaks, with few harmonics; None
+    without peaks.
     """
-    return range(min(max(FEW_HARMONICS, *peaks.model.excitation.harmonics), highest) + 1)
-
-
-def few_harmonics(peaks: FoundPeaks) -> dict[CurvePeak, Top]:
-    """The right blade's peaks of the curve with the lowest F_C/F_E, with few harmonics."""
-    if not peaks.curves:
-        return {}
-    with threads_for(len(peaks.model.M)):
-        return dict(_few_harmonics(peaks, min(peaks.curves, key=lambda c: c.ratio)))
-
-
-def _few_harmonics(peaks: FoundPeaks, curve: ForcedCurve) -> Iterator[tuple[CurvePeak, Top]]:
+    curve = min(peaks.curves, key=lambda c: c.ratio, default=None)
+    if curve is None:
+        return None
     old, model = curve.answer.balance, peaks.model
-    numbers = few(peaks, old.harmonics.highest)
+    numbers = range(min(max(FEW_HARMONICS, *model.excitation.harmonics), old.harmonics.highest) + 1)
     b = balance_of(peaks.plan, model, curve.force, numbers)
-    for peak in curve.peaks["right"]:
-        top = curve.tops.get(("right", peak.number))
-        if top is None:
-            continue
-        x = b.embedded(top.x, old)
-        one = RunPeak(curve, "right", peak.number, top)
-        found = found_again(peaks.plan, model, one, b, x, any_height=True)
-        if math.isfinite(found.height):
-            yield peak, top._replace(frequency=found.frequency, height=found.height, x=x)
-
-
-def _expected(peaks: FoundPeaks, model: Model, number: int, frequency: float) -> float:
-    """Ratio of a peak's frequency with an input to that of the run: the blades are the same, so
-    that the stuck mode tells it, by where the peak lies between it and the free one.
-    """
-    below = CANDIDATES * peaks.plan.scene.excitation.stop
-    own, new = (
-        [m.frequency for m in found if m.axis == "x" and m.in_phase == (number % 2 == 1)]
-        for found in (peaks.linear.modes, stuck_modes(model, below))
-    )
-    free = [p.frequency for side in SIDES for p in peaks.linear.free_peaks[side]]
-    if not (own and new and free) or own[0] == free[0]:
-        return 1.0
-    share = min(max((frequency - free[0]) / (own[0] - free[0]), 0.0), 1.0)
-    return 1.0 + share * (new[0] / own[0] - 1.0)
-
-
-def _effects(
-    peaks: FoundPeaks,
-    curve: ForcedCurve,
-    name: str,
-    end: Changed,
-    tops: Mapping[CurvePeak, Top],
-) -> Iterator[InputEffect]:
-    numbers = few(peaks, curve.answer.balance.harmonics.highest)
-    b = balance_of(peaks.plan, end.model, curve.force, numbers)
-    if "start" in end.changes:
-        b = b.with_sliders(end.changes["start"], b.slider)
-    for peak, top in tops.items():
-        ratio = _expected(peaks, end.model, peak.number, top.frequency)
-        one = RunPeak(curve, "right", peak.number, top)
-        try:
-            f, height = found_again(
-                peaks.plan, end.model, one, b, top.x, ratio, any_height=True, **end.changes
-            )
-        except UpdError as error:
-            log.info("%s, %s: %s", name, end.label, one_line(error))
-            f, height = math.nan, math.nan
-        yield InputEffect(
-            name,
-            end.label,
-            peak.number,
-            peak.mode,
-            f / top.frequency - 1.0,
-            height / top.height - 1.0,
+    tops: dict[tuple[Side, int], Top] = {}
+    with threads_for(len(model.M)):
+        for (side, number), top in curve.tops.items():
+            if side == "right":
+                x, one = b.embedded(top.x, old), RunPeak(curve, side, number, top)
+                found = found_again(peaks, model, one, b, x, any_height=True)
+                if math.isfinite(found.height):
+                    tops[side, number] = top._replace(
+                        frequency=found.frequency, height=found.height, x=x
+                    )
+    right = tuple(
+        peak._replace(
+            frequency=tops["right", peak.number].frequency, height=tops["right", peak.number].height
         )
+        for peak in curve.peaks["right"]
+        if ("right", peak.number) in tops
+    )
+    curve = replace(
+        curve,
+        answer=replace(curve.answer, balance=b),
+        peaks={"left": (), "right": right},
+        tops=tops,
+        checked=(),
+    )
+    return replace(peaks, curves=(curve,)).bare if tops else None

@@ -14,28 +14,32 @@ from scipy.spatial import cKDTree
 
 from upd.analyses.base import Resolved
 from upd.analyses.forced.blade_parts import MIRROR_SIGNS
-from upd.analyses.forced.curves import Top
-from upd.analyses.forced.inputs import few
-from upd.analyses.forced.measures import CurvePeak, StuckMode, tell_modes
+from upd.analyses.forced.measures import StuckMode, tell_modes
 from upd.analyses.forced.model import Array, Model, make_model
-from upd.analyses.forced.paths import balance_of
-from upd.analyses.forced.peaks_again import FoundPeaks, RunPeak, found_again
+from upd.analyses.forced.peaks_again import (
+    NOT_FOUND,
+    FoundPeaks,
+    PeaksAgain,
+    Variant,
+    stuck_frequency,
+)
 from upd.analyses.forced.plan import ALONG, ELASTIC, ForcedPlan
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies
 from upd.fem import Material, mass, rigid_body_modes, stiffness
 from upd.hbm.contact_points import stuck_stiffness
-from upd.hbm.damper import attach
 from upd.linalg import factorise
-from upd.linalg.parallel import threads_for
 from upd.linalg.symmetric import Symmetric
 from upd.mesh import IntArray
 from upd.results import Case
 from upd.scene.forced_contact import SIDES, Side
+from upd.vary.variation import Variation
 
 
-def with_along(solution: ForcedSolution, name: str, laws: Mapping[Side, FaceLaw]) -> Model | None:
+def along_variant(
+    solution: ForcedSolution, name: str, laws: Mapping[Side, FaceLaw]
+) -> Variant | None:
     """The model in which friction resists sliding along the damper too; None where the run has it
     or nothing rubs.
     """
@@ -46,38 +50,40 @@ def with_along(solution: ForcedSolution, name: str, laws: Mapping[Side, FaceLaw]
     contact = replace(scene.contact, directions="two")
     plan = replace(plan, scene=replace(scene, contact=contact), workers=1)
     assert solution.bodies is not None
-    return make_model(plan, solution.bodies, laws, model.state)
+    made = make_model(plan, solution.bodies, laws, model.state)
+    return Variant(Variation(ALONG, "both sliding directions"), made, any_height=True)
 
 
-def along_changes(peaks: FoundPeaks, tops: Mapping[CurvePeak, Top], along: Model) -> list[Resolved]:
-    """Change of the highest peak of the curve with the lowest F_C/F_E, with few harmonics.
+def highest_slipping(few: FoundPeaks) -> FoundPeaks | None:
+    """The highest peak on which a point slips alone; None without one."""
+    (curve,) = few.curves
+    tops = {at: top for at, top in curve.tops.items() if top.slips}
+    if not tops:
+        return None
+    at = max(tops, key=lambda one: tops[one].height)
+    return replace(few, curves=(replace(curve, tops={at: tops[at]}),))
+
+
+def along_changes(few: FoundPeaks, found: PeaksAgain) -> list[Resolved]:
+    """Change of a peak by friction along the damper, with few harmonics.
 
     Parameters
     ----------
-    tops
-        Of that curve, with few harmonics.
+    few
+        Of `highest_slipping`.
+    found
+        The peak with `along_variant`.
     """
-    loose = {peak: top for peak, top in tops.items() if top.slips}
-    if not loose:
-        return []
-    curve = min(peaks.curves, key=lambda c: c.ratio)
-    peak = max(loose, key=lambda one: loose[one].height)
-    top, old = loose[peak], curve.answer.balance
-    numbers = few(peaks, old.harmonics.highest)
-    one, b = (balance_of(peaks.plan, model, curve.force, numbers) for model in (peaks.model, along))
-    W, rest = one.split(top.x)
-    both = np.zeros((W.shape[0], 3, W.shape[2]))
-    # normal, along, up the slope
-    both[:, [0, 2]] = W
-    x = np.concatenate([both.ravel(), rest])
-    with threads_for(len(along.M)):
-        found = found_again(peaks.plan, along, RunPeak(curve, "right", peak.number, top), b, x)
-    case, remedy = replace(curve.case, mode=peak.mode), 'set contact.directions = "two"'
+    (curve,) = few.curves
+    (((side, number), top),) = curve.tops.items()
+    again = found.peaks.get((curve.ratio, side, number), NOT_FOUND)
+    mode = next(one.mode for one in curve.peaks[side] if one.number == number)
+    case, remedy = replace(curve.case, mode=mode), 'set contact.directions = "two"'
     return [
-        Resolved(ALONG, f"peak_{peak.number}_{kind}", case, before, after, unit, remedy)
+        Resolved(ALONG, f"peak_{number}_{kind}", case, before, after, unit, remedy)
         for kind, unit, before, after in (
-            ("accelerance", "(m/s2)/N", top.height, found.height),
-            ("frequency", "Hz", top.frequency, found.frequency),
+            ("accelerance", "(m/s2)/N", top.height, again.height),
+            ("frequency", "Hz", top.frequency, again.frequency),
         )
     ]
 
@@ -89,18 +95,14 @@ def elastic_changes(solution: ForcedSolution, name: str) -> list[Resolved]:
     rigid = solution.linear[name].modes
     elastic = elastic_stuck(solution.plan, solution.bodies, model)
     for in_phase, quantity in ((True, "stuck_in_phase"), (False, "stuck_out_of_phase")):
-        before, after = (
-            next((m.frequency for m in modes if m.axis == "x" and m.in_phase == in_phase), None)
-            for modes in (rigid, elastic)
-        )
-        if before is not None:
+        before, after = (stuck_frequency(modes, in_phase) for modes in (rigid, elastic))
+        if math.isfinite(before):
             remedy = (
                 "the rigid damper is too stiff for these springs, unless they hold its elasticity "
                 "already: compare with a contact analysis of the damper"
             )
-            new = math.nan if after is None else after
             case = Case(stiffness=name)
-            out.append(Resolved(ELASTIC, quantity, case, before, new, "Hz", remedy))
+            out.append(Resolved(ELASTIC, quantity, case, before, after, "Hz", remedy))
     return out
 
 
@@ -125,14 +127,12 @@ def elastic_stuck(plan: ForcedPlan, bodies: Bodies, model: Model) -> list[StuckM
     .. [1] R. R. Craig, A. J. Kurdila, Fundamentals of Structural Dynamics, 2nd ed., 17.5 (inertia
            relief).
     """
-    M, _, K, points = attach(
-        model.M, model.C, model.K, model.contacts, model.damper, model.damper_rows
-    )
-    k = stuck_stiffness(points).ravel()
+    M, _, K, B = model.linear(stuck=False)
+    k = stuck_stiffness(model.contacts).ravel()
     G = elastic_compliance(plan, bodies, model)
     # (k^-1 + G)^-1, also where k = 0
     joint = np.linalg.solve(np.eye(len(k)) + k[:, None] * G, np.diag(k))
-    values, shapes = eigh(K + points.B.T @ joint @ points.B, M)
+    values, shapes = eigh(K + B.T @ joint @ B, M)
     return tell_modes(model, values, shapes, 2.0 * plan.scene.excitation.stop)
 
 

@@ -243,6 +243,39 @@ def _told(frequency: Array, tips: Array, below: float) -> list[StuckMode]:
     ]
 
 
+def _limit(
+    f: Array,
+    harmonic: int,
+    modes: tuple[Array, Array],
+    blades: Sequence[Side],
+    read: Callable[[Side, Array], ComplexArray],
+) -> tuple[dict[Side, ComplexArray], dict[Side, list[CurvePeak]]]:
+    """Accelerance of both blades at frequencies, rising, and its peaks.
+
+    Parameters
+    ----------
+    harmonic
+        That is read: a mode answers where it meets it.
+    modes
+        Their frequencies and half-power widths, Hz.
+    blades
+        Those that move.
+    read
+        Blade and frequencies -> accelerance.
+    """
+    at, width = modes
+    fine = around_modes(at / harmonic, width / harmonic, float(f[0]), float(f[-1]))
+    H = {side: read(side, f) if side in blades else np.zeros(len(f), complex) for side in SIDES}
+    peaks: dict[Side, list[CurvePeak]] = {side: [] for side in SIDES}
+    for side in blades:
+        peaks[side] = exact_peaks(partial(_size, read, side), fine, f)
+    return H, peaks
+
+
+def _size(read: Callable[[Side, Array], ComplexArray], side: Side, f: Array) -> Array:
+    return np.asarray(np.abs(read(side, f)))
+
+
 def linear_curves(
     march: InterfaceModel, frequency: Array, excitation: Excitation, *, stuck: bool
 ) -> tuple[Mapping[Side, ComplexArray], Mapping[Side, list[CurvePeak]]]:
@@ -258,33 +291,15 @@ def linear_curves(
         Every node closed and sticking; else none touches.
     """
     at = stuck_system(march)[0] if stuck else np.sort(march.frequency)
-    width = 2.0 * float(march.damping.max()) * at
-    low, high, k = float(frequency[0]), float(frequency[-1]), excitation.lowest
-    # a mode answers where the harmonic that is read meets it
-    fine = around_modes(at / k, width / k, low, high)
-    curve, moving = partial(_accelerance, march, stuck, excitation), excitation.free_blades
-    rest = np.zeros(len(frequency), complex)
-    return (
-        {s: curve(j, frequency) if stuck or s in moving else rest for j, s in enumerate(SIDES)},
-        {
-            s: exact_peaks(partial(_size, curve, j), fine, frequency)
-            if stuck or s in moving
-            else []
-            for j, s in enumerate(SIDES)
-        },
-    )
+    modes = at, 2.0 * float(march.damping.max()) * at
 
+    def read(side: Side, f: Array) -> ComplexArray:
+        f = excitation.lowest * f
+        moved = march.linear_response(f, excitation.read, stuck=stuck)[:, SIDES.index(side)]
+        return np.asarray(-((2.0 * np.pi * f) ** 2) * 1e-3 * moved)
 
-def _accelerance(
-    march: InterfaceModel, stuck: bool, excitation: Excitation, blade: int, f: Array
-) -> ComplexArray:
-    f = excitation.lowest * f
-    moved = march.linear_response(f, excitation.read, stuck=stuck)[:, blade]
-    return np.asarray(-((2.0 * np.pi * f) ** 2) * 1e-3 * moved)
-
-
-def _size(curve: partial[ComplexArray], k: int, f: Array) -> Array:
-    return np.asarray(np.abs(curve(k, f)))
+    blades = SIDES if stuck else excitation.free_blades
+    return _limit(frequency, excitation.lowest, modes, blades, read)
 
 
 def linear_limits_of(
@@ -297,35 +312,19 @@ def linear_limits_of(
     answer
         Any of the model, with ``force``: its problem counts.
     """
-    f = _frequencies(plan, answer)
-    rows = {side: model.row(side) for side in SIDES}
-    moving = {False: model.excitation.free_blades, True: SIDES}
-    free, stuck = (
-        {
-            side: measures.linear_accelerance(answer, rows[side], force, f, all_stuck)
-            if side in moving[all_stuck]
-            else np.zeros(len(f), complex)
-            for side in SIDES
-        }
-        for all_stuck in (False, True)
-    )
-    free_peaks, stuck_peaks = (
-        {
-            side: linear_peaks(answer, rows[side], force, f, all_stuck)
-            if side in moving[all_stuck]
-            else []
-            for side in SIDES
-        }
-        for all_stuck in (False, True)
-    )
-    modes = measures.stuck_modes(model, CANDIDATES * plan.scene.excitation.stop)
-    return LinearCurves(f, free, stuck, modes, free_peaks, stuck_peaks)
-
-
-def _frequencies(plan: ForcedPlan, answer: measures.Balanced) -> Array:
-    """The sweep's, and finer ones around every free and stuck mode: a drawn curve has its tops."""
     f, k = grid(plan), measures.read_harmonic(answer)
-    for stuck in (False, True):
-        modes, width = linear_modes(answer.balance, stuck)
-        f = finer(f, modes / k, width / k)
-    return f
+    modes = {stuck: linear_modes(answer.balance, stuck) for stuck in (False, True)}
+    # finer around every mode: a drawn curve has its tops
+    for at, width in modes.values():
+        f = finer(f, at / k, width / k)
+
+    def curves(stuck: bool) -> tuple[dict[Side, ComplexArray], dict[Side, list[CurvePeak]]]:
+        def read(side: Side, f: Array) -> ComplexArray:
+            return measures.linear_accelerance(answer, model.row(side), force, f, stuck)
+
+        return _limit(f, k, modes[stuck], SIDES if stuck else model.excitation.free_blades, read)
+
+    free, free_peaks = curves(False)
+    stuck, stuck_peaks = curves(True)
+    below = CANDIDATES * plan.scene.excitation.stop
+    return LinearCurves(f, free, stuck, measures.stuck_modes(model, below), free_peaks, stuck_peaks)

@@ -16,8 +16,6 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.model import Array, ComplexArray, Model
-from upd.hbm.contact_points import stuck_stiffness
-from upd.hbm.damper import attach
 from upd.hbm.parameter_change import ParameterChange
 from upd.hbm.peak_sensitivity import PeakDerivative
 from upd.scene.forced_contact import Side
@@ -55,13 +53,7 @@ class LinearSystem:
 
 def linear_system(model: Model, stuck: bool) -> LinearSystem:
     """Blades and damper without contacts, or with every point closed and sticking."""
-    M, C, K, points = attach(
-        model.M, model.C, model.K, model.contacts, model.damper, model.damper_rows
-    )
-    B = points.B
-    if stuck:
-        K = K + B.T @ (stuck_stiffness(points).ravel()[:, None] * B)
-    return LinearSystem(M, C, K, B, stuck)
+    return LinearSystem(*model.linear(stuck), stuck)
 
 
 def linear_peak(

@@ -14,8 +14,6 @@ from upd.analyses.forced.model import Model
 from upd.dynamics.peaks import find_peaks
 from upd.hbm import FrequencyResponse, Harmonics
 from upd.hbm.balance import Balance
-from upd.hbm.contact_points import stuck_stiffness
-from upd.hbm.damper import attach
 from upd.hbm.fourier import to_complex
 from upd.scene.forced_contact import SIDES, Side
 
@@ -230,12 +228,8 @@ def stuck_shapes(model: Model) -> tuple[Array, Array, Array]:
     M, values, shapes
         (n, n); (n,) squared angular frequencies, rising; (n, n) modes orthonormal in M.
     """
-    M, _, K, points = attach(
-        model.M, model.C, model.K, model.contacts, model.damper, model.damper_rows
-    )
-    B, k = points.B, stuck_stiffness(points).ravel()
-    values, shapes = eigh(K + B.T @ (k[:, None] * B), M)
-    return M, values, shapes
+    M, _, K, _ = model.linear(stuck=True)
+    return M, *eigh(K, M)
 
 
 def tell_modes(model: Model, values: Array, shapes: Array, below: float) -> list[StuckMode]:
@@ -251,7 +245,7 @@ def tell_modes(model: Model, values: Array, shapes: Array, below: float) -> list
     frequency = np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
     tips = np.array([model.row(side) @ shapes for side in SIDES])
     # a mode across the blades does not move their probes along x: the size of a whole tip motion is
-    # that of the modes told here; far above, shapes of hardly any mass move more
+    # that of the modes below; far above, shapes of hardly any mass move more
     size = np.abs(tips).max(axis=0)
     moved = size > PEAKS_ABOVE * size[frequency < below].max(initial=0.0)
     return [

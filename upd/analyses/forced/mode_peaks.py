@@ -1,4 +1,4 @@
-"""Peaks of a forced response told apart by the mode that moves, not by their order in frequency.
+"""Peaks of a forced response by the mode that moves, not by their order in frequency.
 
 A number of a peak is the number of a stuck mode of both blades with the damper: 1 is the lowest
 in which the tips move in phase, 2 the lowest out of phase, 3 and 4 the next of each. It stays the
@@ -18,13 +18,11 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.measures import ComplexArray, CurvePeak, StuckMode
 from upd.analyses.forced.model import Array, Model
 from upd.hbm import FrequencyResponse
-from upd.hbm.contact_points import stuck_stiffness
-from upd.hbm.damper import attach
 from upd.hbm.fourier import to_complex
 
 #: share of the motion above which a mode has more than all others together
 MAJORITY = 0.5
-#: modes up to so many times the highest frequency of a sweep are told in it
+#: modes up to so many times the highest frequency of a sweep are found in it
 CANDIDATES = 2.0
 
 
@@ -215,11 +213,7 @@ def stuck_motion(model: Model, frequency: Array) -> ComplexArray:
     """Amplitudes (m, n_dof) of all dofs with every point stuck, mm per newton of F_E, in the lowest
     harmonic that is excited.
     """
-    M, C, K, points = attach(
-        model.M, model.C, model.K, model.contacts, model.damper, model.damper_rows
-    )
-    k = stuck_stiffness(points).ravel()
-    K = K + points.B.T @ (k[:, None] * points.B)
+    M, C, K, _ = model.linear(stuck=True)
     force = np.concatenate([model.force, np.zeros(len(M) - len(model.force))])
     omega = 2.0 * np.pi * model.excitation.lowest * np.asarray(frequency)
     return np.array([np.linalg.solve(K + 1j * w * C - w**2 * M, force) for w in omega])

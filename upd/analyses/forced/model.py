@@ -6,13 +6,13 @@ What the harmonic balance is given.
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
+from scipy.linalg import block_diag, eigh
 
 from upd.analyses.forced.blade_parts import (
     EVEN_DOFS,
@@ -43,7 +43,7 @@ log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 _AXIS_Y = 1
-#: relative change of the stuck frequencies up to which sliding along the damper is left out
+#: relative change of the stuck frequencies up to which sliding along the damper is not resisted
 ALONG_MATTERS = 1e-3
 
 
@@ -127,6 +127,17 @@ class Model:
         """Whether a contact point stands for itself and its mirror image about y = 0."""
         return self.damper.n_dof < 6
 
+    def linear(self, stuck: bool) -> tuple[Array, Array, Array, Array]:
+        """M, C, K (n, n) of blades and damper and rows B of the points, without contacts or with
+        every point closed and sticking.
+        """
+        M, C, K, points = attach(
+            self.M, self.C, self.K, self.contacts, self.damper, self.damper_rows
+        )
+        if stuck:
+            K = K + points.B.T @ (stuck_stiffness(points).ravel()[:, None] * points.B)
+        return M, C, K, points.B
+
     def damper_dofs(self, coefficients: Array) -> Array:
         """Coefficients of all six dofs of the damper, (..., 6, size), from those of the whole
         system, (..., n_dof, size).
@@ -159,12 +170,13 @@ def make_model(
     small, pairs = _reduced_blades(plan, bodies, whole)
     half = pairs is not None or bodies.half
     faces = {side: pairs[side].face(whole[side]) for side in SIDES} if pairs else whole
-    K, M = _beside(small[0][0], small[1][0]), _beside(small[0][1], small[1][1])
+    K, M = (block_diag(small[0][j], small[1][j]) for j in range(2))
     values, shapes = eigh(K, M)
     frequency = np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
     n = [len(part[0]) for part in small]
     # M has a block for each blade
-    share = np.stack([(part * (M @ shapes)[on]).sum(axis=0) for on, part in _blades(shapes, n)], 1)
+    blades = slice(0, n[0]), slice(n[0], n[0] + n[1])
+    share = np.stack([(shapes[on] * (M @ shapes)[on]).sum(axis=0) for on in blades], 1)
     damping = scene.modal_damping(frequency, share)
     before_after = ((0, n[1]), (n[0], 0))
     rows = np.concatenate(
@@ -306,12 +318,6 @@ def preloaded(model: Model, state: StaticState) -> Model:
     )
 
 
-def _blades(shapes: Array, n: Sequence[int]) -> list[tuple[slice, Array]]:
-    """Dofs of the left and of the right blade, and their part of the shapes."""
-    parts = (slice(0, n[0]), slice(n[0], n[0] + n[1]))
-    return [(on, shapes[on]) for on in parts]
-
-
 def _along_change(
     M: Array, K: Array, points: Contacts, damper: RigidDamper, on_damper: Array
 ) -> float:
@@ -367,9 +373,3 @@ def _probes(scene: ForcedScene, side: Side) -> tuple[str, ...]:
     """What of a blade is seen: its accelerometer, and where it is excited its force's node."""
     excited = side in excitation_of(scene.excitation).blades
     return ("accelerometer", "force") if excited else ("accelerometer",)
-
-
-def _beside(A: Array, B: Array) -> Array:
-    out = np.zeros((len(A) + len(B),) * 2)
-    out[: len(A), : len(A)], out[len(A) :, len(A) :] = A, B
-    return out

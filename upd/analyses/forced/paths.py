@@ -144,7 +144,7 @@ def balance_like(
     Parameters
     ----------
     old
-        The problem of the run, from whose static state sliders start where the scene says so.
+        The problem of the run, from whose static state sliders start where the scene asks for it.
     force, numbers, samples
         As of `balance_of`.
     """

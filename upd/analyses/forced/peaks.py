@@ -11,8 +11,9 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import takewhile
 
 import numpy as np
@@ -200,8 +201,17 @@ def _folds(curve: ForcedCurve) -> Iterator[Fold]:
 # -- time integration ------------------------------------------------------------------------------
 
 
-def confirmed(plan: ForcedPlan, model: Model, curve: ForcedCurve) -> ForcedCurve:
-    """The curve with its peaks where a point slips or opens as time integration confirms them."""
+def confirmed(
+    plan: ForcedPlan, model: Model, curve: ForcedCurve, like: TimeCheck | None = None
+) -> ForcedCurve:
+    """The curve with its peaks where a point slips or opens as time integration confirms them.
+
+    Parameters
+    ----------
+    like
+        Of the same peak of another model, where its top is unstable and the highest stable motion
+        is known: it is looked for about the same place.
+    """
     loose = [(key, top) for key, top in curve.tops.items() if top.slips]
     if not loose:
         return curve
@@ -211,80 +221,82 @@ def confirmed(plan: ForcedPlan, model: Model, curve: ForcedCurve) -> ForcedCurve
     checked = []
     for (side, number), top in loose:
         place = next(k for k, p in enumerate(peaks[side]) if p.number == number)
-        peak = peaks[side][place]
-        found = _confirmed(springs, model, curve, side, peak, top, steps)
+        integrate = partial(_stays, springs, model, curve, steps)
+        found = _confirmed(integrate, curve, side, peaks[side][place], top, like)
         checked.append(found)
         if found.stays and not found.at_top:
-            told = peak._replace(
+            peaks[side][place] = peaks[side][place]._replace(
                 frequency=found.frequency, height=found.integrated, sample=found.sample
             )
-            peaks[side][place] = told
-    told_peaks = {side: tuple(mine) for side, mine in peaks.items()}
-    return replace(curve, peaks=told_peaks, checked=tuple(checked))
+    stable = {side: tuple(mine) for side, mine in peaks.items()}
+    return replace(curve, peaks=stable, checked=tuple(checked))
 
 
 def _confirmed(
-    springs: SpringMarch,
-    model: Model,
+    integrate: Callable[[Array, float], Array | None],
     curve: ForcedCurve,
     side: Side,
     peak: CurvePeak,
     top: Top,
-    steps: int,
+    like: TimeCheck | None,
 ) -> TimeCheck:
     """The top where it stays, else the highest motion down the path that does."""
-    b, starts = curve.answer.balance, 0
+    starts, k = 0, SIDES.index(side)
+    best = TimeCheck(side, peak.number, peak.mode, top.frequency, top.height, math.nan, peak.sample)
 
     def stays(x: Array, f: float) -> Array | None:
         nonlocal starts
         starts += 1
-        return _stays(springs, model, b, x, f, curve.force, steps)
+        return integrate(x, f)
 
-    nothing = TimeCheck(
-        side, peak.number, peak.mode, top.frequency, top.height, math.nan, peak.sample
-    )
-
-    def staying(f: float, both: Array, sample: int, step: float, apart: float) -> TimeCheck:
-        balance, integrated = (float(value) for value in both[:, SIDES.index(side)])
-        return replace(
-            nothing,
-            frequency=f,
-            balance=balance,
-            integrated=integrated,
-            sample=sample,
-            step=step,
-            apart=apart,
-        )
-
-    both = stays(top.x, top.frequency)
-    if both is not None:
-        return replace(staying(top.frequency, both, AT_TOP, 0.0, 0.0), starts=starts)
+    if like is None:
+        both = stays(top.x, top.frequency)
+        if both is not None:
+            balance, integrated = (float(one) for one in both[:, k])
+            return replace(
+                best, balance=balance, integrated=integrated, sample=AT_TOP, starts=starts
+            )
     size, f = np.abs(curve.accelerance[side]), curve.frequency
-    best: TimeCheck | None = None
-    for way in _downhill(curve, size, peak.sample):
-        low, kept = 0, None
-        high = len(way) - 1
-        # bisection: `low` leaves, `high` stays
-        end = stays(curve.answer.x[way[high]], float(f[way[high]]))
-        if end is None:
-            continue
-        kept = end
-        while high - low > 1 and starts < 2 * _MOST_BISECTIONS:
-            middle = (low + high) // 2
-            both = stays(curve.answer.x[way[middle]], float(f[way[middle]]))
+    ways = _downhill(curve, size, peak.sample)
+    if like is not None:
+        ways = [way for way in ways if way[1] - way[0] == like.way] or ways
+    for way in ways:
+        # `low` leaves, `high` stays: steps that double from a known place, then bisection
+        low, high, kept = 0, len(way), None
+        at, step = high - 1, high
+        if like is not None:
+            at, step = int(np.abs(size[way] - like.share * size[way[0]]).argmin()), 1
+        while high - low > 1 and (kept is None or starts < 2 * _MOST_BISECTIONS):
+            both = stays(curve.answer.x[way[at]], float(f[way[at]]))
             if both is None:
-                low = middle
+                low = at
             else:
-                high, kept = middle, both
-        i, beyond = way[high], way[low]
-        step = abs(float(size[beyond] / size[i]) - 1.0)
-        found = staying(float(f[i]), kept, i, step, abs(float(f[beyond] / f[i]) - 1.0))
-        if best is None or found.integrated > best.integrated:
-            best = found
-    return replace(best or nothing, starts=starts)
+                high, kept = at, both
+            if kept is None:
+                at = min(low + step, len(way) - 1)
+            else:
+                at = max((low + high) // 2, high - step)
+            step *= 2
+        if kept is None:
+            continue
+        balance, integrated = (float(one) for one in kept[:, k])
+        if not best.stays or integrated > best.integrated:
+            i, beyond = way[high], way[low]
+            best = replace(
+                best,
+                frequency=float(f[i]),
+                balance=balance,
+                integrated=integrated,
+                sample=i,
+                step=abs(float(size[beyond] / size[i]) - 1.0),
+                apart=abs(float(f[beyond] / f[i]) - 1.0),
+                way=way[1] - way[0],
+                share=float(size[i] / size[way[0]]),
+            )
+    return replace(best, starts=starts)
 
 
-def _downhill(curve: ForcedCurve, size: Array, top: int) -> Iterator[list[int]]:
+def _downhill(curve: ForcedCurve, size: Array, top: int) -> list[list[int]]:
     """Points of the path from a top down to half its power on either side, the side first on which
     the frequency rises along the path.
     """
@@ -295,22 +307,16 @@ def _downhill(curve: ForcedCurve, size: Array, top: int) -> Iterator[list[int]]:
             way.append(way[-1] + step)
         if len(way) > 1:
             ways.append((float(np.mean(up[way])), way))
-    return iter([way for _, way in sorted(ways, key=lambda one: -one[0])])
+    return [way for _, way in sorted(ways, key=lambda one: -one[0])]
 
 
 def _stays(
-    springs: SpringMarch,
-    model: Model,
-    b: Balance,
-    x: Array,
-    f: float,
-    force: float,
-    steps: int,
+    springs: SpringMarch, model: Model, curve: ForcedCurve, steps: int, x: Array, f: float
 ) -> Array | None:
     """Heights (2, 2) of the blades by harmonic balance and by time integration that starts there,
     (m/s2)/N; None where the integration leaves.
     """
-    k = model.excitation.lowest
+    b, force, k = curve.answer.balance, curve.force, model.excitation.lowest
     scale = 1e-3 * (2.0 * np.pi * k * f) ** 2 / force
     march = InterfaceMarch(springs.march, f, force * model.excitation.drive, steps, by_coulomb)
     at = state_at(springs, model, b, x, f, force)

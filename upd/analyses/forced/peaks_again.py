@@ -1,38 +1,47 @@
-"""A peak of the run found again on another model, or with other choices of the balance.
+"""Peaks of the run found again with one thing changed, on its reduced models.
 
-Climbed to from the run's own top, and looked for in a band about it where that fails.
+A linear number is read from the linear limits. A peak on which a point slips or opens is climbed to
+from the run's own top; where that fails it is looked for in a band about it, then in the whole
+sweep. Where the top of the run is unstable, the highest stable motion is looked for there.
 """
 
 from __future__ import annotations
 
 import logging
 import math
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import ForcedCurve, LinearCurves, TimeCheck, Top
 from upd.analyses.forced.linear_limits import linear_limits_of
-from upd.analyses.forced.measures import Unsolved
-from upd.analyses.forced.mode_peaks import numbered_peaks
+from upd.analyses.forced.measures import CurvePeak, StuckMode, Unsolved, stuck_modes
+from upd.analyses.forced.mode_peaks import CANDIDATES, numbered_peaks, tell_stuck_peaks, unmoved
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.paths import (
     BAND,
     BAND_POINTS,
     LONG_STEPS,
     SWEEP_POINTS,
+    balance_like,
     balance_of,
     respond,
 )
 from upd.analyses.forced.peaks import climbed, confirmed, with_tops
 from upd.analyses.forced.plan import ForcedPlan
-from upd.errors import ConvergenceError, one_line
+from upd.errors import ConvergenceError, UpdError, one_line
+from upd.hbm import FrequencyResponse
 from upd.hbm.balance import Balance
+from upd.hbm.fourier import harmonics, sample_count
 from upd.hbm.peaks import FIRST_REACH, is_near
 from upd.hbm.starts import newton
+from upd.linalg.parallel import threads_for
 from upd.scene.forced_contact import SIDES, Side
+from upd.vary.variation import Variation
 
 log = logging.getLogger(__name__)
 #: first step of a climb that begins at the run's own top, over the usual one: maxima side by side
@@ -40,10 +49,14 @@ log = logging.getLogger(__name__)
 _CLOSE = 0.1
 #: points of a path along a band
 _MOST_POINTS = 400
+#: F_C/F_E of a curve or kind of a linear limit; blade; number of the peak
+Place = tuple[float | str, Side, int]
+#: in place of a kind: the lowest stuck mode in phase, number 1, and out of phase, number 2
+STUCK_MODE = "stuck mode"
 
 
 class Found(NamedTuple):
-    """Frequency in Hz and height in (m/s2)/N of a peak on a level; nan where it was not found."""
+    """Frequency in Hz and height in (m/s2)/N of a peak; nan where it was not found."""
 
     frequency: float
     height: float
@@ -54,7 +67,7 @@ NOT_FOUND = Found(math.nan, math.nan)
 
 @dataclass(frozen=True)
 class FoundPeaks:
-    """What is looked for on every level, by one contact stiffness.
+    """What is looked for again, by one contact stiffness.
 
     Attributes
     ----------
@@ -73,7 +86,7 @@ class FoundPeaks:
 
     @property
     def bare(self) -> FoundPeaks:
-        """Without what a level does not need of the curves: less to send."""
+        """Without what is not needed of the curves: less to send."""
         return replace(self, curves=tuple(_bare(one) for one in self.curves))
 
 
@@ -98,16 +111,54 @@ _ALONG = (
 )
 
 
-def linear_of(plan: ForcedPlan, model: Model) -> LinearCurves:
-    """The linear limits of a model."""
-    force = plan.scene.damper.centrifugal
-    problem = balance_of(plan, model, force, (0, *model.excitation.harmonics))
-    return linear_limits_of(plan, model, Unsolved(problem), force)
+class Variant(NamedTuple):
+    """The run with one thing changed.
+
+    Attributes
+    ----------
+    of
+        The change, and its size where it is a level.
+    model
+        The changed model; None where the run's own is solved with more harmonics or samples.
+    more, finer
+        Harmonics more than the run has; factor on its samples.
+    any_height
+        Whether peaks may move far: they are always solved with friction, and the highest of their
+        mode is taken, wherever in the sweep and however high.
+    seconds
+        That making the model took.
+    why
+        Why there is no model.
+    """
+
+    of: Variation
+    model: Model | None = None
+    more: int = 0
+    finer: int = 1
+    any_height: bool = False
+    seconds: float = 0.0
+    why: str = ""
 
 
-def stuck_frequency(linear: LinearCurves, in_phase: bool) -> float:
-    found = (m.frequency for m in linear.modes if m.axis == "x" and m.in_phase == in_phase)
-    return next(found, math.nan)
+class PeaksAgain(NamedTuple):
+    """The peaks of the run with one thing changed.
+
+    Attributes
+    ----------
+    of
+        The change.
+    peaks
+        Place -> what is found there.
+    seconds
+        It took.
+    why
+        Why something was not found; "" otherwise.
+    """
+
+    of: Variation
+    peaks: Mapping[Place, Found]
+    seconds: float
+    why: str = ""
 
 
 class RunPeak(NamedTuple):
@@ -119,107 +170,234 @@ class RunPeak(NamedTuple):
     top: Top
 
 
+def solve_again(peaks: FoundPeaks, variant: Variant) -> PeaksAgain:
+    """The peaks of the run with one thing changed; a fault becomes its reason."""
+    of, model, why = variant.of, variant.model, variant.why
+    nothing = PeaksAgain(of, {}, 0.0, why)
+    begin = time.perf_counter() - variant.seconds
+    if not why and model is not None and model.halved != peaks.model.halved:
+        nothing = nothing._replace(why="another kind of contact points")
+    if nothing.why:
+        log.info("%s, %s: %s", of.source, of.label, nothing.why)
+        return nothing
+    found: dict[Place, Found] = {}
+    with threads_for(len(peaks.model.M if model is None else model.M)):
+        try:
+            linear, free = peaks.linear, 1.0
+            modes: Sequence[StuckMode] = ()
+            if model is not None and variant.any_height:
+                modes = stuck_modes(model, CANDIDATES * peaks.plan.scene.excitation.stop)
+            elif model is not None:
+                linear = linear_of(peaks.plan, model)
+                modes, free = linear.modes, _free(linear) / _free(peaks.linear)
+                found |= stuck_places(modes) | dict(_limits_again(peaks, linear))
+        except UpdError as error:
+            return nothing._replace(why=one_line(error))
+        move = None if model is None else moved_points(peaks.model, model)
+        for curve in peaks.curves:
+            for one in _first_blades(curve):
+                try:
+                    if model is None:
+                        again = _other_balance(peaks, variant, one)
+                    elif one.top.slips or variant.any_height:
+                        ratio = expected(peaks.linear, modes, free, one)
+                        again = peak_on(peaks, model, linear, one, move, ratio, variant.any_height)
+                    else:
+                        again = found.get(("stuck", one.blade, one.number), NOT_FOUND)
+                except UpdError as error:
+                    why = one_line(error)
+                    log.info("%s, %s, %s: %s", of.source, of.label, curve.case, why)
+                    again = NOT_FOUND
+                if again is not None:
+                    found |= _both_blades(one, again)
+    return PeaksAgain(of, found, time.perf_counter() - begin, why)
+
+
+def _first_blades(curve: ForcedCurve) -> Iterator[RunPeak]:
+    """Every mode's peak once, of the right blade where that has one."""
+    for number in dict.fromkeys(number for _, number in curve.tops):
+        side: Side = "right" if ("right", number) in curve.tops else "left"
+        yield RunPeak(curve, side, number, curve.tops[side, number])
+
+
+def _both_blades(one: RunPeak, again: Found) -> dict[Place, Found]:
+    """A peak, and the other blade's of the same mode: it changes alike."""
+    ratio, number = one.curve.ratio, one.number
+    out: dict[Place, Found] = {(ratio, one.blade, number): again}
+    other: Side = "left" if one.blade == "right" else "right"
+    own, first = one.curve.compared(other, number), one.curve.compared(one.blade, number)
+    if own is not None and first is not None:
+        f, height = again.frequency / first[0], again.height / first[1]
+        out[ratio, other, number] = Found(f * own[0], height * own[1])
+    return out
+
+
+# -- linear limits ---------------------------------------------------------------------------------
+
+
+def linear_of(plan: ForcedPlan, model: Model) -> LinearCurves:
+    """The linear limits of a model."""
+    force = plan.scene.damper.centrifugal
+    problem = balance_of(plan, model, force, (0, *model.excitation.harmonics))
+    return linear_limits_of(plan, model, Unsolved(problem), force)
+
+
+def stuck_frequency(modes: Iterable[StuckMode], in_phase: bool) -> float:
+    """The lowest in Hz along x, in or out of phase; nan without."""
+    found = (m.frequency for m in modes if m.axis == "x" and m.in_phase == in_phase)
+    return next(found, math.nan)
+
+
+def _free(linear: LinearCurves) -> float:
+    """The lowest free peak in Hz; nan without."""
+    found = linear.free_peaks["right"] or linear.free_peaks["left"]
+    return found[0].frequency if found else math.nan
+
+
+def stuck_places(modes: Sequence[StuckMode]) -> dict[Place, Found]:
+    """The lowest stuck modes in phase and out of phase."""
+    return {
+        (STUCK_MODE, "right", number): Found(stuck_frequency(modes, number == 1), math.nan)
+        for number in (1, 2)
+    }
+
+
+def limit_peaks(peaks: FoundPeaks, kind: str, side: Side) -> list[CurvePeak]:
+    """Numbered peaks of a limit of the run, by rising frequency."""
+    own = sorted(getattr(peaks.linear, f"{kind}_peaks")[side], key=lambda p: p.frequency)
+    if kind == "free":
+        return unmoved(own)
+    named = tell_stuck_peaks(peaks.model, own, peaks.plan.scene.excitation.stop)
+    return sorted(named, key=lambda p: p.frequency)
+
+
+def _limits_again(peaks: FoundPeaks, linear: LinearCurves) -> Iterator[tuple[Place, Found]]:
+    """Peaks of other limits by rising frequency, with the numbers they have in the run."""
+    for kind in ("free", "stuck"):
+        for side in SIDES:
+            own = getattr(peaks.linear, f"{kind}_peaks")[side]
+            other = sorted(getattr(linear, f"{kind}_peaks")[side], key=lambda p: p.frequency)
+            for one, peak in zip(limit_peaks(peaks, kind, side), other, strict=False):
+                if len(own) == len(other):
+                    yield (kind, side, one.number), Found(peak.frequency, peak.height)
+
+
+def expected(own: LinearCurves, modes: Sequence[StuckMode], free: float, one: RunPeak) -> float:
+    """Ratio of a peak's frequency on another model to that of the run, between those of the free
+    and of the stuck mode by where the peak lies.
+
+    Parameters
+    ----------
+    modes
+        Stuck modes of the other model.
+    free
+        Ratio of the free frequencies.
+    """
+    in_phase = one.number % 2 == 1
+    stuck, again = (stuck_frequency(found, in_phase) for found in (own.modes, modes))
+    start = _free(own)
+    if not math.isfinite(stuck + again + start + free):
+        return 1.0
+    if stuck == start:
+        return again / stuck
+    share = min(max((one.top.frequency - start) / (stuck - start), 0.0), 1.0)
+    return free + share * (again / stuck - free)
+
+
+# -- peaks with friction ---------------------------------------------------------------------------
+
+
+def _other_balance(peaks: FoundPeaks, variant: Variant, one: RunPeak) -> Found | None:
+    """A peak with more harmonics or samples; None where neither matters: all sticks, or the height
+    is that of a time integration.
+    """
+    curve, top, old = one.curve, one.top, one.curve.answer.balance
+    if not top.slips or curve.stayed(one.blade, one.number) is not None:
+        return None
+    numbers = range(old.harmonics.highest + variant.more + 1)
+    samples = max(variant.finer * old.samples, sample_count(harmonics(numbers)))
+    b = balance_like(peaks.plan, peaks.model, curve.force, old, numbers, samples)
+    return found_again(peaks, peaks.model, one, b, b.embedded(top.x, old))
+
+
 def peak_on(
-    peaks: FoundPeaks, model: Model, linear: LinearCurves, one: RunPeak, move: Array | None
+    peaks: FoundPeaks,
+    model: Model,
+    linear: LinearCurves,
+    one: RunPeak,
+    move: Array | None,
+    ratio: float = 1.0,
+    any_height: bool = False,
 ) -> Found:
     """A peak with friction on another model.
 
     Parameters
     ----------
+    linear
+        Limits of that model.
     move
         (n, n_run) motion of the model's points from that of the run's; None where they are the
         same.
+    ratio
+        Of its frequency to that of the run, as far as the linear limits tell.
+    any_height
+        As of `Variant`.
     """
     old, top = one.curve.answer.balance, one.top
-    ratio = expected(peaks.linear, linear, one.number, top.frequency)
     check = one.curve.stayed(one.blade, one.number)
     if check is not None:
-        return confirmed_again(peaks.plan, model, linear, one.curve, check, ratio)
+        return _confirmed_again(peaks.plan, model, linear, one, check, ratio)
     b = balance_of(peaks.plan, model, one.curve.force, old.harmonics.numbers, old.samples)
-    x = top.x if move is None else carried(b, old, top.x, move)
-    return found_again(peaks.plan, model, one, b, x, ratio)
+    same = move is None and b.contacts.tangents == old.contacts.tangents
+    x = top.x if same else carried(b, old, top.x, move)
+    return found_again(peaks, model, one, b, x, ratio, any_height)
 
 
-def confirmed_again(
+def _confirmed_again(
     plan: ForcedPlan,
     model: Model,
     linear: LinearCurves,
-    curve: ForcedCurve,
+    one: RunPeak,
     check: TimeCheck,
     ratio: float,
 ) -> Found:
-    """The highest motion that stays on another model, where the top of the run's path leaves: the
-    border between both moves too.
+    """The highest stable motion on another model, where the top of the run is unstable: the border
+    between both moves too.
     """
-    old, f, e = curve.answer.balance, ratio * check.frequency, plan.scene.excitation
-    given: dict[str, Any] = {"harmonics": old.harmonics.numbers, "samples": old.samples}
-    given["settings"] = replace(LONG_STEPS, most_points=_MOST_POINTS)
-    for band in (
-        np.linspace((1.0 - 2.0 * BAND) * f, (1.0 + 2.0 * BAND) * f, 2 * BAND_POINTS),
-        # the loop of a fold may be longer than any band
-        np.linspace(e.start, e.stop, SWEEP_POINTS),
-    ):
-        try:
-            answer = respond(plan, model, curve.force, band, **given)
-        except ConvergenceError as error:
-            log.info("band about %.6g Hz: %s", f, one_line(error))
-            continue
-        blades = {s: measures.accelerance(answer, model.row(s), curve.force) for s in SIDES}
-        path = replace(curve, answer=answer, accelerance=blades, peaks={}, tops={}, checked=())
-        if path.empty:
-            continue
+    key = check.blade, check.number
+
+    def stable(answer: FrequencyResponse) -> Iterator[CurvePeak]:
+        force = one.curve.force
+        blades = {s: measures.accelerance(answer, model.row(s), force) for s in SIDES}
+        path = replace(one.curve, answer=answer, accelerance=blades, peaks={}, tops={}, checked=())
         path = with_tops(plan, model, linear, path)
         # the other blade changes alike
-        tops = {key: top for key, top in path.tops.items() if key == (check.blade, check.number)}
-        path = confirmed(plan, model, replace(path, tops=tops))
-        for peak in path.peaks[check.blade] if tops else ():
-            near = is_near(peak.frequency / f, peak.height / check.integrated)
-            if peak.number == check.number and near:
-                return Found(peak.frequency, peak.height)
-    return NOT_FOUND
+        tops = {at: top for at, top in path.tops.items() if at == key}
+        path = confirmed(plan, model, replace(path, tops=tops), check)
+        return iter(path.peaks[check.blade] if tops else ())
 
-
-def expected(own: LinearCurves, other: LinearCurves, number: int, frequency: float) -> float:
-    """Ratio of a peak's frequency on another model to that of the run, between those of the free
-    and of the stuck mode by where the peak lies.
-    """
-    in_phase = number % 2 == 1
-    stuck, again = stuck_frequency(own, in_phase), stuck_frequency(other, in_phase)
-    free = [one.free_peaks["right"] or one.free_peaks["left"] for one in (own, other)]
-    if not (math.isfinite(stuck) and math.isfinite(again) and all(free)):
-        return 1.0
-    start = free[0][0].frequency
-    ends = free[1][0].frequency / start, again / stuck
-    if stuck == start:
-        return ends[1]
-    share = min(max((frequency - start) / (stuck - start), 0.0), 1.0)
-    return ends[0] + share * (ends[1] - ends[0])
+    f, old = ratio * check.frequency, one.curve.answer.balance
+    return _on_a_path(plan, model, one, old, f, check.integrated, 2 * BAND, stable)
 
 
 def found_again(
-    plan: ForcedPlan,
+    peaks: FoundPeaks,
     model: Model,
     one: RunPeak,
     b: Balance,
     x: Array,
     ratio: float = 1.0,
-    *,
     any_height: bool = False,
-    **changes: Any,
 ) -> Found:
-    """A peak of another problem: climbed to from the run's top; in a band about it, then in the
-    whole sweep, as the highest of several maxima, where the run has these or the climb fails.
+    """A peak of another problem: climbed to from the run's top; on a path as the highest of several
+    maxima, where the run has these or the climb fails.
 
     Parameters
     ----------
     b, x
         The problem, and the run's motion at the top in its unknowns.
-    ratio
-        Of its frequency to that of the run, as far as the linear limits tell.
-    any_height
-        Whether it may lie anywhere in the sweep and have any height: the highest of its mode.
-    **changes
-        Of the problem, as `respond` takes them.
+    ratio, any_height
+        As of `peak_on`.
     """
     top, force = one.top, one.curve.force
     for factor in dict.fromkeys((ratio, 1.0)) if not top.crowded else ():
@@ -230,26 +408,59 @@ def found_again(
             new = climbed(model, b, start, f, one.blade, force, about, _CLOSE * FIRST_REACH)
             if new is not None:
                 return Found(new.frequency, new.height)
-    f = ratio * top.frequency
+
+    def balanced(answer: FrequencyResponse) -> Iterator[CurvePeak]:
+        size = np.abs(measures.accelerance(answer, model.row(one.blade), force))
+        return iter(numbered_peaks(model, answer, size, peaks.plan.scene.excitation.stop))
+
+    height = math.nan if any_height else top.height
+    return _on_a_path(peaks.plan, model, one, b, ratio * top.frequency, height, BAND, balanced)
+
+
+def _on_a_path(
+    plan: ForcedPlan,
+    model: Model,
+    one: RunPeak,
+    b: Balance,
+    f: float,
+    height: float,
+    width: float,
+    read: Callable[[FrequencyResponse], Iterator[CurvePeak]],
+) -> Found:
+    """A peak on the path along a band about its frequency, else along the whole sweep: the loop of
+    a fold may be longer than any band.
+
+    Parameters
+    ----------
+    b
+        Its harmonics and samples.
+    f, height
+        Where it is expected, Hz and (m/s2)/N; nan where any height is taken.
+    width
+        Half of that of the band, as a share of f.
+    read
+        The peaks of a path.
+    """
     e = plan.scene.excitation
-    bands = [
-        np.linspace((1.0 - BAND) * f, (1.0 + BAND) * f, BAND_POINTS),
-        # the loop of a fold may be longer than any band
+    settings = replace(LONG_STEPS, most_points=_MOST_POINTS)
+    for band in (
+        np.linspace((1.0 - width) * f, (1.0 + width) * f, round(BAND_POINTS * width / BAND)),
         np.linspace(e.start, e.stop, SWEEP_POINTS),
-    ]
-    for band in bands:
-        given: dict[str, Any] = {"harmonics": b.harmonics.numbers, "samples": b.samples}
-        given["settings"] = replace(LONG_STEPS, most_points=_MOST_POINTS)
+    ):
+        given = {"harmonics": b.harmonics.numbers, "samples": b.samples, "settings": settings}
         try:
-            peak = peak_of_mode(
-                plan, model, force, one.blade, one.number, band, **(given | changes)
-            )
+            answer = respond(plan, model, one.curve.force, band, **given)
         except ConvergenceError as error:
             log.info("band about %.6g Hz: %s", f, one_line(error))
             continue
-        if peak is not None and (any_height or is_near(peak[0] / f, peak[1] / top.height)):
-            return Found(*peak)
+        for peak in read(answer) if len(answer.frequency) else ():
+            near = math.isnan(height) or is_near(peak.frequency / f, peak.height / height)
+            if peak.number == one.number and near:
+                return Found(peak.frequency, peak.height)
     return NOT_FOUND
+
+
+# -- motions and points on other models ------------------------------------------------------------
 
 
 def moved_points(base: Model, other: Model) -> Array | None:
@@ -283,11 +494,20 @@ def _up(model: Model) -> Array:
     return out
 
 
-def carried(b: Balance, old: Balance, x: Array, move: Array) -> Array:
+def carried(b: Balance, old: Balance, x: Array, move: Array | None) -> Array:
     """Unknowns of a motion on another model: the same motion of its points, and the rigid motion
     that goes with it.
+
+    Parameters
+    ----------
+    move
+        As of `peak_on`. A model with both sliding directions does not move along the damper.
     """
-    W, _ = old.split(x)
+    W, rest = old.split(x)
+    if b.contacts.tangents > old.contacts.tangents:
+        W = np.insert(W, 1, 0.0, axis=1)
+    if move is None:
+        return np.concatenate([W.ravel(), rest])
     moved = np.einsum("pq,qdk->pdk", move, W)
     flat = np.concatenate([moved.ravel(), np.zeros(b.rigid)])
     if not b.rigid:
@@ -320,8 +540,7 @@ def moved(model: Model, factor: float) -> Model | None:
     faces = {}
     for k, side in enumerate(SIDES):
         face, on = model.faces[side], np.flatnonzero(model.face == k)
-        up = face.position @ face.frame[2]
-        up = up - face.weight @ up
+        up = _up(model)[on]
         rows = np.unique(np.round(up, 6))
         if len(rows) < 2:
             return None
@@ -362,35 +581,3 @@ def straight(rows: Array, s: Array) -> Array:
     out = np.zeros((len(s), len(rows)))
     out[np.arange(len(s)), k], out[np.arange(len(s)), k + 1] = 1.0 - share, share
     return out
-
-
-# -- a band about a peak ---------------------------------------------------------------------------
-
-
-def peak_of_mode(
-    plan: ForcedPlan,
-    model: Model,
-    force: float,
-    side: Side,
-    number: int,
-    frequency: Array,
-    **changes: object,
-) -> tuple[float, float] | None:
-    """Frequency and height of a mode's peak on a path along some frequencies; None without.
-
-    Parameters
-    ----------
-    number
-        Of the mode.
-    frequency
-        (n,) Hz.
-    **changes
-        As `respond` takes them.
-    """
-    answer = respond(plan, model, force, frequency, **changes)
-    if not len(answer.frequency):
-        return None
-    size = np.abs(measures.accelerance(answer, model.row(side), force))
-    found = numbered_peaks(model, answer, size, plan.scene.excitation.stop)
-    mine = [p for p in found if p.number == number]
-    return (mine[0].frequency, mine[0].height) if mine else None

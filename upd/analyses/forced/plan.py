@@ -34,7 +34,7 @@ HARMONICS, SAMPLES = 3, 128
 # 60 and 198 nodes; of one sample the time for each contact dof that moves, a share of all, and the
 # flops of its rows, solved for the unknowns.
 _ITERATIONS, _MOVED_S, _MOVING = 250.0, 2e-6, 0.2
-#: checks of what is left out; each solves a number again with the effect
+#: checks of omitted effects; each solves a number again with the effect
 ALONG = "sliding along y"
 ELASTIC = "elastic damper"
 # Counted and timed on the ready scenes, their elements and harmonics, one thread. A point of a path
@@ -127,10 +127,10 @@ def _whole_faces_cost(
     m = 3.0 * (size["left"]["contact"] + size["right"]["contact"])
     e = scene.excitation
     ways = _WAYS * (scene.balance.method == "march")
-    marched = ways * len(e.centrifugal_to_force) * _CLOSER * math.log(e.stop / e.start)
+    solved = ways * len(e.centrifugal_to_force) * _CLOSER * math.log(e.stop / e.start)
     cost.seconds += balance_seconds(scene, m)
-    cost.seconds += marched * _MARCHED * (_AT_ONCE_S + _DOF_S * m)
-    cost.seconds += marched * dense_s(_FACTORS * m**3)
+    cost.seconds += solved * _MARCHED * (_AT_ONCE_S + _DOF_S * m)
+    cost.seconds += solved * dense_s(_FACTORS * m**3)
     cost.seconds += _files_seconds(scene)
     cost.kept_bytes += _MATRICES * 8.0 * m**2
     memory, workers = cost.side_by_side(min(2, cost.threads), 2)
@@ -223,9 +223,9 @@ def _around_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]], r
 def _sweep_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
     """Sweeps up and down of every curve."""
     e = scene.excitation
-    marched = 2.0 * e.points * len(scene.stiffnesses) * len(e.centrifugal_to_force)
+    solved = 2.0 * e.points * len(scene.stiffnesses) * len(e.centrifugal_to_force)
     step = _SPRING_S + _POINT_S * _points(scene, size)
-    return marched * _PERIODS * time_steps(scene) * step
+    return solved * _PERIODS * time_steps(scene) * step
 
 
 def time_steps(scene: ForcedScene) -> int:
@@ -234,37 +234,24 @@ def time_steps(scene: ForcedScene) -> int:
     return MARCH_SAMPLES if given == "auto" else int(given)
 
 
-def _balance_samples(scene: ForcedScene) -> int:
-    """Samples of a period of the balance."""
-    given = scene.balance.samples
-    return sample_count(harmonics(range(_highest(scene) + 1)), None if given == "auto" else given)
-
-
 def _step_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
     """Seconds of a Newton step with its factors."""
-    points, n = _points(scene, size), _unknowns(scene, size)
+    across = 3 if scene.contact.directions == "two" or scene.mesh.symmetry == "full" else 2
+    highest, given = blade_harmonics(scene), scene.balance.samples
+    points = _points(scene, size)
+    # coefficients of the motion of the contact points
+    n = across * points * (2 * highest + 1)
     factor = dense_s(_STEP_LU * 2.0 / 3.0 * n**3)
     factors = _ENTRY_S * n**2 + factor
     if n > WORTH_KEEPING:
         factors = min(factors, factors / _STEPS_KEPT + _SOLVED * factor * SOLUTIONS / n)
-    samples = _SAMPLE_S * _balance_samples(scene)
-    return _STEP_S + (_POINT_STEP_S + samples) * points + factors
+    count = sample_count(harmonics(range(highest + 1)), None if given == "auto" else given)
+    return _STEP_S + (_POINT_STEP_S + _SAMPLE_S * count) * points + factors
 
 
 def _points(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
     """Contact points of both faces."""
     return sum(_point_count(scene, size[side]["contact"], side) for side in ("left", "right"))
-
-
-def _highest(scene: ForcedScene) -> int:
-    """The highest harmonic, of adaptive ones a usual one."""
-    return 3 if scene.balance.harmonics == "adaptive" else int(scene.balance.harmonics)
-
-
-def _unknowns(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
-    """Unknowns of a point: coefficients of the motion of the contact points."""
-    across = 3 if scene.contact.directions == "two" or scene.mesh.symmetry == "full" else 2
-    return across * _points(scene, size) * (2 * _highest(scene) + 1)
 
 
 def newton_seconds(plan: ForcedPlan) -> float:
@@ -281,13 +268,8 @@ def _point_count(scene: ForcedScene, nodes: int, side: Any) -> float:
     usual = {"rows": rows, "columns": max(1.0, corners / rows)}
     product = 1.0
     for name, choice in zip(usual, scene.contact.lines(side), strict=True):
-        lines = (
-            usual[name]
-            if choice == "all"
-            else float(choice)
-            if isinstance(choice, int)
-            else float(len(choice))
-        )
+        lines = float(choice) if isinstance(choice, int) else float(len(choice))
+        lines = usual[name] if choice == "all" else lines
         if name == "columns" and scene.mesh.symmetry != "full":
             lines = float(int(lines + 1) // 2)
         product *= lines
@@ -295,11 +277,9 @@ def _point_count(scene: ForcedScene, nodes: int, side: Any) -> float:
 
 
 def grid(plan: ForcedPlan) -> Array:
-    """Frequencies of the sweep in Hz, those of the time march among them."""
+    """Frequencies of the sweep in Hz."""
     e = plan.scene.excitation
-    return np.unique(
-        np.concatenate([np.linspace(e.start, e.stop, e.points), plan.scene.balance.time_march])
-    )
+    return np.linspace(e.start, e.stop, e.points)
 
 
 def needs(plan: ForcedPlan, threads: int) -> Needs:
@@ -369,9 +349,12 @@ def effects_of_points(scene: ForcedScene) -> list[Effect]:
     ]
 
 
+_IN_TIME = "of the blades; contact and damper in time"
+
+
 def effects_of_faces(scene: ForcedScene) -> list[Effect]:
     """Of contact by all nodes of both faces."""
-    mu, c = scene.contact.friction, scene.contact
+    mu, c, highest = scene.contact.friction, scene.contact, blade_harmonics(scene)
     whole = scene.mesh.symmetry == "full"
     return [
         Effect(
@@ -384,7 +367,7 @@ def effects_of_faces(scene: ForcedScene) -> list[Effect]:
         Effect(
             "motion odd about y = 0",
             whole,
-            "the full model is marched" if whole else "load and bodies are even about it",
+            "the full model is integrated" if whole else "load and bodies are even about it",
             applies=whole,
         ),
         _excited(scene),
@@ -400,7 +383,9 @@ def effects_of_faces(scene: ForcedScene) -> list[Effect]:
             applies=c.worn > 0.0,
         ),
         Effect("static balance", True, _static_words(scene), "static balance"),
-        harmonics_effect(scene),
+        Effect("harmonics", True, "all: time integration")
+        if scene.balance.method == "march"
+        else Effect("harmonics", True, f"0 to {highest} {_IN_TIME}", "truncation"),
         *centrifugal_effects(scene),
     ]
 
@@ -441,7 +426,7 @@ def _along(scene: ForcedScene) -> Effect:
 
 
 def blade_harmonics(scene: ForcedScene) -> int:
-    """The highest of the blades in the balance."""
+    """The highest of the balance; of adaptive ones a usual one."""
     asked = scene.balance.harmonics
     if asked == "adaptive":
         return max(HARMONICS, scene.excitation.highest_harmonic)
@@ -465,16 +450,3 @@ def balance_seconds(scene: ForcedScene, dofs: float) -> float:
     rows = _MOVING * dofs
     evaluations = _ITERATIONS * len(e.centrifugal_to_force) * samples
     return evaluations * _MOVED_S * rows + dense_s(evaluations * 2.0 * rows**2 * dofs)
-
-
-def harmonics_effect(scene: ForcedScene) -> Effect:
-    """Harmonics of the blades."""
-    b = scene.balance
-    if b.method == "march":
-        return Effect("harmonics", True, "all of them: a time march")
-    return Effect(
-        "harmonics",
-        True,
-        f"0 to {blade_harmonics(scene)} of the blades; contact and damper in time",
-        "truncation",
-    )

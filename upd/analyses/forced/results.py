@@ -57,10 +57,6 @@ def make_results(solution: ForcedSolution) -> list[Result]:
         results += balanced_results(solution, one)
     for sweep in solution.sweeps:
         results += swept_results(solution, sweep)
-    for march in (march for march in solution.marches if march.verifies):
-        value = march.accelerance(solution.models[march.curve.stiffness])
-        case = replace(march.curve.case, frequency=march.frequency)
-        results.append(q.TIME_MARCH.of(value, case, march.height, "harmonic balance", exact=False))
     results += _band_results(solution)
     for name, performance in solution.performances.items():
         results += _performance_results(name, performance)

@@ -11,17 +11,15 @@ from upd.analyses.base import Resolved
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, SweptCurve, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.inputs import InputEffect
-from upd.analyses.forced.levels import PeakLevel
 from upd.analyses.forced.linear_limits import stuck_peaks_of
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.mode_peaks import CANDIDATES, tell_stuck_peaks
 from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.peaks_again import FoundPeaks
+from upd.analyses.forced.peaks_again import FoundPeaks, PeaksAgain
 from upd.analyses.forced.performance import Performance, RatioPoint
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.seated.bodies import Bodies
 from upd.hbm.interface_record import RecordedPeriod
-from upd.hbm.march import SteadyState
 from upd.mesh import IntArray
 from upd.results import Case
 from upd.scene.forced_contact import Side
@@ -80,32 +78,8 @@ class MarchedPeak:
         """Of the losses of all nodes from that of the sweep at this point, over the work of the
         excitation and all losses there.
         """
-        told = self.sweep.found.energy[self.peak.sample]
-        return abs(self.period.energy - float(told[2])) / max(float(np.abs(told).sum()), _TINY)
-
-
-@dataclass(frozen=True)
-class TimeMarch:
-    """A point of a curve by time integration.
-
-    Frequency in Hz, accelerance (m/s2)/N by harmonic balance, and the steady state.
-    """
-
-    curve: ForcedCurve
-    frequency: float
-    height: float
-    steady: SteadyState
-
-    @property
-    def verifies(self) -> bool:
-        """Whether a period was found: nothing else can be compared with an answer."""
-        return self.steady.status == "periodic"
-
-    def accelerance(self, model: Model) -> float:
-        """Accelerance of the right blade by the time integration, (m/s2)/N."""
-        k = model.excitation.lowest
-        amplitude = self.steady.amplitude(model.row("right"), self.curve.answer.harmonics.place(k))
-        return float(1e-3 * (2 * np.pi * k * self.frequency) ** 2 * amplitude / self.curve.force)
+        own = self.sweep.found.energy[self.peak.sample]
+        return abs(self.period.energy - float(own[2])) / max(float(np.abs(own).sum()), _TINY)
 
 
 @dataclass(frozen=True)
@@ -129,7 +103,6 @@ class ForcedSolution:
     models: dict[str, Model] = field(default_factory=dict)
     linear: dict[str, LinearCurves] = field(default_factory=dict)
     curves: list[ForcedCurve] = field(default_factory=list)
-    marches: list[TimeMarch] = field(default_factory=list)
     faces: dict[str, WholeFaces] = field(default_factory=dict)
     balanced: list[FacesCurve] = field(default_factory=list)
     sweeps: list[SweptCurve] = field(default_factory=list)
@@ -137,7 +110,7 @@ class ForcedSolution:
     band: list[BandPoint] = field(default_factory=list)
     performances: dict[str, Performance] = field(default_factory=dict)
     omissions: list[Resolved] = field(default_factory=list)
-    levels: dict[str, list[PeakLevel]] = field(default_factory=dict)
+    levels: dict[str, list[PeaksAgain]] = field(default_factory=dict)
     searched: dict[str, FoundPeaks] = field(default_factory=dict)
     effects: dict[str, list[InputEffect]] = field(default_factory=dict)
 

@@ -5,30 +5,22 @@ friction; around the peaks what levels, inputs and effects left out change.
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any, NamedTuple
 
-import numpy as np
-
-from upd.analyses.forced.curves import ForcedCurve
-from upd.analyses.forced.inputs import INPUTS, few_harmonics, input_effects
-from upd.analyses.forced.left_out import along_changes, elastic_changes, with_along
-from upd.analyses.forced.levels import (
-    COARSER,
-    HARMONICS,
-    MORE_HARMONICS,
-    SAMPLES,
-    Laws,
-    MadeModel,
-    balance_level,
-    coarse_model,
-    model_level,
-    other_models,
+from upd.analyses.forced.inputs import effects_of, few_harmonics, input_variants
+from upd.analyses.forced.left_out import (
+    along_changes,
+    along_variant,
+    elastic_changes,
+    highest_slipping,
 )
+from upd.analyses.forced.levels import COARSER, Laws, coarse_model, other_levels
 from upd.analyses.forced.model import Model, make_model, preloaded
 from upd.analyses.forced.paths import quiet
 from upd.analyses.forced.peaks import solve_curve
-from upd.analyses.forced.peaks_again import FoundPeaks, linear_of
+from upd.analyses.forced.peaks_again import FoundPeaks, Variant, linear_of, solve_again
 from upd.analyses.forced.performance import (
     RatioPoint,
     further_points,
@@ -39,7 +31,7 @@ from upd.analyses.forced.performance import (
     with_curves,
 )
 from upd.analyses.forced.plan import ForcedPlan, grid
-from upd.analyses.forced.solution import BandPoint, ForcedSolution, TimeMarch
+from upd.analyses.forced.solution import BandPoint, ForcedSolution
 from upd.analyses.forced.spring_march import make_springs
 from upd.analyses.forced.statics import StaticState, admissible, same, static_state
 from upd.analyses.forced.stiffness import face_laws
@@ -47,16 +39,13 @@ from upd.analyses.forced.sweeps import both_ways, march_peaks
 from upd.analyses.forced.whole_faces import INTERFACE, linear_limits, make_whole_faces, solve_faces
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import InputError, UpdError, one_line
-from upd.hbm.march import steady_state
 from upd.linalg.parallel import threads_for
-from upd.linalg.processes import Job, SideProcesses
+from upd.linalg.processes import SideProcesses
 from upd.progress import Stages
 
 log = logging.getLogger(__name__)
 #: what a process beside this one imports at once
 _MODULES = ("upd.analyses.forced.inputs", "upd.analyses.forced.performance")
-#: kinds of jobs without which the answer stands
-_BESIDE_THE_ANSWER = ("input", "along", "performance")
 #: other starts of the sliders of a band
 STARTS = ("mid", "upper", "lower")
 
@@ -134,122 +123,95 @@ def _swept_points(solution: ForcedSolution, stages: Stages) -> None:
 # -- harmonic balance ------------------------------------------------------------------------------
 
 
+class _Work(NamedTuple):
+    """What a process beside this one may do, and where its result goes.
+
+    Attributes
+    ----------
+    into
+        Takes the result.
+    function, arguments
+        The job.
+    needed
+        Whether there is no answer without it.
+    """
+
+    into: Callable[[Any], object]
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    needed: bool = False
+
+
+def _done(beside: SideProcesses, work: Sequence[_Work]) -> None:
+    for one, found in zip(work, beside.run([one[1:3] for one in work]), strict=True):
+        if not isinstance(found, UpdError):
+            one.into(found)
+        elif one.needed:
+            raise found
+        else:
+            log.info("%s: %s", one.function.__name__, one_line(found))
+
+
 def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: Stages) -> None:
     laws = _models(solution, stages)
     plan, bodies = solution.plan, solution.bodies
     assert bodies is not None
     scene, first = plan.scene, next(iter(laws))
-    made: dict[str, list[MadeModel]] = {name: [] for name in laws}
-    jobs: list[Job] = []
-    if scene.estimates:
-        for name in laws:
-            model = solution.models[name]
-            jobs += [(coarse_model, (plan, model, laws[name], factor)) for factor in COARSER]
-            made[name] += other_models(plan, model, bodies, laws[name])
-    meshes, jobs = len(jobs), jobs + _curve_jobs(solution)
-    curves = len(jobs) - meshes
-    if scene.wants("performance"):
-        model, highest = solution.models[first], harmonics_of(plan)
-        jobs += [(peaks_at, (plan, model, r, highest)) for r in ratios_of(plan)]
-    with stages("friction", f"{curves} curves, {len(jobs) - meshes - curves} F_C/F_E"), quiet():
-        found = beside.run(jobs)
+    variants: dict[str, list[Variant]] = {name: [] for name in laws}
+    points: list[RatioPoint] = []
+    work: list[_Work] = []
     for name in laws if scene.estimates else ():
-        made[name] += _checked(found[: len(COARSER)])
-        found = found[len(COARSER) :]
-    solution.curves += _checked(found[:curves])
-    points: list[RatioPoint] = [p for p in found[curves:] if not isinstance(p, UpdError)]
+        model = solution.models[name]
+        variants[name] += other_levels(plan, model, bodies, laws[name])
+        for factor in COARSER:
+            given = plan, model, laws[name], factor
+            work.append(_Work(variants[name].append, coarse_model, given, needed=True))
+    order = list(scene.excitation.centrifugal_to_force)
+    for name, model in solution.models.items():
+        # those with most slip first
+        for ratio in sorted(order):
+            curve = plan, model, solution.linear[name], name, ratio
+            work.append(_Work(solution.curves.append, solve_curve, curve, needed=True))
+    if scene.wants("performance"):
+        highest = harmonics_of(plan)
+        for ratio in ratios_of(plan):
+            point = plan, solution.models[first], ratio, highest
+            work.append(_Work(points.append, peaks_at, point))
+    with stages("friction", f"{len(laws) * len(order)} curves, {len(work)} pieces"), quiet():
+        _done(beside, work)
+    solution.curves.sort(key=lambda c: (list(laws).index(c.stiffness), order.index(c.ratio)))
     with stages("around the peaks", "levels, inputs, effects left out"), quiet():
-        _around(solution, laws, made, points, beside)
-    curve = next((c for c in solution.curves if not c.empty), None)
-    for f in scene.balance.time_march if curve is not None else ():
-        assert curve is not None
-        with stages("time march", f"{curve.case}, {f:g} Hz"):
-            solution.marches += _march(curve, f)
-
-
-def _curve_jobs(solution: ForcedSolution) -> list[Job]:
-    """The curves, those with most slip first."""
-    ratios = sorted(solution.plan.scene.excitation.centrifugal_to_force)
-    return [
-        (solve_curve, (solution.plan, model, solution.linear[name], name, ratio))
-        for name, model in solution.models.items()
-        for ratio in ratios
-    ]
-
-
-def _checked(found: Sequence[Any]) -> list[Any]:
-    for one in found:
-        if isinstance(one, UpdError):
-            raise one
-    return list(found)
+        _around(solution, laws, variants, points, beside)
 
 
 def _around(
     solution: ForcedSolution,
     laws: Mapping[str, Laws],
-    made: Mapping[str, Sequence[MadeModel]],
+    variants: Mapping[str, Sequence[Variant]],
     points: Sequence[RatioPoint],
     beside: SideProcesses,
 ) -> None:
     """What is solved again around the peaks: once, on the reduced models."""
-    plan, bodies, first = solution.plan, solution.bodies, next(iter(laws))
-    assert bodies is not None
-    scene, jobs, into = plan.scene, list[Job](), list[tuple[str, str]]()
-    order = list(scene.excitation.centrifugal_to_force)
-    solution.curves.sort(key=lambda c: (list(laws).index(c.stiffness), order.index(c.ratio)))
-
-    def add(kind: str, name: str, *job: Any) -> None:
-        jobs.append((job[0], job[1:]))
-        into.append((kind, name))
-
-    along: Model | None = None
+    plan, first = solution.plan, next(iter(laws))
+    scene, work = plan.scene, list[_Work]()
     further: list[RatioPoint] = []
     for name, model in solution.models.items():
         mine = tuple(c for c in solution.curves if c.stiffness == name and not c.empty)
         peaks = FoundPeaks(plan, model, solution.linear[name], mine)
         solution.searched[name], bare = peaks, peaks.bare
-        if scene.estimates:
-            for one in made[name]:
-                add("level", name, model_level, bare, one)
-            for more in MORE_HARMONICS:
-                add("level", name, balance_level, bare, HARMONICS, more, 1)
-            add("level", name, balance_level, bare, SAMPLES, 0, 2)
-        asked = scene.wants("inputs") or scene.left_out.solves
-        tops = few_harmonics(peaks) if name == first and asked else {}
-        if name == first and scene.wants("performance"):
-            for function, given in further_points(plan, model, with_curves(points, mine), points):
-                add("performance", name, function, *given)
-        if name == first and scene.wants("inputs"):
-            for one_input in INPUTS:
-                add("input", name, input_effects, bare, tops, one_input.name)
-        if name == first and scene.wants("band"):
-            for job in _band_jobs(solution, name):
-                add("band", job[0], *job[1:])
+        levels = solution.levels.setdefault(name, []) if variants[name] else []
+        work += [_Work(levels.append, solve_again, (bare, one)) for one in variants[name]]
         if scene.left_out.solves:
             solution.omissions += elastic_changes(solution, name)
-            along = with_along(solution, name, laws[name]) if name == first else None
-            if along is not None:
-                add("along", name, along_changes, bare, tops, along)
-    found = beside.run(jobs)
-    for place, one in zip(into, found, strict=True):
-        if isinstance(one, UpdError) and place[0] in _BESIDE_THE_ANSWER:
-            # beside the answer: it stands without
-            log.info("%s of %s: %s", *place, one_line(one))
-    kept = [k for k, (kind, _) in enumerate(into) if kind not in _BESIDE_THE_ANSWER]
-    _checked([found[k] for k in kept])
-    for (kind, name), one in zip(into, found, strict=True):
-        if isinstance(one, UpdError):
-            continue
-        if kind == "level":
-            solution.levels.setdefault(name, []).append(one)
-        elif kind == "input":
-            solution.effects.setdefault(name, []).extend(one)
-        elif kind == "performance":
-            further.append(one)
-        elif kind == "band":
-            solution.band.append(BandPoint(first, name, one))
-        else:
-            solution.omissions += one
+        if name == first:
+            if scene.wants("performance"):
+                jobs = further_points(plan, model, with_curves(points, mine), points)
+                work += [_Work(further.append, *job) for job in jobs]
+            if scene.wants("inputs") or scene.left_out.solves:
+                work += _at_few_harmonics(solution, name, laws[name])
+            if scene.wants("band"):
+                work += _band(solution, name)
+    _done(beside, work)
     if scene.wants("performance"):
         mine = tuple(c for c in solution.curves if c.stiffness == first)
         solution.performances[first] = performance_of(
@@ -257,7 +219,28 @@ def _around(
         )
 
 
-def _band_jobs(solution: ForcedSolution, name: str) -> Iterator[tuple[Any, ...]]:
+def _at_few_harmonics(solution: ForcedSolution, name: str, laws: Laws) -> Iterator[_Work]:
+    """Inputs, and sliding along the damper, on the curve with the lowest F_C/F_E."""
+    scene, few = solution.plan.scene, few_harmonics(solution.searched[name])
+    if few is None:
+        return
+    if scene.wants("inputs"):
+        effects = solution.effects.setdefault(name, [])
+        for variant in input_variants(few):
+            yield _Work(
+                lambda one: effects.extend(effects_of(few, one)), solve_again, (few, variant)
+            )
+    along = along_variant(solution, name, laws) if scene.left_out.solves else None
+    highest = highest_slipping(few)
+    if along is not None and highest is not None:
+        yield _Work(
+            lambda one: solution.omissions.extend(along_changes(highest, one)),
+            solve_again,
+            (highest, along),
+        )
+
+
+def _band(solution: ForcedSolution, name: str) -> Iterator[_Work]:
     """Curves from every other named static state, and other starts of the sliders."""
     plan, model, bodies = solution.plan, solution.models[name], solution.bodies
     assert bodies is not None
@@ -273,14 +256,9 @@ def _band_jobs(solution: ForcedSolution, name: str) -> Iterator[tuple[Any, ...]]
     choices += [(f"start {s}", model, {"start": s}) for s in STARTS if s != scene.balance.slider]
     for ratio in scene.excitation.centrifugal_to_force:
         for choice, other, changes in choices:
-            yield choice, peaks_at, plan, other, ratio, highest, changes
+            point = plan, other, ratio, highest, changes
+            yield _Work(partial(_into_band, solution, name, choice), peaks_at, point, needed=True)
 
 
-def _march(curve: ForcedCurve, f: float) -> list[TimeMarch]:
-    """Time integration from the answer at f, when the path reached it."""
-    a = curve.answer
-    i = int(np.argmin(np.abs(a.frequency - f)))
-    if abs(a.frequency[i] - f) > np.sqrt(np.finfo(float).eps) * f:
-        return []
-    height = float(abs(curve.accelerance["right"][i]))
-    return [TimeMarch(curve, f, height, steady_state(a.balance, f, a.x[i]))]
+def _into_band(solution: ForcedSolution, name: str, choice: str, point: RatioPoint) -> None:
+    solution.band.append(BandPoint(name, choice, point))

@@ -36,7 +36,7 @@ SEEN = 8.0
 
 @dataclass(frozen=True)
 class SpringMarch:
-    """A spring model ready to be marched.
+    """A spring model ready for time integration.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ def make_springs(plan: ForcedPlan, model: Model) -> SpringMarch:
 def state_at(
     springs: SpringMarch, model: Model, b: Balance, x: Array, frequency: float, force: float
 ) -> InterfaceState:
-    """Where a steady motion by harmonic balance stands at t = 0, residual slips included.
+    """Where a steady motion by harmonic balance is at t = 0, residual slips included.
 
     Parameters
     ----------

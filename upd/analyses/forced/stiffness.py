@@ -31,8 +31,6 @@ from upd.scene.forced import ForcedScene
 from upd.scene.forced_contact import Side, StiffnessChoice
 
 log = logging.getLogger(__name__)
-#: groups of result.nc with a contact law in the axes of its patch begin so, those in the axes of a
-#: rig with the second name
 
 
 @dataclass(frozen=True)
@@ -126,7 +124,7 @@ def _scene_of_run(folder: Path) -> Scene | None:
 
 def _check_damper(scene: ForcedScene, source: str, contact: Scene | None) -> None:
     """Raise InputError when the contact is that of another damper: its stiffness is not this
-    one's. A damper that cannot be compared is told.
+    one's. A damper that cannot be compared gives a warning.
     """
     own = {**scene.geometry, "arrangement": scene.arrangement}
     rig, other = _damper(scene.recipe, own), None

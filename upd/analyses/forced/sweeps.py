@@ -137,7 +137,7 @@ def march_peaks(solution: ForcedSolution, stages: Stages) -> None:
 
 
 def marched_peak(solution: ForcedSolution, sweep: SweptCurve, peak: CurvePeak) -> MarchedPeak:
-    """The last period of a sweep at one of its peaks, marched again and kept."""
+    """The last period of a sweep at one of its peaks, integrated again and kept."""
     places, rest, kept = _contact(solution, sweep.stiffness)
     period = period_of_sweep(sweep.found, peak.sample, by_coulomb)
     motion = np.zeros((len(period.motion), MOTIONS))

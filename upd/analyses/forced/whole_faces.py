@@ -1,4 +1,4 @@
-"""Both faces of the damper node by node in a forced response: what is marched, and where it begins.
+"""Both faces of the damper node by node in a forced response: the equations, and where they begin.
 
 No springs: the blades' and the damper's own elasticity, Signorini's and Coulomb's conditions on
 every matching node. Where the faces of the damper and the platforms come from, and which static

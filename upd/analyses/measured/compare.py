@@ -55,7 +55,7 @@ class NumberedPeak(Protocol):
 
     @property
     def mode(self) -> str:
-        """How the blades move, "" where nothing is said."""
+        """How the blades move, "" where it is not known."""
 
 
 @dataclass(frozen=True)
