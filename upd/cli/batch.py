@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import textwrap
 from collections import Counter
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
+from rich.text import Text
 
 from upd.batch.engine import Workers
 from upd.batch.ladder import Study
@@ -19,10 +19,9 @@ from upd.batch.studies import StudyResult
 from upd.batch.study_tables import TextTable
 from upd.cli.tables import print_table
 from upd.cli.terminal import counted, duration
-from upd.labels import number, percent_of
-from upd.report.columns import TextColumn
-from upd.results.quantities import number_label
-from upd.results.sampled import SampledNumber, sample_sentence
+from upd.report.columns import TextColumn, whole_table
+from upd.report.tables import sample_table
+from upd.results.sampled import sample_sentence
 
 #: rows shown, and characters of a line of a head; the files hold all
 _ROWS, _WIDTH = 30, 14
@@ -90,42 +89,11 @@ def print_sweep(console: Console, result: SweepResult) -> None:
 
 def print_sample(console: Console, result: SweepResult) -> None:
     """What the sample makes of every number, and where the rest is."""
-    rows = result.sampled
-    span = "middle\n95 %" if all(one.resolved for one in rows) else "least to\nlargest"
-
-    def numbers(head: str, text: Callable[[SampledNumber], str], rank: int = 0) -> TextColumn:
-        return TextColumn(head, tuple(map(text, rows)), right=True, rank=rank)
-
-    columns = [
-        TextColumn("number", tuple(number_label(one.name) for one in rows), folds=_WIDTH),
-        TextColumn("case", tuple(one.case for one in rows), rank=1, folds=_WIDTH),
-        numbers("as given", lambda one: number(one.nominal)),
-        numbers("first\norder", lambda one: _band(one.first_order)),
-        numbers("sample", _sample_band),
-        numbers("mean", lambda one: number(one.mean), 3),
-        numbers("standard\ndeviation", lambda one: number(one.deviation), 4),
-        numbers(
-            span,
-            lambda one: "" if one.low is None else f"{number(one.low)} to {number(one.high)}",
-            2,
-        ),
-        TextColumn("unit", tuple(one.unit for one in rows)),
-        TextColumn("compared", tuple(one.verdict for one in rows), folds=2 * _WIDTH),
-    ]
-    print_table(console, columns, title="Bands by the inputs, to first order and sampled")
-    console.print(sample_sentence(rows))
+    table = sample_table(result.sampled)
+    for line in (table.heading, *whole_table(table, console.width)):
+        console.print(Text(line), soft_wrap=True)
+    console.print(sample_sentence(result.sampled))
     _print_end(console, result)
-
-
-def _band(band: float | None) -> str:
-    return "" if band is None else f"±{percent_of(band)}"
-
-
-def _sample_band(one: SampledNumber) -> str:
-    """The sample's band and its sampling error."""
-    if one.band_low is None or one.band_high is None:
-        return _band(one.band)
-    return f"{_band(one.band)} ({100.0 * one.band_low:.2g} to {100.0 * one.band_high:.2g})"
 
 
 def _print_end(console: Console, result: SweepResult) -> None:

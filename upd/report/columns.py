@@ -1,4 +1,4 @@
-"""Columns of a table in plain text: fitted to a width by leaving columns out, never digits."""
+"""Columns of a table in plain text: fitted to a width by omitting columns, never digits."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class TextColumn:
     right
         Flush right, as numbers are.
     rank
-        The column of the highest rank is left out first; one of rank 0 stays.
+        The column of the highest rank is omitted first; one of rank 0 stays.
     folds
         Characters to which words may be folded; 0 for numbers, which stay whole.
     """

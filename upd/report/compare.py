@@ -37,7 +37,7 @@ def write_comparison(folders: Sequence[str | Path], path: str | Path) -> Path:
 
 
 def run_names(runs: Sequence[RunFolder]) -> list[str]:
-    """Names of the run folders, with as much of their paths as tells them apart."""
+    """Names of the run folders, with as much of their paths as makes them different."""
     paths = [run.path.resolve() for run in runs]
     if len(set(paths)) < len(paths):
         raise InputError("a folder is duplicated; to fix it: give each folder once")

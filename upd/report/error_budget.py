@@ -71,7 +71,7 @@ def budget_charts(entries: Sequence[Entry]) -> list[Chart]:
     return [
         Chart(
             "Error budget",
-            Axis("estimated bound of the error, sources added", "%", low=0.0),
+            Axis("error bound, sources added", "%", low=0.0),
             Axis(""),
             bars=(Bars(cases, parts, texts, above=True, hatched=hatched),),
             figure="error_budget",

@@ -45,6 +45,7 @@ _NOBODYS = (".DS_Store", "Thumbs.db", "desktop.ini")
 class LogLine:
     """One line of run.log."""
 
+    time: str
     level: str
     where: str
     text: str
@@ -89,13 +90,8 @@ class RunFolder:
 
     @property
     def started(self) -> str:
-        """When the run began, as its log says."""
-        try:
-            first = (self.path / "run.log").read_text("utf-8").partition("\n")[0]
-        except (OSError, UnicodeDecodeError):
-            return ""
-        found = _LOG_LINE.match(first)
-        return found["time"].partition(",")[0] if found else ""
+        """When the run began, by its log."""
+        return self.log[0].time if self.log else ""
 
 
 def is_run_file(entry: Path) -> bool:
@@ -210,7 +206,7 @@ def read_arrays(path: Path) -> dict[str, Group]:
 
 
 @dataclass
-class _Effect:
+class _EffectEntry:
     name: str
     on: bool
     why: str
@@ -218,7 +214,7 @@ class _Effect:
 
 
 @dataclass
-class _Check:
+class _CheckEntry:
     name: str
     case: str
     value: float | None
@@ -228,7 +224,7 @@ class _Check:
 
 
 @dataclass
-class _Number:
+class _NumberEntry:
     name: str
     case: str
     case_fields: dict[str, Any]
@@ -244,11 +240,11 @@ class _Summary:
     scene: str
     title: str
     status: str
-    effects: list[_Effect]
-    checks: list[_Check]
+    effects: list[_EffectEntry]
+    checks: list[_CheckEntry]
     size: dict[str, Any]
     cost: dict[str, Any]
-    results: list[_Number]
+    results: list[_NumberEntry]
 
 
 def _summary(folder: Path) -> dict[str, Any]:
@@ -327,4 +323,6 @@ def _tables(text: str, missing: list[str]) -> dict[str, Any]:
 
 def _log(text: str) -> tuple[LogLine, ...]:
     found = (_LOG_LINE.match(line) for line in text.splitlines())
-    return tuple(LogLine(m["level"], m["where"], m["text"]) for m in found if m)
+    return tuple(
+        LogLine(m["time"].partition(",")[0], m["level"], m["where"], m["text"]) for m in found if m
+    )

@@ -203,9 +203,9 @@ def plot(result: RunResult, title: str | None, case: str | None, ax: Axes | None
     chosen = _chosen(charts(result), title, case)
     if ax is not None:
         if len(chosen) > 1:
-            told = "; ".join(f"{c.title}, {c.case}" if c.case else c.title for c in chosen)
+            meant = "; ".join(f"{c.title}, {c.case}" if c.case else c.title for c in chosen)
             raise InputError(
-                f"plot: ax takes one chart, {len(chosen)} are meant ({told}); give title and case"
+                f"plot: ax takes one chart, {len(chosen)} are meant ({meant}); give title and case"
             )
         return [draw(chosen[0], ax)]
     import matplotlib.pyplot as plt

@@ -164,7 +164,7 @@ def _environment() -> Environment:
 
 @cache
 def _packed_plotly() -> str:
-    """The script of the installed package as it stands on every page: 2 MB of base64 instead of
+    """The script of the installed package as every page holds it: 2 MB of base64 instead of
     5 MB. The package itself is slow to import and not needed.
     """
     spec = find_spec("plotly")

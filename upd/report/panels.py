@@ -5,9 +5,7 @@ picture that needs no script, and as many surfaces as the page has room for.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,12 +26,8 @@ _HEADINGS = {
     "work_precision": "What accuracy costs",
     "dimensions": "Geometry and its dimensions",
 }
-#: bytes the PNG files may take before they are made smaller, and the widths in pixels they are then
-#: given, one after the other
-_ROOM_BYTES = 1_000_000
-_WIDTHS = (2400, 1600, 1100, 800)
-
-
+#: pixels of the width of a picture at most
+_WIDTH = 1600
 #: a picture wider than this has drawings side by side
 _SHEET_PIXELS = 1300
 
@@ -69,7 +63,7 @@ def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Pa
     groups: dict[str, list[Chart]] = {}
     for chart in charts:
         groups.setdefault(chart.figure or chart.title, []).append(chart)
-    images = _images(figures)
+    images = {name: small_png(path, _WIDTH) for name, path in figures.items()}
     panels = [
         _panel(name, group[0].heading or group[0].title, images.get(name) or _drawn(group), group)
         for name, group in groups.items()
@@ -79,18 +73,6 @@ def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Pa
         for name, image in images.items()
         if name not in groups
     ]
-
-
-def _images(figures: Mapping[str, Path]) -> dict[str, bytes]:
-    """The PNG files, with a palette and smaller where the page would not hold them as they are."""
-    images = {name: f.read_bytes() for name, f in figures.items()}
-    with ThreadPoolExecutor() as pool:
-        for width in _WIDTHS:
-            if sum(map(len, images.values())) <= _ROOM_BYTES:
-                break
-            smaller = pool.map(partial(small_png, width=width), figures.values())
-            images = dict(zip(figures, smaller, strict=True))
-    return images
 
 
 def _panel(name: str, heading: str, png: bytes, group: list[Chart]) -> Panel:

@@ -96,21 +96,21 @@ class SweepFolder:
 
 
 @dataclass
-class _Axis:
+class _SweepAxis:
     path: str
     unit: str
     values: list[Any]
 
 
 @dataclass
-class _Followed:
+class _SweepFollowed:
     name: str
     case: str
     unit: str
 
 
 @dataclass
-class _Point:
+class _SweepPoint:
     values: list[float | None]
     status: str
     reason: str
@@ -119,14 +119,14 @@ class _Point:
 
 
 @dataclass
-class _Cost:
+class _SweepCost:
     this_call_s: float | None = None
     peak_rss_mb: float | None = None
     stages_s: dict[str, float | None] = field(default_factory=dict)
 
 
 @dataclass
-class _Sample:
+class _SweepSample:
     seed: int
     inputs: dict[str, Any]
     numbers: list[SampledNumber]
@@ -138,13 +138,13 @@ class _Sweep:
 
     scene: str
     title: str
-    axes: list[_Axis]
-    followed: list[_Followed]
+    axes: list[_SweepAxis]
+    followed: list[_SweepFollowed]
     plan: dict[str, Any]
-    cost: _Cost
-    points: list[_Point]
+    cost: _SweepCost
+    points: list[_SweepPoint]
     text: str
-    sample: _Sample | None = None
+    sample: _SweepSample | None = None
 
 
 def read_sweep(folder: Path) -> SweepFolder:

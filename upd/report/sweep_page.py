@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from upd.labels import number, percent_of, unit_label
+from upd.labels import number, unit_label
 from upd.plot.sample_charts import sample_charts
 from upd.plot.sweep_charts import Followed, sheet_name, sweep_charts
 from upd.report.page import Section, Verdict, versions_text, write_page
 from upd.report.panels import Panel, make_panels
 from upd.report.sweep_folder import SweepFolder, read_sweep
-from upd.report.tables import filled, stage_table
+from upd.report.tables import SAMPLE_HEADING, filled, sample_table, stage_table, with_unit
 from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_label
-from upd.results.sampled import SampledNumber, sample_sentence
+from upd.results.sampled import sample_sentence
 
 #: rows of the table on the page; all of them are in table.csv
 MOST_ROWS = 500
@@ -54,8 +54,8 @@ def sweep_sections(sweep: SweepFolder) -> list[Section]:
     return [
         _grid(sweep),
         Section(
-            "Bands by the inputs, to first order and sampled",
-            [_sample_table(sweep.sampled)],
+            SAMPLE_HEADING,
+            [sample_table(sweep.sampled)],
             texts=[f"{sample_sentence(sweep.sampled)} sample.csv has all digits."]
             if sweep.sampled
             else [],
@@ -126,37 +126,6 @@ def _title(column: Mapping[str, Any]) -> str:
     return number_label(column["name"]) + (f" ({column['case']})" if column["case"] else "")
 
 
-def _with_unit(title: str, unit: str) -> str:
-    return f"{title}, {unit_label(unit)}" if unit else title
-
-
-def _sample_table(numbers: Sequence[SampledNumber]) -> AnswerTable:
-    """Every number with its first-order band and the sampled one."""
-
-    def band(value: float | None) -> str:
-        return "" if value is None else f"±{percent_of(value)}"
-
-    def ends(*values: float | None, text: Any = number) -> str:
-        return " to ".join(text(value) for value in values if value is not None)
-
-    middle = "middle 95 %" if all(n.resolved for n in numbers) else "least to largest"
-    columns = {
-        "number": [_with_unit(_title({"name": n.name, "case": n.case}), n.unit) for n in numbers],
-        "# as given": [number(n.nominal) for n in numbers],
-        "# first order": [band(n.first_order) for n in numbers],
-        "# sample": [band(n.band) for n in numbers],
-        "# 95 % interval of the sample's band": [
-            ends(n.band_low, n.band_high, text=percent_of) for n in numbers
-        ],
-        "# mean": [number(n.mean) for n in numbers],
-        "# standard deviation": [number(n.deviation) for n in numbers],
-        f"# {middle}": [ends(n.low, n.high) for n in numbers],
-        "# points": [str(n.count) for n in numbers],
-        "compared": [n.verdict for n in numbers],
-    }
-    return filled("Sample", columns)
-
-
 def verdict(points: Sequence[Mapping[str, Any]]) -> Verdict:
     """How the points ended."""
     failed = sum(p["status"] != "ok" for p in points)
@@ -206,7 +175,7 @@ def _points_table(sweep: SweepFolder) -> AnswerTable:
     """A row per point; numbers without a value at any point have no column."""
     points, places = sweep.data["points"][:MOST_ROWS], sweep.places[:MOST_ROWS]
     columns = {
-        f"# {_with_unit(p.short, p.unit)}": [p.shown(place[k]) for place in places]
+        f"# {with_unit(p.short, p.unit)}": [p.shown(place[k]) for place in places]
         for k, p in enumerate(sweep.parameters)
     }
     empty = []
@@ -214,7 +183,7 @@ def _points_table(sweep: SweepFolder) -> AnswerTable:
         if np.isnan(values).all():
             empty.append(_title(one))
             continue
-        columns[f"# {_with_unit(_title(one), one['unit'])}"] = [
+        columns[f"# {with_unit(_title(one), one['unit'])}"] = [
             "" if np.isnan(v) else number(float(v)) for v in values
         ]
     columns |= {

@@ -23,6 +23,7 @@ from upd.plot.chart import Entry
 from upd.results import read_part, worst_checks
 from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_label
+from upd.results.sampled import SampledNumber
 
 #: columns of numbers that a narrow terminal leaves out, the first one first
 SPARE = ("source", "thesis", "reference", "difference", "±")
@@ -32,6 +33,7 @@ _MOST = 8
 _CASES = 8
 #: heading of numbers that belong to no case
 _WHOLE = "whole run"
+SAMPLE_HEADING = "Bands by the inputs, to first order and sampled"
 
 
 def filled(heading: str, columns: Mapping[str, Sequence[str]], note: str = "") -> AnswerTable:
@@ -141,8 +143,7 @@ def _case_table(cases: Sequence[Sequence[Entry]]) -> AnswerTable:
     shown_cases = cases[: _CASES - (len(cases) > _CASES)]
     columns = {"case": [row[0]["case"] for row in shown_cases]}
     for k, entry in enumerate(cases[0]):
-        unit = unit_label(entry["unit"])
-        columns[f"# {number_label(entry['name'])}" + (f", {unit}" if unit else "")] = [
+        columns[f"# {with_unit(number_label(entry['name']), entry['unit'])}"] = [
             f"{shown(row[k], unit=False)} {plus_minus(row[k])}".rstrip() for row in shown_cases
         ]
     more = len(cases) - len(shown_cases)
@@ -234,3 +235,38 @@ def stage_table(seconds: Mapping[str, float]) -> AnswerTable:
         "# share": [f"{100.0 * s / total:.0f} %" for s in seconds.values()],
     }
     return filled("Cost", columns)
+
+
+def with_unit(title: str, unit: str) -> str:
+    """A title with the unit of its numbers."""
+    return f"{title}, {unit_label(unit)}" if unit else title
+
+
+def sample_table(numbers: Sequence[SampledNumber]) -> AnswerTable:
+    """Every number with its first-order band and the sampled one."""
+
+    def band(value: float | None) -> str:
+        return "" if value is None else f"±{percent_of(value)}"
+
+    def ends(*values: float | None, text: Callable[[float], str] = number) -> str:
+        return " to ".join(text(value) for value in values if value is not None)
+
+    middle = "middle 95 %" if all(n.resolved for n in numbers) else "least to largest"
+    columns = {
+        "number": [
+            with_unit(number_label(n.name) + (f" ({n.case})" if n.case else ""), n.unit)
+            for n in numbers
+        ],
+        "# as given": [number(n.nominal) for n in numbers],
+        "# first order": [band(n.first_order) for n in numbers],
+        "# sample": [band(n.band) for n in numbers],
+        "# 95 % interval of the sample's band": [
+            ends(n.band_low, n.band_high, text=percent_of) for n in numbers
+        ],
+        "# mean": [number(n.mean) for n in numbers],
+        "# standard deviation": [number(n.deviation) for n in numbers],
+        f"# {middle}": [ends(n.low, n.high) for n in numbers],
+        "# points": [str(n.count) for n in numbers],
+        "compared": [n.verdict for n in numbers],
+    }
+    return filled(SAMPLE_HEADING, columns)
