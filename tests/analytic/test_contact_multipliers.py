@@ -50,7 +50,7 @@ def test_pressure_of_consistent_forces_is_exact(nodes: int, power: int) -> None:
 def test_hertz_pressure_on_9_node_faces_does_not_alternate() -> None:
     """Over the middle of the contact force over area is up to 0.7 % off, in turns."""
     settings = {"want": ["normal"], "mesh.element": "hex27", "geometry.patch": "auto"}
-    settings |= {"geometry.divisions": 12, "loads.normal": ["200 N"]}
+    settings |= {"geometry.divisions": 12, "loads.normal": ["200 N"], "left_out.solve": "no"}
     fields = upd.run("hertz", overrides=settings).arrays["F=200 N"]
     x, y, p = (np.asarray(fields[name][1]) for name in ("x", "y", "pressure"))
     hertz = hertz_sphere(200.0, 5.0, contact_modulus(2e5, 0.3, 2e5, 0.3))
@@ -71,6 +71,7 @@ def test_hertz_with_every_element(element: str, divisions: int, bound: float) ->
         "geometry.patch": "auto",
         "geometry.divisions": divisions,
         "loads.normal": ["200 N"],
+        "left_out.solve": "no",
     }
     result = upd.run("hertz", overrides=settings)
     errors = {r.name: abs(r.error) for r in result.rows if r.error is not None}

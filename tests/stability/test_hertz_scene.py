@@ -19,7 +19,10 @@ NORMAL_ONLY = {
     "geometry.patch": "auto",
     "geometry.divisions": 20,
     "geometry.growth": 1.4,
+    "left_out.solve": "no",
 }
+#: what is left out is solved again, as by default
+WHOLE = {"left_out__solve": "yes"}
 
 
 def run(**changes: Any) -> RunResult:
@@ -125,6 +128,7 @@ def test_tangential_load_up_to_the_limit(ratio: float) -> None:
         want=["normal", "tangential", "stiffness"],
         loads__normal=["200 N"],
         loads__tangential=[ratio],
+        **WHOLE,
     )
     # At the limit tractions that may turn hold less than the limits of all nodes added up: one
     # direction leaves out what matters there, and the run says so.
@@ -143,6 +147,7 @@ def test_unlike_bodies_with_friction_are_refused_or_accepted_on_request() -> Non
         want=["normal", "tangential"],
         loads__normal=["0.02 N"],
         contact__coupling_limit=0.5,
+        **WHOLE,
     )
     # pressure alone lets the rim slip: that is what it costs, and all that the run warns of
     warned = {(c.name, c.quantity) for c in accepted.checks if not c.passed}
@@ -150,9 +155,10 @@ def test_unlike_bodies_with_friction_are_refused_or_accepted_on_request() -> Non
 
 
 def test_the_same_scene_in_m_and_in_mm() -> None:
-    mm = run(want=["normal", "tangential"])
+    few = {"want": ["normal", "tangential"], "geometry__divisions": 8}
+    mm = run(**few)
     m = run(
-        want=["normal", "tangential"],
+        **few,
         geometry__radius="0.005 m",
         geometry__block="0.01 m",
         materials__sphere__E="200e9 Pa",
@@ -165,13 +171,9 @@ def test_the_same_scene_in_m_and_in_mm() -> None:
 
 
 def test_everything_a_thousand_times_larger() -> None:
-    small = run(want=["normal", "tangential"], loads__normal=["200 N"])
-    large = run(
-        want=["normal", "tangential"],
-        loads__normal=["2e8 N"],
-        geometry__radius="5 m",
-        geometry__block="10 m",
-    )
+    few = {"want": ["normal", "tangential"], "geometry__divisions": 8}
+    small = run(**few, loads__normal=["200 N"])
+    large = run(**few, loads__normal=["2e8 N"], geometry__radius="5 m", geometry__block="10 m")
     for a, b in zip(small.rows, large.rows, strict=True):
         scale = {"um": 1e3, "um2": 1e6, "N/mm": 1e3}.get(a.unit, 1.0)
         assert b.value == pytest.approx(scale * a.value, rel=1e-9), a.name
@@ -221,9 +223,8 @@ def test_slip_in_two_directions_stays_near_one() -> None:
 def test_every_declared_check_is_made_whatever_is_asked(
     want: list[str], ratios: list[float]
 ) -> None:
-    result = run(
-        want=want, geometry__divisions=8, loads__normal=["200 N"], loads__tangential=ratios
-    )
+    few = {"geometry__divisions": 8, "loads__normal": ["200 N"]}
+    result = run(want=want, loads__tangential=ratios, **few, **WHOLE)
     assert result.status == "ok"
     for effect in result.effects:
         if effect["check"] and not effect["on"]:

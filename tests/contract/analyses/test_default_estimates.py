@@ -131,7 +131,7 @@ def test_an_accuracy_is_reached_on_the_cheapest_level() -> None:
     row = next(r for r in found.results if r.name == "K_N_secant_raw")
     assert row.estimated_error is not None
     assert row.estimated_error <= 0.1
-    finer = {"geometry.divisions": 16, "geometry.divisions_long": 32, "accuracy": "unknown"}
+    finer = {"geometry.divisions": 12, "geometry.divisions_long": 24, "accuracy": "unknown"}
     fine = upd.run("symmetric", overrides=WEDGE | finer)
     assert abs(row.value / fine.value("K_N_secant_raw") - 1.0) <= row.estimated_error
     assert any(e["name"] == "levels chosen by accuracy" for e in found.effects)

@@ -190,6 +190,8 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     scene = {
         "geometry.divisions": 12,
         "loads.normal": ["200 N"],
+        "loads.curve_points": 3,
+        "loads.cycle_steps": 40,
         "title": "<script>document.title = 'taken'</script> Hertz",
     }
     run(
