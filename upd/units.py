@@ -69,11 +69,9 @@ def parse_quantity(value: Any, kind: str) -> float:
             raise InputError(f"{value!r} is not a number with a unit ({known})")
         number, unit = float(match[1]), match[2]
     if unit not in table:
-        other = next((k for k, units in UNITS.items() if unit and unit in units), None)
         if not unit:
             raise InputError(f"{value!r} has no unit: add one of {known}")
-        message = f"{unit!r} is a unit of {other}" if other else f"unit {unit!r} is not known"
-        raise InputError(f"{message}; a {kind} is needed here: use one of {known}")
+        raise InputError(f"{_fault(unit)}; a {kind} is needed here: use one of {known}")
     if not math.isfinite(number):
         raise InputError(f"{value!r} is not finite")
     if number and not 1.0 / _LARGEST < abs(number) < _LARGEST:
@@ -108,10 +106,14 @@ def unit_factor(unit: str, kinds: Sequence[str]) -> tuple[str, float]:
     for kind in kinds:
         if unit and unit in UNITS[kind]:
             return kind, UNITS[kind][unit]
-    other = next((k for k, units in UNITS.items() if unit and unit in units), None)
-    fault = f"is a unit of {other}" if other else "is not known"
     known = "; ".join(f"of {kind} {', '.join(u for u in UNITS[kind] if u)}" for kind in kinds)
-    raise InputError(f"the unit {unit!r} {fault}; understood are those {known}")
+    raise InputError(f"{_fault(unit)}; understood are those {known}")
+
+
+def _fault(unit: str) -> str:
+    """What is wrong with a unit: of another kind, or not known."""
+    other = next((k for k, units in UNITS.items() if unit and unit in units), None)
+    return f"{unit!r} is a unit of {other}" if other else f"the unit {unit!r} is not known"
 
 
 def unit_inside(kind: str) -> str:

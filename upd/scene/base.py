@@ -6,37 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
-from pydantic import AfterValidator, ConfigDict
+from pydantic import ConfigDict
 
-from upd.errors import did_you_mean
 from upd.scene import quantities as q
 
 #: fields of a scene that no file gives: its text with the values alone, its uncertain inputs, and
 #: damping fitted to measured curves
 INSIDE = ("text", "uncertain", "fitted")
 STRICT = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
-
-
-@dataclass(frozen=True)
-class OutputNames:
-    """Outputs of an analysis, by name; any other name is an error that lists them or names the
-    nearest.
-    """
-
-    outputs: Mapping[str, str]
-
-    def __call__(self, value: str) -> str:
-        if value not in self.outputs:
-            known = f"known: {', '.join(self.outputs)}"
-            raise ValueError(
-                f"{value!r} is not an output{did_you_mean(value, self.outputs, known)}"
-            )
-        return value
-
-
-def known_output(outputs: Mapping[str, str]) -> AfterValidator:
-    """A name that is none of ``outputs`` is an error that lists them or names the nearest."""
-    return AfterValidator(OutputNames(outputs))
 
 
 @dataclass(frozen=True)

@@ -14,49 +14,29 @@ from upd.scene.base import (
     MaterialData,
     Rotation,
     SceneBase,
-    known_output,
     repeated,
 )
 
-#: Outputs a scene can ask for, and what each one is.
-WANTS = {
-    "normal": "pressure, contact area and radius, approach",
-    "stiffness": "normal (and, with friction, tangential) contact stiffness",
-    "curve": "force-approach curve up to the largest load",
-    "body_compression": "approach split into contact and finite body",
-    "tangential": "stick and slip under tangential load",
-    "cycle": "hysteresis loop of a full tangential cycle",
-    "fields": "displacement of the whole bodies as VTU",
-    "worn_zones": "where the pressure peaks are",
-    "contact_law": "contact points for a dynamic model: position, normal, k_n, k_t, preload",
-}
+#: Outputs a scene can ask for.
+WANTS = (
+    "normal",
+    "stiffness",
+    "curve",
+    "body_compression",
+    "tangential",
+    "cycle",
+    "fields",
+    "worn_zones",
+    "contact_law",
+)
+Want = Annotated[str, q.one_of(WANTS), q.Example('"normal"', '"stiffness"')]
 #: Outputs each analysis of a contact can give.
-CONTACT_WANTS = {
-    "curved contact": (
-        "normal",
-        "stiffness",
-        "curve",
-        "body_compression",
-        "tangential",
-        "cycle",
-        "fields",
-    ),
-    "flat contact": (
-        "normal",
-        "stiffness",
-        "curve",
-        "tangential",
-        "cycle",
-        "fields",
-        "worn_zones",
-        "contact_law",
-    ),
+CONTACT_WANTS: dict[str, tuple[str, ...]] = {
+    "curved contact": tuple(w for w in WANTS if w not in ("worn_zones", "contact_law")),
+    "flat contact": tuple(w for w in WANTS if w != "body_compression"),
 }
 #: Outputs that call for friction when there is some.
 FRICTION_WANTS = ("stiffness", "tangential", "cycle", "contact_law")
-
-
-Want = Annotated[str, known_output(WANTS), q.Example('"normal"', '"stiffness"')]
 
 
 #: words of contact.coupling
@@ -182,6 +162,14 @@ class Scene(SceneBase):
 
     Attributes
     ----------
+    want
+        Outputs: "normal", pressure, contact area and radius, approach; "stiffness", normal (and,
+        with friction, tangential) contact stiffness; "curve", force-approach curve up to the
+        largest load; "body_compression", approach split into contact and finite body; "tangential",
+        stick and slip under tangential load; "cycle", hysteresis loop of a full tangential cycle;
+        "fields", displacement of the whole bodies as VTU; "worn_zones", where the pressure peaks
+        are; "contact_law", contact points for a dynamic model: position, normal, k_n, k_t, preload.
+        Cost: upd plan shows what each brings with it.
     materials
         One per body of the recipe.
     """

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.scene import quantities as q
-from upd.scene.base import STRICT, MeshChoice, known_output
+from upd.scene.base import STRICT, MeshChoice
 from upd.scene.forced_contact import FrictionChoice, Side, StiffnessChoice
 from upd.scene.measured import (
     FROM_MEASURED,
@@ -27,16 +27,17 @@ from upd.scene.measured import (
 )
 from upd.scene.rig import DamperChoice, RigBase
 
-#: Outputs a forced response can give, and what each one is.
-FORCED_WANTS = {
-    "response": "free, stuck and nonlinear accelerance of both blades over frequency",
-    "contact_state": "which points stick, slip or lift off, over frequency and at the peak",
-    "hysteresis": "loops of the points that dissipate most, energy and power of every point",
-    "damper_motion": "the damper's translations and rotations at the peak, static part included",
-    "performance": "peaks of both blades against F_C/F_E, the best one marked",
-    "inputs": "what the peaks depend on most: stiffness, patch, friction, static state, fit",
-    "band": "every peak over the static states and the start positions of the sliders",
-}
+#: Outputs a forced response can give.
+FORCED_WANTS = (
+    "response",
+    "contact_state",
+    "hysteresis",
+    "damper_motion",
+    "performance",
+    "inputs",
+    "band",
+)
+ForcedWant = Annotated[str, q.one_of(FORCED_WANTS), q.Example('"response"', '"contact_state"')]
 #: the analysis these scenes ask for
 FORCED = "forced response"
 #: tables that only a forced response has
@@ -214,6 +215,15 @@ class ForcedScene(RigBase):
 
     Attributes
     ----------
+    want
+        Outputs: "response", free, stuck and nonlinear accelerance of both blades over frequency;
+        "contact_state", which points stick, slip or lift off, over frequency and at the peak;
+        "hysteresis", loops of the points that dissipate most, energy and power of every point;
+        "damper_motion", the damper's translations and rotations at the peak, static part included;
+        "performance", peaks of both blades against F_C/F_E, the best one marked; "inputs", what the
+        peaks depend on most: stiffness, patch, friction, static state, fit; "band", every peak over
+        the static states and the start positions of the sliders. Cost: upd plan shows what each
+        brings with it.
     analysis
         What distinguishes this scene from one of the rig's modes.
     stiffness
@@ -223,9 +233,7 @@ class ForcedScene(RigBase):
     """
 
     analysis: Literal["forced response"]
-    want: Annotated[
-        tuple[Annotated[str, known_output(FORCED_WANTS), q.Example('"response"')], ...], q.FILLED
-    ]
+    want: Annotated[tuple[ForcedWant, ...], q.FILLED]
     stiffness: Annotated[
         Mapping[q.Name, StiffnessChoice],
         q.FILLED,

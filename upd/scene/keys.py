@@ -20,8 +20,16 @@ from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.fields import table
 from upd.mesh.recipe_modules import READY
-from upd.scene.base import INSIDE, OutputNames
-from upd.scene.hints import hint_at, hints, named_table, notes, quantity_kind, without_notes
+from upd.scene.base import INSIDE
+from upd.scene.hints import (
+    hint_at,
+    hints,
+    must_be_given,
+    named_table,
+    notes,
+    quantity_kind,
+    without_notes,
+)
 from upd.scene.quantities import Noted, Rule
 from upd.scene.rotation import damper_mass
 from upd.scene.toml import toml_key, toml_value
@@ -278,14 +286,14 @@ def chosen_keys(keys: Sequence[SceneKey], asked: str) -> list[SceneKey]:
 
 
 def _walk(cls: type[Any], value: Any, usual: Any, path: Steps, given: Any) -> Iterator[SceneKey]:
-    """Keys of one table, first its own, then those of the tables in it.
+    """Keys of one table, first its own, then those of the tables in it; what must be given first.
 
     ``usual`` is the table that a scene without it has, if any.
     """
     texts, types = entries(cls), hints(cls)
     tables: list[Iterator[SceneKey]] = []
     known = [f for f in fields(cls) if f.name not in INSIDE]
-    for f in sorted(known, key=lambda f: f.name in _LAST):
+    for f in sorted(known, key=lambda f: (f.name in _LAST, not must_be_given(f))):
         here = getattr(value, f.name) if value is not None else None
         mine = given.get(f.name, {}) if isinstance(given, Mapping) else {}
         hint, where = types[f.name], (*path, f.name)
@@ -365,7 +373,6 @@ def _bounds(hint: Any) -> str:
     noted, whole = list(notes(hint)), "whole number " * (inner is int)
     out += [f"{whole}{n.bounds}" for n in noted if isinstance(n, Rule)]
     out += [n.bounds for n in noted if isinstance(n, Noted) and n.bounds]
-    out += [", ".join(n.outputs) for n in noted if isinstance(n, OutputNames)]
     return "; ".join(out)
 
 

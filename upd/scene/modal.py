@@ -9,19 +9,13 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
 from upd.scene import quantities as q
-from upd.scene.base import STRICT, MeshChoice, known_output, repeated
+from upd.scene.base import STRICT, MeshChoice, repeated
 from upd.scene.measured import FROM_MEASURED, UNTIL_READ, MeasuredChoice, measured_problems
 from upd.scene.rig import RigBase, rig_problems
 
-#: Outputs a rig scene can ask for, and what each one is.
-MODAL_WANTS = {
-    "free": "modes of the two blades without a damper",
-    "glued": "modes with the damper glued between the platforms",
-    "reduction": "Craig-Bampton models of both blades, checked against the full ones",
-    "response": "linear frequency response at both accelerometers",
-    "pictures": "pictures of the mode shapes, and the shapes as VTU",
-    "matrices": "reduced K and M as Matrix Market files with the map of their dofs",
-}
+#: Outputs a rig scene can ask for.
+MODAL_WANTS = ("free", "glued", "reduction", "response", "pictures", "matrices")
+ModalWant = Annotated[str, q.one_of(MODAL_WANTS), q.Example('"free"', '"glued"')]
 
 
 @dataclass(frozen=True)
@@ -112,6 +106,13 @@ class ModalScene(RigBase):
 
     Attributes
     ----------
+    want
+        Outputs: "free", modes of the two blades without a damper; "glued", modes with the damper
+        glued between the platforms; "reduction", Craig-Bampton models of both blades, checked
+        against the full ones; "response", linear frequency response at both accelerometers;
+        "pictures", pictures of the mode shapes, and the shapes as VTU; "matrices", reduced K and M
+        as Matrix Market files with the map of their dofs. Cost: upd plan shows what each brings
+        with it.
     measured
         Measured responses by name, beside the computed one: "free" of the right blade, "stuck" of
         both with the damper glued.
@@ -119,10 +120,7 @@ class ModalScene(RigBase):
 
     analysis: ClassVar[str] = "rig"
 
-    want: Annotated[
-        tuple[Annotated[str, known_output(MODAL_WANTS), q.Example('"free"', '"glued"')], ...],
-        q.FILLED,
-    ]
+    want: Annotated[tuple[ModalWant, ...], q.FILLED]
     mesh: MeshChoice = field(default_factory=lambda: MeshChoice(element="hex20"))
     modes: ModesChoice = field(default_factory=ModesChoice)
     reduction: ReductionChoice = field(default_factory=ReductionChoice)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator
 
-from upd.errors import InputError
+from upd.errors import InputError, did_you_mean
 from upd.units import parse_quantity, quantity_text
 
 #: tables of a scene, a name, and places in lists
@@ -97,16 +97,14 @@ class Rule:
     """What a value must hold; ``message`` ends the sentence that begins with one that does not."""
 
     holds: Callable[[Any], bool]
-    message: str
+    message: str | Callable[[Any], str]
     bounds: str
 
     def __call__(self, value: Any) -> Any:
         if not self.holds(value):
-            raise ValueError(
-                f"{value:g} {self.message}"
-                if isinstance(value, float) or (isinstance(value, int) and abs(value) < 10**15)
-                else f"{value!r} {self.message}"
-            )
+            message = self.message if isinstance(self.message, str) else self.message(value)
+            short = isinstance(value, float) or (isinstance(value, int) and abs(value) < 10**15)
+            raise ValueError(f"{value:g} {message}" if short else f"{value!r} {message}")
         return value
 
 
@@ -122,6 +120,16 @@ def must(rule: Callable[[Any], bool], message: str, bounds: str = "") -> AfterVa
     words, for the reference of the keys (without them what the message forbids).
     """
     return AfterValidator(Rule(rule, message, bounds or f"none that {message.partition(';')[0]}"))
+
+
+def one_of(names: Sequence[str]) -> AfterValidator:
+    """A name that is none of ``names`` is a problem that lists them or names the nearest."""
+    known = ", ".join(names)
+
+    def message(value: Any) -> str:
+        return f"is none of its values{did_you_mean(value, names, f'write one of {known}')}"
+
+    return AfterValidator(Rule(lambda v: v in names, message, known))
 
 
 def is_whole(value: Any) -> bool:

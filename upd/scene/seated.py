@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from upd.scene import quantities as q
-from upd.scene.base import STRICT, known_output, repeated
+from upd.scene.base import STRICT, repeated
 from upd.scene.rig import (
     DamperChoice,
     FaceFriction,
@@ -16,14 +16,9 @@ from upd.scene.rig import (
     unreachable_accuracy,
 )
 
-#: Outputs of a seated damper, and what each one is.
-SEATED_WANTS = {
-    "seating": "forces, pressure, stick and slip of both faces while F_C is raised, lowered and "
-    "raised again",
-    "stiffness": "stuck stiffness of each face, and from platform to platform through the damper",
-    "band": "forces after other ways of loading: over-pressed, vibrated in",
-    "moved": "hysteresis while the right blade is moved",
-}
+#: Outputs of a seated damper.
+SEATED_WANTS = ("seating", "stiffness", "band", "moved")
+SeatedWant = Annotated[str, q.one_of(SEATED_WANTS), q.Example('"seating"', '"stiffness"')]
 #: the analysis these scenes ask for
 SEATED = "seated damper"
 #: tables that only this scene has
@@ -125,14 +120,18 @@ class SeatedScene(RigBase):
 
     Attributes
     ----------
+    want
+        Outputs: "seating", forces, pressure, stick and slip of both faces while F_C is raised,
+        lowered and raised again; "stiffness", stuck stiffness of each face, and from platform to
+        platform through the damper; "band", forces after other ways of loading: over-pressed,
+        vibrated in; "moved", hysteresis while the right blade is moved. Cost: upd plan shows what
+        each brings with it.
     analysis
         What distinguishes this scene from the rig's others.
     """
 
     analysis: Literal["seated damper"]
-    want: Annotated[
-        tuple[Annotated[str, known_output(SEATED_WANTS), q.Example('"seating"')], ...], q.FILLED
-    ]
+    want: Annotated[tuple[SeatedWant, ...], q.FILLED]
     blades: BladesChoice = field(default_factory=BladesChoice)
     damper: DamperChoice = field(default_factory=DamperChoice)
     contact: SeatedContact = field(default_factory=SeatedContact)

@@ -106,7 +106,7 @@ def test_all_faults_in_one_message() -> None:
         ('loads.normal=["200 N", "200.00001 N"]', "duplicated"),
         ("name=../../x", "is no name"),
         ("geometry.divisions=auto", "needs an accuracy"),
-        ('want=["normal", "colour"]', "not an output"),
+        ('want=["normal", "colour"]', "'colour' is none of its values; write one of"),
         ("want=[]", "is empty"),
         ("solver.name=mumps", "solver.name"),
     ],
