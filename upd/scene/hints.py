@@ -58,12 +58,16 @@ def hint_at(scene: type[Any], steps: Sequence[str | int]) -> Any:
 
 
 def notes(hint: Any) -> Iterator[Any]:
-    """Everything noted in an annotation and in what it is made of, validators as functions."""
+    """Everything noted in an annotation and in what it is made of: validators as functions, and
+    choices.
+    """
     if get_origin(hint) is Annotated:
         for note in hint.__metadata__:
             yield note.func if isinstance(note, (AfterValidator, BeforeValidator)) else note
         yield from notes(get_args(hint)[0])
-    elif get_origin(hint) not in (None, Literal):
+    elif get_origin(hint) is Literal:
+        yield hint
+    elif get_origin(hint) is not None:
         for inside in get_args(hint):
             yield from notes(inside)
 

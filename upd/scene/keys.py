@@ -368,20 +368,12 @@ def _bounds(hint: Any) -> str:
     if get_origin(inner) is tuple:
         inside = get_args(inner)
         out.append("a list" if inside[-1] is Ellipsis else f"a list of {len(inside)}")
-    choices = [c for choice in _choices(hint) for c in get_args(choice)]
-    out += [", ".join(map(str, choices))] if choices else []
     noted, whole = list(notes(hint)), "whole number " * (inner is int)
+    choices = [str(c) for n in noted if get_origin(n) is Literal for c in get_args(n)]
+    out += [", ".join(choices)] if choices else []
     out += [f"{whole}{n.bounds}" for n in noted if isinstance(n, Rule)]
     out += [n.bounds for n in noted if isinstance(n, Noted) and n.bounds]
     return "; ".join(out)
-
-
-def _choices(hint: Any) -> Iterator[Any]:
-    if get_origin(hint) is Literal:
-        yield hint
-    elif get_origin(hint) is not None:
-        for inside in get_args(hint):
-            yield from _choices(inside)
 
 
 def _parted(entry: str) -> tuple[str, str]:
