@@ -244,7 +244,10 @@ def _validate(data: dict[str, Any]) -> tuple[AnyScene | None, list[str]]:
     recipe, wrong = scene.recipe, list[str]()
     if not problems:
         scene = replace(scene, geometry={"recipe": recipe, **parameters})
-        scene, wrong = DERIVED[kind](scene, own)
+        try:
+            scene = DERIVED[kind](scene, own)
+        except InputError as error:
+            wrong = list(error.args)
     problems += wrong or _PROBLEMS[kind](scene)
     if problems:
         return None, problems
