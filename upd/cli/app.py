@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import sys
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -33,6 +33,81 @@ app = App(
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class MeshConfiguration:
+    """What `upd mesh` makes of a recipe or scene.
+
+    Parameters
+    ----------
+    arrangement
+        Of a rig: which sides of the platforms face each other.
+    damper
+        Of a rig: left out, glued to both platforms, or a body of its own.
+    symmetry
+        half or quarter instead of the whole model.
+    element
+        Nodes per hexahedron; hex8 has 8.
+    """
+
+    arrangement: Literal["symmetric", "asymmetric"] | None = None
+    damper: Literal["none", "glued", "free"] | None = None
+    symmetry: Literal["full", "half", "quarter"] | None = None
+    element: Literal["hex8", "hex20", "hex27"] | None = None
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class SweepPoints:
+    """Which points a sweep solves, and who solves them.
+
+    Parameters
+    ----------
+    sample
+        Points drawn evenly from the limits of all inputs with a half-width (0.6 +- 0.1), in place
+        of --vary: a check of the bands by the inputs, which runs give to first order.
+    seed
+        Of the draw; without, that of the sample in the folder, else 0.
+    workers
+        Processes side by side; by default as many as cores and memory allow.
+    threads
+        Threads of each process. The last digits of numbers depend on it.
+    cluster
+        Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs
+        upd[cluster].
+    """
+
+    sample: int | None = None
+    seed: int | None = None
+    workers: int | None = None
+    threads: int = 1
+    cluster: str = ""
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class StudyWorkers:
+    """Who solves the points of a study.
+
+    Parameters
+    ----------
+    workers
+        Points side by side, each in a fresh process; more than one blurs what a point costs.
+    threads
+        Threads of each point; by default all there are, divided by the workers.
+    cluster
+        Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs
+        upd[cluster].
+    """
+
+    workers: int = 1
+    threads: int | None = None
+    cluster: str = ""
+
+
+_ANY_MESH, _ALL_POINTS, _ONE_WORKER = MeshConfiguration(), SweepPoints(), StudyWorkers()
 
 
 @app.command
@@ -106,10 +181,7 @@ def mesh(
     *,
     output: Annotated[list[Path] | None, Parameter(alias="-o")] = None,
     set: SetOption = None,
-    arrangement: Literal["symmetric", "asymmetric"] | None = None,
-    damper: Literal["none", "glued", "free"] | None = None,
-    symmetry: Literal["full", "half", "quarter"] | None = None,
-    element: Literal["hex8", "hex20", "hex27"] | None = None,
+    configuration: MeshConfiguration = _ANY_MESH,
     split: bool = False,
     picture: Path | None = None,
     no_picture: bool = False,
@@ -127,14 +199,6 @@ def mesh(
     output
         File to write: .msh, .vtu or .inp, by its ending; may be repeated; by default all three in
         runs/mesh-NAME.
-    arrangement
-        Of a rig: which sides of the platforms face each other.
-    damper
-        Of a rig: left out, glued to both platforms, or a body of its own.
-    symmetry
-        half or quarter instead of the whole model.
-    element
-        Nodes per hexahedron; hex8 has 8.
     split
         One file per body, FILE-BODY.msh and so on.
     picture
@@ -145,14 +209,13 @@ def mesh(
         Show the parameters with unit, default and bounds, and stop: nothing is meshed.
     """
     from upd.analyses.meshing import mesh_request
-    from upd.cli.mesh import mesh_files, picture_file, print_parameters, regenerate
+    from upd.cli.mesh import mesh_files, print_parameters, regenerate
 
-    chosen = {"arrangement": arrangement, "damper": damper, "symmetry": symmetry}
-    request = mesh_request(scene, set or [], element=element, **chosen)
+    request = mesh_request(scene, set or [], **asdict(configuration))
     if list:
         print_parameters(terminal.console, request)
         return
-    picture_file(picture)
+    terminal.check_ending(picture, "--picture", ".png")
     place = Path("runs") / f"mesh-{request.name}"
     free = next(folder for folder in numbered(place) if not folder.exists())
     files = mesh_files(output or [], free, request)
@@ -170,9 +233,7 @@ def study(
     at: str | None = None,
     set: SetOption = None,
     out: Path | None = None,
-    workers: int = 1,
-    threads: int | None = None,
-    cluster: str = "",
+    who: StudyWorkers = _ONE_WORKER,
 ) -> int:
     """Show what accuracy costs, or what parameters move.
 
@@ -202,13 +263,6 @@ def study(
         a seated damper.
     out
         Study folder; by default runs/study-NAME-VARY, with the load of --at.
-    workers
-        Points side by side, each in a fresh process; more than one blurs what a point costs.
-    threads
-        Threads of each point; by default all there are, divided by the workers.
-    cluster
-        Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs
-        upd[cluster].
     """
     from upd.batch.studies import plan_study, run_study, scene_at, study_workers
     from upd.cli.batch import print_study, print_study_plan
@@ -220,11 +274,11 @@ def study(
     with Live() as live:
         live("planning", "the points", None)
         planned = plan_study(loaded, vary, tuple(levels) if levels else None)
-        who = study_workers(loaded, planned, workers, threads, cluster)
-    print_study_plan(terminal.console, f"{loaded.title or loaded.name}, {vary}", planned, who)
+        workers = study_workers(loaded, planned, who.workers, who.threads, who.cluster)
+    print_study_plan(terminal.console, f"{loaded.title or loaded.name}, {vary}", planned, workers)
     folder = out or Path("runs") / f"study-{loaded.name}-{vary}{load}"
     with terminal.batch_progress() as watch:
-        result = run_study(loaded, planned, folder, workers=who, watch=watch)
+        result = run_study(loaded, planned, folder, workers=workers, watch=watch)
     print_study(terminal.console, result)
     return OK if result.report.found else FAILED
 
@@ -234,13 +288,9 @@ def sweep(
     scene: str,
     *,
     vary: list[str] | None = None,
-    sample: int | None = None,
-    seed: int | None = None,
+    points: SweepPoints = _ALL_POINTS,
     set: SetOption = None,
     out: Path | None = None,
-    workers: int | None = None,
-    threads: int = 1,
-    cluster: str = "",
     follow: str = "",
     plan_only: bool = False,
 ) -> int:
@@ -255,20 +305,8 @@ def sweep(
     ----------
     vary
         path=first:last:count[:log] or path=value,value,...; repeat for a grid.
-    sample
-        Points drawn evenly from the limits of all inputs with a half-width (0.6 +- 0.1), in place
-        of --vary: a check of the bands by the inputs, which runs give to first order.
-    seed
-        Of the draw; without, that of the sample in the folder, else 0.
     out
         Sweep folder; by default runs/sweep-NAME, or runs/sample-NAME.
-    workers
-        Processes side by side; by default as many as cores and memory allow.
-    threads
-        Threads of each process. The last digits of numbers depend on it.
-    cluster
-        Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs
-        upd[cluster].
     follow
         Names of the numbers for table and figures, with commas between; * stands for any letters.
     plan_only
@@ -281,22 +319,13 @@ def sweep(
     from upd.scene import load_scene
 
     loaded = load_scene(scene, set or [])
-    kind = "sweep" if sample is None else "sample"
+    kind = "sweep" if points.sample is None else "sample"
     folder = out or Path("runs") / f"{kind}-{loaded.name}"
     if not plan_only:
         PointStore(folder, "sweep").check()
     with Live() as live:
         live("planning", "what the points share", None)
-        planned = plan_sweep(
-            loaded,
-            vary or (),
-            folder,
-            sample=sample,
-            seed=seed,
-            workers=workers,
-            threads=threads,
-            cluster=cluster,
-        )
+        planned = plan_sweep(loaded, vary or (), folder, **asdict(points))
     print_sweep_plan(terminal.console, planned)
     if plan_only:
         return OK

@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from upd.cache.files import placed_file
+from upd.cli.terminal import check_ending
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.fields import table
@@ -64,7 +65,7 @@ def print_keys(console: Console, found: Described, asked: str) -> None:
     for steps, mine in groupby(chosen, key=lambda k: k.steps[:-1]):
         console.print(_table(".".join(steps), list(mine)))
     example = f"upd describe SCENE KEY, for example {chosen[-1].path}"
-    console.print(Text(f"Bold: not the default. A key in full: {example}.", "dim"))
+    console.print(Text(f"A key in full: {example}.", "dim"))
 
 
 def _table(name: str, keys: Sequence[SceneKey]) -> Table:
@@ -77,10 +78,11 @@ def _table(name: str, keys: Sequence[SceneKey]) -> Table:
     out.add_column("what it is", overflow="fold", ratio=1)
     for key in keys:
         changed = key.value and key.value != key.default != "must be given"
+        value = f"{key.value} (default {key.default})" if changed else key.value or key.default
         cost = "" if key.cost == "none" else f" Cost: {key.cost}."
         out.add_row(
             Text(key.name),
-            Text(key.value or key.default, "bold" if changed else ""),
+            Text(value, "bold" if changed else ""),
             key.unit,
             Text(key.bounds),
             Text.assemble(key.meaning, (cost, "dim")),
@@ -117,8 +119,7 @@ def _print_one(console: Console, key: SceneKey, params: Any) -> None:
 
 def write_drawing(found: Described, path: Path) -> Path:
     """Draw the geometry with its dimensions. Raises InputError for a place that is no .png file."""
-    if path.suffix.lower() != ".png":
-        raise InputError(f"--drawing {path}: the ending {path.suffix!r} is not known; use .png")
+    check_ending(path, "--drawing", ".png")
     # matplotlib takes a while to import
     from upd.plot.drawing import draw_sections
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import platform
+from contextlib import suppress
 from importlib import metadata
+from pathlib import Path
 
 from upd import __version__
 from upd.errors import UpdError
@@ -23,6 +25,7 @@ _PACKAGES = (
     "h5netcdf",
     "matplotlib",
 )
+_NO_MKL = 'not installed: pip install "upd[mkl]" makes the direct solver more than ten times faster'
 
 
 def examine() -> list[tuple[str, str, bool]]:
@@ -34,22 +37,12 @@ def examine() -> list[tuple[str, str, bool]]:
         ("memory", f"{_memory_gb():.1f} GB", True),
     ]
     for package in _PACKAGES:
+        optional = package in ("pypardiso", "mkl")
         try:
             rows.append((package, metadata.version(package), True))
         except metadata.PackageNotFoundError:
-            optional = package in ("pypardiso", "mkl")
-            rows.append(
-                (
-                    package,
-                    'not installed: pip install "upd[mkl]" makes the direct solver more '
-                    "than ten times faster"
-                    if optional
-                    else "missing",
-                    optional,
-                )
-            )
-    found = select.available()
-    rows += [(name, str(value), True) for name, value in found.items()]
+            rows.append((package, _NO_MKL if optional else "missing", optional))
+    rows += [(name, str(value), True) for name, value in select.available().items()]
     try:
         rows.append(("gmsh libraries", recipes.gmsh_version(), True))
     except UpdError as error:
@@ -66,18 +59,14 @@ def machine() -> str:
 
 
 def _processor() -> str:
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as f:  # noqa: PTH123
-            for line in f:
-                if line.startswith("model name"):
-                    return line.split(":", 1)[1].strip()
-    except OSError:
-        pass
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
     return platform.processor() or platform.machine()
 
 
 def _memory_gb() -> float:
-    try:
+    with suppress(ValueError, OSError, AttributeError):
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9
-    except (ValueError, OSError, AttributeError):
-        return float("nan")
+    return float("nan")

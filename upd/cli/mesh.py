@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,9 @@ from rich.text import Text
 
 from upd.analyses.meshing import MeshRequest
 from upd.cache.files import placed_file
+from upd.cli.describe import Described, print_keys
 from upd.cli.tables import columns_of, print_table
+from upd.cli.terminal import check_ending
 from upd.errors import InputError
 from upd.labels import number
 from upd.mesh import Mesh, recipes
@@ -21,10 +24,8 @@ from upd.mesh.fields import table
 from upd.mesh.pairing import Pairs, check_pairs
 from upd.mesh.quality import centre_of, quality
 from upd.progress import Listener, Stages
-from upd.report.columns import TextColumn
+from upd.scene.keys import recipe_keys
 
-#: characters to which bounds may be folded
-_WORDS = 16
 #: nodes per hexahedron that a .inp file can hold
 _ABAQUS = (8, 20)
 
@@ -45,17 +46,8 @@ def mesh_files(given: Sequence[Path], folder: Path, request: MeshRequest) -> lis
             ) from error
         return [folder / f"{request.name}{ending}" for ending in endings]
     for path in given:
-        if path.suffix.lower() not in ENDINGS:
-            raise InputError(
-                f"{path}: the ending {path.suffix!r} is not known; use one of {', '.join(ENDINGS)}"
-            )
+        check_ending(path, "--output", *ENDINGS)
     return list(given)
-
-
-def picture_file(given: Path | None) -> None:
-    """Raise InputError for a picture that is no .png."""
-    if given is not None and given.suffix.lower() != ".png":
-        raise InputError(f"--picture {given}: the ending {given.suffix!r} is not known; use .png")
 
 
 def regenerate(
@@ -182,25 +174,16 @@ def _print_pairs(console: Console, pairs: Sequence[Pairs], meshes: Mapping[str, 
 
 
 def print_parameters(console: Console, request: MeshRequest) -> None:
-    """The table of a recipe's parameters: unit, default, bounds, and the bounds that the others
-    leave.
-    """
-    rows = table(request.parameters)
-    now = tuple("" if p.value == p.default else _value(p.value) for p in rows)
-    columns = [
-        TextColumn("parameter", tuple(p.name for p in rows)),
-        TextColumn("default", tuple("" if p.default is None else _value(p.default) for p in rows)),
-        TextColumn("now", now, rank=1),
-        TextColumn("unit", tuple(p.unit for p in rows)),
-        TextColumn("bounds", tuple(p.bounds for p in rows), folds=_WORDS),
-        TextColumn("allowed by the others", tuple(p.here for p in rows), folds=_WORDS),
+    """The parameters of a recipe, with the bounds that the others leave."""
+    recipe, params = request.recipe, request.parameters
+    here = {row.name: row.here for row in table(params)}
+    keys = [
+        replace(key, bounds=f"{key.bounds}; here {here[key.name]}") if here[key.name] else key
+        for key in recipe_keys(recipe, params)
     ]
-    print_table(console, columns, title=f"Parameters of {request.recipe}", box=SIMPLE_HEAD)
-    meaning = (
-        "allowed by the others: between these values the recipe's own checks pass while the other "
-        "parameters stay as they are."
-    )
-    console.print(Text(meaning, "dim"))
+    print_keys(console, Described(f"Parameters of {recipe}", keys, recipe, params), "")
+    meaning = "the recipe's own checks pass while the other parameters stay as they are."
+    console.print(Text(f"here: between these values {meaning}", "dim"))
 
 
 def _value(value: Any) -> str:

@@ -7,12 +7,14 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 from rich.console import Console
 from rich.text import Text
 
+from upd.errors import InputError
 from upd.report.columns import text_width
 
 if TYPE_CHECKING:
@@ -36,6 +38,13 @@ SetOption = Annotated[
 def warn(message: object, style: str = "") -> None:
     """A fault, a line on stderr."""
     errors.print(Text.assemble(("upd:", style), f" {message}"))
+
+
+def check_ending(path: Path | None, option: str, *endings: str) -> None:
+    """Raise InputError for a file of another ending, before anything is done."""
+    if path is not None and path.suffix.lower() not in endings:
+        known = ", ".join(endings)
+        raise InputError(f"{option} {path}: the ending {path.suffix!r} is not known; use {known}")
 
 
 class Notes(logging.Handler):

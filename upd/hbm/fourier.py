@@ -119,12 +119,10 @@ def harmonics(numbers: Iterable[int]) -> Harmonics:
     else:
         given = [] if any(k != whole for k, whole in given) else given
     if not given:
-        example = (
-            f"range({numbers + 1})" if isinstance(numbers, int) and numbers > 0 else "(0, 1, 3)"
-        )
+        form = f"range({numbers + 1})" if isinstance(numbers, int) and numbers > 0 else "(0, 1, 3)"
         raise InputError(
             f"harmonics: {numbers!r} is no set of whole numbers; to fix it: list them, for example "
-            f"{example}"
+            f"{form}"
         )
     ordered = tuple(sorted({whole for _, whole in given}))
     if not ordered or ordered[0] < 0 or ordered[-1] < 1:

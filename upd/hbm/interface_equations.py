@@ -233,15 +233,13 @@ class InterfaceEquations:
         slips = self.others + np.searchsorted(self.tangents, before)
         return np.concatenate([np.arange(self.others), slips])
 
-    def widened(
-        self, values: FloatArray, places: IntArray, more: float | None = None
-    ) -> FloatArray:
+    def widened(self, values: FloatArray, rows: IntArray, more: float | None = None) -> FloatArray:
         """Values of the unknowns so far among those with more nodes that may move.
 
         Parameters
         ----------
         values : (u,) ndarray
-        places : (u,) ndarray of int
+        rows : (u,) ndarray of int
             Their places.
         more : float, optional
             Of the others; by itself the slips they have.
@@ -252,7 +250,7 @@ class InterfaceEquations:
         """
         out = np.empty(self.size)
         out[self.others :] = self.slip[self.tangents - self.model.n] if more is None else more
-        out[places] = values
+        out[rows] = values
         return out
 
     def joined(self, q: FloatArray, rigid: FloatArray, slip: FloatArray) -> FloatArray:

@@ -42,7 +42,8 @@ def module_of(recipe: str) -> ModuleType:
     if recipe.endswith(".py"):
         return _user_module(Path(recipe))
     if is_mesh(recipe):
-        return _mesh_module(Path(recipe))
+        digest = hashlib.sha256(_content(Path(recipe), "a mesh")).hexdigest()
+        return _read_mesh(str(Path(recipe).resolve()), digest)
     if recipe not in READY:
         ready = f"ready: {', '.join(READY)}, or the path of a .py file or of a mesh (.msh, .inp)"
         raise InputError(f"recipe {recipe!r}: is not known{did_you_mean(recipe, READY, ready)}")
@@ -68,38 +69,31 @@ def geometry_module(name: str) -> ModuleType:
     return importlib.import_module(f"geometry.{name}")
 
 
-def _mesh_module(path: Path) -> ModuleType:
-    """The user's mesh file as a recipe, read afresh whenever it changed."""
+def _content(path: Path, what: str) -> bytes:
+    """What the user's file holds. Raises InputError where it cannot be read."""
     try:
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        return path.read_bytes()
     except OSError as problem:
         raise InputError(
-            f"recipe {str(path)!r}: cannot be read ({problem.strerror}); give the path of a mesh"
+            f"recipe {str(path)!r}: cannot be read ({problem.strerror}); give the path of {what}"
         ) from None
-    return _read_mesh(str(path.resolve()), digest)
 
 
 @functools.lru_cache(maxsize=4)
 def _read_mesh(path: str, digest: str) -> ModuleType:
-    """The mesh of a file of this content."""
+    """The user's mesh file as a recipe, read afresh whenever its content changed."""
     del digest
     return recipe_of(Path(path))
 
 
 def _user_module(path: Path) -> ModuleType:
     """The user's recipe file, run afresh whenever its text changed."""
-    try:
-        source = path.read_bytes()
-    except OSError as problem:
-        raise InputError(
-            f"recipe {str(path)!r}: cannot be read ({problem.strerror}); give the path of "
-            "a .py file"
-        ) from None
+    source = _content(path, "a .py file")
     geometry_module("blocks")  # a recipe imports from our package: say so first when it is hidden
     name = f"upd_recipe_{hashlib.sha256(str(path.resolve()).encode() + source).hexdigest()[:16]}"
     if name in sys.modules:
         return sys.modules[name]
-    _tell_first(path, name)
+    _warn_first(path, name)
     module = ModuleType(name)
     module.__file__ = str(path.resolve())
     # dataclasses and typing look the module up by name
@@ -116,7 +110,7 @@ def _user_module(path: Path) -> ModuleType:
     return module
 
 
-def _tell_first(path: Path, name: str) -> None:
+def _warn_first(path: Path, name: str) -> None:
     """Say that a scene runs the code of a file, the first time it does so on this machine."""
     mark = cache_folder() / "recipes" / name
     if mark.exists():

@@ -239,8 +239,8 @@ def placement(recipe: str, params: Mapping[str, Any]) -> tuple[FloatArray, Float
 
 
 def damper_sizes(recipe: str, params: Mapping[str, Any]) -> DamperSizes | None:
-    """The damper the parameters describe and its contact; None when the recipe does not tell
-    (its damper_sizes(params)).
+    """The damper the parameters describe and its contact; None when the recipe has no
+    damper_sizes(params).
     """
     declared = getattr(module_of(recipe), "damper_sizes", None)
     if not callable(declared):
@@ -256,9 +256,7 @@ def damper_sizes(recipe: str, params: Mapping[str, Any]) -> DamperSizes | None:
 def _declared(recipe: str, function: str, what: str) -> Callable[[Any], Any]:
     found = getattr(module_of(recipe), function, None)
     if not callable(found):
-        raise InputError(
-            f"recipe {recipe!r}: does not tell the {what}; add a function {function}(params)"
-        )
+        raise InputError(f"recipe {recipe!r}: has no {what}; add a function {function}(params)")
     declared: Callable[[Any], Any] = found
     return declared
 

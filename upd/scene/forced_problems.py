@@ -97,15 +97,11 @@ def _whole_faces_problems(scene: ForcedScene) -> list[str]:
             'contact.model = "interface" needs "hex8i"'
         )
     if others:
-        add(
-            f"want: {', '.join(others)}: only of contact points with springs; with contact.model = "
-            f'"interface" take of {", ".join(WHOLE_FACES_WANTS)}'
-        )
+        known = ", ".join(WHOLE_FACES_WANTS)
+        add(f'want: contact.model = "interface" has no {", ".join(others)}; take of {known}')
     if integrated and scene.balance.method == "balance":
-        add(
-            f"want: {', '.join(integrated)}: of whole faces from the sweeps alone: write "
-            'balance.method = "march"'
-        )
+        which = ", ".join(integrated)
+        add(f'want: {which} of whole faces: from sweeps alone, write balance.method = "march"')
     return problems
 
 

@@ -1,11 +1,11 @@
-"""Annotations of a scene's tables: that at a path of it, and what is noted of a value."""
+"""Annotations of a scene's tables: the one at a path, and what it notes of a value."""
 
 from __future__ import annotations
 
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import is_dataclass
+from dataclasses import MISSING, Field, is_dataclass
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import AfterValidator, BeforeValidator
@@ -13,9 +13,19 @@ from pydantic import AfterValidator, BeforeValidator
 from upd.scene.quantities import Noted, QuantityReader
 
 
+def path_of(steps: Sequence[str | int]) -> str:
+    """The path in the file: "loads.normal[0]"."""
+    return "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in steps).lstrip(".")
+
+
 def hints(cls: Any) -> dict[str, Any]:
     """Annotations of a class's fields, by name."""
     return typing.get_type_hints(cls, include_extras=True)
+
+
+def must_be_given(f: Field[Any]) -> bool:
+    """Whether a field of a table has no default."""
+    return f.default is MISSING and f.default_factory is MISSING
 
 
 def without_notes(hint: Any) -> Any:
@@ -48,12 +58,16 @@ def hint_at(scene: type[Any], steps: Sequence[str | int]) -> Any:
 
 
 def notes(hint: Any) -> Iterator[Any]:
-    """Everything noted in an annotation and in what it is made of, validators as functions."""
+    """Everything noted in an annotation and in what it is made of: validators as functions, and
+    choices.
+    """
     if get_origin(hint) is Annotated:
         for note in hint.__metadata__:
             yield note.func if isinstance(note, (AfterValidator, BeforeValidator)) else note
         yield from notes(get_args(hint)[0])
-    elif get_origin(hint) not in (None, Literal):
+    elif get_origin(hint) is Literal:
+        yield hint
+    elif get_origin(hint) is not None:
         for inside in get_args(hint):
             yield from notes(inside)
 

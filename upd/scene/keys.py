@@ -21,7 +21,15 @@ from upd.mesh import recipes
 from upd.mesh.fields import table
 from upd.mesh.recipe_modules import READY
 from upd.scene.base import INSIDE
-from upd.scene.hints import hint_at, hints, named_table, notes, quantity_kind, without_notes
+from upd.scene.hints import (
+    hint_at,
+    hints,
+    must_be_given,
+    named_table,
+    notes,
+    quantity_kind,
+    without_notes,
+)
 from upd.scene.quantities import Noted, Rule
 from upd.scene.rotation import damper_mass
 from upd.scene.toml import toml_key, toml_value
@@ -278,14 +286,14 @@ def chosen_keys(keys: Sequence[SceneKey], asked: str) -> list[SceneKey]:
 
 
 def _walk(cls: type[Any], value: Any, usual: Any, path: Steps, given: Any) -> Iterator[SceneKey]:
-    """Keys of one table, first its own, then those of the tables in it.
+    """Keys of one table, first its own, then those of the tables in it; what must be given first.
 
     ``usual`` is the table that a scene without it has, if any.
     """
     texts, types = entries(cls), hints(cls)
     tables: list[Iterator[SceneKey]] = []
     known = [f for f in fields(cls) if f.name not in INSIDE]
-    for f in sorted(known, key=lambda f: f.name in _LAST):
+    for f in sorted(known, key=lambda f: (f.name in _LAST, not must_be_given(f))):
         here = getattr(value, f.name) if value is not None else None
         mine = given.get(f.name, {}) if isinstance(given, Mapping) else {}
         hint, where = types[f.name], (*path, f.name)
@@ -360,20 +368,12 @@ def _bounds(hint: Any) -> str:
     if get_origin(inner) is tuple:
         inside = get_args(inner)
         out.append("a list" if inside[-1] is Ellipsis else f"a list of {len(inside)}")
-    choices = [c for choice in _choices(hint) for c in get_args(choice)]
-    out += [", ".join(map(str, choices))] if choices else []
     noted, whole = list(notes(hint)), "whole number " * (inner is int)
+    choices = [str(c) for n in noted if get_origin(n) is Literal for c in get_args(n)]
+    out += [", ".join(choices)] if choices else []
     out += [f"{whole}{n.bounds}" for n in noted if isinstance(n, Rule)]
     out += [n.bounds for n in noted if isinstance(n, Noted) and n.bounds]
     return "; ".join(out)
-
-
-def _choices(hint: Any) -> Iterator[Any]:
-    if get_origin(hint) is Literal:
-        yield hint
-    elif get_origin(hint) is not None:
-        for inside in get_args(hint):
-            yield from _choices(inside)
 
 
 def _parted(entry: str) -> tuple[str, str]:

@@ -243,10 +243,11 @@ def _validate(data: dict[str, Any]) -> tuple[AnyScene | None, list[str]]:
         return None, problems
     recipe, wrong = scene.recipe, list[str]()
     if not problems:
-        given = scene.geometry
         scene = replace(scene, geometry={"recipe": recipe, **parameters})
-        scene, wrong = DERIVED[kind](scene, own)
-        scene = replace(scene, geometry=given)
+        try:
+            scene = DERIVED[kind](scene, own)
+        except InputError as error:
+            wrong = list(error.args)
     problems += wrong or _PROBLEMS[kind](scene)
     if problems:
         return None, problems

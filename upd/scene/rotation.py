@@ -7,7 +7,8 @@ newtons becomes F_C/F_E.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -39,101 +40,97 @@ def damper_mass(scene: Any) -> float | None:
     scene
         A forced response or a seated damper as it was loaded.
     """
-    volume, problem = _volume(scene)
-    return None if problem else (scene.damper.density or scene.material.density) * volume
+    density: float = scene.damper.density or scene.material.density
+    with suppress(InputError):
+        return density * _volume(scene)
+    return None
 
 
-def _modal(scene: ModalScene, data: Mapping[str, Any]) -> tuple[ModalScene, list[str]]:
-    fitted, problems = _fitted(scene, data, "response")
+def _modal(scene: ModalScene, data: Mapping[str, Any]) -> ModalScene:
+    fitted = _fitted(scene, data, "response")
     if not fitted:
-        return scene, problems
-    return replace(scene, response=replace(scene.response, damping=main_ratio(fitted))), []
+        return scene
+    return replace(scene, response=replace(scene.response, damping=main_ratio(fitted)))
 
 
-def _seated(scene: Any, data: Mapping[str, Any]) -> tuple[Any, list[str]]:
-    """The scene of a damper between two blades with its density and F_C."""
+def _seated(scene: Any, data: Mapping[str, Any], more: Sequence[str] = ()) -> Any:
+    """The scene of a damper between two blades with its density and F_C; `more` is wrong too."""
     damper = scene.damper
     problems = _problems("damper", damper, data.get("damper", {}))
     if damper.mass is not None and damper.density is not None:
         problems.append("damper: mass and density are both given; give one")
-    if problems:
-        return scene, problems
+    _refuse([*problems, *more])
     density, centrifugal = damper.density or scene.material.density, damper.centrifugal
     if damper.mass is not None or damper.speed is not None:
-        volume, problem = _volume(scene)
-        if problem:
-            return scene, [problem]
+        volume = _volume(scene)
         density = density if damper.mass is None else damper.mass / volume
         if damper.speed is not None and damper.radius is not None:
             centrifugal = density * volume * damper.radius * damper.speed**2
-    return replace(scene, damper=replace(damper, density=density, centrifugal=centrifugal)), []
+    return replace(scene, damper=replace(damper, density=density, centrifugal=centrifugal))
 
 
-def _forced(scene: ForcedScene, data: Mapping[str, Any]) -> tuple[ForcedScene, list[str]]:
-    e = scene.excitation
-    changed, problems = _seated(scene, data)
-    add = problems.append
+def _forced(scene: ForcedScene, data: Mapping[str, Any]) -> ForcedScene:
+    e, problems = scene.excitation, []
     wanted = data.get("excitation", {}).get("centrifugal_to_force")
-    if e.force and wanted is not None and wanted != FROM_FORCE:
-        add(
+    if e.force and wanted not in (None, FROM_FORCE):
+        problems.append(
             "excitation: force and centrifugal_to_force are both given; give one, or "
             f'centrifugal_to_force = "{FROM_FORCE}"'
         )
     if wanted == FROM_FORCE and not e.force:
-        add(f'excitation.centrifugal_to_force: "{FROM_FORCE}" needs excitation.force')
+        problems.append(f'excitation.centrifugal_to_force: "{FROM_FORCE}" needs excitation.force')
     if 0.0 in e.force:
-        add("excitation.force: 0 N excites nothing; give a positive force")
-    fitted, more = ((), []) if problems else _fitted(scene, data, "excitation")
-    problems += more
-    if problems:
-        return scene, problems
+        problems.append("excitation.force: 0 N excites nothing; give a positive force")
+    changed: ForcedScene = _seated(scene, data, problems)
+    fitted = _fitted(scene, data, "excitation")
     if fitted:
         changed, e = replace(changed, fitted=fitted), replace(e, damping=main_ratio(fitted))
     ratios = tuple(changed.damper.centrifugal / force for force in e.force)
     e = replace(e, centrifugal_to_force=ratios or e.centrifugal_to_force)
-    return replace(changed, excitation=e), []
+    return replace(changed, excitation=e)
 
 
 def _fitted(
     scene: ModalScene | ForcedScene, data: Mapping[str, Any], table: str
-) -> tuple[tuple[FittedMode, ...], list[str]]:
-    """Damping from the measured free curves where the table asks for it, and what is wrong."""
+) -> tuple[FittedMode, ...]:
+    """Damping from the measured free curves where the table asks for it."""
     # damaged files are found with the other problems
     if data.get(table, {}).get("damping") != FROM_MEASURED or measured_problems(scene.measured):
-        return (), []
-    try:
-        return fitted_modes(scene.measured, table), []
-    except InputError as error:
-        return (), [str(error)]
+        return ()
+    return fitted_modes(scene.measured, table)
 
 
-def _contact(scene: Scene, data: Mapping[str, Any]) -> tuple[Scene, list[str]]:
+def _contact(scene: Scene, data: Mapping[str, Any]) -> Scene:
     loads, mass = scene.loads, scene.loads.mass
     problems = _problems("loads", loads, data.get("loads", {}))
     if not problems and loads.speed is None and mass is not None:
         problems = ["loads.mass: counts for F_C = m r w^2 only; add radius and speed"]
-    if problems or loads.speed is None or loads.radius is None:
-        return scene, problems
+    _refuse(problems)
+    if loads.speed is None or loads.radius is None:
+        return scene
     if mass is None:
         material = scene.materials.get(_DAMPER)
         if material is None:
-            return scene, ["loads.mass: is missing; give the damper's mass"]
-        volume, problem = _volume(scene)
-        if problem:
-            return scene, [problem]
-        mass = material.density * volume
+            raise InputError("loads.mass: is missing; give the damper's mass")
+        mass = material.density * _volume(scene)
     force = mass * loads.radius * loads.speed**2
-    return replace(scene, loads=replace(loads, centrifugal=force)), []
+    return replace(scene, loads=replace(loads, centrifugal=force))
 
 
 #: class of a scene -> function of it and of its data as they were read: the scene with centrifugal
-#: force, density of the damper, force ratios and damping as numbers, and what is wrong with them
-DERIVED: Mapping[type[Any], Callable[[Any, Mapping[str, Any]], tuple[Any, list[str]]]] = {
+#: force, density of the damper, force ratios and damping as numbers. Raises InputError whose
+#: arguments are the problems.
+DERIVED: Mapping[type[Any], Callable[[Any, Mapping[str, Any]], Any]] = {
     Scene: _contact,
     ModalScene: _modal,
     ForcedScene: _forced,
     SeatedScene: _seated,
 }
+
+
+def _refuse(problems: Sequence[str]) -> None:
+    if problems:
+        raise InputError(*problems)
 
 
 def _problems(table: str, values: Rotation, given: Mapping[str, Any]) -> list[str]:
@@ -150,21 +147,20 @@ def _problems(table: str, values: Rotation, given: Mapping[str, Any]) -> list[st
     return []
 
 
-def _volume(scene: Any) -> tuple[float, str]:
-    """Volume of the scene's damper in mm3, or the problem."""
+def _volume(scene: Any) -> float:
+    """Volume of the scene's damper in mm3. Raises InputError where its recipe has none."""
     contact = isinstance(scene, Scene)
     own = {} if contact else {"arrangement": scene.arrangement}
     given = {k: v for k, v in scene.geometry.items() if k not in ("recipe", "damper")} | own
     try:
         sizes = recipes.damper_sizes(scene.recipe, {k: v for k, v in given.items() if v != "auto"})
     except InputError as error:
-        return 0.0, f"geometry: {error}"
+        raise InputError(f"geometry: {error}") from None
     if sizes is not None:
-        return sizes.volume, ""
-    remedy = (
-        "give loads.mass"
+        return sizes.volume
+    table, remedy = (
+        ("loads", "give loads.mass")
         if contact
-        else "give centrifugal and density instead, or add damper_sizes(params) to it"
+        else ("damper", "give centrifugal and density, or add damper_sizes(params) to it")
     )
-    table = "loads" if contact else "damper"
-    return 0.0, f"{table}: the recipe {scene.recipe!r} has no volume of the damper; {remedy}"
+    raise InputError(f"{table}: the recipe {scene.recipe!r} has no volume of the damper; {remedy}")

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from upd.errors import did_you_mean
 from upd.scene.base import INSIDE
 from upd.scene.forced import FORCED, FORCED_ONLY
-from upd.scene.hints import hint_at, hints, without_notes
+from upd.scene.hints import hint_at, hints, must_be_given, path_of, without_notes
 from upd.scene.quantities import Example
 from upd.scene.seated import SEATED, SEATED_ONLY, SeatedScene
 
@@ -32,8 +32,7 @@ def sentence(error: Any, scene: type[Any]) -> str:
     """One problem of a scene: its path in the file, what is wrong, and what to write instead."""
     # pydantic marks an error of a table's key by one more step
     location = tuple(step for step in error["loc"] if step != "[key]")
-    steps = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in location)
-    return f"{''.join(steps).lstrip('.') or 'scene'}: {_fault(error, location, scene)}"
+    return f"{path_of(location) or 'scene'}: {_fault(error, location, scene)}"
 
 
 def _fault(error: Any, location: Sequence[Any], scene: type[Any]) -> str:
@@ -128,7 +127,7 @@ def _items(wanted: Any, default: Any = None) -> tuple[str, ...]:
 def _table(cls: Any) -> str:
     """An inline table with the keys that must be there, or with the first one."""
     known: tuple[Field[Any], ...] = fields(cls)
-    needed = [f for f in known if f.default is MISSING and f.default_factory is MISSING]
+    needed = [f for f in known if must_be_given(f)]
     keys = [
         f"{f.name} = {_example(hints(cls)[f.name], None if f.default is MISSING else f.default)}"
         for f in needed or known[:1]

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from upd.errors import InputError
+from upd.scene.hints import path_of
 from upd.scene.keys import input_kind
 from upd.scene.quantities import Steps, Uncertainty
 from upd.units import parse_quantity
@@ -44,11 +45,6 @@ class GivenBand:
     unit: str
     band: str
     rest: str
-
-
-def path_of(steps: Steps) -> str:
-    """The path in the file: "loads.normal[0]"."""
-    return "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in steps).lstrip(".")
 
 
 def taken_out(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[GivenBand]]:
@@ -110,24 +106,20 @@ def uncertainties(
     for one in bands:
         path = path_of(one.steps)
         try:
-            found = _read(scene, one, recipe)
+            kind = input_kind(scene, recipe, one.steps)
+            if not kind:
+                raise InputError(
+                    "is no physical quantity known within limits, but chosen; to fix it: write it "
+                    "without +-"
+                )
+            value = parse_quantity(one.value, kind)
+            half = _half_width(one, kind, value)
+            found = Uncertainty(path, value, half, one.given, kind, one.steps)
             _check_ends(found, data, problems_of)
             out[path] = found
         except InputError as error:
             problems.append(f"{path}: {one.given!r}: {error}")
     return out, problems
-
-
-def _read(scene: type[Any], one: GivenBand, recipe: str) -> Uncertainty:
-    kind = input_kind(scene, recipe, one.steps)
-    if not kind:
-        raise InputError(
-            "is no physical quantity known within limits, but chosen; to fix it: write it "
-            "without +-"
-        )
-    value = parse_quantity(one.value, kind)
-    half = _half_width(one, kind, value)
-    return Uncertainty(path_of(one.steps), value, half, one.given, kind, one.steps)
 
 
 def _half_width(one: GivenBand, kind: str, value: float) -> float:

@@ -23,7 +23,7 @@ def test_all_keys_of_a_scene(capsys: pytest.CaptureFixture[str]) -> None:
     assert "Scene hertz: Half-sphere on a block" in told
     for table in ("[geometry]", "[materials.sphere]", "[contact]", "[left_out]"):
         assert table in told
-    assert "friction 0.3 >= 0" in told
+    assert "friction 0.3 (default 0.0) >= 0" in told
     assert 'E "200 GPa" MPa > 0' in told
 
 

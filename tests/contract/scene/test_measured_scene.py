@@ -81,7 +81,7 @@ def test_points_of_sweeps_know_the_file_they_were_solved_with(tmp_path: Path) ->
         ("", '"measured"', "needs a measured free curve"),
         (FREE + "centrifugal_to_force = 5.0", "0.005", "are both given"),
         ('[measured.free]\nfile = "free.csv"', "0.005", "are both missing"),
-        (FREE + 'unit = "furlong"', "0.005", "measured.free.unit: 'furlong' is no unit"),
+        (FREE + 'unit = "furlong"', "0.005", "measured.free.unit: 'furlong' is none"),
         (FREE.replace("free.csv", "no.csv"), "0.005", "no.csv, cannot be read"),
         (FREE + 'blade = "middle"', "0.005", "measured.free.blade"),
         (FREE + 'colum = "x"', "0.005", "did you mean 'column'"),
