@@ -10,7 +10,7 @@ from typing import Any
 
 from upd.analyses import analysis_of
 from upd.analyses.base import Plan
-from upd.analyses.flat.printed import printed_of
+from upd.analyses.flat.results import printed_of
 from upd.batch.ladder import Ladder, Levels, StudyReport, no_levels
 from upd.batch.study_point import Settings, SolvedPoint, StudyPoint, solved_alone
 from upd.batch.study_tables import TextTable

@@ -232,10 +232,6 @@ def with_inputs(results: Iterable[Result], found: InputParts) -> tuple[Result, .
     )
 
 
-#: name that scripts know
-Row = Result
-
-
 def with_parts(result: Result, parts: Iterable[ErrorPart]) -> Result:
     """The number with the parts of its error: their sum bounds it whatever their signs."""
     mine = tuple(parts)

@@ -45,11 +45,6 @@ def tangential_fields(traction: Array, slip: Array, stick: NDArray[np.bool_]) ->
     }
 
 
-def together_fields(pressure: Array) -> Variables:
-    """The pressure (n_x, n_y) in MPa under a tangential load, which coupled contact moves."""
-    return {"pressure": variable(XY, pressure, "MPa")}
-
-
 def path_group(path: LoadPath) -> tuple[str, ArrayGroup]:
     """Name and variables of a tangential path."""
     content = "cycle" if path.cycle else "path"

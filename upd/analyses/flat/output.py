@@ -8,18 +8,17 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.contact.output import (
+    XY,
     Variables,
     curve_group,
     lattice,
     normal_fields,
     path_group,
     tangential_fields,
-    together_fields,
     write_meshes,
 )
 from upd.analyses.flat.maps import FaceLattice, contact_law, corner, lattices, whole_area
-from upd.analyses.flat.printed import printed_of
-from upd.analyses.flat.results import band_middles
+from upd.analyses.flat.results import band_middles, printed_of
 from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.contact.law import ContactLaw
 from upd.mesh import recipes
@@ -101,7 +100,8 @@ def _tangential(solution: FlatSolution, k: FaceLattice, t: FlatTangentialCase) -
     slip = np.stack([k.field(c) for c in t.slip.T], -1)
     out = tangential_fields(traction, slip, k.field(t.stick) > 0.0)
     if t.state is not None:
-        out |= together_fields(k.field(pressure(np.maximum(t.pressed, 0.0))))
+        # which coupled contact moves
+        out["pressure"] = variable(XY, k.field(pressure(np.maximum(t.pressed, 0.0))), "MPa")
     return out
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from upd.analyses import printed
 from upd.analyses.contact.plan import direction_name
 from upd.analyses.contact.results import LOCATED, shear_stiffness
 from upd.analyses.flat.maps import (
@@ -17,12 +21,13 @@ from upd.analyses.flat.maps import (
     tilt_stiffness,
     whole_area,
 )
-from upd.analyses.flat.printed import printed_of
+from upd.analyses.flat.plan import normal_loads
 from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
-from upd.analyses.printed import with_printed
 from upd.mesh import IntArray, Mesh
+from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result
 from upd.results import quantities as q
+from upd.scene import Scene
 
 #: the numbers that matter, most important first
 HEADLINE = (
@@ -66,7 +71,25 @@ def make_results(solution: FlatSolution) -> list[Result]:
             for path in solution.paths
             if path.normal == case.case and path.cycle
         ]
-    return with_printed(out + _curve(solution), printed_of(scene))
+    return printed.with_printed(out + _curve(solution), printed_of(scene))
+
+
+def printed_of(scene: Scene) -> Lookup:
+    """What was printed of the scene's bodies.
+
+    Of a case with a normal load only where that is, to the newton it is printed with, a load of the
+    ready scene.
+    """
+    look_up, ready = printed.printed_of(scene), printed.ready_scene(scene)
+    if ready is None:
+        return look_up
+    loads = {round(load.force) for load in normal_loads(ready)}
+
+    def under_load(name: str, case: Mapping[str, Any]) -> tuple[Printed, ...]:
+        load = case.get("load")
+        return look_up(name, case) if load is None or round(load) in loads else ()
+
+    return under_load
 
 
 def _equilibrium(solution: FlatSolution) -> list[Result]:

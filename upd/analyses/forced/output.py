@@ -56,44 +56,34 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
         "measured curve".
     """
     out: dict[str, ArrayGroup] = {}
-    excited = excitation_of(solution.plan.scene.excitation)
+    scene = solution.plan.scene
+
+    def add(content: str, case: Case | str, variables: Variables) -> None:
+        """A group of a case, or of a stiffness."""
+        mine = case if isinstance(case, Case) else Case(stiffness=case)
+        out[f"{content} {case}"] = ArrayGroup(variables, content=content, case=mine)
+
     for name, model in solution.models.items():
-        out[f"points {name}"] = ArrayGroup(
-            _points(model), content=POINTS, case=Case(stiffness=name)
-        )
-    for name in solution.faces if solution.plan.scene.wants("contact_state") else ():
-        out[f"points {name}"] = ArrayGroup(
-            _nodes(solution, name), content=POINTS, case=Case(stiffness=name)
-        )
+        add(POINTS, name, _points(model))
+    for name in solution.faces if scene.wants("contact_state") else ():
+        add(POINTS, name, _nodes(solution, name))
     for name, linear in solution.linear.items():
-        out[f"linear {name}"] = ArrayGroup(
-            linear_arrays(solution, linear), content=LINEAR, case=Case(stiffness=name)
-        )
-    for curve in solution.curves:
-        if not curve.empty:
-            out[f"friction {curve.case}"] = ArrayGroup(
-                friction_arrays(solution, curve), content=FRICTION, case=curve.case
-            )
+        add(LINEAR, name, linear_arrays(solution, linear))
+    for curve in (c for c in solution.curves if not c.empty):
+        add(FRICTION, curve.case, friction_arrays(solution, curve))
     for path in (c for c in solution.balanced if not c.empty):
         whole = faces_friction(path, solution.marked_points(path))
-        if solution.plan.scene.wants("contact_state"):
-            whole["share"] = shares_by_face(
-                whole["state"][1], faces_places(solution, path.stiffness)
-            )
-        out[f"friction {path.case}"] = ArrayGroup(whole, content=FRICTION, case=path.case)
+        if scene.wants("contact_state"):
+            places = faces_places(solution, path.stiffness)
+            whole["share"] = shares_by_face(whole["state"][1], places)
+        add(FRICTION, path.case, whole)
     for one in (s for s in solution.sweeps if len(s.frequency)):
-        out[f"sweep {one.case}"] = ArrayGroup(
-            swept_arrays(one, excited), content=SWEEP, case=one.case
-        )
+        add(SWEEP, one.case, swept_arrays(one, excitation_of(scene.excitation)))
     for one, marched in peaks_by_sweep(solution.marched):
-        out[f"{MARCHED} {one.case}"] = ArrayGroup(
-            marched_arrays(solution, marched), content=MARCHED, case=one.case
-        )
+        add(MARCHED, one.case, marched_arrays(solution, marched))
     for name, performance in solution.performances.items():
-        out[f"performance {name}"] = ArrayGroup(
-            performance_arrays(performance), content=PERFORMANCE, case=Case(stiffness=name)
-        )
-    out |= measured_arrays(solution.plan.scene.measured) if out else {}
+        add(PERFORMANCE, name, performance_arrays(performance))
+    out |= measured_arrays(scene.measured) if out else {}
     measured = measured_peaks(solution.plan)
     if measured and out:
         source = ", ".join(dict.fromkeys(one.source for one in measured))

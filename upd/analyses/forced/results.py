@@ -26,20 +26,13 @@ from upd.analyses.forced.performance import Performance
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import StaticState
 from upd.analyses.measured import FREE, STUCK, Computed
+from upd.analyses.seated.balance import RIGID
 from upd.measured.compare import on_path
 from upd.measured.curve import LEAST_POINTS
 from upd.results import Case, Result
 from upd.results import quantities as q
 from upd.scene.forced_contact import SIDES, Side
 from upd.scene.measured import MeasuredChoice
-
-#: a rigid damper in the same static state; of the seated one, as far as friction can oppose F_C
-_SAID = {
-    "seated": "rigid damper, full friction against F_C",
-    "opposing": "rigid damper, full friction against F_C",
-    "reversed": "rigid damper, full friction along F_C",
-    "frictionless": "rigid damper without friction",
-}
 
 
 def make_results(solution: ForcedSolution) -> list[Result]:
@@ -106,7 +99,7 @@ def _static_forces(case: Case, state: StaticState, N: Array, T: Array) -> list[R
         at = replace(case, side=side, choice=state.name)
         for quantity, values, way in ((q.STATIC_N, N, "normal"), (q.STATIC_T, T, "tangential")):
             known = None if state.known is None else getattr(state.known, f"{way}_{side}")
-            source = _SAID.get(state.name, "") if known is not None else ""
+            source = RIGID.get(state.name, "") if known is not None else ""
             exact = state.name != "seated"
             results.append(quantity.of(values[k], at, known, source, exact=exact))
     return results

@@ -12,13 +12,13 @@ import numpy as np
 from upd.analyses.contact.coupled import CoupledState
 from upd.analyses.contact.loading import LoadPath
 from upd.analyses.contact.output import (
+    XY,
     Variables,
     curve_group,
     lattice,
     normal_fields,
     path_group,
     tangential_fields,
-    together_fields,
     write_meshes,
 )
 from upd.analyses.hertz.results import (
@@ -59,7 +59,8 @@ def arrays(solution: HertzSolution) -> dict[str, ArrayGroup]:
     for t in solution.tangential:
         variables = lines | tangential_fields(t.traction, t.slip, t.stick) | _cattaneo(solution, t)
         if t.state is not None:
-            variables |= together_fields(t.pressure)
+            # which coupled contact moves
+            variables["pressure"] = variable(XY, t.pressure, "MPa")
         out[t.case.label] = ArrayGroup(variables, content="tangential", case=t.case)
     for cycle in solution.cycles:
         name, group = path_group(cycle)

@@ -9,6 +9,13 @@ from upd.contact.equilibrium import FaceForces, equilibrium
 from upd.errors import InputError
 
 Array = NDArray[np.float64]
+#: state of the damper -> the rigid one beside it; of the seated one friction opposes all it can
+RIGID = {
+    "seated": "rigid damper, full friction against F_C",
+    "opposing": "rigid damper, full friction against F_C",
+    "reversed": "rigid damper, full friction along F_C",
+    "frictionless": "rigid damper without friction",
+}
 
 
 def face_angles(frames: Array) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from upd.analyses.seated.balance import rigid_balance
+from upd.analyses.seated.balance import RIGID, rigid_balance
 from upd.analyses.seated.solve import (
     AGAIN,
     LOWERED,
@@ -44,11 +44,6 @@ _LEG = (q.LEG_K_N, q.LEG_K_T_ALONG, q.LEG_K_T)
 _STIFFNESSES = {one.name for one in (*_FACE, *_LEG)}
 #: rigid damper that slips on both faces, and in which sense friction acts, by phase
 _BALANCES = {RAISED: "opposing", LOWERED: "reversed", AGAIN: "opposing", SMOOTH: "frictionless"}
-_SAID = {
-    "opposing": "rigid damper, full friction against F_C",
-    "reversed": "rigid damper, full friction along F_C",
-    "frictionless": "rigid damper without friction",
-}
 
 
 def headline(results: Sequence[Entry]) -> list[Entry]:
@@ -104,7 +99,7 @@ def _forces(solution: SeatedSolution, phase: Phase) -> Iterator[Result]:
         normal, along, up = solution.forces(phase.name)[k]
         for quantity, value, way in ((q.FACE_N, normal, "normal"), (q.FACE_T, up, "tangential")):
             reference = None if known is None else getattr(known, f"{way}_{side}")
-            source, exact = _SAID.get(mode, ""), mode == "frictionless"
+            source, exact = RIGID.get(mode, ""), mode == "frictionless"
             yield quantity.of(value, case, reference, source, exact=exact)
         if solution.interface.copies == 1:
             yield q.FACE_T_ALONG.of(along, case)
