@@ -111,7 +111,7 @@ SolveOn = Callable[[ContactPlan, ContactModel], Any]
 
 
 @dataclass(frozen=True)
-class SolvedAgain:
+class CompanionSolver:
     """How an analysis solves its loads on the companion.
 
     Attributes
@@ -189,7 +189,7 @@ def left_out(plan: ContactPlan, name: str) -> bool:
     return solves and any(e.name == name and e.word == "no" for e in plan.effects)
 
 
-def solve(wanted: Wanted, again: SolvedAgain, plan: ContactPlan, stages: Stages) -> Any:
+def solve(wanted: Wanted, again: CompanionSolver, plan: ContactPlan, stages: Stages) -> Any:
     """Run everything the plan calls for, and numbers again with the effects it leaves out.
 
     Errors as for `solve_wanted`; what converged so far is their ``partial``.
@@ -252,7 +252,7 @@ def _tilted(solution: Any, case: Any) -> Resolved:
     return Resolved(TILT, quantity, case.case, without, included, unit, remedy)
 
 
-def _on_companion(again: SolvedAgain, solution: Any, model: ContactModel) -> Iterator[Resolved]:
+def _on_companion(again: CompanionSolver, solution: Any, model: ContactModel) -> Iterator[Resolved]:
     """Every number that shows what an effect left out changes, on the companion ``model``."""
     plan, scene = solution.plan, solution.plan.scene
     arms = tilt_arms(variant(plan, 2), model)
@@ -277,7 +277,7 @@ def _on_companion(again: SolvedAgain, solution: Any, model: ContactModel) -> Ite
         yield from _sheared(again, solution, model)
 
 
-def _sheared(again: SolvedAgain, solution: Any, model: ContactModel) -> Iterator[Resolved]:
+def _sheared(again: CompanionSolver, solution: Any, model: ContactModel) -> Iterator[Resolved]:
     plan, scene = solution.plan, solution.plan.scene
     mine = again.solve(variant(plan, scene.contact.directions), model)
     numbers = again.make_results(mine)
