@@ -131,7 +131,7 @@ def _versions() -> str:
 
 
 def _leave_report(own: OwnFolder, result: Any, stages: Stages) -> Any:
-    """Write the page; the result, told when there is none."""
+    """Write the page; the result, with the fault when there is none."""
     try:
         with stages("report", str(own.place / "report.html")):
             write_report(own.path)
@@ -139,11 +139,11 @@ def _leave_report(own: OwnFolder, result: Any, stages: Stages) -> Any:
         # The numbers are on disk: a page that fails must not hide how the run itself ended.
         log.exception("report.html was not written")
         if result is not None:
-            result = _told(result, f"report.html not written ({one_line(error)})", own.path)
+            result = _with_fault(result, f"report.html not written ({one_line(error)})", own.path)
     return result
 
 
-def _told(result: RunResult, fault: str, folder: Path) -> RunResult:
+def _with_fault(result: RunResult, fault: str, folder: Path) -> RunResult:
     """The result with a fault of its pictures in its status, in summary.json too where the disk
     takes it.
     """
@@ -163,9 +163,9 @@ def _run(
     except UpdError as error:
         log.error("failed: %s", error)
         if folder is not None:
-            told = f"failed: {error}"
+            status = f"failed: {error}"
             known = error.estimates
-            _leave(analysis, plan, error.partial, stages, folder, place, told, estimates=known)
+            _leave(analysis, plan, error.partial, stages, folder, place, status, estimates=known)
         raise
     except BaseException as error:
         log.exception("stopped")
@@ -286,7 +286,7 @@ def _leave(
             write_figures(result, folder)
     except Exception as error:
         log.exception("figures were not written")
-        result = _told(result, f"figures not written ({one_line(error)})", folder)
+        result = _with_fault(result, f"figures not written ({one_line(error)})", folder)
     result = result.with_cost(stages.cost())
     with suppress(OSError):
         # The one written first has all but the seconds of the files.
@@ -399,9 +399,9 @@ class _RunLog(logging.FileHandler):
     """The log of a run; on a full disk it loses lines, without a word on the terminal."""
 
     def handleError(self, record: logging.LogRecord) -> None:
-        """Do nothing: the run itself tells of its disk."""
+        """Do nothing: the run itself reports its disk."""
 
     def close(self) -> None:
-        """Close the file, whatever the disk says of its last lines."""
+        """Close the file, whatever the disk does with its last lines."""
         with suppress(OSError):
             super().close()

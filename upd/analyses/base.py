@@ -326,9 +326,9 @@ def refuse_oversize(plan: Plan[Any]) -> None:
             "(geometry.divisions or geometry.refine), a patch sized from the load, loads nearer to "
             "each other, ask for less accuracy,"
         )
-        told = f" ({mesh})" if mesh else ""
+        counts = f" ({mesh})" if mesh else ""
         raise InputError(
-            f"the mesh needs about {plan.memory_bytes / 1e9:.3g} GB{told}, there are "
+            f"the mesh needs about {plan.memory_bytes / 1e9:.3g} GB{counts}, there are "
             f"{limit / 1e9:.3g} GB{fitting(plan, limit)}: use a coarser mesh "
             f"{coarser if mesh else ''}".rstrip()
             + " or close other programs"

@@ -1,6 +1,6 @@
 """Self-checks that every contact of two bodies has.
 
-Balance, one-sided contact, Coulomb's limit, what the effects left out stand on.
+Balance, one-sided contact, Coulomb's limit, the effects left out.
 """
 
 from __future__ import annotations

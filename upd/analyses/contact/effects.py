@@ -163,7 +163,7 @@ def coupling_effects(scene: Scene, loaded: bool) -> list[Effect]:
     why = (
         "beta = 0: pressure alone does not shear the contact"
         if not beta > 0.0
-        else f"|beta| = {beta:.3g}: the shear of the pressure alone is left out"
+        else f"|beta| = {beta:.3g}: the shear of the pressure alone is not simulated"
         if unlike
         else "no output depends on the shear of the pressure alone"
     )
@@ -272,7 +272,7 @@ def _on_companion(again: CompanionSolver, solution: Any, model: ContactModel) ->
     for case in solution.normal:
         if case.case.load:
             yield from _displaced_changes(plan, model, press, case.case, case.case.load)
-    # What is left out beside coupling, coupled contact has.
+    # Coupled contact has the other effects.
     if not scene.coupled:
         yield from _sheared(again, solution, model)
 
@@ -436,7 +436,7 @@ def pressure_slip(
 def displaced_gap(model: ContactModel, force: Array) -> Array:
     """(n,) gap in mm before the load, with the faces where the displacement carries their nodes.
 
-    Node pairs that the normal forces (n,) in N move apart by s along the faces no longer stand on
+    Node pairs that the normal forces (n,) in N move apart by s along the faces are no longer on
     one normal: across the slope of the deformed faces the gap is smaller by grad(zeta) . s, the
     mean of both faces.
     """
@@ -497,7 +497,7 @@ def _slipped_stiffness(C: Array, limit: Array, before: TangentialHistory, load: 
 
 
 def _not_solved(plan: ContactPlan, cases: Iterable[Case]) -> list[Resolved]:
-    """What the checks are told when the companion has no answer."""
+    """What the checks show when the companion has no answer."""
     quantity, unit = _quantity(plan.scene)
     return [
         Resolved(e.name, quantity, case, float("nan"), float("nan"), unit)

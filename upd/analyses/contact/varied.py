@@ -159,7 +159,7 @@ def spacing(parameters: Mapping[str, Any]) -> float:
 
 
 def bare(scene: Scene) -> Overrides:
-    """What takes off a scene what costs and shows no number; of a cycle no more steps than usual,
+    """Overrides without what costs and shows no number; of a cycle no more steps than usual,
     which only its drawing needs.
     """
     steps = min(scene.loads.cycle_steps, Loads.cycle_steps)

@@ -29,7 +29,7 @@ from upd.plot.chart import Array, Arrays, Axis, Band, Chart, Group, Map, Scatter
 from upd.plot.common import UM, case_of, pressure_map, scalar, state_map, with_content
 from upd.results import Case
 
-# Normal loads whose pressure stands on the sheet; of the other maps, those of the first load.
+# Normal loads whose pressure is on the sheet; of the other maps, those of the first load.
 _SHOWN = 2
 
 Faces = dict[Case, list[Group]]
@@ -326,7 +326,7 @@ def _law(group: Group, faces: list[Group], sheet: bool) -> Chart:
         size,
         Axis("preload", "N"),
     )
-    told = f"{len(k_n)} points, k_n {k_n.sum():.3g} N/mm in all"
+    detail = f"{len(k_n)} points, k_n {k_n.sum():.3g} N/mm in all"
     return face_chart(
         "Contact points of the dynamic model",
         faces,
@@ -336,5 +336,5 @@ def _law(group: Group, faces: list[Group], sheet: bool) -> Chart:
         scatters=(points,),
         sheet=sheet,
         columns=1,
-        detail=told,
+        detail=detail,
     )

@@ -15,7 +15,7 @@ from upd.scene.rig import rig_parameters
 
 SeatedPlan = Plan[SeatedScene]
 
-#: checks of what is left out; each solves the faces' forces again with it
+#: checks of effects omitted; each solves the faces' forces again with it
 WORN = "worn faces"
 OTHER_WAYS = "other ways of loading"
 
