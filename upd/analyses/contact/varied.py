@@ -35,7 +35,7 @@ from upd.analyses.contact.plan import (
     is_curved,
     refined_growth,
 )
-from upd.analyses.contact.plans import auto_patch, make_plan
+from upd.analyses.contact.scene_plan import auto_patch, make_plan
 from upd.analyses.cost import CostModel
 from upd.errors import InputError
 from upd.mesh import recipes

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from upd.analyses import printed
-from upd.analyses.contact.plans import normal_loads
+from upd.analyses.contact.scene_plan import normal_loads
 from upd.reference.printed import Lookup, Printed
 from upd.scene import Scene
 
