@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from upd.analyses.seated.balance import rigid_balance
+from upd.analyses.seated.lattice import rigid_balance
 from upd.analyses.seated.solve import (
     AGAIN,
     LOWERED,
