@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -91,7 +91,7 @@ def run(
     stages = Stages(progress)
     if out is None:
         log.info(_versions())
-        return _run(analysis, plan, stages, None, None)
+        return _solved(_Run(analysis, stages, None, None), plan)
     own = _take_folder(Path(out), numbered)
     if own.replaces:
         for seconds in (None, 0.0):
@@ -101,7 +101,7 @@ def run(
     # matplotlib takes a while to import: meanwhile the solver computes.
     threading.Thread(target=import_module, args=("upd.plot.matplotlib_parts",), daemon=True).start()
     try:
-        result = _run(analysis, plan, stages, own.path, own.place)
+        result = _solved(_Run(analysis, stages, own.path, own.place), plan)
         if report:
             result = _leave_report(own, result, stages)
     except BaseException as error:
@@ -131,7 +131,7 @@ def _versions() -> str:
 
 
 def _leave_report(own: OwnFolder, result: Any, stages: Stages) -> Any:
-    """Write the page; the result, told when there is none."""
+    """Write the page; the result, with the fault when there is none."""
     try:
         with stages("report", str(own.place / "report.html")):
             write_report(own.path)
@@ -139,11 +139,11 @@ def _leave_report(own: OwnFolder, result: Any, stages: Stages) -> Any:
         # The numbers are on disk: a page that fails must not hide how the run itself ended.
         log.exception("report.html was not written")
         if result is not None:
-            result = _told(result, f"report.html not written ({one_line(error)})", own.path)
+            result = _with_fault(result, f"report.html not written ({one_line(error)})", own.path)
     return result
 
 
-def _told(result: RunResult, fault: str, folder: Path) -> RunResult:
+def _with_fault(result: RunResult, fault: str, folder: Path) -> RunResult:
     """The result with a fault of its pictures in its status, in summary.json too where the disk
     takes it.
     """
@@ -155,35 +155,38 @@ def _told(result: RunResult, fault: str, folder: Path) -> RunResult:
     return result
 
 
-def _run(
-    analysis: Analysis, plan: Plan[Any], stages: Stages, folder: Path | None, place: Path | None
-) -> RunResult:
+class _Run(NamedTuple):
+    """A run that is under way: where it writes (None: nowhere), and where its folder will be."""
+
+    analysis: Analysis
+    stages: Stages
+    folder: Path | None
+    place: Path | None
+
+
+def _solved(run: _Run, plan: Plan[Any]) -> RunResult:
+    """Solve and check; the result, with what the run folder then holds.
+
+    An error leaves what converged in the folder.
+    """
     try:
-        solution = analysis.solve(plan, stages)
-    except UpdError as error:
-        log.error("failed: %s", error)
-        if folder is not None:
-            told = f"failed: {error}"
-            known = error.estimates
-            _leave(analysis, plan, error.partial, stages, folder, place, told, estimates=known)
-        raise
+        solution = run.analysis.solve(plan, run.stages)
     except BaseException as error:
-        log.exception("stopped")
-        if folder is not None:
-            _leave(
-                analysis,
-                plan,
-                getattr(error, "partial", None),
-                stages,
-                folder,
-                place,
-                f"stopped: {type(error).__name__}",
-            )
+        if isinstance(error, UpdError):
+            log.error("failed: %s", error)
+            status = f"failed: {error}"
+        else:
+            log.exception("stopped")
+            status = f"stopped: {type(error).__name__}"
+        if run.folder is not None:
+            partial, estimates = (getattr(error, name, None) for name in ("partial", "estimates"))
+            _leave(run, _collected(run, plan, partial, status, (), estimates or {}), partial)
         raise
-    with stages("self-checks"):
-        checks = analysis.check_solution(solution)
+    with run.stages("self-checks"):
+        checks = run.analysis.check_solution(solution)
     failed = [c for c in checks if not c.passed and c.fatal]
-    result, fault = _leave(analysis, solution.plan, solution, stages, folder, place, "", checks)
+    result = _collected(run, solution.plan, solution, "", checks, None)
+    result, fault = _leave(run, result, solution)
     if fault:
         log.error(fault)
         disk = UpdError(fault)
@@ -192,7 +195,7 @@ def _run(
     if result.outcome == FAILED:
         log.error(result.status)
         failure = (
-            _failure(analysis, failed)
+            _failure(run.analysis, failed)
             if failed
             else ConvergenceError(result.status.removeprefix("failed: "))
         )
@@ -207,44 +210,36 @@ def _failure(analysis: Analysis, failed: list[Check]) -> UpdError:
     return kind(f"self-check failed\n{text}")
 
 
-def _leave(
-    analysis: Analysis,
+def _collected(
+    run: _Run,
     plan: Plan[Any],
     solution: Any,
-    stages: Stages,
-    folder: Path | None,
-    place: Path | None,
     status: str,
-    checks: Sequence[Check] = (),
-    estimates: Estimates | None = None,
-) -> tuple[RunResult, str]:
-    """Collect the result and write the run folder, numbers first and pictures last.
+    checks: Sequence[Check],
+    estimates: Estimates | None,
+) -> RunResult:
+    """The result of a run.
 
     Parameters
     ----------
-    folder, place
-        Where to write, and where the folder will stand.
+    solution
+        None where nothing converged.
     status
         "" derives it from checks and results.
     estimates
-        Errors of the numbers where they are known already.
-
-    Returns
-    -------
-    RunResult, str
-        The result, and what the disk did not take of numbers, arrays and meshes; "" when all is
-        there. Pictures that are missing stand in the status.
+        Errors of the numbers of a run that failed; None: they are estimated.
     """
+    analysis, stages = run.analysis, run.stages
     with stages("numbers"):
         arrays = analysis.arrays(solution) if solution is not None else {}
         made = analysis.make_results(solution) if solution is not None else ()
     results = tuple(map(_reached, made))
     if estimates is not None:
         results = with_estimates(results, estimates)
-    if not status:
+    else:
         results = _with_estimates(analysis, solution, results, stages)
         results = with_inputs(results, input_parts(analysis, solution, results, stages))
-    result = RunResult(
+    return RunResult(
         scene=plan.scene.name,
         title=plan.scene.title,
         status=status or status_of(checks, results),
@@ -254,18 +249,30 @@ def _leave(
         size=_size(analysis, plan, solution)
         | {"analysis": analysis.name, "mesh": dict(plan.parameters), "solver": dict(plan.solver)},
         arrays=arrays,
-        folder=place,
+        folder=run.place,
         scene_text=scene_as_run(plan.scene),
     ).with_cost(stages.cost())
+
+
+def _leave(run: _Run, result: RunResult, solution: Any) -> tuple[RunResult, str]:
+    """Write the run folder, numbers first and pictures last.
+
+    Returns
+    -------
+    RunResult, str
+        The result, and what the disk did not take of numbers, arrays and meshes; "" when all is
+        there. Pictures that are missing stand in the status.
+    """
+    folder, place, stages = run.folder, run.place, run.stages
     if folder is None:
         return result, ""
     try:
         _write_summary(result, folder)
         if solution is not None:
             with stages("files", str(place)):
-                write_netcdf(folder / "result.nc", arrays)
+                write_netcdf(folder / "result.nc", result.arrays)
                 write_curves(chart_arrays(result), folder)
-                analysis.write_files(solution, folder)
+                run.analysis.write_files(solution, folder)
     except (OSError, UpdError) as error:
         if disk_fault(error) is None:
             raise
@@ -286,7 +293,7 @@ def _leave(
             write_figures(result, folder)
     except Exception as error:
         log.exception("figures were not written")
-        result = _told(result, f"figures not written ({one_line(error)})", folder)
+        result = _with_fault(result, f"figures not written ({one_line(error)})", folder)
     result = result.with_cost(stages.cost())
     with suppress(OSError):
         # The one written first has all but the seconds of the files.
@@ -399,9 +406,9 @@ class _RunLog(logging.FileHandler):
     """The log of a run; on a full disk it loses lines, without a word on the terminal."""
 
     def handleError(self, record: logging.LogRecord) -> None:
-        """Do nothing: the run itself tells of its disk."""
+        """Do nothing: the run itself reports its disk."""
 
     def close(self) -> None:
-        """Close the file, whatever the disk says of its last lines."""
+        """Close the file, whatever the disk does with its last lines."""
         with suppress(OSError):
             super().close()

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from upd.analyses.contact.plans import make_plan
+from upd.analyses.contact.scene_plan import make_plan
 from upd.analyses.contact.varied import half_cost
 from upd.errors import InputError
 from upd.progress import Stages

@@ -40,7 +40,7 @@ def _package(name: str) -> Analysis:
 def make_plan(scene: AnyScene) -> Plan[Any]:
     """Derive the plan of ``scene``.
 
-    What will be simulated, what is left out and why, size and cost. Raises InputError.
+    What will be simulated, what not and why, size and cost. Raises InputError.
     """
     analysis = analysis_of(scene)
     plan: Plan[Any] = with_input_cost(analysis, analysis.make_plan(scene))

@@ -20,7 +20,7 @@ from upd.results import ArrayGroup, Case, Check, Estimates, Result, left_out_che
 from upd.results.answer_table import AnswerTable
 from upd.scene import AnyScene
 from upd.scene.base import LeftOut
-from upd.vary.inputs import ChangesByInputs, KnownInputs
+from upd.vary.inputs import InputDerivatives
 from upd.vary.variation import Overrides
 
 __all__ = [
@@ -239,12 +239,8 @@ class Analysis:
     estimate
         solution, its numbers, stages -> the parts of their errors, from cheaper companions; None
         where none are known.
-    input_changes
-        solution, its numbers, the ends of the inputs known within limits -> what half an interval
-        does to the numbers, of those inputs whose derivatives the analysis knows.
-    known_inputs
-        plan, the ends of the inputs known within limits -> paths of those whose derivatives the
-        analysis knows, and seconds that they take. None where it knows none.
+    derivatives
+        Of its numbers by inputs known within limits; None where it knows none.
     coarsened
         plan as run -> what makes a scene into its cheap level: the numbers that inputs change are
         solved on it again. None where the scene itself is.
@@ -266,8 +262,7 @@ class Analysis:
     answer: Callable[[Sequence[Entry]], list[AnswerTable]] | None = None
     verdict_names: tuple[str, ...] = ()
     estimate: Callable[[Any, Sequence[Result], Stages], Estimates] | None = None
-    input_changes: ChangesByInputs | None = None
-    known_inputs: KnownInputs | None = None
+    derivatives: InputDerivatives | None = None
     coarsened: Callable[[Any], Overrides] | None = None
 
 
@@ -326,9 +321,9 @@ def refuse_oversize(plan: Plan[Any]) -> None:
             "(geometry.divisions or geometry.refine), a patch sized from the load, loads nearer to "
             "each other, ask for less accuracy,"
         )
-        told = f" ({mesh})" if mesh else ""
+        counts = f" ({mesh})" if mesh else ""
         raise InputError(
-            f"the mesh needs about {plan.memory_bytes / 1e9:.3g} GB{told}, there are "
+            f"the mesh needs about {plan.memory_bytes / 1e9:.3g} GB{counts}, there are "
             f"{limit / 1e9:.3g} GB{fitting(plan, limit)}: use a coarser mesh "
             f"{coarser if mesh else ''}".rstrip()
             + " or close other programs"

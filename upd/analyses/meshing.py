@@ -35,7 +35,7 @@ class MeshRequest:
 
     @property
     def parameters(self) -> Any:
-        """The recipe's own object. Raises InputError with what it says about the values."""
+        """The recipe's own object. Raises InputError for values that it refuses."""
         return recipes.made(self.recipe, self.given)
 
 
@@ -87,7 +87,7 @@ def mesh_request(
             )
         given[name] = value
     request = MeshRequest(made.name, made.recipe, given)
-    # what is wrong with them is told before anything is meshed
+    # what is wrong with them is reported before anything is meshed
     _ = request.parameters
     return request
 

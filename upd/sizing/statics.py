@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from upd.analyses.centrifugal import centrifugal_words
-from upd.analyses.seated.balance import face_angles
-from upd.analyses.seated.lattice import patch_frame
+from upd.analyses.seated.lattice import face_angles, patch_frame
+from upd.analyses.seated.plan import centrifugal_words
 from upd.contact.damper_section import (
     AdmissibleForces,
     DamperSection,

@@ -1,1 +1,1 @@
-"""The same scene with one thing changed, solved again, and what that tells of its numbers."""
+"""The same scene with one thing changed, solved again, and what that shows of its numbers."""

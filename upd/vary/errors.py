@@ -125,7 +125,7 @@ def source_estimates(
     levels
         Its variations, the finest of coarser ones first.
     half_cost
-        Order of convergence -> seconds that a level with half the error adds. InputError says why
+        Order of convergence -> seconds that a level with half the error adds. InputError where
         there is no such level.
     reason
         Why it has no variations.
@@ -158,8 +158,7 @@ def bound(key: Key, run: SolvedVariation, levels: Sequence[SolvedVariation]) -> 
     """Bound of a number's error by what the levels of one source are.
 
     A level with a base stands for the run: the run has the same error in proportion. Where the run
-    and its levels have the number at neighbouring loads, `sampled_error` tells, and `ladder_error`
-    else.
+    and its levels have the number at neighbouring loads it is `sampled_error`, `ladder_error` else.
 
     Returns
     -------

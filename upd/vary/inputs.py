@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from typing import Any
+from typing import Any, NamedTuple
 
 from upd.errors import UpdError, one_line
 from upd.mesh import recipes
@@ -56,8 +56,23 @@ class InputChange:
 
 #: path of an input -> name and case of a number -> what its half-width does to it
 InputChanges = Mapping[str, Mapping[Key, InputChange]]
-ChangesByInputs = Callable[[Any, Sequence[Result], Sequence[InputEnds]], InputChanges]
-KnownInputs = Callable[[Any, Sequence[InputEnds]], tuple[set[str], float]]
+
+
+class InputDerivatives(NamedTuple):
+    """What an analysis knows of its numbers' derivatives by inputs.
+
+    Attributes
+    ----------
+    changes
+        solution, its numbers, the ends of the inputs known within limits -> what half an interval
+        does to the numbers, of those inputs whose derivatives the analysis knows.
+    known
+        plan, the ends of the inputs known within limits -> paths of those whose derivatives the
+        analysis knows, and seconds that they take.
+    """
+
+    changes: Callable[[Any, Sequence[Result], Sequence[InputEnds]], InputChanges]
+    known: Callable[[Any, Sequence[InputEnds]], tuple[set[str], float]]
 
 
 def input_parts(
@@ -88,9 +103,9 @@ def input_parts(
     ends = input_ends(plan.scene)
     main = [one for one in numbers if is_main(analysis, one)]
     found: dict[str, dict[Key, InputChange]] = {one.of.path: {} for one in ends}
-    if analysis.input_changes is not None:
+    if analysis.derivatives is not None:
         with stages("input uncertainty", "derivatives"):
-            for path, changes in analysis.input_changes(solution, numbers, ends).items():
+            for path, changes in analysis.derivatives.changes(solution, numbers, ends).items():
                 found[path] |= changes
     faults: dict[str, str] = {}
     for one in ends:
@@ -134,8 +149,8 @@ def with_input_cost(analysis: Any, plan: Any) -> Any:
         return plan
     ends = input_ends(plan.scene)
     known, seconds = (set[str](), 0.0)
-    if analysis.known_inputs is not None:
-        known, seconds = analysis.known_inputs(plan, ends)
+    if analysis.derivatives is not None:
+        known, seconds = analysis.derivatives.known(plan, ends)
     others = [one for one in ends if one.of.path not in known]
     if others:
         seconds += 2.0 * len(others) * _companion_seconds(analysis, plan, others[0])

@@ -357,7 +357,7 @@ def fitted_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
 
     q(h) = limit + C h^p + scatter, by least squares with deviations that go with h^(3/2). The order
     p is the formal one, 2, unless another of 1/2 to 2 explains the levels so much better that an
-    F test at 5 % tells. The bound is 1.25 times the finest level's distance from the limit (Roache)
+    F test at 5 % shows. The bound is 1.25 times the finest level's distance from the limit (Roache)
     and, beside it, the half-width of the limit's 95 % interval (Student's t). Levels without
     scatter get 1.25 times Richardson's error this way, levels that are scatter alone its size.
 

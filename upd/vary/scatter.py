@@ -30,8 +30,8 @@ _COEFFICIENTS = 4
 def sampled_error(sizes: Sequence[float], samples: Sequence[FloatArray]) -> ErrorEstimate:
     r"""Bound the error of the finest of several levels by what each shows at neighbouring loads.
 
-    Nothing but x = h / a(F), the spacing over the radius of the contact, tells a curved contact on
-    a lattice from its limit, if the bodies are large against it. So a number is
+    Nothing but x = h / a(F), the spacing over the radius of the contact, distinguishes a curved
+    contact on a lattice from its limit, if the bodies are large against it. So a number is
 
     q(F, h) = Q(F) (1 + C x^p + s(x)),
 
@@ -44,7 +44,7 @@ def sampled_error(sizes: Sequence[float], samples: Sequence[FloatArray]) -> Erro
 
     is fitted by least squares with deviations that go with x^(3/2), as the pressure falls to zero
     as the root of the distance from the edge. What a sum over the lattice leaves on average is of
-    order 2, of a count of nodes of order 1; nothing tells which a number is, so both are fitted and
+    order 2, of a count of nodes of order 1; nothing shows which a number is, so both are fitted and
     weighted by their likelihood (squares^(-n/2), the same number of coefficients). The bound is
     exceeded by the distance of the finest level's plain value from log Q(F0), under the two
     Student's t of this limit with their weights, with a probability of 5 %.

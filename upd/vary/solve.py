@@ -70,7 +70,7 @@ def solve(
 def _numbers(
     problem: Problem, scene: Any, variation: Variation
 ) -> tuple[Sequence[Result], Samples]:
-    """Of a variation; its solution is let go, whose factors are the memory of the next."""
+    """Of a variation; its solution is released: its factors are the memory of the next."""
     solution = problem.solve(varied_plan(problem, scene, variation), Stages())
     samples = {} if problem.sample is None else problem.sample(solution)
     return problem.make_results(solution), samples

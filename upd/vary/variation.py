@@ -110,14 +110,14 @@ class Problem:
     solve, make_results
         plan, stages -> solution; its numbers.
     bare
-        scene -> what takes off it what costs and shows no number.
+        scene -> overrides without what costs and shows no number.
     sources
         Of errors that variations show, in the order of their parts.
     levels
         plan -> the variations that its errors are estimated with.
     half_cost
         plan, source, seconds of the run, order of convergence -> seconds that half of an error
-        adds. InputError says why there is no such level.
+        adds. InputError: there is no such level.
     sample
         solution -> its numbers at neighbouring loads; None where those show nothing.
     corrected

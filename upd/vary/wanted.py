@@ -131,9 +131,9 @@ def plan_wanted(wanted: Wanted, usual: Callable[[Any], Any], scene: Any) -> Any:
 def solve_wanted(wanted: Wanted, plan: Any, stages: Stages) -> tuple[Any, Estimates | None]:
     """Run a plan; on levels that are shown to reach the accuracy where its scene asks for one.
 
-    A number is given up where the source that leaves most of it has no higher level, or none within
-    the memory. The others are still brought to their accuracy, and the run ends with an error that
-    names what it lacks.
+    A number is given up where the sources without a higher level, or without one within the memory,
+    leave more than its accuracy. The others are still brought to theirs, and the run ends with an
+    error that names what it lacks.
 
     Returns
     -------
@@ -259,20 +259,21 @@ class LevelSearch:
         missed = {key: parts for key, parts in shares.items() if 1.0 < _sum(parts) < math.inf}
         for key in sorted(missed, key=lambda key: -_sum(missed[key])):
             parts = missed[key]
-            most = max(parts, key=lambda source: parts[source])
             higher = {
                 one.source: self._within_memory(self._lifted(levels, k))
                 for k, one in enumerate(self.choices)
-                if parts.get(one.source, 0.0) >= min(parts[most], 1.0 / len(parts))
             }
-            if higher.get(most) is not None:
-                now = self.planned(levels).seconds
-                gains = {
-                    one: parts[source] / max(self.planned(one).seconds - now, _LEAST_S)
-                    for source, one in higher.items()
-                    if one is not None
-                }
-                return max(gains, key=lambda one: gains[one])
+            raisable = {s: share for s, share in parts.items() if higher.get(s) is not None}
+            if not raisable or _sum(parts) - _sum(raisable) > 1.0:
+                continue
+            even = min(max(raisable.values()), 1.0 / len(parts))
+            now = self.planned(levels).seconds
+            gains = {
+                one: share / max(self.planned(one).seconds - now, _LEAST_S)
+                for source, share in raisable.items()
+                if share >= even and (one := higher[source]) is not None
+            }
+            return max(gains, key=lambda one: gains[one])
         return None
 
     def _lifted(self, levels: Levels, k: int) -> Levels | None:

@@ -239,7 +239,7 @@ def test_a_name_that_no_number_has_is_refused_in_the_first_round() -> None:
 @pytest.mark.parametrize("seed", range(20))
 def test_rounds_raise_one_source_at_a_time_until_all_is_reached(seed: int) -> None:
     """Errors that fall by any power: levels only rise, and no source that leaves less than an even
-    part of the accuracy is raised.
+    part of the accuracy is raised while one leaves more.
     """
     rng = np.random.default_rng(seed)
     power = rng.uniform(0.5, 3.0, 2)
@@ -264,13 +264,14 @@ def test_rounds_raise_one_source_at_a_time_until_all_is_reached(seed: int) -> No
         made.run(asked)
     except ConvergenceError:
         left = errors(made.solved[-1])
-        most = max(left, key=lambda source: left[source])
-        assert getattr(made.solved[-1], most) == len(SIZES) - 1
+        last = made.solved[-1]
+        assert sum(e for s, e in left.items() if getattr(last, s) == len(SIZES) - 1) > 0.02
     for before, after in pairwise(made.solved):
         raised = [s for s in ("mesh", "modes") if getattr(after, s) > getattr(before, s)]
         assert len(raised) == 1
         assert after.mesh + after.modes == before.mesh + before.modes + 1
-        assert errors(before)[raised[0]] >= 0.5 * 0.02
+        others = [e for s, e in errors(before).items() if getattr(before, s) < len(SIZES) - 1]
+        assert errors(before)[raised[0]] >= min(0.5 * 0.02, max(others))
         assert sum(errors(before).values()) > 0.02
 
 
@@ -281,8 +282,11 @@ def test_the_source_that_leaves_most_for_its_seconds_is_raised() -> None:
     assert search.raised((0, 0), {key: {"mesh": 5.0, "modes": 1.0}}) == (0, 1)
     assert search.raised((0, 0), {key: {"mesh": 5.0, "modes": 0.4}}) == (1, 0)
     assert search.raised((0, 0), {key: {"mesh": 0.5, "modes": 0.5}}) is None
-    # most of it is on its highest level, or is not known
+    # what is on its highest level is too much, or is not known
     assert search.raised((3, 0), {key: {"mesh": 5.0, "modes": 1.0}}) is None
+    assert search.raised((3, 0), {key: {"mesh": 0.6, "modes": 0.5}}) == (3, 1)
+    assert search.raised((0, 0), {key: {"time": 0.9, "modes": 0.2}}) == (0, 1)
+    assert search.raised((0, 0), {key: {"time": 1.1, "modes": 0.2}}) is None
     assert search.raised((0, 0), {key: {"mesh": math.nan, "modes": 9.0}}) is None
     # without any bound the first source, which another level shows
     assert search.raised((0, 0), None) == (1, 0)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from upd.analyses.contact.plans import make_plan
+from upd.analyses.contact.scene_plan import make_plan
 from upd.analyses.contact.varied import levels, neighbours_seconds
 from upd.analyses.hertz.results import make_results
 from upd.analyses.hertz.samples import sample

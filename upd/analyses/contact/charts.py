@@ -5,13 +5,20 @@ Contact states, force over approach, tangential paths.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.plot.chart import Array, Arrays, Axis, Group, Style, Trace
+from upd.plot.chart import Array, Arrays, Axis, Chart, Group, Style, Trace
 from upd.plot.common import UM, case_of, with_content
 from upd.results import Case
 
+FACE_X, FACE_Y = Axis("x, along the damper", "mm"), Axis("y, up the slope", "mm")
+#: size of a face
+FACE_SIZE = (7.2, 4.2)
+#: percentile of the pressure where the colours end: beyond it the pressure is the edge's
+TOP_PERCENTILE = 99.0
 APPROACH, FORCE = Axis("approach δ", "µm", low=0.0), Axis("normal force F", "N", low=0.0)
 
 
@@ -68,3 +75,9 @@ def frames(groups: list[Group]) -> tuple[Trace, ...]:
         x, y = np.array([left, right, right, left, left]), np.array([low, low, high, high, low])
         out.append(Trace("", x, y, outline=True))
     return tuple(out)
+
+
+def face_chart(title: str, groups: list[Group], case: str, figure: str, **more: Any) -> Chart:
+    """A chart of faces with their edges, lengths in mm alike; ``more`` are fields of it."""
+    more = {"traces": frames(groups), "size": FACE_SIZE, **more}
+    return Chart(title, FACE_X, FACE_Y, case=case, figure=figure, equal=True, **more)

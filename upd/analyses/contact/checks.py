@@ -1,6 +1,6 @@
 """Self-checks that every contact of two bodies has.
 
-Balance, one-sided contact, Coulomb's limit, what the effects left out stand on.
+Balance, one-sided contact, Coulomb's limit, the effects left out.
 """
 
 from __future__ import annotations
@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.contact.coupled import as_normal, opened_by_shear, shear_nodes
-from upd.analyses.contact.effects import checks_of
+from upd.analyses.contact.effects import beta_of, checks_of
 from upd.analyses.contact.loading import LoadPath, Sheared, tangential_compliance, tilt_arms
 from upd.analyses.contact.plan import NORMAL, ContactPlan
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
-from upd.reference import dundurs_beta
 from upd.results import NO_CASE, Case, Check
 from upd.scene import Scene
 
@@ -241,22 +240,20 @@ def left_out_checks(solution: Any) -> list[Check]:
     plan, scene = solution.plan, solution.plan.scene
     checks = checks_of(solution.left_out, scene)
     if plan.effect("friction") and not scene.coupled:
-        checks.append(_coupling_check(scene, solution.model))
+        checks.append(_coupling_check(scene))
     return checks
 
 
-def _coupling_check(scene: Scene, model: ContactModel) -> Check:
+def _coupling_check(scene: Scene) -> Check:
     """How far the materials are from shearing a contact of half-spaces by pressure alone.
 
     Bodies of finite shape couple the two problems whatever their materials: nearly not at all
     where the contact is small against both, much where it is as large as they are.
     """
-    upper, lower = (scene.materials[b.name] for b in (model.upper, model.lower))
-    beta = abs(float(dundurs_beta(upper.E, upper.nu, lower.E, lower.nu)))
     return Check(
         "Dundurs beta",
         NO_CASE,
-        beta,
+        beta_of(scene),
         scene.contact.coupling_limit,
         "|beta|: how much pressure shears half-spaces of unlike materials",
         "normal and tangential problems are coupled for these materials: raise "

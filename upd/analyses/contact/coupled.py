@@ -1,7 +1,7 @@
 """Normal and tangential contact at once, along a run's loads.
 
 The normal load rises without a tangential one; the tangential loads follow it. Friction remembers
-its way: every state goes on from the one before.
+its way: every state starts from the one before.
 """
 
 from __future__ import annotations

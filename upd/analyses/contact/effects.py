@@ -111,7 +111,7 @@ SolveOn = Callable[[ContactPlan, ContactModel], Any]
 
 
 @dataclass(frozen=True)
-class SolvedAgain:
+class CompanionSolver:
     """How an analysis solves its loads on the companion.
 
     Attributes
@@ -163,7 +163,7 @@ def coupling_effects(scene: Scene, loaded: bool) -> list[Effect]:
     why = (
         "beta = 0: pressure alone does not shear the contact"
         if not beta > 0.0
-        else f"|beta| = {beta:.3g}: the shear of the pressure alone is left out"
+        else f"|beta| = {beta:.3g}: the shear of the pressure alone is not simulated"
         if unlike
         else "no output depends on the shear of the pressure alone"
     )
@@ -189,7 +189,7 @@ def left_out(plan: ContactPlan, name: str) -> bool:
     return solves and any(e.name == name and e.word == "no" for e in plan.effects)
 
 
-def solve(wanted: Wanted, again: SolvedAgain, plan: ContactPlan, stages: Stages) -> Any:
+def solve(wanted: Wanted, again: CompanionSolver, plan: ContactPlan, stages: Stages) -> Any:
     """Run everything the plan calls for, and numbers again with the effects it leaves out.
 
     Errors as for `solve_wanted`; what converged so far is their ``partial``.
@@ -252,7 +252,7 @@ def _tilted(solution: Any, case: Any) -> Resolved:
     return Resolved(TILT, quantity, case.case, without, included, unit, remedy)
 
 
-def _on_companion(again: SolvedAgain, solution: Any, model: ContactModel) -> Iterator[Resolved]:
+def _on_companion(again: CompanionSolver, solution: Any, model: ContactModel) -> Iterator[Resolved]:
     """Every number that shows what an effect left out changes, on the companion ``model``."""
     plan, scene = solution.plan, solution.plan.scene
     arms = tilt_arms(variant(plan, 2), model)
@@ -272,12 +272,12 @@ def _on_companion(again: SolvedAgain, solution: Any, model: ContactModel) -> Ite
     for case in solution.normal:
         if case.case.load:
             yield from _displaced_changes(plan, model, press, case.case, case.case.load)
-    # What is left out beside coupling, coupled contact has.
+    # Coupled contact has the other effects.
     if not scene.coupled:
         yield from _sheared(again, solution, model)
 
 
-def _sheared(again: SolvedAgain, solution: Any, model: ContactModel) -> Iterator[Resolved]:
+def _sheared(again: CompanionSolver, solution: Any, model: ContactModel) -> Iterator[Resolved]:
     plan, scene = solution.plan, solution.plan.scene
     mine = again.solve(variant(plan, scene.contact.directions), model)
     numbers = again.make_results(mine)
@@ -436,7 +436,7 @@ def pressure_slip(
 def displaced_gap(model: ContactModel, force: Array) -> Array:
     """(n,) gap in mm before the load, with the faces where the displacement carries their nodes.
 
-    Node pairs that the normal forces (n,) in N move apart by s along the faces no longer stand on
+    Node pairs that the normal forces (n,) in N move apart by s along the faces are no longer on
     one normal: across the slope of the deformed faces the gap is smaller by grad(zeta) . s, the
     mean of both faces.
     """
@@ -497,7 +497,7 @@ def _slipped_stiffness(C: Array, limit: Array, before: TangentialHistory, load: 
 
 
 def _not_solved(plan: ContactPlan, cases: Iterable[Case]) -> list[Resolved]:
-    """What the checks are told when the companion has no answer."""
+    """What the checks show when the companion has no answer."""
     quantity, unit = _quantity(plan.scene)
     return [
         Resolved(e.name, quantity, case, float("nan"), float("nan"), unit)

@@ -52,7 +52,7 @@ def load_point(plan: ContactPlan, model: ContactModel) -> Array:
 def tilt_arms(plan: ContactPlan, model: ContactModel, *, held: bool | None = None) -> Array:
     """(n, k) mm from the load line to the nodes, for the k free tilts.
 
-    ``held``: in place of what the scene says.
+    ``held``: in place of the scene's choice.
     """
     if plan.scene.contact.tilt != "free" if held is None else held:
         return np.zeros((len(model.gap), 0))

@@ -106,7 +106,7 @@ def contact_plan(
     counted = recipes.count(scene.recipe, parameters) if about is None else about
     size = {body: dict(count) for body, count in counted.items()}
     if about is None and recipes.counted_by_mesh(scene.recipe):
-        # The mesh is there: what it lacks is told before anything is written.
+        # The mesh is there: what it lacks is reported before anything is written.
         require_contact_sets(scene, recipes.build_mesh(scene.recipe, parameters)[0], families)
     missing = sorted(set(size) - set(scene.materials))
     spare = sorted(set(scene.materials) - set(size))
@@ -128,16 +128,16 @@ def contact_plan(
     for body, count in size.items():
         found = []
         for family in families:
-            told = (
+            task = (
                 f"{body}, {family.label}",
                 count["hexes"],
                 count["nodes"],
                 len(family.components) * count["contact"],
             )
             found.append(
-                cost.contact(*told, _products(scene, effects, family), room)
+                cost.contact(*task, _products(scene, effects, family), room)
                 if _may_learn(scene) and body not in in_the_mean
-                else cost.condensed(*told)
+                else cost.condensed(*task)
             )
         if body in in_the_mean:
             for family in families:
@@ -406,8 +406,8 @@ def require_contact_sets(
         if problem := _patch_problem(scene, mesh):
             problems.setdefault(problem, []).append(name)
     if problems:
-        told = [f"  {', '.join(bodies)}: {problem}" for problem, bodies in problems.items()]
-        raise OwnMeshError("\n".join([f"recipe {scene.recipe!r}: patches of the contact", *told]))
+        lines = [f"  {', '.join(bodies)}: {problem}" for problem, bodies in problems.items()]
+        raise OwnMeshError("\n".join([f"recipe {scene.recipe!r}: patches of the contact", *lines]))
 
 
 def _patch_problem(scene: Scene, mesh: Mesh) -> str:

@@ -35,7 +35,7 @@ from upd.analyses.contact.plan import (
     is_curved,
     refined_growth,
 )
-from upd.analyses.contact.plans import auto_patch, make_plan
+from upd.analyses.contact.scene_plan import auto_patch, make_plan
 from upd.analyses.cost import CostModel
 from upd.errors import InputError
 from upd.mesh import recipes
@@ -159,7 +159,7 @@ def spacing(parameters: Mapping[str, Any]) -> float:
 
 
 def bare(scene: Scene) -> Overrides:
-    """What takes off a scene what costs and shows no number; of a cycle no more steps than usual,
+    """Overrides without what costs and shows no number; of a cycle no more steps than usual,
     which only its drawing needs.
     """
     steps = min(scene.loads.cycle_steps, Loads.cycle_steps)

@@ -1,6 +1,6 @@
 """Whether a body yields under a contact: von Mises stress against its yield stress.
 
-Off for a body whose material has no yield_stress. The contact itself stays elastic: the check says
+Off for a body whose material has no yield_stress. The contact itself stays elastic: the check shows
 where that ends.
 """
 
@@ -56,12 +56,12 @@ def hertz_checks(
         worst = hertz_yield_point(nu)
         stress = worst.ratio * hertz.max_pressure
         begins = hertz_yield_load(limit, nu, radius, modulus)
-        says = (
+        text = (
             f"largest von Mises stress / yield stress of {body.name}, Hertz without friction: "
             f"{stress:.4g} MPa at depth {worst.depth * hertz.radius:.3g} mm; yields from "
             f"{begins:.4g} N"
         )
-        out.append(_check(case, body.name, stress / limit, says))
+        out.append(_check(case, body.name, stress / limit, text))
     return out
 
 
@@ -77,11 +77,11 @@ def partial_slip_checks(
         ratio = partial_slip_ratio(scene.contact.friction, case.ratio, nu)
         # friction never relieves the most stressed place
         stress = max(ratio, hertz_yield_point(nu).ratio) * hertz.max_pressure
-        says = (
+        text = (
             f"largest von Mises stress / yield stress of {body.name}, Hertz's pressure and "
             f"Cattaneo's traction on a half-space: {stress:.4g} MPa"
         )
-        out.append(_check(case, body.name, stress / limit, says))
+        out.append(_check(case, body.name, stress / limit, text))
     return out
 
 
@@ -111,16 +111,16 @@ def half_space_checks(
         ]
         worst = max(found, key=lambda one: one.value)
         sheared = any(len(fields) > 1 for _, _, fields in faces.values())
-        says = (
+        text = (
             f"largest von Mises stress / yield stress of {body.name}, computed pressure"
             f"{' and friction' if sheared else ', no friction,'} on a half-space: "
             f"{worst.value:.4g} MPa at depth {worst.place[2]:.3g} mm, "
             f"and {100.0 * worst.resolution:.2g} % that the lattice leaves open"
         )
         value = worst.value * (1.0 + worst.resolution) / limit
-        out.append(_check(case, body.name, value, says))
+        out.append(_check(case, body.name, value, text))
     return out
 
 
-def _check(case: Case, body: str, value: float, says: str) -> Check:
-    return Check("onset of yield", replace(case, body=body), value, 1.0, says, _REMEDY, fatal=False)
+def _check(case: Case, body: str, value: float, text: str) -> Check:
+    return Check("onset of yield", replace(case, body=body), value, 1.0, text, _REMEDY, fatal=False)

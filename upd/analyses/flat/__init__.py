@@ -10,7 +10,7 @@ from functools import partial
 from upd.analyses.base import Analysis
 from upd.analyses.contact import effects
 from upd.analyses.contact.bodies import needs
-from upd.analyses.contact.effects import SolvedAgain
+from upd.analyses.contact.effects import CompanionSolver
 from upd.analyses.contact.results import pick
 from upd.analyses.contact.varied import (
     FLAT_GOVERNING,
@@ -26,7 +26,7 @@ from upd.vary.wanted import plan_wanted
 
 PROBLEM = mesh_problem(solve_plan, results.make_results)
 WANTED = make_wanted(PROBLEM, FLAT_GOVERNING)
-_AGAIN = SolvedAgain(solve_companion, results.make_results, note_moved)
+_AGAIN = CompanionSolver(solve_companion, results.make_results, note_moved)
 ANALYSIS = Analysis(
     name="flat",
     headline_names=results.HEADLINE,

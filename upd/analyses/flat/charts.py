@@ -11,8 +11,13 @@ from numpy.typing import NDArray
 
 from upd.analyses.contact.charts import (
     APPROACH,
+    FACE_SIZE,
+    FACE_X,
+    FACE_Y,
     FORCE,
+    TOP_PERCENTILE,
     closed_nodes,
+    face_chart,
     frames,
     from_zero,
     is_loaded,
@@ -24,12 +29,8 @@ from upd.plot.chart import Array, Arrays, Axis, Band, Chart, Group, Map, Scatter
 from upd.plot.common import UM, case_of, pressure_map, scalar, state_map, with_content
 from upd.results import Case
 
-_X, _Y = Axis("x, along the damper", "mm"), Axis("y, up the slope", "mm")
-_FACE, _CURVE = (7.2, 4.2), (5.6, 4.4)
-# Normal loads whose pressure stands on the sheet; of the other maps, those of the first load.
+# Normal loads whose pressure is on the sheet; of the other maps, those of the first load.
 _SHOWN = 2
-# Where the colours end: beyond it the pressure is the edge's.
-_TOP_PERCENTILE = 99.0
 
 Faces = dict[Case, list[Group]]
 
@@ -96,26 +97,22 @@ def _joined(groups: list[Group], name: str) -> Array:
 def _pressure(case: Case, groups: list[Group], sheet: bool) -> Chart:
     p = _joined(groups, "pressure")
     maps = tuple(
-        pressure_map(group, 1.0, top=float(np.percentile(p, _TOP_PERCENTILE))) for group in groups
+        pressure_map(group, 1.0, top=float(np.percentile(p, TOP_PERCENTILE))) for group in groups
     )
     note = (
         f"The largest pressure, {p.max():.3g} MPa, is an edge's; the colours end at the 99th "
         "percentile. Open nodes are white."
     )
-    return Chart(
+    detail, more = f"largest {p.max():.3g} MPa", {"sheet": sheet, "columns": 3}
+    return face_chart(
         "Contact pressure",
-        _X,
-        _Y,
-        frames(groups),
-        maps,
+        groups,
         case.label,
         "pressure",
-        equal=True,
+        maps=maps,
         note=note,
-        sheet=sheet,
-        columns=3,
-        size=_FACE,
-        detail=f"largest {p.max():.3g} MPa",
+        detail=detail,
+        **more,
     )
 
 
@@ -136,13 +133,13 @@ def _per_length(normal: Faces) -> Chart:
     ordinate = Axis("force per length", "N/mm", low=0.0)
     return Chart(
         "Normal force per length",
-        _X,
+        FACE_X,
         ordinate,
         tuple(traces),
         figure="pressure",
         bands=tuple(bands),
         columns=3,
-        size=_FACE,
+        size=FACE_SIZE,
     )
 
 
@@ -167,26 +164,17 @@ def _opening(case: Case, groups: list[Group], sheet: bool) -> Chart:
             traces.append(Trace(label, x, y, style, colour))
     # Room for the legend above the nodes.
     upwards = replace(
-        _Y,
+        FACE_Y,
         high=float(
             max(values(g, "y")[-1] for g in groups)
             + 0.1 * np.ptp(np.concatenate([t.x for t in traces]))
         ),
     )
     note = f"{n} of {whole} nodes are in contact; crosses are open."
-    return Chart(
-        "Nodes in contact",
-        _X,
-        upwards,
-        tuple(traces),
-        case=case.label,
-        figure="contact_open",
-        equal=True,
-        note=note,
-        sheet=sheet,
-        columns=1,
-        size=_FACE,
+    found = face_chart(
+        "Nodes in contact", groups, case.label, "contact_open", note=note, sheet=sheet, columns=1
     )
+    return replace(found, y=upwards, traces=tuple(traces))
 
 
 def _surface(case: Case, groups: list[Group], sheet: bool) -> Chart:
@@ -206,19 +194,15 @@ def _surface(case: Case, groups: list[Group], sheet: bool) -> Chart:
     )
     body = groups[0]["surface_displacement"].attributes.get("body", "upper body")
     note = f"How far the contact nodes of the {body} stay behind its distant set."
-    return Chart(
+    return face_chart(
         f"Deformed surface of the {body}",
-        _X,
-        _Y,
-        frames(groups),
-        maps,
+        groups,
         case.label,
         "surface",
-        equal=True,
+        maps=maps,
         note=note,
         sheet=sheet,
         columns=1,
-        size=_FACE,
     )
 
 
@@ -227,19 +211,16 @@ def _states(arrays: Arrays, case: Case, groups: list[Group], ratios: int, sheet:
         (group, normal) for group in groups if (normal := normal_of(arrays, group)) is not None
     ]
     maps = tuple(state_map(group, closed_nodes(normal), 1.0) for group, normal in pairs)
-    return Chart(
+    note, more = "Blue sticks, orange slips.", {"sheet": sheet, "columns": max(1, ratios)}
+    return face_chart(
         "Stick and slip",
-        _X,
-        _Y,
-        frames(groups),
-        maps,
+        groups,
         case.label,
         "stick_slip",
-        equal=True,
-        note="Blue sticks, orange slips.",
-        sheet=sheet,
-        columns=max(1, ratios),
+        maps=maps,
+        note=note,
         size=(5.4, 4.0),
+        **more,
     )
 
 
@@ -270,7 +251,6 @@ def _approach(arrays: Arrays) -> list[Chart]:
                 FORCE,
                 tuple(traces),
                 figure="force_approach",
-                size=_CURVE,
             )
         )
     return out
@@ -289,9 +269,7 @@ def _pressure_over_force(arrays: Arrays) -> list[Chart]:
             Trace("mean over the contact", F, values(group, "mean_pressure"), "both", 1),
         )
         axes = Axis("normal force F", "N", low=0.0), Axis("pressure", "MPa", low=0.0)
-        out.append(
-            Chart("Pressure over normal force", *axes, traces, figure="force_approach", size=_CURVE)
-        )
+        out.append(Chart("Pressure over normal force", *axes, traces, figure="force_approach"))
     return out
 
 
@@ -327,7 +305,6 @@ def _path_chart(direction: str, groups: list[Group], cycle: bool) -> Chart:
         case=case,
         figure="force_displacement",
         bands=tuple(bands),
-        size=_CURVE,
     )
 
 
@@ -349,19 +326,15 @@ def _law(group: Group, faces: list[Group], sheet: bool) -> Chart:
         size,
         Axis("preload", "N"),
     )
-    told = f"{len(k_n)} points, k_n {k_n.sum():.3g} N/mm in all"
-    return Chart(
+    detail = f"{len(k_n)} points, k_n {k_n.sum():.3g} N/mm in all"
+    return face_chart(
         "Contact points of the dynamic model",
-        _X,
-        _Y,
-        frames(faces),
-        case=case_of(group).label,
-        figure="contact_law",
-        equal=True,
+        faces,
+        case_of(group).label,
+        "contact_law",
         note="The area of a mark is its share of the normal stiffness.",
         scatters=(points,),
         sheet=sheet,
         columns=1,
-        size=_FACE,
-        detail=told,
+        detail=detail,
     )

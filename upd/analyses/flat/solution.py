@@ -19,7 +19,7 @@ from upd.analyses.contact.plan import (
     ContactPlan,
     direction_name,
 )
-from upd.analyses.contact.plans import DamperLoad
+from upd.analyses.contact.scene_plan import DamperLoad
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
 from upd.contact.tilt import TiltedContact

@@ -44,7 +44,7 @@ from upd.analyses.contact.plan import (
     direction_name,
     unit_vector,
 )
-from upd.analyses.contact.plans import DamperLoad, normal_loads
+from upd.analyses.contact.scene_plan import DamperLoad, normal_loads
 from upd.analyses.flat.solution import (
     FlatNormalCase,
     FlatSolution,

@@ -23,7 +23,7 @@ from upd.analyses.forced import (
 )
 from upd.analyses.forced.solution import ForcedSolution
 from upd.linalg.parallel import threads_for
-from upd.vary.inputs import coarsened_rig
+from upd.vary.inputs import InputDerivatives, coarsened_rig
 
 Made = TypeVar("Made")
 
@@ -55,8 +55,7 @@ ANALYSIS = Analysis(
     headline=answer.headline,
     answer=answer.answer,
     verdict_names=("best_peak", "reduction_of_free_peak"),
-    input_changes=input_uncertainty.input_changes,
-    known_inputs=input_uncertainty.known_inputs,
+    derivatives=InputDerivatives(input_uncertainty.input_changes, input_uncertainty.known_inputs),
     coarsened=lambda plan: coarsened_rig(plan, ("response",), ("balance.method", "balance")),
     estimate=estimates.estimate,
 )

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import Effect, Needs, Plan
-from upd.analyses.centrifugal import centrifugal_effects
 from upd.analyses.cost import NODES, CostModel, dense_s
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.stiffness import check_sources, plans_to_solve
+from upd.analyses.seated.plan import centrifugal_effects
 from upd.cache.sources import key_of
 from upd.hbm.fourier import harmonics, sample_count
 from upd.hbm.kept_factors import SOLUTIONS, WORTH_KEEPING

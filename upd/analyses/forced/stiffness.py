@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.contact.plan import ContactPlan
-from upd.analyses.contact.plans import make_plan as make_contact_plan
+from upd.analyses.contact.scene_plan import make_plan as make_contact_plan
 from upd.analyses.flat import ANALYSIS as FLAT
 from upd.cache.arrays import cache_folder
 from upd.cache.sources import source_digest

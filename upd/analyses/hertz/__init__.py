@@ -10,7 +10,7 @@ from functools import partial
 from upd.analyses.base import Analysis
 from upd.analyses.contact import effects
 from upd.analyses.contact.bodies import needs
-from upd.analyses.contact.effects import SolvedAgain
+from upd.analyses.contact.effects import CompanionSolver
 from upd.analyses.contact.results import pick
 from upd.analyses.contact.varied import (
     CURVED_GOVERNING,
@@ -28,7 +28,7 @@ from upd.vary.wanted import plan_wanted
 
 PROBLEM = mesh_problem(solve_plan, results.make_results, sample)
 WANTED = make_wanted(PROBLEM, CURVED_GOVERNING)
-_AGAIN = SolvedAgain(lambda plan, model: solve_on(plan, model, Stages()), results.make_results)
+_AGAIN = CompanionSolver(lambda plan, model: solve_on(plan, model, Stages()), results.make_results)
 ANALYSIS = Analysis(
     name="hertz",
     headline_names=results.HEADLINE,

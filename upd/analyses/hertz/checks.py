@@ -10,7 +10,7 @@ import numpy as np
 from upd.analyses.contact import checks as common
 from upd.analyses.contact import yielding
 from upd.analyses.contact.plan import NORMAL
-from upd.analyses.contact.plans import has_mirror_planes, wider_patch
+from upd.analyses.contact.scene_plan import has_mirror_planes, wider_patch
 from upd.analyses.hertz.products import product_checks
 from upd.analyses.hertz.results import closed_form_traction, hertz_of
 from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
@@ -165,10 +165,10 @@ def _left_out(solution: HertzSolution) -> list[Check]:
             "the contact reaches where the faces are too steep for small-displacement theory: "
             "lower the load"
         )
-        says = "steepest slope of the gap where the bodies touch"
+        text = "steepest slope of the gap where the bodies touch"
         return [
             *checks,
-            Check("slope in the contact", NO_CASE, _slope(solution), 0.2, says, remedy),
+            Check("slope in the contact", NO_CASE, _slope(solution), 0.2, text, remedy),
         ]
     ratio = max(c.measures.radius_outermost for c in solution.normal) / scene.sphere_radius
     remedy = "the contact is too large for small-displacement theory: lower the load"

@@ -26,7 +26,7 @@ def sample(solution: HertzSolution) -> Samples:
 
     They move the contact's edge by up to one spacing of the lattice each way, on the same condensed
     bodies. What the finite bodies add to a displacement is taken in proportion to the load: it
-    knows the total force only. A load whose contact reaches the rim of the patch is left out.
+    knows the total force only. A load whose contact reaches the rim of the patch is omitted.
 
     Returns
     -------

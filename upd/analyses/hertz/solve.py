@@ -165,7 +165,7 @@ def _normal_case(
     pressure = patch.whole(solution.model.multipliers.pressure(result.force))
     located = None
     if solution.plan.scene.sphere_radius is None:
-        # Nobody says that this contact is an ellipse.
+        # This contact need not be an ellipse.
         average = force / patch.area()
         located = located_area(patch.X, patch.Y, average, gap, force > 0.0, solution.modulus)
     return HertzNormalCase(

@@ -1,6 +1,6 @@
 """Self-checks of a rig.
 
-Every mode's residual and orthogonality, none missed, the reduction's upper bound, what is left out.
+Every mode's residual and orthogonality, none missed, the reduction's upper bound, effects omitted.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ def check_solution(solution: ModalSolution) -> list[Check]:
         )
     if solution.response is not None:
         remedy = "the modes left out matter here: raise modes.below"
-        says = "|modal / direct - 1| off resonance, undamped"
+        text = "|modal / direct - 1| off resonance, undamped"
         checks.append(
             Check(
                 "modal response",
                 NO_CASE,
                 solution.response.modal_error,
                 0.02,
-                says,
+                text,
                 remedy,
                 fatal=False,
             )

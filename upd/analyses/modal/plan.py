@@ -1,4 +1,4 @@
-"""Plan of a rig: which bodies are solved, in which mirror families, what is left out, size and
+"""Plan of a rig: which bodies are solved, in which mirror families, effects omitted, size and
 cost.
 """
 

@@ -146,7 +146,7 @@ def frequency_changes(shapes: Array, eigenvalue: float, below: Matrices, above: 
 
 def _groups(modes: Sequence[RigMode]) -> Iterator[list[RigMode]]:
     """Modes of one body and mirror family that have the same frequency as far as their residual
-    tells, rising.
+    shows, rising.
     """
     for key in dict.fromkeys((m.body.name, m.family) for m in modes):
         group: list[RigMode] = []

@@ -120,7 +120,7 @@ class RigResponse:
     accelerance
         "free" or "glued" -> blade -> (n,) at its accelerometer, (m/s2)/N.
     damping
-        Modal damping ratio; ``tuned`` says how it was found from a measured peak.
+        Modal damping ratio; ``tuned``: how it was found from a measured peak.
     peak
         Frequency in Hz and height in (m/s2)/N of the free right blade's peak in the band, if any.
     half_power

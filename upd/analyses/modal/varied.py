@@ -37,7 +37,7 @@ _COARSEST = "the rig cannot be meshed coarser: its recipe has no smaller refinem
 
 
 def bare(scene: RigScene) -> Overrides:
-    """What takes off a scene what costs and shows no number."""
+    """Overrides without what costs and shows no number."""
     return (("want", tuple(w for w in scene.want if w in _WANTED) or ("free",)), *ALONE)
 
 
@@ -94,7 +94,7 @@ def _corrected(
 ) -> Estimates:
     """The errors by the mesh, and of the reduced model by the modes it keeps."""
     del solved
-    # The reduced model stands on the same mesh as the full one.
+    # The reduced model has the mesh of the full one.
     of_full = {
         (r.name, r.case): found[full.name, full.case]
         for r in run.numbers

@@ -7,17 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.contact.charts import frames, values
+from upd.analyses.contact.charts import TOP_PERCENTILE, face_chart, values
 from upd.analyses.seated.output import FACE, HISTORY, MOVED, SEATING
 from upd.analyses.seated.solve import RAISED, SMOOTH, WAYS
 from upd.plot.chart import STATES, Arrays, Axis, Chart, Group, Map, Style, Trace
 from upd.plot.common import UM, case_of, lattice, pressure_map, with_content
 from upd.scene.forced_contact import SIDES
 
-_X, _Y = Axis("x, along the damper", "mm"), Axis("y, up the slope", "mm")
-_FACE, _CURVE = (7.2, 4.2), (5.6, 4.4)
-# Where the colours end: beyond it the pressure is the edge's.
-_TOP_PERCENTILE = 99.0
 _STYLES: dict[str, Style] = dict(zip(SEATING, ("line", "dashed", "dotted"), strict=True))
 _MARKS: tuple[tuple[Style, str, str], ...] = (
     ("points", "normal", "N"),
@@ -64,7 +60,6 @@ def _seating(histories: Mapping[str, Group], summary: Mapping[str, Any]) -> list
                 (*traces, *_rigid(summary, side, histories)),
                 case=f"{side} face",
                 figure="seating",
-                size=_CURVE,
                 note="T is positive up the slope, where friction holds the damper back.",
             )
         )
@@ -123,7 +118,6 @@ def _ways(histories: Mapping[str, Group]) -> list[Chart]:
             Axis("force on the face", "N"),
             tuple(traces),
             figure="seating",
-            size=_CURVE,
             note="All hold the same F_C: friction leaves open which, and the way of loading "
             "decides.",
         )
@@ -139,40 +133,30 @@ def _maps(arrays: Arrays) -> list[Chart]:
     out = []
     for (name, side), groups in found.items():
         p = np.concatenate([values(g, "pressure").ravel() for g in groups])
-        top = float(np.percentile(p[p > 0.0], _TOP_PERCENTILE)) if (p > 0.0).any() else None
+        top = float(np.percentile(p[p > 0.0], TOP_PERCENTILE)) if (p > 0.0).any() else None
         out.append(
-            Chart(
+            face_chart(
                 "Contact pressure",
-                _X,
-                _Y,
-                frames(groups),
-                tuple(pressure_map(g, 1.0, top=top) for g in groups),
+                groups,
                 f"{name}, {side} face",
                 "pressure",
-                equal=True,
+                maps=tuple(pressure_map(g, 1.0, top=top) for g in groups),
                 note="Open nodes are white; the colours end at the 99th percentile, where only "
                 "edges go on.",
                 sheet=name == RAISED,
-                columns=2,
-                size=_FACE,
                 detail=f"largest {p.max():.3g} MPa",
             )
         )
     for (name, side), groups in found.items():
         out.append(
-            Chart(
+            face_chart(
                 "Stick and slip",
-                _X,
-                _Y,
-                frames(groups),
-                tuple(_state(g) for g in groups),
+                groups,
                 f"{name}, {side} face",
                 "stick_slip",
-                equal=True,
+                maps=tuple(_state(g) for g in groups),
                 note="In the last load step: blue sticks, orange slips, grey is open.",
                 sheet=name in (RAISED, "lowered"),
-                columns=2,
-                size=_FACE,
             )
         )
     return out
@@ -201,7 +185,6 @@ def _moved(arrays: Arrays) -> list[Chart]:
                 tuple(traces),
                 case=name,
                 figure="hysteresis",
-                size=_CURVE,
                 sheet=name not in WAYS,
             )
         )
@@ -237,7 +220,6 @@ def _damper(histories: Mapping[str, Group]) -> list[Chart]:
                 Axis(title.split(" ")[0].lower(), unit),
                 traces,
                 figure="damper_motion",
-                size=_CURVE,
             )
         )
     return out

@@ -33,8 +33,8 @@ def corrected(
 ) -> Estimates:
     """The parts by variations with those known from the run.
 
-    A number that is zero, or that a variation has with the other sign, has no error relative to it
-    and says so.
+    A number that is zero, or that a variation has with the other sign, has no error relative to it,
+    for that reason.
     """
     known = dict(merged(found, _by_solver(solution, run.numbers)))
     for key, parts in by_edges(solution).items():

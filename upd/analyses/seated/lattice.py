@@ -1,4 +1,6 @@
-"""The lattice of a blade's contact patch: corner nodes, tributary areas, the frame of the face."""
+"""Faces of a mesh: lattice of a blade's contact patch, tributary areas, frame; balance of a rigid
+damper on both faces in closed form.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from upd.contact.equilibrium import FaceForces, equilibrium
+from upd.errors import InputError
 from upd.mesh import FloatArray, IntArray, Mesh
 
 
@@ -73,3 +77,32 @@ def lines(x: FloatArray) -> IntArray:
     out = np.empty(len(x), np.int64)
     out[order] = np.concatenate([[0], np.cumsum(step)])
     return out
+
+
+def face_angles(frames: FloatArray) -> tuple[float, float]:
+    """Inclination of left and right face to the horizontal, deg.
+
+    Parameters
+    ----------
+    frames
+        (2, 3, 3) of each face, unit rows: normal into the blade, along the damper, up the slope.
+    """
+    x, _, z = frames[:, 0].T
+    left, right = np.degrees(np.arctan2(np.abs(x), np.maximum(z, 0.0)))
+    return float(left), float(right)
+
+
+def rigid_balance(
+    frames: FloatArray, centrifugal: float, friction: float, state: str
+) -> FaceForces | None:
+    """Forces of a rigid damper that slips on both faces; None where it jams before.
+
+    Parameters
+    ----------
+    state
+        "opposing", "frictionless" or "reversed".
+    """
+    try:
+        return equilibrium(*face_angles(frames), centrifugal, friction, state)
+    except InputError:
+        return None

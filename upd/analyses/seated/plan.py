@@ -6,16 +6,18 @@ from collections.abc import Mapping
 from typing import Any
 
 from upd.analyses.base import Effect, Needs, Plan
-from upd.analyses.centrifugal import centrifugal_effects
 from upd.analyses.cost import NODES, CostModel, dense_s
 from upd.cache.sources import key_of
+from upd.labels import number
 from upd.mesh import recipes
 from upd.scene import SeatedScene
 from upd.scene.rig import rig_parameters
+from upd.scene.rotation import damper_mass
+from upd.units import UNITS
 
 SeatedPlan = Plan[SeatedScene]
 
-#: checks of what is left out; each solves the faces' forces again with it
+#: checks of effects omitted; each solves the faces' forces again with it
 WORN = "worn faces"
 OTHER_WAYS = "other ways of loading"
 
@@ -159,4 +161,38 @@ def _effects(scene: SeatedScene, symmetry: str) -> list[Effect]:
             applies=mu > 0.0,
         ),
         Effect("inertia", False, "quasi-static", applies=False),
+    ]
+
+
+def centrifugal_words(scene: Any, mass: float | None) -> str:
+    """F_C, where it comes from, and the damper's mass.
+
+    Parameters
+    ----------
+    scene
+        A forced response or a seated damper.
+    mass
+        Of the damper, t; None where it is not known.
+    """
+    damper = scene.damper
+    force, grams = number(damper.centrifugal, "N"), "" if mass is None else number(1e6 * mass, "g")
+    if damper.speed is None or damper.radius is None:
+        return f"{force}, damper {grams}" if grams else force
+    rpm = damper.speed / UNITS["speed"]["rpm"]
+    return f"{force} = m r w^2: damper {grams}, {damper.radius:.6g} mm, {rpm:.6g} rpm"
+
+
+def centrifugal_effects(scene: Any) -> list[Effect]:
+    """F_C and the damper's mass, and that nothing else of the rotation counts.
+
+    Parameters
+    ----------
+    scene
+        A forced response or a seated damper.
+    """
+    pulled = "the rig does not turn: wires pull the damper with F_C"
+    turns = "F_C on the damper alone: the blades are those at rest"
+    return [
+        Effect("centrifugal force", True, centrifugal_words(scene, damper_mass(scene))),
+        Effect("rotation", False, pulled if scene.damper.speed is None else turns, applies=False),
     ]

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 _X = 0
 RAISED, LOWERED, AGAIN = "raised", "lowered", "raised again"
 OVER, SHAKEN, SMOOTH = "over-pressed", "vibrated in", "frictionless"
-#: ways to F_C that friction tells apart
+#: ways to F_C that differ by friction
 WAYS = (RAISED, AGAIN, OVER, SHAKEN)
 
 
@@ -102,7 +102,7 @@ class SeatedSolution:
     platforms
         The contact with the platforms held, for stiffnesses.
     omissions
-        Numbers solved again with what is left out.
+        Numbers solved again with the effects omitted.
     """
 
     plan: SeatedPlan
@@ -213,7 +213,7 @@ def _go_on(solution: SeatedSolution, stages: Stages) -> None:
         jobs.append(partial(_worn, solution))
     with stages("seating", f"{', '.join(names)}: {steps} load steps"):
         in_parallel(jobs, 2)
-    # In the order they are told in, whichever ended first.
+    # In the order of the report, whichever ended first.
     solution.phases = {name: solution.phases[name] for name in (RAISED, *names)}
 
 
@@ -264,23 +264,23 @@ def _phase(solution: SeatedSolution, way: _Way) -> None:
 
 
 def _solve_again(solution: SeatedSolution, stages: Stages) -> Iterator[Resolved]:
-    """Normal forces of the faces with what is left out."""
+    """Normal forces of the faces with the effects omitted."""
     scene, of = solution.plan.scene, solution.interface
     without = solution.forces(RAISED)[:, 0]
     side = int(np.argmax(without))
     case = Case(name=RAISED, side=SIDES[side])
 
-    def told(effect: str, included: float, remedy: str) -> Resolved:
+    def resolved(effect: str, included: float, remedy: str) -> Resolved:
         return Resolved(effect, "face_N", case, float(without[side]), included, "N", remedy)
 
     if scene.contact.worn < 1.0:
         assert solution.worn is not None
         included = float(of.face_forces(solution.worn)[-1, side, 0])
-        yield told(WORN, included, 'set contact.fit = "worn"')
+        yield resolved(WORN, included, 'set contact.fit = "worn"')
     if not scene.wants("band"):
         if SHAKEN not in solution.phases:
             with stages("seating", SHAKEN):
                 _phase(solution, _shaken(solution.plan))
         included = float(solution.forces(SHAKEN)[side, 0])
         del solution.phases[SHAKEN]
-        yield told(OTHER_WAYS, included, 'friction leaves the state open: add "band" to want')
+        yield resolved(OTHER_WAYS, included, 'friction leaves the state open: add "band" to want')

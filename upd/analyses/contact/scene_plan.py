@@ -1,6 +1,6 @@
 """Plan of a contact, curved or flat.
 
-Normal loads, mirror planes, load families, what is left out, sizes from Hertz's contact.
+Normal loads, mirror planes, load families, effects omitted, sizes from Hertz's contact.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class DamperLoad:
 
     @property
     def case(self) -> Case:
-        """The force, with as many digits as the scene tells loads apart by."""
+        """The force, with as many digits as distinguish the scene's loads."""
         return Case(load=self.force)
 
 
@@ -140,7 +140,7 @@ def _symmetry(scene: Scene) -> tuple[str, str]:
     if scene.contact.tilt == "free":
         reasons.append("the damper may tilt about both axes")
     if scene.geometry.get("pad_offset", 0.0) != 0.0:
-        reasons.append("the pads stand at unequal heights")
+        reasons.append("the pads have unequal heights")
     if asked not in ("auto", "full") and reasons:
         raise InputError(f'mesh.symmetry: {"; ".join(reasons)}; use "full" or "auto"')
     if asked != "auto":
@@ -310,7 +310,7 @@ def _friction_effects(scene: Scene, loaded: bool) -> list[Effect]:
     if not friction:
         return [*out, *(coupling_effects(scene, loaded)[:1] if mu > 0.0 else ())]
     cycle = scene.wants("cycle")
-    marched = cycle or scene.coupled or not curved
+    stepped = cycle or scene.coupled or not curved
     return [
         *out,
         Effect(DIRECTIONS, True, TOGETHER if scene.coupled else "asked for")
@@ -324,13 +324,13 @@ def _friction_effects(scene: Scene, loaded: bool) -> list[Effect]:
         *coupling_effects(scene, loaded),
         Effect(
             "load history",
-            marched,
+            stepped,
             "a full cycle is asked for"
             if cycle
-            else "first loading, marched in small steps"
-            if marched
+            else "first loading, in small steps"
+            if stepped
             else "first loading only",
-            applies=marched,
+            applies=stepped,
         ),
     ]
 
