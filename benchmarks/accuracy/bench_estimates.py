@@ -150,7 +150,7 @@ def _followed(
         )
     keys = [k for k in found.solved[0].values if k[0] in names]
     values = {f"{k[0]}, {k[1].label}": np.array([s.values[k] for s in found.solved]) for k in keys}
-    return np.array([s.point.h for s in found.solved]), values, keys
+    return np.array([s.point.size for s in found.solved]), values, keys
 
 
 def _against(scene: str, overrides: Mapping[str, Any], keys: Sequence[Any]) -> dict[str, float]:
@@ -178,7 +178,7 @@ def flat(scene: str, held: Mapping[str, Any], levels: Sequence[int], fine: int) 
     names = ("K_N_secant_raw", "K_Tx_initial_raw", "K_Ty_initial_raw")
     h, values, keys = _followed(scene, "mesh", levels, {**_FLAT, **held}, names)
     planned = plan_study(load_scene(scene, {**_FLAT, **held}), "mesh", (levels[-1], fine))
-    settings = {**dict(planned.points[-1].settings), "mesh.element": "hex20"}
+    settings = {**dict(planned.points[-1].overrides), "mesh.element": "hex20"}
     limits = _against(scene, {**_FLAT, **held, **settings}, keys)
     return Ladder(f"{scene}, mesh", f"hex20, {fine} divisions", h, values, limits)
 

@@ -24,8 +24,9 @@ from upd import load_scene
 from upd.batch import store as point_store
 from upd.batch import sweep
 from upd.batch.engine import ATTEMPTS, Job, Progress, dispatch
-from upd.batch.point import OTHER_CODE, Outcome, Task, read_outcome, solve_task
+from upd.batch.point import OTHER_CODE, Task, solve_task
 from upd.errors import InputError, UpdError
+from upd.vary.outcome import Outcome, read_outcome
 
 TINY = {
     "geometry.divisions": 8,

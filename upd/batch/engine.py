@@ -13,10 +13,11 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 
 from upd.batch.executors import Executor, InProcess, Processes
-from upd.batch.point import OTHER_CODE, Outcome, Task, read_outcome
+from upd.batch.point import OTHER_CODE, Task
 from upd.batch.store import PointStore
 from upd.errors import InputError, UpdError
 from upd.linalg import select
+from upd.vary.outcome import Outcome, read_outcome
 
 #: A point whose worker dies this often is given up.
 ATTEMPTS = 3

@@ -18,7 +18,6 @@ import numpy as np
 
 from upd.batch.grid import GridAxis, values_at
 from upd.batch.plan import SweepPlan
-from upd.batch.point import Outcome
 from upd.batch.store import PointStore
 from upd.batch.table import Column, csv_text, reasons
 from upd.cache.files import write_text
@@ -29,6 +28,7 @@ from upd.plot.sample_charts import sample_charts
 from upd.plot.sweep_charts import figure_names, sweep_charts
 from upd.results import write_netcdf
 from upd.results.sampled import SampledNumber
+from upd.vary.outcome import Outcome
 
 
 @dataclass(frozen=True)

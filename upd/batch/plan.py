@@ -17,7 +17,7 @@ from upd.analyses.base import Needs
 from upd.batch.dask import check_address
 from upd.batch.engine import Workers, check_numbers, fitting
 from upd.batch.grid import GridAxis, Place, parse_axes, places, settings
-from upd.batch.point import Outcome, Task, point_settings
+from upd.batch.point import Task, point_settings
 from upd.batch.sample import (
     Sample,
     draw_sample,
@@ -31,6 +31,7 @@ from upd.cache.arrays import cache_limit
 from upd.cache.sources import source_digest
 from upd.errors import InputError
 from upd.scene import AnyScene, load_scene
+from upd.vary.outcome import Outcome
 
 _DECIMAL = re.compile(r"\d+\.\d+(e[+-]?\d+)?")
 
@@ -148,7 +149,7 @@ def plan_sweep(
         Task(text, changed, threads, where, limit, scene.recipe, code) for text, changed in given
     )
     kept = PointStore(folder, "sweep").finished(tasks)
-    needs, refused = _needs(tasks, kept)
+    needs, refused = point_needs(tasks, kept)
     if len(refused) == len(grid):
         raise InputError(
             f"no point of the {'grid' if drawn is None else 'sample'} can be run. The first: "
@@ -192,7 +193,7 @@ def _drawn(
     return draw_sample(scene, count, kept_seed(folder) if seed is None else seed)
 
 
-class _PointNeeds(NamedTuple):
+class PointNeeds(NamedTuple):
     """What a point shares with others, its memory and its seconds."""
 
     shared: Needs
@@ -200,11 +201,11 @@ class _PointNeeds(NamedTuple):
     seconds: float
 
 
-def _needs(
-    tasks: Sequence[Task], kept: Collection[int]
-) -> tuple[dict[int, _PointNeeds], dict[int, Outcome]]:
+def point_needs(
+    tasks: Sequence[Task], kept: Collection[int] = ()
+) -> tuple[dict[int, PointNeeds], dict[int, Outcome]]:
     """What every missing point needs, and the points that the scene does not allow."""
-    needs: dict[int, _PointNeeds] = {}
+    needs: dict[int, PointNeeds] = {}
     refused: dict[int, Outcome] = {}
     for number, task in enumerate(tasks):
         if number in kept:
@@ -217,7 +218,7 @@ def _needs(
         except InputError as error:
             refused[number] = Outcome(failure=" ".join(f"InputError: {error}".split()))
         else:
-            needs[number] = _PointNeeds(shared, plan.memory_bytes, plan.seconds)
+            needs[number] = PointNeeds(shared, plan.memory_bytes, plan.seconds)
     return needs, refused
 
 

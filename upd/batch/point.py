@@ -16,7 +16,7 @@ import tomllib
 import traceback
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +29,10 @@ from upd.errors import UpdError
 from upd.linalg.pardiso import load as load_pardiso
 from upd.linalg.select import has_pardiso
 from upd.report.notebook import RunResult
-from upd.results import Case, InputPart, Result, read_input_part
+from upd.results import Result
 from upd.scene import load_scene
 from upd.scene.quantities import UNKNOWN
+from upd.vary.outcome import Outcome, PointResult
 
 log = logging.getLogger(__name__)
 
@@ -97,128 +98,6 @@ class Task:
                 "code": self.code,
             }
         )[:20]
-
-
-@dataclass(frozen=True)
-class PointResult:
-    """One number of a point.
-
-    Attributes
-    ----------
-    value
-        None where the number is not finite.
-    error
-        Relative difference from the number's reference.
-    printed_error
-        That of a published value.
-    exact
-        Whether the reference is what the number should converge to.
-    withheld
-        Why the number was not reached.
-    estimated
-        Estimated relative error.
-    inputs
-        What the inputs known within limits do to it.
-    """
-
-    name: str
-    case: Case
-    unit: str
-    value: float | None
-    error: float | None = None
-    printed_error: float | None = None
-    exact: bool = True
-    withheld: str = ""
-    estimated: float | None = None
-    inputs: tuple[InputPart, ...] = ()
-
-    def as_dict(self) -> dict[str, Any]:
-        """The number for JSON: ``case`` in words, its attributes under ``case_fields``.
-
-        What is not given is left out.
-        """
-        given = {
-            f.name: value for f in fields(self) if (value := getattr(self, f.name)) != f.default
-        }
-        return {
-            **given,
-            "case": self.case.label,
-            "case_fields": self.case.given(),
-            **({"inputs": [part.as_dict() for part in self.inputs]} if self.inputs else {}),
-        }
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a point gave, or the reason it failed.
-
-    Attributes
-    ----------
-    results
-        All numbers of the run.
-    failure
-        Why it failed; "" when it did not.
-    final
-        Whether the same would come out again; other failures (killed, no memory) are tried again by
-        the next call.
-    seconds, stages
-        Of the run, by its own clock: without the start of the process and its imports.
-    memory_mb
-        Largest resident memory during the run.
-    n_dof
-        Degrees of freedom of all bodies.
-    warnings
-        Names of the self-checks that did not pass.
-    shared
-        What was taken from where, see `upd.cache.shared.Store`.
-    where
-        "host:process".
-    """
-
-    results: tuple[PointResult, ...] = ()
-    failure: str = ""
-    final: bool = True
-    seconds: float = 0.0
-    memory_mb: float = 0.0
-    stages: Mapping[str, float] = field(default_factory=dict)
-    n_dof: int = 0
-    warnings: tuple[str, ...] = ()
-    shared: Mapping[str, int] = field(default_factory=dict)
-    where: str = ""
-
-    def text(self) -> str:
-        """The outcome as JSON."""
-        data = {f.name: getattr(self, f.name) for f in fields(self)}
-        return json.dumps(
-            data | {"results": [r.as_dict() for r in self.results]}, indent=1, allow_nan=False
-        )
-
-
-def read_outcome(text: str) -> Outcome:
-    """The outcome in a JSON text.
-
-    Raises
-    ------
-    ValueError, TypeError, KeyError
-        For any other text.
-    """
-    data = json.loads(text)
-    return Outcome(
-        **(
-            data
-            | {
-                "results": tuple(map(_read_result, data["results"])),
-                "warnings": tuple(data["warnings"]),
-            }
-        )
-    )
-
-
-def _read_result(data: Mapping[str, Any]) -> PointResult:
-    given = {**data}
-    case = Case(**given.pop("case_fields"))
-    inputs = tuple(map(read_input_part, given.get("inputs", ())))
-    return PointResult(**(given | {"case": case, "inputs": inputs}))
 
 
 def solve_task(text: str) -> str:

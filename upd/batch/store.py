@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from upd.batch.point import Outcome, Task, read_outcome
+from upd.batch.point import Task
 from upd.cache.files import locked, write_text
 from upd.errors import InputError, UpdError
+from upd.vary.outcome import Outcome, read_outcome
 
 #: the grid of a sweep or the draw of its sample, from its first moment on
 GRID = "grid.json"

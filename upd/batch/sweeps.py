@@ -15,12 +15,12 @@ from typing import Any
 from upd.batch.engine import Watcher, run_points
 from upd.batch.output import SweepResult, draw, write_outputs
 from upd.batch.plan import SweepPlan, plan_sweep
-from upd.batch.point import Outcome
 from upd.batch.sample import sampled_numbers
 from upd.batch.store import PointStore
 from upd.batch.table import check_follow, make_columns, patterns
 from upd.errors import one_line
 from upd.scene import load_scene
+from upd.vary.outcome import Outcome
 
 log = logging.getLogger(__name__)
 

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from upd.analyses import analysis_of
 from upd.batch.grid import GridAxis, Place
-from upd.batch.point import Outcome, PointResult
 from upd.errors import InputError
 from upd.labels import file_name
 from upd.results import Case, InputPart, shared_label
 from upd.scene import AnyScene
+from upd.vary.outcome import Outcome, PointResult
 
 Array = NDArray[np.float64]
 

@@ -6,12 +6,11 @@ from rich.console import Console
 from rich.markup import escape
 
 from upd.batch.engine import Workers
-from upd.batch.ladder import Study
-from upd.batch.studies import StudyResult
-from upd.batch.study_tables import TextTable
+from upd.batch.studies import Study, StudyResult
 from upd.cli.progress import counted, duration
 from upd.cli.tables import print_table
 from upd.report.columns import TextColumn
+from upd.vary.tables import TextTable
 
 #: characters to which a column of words may be folded
 _WORDS = 16

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.batch.study_point import Key, SolvedPoint, matching, solved_alone
 from upd.vary.orders import (
     ErrorEstimate,
     Extrapolation,
@@ -21,6 +20,8 @@ from upd.vary.orders import (
     extrapolate,
     fit_rate,
 )
+from upd.vary.outcome import SolvedPoint, matching, without_failed
+from upd.vary.variation import Key
 
 Array = NDArray[np.float64]
 
@@ -101,12 +102,12 @@ def make_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[Con
 
     Failed points are left out.
     """
-    good, curves = solved_alone(solved), []
+    good, curves = without_failed(solved), []
     for key in matching(good, names):
         ladders: dict[str, list[SolvedPoint]] = {}
         for one in good:
             if np.isfinite(one.values.get(key, np.nan)):
-                ladders.setdefault(one.point.curve, []).append(one)
+                ladders.setdefault(one.point.source, []).append(one)
         curves += [
             _curve(key, points, _finer_level(curve, ladders))
             for curve, points in ladders.items()
@@ -117,7 +118,7 @@ def make_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[Con
 
 
 def _finest(points: Sequence[SolvedPoint]) -> SolvedPoint:
-    return min(points, key=lambda p: p.point.h)
+    return min(points, key=lambda p: p.point.size)
 
 
 def _finer_level(curve: str, ladders: Mapping[str, Sequence[SolvedPoint]]) -> SolvedPoint | None:
@@ -151,7 +152,7 @@ def closed_form(key: Key, points: Sequence[SolvedPoint]) -> Array | None:
 
 def _curve(key: Key, points: Sequence[SolvedPoint], finer: SolvedPoint | None) -> ConvergenceCurve:
     values = np.array([p.values[key] for p in points])
-    h = [p.point.h for p in points]
+    h = [p.point.size for p in points]
     different = len(set(h)) == len(h)
     own = extrapolate(h, values) if len(set(h)) >= 3 else None
     change, closed = change_order(h, values), closed_form(key, points)
@@ -166,7 +167,7 @@ def _curve(key: Key, points: Sequence[SolvedPoint], finer: SolvedPoint | None) -
         # No limit to extrapolate to.
         reference, against = values[-1:], "finest level, no limit"
     elif finer is not None:
-        against = f"finer level, {finer.point.curve} {finer.point.label}"
+        against = f"finer level, {finer.point.source} {finer.point.label}"
         reference = np.array([finer.values[key]])
     elif own is not None and change >= _CONVERGES:
         reference, against = np.array([own.limit]), "its own extrapolation"
@@ -176,7 +177,7 @@ def _curve(key: Key, points: Sequence[SolvedPoint], finer: SolvedPoint | None) -
     error = values / reference - 1.0
     printed = next((p.printed_errors[key] for p in points if key in p.printed_errors), None)
     return make_curve(
-        points[0].point.curve,
+        points[0].point.source,
         key,
         points,
         error,
@@ -202,7 +203,7 @@ def finest_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[C
     with; what the variation does not touch has no error to show. Linear curves of a response have
     none either. Neither have load steps a closed form: that has no part of the mesh's error.
     """
-    good = solved_alone(solved)
+    good = without_failed(solved)
     curves = []
     for key in with_friction(matching(good, names)):
         mine = [p for p in good if np.isfinite(p.values.get(key, np.nan))]
@@ -212,13 +213,13 @@ def finest_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[C
         reference = float(values[-1])
         error = values / reference - 1.0 if reference else np.zeros(0)
         if error.any():
-            h = [p.point.h for p in mine]
+            h = [p.point.size for p in mine]
             # Choices that are no levels have one size.
             estimate = estimate_error(h, values) if len(set(h)) == len(h) else None
             order = float("nan") if estimate is None else estimate.order
             curves.append(
                 make_curve(
-                    mine[0].point.curve,
+                    mine[0].point.source,
                     key,
                     mine,
                     error,
@@ -246,7 +247,7 @@ def _friction_seconds(one: SolvedPoint) -> float:
 
 def accuracy_curves(solved: Sequence[SolvedPoint], keys: Sequence[Key]) -> list[ConvergenceCurve]:
     """Estimated error of every number over the cost of a level, and the true one beside it."""
-    good = solved_alone(solved)
+    good = without_failed(solved)
     curves = []
     for key in keys:
         kinds = {ESTIMATED: [one.estimates for one in good], TRUE: list(map(true_errors, good))}
@@ -285,7 +286,7 @@ def make_curve(
         "name": name,
         "case": case.label,
         "labels": tuple(p.point.label for p in points),
-        "h": tuple(p.point.h for p in points),
+        "h": tuple(p.point.size for p in points),
         "error": tuple(map(float, error)),
         "seconds": tuple(p.outcome.seconds for p in points),
         "memory_mb": tuple(p.outcome.memory_mb for p in points),

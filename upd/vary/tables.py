@@ -5,13 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from upd.batch.curves import ConvergenceCurve, with_friction
-from upd.batch.study_point import SolvedPoint, matching
 from upd.labels import number_label, percent
+from upd.vary.curves import ConvergenceCurve
+from upd.vary.outcome import SolvedPoint
+from upd.vary.variation import Key
 
 #: head, "l" or "r", and what makes the cell of a row
 TableColumn = tuple[str, str, Callable[[Any], str]]
@@ -21,38 +23,24 @@ TableColumn = tuple[str, str, Callable[[Any], str]]
 class TextTable:
     """A table for a terminal.
 
-    Cells as text, ``align`` a letter per column ("l", "r"), the first column at least ``width``
-    wide. Columns of words named in ``spare`` are left out first where the terminal is narrow.
+    Cells as text, ``align`` a letter per column ("l", "r"). Columns of words named in ``spare`` are
+    left out first where the terminal is narrow.
     """
 
     title: str
     columns: tuple[str, ...]
     align: str
     rows: tuple[tuple[str, ...], ...]
-    width: int = 0
     spare: tuple[str, ...] = ()
 
 
 def make_table(
-    title: str,
-    columns: Sequence[TableColumn],
-    rows: Iterable[Any],
-    *,
-    whole: bool = False,
-    spare: tuple[str, ...] = (),
+    title: str, columns: Sequence[TableColumn], rows: Iterable[Any], spare: tuple[str, ...] = ()
 ) -> TextTable:
-    """A table of rows of any kind. ``whole``: words of its first column are not broken, however
-    narrow the terminal.
-    """
-    cells = tuple(tuple(cell(row) for _, _, cell in columns) for row in rows)
-    return TextTable(
-        title,
-        tuple(head for head, _, _ in columns),
-        "".join(letter for _, letter, _ in columns),
-        cells,
-        max((len(row[0]) for row in cells), default=0) if whole else 0,
-        spare,
-    )
+    """A table of rows of any kind."""
+    heads, letters, cells = zip(*columns, strict=True)
+    made = tuple(tuple(cell(row) for cell in cells) for row in rows)
+    return TextTable(title, heads, "".join(letters), made, spare)
 
 
 def cost_columns(digits: int = 2) -> tuple[TableColumn, ...]:
@@ -78,7 +66,7 @@ def markdown_table(table: TextTable) -> list[str]:
 
 
 _POINTS: tuple[TableColumn, ...] = (
-    ("curve", "l", lambda one: str(one.point.curve)),
+    ("curve", "l", lambda one: str(one.point.source)),
     ("level", "l", lambda one: str(one.point.label)),
     *cost_columns(),
 )
@@ -114,7 +102,6 @@ def convergence_tables(
             verdict,
         ),
         curves,
-        whole=True,
         spare=("against", "verdict"),
     )
     whole = make_table(
@@ -135,22 +122,23 @@ def convergence_tables(
     return (points, short), (points, whole)
 
 
-def level_table(solved: Sequence[SolvedPoint], names: Sequence[str]) -> TextTable:
-    """The followed numbers of every level: what the choices of contact points are read from."""
-    keys = with_friction(matching(solved, names))
-    named = [name for name, _ in keys]
-    rows = []
-    for name, case in keys:
-        cells = (
-            f"{p.values[name, case]:.5g}"
-            if (name, case) in p.values
-            else "failed" * bool(p.outcome.failure)
-            for p in solved
-        )
-        label = name.replace("_", " ") + (f" ({case.label})" if named.count(name) > 1 else "")
-        rows.append((label, *cells))
-    heads = ("Hz, (m/s2)/N", *(p.point.label for p in solved))
-    return TextTable("Numbers of every level", heads, "l" * len(heads), tuple(rows))
+def level_table(
+    title: str,
+    keys: Sequence[Key],
+    solved: Sequence[SolvedPoint],
+    text: Callable[[SolvedPoint, Key], str],
+) -> TextTable:
+    """A row for every number, with what each level has of it."""
+    levels = ((one.point.label, "r", partial(text, one)) for one in solved)
+    return make_table(
+        title,
+        (
+            ("number", "l", lambda key: number_label(key[0])),
+            ("case", "l", lambda key: str(key[1].label)),
+            *levels,
+        ),
+        keys,
+    )
 
 
 def _rate_text(order: float) -> str:
