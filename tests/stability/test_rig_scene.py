@@ -14,7 +14,7 @@ import upd
 from upd.analyses import modal
 from upd.analyses.modal.ladders import DIMENSIONS, MODES_ONLY, frequency_derivatives
 from upd.analyses.modal.sensitivity import STEP, frequency_changes
-from upd.batch.engine import Workers, run_points
+from upd.batch.engine import Batch, Workers, run_points
 from upd.batch.store import PointStore
 from upd.batch.studies import plan_study, point_task, run_study
 from upd.errors import InputError, UpdError
@@ -225,7 +225,8 @@ def test_sensitivity_of_a_cantilever(tmp_path: Path, monkeypatch: pytest.MonkeyP
     ]
     store = PointStore(tmp_path, "study")
     with store.sole():
-        outcomes = run_points([point_task(p, scene, 0, "") for p in chosen], store, Workers(0, 0))
+        tasks = [point_task(p, scene, 0, "") for p in chosen]
+        outcomes = run_points(Batch(tasks, Workers(0, 0), {}), store)
     low, up = (SolvedPoint(p, o).values for p, o in zip(chosen, outcomes, strict=True))
     whole = {key[0]: np.log(up[key] / low[key]) / np.log(1.01 / 0.99) for key in low}
     assert table["core_length"] == pytest.approx(whole, abs=2e-3)

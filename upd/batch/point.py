@@ -30,7 +30,7 @@ from upd.linalg.pardiso import load as load_pardiso
 from upd.linalg.select import has_pardiso
 from upd.report.notebook import RunResult
 from upd.results import Result
-from upd.scene import load_scene
+from upd.scene import AnyScene, load_scene
 from upd.scene.quantities import UNKNOWN
 from upd.vary.outcome import Outcome, PointResult
 
@@ -40,7 +40,7 @@ log = logging.getLogger(__name__)
 _FILES_ONLY = ("fields",)
 #: One point at a time in a process: limits of threads and what is shared belong to the process.
 _turn = threading.Lock()
-_stores: dict[tuple[str, int, float], Store] = {}
+_stores: dict[tuple[Path, int, float], Store] = {}
 #: Begins the failure of a worker with other sources than those of whoever gives the points.
 OTHER_CODE = "the worker runs another version of upd, of its libraries or of the recipe"
 
@@ -58,10 +58,8 @@ class Task:
     threads
         Threads of the libraries, which the last digits depend on; 0: as many as they take by
         themselves.
-    cache
-        Folder of kept condensations; "" for the worker's own.
     limit_bytes
-        Bytes that folder may hold.
+        Bytes that the worker's folder of kept condensations may hold.
     recipe
         The scene's recipe.
     code
@@ -74,7 +72,6 @@ class Task:
     scene: str
     settings: Mapping[str, Any]
     threads: int = 1
-    cache: str = ""
     limit_bytes: float = LIMIT_BYTES
     recipe: str = ""
     code: str = ""
@@ -113,26 +110,29 @@ def solve_task(text: str) -> str:
 
 
 def forget() -> None:
-    """Let go of the models kept in this process."""
+    """Release the models kept in this process."""
     _stores.clear()
 
 
+def load_point(task: Task) -> AnyScene:
+    """The scene of a point. Raises InputError where it does not take the settings."""
+    data = tomllib.loads(task.scene)
+    settings = task.settings if task.alone else point_settings(data, task.settings)
+    scene: AnyScene = load_scene(data, dict(settings))
+    return scene
+
+
 def point_settings(data: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """The values of a point, and the scene's outputs without those that only files show."""
-    mine = without_estimates(data, settings)
+    """The values of a point that shares with others: without outputs that only files show, and
+    without estimates unless an accuracy is asked for, which would cost a third of a sweep.
+    """
+    mine = {} if "accuracy" in data else {"accuracy": UNKNOWN}
+    mine |= settings
     want = settings.get("want", data.get("want"))
     if not isinstance(want, Sequence) or isinstance(want, str):
         return mine
     kept = [w for w in want if w not in _FILES_ONLY]
     return {**mine, "want": kept} if kept and len(kept) < len(want) else mine
-
-
-def without_estimates(data: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """The values of a point that estimates no errors, unless an accuracy is asked for: the points
-    of a study show them, and a sweep's companions would cost a third of it.
-    """
-    asked = "accuracy" in settings or "accuracy" in data
-    return dict(settings) if asked else {**settings, "accuracy": UNKNOWN}
 
 
 def _solved(task: Task) -> Outcome:
@@ -142,9 +142,7 @@ def _solved(task: Task) -> Outcome:
     store = None if task.alone else _store(task)
     before = {} if store is None else dict(store.counts)
     try:
-        data = tomllib.loads(task.scene)
-        settings = without_estimates if task.alone else point_settings
-        scene = load_scene(data, settings(data, task.settings))
+        scene = load_point(task)
         with ExitStack() as around:
             if task.threads:
                 if has_pardiso():
@@ -162,11 +160,8 @@ def _solved(task: Task) -> Outcome:
 
 
 def _store(task: Task) -> Store:
-    folder = task.cache or str(condensation_folder())
-    return _stores.setdefault(
-        (folder, task.threads, task.limit_bytes),
-        Store(Path(folder), task.threads, task.limit_bytes),
-    )
+    mine = condensation_folder(), task.threads, task.limit_bytes
+    return _stores.setdefault(mine, Store(*mine))
 
 
 def _failed(error: Exception, seconds: float) -> Outcome:

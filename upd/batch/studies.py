@@ -13,7 +13,7 @@ from typing import Any
 
 from upd.analyses import analysis_of, ladders_of
 from upd.batch.dask import check_address
-from upd.batch.engine import Watcher, Workers, check_numbers, fitting, run_points
+from upd.batch.engine import Batch, Watcher, Workers, check_numbers, fitting, run_points
 from upd.batch.plan import point_needs
 from upd.batch.point import Task
 from upd.batch.store import PointStore
@@ -64,7 +64,7 @@ class Study:
         curves = [asdict(one) for one in report.curves]
         table, data = folder / "study.md", folder / "study.json"
         lines = [f"# {self.title}", ""]
-        for part in report.page or report.tables:
+        for part in report.tables:
             lines += [f"## {part.title}", "", *markdown_table(part), ""]
         write_text(table, "\n".join([*lines, *(f"- {note}" for note in report.notes)]) + "\n")
         if not self.points:
@@ -254,14 +254,8 @@ def run_study(
     tasks = [point_task(point, scene, who.threads, code) for point in points]
     with store.sole():
         known = store.finished(tasks)
-        outcomes = run_points(
-            tasks,
-            store,
-            who,
-            known=known,
-            label=lambda k: f"{points[k].source} {points[k].label}",
-            watch=watch,
-        )
+        batch = Batch(tasks, who, known, lambda k: f"{points[k].source} {points[k].label}")
+        outcomes = run_points(batch, store, watch=watch)
         solved = tuple(
             SolvedPoint(point, outcome) for point, outcome in zip(points, outcomes, strict=True)
         )

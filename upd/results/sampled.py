@@ -24,7 +24,7 @@ Analysis 34, 1884-1910: a Latin hypercube of n points is no worse than n - 1 ind
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 
 #: half-widths of limits over the standard deviation of what lies evenly between them
 LIMITS = math.sqrt(3.0)
-#: part of the sample beyond either end that is told, and of its distribution beyond either end of
+#: part of the sample beyond either end that is given, and of its distribution beyond either end of
 #: a comparison's 95 % interval
 TAIL = 0.025
 #: verdicts
@@ -140,35 +140,31 @@ def sampled_number(
         "nominal": nominal,
         "first_order": None,
         "count": len(drawn),
-        **_told(drawn),
+        **_moments(drawn),
         **dict.fromkeys(("band", "band_low", "band_high", "shift", "shift_error")),
         "outcome": UNKNOWN_BAND,
     }
 
-    def told(verdict: str, **more: Any) -> SampledNumber:
+    def found(verdict: str, **more: Any) -> SampledNumber:
         missing = len(values) - 1 - len(drawn)
         lost = f"; {missing} of {len(values) - 1} points have no such number" if missing else ""
         return SampledNumber(**out | more, verdict=verdict + lost)
 
     if nominal is None:
-        return told("no number with the inputs at their values")
+        return found("no number with the inputs at their values")
     if nominal == 0.0:
-        return told("the number is 0: nothing is relative to it")
+        return found("the number is 0: nothing is relative to it")
     if out["deviation"] is None:
-        return told("too few points have it for a standard deviation")
+        return found("too few points have it for a standard deviation")
     out["band"] = LIMITS * out["deviation"] / abs(nominal)
     why = _unknown(inputs, paths)
     if why:
-        return told(why)
-    changes = _changes(inputs)
+        return found(why)
+    changes = {part.path: part.change for part in inputs}
     c = np.array([changes[path] for path in paths])
     out["first_order"] = float(np.linalg.norm(c))
     predicted = nominal * (1.0 + shifts[1:][known[1:]] @ c)
-    return told(**_compared(drawn, predicted, nominal, float(out["first_order"]), out["band"]))
-
-
-def _changes(inputs: Sequence[InputPart]) -> Mapping[str, float]:
-    return {part.path: part.change for part in inputs}
+    return found(**_compared(drawn, predicted, nominal, float(out["first_order"]), out["band"]))
 
 
 def _unknown(inputs: Sequence[InputPart], paths: Sequence[str]) -> str:
@@ -181,7 +177,7 @@ def _unknown(inputs: Sequence[InputPart], paths: Sequence[str]) -> str:
     return f"no first-order band ({'; '.join(lost)})" if lost else ""
 
 
-def _told(drawn: Array) -> dict[str, float | None]:
+def _moments(drawn: Array) -> dict[str, float | None]:
     """Mean, deviation and ends of the sample."""
     names = ("mean", "deviation", "low", "high")
     if not len(drawn):
@@ -214,7 +210,7 @@ def _compared(
         "shift": shift,
         "shift_error": shift_error,
     }
-    # two digits are what a band is told in: closer is the same
+    # a band is given in two digits: closer is the same
     digit = 0.5 * 10.0 ** (math.floor(math.log10(band)) - 1)
     same_band = ends[0] <= band + digit and ends[1] >= band - digit
     same_mean = abs(shift) <= shift_error + digit

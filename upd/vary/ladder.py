@@ -36,8 +36,6 @@ class StudyReport:
         Sentences below the tables.
     curves
         For study.json and the figures.
-    page
-        Tables of study.md, where they are not those of the terminal.
     charts
         Makes the figures from the curves as study.json holds them.
     """
@@ -46,7 +44,6 @@ class StudyReport:
     found: bool
     notes: tuple[str, ...] = ()
     curves: tuple[ConvergenceCurve, ...] = ()
-    page: tuple[TextTable, ...] = ()
     charts: Callable[[Sequence[Mapping[str, Any]]], list[Chart]] = work_precision_charts
 
 
@@ -78,8 +75,8 @@ def finest_report(
 def _convergence(
     solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve], *before: TextTable
 ) -> StudyReport:
-    tables, page = convergence_tables(solved, curves)
-    return StudyReport((*before, *tables), bool(curves), (), tuple(curves), page)
+    tables = (*before, *convergence_tables(solved, curves))
+    return StudyReport(tables, bool(curves), (), tuple(curves))
 
 
 def accuracy_report(

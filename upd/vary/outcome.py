@@ -50,7 +50,7 @@ class PointResult:
     def as_dict(self) -> dict[str, Any]:
         """The number for JSON: ``case`` in words, its attributes under ``case_fields``.
 
-        What is not given is left out.
+        What is not given is omitted.
         """
         given = {
             f.name: value for f in fields(self) if (value := getattr(self, f.name)) != f.default

@@ -74,52 +74,30 @@ _POINTS: tuple[TableColumn, ...] = (
 
 def convergence_tables(
     solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve]
-) -> tuple[tuple[TextTable, ...], tuple[TextTable, ...]]:
-    """The points and what they cost, then the curves: for a terminal, and for study.md.
-
-    A terminal shows the error of every followed number on its finest level, its rate, the error
-    estimated there, and that of the coarsest level; study.md that of each level.
+) -> tuple[TextTable, TextTable]:
+    """The points and what they cost, then the curves: the error of every followed number on its
+    finest level, its rate, the error estimated there, and those of the other levels.
     """
-    points = make_table("Points", _POINTS, solved)
-    case: TableColumn = ("case", "l", lambda c: str(c.case))
-    curve: TableColumn = ("curve", "l", lambda c: str(c.curve))
-    order: TableColumn = ("order", "r", lambda c: _rate_text(c.order))
-    verdict: TableColumn = ("verdict", "l", lambda c: str(c.verdict))
-    against: TableColumn = ("against", "l", lambda c: str(c.against))
-    short = make_table(
+    errors = make_table(
         "Error",
         (
             ("number", "l", lambda c: number_label(c.name)),
-            case,
-            curve,
+            ("case", "l", lambda c: str(c.case)),
+            ("curve", "l", lambda c: str(c.curve)),
             ("finest", "r", lambda c: percent(c.error[-1])),
-            order,
+            ("order", "r", lambda c: _rate_text(c.order)),
             ("estimated", "r", _estimated),
-            # what a narrow terminal leaves out first stands last among the numbers
+            # what a narrow terminal leaves out first stands last
             ("coarsest", "r", lambda c: percent(c.error[0])),
             ("thesis", "r", lambda c: percent(c.thesis_error)),
-            against,
-            verdict,
-        ),
-        curves,
-        spare=("against", "verdict"),
-    )
-    whole = make_table(
-        "Error",
-        (
-            ("number", "l", lambda c: str(c.name)),
-            case,
-            curve,
-            order,
+            ("against", "l", lambda c: str(c.against)),
+            ("verdict", "l", lambda c: str(c.verdict)),
             ("error on each level", "l", _levels_text),
-            ("estimated on the finest", "r", _estimated),
-            against,
-            ("thesis", "r", _thesis),
-            verdict,
         ),
         curves,
+        spare=("against", "verdict", "error on each level"),
     )
-    return (points, short), (points, whole)
+    return make_table("Points", _POINTS, solved), errors
 
 
 def level_table(
@@ -146,13 +124,9 @@ def _rate_text(order: float) -> str:
     return f"{order:.1f}" if np.isfinite(order) else "no clear order"
 
 
-def _thesis(curve: ConvergenceCurve) -> str:
-    return "" if curve.thesis_error is None else f"{100 * curve.thesis_error:+.1f} %"
-
-
 def _levels_text(c: ConvergenceCurve) -> str:
     return ", ".join(
-        f"{label}: {100 * e:+.2f} %" for label, e in zip(_short(c.labels), c.error, strict=True)
+        f"{label}: {percent(e)}" for label, e in zip(_short(c.labels), c.error, strict=True)
     )
 
 

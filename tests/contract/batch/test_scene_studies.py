@@ -367,8 +367,8 @@ def test_a_narrow_terminal_keeps_order_and_estimate() -> None:
     printed = console.file.getvalue()  # type: ignore[attr-defined]
     assert "estimated" in printed
     assert "order" in printed
-    assert "not shown at this width: against, verdict" in printed
-    text = "\n".join(markdown_table(report.page[-1]))
+    assert "not shown at this width: against, verdict, error on each level" in printed
+    text = "\n".join(markdown_table(report.tables[-1]))
     assert "0.5: +" in text
     assert "2: +" in text
     assert "refine:" not in text
@@ -376,9 +376,8 @@ def test_a_narrow_terminal_keeps_order_and_estimate() -> None:
         replace(one, point=replace(one.point, label=label))
         for one, label in zip(levels, ("row 2", "rows 0-1, 2 spots", "all rows"), strict=True)
     ]
-    assert "rows 0-1, 2 spots: +" in "\n".join(
-        markdown_table(limit_report(None, named, ["peak_1_frequency"]).page[-1])
-    )
+    tables = limit_report(None, named, ["peak_1_frequency"]).tables
+    assert "rows 0-1, 2 spots: +" in "\n".join(markdown_table(tables[-1]))
 
 
 def test_figures_show_both_costs_and_the_estimate() -> None:

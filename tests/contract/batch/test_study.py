@@ -59,7 +59,7 @@ def test_ladder_runs_resumes_and_reports(tmp_path: Path) -> None:
     # Without the bodies' share nothing but the ladder itself says where it leads.
     assert approach.against in ("its own extrapolation", "finest level, no clear order")
     table, data, figure = again.files
-    assert "max_pressure" in table.read_text(encoding="utf-8")
+    assert "maximum pressure" in table.read_text(encoding="utf-8")
     assert figure.name == "work_precision.png"
     assert figure.stat().st_size > 10_000
     written = json.loads(data.read_text(encoding="utf-8"))
@@ -375,7 +375,7 @@ def test_parameters_are_changed_one_at_a_time(tmp_path: Path) -> None:
     assert rows[-1][0] == "thesis, Table XI (one K_T)"
     (table,) = found.report.tables
     assert [row[0] for row in table.rows] == [label for label, _, _ in rows]
-    assert f"| as given | {given:.4g} |" in found.files[0].read_text(encoding="utf-8")
+    assert f"| as given | {1e-6 * given:.4g} |" in found.files[0].read_text(encoding="utf-8")
 
 
 def test_two_pads_are_compared_one_by_one(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ of the scene at a time, each beside the scene as given.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -18,7 +18,7 @@ from upd.mesh import recipes
 from upd.scene import Scene
 from upd.vary.ladder import Asked, Ladder, StudyReport, even, no_levels
 from upd.vary.outcome import SolvedPoint, without_failed
-from upd.vary.tables import TextTable, make_table
+from upd.vary.tables import make_table
 from upd.vary.variation import Overrides, Variation
 
 #: shares of the scene's divisions: spacing from twice to half of it
@@ -172,27 +172,23 @@ def _printed_rows(scene: Scene) -> list[Row]:
 
 
 def _report(scene: Scene, solved: Sequence[SolvedPoint], names: Sequence[str]) -> StudyReport:
-    """Stiffnesses in 1e6 N/mm on a terminal, in N/mm in study.md."""
+    """Stiffnesses of every point, a row each."""
     del names
     rows = parameter_rows(scene, solved)
     there = {name for _, values, _ in rows for name in values}
     wanted = [PER_PAD[n] if PER_PAD.get(n) in there else n for n in STIFFNESSES]
     shown = [name for name in wanted if name in there]
 
-    def cell(name: str, unit: float, form: str, row: Row) -> str:
+    def cell(name: str, row: Row) -> str:
         _, values, failure = row
         if failure:
             return failure if name == shown[0] else ""
-        return f"{values[name] / unit:{form}}" if name in values else ""
+        return f"{1e-6 * values[name]:.4g}" if name in values else ""
 
-    def table(title: str, unit: float, head: Callable[[str], str], form: str) -> TextTable:
-        columns = ((head(name), "r", partial(cell, name, unit, form)) for name in shown)
-        setup = ("setup", "l", lambda row: str(row[0]))
-        return make_table(f"What moves the stiffness, {title}", (setup, *columns), rows)
-
-    short = table("1e6 N/mm", 1e6, number_label, ".3f")
-    whole = table("N/mm", 1.0, str, ".4g")
-    return StudyReport((short,), bool(without_failed(solved)), page=(whole,))
+    columns = ((number_label(name), "r", partial(cell, name)) for name in shown)
+    setup = ("setup", "l", lambda row: str(row[0]))
+    table = make_table("What moves the stiffness, 1e6 N/mm", (setup, *columns), rows)
+    return StudyReport((table,), bool(without_failed(solved)))
 
 
 LADDERS: Mapping[str, Ladder] = {

@@ -119,25 +119,12 @@ def _meshes(scene: ForcedScene, asked: Asked) -> Iterator[dict[str, int]]:
 
 def _notes(scene: ForcedScene) -> Iterator[str]:
     """What the levels set in the scene."""
-    static = f'"{state}"' if isinstance(state := scene.contact.static, str) else "as given"
-    ratio = min(scene.excitation.centrifugal_to_force)
-    yield (
-        f'every level: F_C/F_E {ratio:g} alone, want = ["response"], left_out.solve = "no", '
-        f"contact.static = {static}, "
-        f"{scene.excitation.start:g} to {scene.excitation.stop:g} Hz"
-    )
-    changes = {key: value for key, value in _of_faces(scene) if not isinstance(value, list)}
-    had = {
-        "mesh.element": scene.mesh.element,
-        "balance.method": scene.balance.method,
-        "contact.model": scene.contact.model,
-    }
-    words = (
-        f'{key} = "{value}"' + f' (the scene: "{had[key]}")' * (had[key] != value)
-        for key, value in changes.items()
-    )
-    yield f"interface, elements up x along a face: {', '.join(words)}"
-    yield f'springs: balance.method = "{scene.balance.method}", points and mesh as in the scene'
+    ratio, span = min(scene.excitation.centrifugal_to_force), scene.excitation
+    yield f"every level: F_C/F_E {ratio:g} alone, {span.start:g} to {span.stop:g} Hz"
+    changes = ((key, value) for key, value in _of_faces(scene) if isinstance(value, str))
+    settings = ", ".join(f'{key} = "{value}"' for key, value in changes)
+    yield f"interface, elements up x along a face: {settings}"
+    yield "springs: method, points and mesh as in the scene"
     yield "change of a range over both sweeps: that of its end which is farther off"
 
 

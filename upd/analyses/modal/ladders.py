@@ -6,7 +6,6 @@ d ln f / d ln p come from the modes of the rig as given and the matrices of slig
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 
 from upd.analyses.modal.sensitivity import free_and_glued, log_derivatives
@@ -106,11 +105,10 @@ def _dimension_report(
             for dimension, found in derivatives.items()
         ),
     ]
-    align = "l" + "r" * len(frequencies)
-    page = TextTable("d ln f / d ln p", ("dimension", *frequencies), align, tuple(rows))
-    short = replace(page, columns=tuple(name.replace("_", " ") for name in page.columns))
+    heads = ("dimension", *(name.replace("_", " ") for name in frequencies))
+    table = TextTable("d ln f / d ln p", heads, "l" + "r" * len(frequencies), tuple(rows))
     any_found = any(not isinstance(found, str) for found in derivatives.values())
-    return StudyReport((short,), any_found, page=(page,))
+    return StudyReport((table,), any_found)
 
 
 _MODES = counts(
