@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from upd.analyses.forced.linear_limits import QUARTER, linear_modes
 from upd.batch.engine import Watcher
 from upd.batch.plan import plan_sweep
-from upd.batch.point import Outcome
 from upd.batch.sweeps import run_sweep
 from upd.errors import InputError
 from upd.hbm.peaks_over import SAME
@@ -22,6 +21,7 @@ from upd.scene.quantities import FROM_FORCE, UNKNOWN
 from upd.sizing.choice import ChosenDamper
 from upd.sizing.ranges import InputRange, with_values
 from upd.sizing.rig_peaks import RigPeaks
+from upd.vary.outcome import Outcome
 
 Array = NDArray[np.float64]
 

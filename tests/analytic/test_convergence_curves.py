@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from upd.batch.curves import ConvergenceCurve, make_curves
-from upd.batch.point import Outcome, PointResult
-from upd.batch.study_point import SolvedPoint, StudyPoint
 from upd.results import Case
+from upd.vary.curves import ConvergenceCurve, make_curves
+from upd.vary.outcome import Outcome, PointResult, SolvedPoint
+from upd.vary.variation import Variation
 
 CASE = Case(load=200.0)
 H = (1.0, 0.7, 0.5, 0.35)
@@ -16,7 +16,7 @@ def ladder(curve: str, numbers: dict[str, list[float]], n_dof: int, **closed: fl
     """A point per level; ``closed`` are closed forms of numbers."""
     return [
         SolvedPoint(
-            StudyPoint(curve, f"level {k}", (), H[k]),
+            Variation(curve, f"level {k}", (), H[k]),
             Outcome(
                 results=tuple(
                     PointResult(

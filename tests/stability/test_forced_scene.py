@@ -14,15 +14,15 @@ from rigs import LINES
 import upd
 from upd.analyses import forced
 from upd.analyses.forced import paths
-from upd.batch.curves import finest_curves
-from upd.batch.point import Outcome, PointResult
 from upd.batch.studies import plan_study
-from upd.batch.study_point import SolvedPoint, StudyPoint
 from upd.errors import ConvergenceError, InputError
 from upd.report.folder import read_arrays
 from upd.report.notebook import RunResult, charts, headline
 from upd.results import Case, read_netcdf
 from upd.scene import load_scene
+from upd.vary.curves import finest_curves
+from upd.vary.outcome import Outcome, PointResult, SolvedPoint
+from upd.vary.variation import Variation
 
 CHEAP: dict[str, Any] = {
     **LINES,
@@ -345,12 +345,12 @@ def test_ladders_compare_with_their_finest_level() -> None:
     # at the load under which most slips, one path
     assert scene.excitation.centrifugal_to_force[0] > 194.0
     for point in points:
-        told = dict(point.settings)
+        told = dict(point.overrides)
         assert told["excitation.centrifugal_to_force"] == [194.0]
         assert told["balance.method"] == "balance"
     for vary in ("samples", "modes", "contacts"):
         for point in plan_study(scene, vary).points:
-            assert isinstance(load_scene("symmetric-response", dict(point.settings)).name, str)
+            assert isinstance(load_scene("symmetric-response", dict(point.overrides)).name, str)
 
     def solved(label: str, f: float, seconds: float) -> SolvedPoint:
         case, linear = (
@@ -364,7 +364,7 @@ def test_ladders_compare_with_their_finest_level() -> None:
         ]
         found += [("peak_2_frequency", case, 500.0)]
         return SolvedPoint(
-            StudyPoint("harmonics", label, ()),
+            Variation("harmonics", label, ()),
             Outcome(tuple(PointResult(n, c, "", v) for n, c, v in found), seconds=9.0),
         )
 

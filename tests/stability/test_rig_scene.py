@@ -12,12 +12,11 @@ from scipy.sparse import csr_array
 
 import upd
 from upd.analyses import modal
+from upd.analyses.modal.ladders import DIMENSIONS, MODES_ONLY, frequency_derivatives
 from upd.analyses.modal.sensitivity import STEP, frequency_changes
-from upd.batch.engine import Workers, run_points
-from upd.batch.rig_ladders import DIMENSIONS, MODES_ONLY, frequency_derivatives
+from upd.batch.engine import Batch, Workers, run_points
 from upd.batch.store import PointStore
-from upd.batch.studies import plan_study, run_study
-from upd.batch.study_point import SolvedPoint, StudyPoint
+from upd.batch.studies import plan_study, point_task, run_study
 from upd.errors import InputError, UpdError
 from upd.fem import Material, box_mesh, mass, stiffness
 from upd.linalg import modes
@@ -25,6 +24,8 @@ from upd.reduction import ReducedModel
 from upd.report.folder import read_arrays
 from upd.report.notebook import RunResult, charts, headline
 from upd.results import Case
+from upd.vary.outcome import SolvedPoint
+from upd.vary.variation import Variation
 
 CHEAP: dict[str, Any] = {
     "mesh.element": "hex8i",
@@ -202,7 +203,7 @@ def test_ladders(tmp_path: Path) -> None:
     few, many = (abs(one.errors["f3_reduced", Case(name="Craig-Bampton")]) for one in found.solved)
     assert many < 1e-3 < few
     points = plan_study(scene, "element").points
-    assert {p.curve for p in points} == {"hex8", "hex8i", "hex20", "hex27"}
+    assert {p.source for p in points} == {"hex8", "hex8i", "hex20", "hex27"}
     with pytest.raises(InputError, match="--vary patch"):
         plan_study(scene, "patch")
 
@@ -215,7 +216,7 @@ def test_sensitivity_of_a_cantilever(tmp_path: Path, monkeypatch: pytest.MonkeyP
     """
     scene = upd.load_scene("rig", CHEAP)
     two = {name: DIMENSIONS[name] for name in ("core_length", "shank_tx")}
-    monkeypatch.setattr("upd.batch.rig_ladders.DIMENSIONS", two)
+    monkeypatch.setattr("upd.analyses.modal.ladders.DIMENSIONS", two)
     (report,) = plan_study(scene, "dimensions").present(()).tables
     assert [row[0] for row in report.rows] == ["as given, Hz", *two]
     _, found = frequency_derivatives(scene)
@@ -226,12 +227,13 @@ def test_sensitivity_of_a_cantilever(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert table["shank_tx"]["f1_glued"] < 0.3
     core = float(scene.geometry["core_length"])
     chosen = [
-        StudyPoint("core_length", label, (*MODES_ONLY, ("geometry.core_length", f"{length!r} mm")))
+        Variation("core_length", label, (*MODES_ONLY, ("geometry.core_length", f"{length!r} mm")))
         for label, length in (("shorter", 0.99 * core), ("longer", 1.01 * core))
     ]
     store = PointStore(tmp_path, "study")
     with store.sole():
-        outcomes = run_points([p.task(scene, 0, "") for p in chosen], store, Workers(0, 0))
+        tasks = [point_task(p, scene, 0, "") for p in chosen]
+        outcomes = run_points(Batch(tasks, Workers(0, 0), {}), store)
     low, up = (SolvedPoint(p, o).values for p, o in zip(chosen, outcomes, strict=True))
     whole = {key[0]: np.log(up[key] / low[key]) / np.log(1.01 / 0.99) for key in low}
     assert table["core_length"] == pytest.approx(whole, abs=2e-3)

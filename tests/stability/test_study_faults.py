@@ -18,10 +18,10 @@ from upd import load_scene
 from upd.batch import store as point_store
 from upd.batch import study
 from upd.batch.engine import ATTEMPTS, Progress, Workers
-from upd.batch.ladder import Study, StudyReport
-from upd.batch.studies import plan_study, run_study
-from upd.batch.study_point import StudyPoint
+from upd.batch.studies import Study, plan_study, run_study
 from upd.errors import InputError, UpdError
+from upd.vary.ladder import StudyReport
+from upd.vary.variation import Variation
 
 TINY = {
     "geometry.divisions": 8,
@@ -185,8 +185,8 @@ def test_disk_full_in_mid_study_is_one_clear_error_and_keeps_what_was_there(
 ODD = Study(
     "odd",
     (
-        StudyPoint("odd", "unknown key", (("contact.fricton", 0.3),)),
-        StudyPoint("odd", "as given", ()),
+        Variation("odd", "unknown key", (("contact.fricton", 0.3),)),
+        Variation("odd", "as given", ()),
     ),
     lambda solved: StudyReport((), True),
 )

@@ -5,12 +5,14 @@ The scene names the one it needs.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
 from upd.analyses.base import Analysis, Plan
 from upd.scene import AnyScene
 from upd.vary.inputs import with_input_cost
+from upd.vary.ladder import Ladder
 
 #: what a scene or its recipe names as its analysis -> package
 _PACKAGES = {
@@ -35,6 +37,13 @@ def analysis_named(name: str) -> Analysis | None:
 def _package(name: str) -> Analysis:
     found: Analysis = import_module(f"upd.analyses.{name}").ANALYSIS
     return found
+
+
+def ladders_of(scene: AnyScene) -> Mapping[str, Ladder]:
+    """What a convergence study of the scene can vary, by name."""
+    package = _PACKAGES[scene.analysis]
+    offered: Mapping[str, Ladder] = import_module(f"upd.analyses.{package}.ladders").LADDERS
+    return {vary: ladder for vary, ladder in offered.items() if ladder.applies(scene)}
 
 
 def make_plan(scene: AnyScene) -> Plan[Any]:

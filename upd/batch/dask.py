@@ -48,24 +48,35 @@ class DaskCluster:
 
     def __init__(self, address: str) -> None:
         check_address(address)
-        self._dask = importlib.import_module("distributed")
-        self.deaths: tuple[type[BaseException], ...] = (
-            self._dask.KilledWorker,
-            CancelledError,
-            OSError,
-        )
-        patience_s = self._patience = PATIENCE_S
-        self._levels = _quiet()
-        self._local, self._client = _connect(self._dask, address, patience_s)
+        dask = importlib.import_module("distributed")
+        self.deaths: tuple[type[BaseException], ...] = (dask.KilledWorker, CancelledError, OSError)
+        self._patience, self._levels = PATIENCE_S, _quiet()
         self._executors: dict[str, Any] = {}
         self._known: tuple[float, list[str]] = (-_LOOK_S, [])
         self._seen = time.monotonic()
+        self._local: Any = None
+        local = _LOCAL.fullmatch(address)
+        if local is not None:
+            self._local = dask.LocalCluster(
+                n_workers=int(local[1]),
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address=None,
+                worker_dashboard_address=None,
+            )
         try:
-            self._client.wait_for_workers(1, timeout=patience_s)
+            self._client = dask.Client(self._local or address, timeout=min(self._patience, 15.0))
+        except OSError as error:
+            raise InputError(
+                f"--cluster {address}: no scheduler answers there ({type(error).__name__}): start "
+                "one with `dask scheduler`"
+            ) from None
+        try:
+            self._client.wait_for_workers(1, timeout=self._patience)
         except OSError:
             self.close()
             raise InputError(
-                f"--cluster {address}: no worker came within {patience_s:g} s: start some "
+                f"--cluster {address}: no worker came within {self._patience:g} s: start some "
                 f"with `dask worker {address} --nthreads 1`"
             ) from None
 
@@ -139,24 +150,3 @@ def check_address(address: str) -> None:
         )
     if importlib.util.find_spec("distributed") is None:
         raise InputError(_MISSING)
-
-
-def _connect(dask: Any, address: str, patience_s: float) -> tuple[Any, Any]:
-    """The local cluster, if any, and a client. Raises InputError."""
-    local = _LOCAL.fullmatch(address)
-    if local is not None:
-        cluster = dask.LocalCluster(
-            n_workers=int(local[1]),
-            threads_per_worker=1,
-            host="127.0.0.1",
-            dashboard_address=None,
-            worker_dashboard_address=None,
-        )
-        return cluster, dask.Client(cluster)
-    try:
-        return None, dask.Client(address, timeout=min(patience_s, 15.0))
-    except OSError as error:
-        message = (
-            f"no scheduler answers there ({type(error).__name__}): start one with `dask scheduler`"
-        )
-        raise InputError(f"--cluster {address}: {message}") from None

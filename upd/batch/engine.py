@@ -7,16 +7,17 @@ from __future__ import annotations
 
 import math
 import time
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from upd.batch.executors import Executor, InProcess, Processes
-from upd.batch.point import OTHER_CODE, Outcome, Task, read_outcome
+from upd.batch.point import OTHER_CODE, Task
 from upd.batch.store import PointStore
 from upd.errors import InputError, UpdError
 from upd.linalg import select
+from upd.vary.outcome import Outcome, read_outcome
 
 #: A point whose worker dies this often is given up.
 ATTEMPTS = 3
@@ -72,7 +73,6 @@ class Progress:
     done: int
     total: int
     failed: int
-    running: int
     rate: float
     left_s: float
     label: str = ""
@@ -81,6 +81,7 @@ class Progress:
 
 
 Watcher = Callable[[Progress], None]
+_NONE = Outcome()
 
 
 def check_numbers(workers: int | None, threads: int) -> None:
@@ -163,40 +164,50 @@ def time_left(
     return float("inf") if expected is None else max(0.0, rest / side_by_side - passed)
 
 
+@dataclass(frozen=True)
+class Batch:
+    """Points to solve.
+
+    Attributes
+    ----------
+    known
+        Number -> outcome there is already.
+    label
+        Number -> words for the point.
+    groups
+        Number -> what the point shares with others: points of one group follow each other on one
+        worker.
+    seconds
+        Number -> predicted for the point; None: all alike.
+    """
+
+    tasks: Sequence[Task]
+    workers: Workers
+    known: Mapping[int, Outcome]
+    label: Callable[[int], str] = str
+    groups: Mapping[int, str] = field(default_factory=dict)
+    seconds: Mapping[int, float] | None = None
+
+
 def run_points(
-    tasks: Sequence[Task],
+    batch: Batch,
     store: PointStore,
-    workers: Workers,
     *,
-    known: Mapping[int, Outcome] | None = None,
-    groups: Mapping[int, str] | None = None,
-    label: Callable[[int], str] = str,
     check: Callable[[Outcome], None] | None = None,
-    expected: Mapping[int, float] | None = None,
     watch: Watcher | None = None,
 ) -> tuple[Outcome, ...]:
     """Solve the tasks whose outcome is not known yet, and keep what is final in the store, which
     the caller holds (`PointStore.sole`).
 
     A point that fails is an outcome with its reason; one whose worker dies is tried again,
-    `ATTEMPTS` times in all. Kill the batch at any moment: finished points are
-    kept.
+    `ATTEMPTS` times in all. Kill the batch at any moment: finished points are kept.
 
     Parameters
     ----------
-    known
-        Number -> outcome there is already; None: those the store has.
-    groups
-        Number -> what the point shares with others: points of one group follow each other on one
-        worker.
-    label
-        Words for a point, for ``watch``.
     check
         Called with every solved outcome; what it raises ends the batch.
-    expected
-        Number -> seconds predicted for the point; None: all alike.
     watch
-        Called whenever a point has ended or the number of running ones may have changed.
+        Called whenever a point has ended, and about once a second.
 
     Returns
     -------
@@ -210,26 +221,30 @@ def run_points(
     UpdError
         When the disk is full or the cluster has gone.
     """
-    outcomes = dict(store.finished(tasks) if known is None else known)
+    outcomes, tasks = dict(batch.known), batch.tasks
     jobs = [
-        Job(k, task.text(), groups[k] if groups else "")
+        Job(k, task.text(), batch.groups.get(k, ""))
         for k, task in enumerate(tasks)
         if k not in outcomes
     ]
-    if not jobs:
-        return tuple(outcomes[k] for k in range(len(tasks)))
-    begin, before, running = time.perf_counter(), len(outcomes), 0
-    finished: set[int] = set()
+    numbers, finished = [job.number for job in jobs], set[int]()
+    begin = time.perf_counter()
 
-    def show(name: str = "", seconds: float = 0.0, failure: str = "") -> None:
+    def show(label: str = "", outcome: Outcome = _NONE) -> None:
         if watch is not None:
-            done = len(outcomes)
-            rate = (done - before) / max(time.perf_counter() - begin, 1e-9)
-            passed = time.perf_counter() - begin
-            numbers = [job.number for job in jobs]
-            left = time_left(numbers, finished, passed, max(1, workers.count), expected)
-            failed = sum(bool(outcome.failure) for outcome in outcomes.values())
-            watch(Progress(done, len(tasks), failed, running, rate, left, name, seconds, failure))
+            passed, side_by_side = time.perf_counter() - begin, max(1, batch.workers.count)
+            watch(
+                Progress(
+                    done=len(outcomes),
+                    total=len(tasks),
+                    failed=sum(bool(one.failure) for one in outcomes.values()),
+                    rate=len(finished) / max(passed, 1e-9),
+                    left_s=time_left(numbers, finished, passed, side_by_side, batch.seconds),
+                    label=label,
+                    seconds=outcome.seconds,
+                    failure=outcome.failure,
+                )
+            )
 
     def record(number: int, outcome: Outcome) -> None:
         store.keep(tasks[number], outcome)
@@ -237,18 +252,14 @@ def run_points(
             check(outcome)
         outcomes[number] = outcome
         finished.add(number)
-        show(label(number), outcome.seconds, outcome.failure)
+        show(batch.label(number), outcome)
 
-    def idle(now: int) -> None:
-        nonlocal running
-        running = now
-        show()
-
-    executor = workers.open()
-    try:
-        dispatch(jobs, executor, record, idle)
-    finally:
-        executor.close()
+    if jobs:
+        executor = batch.workers.open()
+        try:
+            dispatch(jobs, executor, record, show)
+        finally:
+            executor.close()
     return tuple(outcomes[k] for k in range(len(tasks)))
 
 
@@ -261,47 +272,20 @@ class Job:
     group: str
 
 
-class _Queue:
-    """Jobs by group. A worker stays with its group.
-
-    Then it opens a new one; then it helps with the longest.
-    """
-
-    def __init__(self, jobs: Sequence[Job]) -> None:
-        self._waiting: dict[str, deque[Job]] = {}
-        for job in jobs:
-            self._waiting.setdefault(job.group, deque()).append(job)
-        self._opened: set[str] = set()
-        self._at: dict[str, str] = {}
-
-    def __len__(self) -> int:
-        return sum(map(len, self._waiting.values()))
-
-    def take(self, worker: str) -> Job:
-        group = self._group(worker)
-        job = self._waiting[group].popleft()
-        if not self._waiting[group]:
-            del self._waiting[group]
-        self._opened.add(group)
-        self._at[worker] = group
-        return job
-
-    def put_back(self, job: Job) -> None:
-        self._waiting.setdefault(job.group, deque()).appendleft(job)
-
-    def _group(self, worker: str) -> str:
-        own = self._at.get(worker)
-        if own in self._waiting:
-            return own
-        fresh = next((group for group in self._waiting if group not in self._opened), None)
-        return fresh or max(self._waiting, key=lambda group: len(self._waiting[group]))
+def _take(waiting: list[Job], own: str, opened: set[str]) -> Job:
+    """The next job of a worker: of its own group, else of an unopened one, else of the largest."""
+    left = Counter(job.group for job in waiting)
+    fresh = next((group for group in left if group not in opened), left.most_common(1)[0][0])
+    group = own if own in left else fresh
+    opened.add(group)
+    return waiting.pop(next(k for k, job in enumerate(waiting) if job.group == group))
 
 
 def dispatch(
     jobs: Sequence[Job],
     executor: Executor,
     record: Callable[[int, Outcome], None],
-    idle: Callable[[int], None],
+    tick: Callable[[], None],
 ) -> None:
     """Have all jobs solved.
 
@@ -309,25 +293,27 @@ def dispatch(
     ----------
     record
         Called with each point's number and outcome, once.
-    idle
-        Called with how many points run, whenever that may have changed.
+    tick
+        Called about once a second.
 
     Raises
     ------
     InputError, UpdError
         When a worker has other sources, or cannot run points; and whatever ``record`` raises.
     """
-    queue = _Queue(jobs)
+    waiting, opened = list(jobs), set[str]()
+    groups: dict[str, str] = {}
     running: dict[Future[str], tuple[str, Job]] = {}
     deaths: Counter[int] = Counter()
-    while len(queue) or running:
+    while waiting or running:
         there = executor.workers()
         busy = {worker for worker, _ in running.values()}
         for worker in there:
-            if len(queue) and worker not in busy:
-                job = queue.take(worker)
+            if waiting and worker not in busy:
+                job = _take(waiting, groups.get(worker, ""), opened)
+                groups[worker] = job.group
                 running[executor.submit(worker, job.task)] = (worker, job)
-        idle(len(running))
+        tick()
         done = wait(running, _LOOK_S, FIRST_COMPLETED).done
         if not running:
             time.sleep(_LOOK_S)
@@ -343,7 +329,7 @@ def dispatch(
             future.cancel()
             deaths[job.number] += 1
             if deaths[job.number] < ATTEMPTS:
-                queue.put_back(job)
+                waiting.insert(0, job)
             else:
                 record(job.number, Outcome(failure=_killed(deaths[job.number]), final=False))
 

@@ -106,19 +106,15 @@ def _axis(text: str, scene: Mapping[str, Any]) -> GridAxis:
     if not sep or not path or not given:
         raise InputError(f"--vary {text!r}: {_FORMS}")
     parts = [part.strip() for part in given.split(":")]
-    is_range = (
-        len(parts) > 1
-        and _QUANTITY.fullmatch(parts[0]) is not None
-        and _QUANTITY.fullmatch(parts[1]) is not None
-    )
+    ends = [end for end in map(_quantity, parts[:2]) if end is not None]
     now = _entry(scene, path)
     wrapped = isinstance(now, list)
-    own = _unit(now[0] if wrapped and now else now)
-    values = (
-        _range(path, parts, own)
-        if is_range
-        else [_with_unit(_value(part), own) for part in _listed(given)]
-    )
+    mine = _quantity(now[0] if wrapped and now else now)
+    own = "" if mine is None else mine[1]
+    if len(ends) == 2:
+        values = _range(path, parts, ends, own)
+    else:
+        values = [_with_unit(_value(part), own) for part in _listed(given)]
     if len(set(map(str, values))) < len(values):
         raise InputError(f"--vary {path}: a value is duplicated")
     numbers, unit = _numbers(values)
@@ -132,17 +128,14 @@ def _listed(given: str) -> list[str]:
     return parts
 
 
-def _range(path: str, parts: Sequence[str], own: str) -> list[Any]:
+def _range(
+    path: str, parts: Sequence[str], ends: Sequence[tuple[float, str]], own: str
+) -> list[Any]:
     """Evenly spaced values, or in equal ratios with a fourth part "log"."""
-    logarithmic = parts[3:] == ["log"]
-    if (
-        len(parts) not in (3, 4)
-        or (len(parts) == 4 and not logarithmic)
-        or not re.fullmatch(r"\d+", parts[2])
-        or int(parts[2]) < 1
-    ):
+    if not re.fullmatch(r"0*[1-9]\d*(:log)?", ":".join(parts[2:])):
         raise InputError(f"--vary {path}={':'.join(parts)}: {_FORMS}")
-    (first, unit_a), (last, unit_b) = _split(parts[0]), _split(parts[1])
+    logarithmic = len(parts) == 4
+    (first, unit_a), (last, unit_b) = ends
     if unit_a and unit_b and unit_a != unit_b:
         raise InputError(
             f"--vary {path}: the range begins in {unit_a} and ends in {unit_b}; give both "
@@ -158,20 +151,13 @@ def _range(path: str, parts: Sequence[str], own: str) -> list[Any]:
     spaced = np.geomspace(first, last, count) if logarithmic else np.linspace(first, last, count)
     # 0.30000000000000004 is no value a user meant.
     numbers = [float(f"{v:.12g}") for v in spaced]
-    if "." not in parts[0] + parts[1] and all(v.is_integer() for v in numbers):
-        return [_with_unit(int(v), unit) for v in numbers]
-    return [_with_unit(v, unit) for v in numbers]
+    whole = "." not in parts[0] + parts[1] and all(v.is_integer() for v in numbers)
+    return [_with_unit(int(v) if whole else v, unit) for v in numbers]
 
 
 def _with_unit(value: Any, unit: str) -> Any:
     plain = isinstance(value, (int, float)) and not isinstance(value, bool)
     return f"{value!r} {unit}" if plain and unit else value
-
-
-def _split(text: str) -> tuple[float, str]:
-    match = _QUANTITY.fullmatch(text)
-    assert match is not None
-    return float(match[1]), match[2] or ""
 
 
 def _value(text: str) -> Any:
@@ -188,21 +174,19 @@ def _entry(scene: Mapping[str, Any], path: str) -> Any:
     return node
 
 
-def _unit(value: Any) -> str:
-    match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
-    return (match[2] or "") if match is not None else ""
-
-
 def _numbers(values: Sequence[Any]) -> tuple[tuple[float, ...] | None, str]:
     """The values as numbers in their common unit, when they are."""
-    if any(isinstance(v, (bool, list, dict)) for v in values):
+    if any(isinstance(v, bool) for v in values):
         return None, ""
-    found = [(float(v), "") if isinstance(v, (int, float)) else _quantity(v) for v in values]
-    units = {item[1] for item in found if item is not None}
-    if None in found or len(units) != 1:
+    numbers = [(float(v), "") if isinstance(v, (int, float)) else _quantity(v) for v in values]
+    found = [one for one in numbers if one is not None]
+    units = {unit for _, unit in found}
+    if len(found) < len(numbers) or len(units) != 1:
         return None, ""
-    return tuple(item[0] for item in found if item is not None), units.pop()
+    return tuple(number for number, _ in found), units.pop()
 
 
 def _quantity(value: Any) -> tuple[float, str] | None:
-    return _split(value) if isinstance(value, str) and _QUANTITY.fullmatch(value) else None
+    """The number and the unit of a text; None where it is none."""
+    match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
+    return None if match is None else (float(match[1]), match[2] or "")

@@ -5,8 +5,6 @@ Each file is written whole or not at all.
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 from collections.abc import Iterable, Sequence
@@ -18,9 +16,8 @@ import numpy as np
 
 from upd.batch.grid import GridAxis, values_at
 from upd.batch.plan import SweepPlan
-from upd.batch.point import Outcome
 from upd.batch.store import PointStore
-from upd.batch.table import Column, csv_text, reasons
+from upd.batch.table import Column, as_csv, csv_text, reasons
 from upd.cache.files import write_text
 from upd.cache.sources import versions
 from upd.errors import InputError
@@ -29,6 +26,7 @@ from upd.plot.sample_charts import sample_charts
 from upd.plot.sweep_charts import figure_names, sweep_charts
 from upd.results import write_netcdf
 from upd.results.sampled import SampledNumber
+from upd.vary.outcome import Outcome
 
 
 @dataclass(frozen=True)
@@ -82,18 +80,9 @@ def write_outputs(store: PointStore, result: SweepResult) -> list[Path]:
     if plan.sample is None:
         return [table, arrays, data]
     compared = folder / "sample.csv"
-    write_text(compared, sample_text(result.sampled))
+    heads = [field.name for field in fields(SampledNumber)]
+    write_text(compared, as_csv([heads, *(one.as_dict().values() for one in result.sampled)]))
     return [compared, table, arrays, data]
-
-
-def sample_text(sampled: Sequence[SampledNumber]) -> str:
-    """What a sample makes of every number as CSV, with all digits."""
-    out = io.StringIO()
-    write = csv.writer(out, lineterminator="\n").writerow
-    write([field.name for field in fields(SampledNumber)])
-    for one in sampled:
-        write(["" if value is None else value for value in one.as_dict().values()])
-    return out.getvalue()
 
 
 def draw(

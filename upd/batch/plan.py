@@ -17,7 +17,7 @@ from upd.analyses.base import Needs
 from upd.batch.dask import check_address
 from upd.batch.engine import Workers, check_numbers, fitting
 from upd.batch.grid import GridAxis, Place, parse_axes, places, settings
-from upd.batch.point import Outcome, Task, point_settings
+from upd.batch.point import Task, load_point
 from upd.batch.sample import (
     Sample,
     draw_sample,
@@ -30,8 +30,13 @@ from upd.batch.store import PointStore
 from upd.cache.arrays import cache_limit
 from upd.cache.sources import source_digest
 from upd.errors import InputError
-from upd.scene import AnyScene, load_scene
+from upd.scene import AnyScene
+from upd.vary.outcome import Outcome
 
+_FACTORS = (
+    "displacements inside the bodies are asked for: their factor is not kept on disk, each worker "
+    "makes it once a model"
+)
 _DECIMAL = re.compile(r"\d+\.\d+(e[+-]?\d+)?")
 
 
@@ -102,7 +107,6 @@ def plan_sweep(
     seed: int | None = None,
     workers: int | None = None,
     threads: int = 1,
-    cache: Path | None = None,
     cluster: str = "",
 ) -> SweepPlan:
     """Plan the full factorial of ``vary``, or a sample of the scene's uncertain inputs.
@@ -120,8 +124,6 @@ def plan_sweep(
     workers
         Processes side by side, at most as threads allow; None: as many as cores and memory allow;
         0: this process.
-    cache
-        Folder of kept condensations; None: the user's.
     cluster
         "local:4" or "tcp://host:port".
 
@@ -143,12 +145,11 @@ def plan_sweep(
         given = [(text, {}) for text in sample_texts(scene, drawn, axes)]
     code = source_digest(scene.recipe)
     limit = cache_limit()
-    where = "" if cache is None else str(cache.resolve())
     tasks = tuple(
-        Task(text, changed, threads, where, limit, scene.recipe, code) for text, changed in given
+        Task(text, changed, threads, limit, scene.recipe, code) for text, changed in given
     )
     kept = PointStore(folder, "sweep").finished(tasks)
-    needs, refused = _needs(tasks, kept)
+    needs, refused = point_needs(tasks, kept)
     if len(refused) == len(grid):
         raise InputError(
             f"no point of the {'grid' if drawn is None else 'sample'} can be run. The first: "
@@ -170,7 +171,7 @@ def plan_sweep(
         memory_bytes=memory,
         seconds={number: one.seconds for number, one in needs.items()},
         workers=Workers(many, threads, cluster),
-        notes=(*notes, *_sharing_notes(shared)),
+        notes=(*notes, *([_FACTORS] if any(one.factors for one in shared) else [])),
         sample=drawn,
     )
 
@@ -192,7 +193,7 @@ def _drawn(
     return draw_sample(scene, count, kept_seed(folder) if seed is None else seed)
 
 
-class _PointNeeds(NamedTuple):
+class PointNeeds(NamedTuple):
     """What a point shares with others, its memory and its seconds."""
 
     shared: Needs
@@ -200,39 +201,21 @@ class _PointNeeds(NamedTuple):
     seconds: float
 
 
-def _needs(
-    tasks: Sequence[Task], kept: Collection[int]
-) -> tuple[dict[int, _PointNeeds], dict[int, Outcome]]:
+def point_needs(
+    tasks: Sequence[Task], kept: Collection[int] = ()
+) -> tuple[dict[int, PointNeeds], dict[int, Outcome]]:
     """What every missing point needs, and the points that the scene does not allow."""
-    needs: dict[int, _PointNeeds] = {}
+    needs: dict[int, PointNeeds] = {}
     refused: dict[int, Outcome] = {}
     for number, task in enumerate(tasks):
         if number in kept:
             continue
         try:
-            data = tomllib.loads(task.scene)
-            scene = load_scene(data, point_settings(data, task.settings))
+            scene = load_point(task)
             plan = make_plan(scene)
             shared = analysis_of(scene).needs(plan, task.threads)
         except InputError as error:
             refused[number] = Outcome(failure=" ".join(f"InputError: {error}".split()))
         else:
-            needs[number] = _PointNeeds(shared, plan.memory_bytes, plan.seconds)
+            needs[number] = PointNeeds(shared, plan.memory_bytes, plan.seconds)
     return needs, refused
-
-
-def _sharing_notes(shared: Sequence[Needs]) -> list[str]:
-    notes = []
-    if any(one.factors for one in shared):
-        notes.append(
-            "displacements inside the bodies are asked for: their factor is not kept on "
-            "disk, each worker makes it once a model"
-        )
-    if any(one.condensations for one in shared):
-        notes.append(
-            "points do not start from their neighbours: a contact set is found from load "
-            "to load inside a point, at hardly any cost"
-        )
-    elif shared:
-        notes.append("points do not start from their neighbours: each is solved on its own")
-    return notes

@@ -16,7 +16,7 @@ import tomllib
 import traceback
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +29,10 @@ from upd.errors import UpdError
 from upd.linalg.pardiso import load as load_pardiso
 from upd.linalg.select import has_pardiso
 from upd.report.notebook import RunResult
-from upd.results import Case, InputPart, Result, read_input_part
-from upd.scene import load_scene
+from upd.results import Result
+from upd.scene import AnyScene, load_scene
 from upd.scene.quantities import UNKNOWN
+from upd.vary.outcome import Outcome, PointResult
 
 log = logging.getLogger(__name__)
 
@@ -39,7 +40,7 @@ log = logging.getLogger(__name__)
 _FILES_ONLY = ("fields",)
 #: One point at a time in a process: limits of threads and what is shared belong to the process.
 _turn = threading.Lock()
-_stores: dict[tuple[str, int, float], Store] = {}
+_stores: dict[tuple[Path, int, float], Store] = {}
 #: Begins the failure of a worker with other sources than those of whoever gives the points.
 OTHER_CODE = "the worker runs another version of upd, of its libraries or of the recipe"
 
@@ -57,10 +58,8 @@ class Task:
     threads
         Threads of the libraries, which the last digits depend on; 0: as many as they take by
         themselves.
-    cache
-        Folder of kept condensations; "" for the worker's own.
     limit_bytes
-        Bytes that folder may hold.
+        Bytes that the worker's folder of kept condensations may hold.
     recipe
         The scene's recipe.
     code
@@ -73,7 +72,6 @@ class Task:
     scene: str
     settings: Mapping[str, Any]
     threads: int = 1
-    cache: str = ""
     limit_bytes: float = LIMIT_BYTES
     recipe: str = ""
     code: str = ""
@@ -99,128 +97,6 @@ class Task:
         )[:20]
 
 
-@dataclass(frozen=True)
-class PointResult:
-    """One number of a point.
-
-    Attributes
-    ----------
-    value
-        None where the number is not finite.
-    error
-        Relative difference from the number's reference.
-    printed_error
-        That of a published value.
-    exact
-        Whether the reference is what the number should converge to.
-    withheld
-        Why the number was not reached.
-    estimated
-        Estimated relative error.
-    inputs
-        What the inputs known within limits do to it.
-    """
-
-    name: str
-    case: Case
-    unit: str
-    value: float | None
-    error: float | None = None
-    printed_error: float | None = None
-    exact: bool = True
-    withheld: str = ""
-    estimated: float | None = None
-    inputs: tuple[InputPart, ...] = ()
-
-    def as_dict(self) -> dict[str, Any]:
-        """The number for JSON: ``case`` in words, its attributes under ``case_fields``.
-
-        What is not given is left out.
-        """
-        given = {
-            f.name: value for f in fields(self) if (value := getattr(self, f.name)) != f.default
-        }
-        return {
-            **given,
-            "case": self.case.label,
-            "case_fields": self.case.given(),
-            **({"inputs": [part.as_dict() for part in self.inputs]} if self.inputs else {}),
-        }
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a point gave, or the reason it failed.
-
-    Attributes
-    ----------
-    results
-        All numbers of the run.
-    failure
-        Why it failed; "" when it did not.
-    final
-        Whether the same would come out again; other failures (killed, no memory) are tried again by
-        the next call.
-    seconds, stages
-        Of the run, by its own clock: without the start of the process and its imports.
-    memory_mb
-        Largest resident memory during the run.
-    n_dof
-        Degrees of freedom of all bodies.
-    warnings
-        Names of the self-checks that did not pass.
-    shared
-        What was taken from where, see `upd.cache.shared.Store`.
-    where
-        "host:process".
-    """
-
-    results: tuple[PointResult, ...] = ()
-    failure: str = ""
-    final: bool = True
-    seconds: float = 0.0
-    memory_mb: float = 0.0
-    stages: Mapping[str, float] = field(default_factory=dict)
-    n_dof: int = 0
-    warnings: tuple[str, ...] = ()
-    shared: Mapping[str, int] = field(default_factory=dict)
-    where: str = ""
-
-    def text(self) -> str:
-        """The outcome as JSON."""
-        data = {f.name: getattr(self, f.name) for f in fields(self)}
-        return json.dumps(
-            data | {"results": [r.as_dict() for r in self.results]}, indent=1, allow_nan=False
-        )
-
-
-def read_outcome(text: str) -> Outcome:
-    """The outcome in a JSON text.
-
-    Raises
-    ------
-    ValueError, TypeError, KeyError
-        For any other text.
-    """
-    data = json.loads(text)
-    return Outcome(
-        **(
-            data
-            | {
-                "results": tuple(map(_read_result, data["results"])),
-                "warnings": tuple(data["warnings"]),
-            }
-        )
-    )
-
-
-def _read_result(data: Mapping[str, Any]) -> PointResult:
-    given = {**data}
-    case = Case(**given.pop("case_fields"))
-    inputs = tuple(map(read_input_part, given.get("inputs", ())))
-    return PointResult(**(given | {"case": case, "inputs": inputs}))
-
-
 def solve_task(text: str) -> str:
     """Solve the point of a JSON task and return its JSON outcome; a failure becomes its reason.
 
@@ -234,26 +110,29 @@ def solve_task(text: str) -> str:
 
 
 def forget() -> None:
-    """Let go of the models kept in this process."""
+    """Release the models kept in this process."""
     _stores.clear()
 
 
+def load_point(task: Task) -> AnyScene:
+    """The scene of a point. Raises InputError where it does not take the settings."""
+    data = tomllib.loads(task.scene)
+    settings = task.settings if task.alone else point_settings(data, task.settings)
+    scene: AnyScene = load_scene(data, dict(settings))
+    return scene
+
+
 def point_settings(data: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """The values of a point, and the scene's outputs without those that only files show."""
-    mine = without_estimates(data, settings)
+    """The values of a point that shares with others: without outputs that only files show, and
+    without estimates unless an accuracy is asked for, which would cost a third of a sweep.
+    """
+    mine = {} if "accuracy" in data else {"accuracy": UNKNOWN}
+    mine |= settings
     want = settings.get("want", data.get("want"))
     if not isinstance(want, Sequence) or isinstance(want, str):
         return mine
     kept = [w for w in want if w not in _FILES_ONLY]
     return {**mine, "want": kept} if kept and len(kept) < len(want) else mine
-
-
-def without_estimates(data: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """The values of a point that estimates no errors, unless an accuracy is asked for: the points
-    of a study show them, and a sweep's companions would cost a third of it.
-    """
-    asked = "accuracy" in settings or "accuracy" in data
-    return dict(settings) if asked else {**settings, "accuracy": UNKNOWN}
 
 
 def _solved(task: Task) -> Outcome:
@@ -263,9 +142,7 @@ def _solved(task: Task) -> Outcome:
     store = None if task.alone else _store(task)
     before = {} if store is None else dict(store.counts)
     try:
-        data = tomllib.loads(task.scene)
-        settings = without_estimates if task.alone else point_settings
-        scene = load_scene(data, settings(data, task.settings))
+        scene = load_point(task)
         with ExitStack() as around:
             if task.threads:
                 if has_pardiso():
@@ -283,11 +160,8 @@ def _solved(task: Task) -> Outcome:
 
 
 def _store(task: Task) -> Store:
-    folder = task.cache or str(condensation_folder())
-    return _stores.setdefault(
-        (folder, task.threads, task.limit_bytes),
-        Store(Path(folder), task.threads, task.limit_bytes),
-    )
+    mine = condensation_folder(), task.threads, task.limit_bytes
+    return _stores.setdefault(mine, Store(*mine))
 
 
 def _failed(error: Exception, seconds: float) -> Outcome:

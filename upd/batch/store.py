@@ -5,15 +5,17 @@ killed batch takes up where it stood.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from upd.batch.point import Outcome, Task, read_outcome
+from upd.batch.point import Task
 from upd.cache.files import locked, write_text
 from upd.errors import InputError, UpdError
+from upd.vary.outcome import Outcome, read_outcome
 
 #: the grid of a sweep or the draw of its sample, from its first moment on
 GRID = "grid.json"
@@ -55,20 +57,12 @@ class PointStore:
                 write_text(self.path(task), outcome.text() + "\n")
 
     def check(self) -> None:
-        """Try to write into the folder; new ones, it and its parents, are not left behind.
-
-        Raises InputError before the first point, also for a folder with other things in it.
-        """
+        """Raise InputError where the folder cannot be written, or has other things in it."""
         self._check_ours()
-        new = [place for place in (self.folder, *self.folder.parents) if not place.exists()]
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            write_text(self.folder / ".try", "")
-            (self.folder / ".try").unlink()
-            for place in new:
-                place.rmdir()
-        except OSError as error:
-            raise self._refused(error) from None
+        places = (self.folder.resolve(), *self.folder.resolve().parents)
+        there = next(place for place in places if place.exists())
+        if not there.is_dir() or not os.access(there, os.W_OK):
+            raise self._refused(f"{there}: no folder, or no permission")
 
     @contextmanager
     def sole(self) -> Iterator[None]:
@@ -83,7 +77,7 @@ class PointStore:
         try:
             (self.folder / "points").mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise self._refused(error) from None
+            raise self._refused(error.strerror) from None
         with ExitStack() as stack:
             try:
                 stack.enter_context(locked(self.folder / ".lock", wait=False))
@@ -115,8 +109,12 @@ class PointStore:
         InputError
             When the folder has the results of another grid: they stay.
         """
-        earlier = self._earlier_grid()
-        if earlier is not None and not _same(earlier, grid):
+        file = self.folder / GRID
+        try:
+            earlier = json.loads(file.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            earlier = grid
+        if earlier != grid:
             differs = "" if earlier["axes"] != grid["axes"] else ", of a scene with other values"
             raise InputError(
                 f"the sweep folder {self.folder} holds another sweep ({_shown(earlier)}{differs}): "
@@ -124,26 +122,7 @@ class PointStore:
                 "or delete it"
             )
         with self.writing():
-            write_text(self.folder / GRID, json.dumps(grid, indent=1) + "\n")
-
-    def _earlier_grid(self) -> dict[str, Any] | None:
-        """The grid whose results the folder holds; sweeps from before it was kept have it in their
-        summary.
-        """
-        for name in (GRID, "sweep.json"):
-            try:
-                data = json.loads((self.folder / name).read_text(encoding="utf-8"))
-                return {
-                    "scene": data["scene"],
-                    "given": data.get("given"),
-                    "axes": [
-                        {key: axis[key] for key in ("path", "values")} for axis in data["axes"]
-                    ],
-                    "sample": data.get("sample"),
-                }
-            except (OSError, ValueError, TypeError, KeyError):
-                continue
-        return None
+            write_text(file, json.dumps(grid, indent=1) + "\n")
 
     def _check_ours(self) -> None:
         try:
@@ -162,17 +141,11 @@ class PointStore:
                 f"the folder {self.folder} holds a sweep: choose another with --out for the study"
             )
 
-    def _refused(self, error: OSError) -> InputError:
+    def _refused(self, why: str | None) -> InputError:
         return InputError(
-            f"the {self.what} folder {self.folder} cannot be written ({error.strerror}): "
-            "choose another with --out"
+            f"the {self.what} folder {self.folder} cannot be written ({why}): choose another with "
+            "--out"
         )
-
-
-def _same(earlier: Mapping[str, Any], grid: Mapping[str, Any]) -> bool:
-    """Whether it is the same sweep; those from before the scene was kept have axes alone."""
-    known = [key for key in ("scene", "axes", "given") if earlier[key] is not None]
-    return all(earlier[key] == grid[key] for key in known)
 
 
 def _shown(grid: Mapping[str, Any]) -> str:

@@ -1,62 +1,82 @@
-"""Studies of a scene: which there are for its analysis, and how one is run."""
+"""Studies of a scene: its variations, solved, and their report."""
 
 from __future__ import annotations
 
+import json
 import math
 import time
 import tomllib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from upd.analyses import analysis_of
-from upd.batch import contact_ladders, response_ladders, rig_ladders, whole_faces
+from upd.analyses import analysis_of, ladders_of
 from upd.batch.dask import check_address
-from upd.batch.engine import Watcher, Workers, check_numbers, fitting, run_points
-from upd.batch.ladder import Ladder, Levels, Study, StudyReport
-from upd.batch.parameter_study import PARAMETERS
+from upd.batch.engine import Batch, Watcher, Workers, check_numbers, fitting, run_points
+from upd.batch.plan import point_needs
+from upd.batch.point import Task
 from upd.batch.store import PointStore
-from upd.batch.study_point import SolvedPoint
+from upd.cache.files import write_text
 from upd.cache.sources import source_digest
 from upd.errors import InputError
 from upd.linalg import select
+from upd.plot.matplotlib import write_sheets
 from upd.scene import AnyScene, load_scene
+from upd.scene.quantities import UNKNOWN
 from upd.units import parse_quantity
+from upd.vary.ladder import Asked, StudyReport
+from upd.vary.outcome import SolvedPoint
+from upd.vary.tables import markdown_table
+from upd.vary.variation import Variation
 
-#: analysis -> what can be varied
-STUDIES: Mapping[str, Mapping[str, Ladder]] = {
-    "hertz": contact_ladders.CURVED,
-    "flat": {**contact_ladders.FLAT, **PARAMETERS},
-    "modal": rig_ladders.MODAL,
-    "forced": {**response_ladders.FORCED, **whole_faces.CONTACT},
-    "seated": rig_ladders.SEATED,
+#: numbers the loads alone decide: no level changes them
+_OF_LOADS = ("F_N", "F_T")
+#: analysis -> what --at sets in the scene, and what it chooses; a force where it has a unit
+_NORMAL = ("loads.normal", "N", "the normal force of a contact")
+_LOADS = {
+    "forced": ("excitation.centrifugal_to_force", "", "one F_C/F_E"),
+    "seated": ("damper.centrifugal", "N", "F_C of a seated damper"),
+    "hertz": _NORMAL,
+    "flat": _NORMAL,
 }
-#: analysis -> its scenes in words
-_KINDS = {
-    "hertz": "a curved contact",
-    "flat": "a flat contact",
-    "modal": "free vibration",
-    "forced": "a forced response",
-    "seated": "a seated damper",
-}
-#: variation -> what a scene that does not offer it lacks
-_NOTHING = {
-    "harmonics": "no harmonics",
-    "samples": "no samples of a period",
-    "modes": "no reduction to modes",
-    "contacts": "no contact points on springs",
-    "contact": "no springs to compare with whole faces",
-    "steps": "no load steps or time steps",
-    "accuracy": "no mesh that follows from an accuracy",
-    "solver": "no choice of solvers to compare",
-    "patch": "no patch whose edge is chosen",
-    "parameters": "no list of things to move one at a time",
-    "dimensions": "no derivatives of frequencies with respect to dimensions",
-}
-#: analyses of contacts, and the variation that has a meaning for them only where normal and
-#: tangential contact are coupled
-_CONTACTS, _COUPLED = ("hertz", "flat"), "steps"
+
+
+@dataclass(frozen=True)
+class Study:
+    """Points in the order they are solved in, and what is made of them once they are.
+
+    Attributes
+    ----------
+    present
+        Makes the report; points that failed are in it.
+    """
+
+    title: str
+    points: tuple[Variation, ...]
+    present: Callable[[Sequence[SolvedPoint]], StudyReport]
+
+    def write(self, folder: Path, solved: Sequence[SolvedPoint], report: StudyReport) -> list[Path]:
+        """Write study.md, study.json (of a study with points) and the figures into ``folder``.
+
+        Returns the paths, the table first.
+        """
+        curves = [asdict(one) for one in report.curves]
+        table, data = folder / "study.md", folder / "study.json"
+        lines = [f"# {self.title}", ""]
+        for part in report.tables:
+            lines += [f"## {part.title}", "", *markdown_table(part), ""]
+        write_text(table, "\n".join([*lines, *(f"- {note}" for note in report.notes)]) + "\n")
+        if not self.points:
+            return [table]
+        content = {
+            "title": self.title,
+            "points": [one.as_dict() for one in solved],
+            "curves": curves,
+            "notes": list(report.notes),
+        }
+        write_text(data, json.dumps(content, indent=1) + "\n")
+        return [table, data, *write_sheets(report.charts(curves), folder)]
 
 
 @dataclass(frozen=True)
@@ -99,7 +119,7 @@ def study(
     Parameters
     ----------
     vary
-        What is varied, one of `variations`.
+        What is varied, one of `upd.analyses.ladders_of`.
     levels
         Levels of a ladder, coarse to fine; None for the usual ones.
     at
@@ -136,29 +156,34 @@ def study(
     return run_study(loaded, planned, Path(out), workers=who, watch=watch)
 
 
-def variations(scene: Any) -> Mapping[str, Ladder]:
-    """What can be varied in the scene."""
-    analysis = analysis_of(scene).name
-    offered = STUDIES[analysis]
-    if analysis in _CONTACTS and not scene.coupled:
-        return {vary: ladder for vary, ladder in offered.items() if vary != _COUPLED}
-    return offered
-
-
-def plan_study(scene: AnyScene, vary: str, levels: Levels = None) -> Study:
+def plan_study(scene: AnyScene, vary: str, asked: Asked = None) -> Study:
     """The study of one variation.
 
     Raises InputError when the scene's analysis has none of that name, and for levels that are none.
     """
-    offered = variations(scene)
+    offered = ladders_of(scene)
     if vary not in offered:
-        analysis = analysis_of(scene).name
-        why = _NOTHING.get(vary, "")
-        if analysis in _CONTACTS and vary == _COUPLED:
-            why = 'no number that load steps change, unless contact.coupling = "coupled"'
-        reason = f"; {_KINDS[analysis]} has {why}" if why else ""
-        raise InputError(f"--vary {vary}: choose one of {', '.join(offered)}{reason}")
-    return offered[vary].study(scene, vary, levels)
+        raise InputError(f"--vary {vary}: choose one of {', '.join(offered)}")
+    ladder = offered[vary]
+    headline = analysis_of(scene).headline_names
+    names = [n for n in dict.fromkeys((*headline, *ladder.follow)) if n not in _OF_LOADS]
+
+    def present(solved: Sequence[SolvedPoint]) -> StudyReport:
+        report = ladder.report(scene, solved, names)
+        return replace(report, notes=(*ladder.notes(scene), *report.notes))
+
+    title = f"{scene.title or scene.name}: {ladder.title(scene, vary)}"
+    return Study(title, tuple(ladder.variations(scene, asked)), present)
+
+
+def point_task(one: Variation, scene: AnyScene, threads: int, code: str) -> Task:
+    """A point for a worker. It shares nothing with others: its seconds and memory count.
+
+    It estimates no errors, unless it asks for an accuracy: the seconds are those of the level
+    alone.
+    """
+    settings = {"accuracy": UNKNOWN} | dict(one.overrides)
+    return Task(scene.text, settings, threads, recipe=scene.recipe, code=code, alone=True)
 
 
 def study_workers(
@@ -181,33 +206,18 @@ def study_workers(
     """
     if cluster:
         check_address(cluster)
-    alone = workers < 2 and not cluster
-    shared = 1 if cluster else max(1, select.threads() // max(workers, 1))
-    each = shared if threads is None else threads
-    check_numbers(workers, each)
-    if threads is None and alone:
-        # What a single run takes.
-        each = 0
-    many = (
-        workers
-        if alone or cluster
-        else fitting(workers, each, len(planned.points), _largest(scene, planned))[0]
-    )
+    side_by_side = max(workers, 1)
+    each = 1 if cluster else max(1, select.threads() // side_by_side)
+    check_numbers(workers, each if threads is None else threads)
+    if workers < 2 or cluster:
+        # Alone it has what a single run takes.
+        default = each if cluster else 0
+        return Workers(workers, default if threads is None else threads, cluster, fresh=True)
+    each = each if threads is None else threads
+    needs, _ = point_needs([point_task(one, scene, each, "") for one in planned.points])
+    largest = max((one.memory_bytes for one in needs.values()), default=0.0)
+    many, _ = fitting(workers, each, len(planned.points), largest)
     return Workers(many, each, cluster, fresh=True)
-
-
-def _largest(scene: AnyScene, planned: Study) -> float:
-    """Bytes of the largest point."""
-    data = tomllib.loads(scene.text)
-    found = [0.0]
-    for point in planned.points:
-        try:
-            one = load_scene(data, dict(point.settings))
-            found.append(analysis_of(one).make_plan(one).memory_bytes)
-        except InputError:
-            # It will say so itself, as a point that fails.
-            continue
-    return max(found)
 
 
 def run_study(
@@ -240,18 +250,12 @@ def run_study(
     who = Workers(threads=0, fresh=True) if workers is None else workers
     store = PointStore(folder, "study")
     code = source_digest(scene.recipe)
-    points = tuple(planned.points)
-    tasks = [point.task(scene, who.threads, code) for point in points]
+    points = planned.points
+    tasks = [point_task(point, scene, who.threads, code) for point in points]
     with store.sole():
         known = store.finished(tasks)
-        outcomes = run_points(
-            tasks,
-            store,
-            who,
-            known=known,
-            label=lambda k: f"{points[k].curve} {points[k].label}",
-            watch=watch,
-        )
+        batch = Batch(tasks, who, known, lambda k: f"{points[k].source} {points[k].label}")
+        outcomes = run_points(batch, store, watch=watch)
         solved = tuple(
             SolvedPoint(point, outcome) for point, outcome in zip(points, outcomes, strict=True)
         )
@@ -263,7 +267,7 @@ def run_study(
     )
 
 
-def scene_at(scene: AnyScene, at: float | str | None) -> AnyScene:
+def scene_at(scene: Any, at: float | str | None) -> AnyScene:
     """The scene at one load.
 
     Parameters
@@ -278,14 +282,22 @@ def scene_at(scene: AnyScene, at: float | str | None) -> AnyScene:
         For what is no such load, a scene without one, and one that does not take it.
     """
     if at is None:
-        return scene
+        given: AnyScene = scene
+        return given
     analysis = analysis_of(scene).name
-    if analysis == "modal":
+    if analysis not in _LOADS:
         raise InputError(
-            f"--at {at}: free vibration has no load to choose; leave it out, or study a forced "
-            "response"
+            f"--at {at}: the scene has no load to choose; leave it out, or study a forced response"
         )
-    settings = _ratio(scene, at) if analysis == "forced" else _force(analysis, at)
+    path, unit, chosen = _LOADS[analysis]
+    load = _positive(at, unit)
+    if load is None:
+        form = 'force, for example --at "200 N"' if unit else "number without a unit, as --at 194"
+        raise InputError(f"--at {at}: chooses {chosen}; write a positive {form}")
+    value: Any = f"{load!r} {unit}" if unit else load
+    settings = {path: value if analysis == "seated" else [value]}
+    if analysis == "forced" and scene.excitation.force:
+        settings["excitation.force"] = []
     try:
         changed: AnyScene = load_scene(tomllib.loads(scene.text), settings)
     except InputError as problem:
@@ -293,34 +305,13 @@ def scene_at(scene: AnyScene, at: float | str | None) -> AnyScene:
     return changed
 
 
-def _ratio(scene: Any, at: float | str) -> dict[str, Any]:
+def _positive(at: float | str, unit: str) -> float | None:
+    """The load, a force in N where it may have a unit; None where it is none."""
     try:
-        ratio = float(at)
-    except ValueError:
-        ratio = math.nan
-    if not 0.0 < ratio < math.inf:
-        raise InputError(
-            f"--at {at}: a forced response is studied at one F_C/F_E; write a positive number "
-            "without a unit, for example --at 194"
-        )
-    return {
-        "excitation.centrifugal_to_force": [ratio],
-        **({"excitation.force": []} if scene.excitation.force else {}),
-    }
-
-
-def _force(analysis: str, at: float | str) -> dict[str, Any]:
-    try:
-        force = float(at)
+        load = float(at)
     except ValueError:
         try:
-            force = float(parse_quantity(at, "force"))
+            load = float(parse_quantity(at, "force")) if unit else math.nan
         except InputError:
-            force = math.nan
-    if not 0.0 < force < math.inf:
-        of = "F_C of a seated damper" if analysis == "seated" else "the normal force of a contact"
-        raise InputError(
-            f'--at {at}: chooses {of}; write a positive force, for example --at "200 N"'
-        )
-    text = f"{force!r} N"
-    return {"damper.centrifugal": text} if analysis == "seated" else {"loads.normal": [text]}
+            return None
+    return load if 0.0 < load < math.inf else None

@@ -12,15 +12,15 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from upd.batch.engine import Watcher, run_points
+from upd.batch.engine import Batch, Watcher, run_points
 from upd.batch.output import SweepResult, draw, write_outputs
 from upd.batch.plan import SweepPlan, plan_sweep
-from upd.batch.point import Outcome
 from upd.batch.sample import sampled_numbers
 from upd.batch.store import PointStore
 from upd.batch.table import check_follow, make_columns, patterns
 from upd.errors import one_line
 from upd.scene import load_scene
+from upd.vary.outcome import Outcome
 
 log = logging.getLogger(__name__)
 
@@ -132,17 +132,8 @@ def run_sweep(
         if solved is not None:
             check(solved)
         known = plan.kept | plan.refused
-        found = run_points(
-            plan.tasks,
-            store,
-            plan.workers,
-            known=known,
-            groups=plan.groups,
-            label=plan.label,
-            check=check,
-            expected=plan.seconds,
-            watch=watch,
-        )
+        batch = Batch(plan.tasks, plan.workers, known, plan.label, plan.groups, plan.seconds)
+        found = run_points(batch, store, check=check, watch=watch)
         columns = tuple(make_columns(found, patterns(plan.scene, follow)))
         sampled = () if plan.sample is None else sampled_numbers(plan.sample, columns)
         seconds = time.perf_counter() - begin

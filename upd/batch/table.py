@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import Any
@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from upd.analyses import analysis_of
 from upd.batch.grid import GridAxis, Place
-from upd.batch.point import Outcome, PointResult
 from upd.errors import InputError
 from upd.labels import file_name
 from upd.results import Case, InputPart, shared_label
 from upd.scene import AnyScene
+from upd.vary.outcome import Outcome, PointResult
 
 Array = NDArray[np.float64]
 
@@ -241,31 +241,26 @@ def csv_text(
 
     The reason is why a point failed, or why it lacks a number.
     """
-    out = io.StringIO()
-    write = csv.writer(out, lineterminator="\n").writerow
-    write(
-        [
-            *(axis.header for axis in axes),
-            *(column.header for column in columns),
-            "status",
-            "reason",
-            "warnings",
-            "seconds",
-        ]
-    )
+    heads = [*(axis.header for axis in axes), *(column.header for column in columns)]
+    rows: list[list[Any]] = [[*heads, "status", "reason", "warnings", "seconds"]]
     why = reasons(outcomes, columns)
     for number, (place, outcome) in enumerate(zip(places, outcomes, strict=True)):
-        shown = [axis.shown(k) for axis, k in zip(axes, place, strict=True)]
         numbers = [float(column.values[number]) for column in columns]
-        status = "failed" if outcome.failure else "ok"
-        write(
+        rows.append(
             [
-                *shown,
+                *(axis.shown(k) for axis, k in zip(axes, place, strict=True)),
                 *("" if np.isnan(v) else repr(v) for v in numbers),
-                status,
+                "failed" if outcome.failure else "ok",
                 why[number],
                 "; ".join(outcome.warnings),
                 f"{outcome.seconds:.3f}",
             ]
         )
+    return as_csv(rows)
+
+
+def as_csv(rows: Iterable[Iterable[Any]]) -> str:
+    """Rows as CSV; what is not known is empty."""
+    out = io.StringIO()
+    csv.writer(out, lineterminator="\n").writerows(rows)
     return out.getvalue()

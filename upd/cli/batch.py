@@ -12,16 +12,15 @@ from rich.console import Console
 from rich.text import Text
 
 from upd.batch.engine import Workers
-from upd.batch.ladder import Study
 from upd.batch.output import SweepResult
 from upd.batch.plan import SweepPlan
-from upd.batch.studies import StudyResult
-from upd.batch.study_tables import TextTable
+from upd.batch.studies import Study, StudyResult
 from upd.cli.tables import print_table
 from upd.cli.terminal import counted, duration
 from upd.report.columns import TextColumn, whole_table
 from upd.report.tables import sample_table
 from upd.results.sampled import sample_sentence
+from upd.vary.tables import TextTable
 
 #: rows shown, and characters of a line of a head; the files hold all
 _ROWS, _WIDTH = 30, 14

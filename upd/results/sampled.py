@@ -24,7 +24,7 @@ Analysis 34, 1884-1910: a Latin hypercube of n points is no worse than n - 1 ind
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -145,30 +145,26 @@ def sampled_number(
         "outcome": UNKNOWN_BAND,
     }
 
-    def compared(verdict: str, **more: Any) -> SampledNumber:
+    def found(verdict: str, **more: Any) -> SampledNumber:
         missing = len(values) - 1 - len(drawn)
         lost = f"; {missing} of {len(values) - 1} points have no such number" if missing else ""
         return SampledNumber(**out | more, verdict=verdict + lost)
 
     if nominal is None:
-        return compared("no number with the inputs at their values")
+        return found("no number with the inputs at their values")
     if nominal == 0.0:
-        return compared("the number is 0: nothing is relative to it")
+        return found("the number is 0: nothing is relative to it")
     if out["deviation"] is None:
-        return compared("too few points have it for a standard deviation")
+        return found("too few points have it for a standard deviation")
     out["band"] = LIMITS * out["deviation"] / abs(nominal)
     why = _unknown(inputs, paths)
     if why:
-        return compared(why)
-    changes = _changes(inputs)
+        return found(why)
+    changes = {part.path: part.change for part in inputs}
     c = np.array([changes[path] for path in paths])
     out["first_order"] = float(np.linalg.norm(c))
     predicted = nominal * (1.0 + shifts[1:][known[1:]] @ c)
-    return compared(**_compared(drawn, predicted, nominal, float(out["first_order"]), out["band"]))
-
-
-def _changes(inputs: Sequence[InputPart]) -> Mapping[str, float]:
-    return {part.path: part.change for part in inputs}
+    return found(**_compared(drawn, predicted, nominal, float(out["first_order"]), out["band"]))
 
 
 def _unknown(inputs: Sequence[InputPart], paths: Sequence[str]) -> str:

@@ -12,20 +12,21 @@ from typing import Any
 import pytest
 
 from upd import load_scene, make_plan, run
+from upd.analyses import ladders_of
 from upd.analyses.base import Plan
 from upd.analyses.contact.varied import level_of
+from upd.analyses.flat.ladders import parameter_points, parameter_rows
 from upd.analyses.hertz import PROBLEM, WANTED
-from upd.batch.curves import make_curves
 from upd.batch.engine import Progress, Workers
-from upd.batch.parameter_study import parameter_points, parameter_rows
 from upd.batch.store import PointStore
-from upd.batch.studies import STUDIES, plan_study, run_study, study, study_workers, variations
+from upd.batch.studies import plan_study, point_task, run_study, study, study_workers
 from upd.cli import main
 from upd.errors import ConvergenceError, InputError
 from upd.linalg import select
 from upd.progress import Stages
 from upd.results import Case, Result
 from upd.vary import errors
+from upd.vary.curves import make_curves
 from upd.vary.wanted import plan_wanted, solve_wanted
 
 pytestmark = pytest.mark.estimated
@@ -62,7 +63,7 @@ def test_ladder_runs_resumes_and_reports(tmp_path: Path) -> None:
     # Without the bodies' share nothing but the ladder itself says where it leads.
     assert approach.against in ("its own extrapolation", "finest level, no clear order")
     table, data, figure = again.files
-    assert "max_pressure" in table.read_text(encoding="utf-8")
+    assert "maximum pressure" in table.read_text(encoding="utf-8")
     assert figure.name == "work_precision.png"
     assert figure.stat().st_size > 10_000
     written = json.loads(data.read_text(encoding="utf-8"))
@@ -154,10 +155,17 @@ def test_who_solves_a_study(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_variations(vary: str, curves: int) -> None:
     points = plan_study(load_scene("hertz"), vary).points
-    assert len({p.curve for p in points}) == curves
-    assert len({p.settings for p in points}) == len(points)
+    assert len({p.source for p in points}) == curves
+    assert len({p.overrides for p in points}) == len(points)
     for p in points:
-        make_plan(load_scene("hertz", dict(p.settings)))
+        make_plan(load_scene("hertz", dict(p.overrides)))
+
+
+#: what one analysis or another can vary
+SOME = {
+    "mesh", "element", "solver", "patch", "accuracy", "parameters", "modes", "dimensions", "steps",
+    "harmonics", "samples", "contacts", "contact",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -175,11 +183,11 @@ def test_variations(vary: str, curves: int) -> None:
 )
 def test_every_analysis_offers_its_studies(name: str, offered: set[str]) -> None:
     scene = load_scene(name)
-    assert variations(scene).keys() == offered
+    assert ladders_of(scene).keys() == offered
     for vary in offered:
         # derivatives come from one set of modes, without points
         assert len(plan_study(scene, vary).points) > 1 or vary == "dimensions"
-    for strange in set().union(*STUDIES.values()) - offered:
+    for strange in SOME - offered:
         with pytest.raises(InputError, match=f"--vary {strange}: choose one of "):
             plan_study(scene, strange)
 
@@ -353,17 +361,17 @@ def test_parameters_are_changed_one_at_a_time(tmp_path: Path) -> None:
     assert {"as given", "damper held at wires", "tilt free", "mu = 0.3"} <= points.keys()
     assert not any("point" in label for label in points)
     # the thesis prints the ratio of the patch's elements, 34 to 12, and no size
-    small = dict(points["patch 17 x 6 mm"].settings)
+    small = dict(points["patch 17 x 6 mm"].overrides)
     assert small == {
         "geometry.patch_length": "6.0 mm",
         "geometry.patch_width": "17.0 mm",
         "geometry.band": "4.0 mm",
     }
-    assert dict(points["patch 42.5 x 6 mm"].settings) == {"geometry.patch_length": "6.0 mm"}
-    scaled = dict(points["patch 17 x 6 mm, damper 0.4 times as large"].settings)
+    assert dict(points["patch 42.5 x 6 mm"].overrides) == {"geometry.patch_length": "6.0 mm"}
+    scaled = dict(points["patch 17 x 6 mm, damper 0.4 times as large"].overrides)
     assert (scaled["geometry.length"], scaled["geometry.base"]) == ("17.0 mm", "12.0 mm")
     for point in points.values():
-        load_scene("symmetric", dict(point.settings))
+        load_scene("symmetric", dict(point.overrides))
     chosen = replace(
         plan_study(scene, "parameters"),
         points=tuple(
@@ -386,14 +394,14 @@ def test_parameters_are_changed_one_at_a_time(tmp_path: Path) -> None:
     assert rows[-1][0] == "thesis, Table XI (one K_T)"
     (table,) = found.report.tables
     assert [row[0] for row in table.rows] == [label for label, _, _ in rows]
-    assert f"| as given | {given:.4g} |" in found.files[0].read_text(encoding="utf-8")
+    assert f"| as given | {1e-6 * given:.4g} |" in found.files[0].read_text(encoding="utf-8")
 
 
 def test_two_pads_are_compared_one_by_one(tmp_path: Path) -> None:
     coarse = {"geometry.divisions": 4, "geometry.divisions_long": 8}
     scene = load_scene("asymmetric", {**FLAT, "contact.distant.damper": "wires", **coarse})
     points = {p.label: p for p in parameter_points(scene)}
-    gap = dict(points["pads 7.2 x 3.2 mm"].settings)["geometry.pad_gap"]
+    gap = dict(points["pads 7.2 x 3.2 mm"].overrides)["geometry.pad_gap"]
     assert float(gap.removesuffix(" mm")) == pytest.approx(42.5 - 2.0 * 7.2)
     chosen = replace(plan_study(scene, "parameters"), points=(points["as given"],))
     found = run_study(scene, chosen, tmp_path, workers=HERE)
@@ -411,7 +419,7 @@ def test_settings_and_threads_name_a_point(tmp_path: Path) -> None:
     points = plan_study(scene, "mesh", (8, 12)).points
     store = PointStore(tmp_path, "study")
     tasks: list[Any] = [
-        point.task(scene, threads, code)
+        point_task(point, scene, threads, code)
         for point in points
         for threads in (0, 1)
         for code in ("a", "b")

@@ -18,7 +18,7 @@ from upd.batch import sweep
 from upd.batch.engine import Progress
 from upd.batch.grid import parse_axes, places, settings
 from upd.batch.output import draw
-from upd.batch.point import Outcome, PointResult, Task, read_outcome, solve_task
+from upd.batch.point import Task, solve_task
 from upd.batch.store import PointStore
 from upd.batch.table import csv_text, make_columns, reasons
 from upd.cache.shared import Store, active
@@ -26,6 +26,7 @@ from upd.cli import main
 from upd.errors import InputError
 from upd.reduction.stored import stored_condensation
 from upd.results import Case, shared_label
+from upd.vary.outcome import Outcome, PointResult, read_outcome
 
 SCENE = {
     "contact": {"friction": 0.6},

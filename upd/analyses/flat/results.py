@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from upd.analyses import printed
 from upd.analyses.contact.plan import direction_name
 from upd.analyses.contact.results import LOCATED, shear_stiffness
+from upd.analyses.contact.scene_plan import normal_loads
 from upd.analyses.flat.maps import (
     contact_law,
     corner,
@@ -21,7 +22,6 @@ from upd.analyses.flat.maps import (
     tilt_stiffness,
     whole_area,
 )
-from upd.analyses.flat.plan import normal_loads
 from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.mesh import IntArray, Mesh
 from upd.reference.printed import Lookup, Printed

@@ -26,7 +26,7 @@ from upd.analyses.forced.performance import Performance
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import StaticState
 from upd.analyses.measured import FREE, STUCK, Computed
-from upd.analyses.seated.balance import RIGID
+from upd.analyses.seated.results import RIGID
 from upd.measured.compare import on_path
 from upd.measured.curve import LEAST_POINTS
 from upd.results import Case, Result

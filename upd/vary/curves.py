@@ -4,14 +4,13 @@ level.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.batch.study_point import Key, SolvedPoint, matching, solved_alone
 from upd.results.quantities import quantity_of
 from upd.vary.orders import (
     ErrorEstimate,
@@ -21,6 +20,8 @@ from upd.vary.orders import (
     extrapolate,
     fit_rate,
 )
+from upd.vary.outcome import SolvedPoint, matching, without_failed
+from upd.vary.variation import Key
 
 Array = NDArray[np.float64]
 
@@ -94,33 +95,27 @@ class ConvergenceCurve:
 def make_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[ConvergenceCurve]:
     """Curves of the numbers whose names match ``names`` (shell patterns).
 
-    Failed points are left out.
+    Failed points are omitted.
     """
-    good, curves = solved_alone(solved), []
+    good, curves = without_failed(solved), []
     for key in matching(good, names):
         ladders: dict[str, list[SolvedPoint]] = {}
         for one in good:
             if np.isfinite(one.values.get(key, np.nan)):
-                ladders.setdefault(one.point.curve, []).append(one)
-        curves += [
-            _curve(key, points, _finer_level(curve, ladders))
-            for curve, points in ladders.items()
+                ladders.setdefault(one.point.source, []).append(one)
+        for curve, points in ladders.items():
+            others = [_finest(them) for name, them in ladders.items() if name != curve]
+            finer = max(others, key=lambda p: p.outcome.n_dof, default=None)
+            if finer is not None and finer.outcome.n_dof <= max(p.outcome.n_dof for p in points):
+                finer = None
             # What ends in zero has no relative error.
-            if points[-1].values[key]
-        ]
+            if points[-1].values[key]:
+                curves.append(_curve(key, points, finer))
     return curves
 
 
 def _finest(points: Sequence[SolvedPoint]) -> SolvedPoint:
-    return min(points, key=lambda p: p.point.h)
-
-
-def _finer_level(curve: str, ladders: Mapping[str, Sequence[SolvedPoint]]) -> SolvedPoint | None:
-    """The finest level of another ladder, where that has more dofs than any level of this one."""
-    others = [_finest(points) for name, points in ladders.items() if name != curve]
-    best = max(others, key=lambda p: p.outcome.n_dof, default=None)
-    mine = max(p.outcome.n_dof for p in ladders[curve])
-    return best if best is not None and best.outcome.n_dof > mine else None
+    return min(points, key=lambda p: p.point.size)
 
 
 def closed_form(key: Key, points: Sequence[SolvedPoint]) -> Array | None:
@@ -146,49 +141,50 @@ def closed_form(key: Key, points: Sequence[SolvedPoint]) -> Array | None:
 
 
 def _curve(key: Key, points: Sequence[SolvedPoint], finer: SolvedPoint | None) -> ConvergenceCurve:
+    """The curve of one ladder.
+
+    Parameters
+    ----------
+    finer
+        The finest level of another ladder, where that has more dofs than any level of this one.
+    """
     values = np.array([p.values[key] for p in points])
-    h = [p.point.h for p in points]
-    different = len(set(h)) == len(h)
+    h = [p.point.size for p in points]
     own = extrapolate(h, values) if len(set(h)) >= 3 else None
     change, closed = change_order(h, values), closed_form(key, points)
     # An approach and a frequency have a limit, whatever few coarse levels show.
     same = quantity_of(key[0])[0].same_bodies
     no_limit = closed is None and not same and change < _CONVERGES
+    clear = True
     if closed is not None:
-        reference, against = closed, "reference"
-        if same:
-            against = "reference, same bodies"
+        reference, against = closed, "reference, same bodies" if same else "reference"
     elif no_limit:
-        # No limit to extrapolate to.
-        reference, against = values[-1:], "finest level, no limit"
+        reference, against, clear = values[-1:], "finest level, no limit", False
     elif finer is not None:
-        against = f"finer level, {finer.point.curve} {finer.point.label}"
         reference = np.array([finer.values[key]])
+        against = f"finer level, {finer.point.source} {finer.point.label}"
     elif own is not None and change >= _CONVERGES:
         reference, against = np.array([own.limit]), "its own extrapolation"
     else:
+        clear = len(h) < 3
         reference = np.array([_finest(points).values[key]])
-        against = "finest level" if len(h) < 3 else "finest level, no clear order"
+        against = "finest level" if clear else "finest level, no clear order"
     error = values / reference - 1.0
-    printed = next((p.printed_errors[key] for p in points if key in p.printed_errors), None)
+    # An error that changes sign on the way scatters.
+    clear = clear and len(set(np.sign(error[error != 0.0]))) < 2
     return make_curve(
-        points[0].point.curve,
+        points[0].point.source,
         key,
         points,
         error,
         float(reference[-1]),
         against,
-        order=float("nan") if no_limit or "no clear" in against else _clear_rate(h, error),
-        thesis_error=printed,
+        order=fit_rate(h, error) if clear else float("nan"),
+        thesis_error=next((p.printed_errors[key] for p in points if key in p.printed_errors), None),
         limit=own,
         change=change,
-        estimate=estimate_error(h, values) if different and not no_limit else None,
+        estimate=estimate_error(h, values) if len(set(h)) == len(h) and not no_limit else None,
     )
-
-
-def _clear_rate(h: Sequence[float], error: Array) -> float:
-    """The fitted rate; nan for an error that changes sign on the way: it scatters."""
-    return fit_rate(h, error) if len(set(np.sign(error[error != 0.0]))) < 2 else float("nan")
 
 
 def finest_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[ConvergenceCurve]:
@@ -198,7 +194,7 @@ def finest_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[C
     with; what the variation does not touch has no error to show. Linear curves of a response have
     none either. Neither have load steps a closed form: that has no part of the mesh's error.
     """
-    good = solved_alone(solved)
+    good = without_failed(solved)
     curves = []
     for key in with_friction(matching(good, names)):
         mine = [p for p in good if np.isfinite(p.values.get(key, np.nan))]
@@ -208,13 +204,13 @@ def finest_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[C
         reference = float(values[-1])
         error = values / reference - 1.0 if reference else np.zeros(0)
         if error.any():
-            h = [p.point.h for p in mine]
+            h = [p.point.size for p in mine]
             # Choices that are no levels have one size.
             estimate = estimate_error(h, values) if len(set(h)) == len(h) else None
             order = float("nan") if estimate is None else estimate.order
             curves.append(
                 make_curve(
-                    mine[0].point.curve,
+                    mine[0].point.source,
                     key,
                     mine,
                     error,
@@ -242,7 +238,7 @@ def _friction_seconds(one: SolvedPoint) -> float:
 
 def accuracy_curves(solved: Sequence[SolvedPoint], keys: Sequence[Key]) -> list[ConvergenceCurve]:
     """Estimated error of every number over the cost of a level, and the true one beside it."""
-    good = solved_alone(solved)
+    good = without_failed(solved)
     curves = []
     for key in keys:
         kinds = {ESTIMATED: [one.estimates for one in good], TRUE: list(map(true_errors, good))}
@@ -281,7 +277,7 @@ def make_curve(
         "name": name,
         "case": case.label,
         "labels": tuple(p.point.label for p in points),
-        "h": tuple(p.point.h for p in points),
+        "h": tuple(p.point.size for p in points),
         "error": tuple(map(float, error)),
         "seconds": tuple(p.outcome.seconds for p in points),
         "memory_mb": tuple(p.outcome.memory_mb for p in points),

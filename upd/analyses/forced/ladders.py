@@ -1,4 +1,5 @@
-"""Ladders of a forced response: harmonics, samples, time steps, modes kept, contact points, meshes.
+"""What a convergence study of a forced response varies: harmonics, samples, time steps, modes kept,
+contact points, meshes.
 
 All at the scene's first stiffness and lowest F_C/F_E.
 
@@ -16,13 +17,15 @@ from functools import partial
 from typing import Any
 
 from upd.analyses.cost import NODES
+from upd.analyses.forced import compared_faces
+from upd.analyses.forced.compared_faces import at_ratio
 from upd.analyses.forced.levels import FACES, count_of
-from upd.batch.ladder import Counts, Ladder, Levels, no_levels, refinements
-from upd.batch.study_point import Settings, StudyPoint
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import GAUSS, SIDES
+from upd.vary.ladder import Asked, Ladder, counts, finest_report, no_levels, refinements
+from upd.vary.variation import Overrides, Variation
 
 #: numbers a ladder follows beside those the analysis names first: where the model changes, the
 #: stuck frequencies
@@ -64,20 +67,7 @@ _ASYMMETRIC: tuple[tuple[str, Any, Any], ...] = (
 )
 
 
-def at_ratio(scene: ForcedScene) -> Settings:
-    """What every level of a response sets: the lowest F_C/F_E, where most slips.
-
-    At a load under which every point sticks no level differs from another.
-    """
-    return (
-        ("want", ["response"]),
-        ("left_out.solve", "no"),
-        ("excitation.centrifugal_to_force", [min(scene.excitation.centrifugal_to_force)]),
-        *([("excitation.force", [])] if scene.excitation.force else []),
-    )
-
-
-def _base(scene: ForcedScene, method: str = "balance") -> Settings:
+def _base(scene: ForcedScene, method: str = "balance") -> Overrides:
     """One stiffness, and one path of the balance or the sweeps alone."""
     return (
         *at_ratio(scene),
@@ -86,10 +76,10 @@ def _base(scene: ForcedScene, method: str = "balance") -> Settings:
     )
 
 
-def _contact_points(scene: ForcedScene, levels: Levels) -> list[StudyPoint]:
-    no_levels(levels, "the choices of contact points are fixed")
+def _contact_points(scene: ForcedScene, asked: Asked) -> list[Variation]:
+    no_levels(asked, "the choices of contact points are fixed")
     return [
-        StudyPoint(
+        Variation(
             "contacts",
             label,
             (
@@ -98,6 +88,7 @@ def _contact_points(scene: ForcedScene, levels: Levels) -> list[StudyPoint]:
                 ("contact.rows", rows),
                 ("contact.columns", columns),
             ),
+            1.0,
         )
         for label, rows, columns in (
             _SYMMETRIC if scene.arrangement == "symmetric" else _ASYMMETRIC
@@ -105,9 +96,7 @@ def _contact_points(scene: ForcedScene, levels: Levels) -> list[StudyPoint]:
     ]
 
 
-def response_meshes(
-    scene: ForcedScene, levels: Levels, *, vary: str = "mesh"
-) -> Iterator[StudyPoint]:
+def response_meshes(scene: ForcedScene, asked: Asked, *, vary: str = "mesh") -> Iterator[Variation]:
     """geometry.refine, with the scene's element ("mesh") or all that carry the contact ("element").
 
     Raises InputError for levels that are none, and for a recipe without ``refine``.
@@ -119,15 +108,15 @@ def response_meshes(
         )
     whole_faces = scene.contact.model != "springs"
     known = _NODE_BY_NODE if whole_faces else tuple(_REFINE)
-    asked = refinements(levels)
+    refined = refinements(asked)
     # Gauss points do not hang on the mesh
     keeps = whole_faces or scene.contact.rule == GAUSS
     base = (*_base(scene), *(() if keeps else _same_areas(scene)))
     for element in (scene.mesh.element,) if vary == "mesh" else known:
-        for refine in asked or _usual(scene, element):
-            settings = (*base, ("geometry.refine", refine), ("mesh.element", element))
+        for refine in refined or _usual(scene, element):
+            overrides = (*base, ("geometry.refine", refine), ("mesh.element", element))
             size = _size(scene, base, element, refine)
-            yield StudyPoint(element, f"refine {refine:g}", settings, size)
+            yield Variation(element, f"refine {refine:g}", overrides, size)
 
 
 def _usual(scene: ForcedScene, element: str) -> tuple[float, ...]:
@@ -136,7 +125,7 @@ def _usual(scene: ForcedScene, element: str) -> tuple[float, ...]:
     return tuple(n for n in _REFINE[element] if n >= 1 or not isinstance(default, int))
 
 
-def _size(scene: ForcedScene, base: Settings, element: str, refine: float) -> float:
+def _size(scene: ForcedScene, base: Overrides, element: str, refine: float) -> float:
     """Size of an element against that at refine 1: counts that are not whole are rounded, so it is
     found from the numbers of elements, a cube root.
     """
@@ -153,7 +142,7 @@ def _size(scene: ForcedScene, base: Settings, element: str, refine: float) -> fl
     return float((hexes[0] / hexes[1]) ** (1.0 / 3.0))
 
 
-def _same_areas(scene: ForcedScene) -> Settings:
+def _same_areas(scene: ForcedScene) -> Overrides:
     """Points over areas that all levels share: rows and columns of them, and counts of elements
     that even half of them divides.
     """
@@ -206,14 +195,11 @@ def response_title(scene: ForcedScene, vary: str) -> str:
 
 
 _march = partial(_base, method="march")
-_on_levels = partial(
-    Ladder, follow=_NUMBERS, against="finest", every_level=True, subject=response_title
-)
-_on_meshes = partial(Ladder, follow=_NUMBERS, notes=_notes, subject=response_title)
+_on_levels = partial(Ladder, follow=_NUMBERS, report=finest_report, title=response_title)
+_on_meshes = partial(Ladder, follow=_NUMBERS, notes=_notes, title=response_title)
+_counts = partial(counts, base=_base, offset=1)
 
-_counts = partial(Counts, base=_base, offset=1)
-
-FORCED: Mapping[str, Ladder] = {
+LADDERS: Mapping[str, Ladder] = {
     "mesh": _on_meshes(response_meshes),
     "element": _on_meshes(partial(response_meshes, vary="element")),
     "harmonics": _on_levels(
@@ -230,4 +216,5 @@ FORCED: Mapping[str, Ladder] = {
         _counts("modes", "{} modes a blade", "reduction.modes", (0, 2, 5, 10, 20, 40), 0)
     ),
     "contacts": _on_levels(_contact_points),
+    "contact": compared_faces.LADDER,
 }

@@ -1,23 +1,30 @@
-"""What moves the stiffness of a flat contact.
-
-One parameter of the scene at a time, each beside the scene as given.
+"""What a convergence study of a flat contact varies, and what moves its stiffness: one parameter
+of the scene at a time, each beside the scene as given.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from upd.analyses import analysis_of
 from upd.analyses.base import Plan
+from upd.analyses.contact import ladders
+from upd.analyses.contact.varied import FLAT_GOVERNING
 from upd.analyses.flat.results import printed_of
-from upd.batch.ladder import Ladder, Levels, StudyReport, no_levels
-from upd.batch.study_point import Settings, SolvedPoint, StudyPoint, solved_alone
-from upd.batch.study_tables import TextTable
 from upd.mesh import recipes
 from upd.results.quantities import number_label
 from upd.scene import Scene
+from upd.vary.ladder import Asked, Ladder, StudyReport, even, no_levels
+from upd.vary.outcome import SolvedPoint, without_failed
+from upd.vary.tables import make_table
+from upd.vary.variation import Overrides, Variation
 
+#: shares of the scene's divisions: spacing from twice to half of it
+_SHARES = (0.5, 0.67, 1.0, 1.34, 1.67)
+#: in per cent
+_ACCURACIES = (20.0, 10.0, 5.0)
 #: numbers of the table, in its order
 STIFFNESSES = (
     "K_N_secant_raw",
@@ -44,20 +51,25 @@ _WEDGE = ("base", "height", "length", "patch_offset", "wire_position", "wire_wid
 Row = tuple[str, dict[str, float], str]
 
 
-def parameter_points(scene: Scene, levels: Levels = None) -> list[StudyPoint]:
+def _usual(plan: Plan[Any]) -> Sequence[int]:
+    usual = int(plan.parameters["divisions"])
+    return tuple(dict.fromkeys(even(share * usual) for share in _SHARES))
+
+
+def parameter_points(scene: Scene, asked: Asked = None) -> list[Variation]:
     """The scene as given, then with one parameter changed at a time.
 
     Block, patch, distant sets, tilt, friction, element. Raises InputError for levels, and when the
     scene leaves the mesh to an accuracy.
     """
-    no_levels(levels, "a parameter study changes one parameter at a time")
+    no_levels(asked, "a parameter study changes one parameter at a time")
     return [
-        StudyPoint("parameters", label, settings)
-        for label, settings in _setups(scene, analysis_of(scene).make_plan(scene))
+        Variation("parameters", label, overrides, 1.0)
+        for label, overrides in _setups(scene, analysis_of(scene).make_plan(scene))
     ]
 
 
-def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Settings]]:
+def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Overrides]]:
     p = plan.parameters
     yield "as given", ()
     for name in ("margin", "thickness"):
@@ -81,7 +93,7 @@ def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Settings]]:
         yield f"bands {0.2 * p['band']:g} mm wide", _lengths({"band": 0.2 * p["band"]})
 
 
-def _patches(recipe: str, parameters: Mapping[str, Any]) -> Iterable[tuple[str, Settings]]:
+def _patches(recipe: str, parameters: Mapping[str, Any]) -> Iterable[tuple[str, Overrides]]:
     """Smaller patches on the same damper, a lower one, and the damper smaller with its patch."""
     p = recipes.made(recipe, parameters)
     if hasattr(p, "patch_width") and hasattr(p, "band"):
@@ -109,7 +121,7 @@ def _patch_label(width: float, length: float) -> str:
     return f"patch {width:g} x {length:g} mm"
 
 
-def _lengths(values: Mapping[str, float]) -> Settings:
+def _lengths(values: Mapping[str, float]) -> Overrides:
     return tuple((f"geometry.{name}", f"{value!r} mm") for name, value in values.items())
 
 
@@ -159,39 +171,29 @@ def _printed_rows(scene: Scene) -> list[Row]:
     return out
 
 
-def _report(scene: Scene, solved: Sequence[SolvedPoint]) -> StudyReport:
-    """Stiffnesses in 1e6 N/mm on a terminal, in N/mm in study.md."""
+def _report(scene: Scene, solved: Sequence[SolvedPoint], names: Sequence[str]) -> StudyReport:
+    """Stiffnesses of every point, a row each."""
+    del names
     rows = parameter_rows(scene, solved)
     there = {name for _, values, _ in rows for name in values}
     wanted = [PER_PAD[n] if PER_PAD.get(n) in there else n for n in STIFFNESSES]
-    names = [name for name in wanted if name in there]
+    shown = [name for name in wanted if name in there]
 
-    def table(title: str, heads: Iterable[str], form: Callable[[float], str]) -> TextTable:
-        cells = tuple(
-            (
-                label,
-                *(
-                    (failure, *[""] * (len(names) - 1))
-                    if failure
-                    else (form(values[n]) if n in values else "" for n in names)
-                ),
-            )
-            for label, values, failure in rows
-        )
-        return TextTable(title, ("setup", *heads), "l" + "r" * len(names), cells, 28)
+    def cell(name: str, row: Row) -> str:
+        _, values, failure = row
+        if failure:
+            return failure if name == shown[0] else ""
+        return f"{1e-6 * values[name]:.4g}" if name in values else ""
 
-    title = "What moves the stiffness"
-    short = table(
-        f"{title}, 1e6 N/mm", map(number_label, names), lambda value: f"{1e-6 * value:.3f}"
-    )
-    whole = table(f"{title}, N/mm", names, lambda value: f"{value:.4g}")
-    return StudyReport((short,), bool(solved_alone(solved)), page=(whole,))
+    columns = ((number_label(name), "r", partial(cell, name)) for name in shown)
+    setup = ("setup", "l", lambda row: str(row[0]))
+    table = make_table("What moves the stiffness, 1e6 N/mm", (setup, *columns), rows)
+    return StudyReport((table,), bool(without_failed(solved)))
 
 
-PARAMETERS: Mapping[str, Ladder] = {
+LADDERS: Mapping[str, Ladder] = {
+    **ladders.ladders(_usual, FLAT_GOVERNING, _ACCURACIES),
     "parameters": Ladder(
-        parameter_points,
-        subject=lambda scene, vary: "what moves the stiffness",
-        report=_report,
-    )
+        parameter_points, report=_report, title=lambda scene, vary: "what moves the stiffness"
+    ),
 }

@@ -8,16 +8,11 @@ mesh of the faces.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
 
 from upd.analyses.forced.whole_faces import INTERFACE
 from upd.analyses.seated.varied import PATCH
-from upd.batch.curves import ConvergenceCurve, make_curve
-from upd.batch.ladder import Ladder, Levels, StudyReport, even, shown
-from upd.batch.point import PointResult
-from upd.batch.response_ladders import at_ratio
-from upd.batch.study_point import Settings, SolvedPoint, StudyPoint, solved_alone
-from upd.batch.study_tables import TableColumn, TextTable, cost_columns, make_table
 from upd.errors import InputError
 from upd.labels import percent
 from upd.plot.work_precision import change_charts
@@ -25,6 +20,11 @@ from upd.results import Case
 from upd.results.quantities import PEAK_ACCELERANCE, PEAK_FREQUENCY, quantity_of
 from upd.results.quantity import Quantity
 from upd.scene import ForcedScene
+from upd.vary.curves import ConvergenceCurve, make_curve
+from upd.vary.ladder import Asked, Ladder, StudyReport, chosen_levels, even
+from upd.vary.outcome import PointResult, SolvedPoint, without_failed
+from upd.vary.tables import TableColumn, TextTable, cost_columns, make_table
+from upd.vary.variation import Overrides, Variation
 
 #: meshes of both faces: 60, 198 and 468 nodes of the symmetric damper's half (the last has the
 #: thesis's elements), 60, 196 and 460 of the asymmetric one's
@@ -45,12 +45,25 @@ _KINDS = {PEAK_FREQUENCY: ("frequency\nHz", 5), PEAK_ACCELERANCE: ("height\n(m/s
 PeakKey = tuple[int, Quantity]
 
 
-def whole_faces_points(scene: ForcedScene, levels: Levels = None) -> list[StudyPoint]:
-    """One point for each stiffness of the springs, one for each mesh of both faces.
+def at_ratio(scene: ForcedScene) -> Overrides:
+    """What every level of a response sets: the lowest F_C/F_E, where most slips.
+
+    At a load under which every point sticks no level differs from another.
+    """
+    return (
+        ("want", ["response"]),
+        ("left_out.solve", "no"),
+        ("excitation.centrifugal_to_force", [min(scene.excitation.centrifugal_to_force)]),
+        *([("excitation.force", [])] if scene.excitation.force else []),
+    )
+
+
+def whole_faces_points(scene: ForcedScene, asked: Asked = None) -> list[Variation]:
+    """One level for each stiffness of the springs, one for each mesh of both faces.
 
     Parameters
     ----------
-    levels
+    asked
         Elements up the patch or pad, those along it in proportion; None for the usual ones.
 
     Raises
@@ -59,21 +72,19 @@ def whole_faces_points(scene: ForcedScene, levels: Levels = None) -> list[StudyP
         For levels that are none, and for a rig whose faces are not divided by these parameters.
     """
     base = at_ratio(scene)
-    springs = [
-        StudyPoint(
-            SPRINGS, name, (*base, ("contact.model", SPRINGS), ("contact.stiffness", [name]))
-        )
-        for name in scene.stiffnesses
-    ]
-    faces = []
-    for mesh in _meshes(scene, levels):
+    made = []
+    for name in scene.stiffnesses:
+        overrides = (*base, ("contact.model", SPRINGS), ("contact.stiffness", [name]))
+        made.append(Variation(SPRINGS, name, overrides, 1.0))
+    for mesh in _meshes(scene, asked):
         slope, along = list(mesh.values())[:2]
-        settings = (*base, *_of_faces(scene), *((f"geometry.{k}", n) for k, n in mesh.items()))
-        faces.append(StudyPoint(INTERFACE, f"{slope} x {along}", settings, 1.0 / slope))
-    return [*springs, *faces]
+        geometry = ((f"geometry.{k}", n) for k, n in mesh.items())
+        overrides = (*base, *_of_faces(scene), *geometry)
+        made.append(Variation(INTERFACE, f"{slope} x {along}", overrides, 1.0 / slope))
+    return made
 
 
-def _of_faces(scene: ForcedScene) -> Settings:
+def _of_faces(scene: ForcedScene) -> Overrides:
     """What a contact by whole faces asks of the scene."""
     mine = scene.mesh.element
     return (
@@ -83,16 +94,15 @@ def _of_faces(scene: ForcedScene) -> Settings:
     )
 
 
-def _meshes(scene: ForcedScene, levels: Levels) -> Iterator[dict[str, int]]:
+def _meshes(scene: ForcedScene, asked: Asked) -> Iterator[dict[str, int]]:
     """Parameter -> elements, of every level: up the face first, then along it."""
     known = _MESHES[scene.arrangement]
-    asked = levels or ()
-    chosen = {int(n) for n in asked if float(n).is_integer() and n >= 2}
-    if len(chosen) < len(asked):
-        raise InputError(
-            f"--levels {shown(asked)}: give different whole numbers of elements up a face, 2 or "
-            "more"
-        )
+    chosen = chosen_levels(
+        asked or _USUAL[scene.arrangement],
+        lambda n: float(n).is_integer() and n >= 2,
+        "whole numbers of elements up a face, 2 or more",
+        least=1,
+    )
     slope, others = PATCH[scene.arrangement]
     missing = [key for key in (slope, *others) if key not in scene.geometry]
     if missing:
@@ -101,37 +111,23 @@ def _meshes(scene: ForcedScene, levels: Levels) -> Iterator[dict[str, int]]:
             "the faces; to fix it: run the scene with meshes of your own"
         )
     most = max(known)
-    for n in sorted(chosen or _USUAL[scene.arrangement]):
+    for n in map(int, chosen):
         counts = known.get(n) or tuple(even(n * one / most) for one in known[most])
         yield {slope: n} | dict(zip(others, counts, strict=True))
 
 
 def _notes(scene: ForcedScene) -> Iterator[str]:
     """What the levels set in the scene."""
-    static = f'"{state}"' if isinstance(state := scene.contact.static, str) else "as given"
-    ratio = min(scene.excitation.centrifugal_to_force)
-    yield (
-        f'every level: F_C/F_E {ratio:g} alone, want = ["response"], left_out.solve = "no", '
-        f"contact.static = {static}, "
-        f"{scene.excitation.start:g} to {scene.excitation.stop:g} Hz"
-    )
-    changes = {key: value for key, value in _of_faces(scene) if not isinstance(value, list)}
-    had = {
-        "mesh.element": scene.mesh.element,
-        "balance.method": scene.balance.method,
-        "contact.model": scene.contact.model,
-    }
-    words = (
-        f'{key} = "{value}"' + f' (the scene: "{had[key]}")' * (had[key] != value)
-        for key, value in changes.items()
-    )
-    yield f"interface, elements up x along a face: {', '.join(words)}"
-    yield f'springs: balance.method = "{scene.balance.method}", points and mesh as in the scene'
+    ratio, span = min(scene.excitation.centrifugal_to_force), scene.excitation
+    yield f"every level: F_C/F_E {ratio:g} alone, {span.start:g} to {span.stop:g} Hz"
+    changes = ((key, value) for key, value in _of_faces(scene) if isinstance(value, str))
+    settings = ", ".join(f'{key} = "{value}"' for key, value in changes)
+    yield f"interface, elements up x along a face: {settings}"
+    yield "springs: method, points and mesh as in the scene"
     yield "change of a range over both sweeps: that of its end which is farther off"
 
 
-@dataclass(frozen=True)
-class LevelNumber:
+class LevelNumber(NamedTuple):
     """Frequency or height of a peak on one level.
 
     Attributes
@@ -158,21 +154,18 @@ class LevelNumber:
             return f"{low} to {high}"
         return f"{low} or none" if self.why else low
 
-    def change(self, from_: LevelNumber) -> float | None:
+    def change(self, from_: LevelNumber | None) -> float | None:
         """Relative difference of the end that is farther off; None where one has none."""
-        if self.ends is None or from_.ends is None:
+        if self.ends is None or from_ is None or from_.ends is None:
             return None
         pairs = zip(self.ends, from_.ends, strict=True)
         return max((mine / other - 1.0 for mine, other in pairs), key=abs)
 
 
-def finest(solved: Sequence[SolvedPoint]) -> SolvedPoint | None:
-    """The finest mesh of both faces that was solved."""
-    good = [p for p in solved_alone(solved) if p.point.curve == INTERFACE]
-    return min(good, key=lambda p: p.point.h, default=None)
+Numbers = Mapping[PeakKey, LevelNumber]
 
 
-def peak_numbers(one: SolvedPoint) -> dict[PeakKey, LevelNumber]:
+def peak_numbers(one: SolvedPoint) -> Numbers:
     """Number of the peak and its frequency or accelerance -> what the level has of it.
 
     Peaks are numbered by the mode in which the blades move, so that numbers of levels whose
@@ -195,47 +188,55 @@ def _level_number(results: Sequence[PointResult]) -> LevelNumber:
     return LevelNumber(mode, (min(values), max(values)) if values else None, why)
 
 
-def change_curves(solved: Sequence[SolvedPoint]) -> list[ConvergenceCurve]:
+def finest(solved: Sequence[SolvedPoint]) -> SolvedPoint | None:
+    """The finest mesh of both faces that was solved."""
+    good = [p for p in without_failed(solved) if p.point.source == INTERFACE]
+    return min(good, key=lambda p: p.point.size, default=None)
+
+
+def change_curves(solved: Sequence[SolvedPoint]) -> Iterator[ConvergenceCurve]:
     """Change of every peak's numbers from the finest mesh over the seconds of a level.
 
-    Each stiffness of the springs is a curve of one level.
+    A curve for the meshes of both faces, one for each stiffness of the springs.
     """
     fine = finest(solved)
-    if fine is None:
-        return []
-    ladders: dict[str, list[SolvedPoint]] = {}
-    for p in solved_alone(solved):
-        ladders.setdefault(p.name if p.point.curve == SPRINGS else INTERFACE, []).append(p)
-    curves = []
-    for key, reference in peak_numbers(fine).items():
-        if reference.ends is None:
+    ways: dict[str, list[SolvedPoint]] = {}
+    for one in without_failed(solved):
+        way = one.name if one.point.source == SPRINGS else INTERFACE
+        ways.setdefault(way, []).append(one)
+    for key, reference in peak_numbers(fine).items() if fine else ():
+        if fine is None or reference.ends is None:
             continue
         name = (key[1].named(key[0]), Case(mode=reference.mode))
-        for curve, points in ladders.items():
-            found = [(p, n.change(reference)) for p in points if (n := peak_numbers(p).get(key))]
-            changes = {p.name: change for p, change in found if change is not None}
-            mine = [p for p, _ in found if p.name in changes]
-            if mine:
-                last = reference.ends[1]
-                curves.append(make_curve(curve, name, mine, changes.values(), last, fine.name))
-    return curves
+        for way, points in ways.items():
+            numbers = [(one, peak_numbers(one).get(key)) for one in points]
+            changes = [(one, n.change(reference)) for one, n in numbers if n is not None]
+            known = [(one, change) for one, change in changes if change is not None]
+            if known:
+                mine, errors = zip(*known, strict=True)
+                yield make_curve(way, name, mine, errors, reference.ends[1], fine.name)
 
 
-def _report(scene: ForcedScene, solved: Sequence[SolvedPoint]) -> StudyReport:
+def _report(scene: ForcedScene, solved: Sequence[SolvedPoint], names: Sequence[str]) -> StudyReport:
     """What every level costs, then each peak on every level, then why sweeps lack one."""
-    fine = finest(solved)
-    numbers = sorted({k for one in solved for k, _ in peak_numbers(one)})
+    del scene, names
+    fine, levels = finest(solved), {one.name: peak_numbers(one) for one in solved}
+    peaks = sorted({peak for numbers in levels.values() for peak, _ in numbers})
     costs = (_LEVEL, ("nodes", "r", _nodes), *cost_columns(digits=1))
     tables = [
-        make_table("What every contact costs", costs, solved, whole=True),
-        *(_peak_table(solved, k, fine) for k in numbers),
+        make_table("What every contact costs", costs, solved),
+        *(_peak_table(solved, levels, peak, fine.name if fine else "") for peak in peaks),
     ]
+    # frequency and height share one reason
+    reasons = dict.fromkeys(
+        f"{name}, peak {peak}: {number.why}"
+        for name, numbers in levels.items()
+        for (peak, _), number in numbers.items()
+        if number.why
+    )
+    curves = tuple(change_curves(solved))
     return StudyReport(
-        tuple(tables),
-        fine is not None,
-        (*_notes(scene), *_reasons(solved)),
-        tuple(change_curves(solved)),
-        charts=change_charts,
+        tuple(tables), fine is not None, tuple(reasons), curves, charts=change_charts
     )
 
 
@@ -248,47 +249,35 @@ def _nodes(one: SolvedPoint) -> str:
     return "" if count is None else f"{count:.0f}"
 
 
-def _peak_table(solved: Sequence[SolvedPoint], peak: int, fine: SolvedPoint | None) -> TextTable:
+def _peak_table(
+    solved: Sequence[SolvedPoint], levels: Mapping[str, Numbers], peak: int, fine: str
+) -> TextTable:
     """A row per level: frequency, height, and their change from the finest mesh."""
-    reference = {} if fine is None else peak_numbers(fine)
-    modes = {n.mode for one in solved for (k, _), n in peak_numbers(one).items() if k == peak}
+
+    def value(key: PeakKey, digits: int, one: SolvedPoint) -> str:
+        found = levels[one.name].get(key)
+        return "none" if found is None else found.text(digits)
+
+    def change(key: PeakKey, one: SolvedPoint) -> str:
+        found = levels[one.name].get(key)
+        if found is None or not fine or one.name == fine:
+            return ""
+        return percent(found.change(levels[fine].get(key)))
+
     columns = [_LEVEL]
     for kind, (head, digits) in _KINDS.items():
         key = (peak, kind)
-
-        def value(one: SolvedPoint, key: PeakKey = key, digits: int = digits) -> str:
-            found = peak_numbers(one).get(key)
-            return "none" if found is None else found.text(digits)
-
-        def change(one: SolvedPoint, key: PeakKey = key) -> str:
-            found, other = peak_numbers(one).get(key), reference.get(key)
-            if found is None or other is None or one is fine:
-                return ""
-            return percent(found.change(other))
-
-        columns += [(head, "r", value), ("its\nchange", "r", change)]
-    title = f"Peak {peak}" + f", {' or '.join(sorted(modes - {''}))}" * bool(modes - {""})
-    if fine is not None:
-        title += f"; change from {fine.name}"
-    return make_table(title, columns, solved, whole=True)
-
-
-def _reasons(solved: Sequence[SolvedPoint]) -> list[str]:
-    """Why peaks were not reached, level by level; frequency and height share one reason."""
-    return list(
-        dict.fromkeys(
-            f"{one.name}, peak {k}: {found.why}"
-            for one in solved
-            for (k, _), found in peak_numbers(one).items()
-            if found.why
-        )
-    )
+        columns.append((head, "r", partial(value, key, digits)))
+        columns.append(("its\nchange", "r", partial(change, key)))
+    modes = {n.mode for one in levels.values() for (k, _), n in one.items() if k == peak} - {""}
+    title = f"Peak {peak}" + f", {' or '.join(sorted(modes))}" * bool(modes)
+    title += f"; change from {fine}" * bool(fine)
+    return make_table(title, columns, solved)
 
 
 def _title(scene: ForcedScene, vary: str) -> str:
+    del vary
     return f"springs and whole faces, F_C/F_E {min(scene.excitation.centrifugal_to_force):g}"
 
 
-CONTACT: Mapping[str, Ladder] = {
-    "contact": Ladder(whole_faces_points, subject=_title, report=_report)
-}
+LADDER = Ladder(whole_faces_points, report=_report, notes=_notes, title=_title)

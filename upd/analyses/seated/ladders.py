@@ -1,0 +1,37 @@
+"""What a convergence study of a seated damper varies: meshes of its faces, elements, load steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import partial
+
+from upd.analyses.seated.varied import PATCH
+from upd.scene import SeatedScene
+from upd.vary.ladder import Asked, Ladder, counts, even, whole_levels
+from upd.vary.variation import Overrides, Variation
+
+#: numbers a ladder follows beside those the analysis names first
+_NUMBERS = ("closed_share", "max_pressure", "damper_u?", "seating_loss")
+#: elements up a patch
+_SLOPE = (4, 8, 12, 16)
+_BASE: Overrides = (("want", ["seating", "stiffness"]), ("left_out.solve", "no"))
+
+
+def _meshes(scene: SeatedScene, asked: Asked, *, all_elements: bool) -> Iterator[Variation]:
+    """Elements up the patch, those along it in proportion."""
+    slope, others = PATCH[scene.arrangement]
+    usual = int(scene.geometry[slope])
+    for element in ("hex8", "hex8i") if all_elements else (scene.mesh.element,):
+        for n in whole_levels(asked, 2) or _SLOPE:
+            counted = {slope: n} | {key: even(scene.geometry[key] * n / usual) for key in others}
+            geometry = tuple((f"geometry.{key}", value) for key, value in counted.items())
+            overrides = (*_BASE, *geometry, ("mesh.element", element))
+            yield Variation(element, f"{n} elements up the patch", overrides, 1.0 / n)
+
+
+_STEPS = counts("steps", "{} load steps", "seating.steps", (2, 5, 10, 20, 40), 2, _BASE)
+LADDERS: Mapping[str, Ladder] = {
+    "mesh": Ladder(partial(_meshes, all_elements=False), _NUMBERS),
+    "element": Ladder(partial(_meshes, all_elements=True), _NUMBERS),
+    "steps": Ladder(_STEPS, _NUMBERS),
+}

@@ -1,0 +1,144 @@
+"""Tables of a study, for a terminal and for study.md: points and their cost, errors, numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from upd.labels import percent
+from upd.results.quantities import number_label
+from upd.vary.curves import ConvergenceCurve
+from upd.vary.outcome import SolvedPoint
+from upd.vary.variation import Key
+
+#: head, "l" or "r", and what makes the cell of a row
+TableColumn = tuple[str, str, Callable[[Any], str]]
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """A table for a terminal.
+
+    Cells as text, ``align`` a letter per column ("l", "r"). Columns of words named in ``spare`` are
+    left out first where the terminal is narrow.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    align: str
+    rows: tuple[tuple[str, ...], ...]
+    spare: tuple[str, ...] = ()
+
+
+def make_table(
+    title: str, columns: Sequence[TableColumn], rows: Iterable[Any], spare: tuple[str, ...] = ()
+) -> TextTable:
+    """A table of rows of any kind."""
+    heads, letters, cells = zip(*columns, strict=True)
+    made = tuple(tuple(cell(row) for cell in cells) for row in rows)
+    return TextTable(title, heads, "".join(letters), made, spare)
+
+
+def cost_columns(digits: int = 2) -> tuple[TableColumn, ...]:
+    """What a solved point costs, and why it failed."""
+
+    def seconds(one: SolvedPoint) -> str:
+        return f"{one.outcome.seconds:.{digits}f}"
+
+    return (
+        ("dofs", "r", lambda one: f"{one.outcome.n_dof}"),
+        ("seconds", "r", seconds),
+        ("peak MB", "r", lambda one: f"{one.outcome.memory_mb:.0f}"),
+        ("note", "l", lambda one: str(one.outcome.failure)),
+    )
+
+
+def markdown_table(table: TextTable) -> list[str]:
+    """Lines of a table in Markdown."""
+    heads = (head.replace("\n", " ") for head in table.columns)
+    marks = "".join("---:|" if letter == "r" else "---|" for letter in table.align)
+    lines = (f"| {' | '.join(row)} |" for row in table.rows)
+    return [f"| {' | '.join(heads)} |", f"|{marks}", *lines]
+
+
+_POINTS: tuple[TableColumn, ...] = (
+    ("curve", "l", lambda one: str(one.point.source)),
+    ("level", "l", lambda one: str(one.point.label)),
+    *cost_columns(),
+)
+
+
+def convergence_tables(
+    solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve]
+) -> tuple[TextTable, TextTable]:
+    """The points and what they cost, then the curves: the error of every followed number on its
+    finest level, its rate, the error estimated there, and those of the other levels.
+    """
+    errors = make_table(
+        "Error",
+        (
+            ("number", "l", lambda c: number_label(c.name)),
+            ("case", "l", lambda c: str(c.case)),
+            ("curve", "l", lambda c: str(c.curve)),
+            ("finest", "r", lambda c: percent(c.error[-1])),
+            ("order", "r", lambda c: _rate_text(c.order)),
+            ("estimated", "r", _estimated),
+            # what a narrow terminal leaves out first stands last
+            ("coarsest", "r", lambda c: percent(c.error[0])),
+            ("thesis", "r", lambda c: percent(c.thesis_error)),
+            ("against", "l", lambda c: str(c.against)),
+            ("verdict", "l", lambda c: str(c.verdict)),
+            ("error on each level", "l", _levels_text),
+        ),
+        curves,
+        spare=("against", "verdict", "error on each level"),
+    )
+    return make_table("Points", _POINTS, solved), errors
+
+
+def level_table(
+    title: str,
+    keys: Sequence[Key],
+    solved: Sequence[SolvedPoint],
+    text: Callable[[SolvedPoint, Key], str],
+) -> TextTable:
+    """A row for every number, with what each level has of it."""
+    levels = ((one.point.label, "r", partial(text, one)) for one in solved)
+    return make_table(
+        title,
+        (
+            ("number", "l", lambda key: number_label(key[0])),
+            ("case", "l", lambda key: str(key[1].label)),
+            *levels,
+        ),
+        keys,
+    )
+
+
+def _rate_text(order: float) -> str:
+    """The fitted order, or that there is none."""
+    return f"{order:.1f}" if np.isfinite(order) else "no clear order"
+
+
+def _levels_text(c: ConvergenceCurve) -> str:
+    return ", ".join(
+        f"{label}: {percent(e)}" for label, e in zip(_short(c.labels), c.error, strict=True)
+    )
+
+
+def _short(labels: Sequence[str]) -> list[str]:
+    """The first number of every level's label, where it differs on every level; else the labels."""
+    numbers = [re.findall(r"(?<!\S)\d[\d.]*(?!\S)", label)[:1] for label in labels]
+    firsts = [found[0] for found in numbers if found]
+    return firsts if len(set(firsts)) == len(labels) else list(labels)
+
+
+def _estimated(curve: ConvergenceCurve) -> str:
+    """Error of the finest level as the levels alone tell it."""
+    found = curve.estimate
+    return "" if found is None or not np.isfinite(found.error) else f"{100 * found.error:.2g} %"
