@@ -135,7 +135,7 @@ def rows(name: str, found: BestDamper, took: float, grid: GridCheck) -> Iterator
         "target": f"grid: {grid.heights[k]:.4g}",
         "note": "grid points stand beside the optimum",
     }
-    for growth, told in zip(GROWTHS, chosen.reaches.centrifugal, strict=True):
+    for growth, told in zip(GROWTHS, chosen.reaches["damper.centrifugal"], strict=True):
         # points up to an end that is told; up to the bound where none is
         low, high = (end.end for end in told)
         inside = ~((grid.values < low) | (grid.values > high)) & np.isfinite(grid.heights)
@@ -167,7 +167,7 @@ def paths() -> Iterator[dict[str, Any]]:
     low, high, count = PATHS
     e, lost = scene.excitation, []
     with _empty_cache():
-        rig = RigPeaks(scene, "thesis", (high, high), 1.0, (), {}, Stages(silent), lambda _: None)
+        rig = RigPeaks(scene, (high, high), 1.0, (), {}, Stages(silent), lambda _: None)
         sweep = np.linspace(e.start, e.stop, CURVE_POINTS)
         for ratio in np.geomspace(low, high, count):
             force = scene.damper.centrifugal / ratio

@@ -354,10 +354,10 @@ def fit(
 ) -> int:
     """Find inputs of a forced response that give wanted numbers or measured curves.
 
-    Says what these leave unknown: directions, correlations, the family of inputs that fit equally
-    well, and which further measurement would tell them apart. Writes the scene with the fitted
-    values, figure, numbers and report.html. Ends with 1 when the targets are not reached; the files
-    then hold the nearest. Kill it at any moment; called again it goes on.
+    Prints what these leave unknown: directions, the family of inputs that fit equally well, and
+    which further measurement would tell them apart. Writes the scene with the fitted values,
+    figure, numbers and report.html. Ends with 1 when the targets are not reached; the files then
+    hold the nearest. Kill it at any moment; called again it continues.
 
     Parameters
     ----------
