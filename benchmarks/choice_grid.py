@@ -18,8 +18,9 @@ from upd.errors import InputError
 from upd.hbm.peaks_over import SAME
 from upd.scene import ForcedScene
 from upd.scene.quantities import FROM_FORCE, UNKNOWN
+from upd.scene.ranges import with_values
 from upd.sizing.choice import ChosenDamper
-from upd.sizing.ranges import InputRange, with_values
+from upd.sizing.ranges import InputRange
 from upd.sizing.rig_peaks import RigPeaks
 from upd.vary.outcome import Outcome
 

@@ -121,7 +121,7 @@ def rows(name: str, found: BestDamper, took: float, grid: GridCheck) -> Iterator
         "target": f"grid: {grid.heights[k]:.4g}",
         "note": "grid points stand beside the optimum",
     }
-    for growth, told in zip(GROWTHS, chosen.reaches.centrifugal, strict=True):
+    for growth, told in zip(GROWTHS, chosen.reaches["damper.centrifugal"], strict=True):
         # points up to an end that is told; up to the bound where none is
         low, high = (end.end for end in told)
         inside = ~((grid.values < low) | (grid.values > high)) & np.isfinite(grid.heights)

@@ -13,7 +13,7 @@ import numpy as np
 
 import upd
 from upd.fitting import Fit, FitResponses, Residuals, read_parameters, read_targets
-from upd.fitting.tables import interval
+from upd.fitting.answer import interval
 
 RIGHT, LEFT = "stiffness.thesis.right", "stiffness.thesis.left"
 BOTH = f"{RIGHT}.K_N+{RIGHT}.K_T"

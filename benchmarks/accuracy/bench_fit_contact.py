@@ -20,9 +20,9 @@ from scipy.stats import beta
 
 import upd
 from upd.fitting import CurveTarget, FitResponses, Residuals, Targets, knowledge, read_parameters
-from upd.fitting.first_order import KEPT, is_bent, misfit_rises
+from upd.fitting.intervals import KEPT, is_bent, misfit_rises
 from upd.fitting.residuals import Start
-from upd.fitting.solver import search, settled
+from upd.fitting.search import search, settled
 from upd.measured import MeasuredCurve
 
 RIGHT, LEFT = "stiffness.thesis.right", "stiffness.thesis.left"
@@ -124,7 +124,7 @@ def recovered(damper: Damper, made: FitResponses) -> Iterator[dict[str, Any]]:
             "value": float(abs(np.exp(found[0].end[k]) / damper.factors[k] - 1.0)),
             "unit": "",
             "reference": EXACT,
-            "note": f"{made.evaluations} models",
+            "note": f"{made.source.made} models",
         }
 
 
@@ -142,7 +142,7 @@ def coverage(
     for i in range(repeats):
         made.targets = with_noise(exact, noise, rng)
         residuals = Residuals(made)
-        best = settled(residuals, [Start(true, true, np.inf, 0)])[0]
+        best = settled(residuals, [Start(true, true, np.inf)])[0]
         known = knowledge(residuals, best.end)
         if known.error is None:
             continue

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
+from upd.cache.journal import Journal
 from upd.hbm import FrequencyResponse, contacts, frequency_response
 from upd.hbm.peaks_over import AGREES, JUMP_STEP, Deciding, PeakPoint, PeaksOver, peak_point
 from upd.reference.friction import jenkins_peak
@@ -183,16 +184,19 @@ def test_beside_a_curve_that_fails_the_one_next_to_it_tells() -> None:
         assert told.y == pytest.approx(0.5 * s - 1.35)
 
 
-def test_curves_are_kept_for_a_search_that_is_begun_again(tmp_path: Path) -> None:
+def test_curves_are_kept_for_a_search_that_is_begun_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Also those that were not followed through."""
+    monkeypatch.setenv("UPD_CACHE", str(tmp_path))
     found = losing(lambda s: 0.4 < s < 0.6)
-    first = PeaksOver(found, 0.0, 2.0, step=1.0, kept=tmp_path / "kept.npz")
+    first = PeaksOver(found, 0.0, 2.0, step=1.0, kept=Journal("kept"))
     first.look(0.5)
 
     def none(_: float) -> None:
         raise AssertionError
 
-    again = PeaksOver(none, 0.0, 2.0, step=1.0, kept=tmp_path / "kept.npz")
+    again = PeaksOver(none, 0.0, 2.0, step=1.0, kept=Journal("kept"))
     assert again.resumed == len(first.points) == 3
     assert again.missed == first.missed and len(first.missed) == 3
     for s, peaks in first.points.items():

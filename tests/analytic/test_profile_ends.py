@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
@@ -10,8 +9,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import norm
 
-from upd.fitting.first_order import KEPT, TOLD, Knowledge, is_bent, misfit_rises
-from upd.fitting.profile import FIRST, profile
+from upd.fitting.intervals import FIRST, KEPT, SHOWN, Knowledge, is_bent, misfit_rises, profile
 from upd.fitting.residuals import Residuals, Start
 
 #: half-widths to first order, and how much steeper the first residual is above 0
@@ -25,10 +23,8 @@ class _Bent:
 
     def __init__(self, high: float) -> None:
         self.low, self.high = np.array([-1.0, -1.0]), np.array([high, 1.0])
-        self.responses = SimpleNamespace(evaluations=0)
 
     def __call__(self, z: np.ndarray) -> np.ndarray:
-        self.responses.evaluations += 1
         u = z[0] / HALF * (STEEPER if z[0] > 0.0 else 1.0)
         return np.array([u, z[1] / HALF - 3.0 * u])
 
@@ -45,7 +41,7 @@ class _Bent:
 
         found = least_squares(part, begin[free : free + 1])
         z[free] = found.x[0]
-        return Start(begin, z, 2.0 * float(found.cost), int(found.nfev))
+        return Start(begin, z, 2.0 * float(found.cost))
 
 
 def known() -> Knowledge:
@@ -62,28 +58,28 @@ def test_ends_are_where_the_misfit_has_risen_by_one(first: float) -> None:
     toy = _Bent(1.0)
     residuals, best = cast(Residuals, toy), np.zeros(2)
     rises = misfit_rises(toy, known(), best, toy.low, toy.high)
-    assert is_bent(rises[0], TOLD)
+    assert is_bent(rises[0], SHOWN)
     assert rises[0, 0] == pytest.approx(1.0)
     found = profile(residuals, known(), best, 0, first)
-    assert found.ends == pytest.approx((-HALF, HALF / STEEPER), rel=1e-2)
+    ends = found.z[[0, -1], 0]
+    assert ends == pytest.approx((-HALF, HALF / STEEPER), rel=1e-2)
     # none beyond an end
-    assert found.ends[0] >= -HALF and found.ends[1] <= HALF / STEEPER
+    assert ends[0] >= -HALF and ends[1] <= HALF / STEEPER
     assert found.z[:, 0] == pytest.approx(np.sort(found.z[:, 0]))
-    assert found.models > 0
     assert len(found.z) <= (12 if first == 1.0 else 24)
 
 
 def test_a_profile_ends_at_a_bound() -> None:
     found = profile(cast(Residuals, _Bent(0.02)), known(), np.zeros(2), 0, 1.0)
-    assert found.ends[1] == pytest.approx(0.02)
-    assert found.bounded == (False, True)
+    assert found.z[-1, 0] == 0.02
+    assert found.z[0, 0] == pytest.approx(-HALF, rel=1e-2)
 
 
 def test_where_the_misfit_is_quadratic_nothing_is_bent() -> None:
-    assert not is_bent(np.array([1.1, 0.9]), TOLD)
+    assert not is_bent(np.array([1.1, 0.9]), SHOWN)
     assert not is_bent(np.array([np.nan, 1.0]), KEPT)
-    assert is_bent(np.array([1.0, 0.6]), TOLD)
-    assert is_bent(np.array([np.nan, 1.5]), TOLD)
+    assert is_bent(np.array([1.0, 0.6]), SHOWN)
+    assert is_bent(np.array([np.nan, 1.5]), SHOWN)
 
 
 def test_an_interval_off_by_a_share_keeps_its_probability_to_half_a_digit() -> None:

@@ -95,7 +95,7 @@ def trim(folder: Path, limit_bytes: float, newest: str) -> None:
     for path in folder.glob("*"):
         with suppress(OSError):
             status = path.stat()
-            if path.suffix == ".npz" and not path.name.startswith("."):
+            if path.suffix in (".npz", ".jsonl") and not path.name.startswith("."):
                 known.append((path.name == newest, status.st_mtime, status.st_size, path))
             elif time.time() - status.st_mtime > _ABANDONED_S:
                 path.unlink(missing_ok=True)

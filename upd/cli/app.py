@@ -358,10 +358,10 @@ def fit(
 ) -> int:
     """Find inputs of a forced response that give wanted numbers or measured curves.
 
-    Reports what these leave unknown: directions, correlations, the family of inputs that fit
-    equally well, and which further measurement would distinguish them. Writes the scene with the
-    fitted values, figure, numbers and report.html. Ends with 1 when the targets are not reached;
-    the files then hold the nearest. Kill it at any moment; called again it continues.
+    Reports what these leave unknown: directions, the family of inputs that fit equally well, and
+    which further measurement would distinguish them. Writes the scene with the fitted values,
+    figure, numbers and report.html. Ends with 1 when the targets are not reached; the files then
+    hold the nearest. Kill it at any moment; called again it continues.
 
     Parameters
     ----------

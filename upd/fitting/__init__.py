@@ -4,12 +4,12 @@
 `knowledge` the misfit that is least, and what is known of the inputs.
 """
 
-from upd.fitting.answer import Fit, fit
-from upd.fitting.first_order import Knowledge, knowledge
+from upd.fitting.answer import Fit
+from upd.fitting.intervals import Knowledge, Profile, knowledge
 from upd.fitting.parameters import VariedInput, read_parameters
-from upd.fitting.profile import Profile
 from upd.fitting.residuals import Residuals
 from upd.fitting.responses import FitResponses
+from upd.fitting.search import fit
 from upd.fitting.targets import CurveTarget, FitTarget, Targets, read_targets
 
 __all__ = [

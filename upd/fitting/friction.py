@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,11 @@ from upd.errors import ConvergenceError
 from upd.hbm import FrequencyResponse, climb
 from upd.hbm.balance import Balance
 from upd.hbm.parameter_change import ParameterChange
-from upd.hbm.peak_sensitivity import displacement_derivatives, peak_derivatives
+from upd.hbm.peak_sensitivity import (
+    PeakDerivative,
+    displacement_derivatives,
+    peak_derivatives,
+)
 from upd.hbm.starts import first_point, newton, place_sliders
 from upd.scene.forced_contact import SIDES, Side
 
@@ -38,16 +41,6 @@ Curves = dict[Side, tuple[ComplexArray, ComplexArray]]
 _M = 1e-3
 #: relative distance of a frequency asked for from a point of a path that is it
 _SAME = 1e-9
-
-
-@dataclass(frozen=True)
-class PeakWithChanges:
-    """A peak with friction: Hz, height in (m/s2)/N, and the changes (n,) of both."""
-
-    frequency: float
-    height: float
-    by_frequency: Array
-    by_height: Array
 
 
 class CurveWithFriction:
@@ -70,7 +63,7 @@ class CurveWithFriction:
 
     def at(
         self, plan: ForcedPlan, model: Model, changes: Sequence[DataChange]
-    ) -> tuple[dict[PeakKey, PeakWithChanges | ConvergenceError], Curves]:
+    ) -> tuple[dict[PeakKey, PeakDerivative | ConvergenceError], Curves]:
         """Peaks, or why they were not found, and the curves of both blades with their changes.
 
         Parameters
@@ -102,7 +95,7 @@ class CurveWithFriction:
         ]
         answer = self._solve(plan, model, force)
         points = [self._point(b, answer, float(f)) for f in self.frequencies]
-        tops: dict[PeakKey, PeakWithChanges | ConvergenceError] = {}
+        tops: dict[PeakKey, PeakDerivative | ConvergenceError] = {}
         for key in self.peaks:
             try:
                 x, f = self._top(plan, model, b, answer, key)
@@ -113,7 +106,7 @@ class CurveWithFriction:
                 continue
             height = one.height * _M / force
             by = height * (one.by_height / one.height - forces)
-            tops[key] = PeakWithChanges(f, height, one.by_frequency, by)
+            tops[key] = PeakDerivative(f, height, by, one.by_frequency)
         return tops, self._curves(b, model, force, points, whole, forces)
 
     def _solve(self, plan: ForcedPlan, model: Model, force: float) -> FrequencyResponse:

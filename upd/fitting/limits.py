@@ -27,6 +27,7 @@ from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.errors import ConvergenceError
 from upd.fitting.targets import PEAK_NUMBERS, STUCK_MODES
 from upd.hbm.parameter_change import ParameterChange
+from upd.hbm.peak_sensitivity import PeakDerivative
 from upd.scene.forced_contact import Side
 
 Array = NDArray[np.float64]
@@ -35,6 +36,13 @@ ComplexArray = NDArray[np.complex128]
 _M = 1e-3
 #: frequencies solved at once
 _AT_ONCE = 64
+
+
+def number_of(peak: PeakDerivative, what: str) -> tuple[float, Array]:
+    """Frequency or height of a peak, and its changes."""
+    if what == "frequency":
+        return peak.frequency, peak.by_frequency
+    return peak.height, peak.by_height
 
 
 class LimitNumbers:
@@ -73,9 +81,8 @@ class LimitNumbers:
                 f"{of}: no such peak between {e.start:g} and {e.stop:g} Hz, the ends of the sweep"
             )
         found = limit_peak(self.model, side, kind == "stuck", peak.frequency, self.changes)
-        if what == "frequency":
-            return peak.frequency, found.by_frequency
-        return peak.height, peak.height * found.by_height / found.height
+        by = peak.height * found.by_height / found.height
+        return number_of(PeakDerivative(peak.frequency, peak.height, by, found.by_frequency), what)
 
     def _mode(self, of: str) -> tuple[float, Array]:
         below = CANDIDATES * self.plan.scene.excitation.stop
@@ -115,7 +122,7 @@ def limit_curve(
     force = np.concatenate([model.force, np.zeros(model.damper.n_dof)])
     both = np.column_stack([force, model.row(side)])
     if not stuck:
-        # without contacts the damper is not held: it does not move, and is left out
+        # without contacts the damper is not held: it does not move, and is omitted
         n = model.n
         both, M, C, K = both[:n], model.M, model.C, model.K
         made = [(m[:n, :n], c[:n, :n], k[:n, :n]) for m, c, k in made]

@@ -25,14 +25,14 @@ from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
 from upd.cache.arrays import cache_folder
 from upd.cache.files import write_text
 from upd.cache.sources import key_of
-from upd.errors import InputError
 from upd.fitting.parameters import VariedInput, scene_with
 from upd.linalg.parallel import threads_for
 from upd.mesh import recipes
 from upd.progress import Stages
 from upd.scene import ForcedScene, load_scene
 from upd.scene.forced_contact import SIDES, Side
-from upd.scene.quantities import UNKNOWN, Uncertainty
+from upd.scene.quantities import Uncertainty
+from upd.scene.ranges import one_model, stiffness_of
 from upd.scene.toml import toml_key, toml_value
 from upd.vary.inputs import InputEnds
 
@@ -53,7 +53,6 @@ _SEATED, _FRICTIONLESS = "seated", "frictionless"
 class FittedModel:
     """One model: what it was made of, and what known inputs change of it."""
 
-    scene: ForcedScene
     plan: ForcedPlan
     bodies: Bodies
     model: Model
@@ -70,7 +69,7 @@ class ModelSource:
     parameters
         Of the fit.
     ratios
-        F_C/F_E of what is followed with friction; without any the static state is left out (a
+        F_C/F_E of what is followed with friction; without any the static state is omitted (a
         stuck point is as stiff under any preload).
     like
         Of the same scene: its blades are taken.
@@ -89,22 +88,10 @@ class ModelSource:
         ratios: Sequence[float] = (),
         like: ModelSource | None = None,
     ) -> None:
-        if scene.contact.model == "interface":
-            raise InputError(
-                'contact.model: fits take contact points on springs; set contact.model="springs"'
-            )
-        if scene.wanted_accuracy is not None:
-            raise InputError(
-                "accuracy: a fit keeps one mesh; leave it out or set it to "
-                f'"{UNKNOWN}", and choose the levels in the scene'
-            )
-        if ratios and scene.harmonic_numbers == "adaptive":
-            raise InputError(
-                "balance.harmonics: a fit of peaks or curves with friction keeps its harmonics; "
-                "set a number, for example balance.harmonics=3"
-            )
         self.scene, self.parameters, self.ratios = scene, tuple(parameters), tuple(ratios)
-        self.stiffness = _stiffness(scene, parameters)
+        paths = [path for one in parameters for path in one.paths]
+        self.stiffness = stiffness_of(scene, paths)
+        one_model(scene, self.stiffness, "a fit", friction=bool(ratios))
         #: models made
         self.made = 0
         self._stages = Stages()
@@ -114,7 +101,6 @@ class ModelSource:
         self._tangents: int | None = None
         none = np.zeros(len(self.parameters))
         self.exact = [is_known(self._ends(none, k)) for k in range(len(self.parameters))]
-        paths = [path for one in parameters for path in one.paths]
         seated = bool(ratios) and scene.contact.loaded and scene.contact.static == _SEATED
         #: inputs that make new blades, or a new static state, with every evaluation
         self.dear = [
@@ -188,33 +174,23 @@ class ModelSource:
         self._models.clear()
         return "" if used == chosen else _DIRECTIONS[used]
 
-    def bare(self, scene: ForcedScene) -> ForcedScene:
+    def bare(self, scene: ForcedScene, *, contact_moves: bool = True) -> ForcedScene:
         """What is needed alone: one stiffness, the F_C/F_E that are followed, nothing estimated or
-        solved again.
+        solved again; a contact scene with the rig's geometry, unless its numbers do not count.
         """
-        contact = replace(scene.contact, stiffness=(self.stiffness,))
+        one = one_model(scene, self.stiffness, "a fit", friction=False)
+        contact, excitation, stiffness = one.contact, one.excitation, dict(one.stiffness)
         if self._tangents is not None:
             contact = replace(contact, directions=_DIRECTIONS[self._tangents])
-        excitation = scene.excitation
         if self.ratios:
             excitation = replace(excitation, centrifugal_to_force=self.ratios, force=())
         else:
             contact = replace(contact, fit="unloaded")
-        stiffness = dict(scene.stiffness)
-        if self._contact:
+        if contact_moves and self._contact:
             stiffness[self.stiffness] = replace(
                 stiffness[self.stiffness], scene=contact_scene(scene, self._contact)
             )
-        return replace(
-            scene,
-            accuracy=UNKNOWN,
-            uncertain={},
-            left_out=replace(scene.left_out, solve="no"),
-            contact=contact,
-            excitation=excitation,
-            stiffness=stiffness,
-            measured={},
-        )
+        return replace(one, contact=contact, excitation=excitation, stiffness=stiffness)
 
     def _ends(self, z: Array, k: int) -> InputEnds:
         """One parameter a step down and up from its place."""
@@ -222,19 +198,12 @@ class ModelSource:
         for shift in (0.0, -STEP, STEP):
             moved = np.array(z, float)
             moved[k] += shift
-            scenes.append(self._plain(scene_with(self.scene, self.parameters, moved)))
+            there = scene_with(self.scene, self.parameters, moved)
+            scenes.append(self.bare(there, contact_moves=False))
         one = self.parameters[k]
         value = one.value(float(z[k]))
         known = Uncertainty(one.paths[0], value, STEP * value, "", one.kind, ())
         return InputEnds(known, *scenes)
-
-    def _plain(self, scene: ForcedScene) -> ForcedScene:
-        """Bare, with the contact scene as it is named: its numbers do not count here."""
-        kept, self._contact = getattr(self, "_contact", None), None
-        try:
-            return self.bare(scene)
-        finally:
-            self._contact = kept
 
     def _model(self, scene: ForcedScene) -> FittedModel:
         self.made += 1
@@ -244,7 +213,7 @@ class ModelSource:
         frame = self._frame(scene)
         if frame in self._models and not any(law.law for law in laws.values()):
             model = _with_contact(self._models[frame], laws, scene.contact.friction)
-            return FittedModel(scene, plan, bodies, model)
+            return FittedModel(plan, bodies, model)
         # small matrices once the blades are reduced
         with threads_for(1) if bodies.reduced else nullcontext():
             model = make_model(plan, bodies, laws)
@@ -252,7 +221,7 @@ class ModelSource:
         if self._tangents is None and scene.contact.directions == "auto":
             # once chosen they stay: numbers would jump
             self._tangents = model.contacts.tangents if model.halved else None
-        return FittedModel(scene, plan, bodies, model)
+        return FittedModel(plan, bodies, model)
 
     def _frame(self, scene: ForcedScene) -> str:
         contact = replace(scene.contact, directions="auto")
@@ -319,18 +288,6 @@ def _with_contact(model: Model, laws: Mapping[Side, FaceLaw], friction: float) -
         mu=np.full_like(old.mu, friction),
     )
     return replace(model, laws=laws, contacts=replace(model.contacts, law=law))
-
-
-def _stiffness(scene: ForcedScene, parameters: Sequence[VariedInput]) -> str:
-    """Name of the contact stiffness that the numbers are read for."""
-    paths = [path.split(".") for one in parameters for path in one.paths]
-    named = list(dict.fromkeys(steps[1] for steps in paths if steps[0] == "stiffness"))
-    if len(named) > 1:
-        raise InputError(
-            f"parameters of several contact stiffnesses ({', '.join(named)}): a fit has one; to "
-            "fix it: vary those of one"
-        )
-    return named[0] if named else next(iter(scene.stiffnesses))
 
 
 def _remembered(kept: dict[str, T], key: str, make: Callable[[], T]) -> T:

@@ -30,8 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.errors import UpdError, one_line
-from upd.fitting.parameters import VariedInput
-from upd.fitting.profile import Profile
+from upd.fitting.intervals import Profile
 from upd.fitting.residuals import Residuals
 from upd.fitting.responses import FitResponses
 from upd.fitting.targets import (
@@ -118,18 +117,13 @@ def candidates(scene: ForcedScene, targets: Targets, *, friction: bool) -> Targe
 
 
 def rank_measurements(
-    scene: ForcedScene,
-    targets: Targets,
-    parameters: Sequence[VariedInput],
-    residuals: Residuals,
-    best: Array,
-    traced: Sequence[Profile],
+    residuals: Residuals, best: Array, traced: Sequence[Profile]
 ) -> tuple[FurtherMeasurement, ...]:
     """Measurements by how much each would narrow the widest direction.
 
     Parameters
     ----------
-    scene, targets, parameters, residuals
+    residuals
         Of the fit.
     best
         (n,) the answer.
@@ -142,9 +136,10 @@ def rank_measurements(
         The most telling first; those that tell nothing are left out.
     """
     made = residuals.responses
+    scene, targets = made.scene, made.targets
     friction = bool(targets.ratios) or (made.cheap and not _is_seated(scene))
     asked = candidates(scene, targets, friction=friction)
-    responses = FitResponses(scene, asked, parameters, needed=False, like=made)
+    responses = FitResponses(scene, asked, made.parameters, needed=False, like=made)
     try:
         value, slope = responses.at(best)
     except UpdError as error:

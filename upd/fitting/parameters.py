@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.errors import InputError, one_line
-from upd.scene import ForcedScene, load_scene
+from upd.errors import InputError
+from upd.scene import ForcedScene
 from upd.scene.keys import SceneKey, scalar_input, scene_keys
-from upd.scene.uncertain import put_back
-from upd.units import parse_quantity, quantity_text, unit_inside
+from upd.scene.ranges import InputProblems, check_ends, input_text, read_range, with_values
+from upd.units import unit_inside
 
 Array = NDArray[np.float64]
 #: factors between which an input is sought without bounds of its own: stiffnesses, all others
@@ -82,22 +81,18 @@ def read_parameters(scene: ForcedScene, vary: Sequence[str]) -> tuple[VariedInpu
         With everything that is wrong with them.
     """
     found: list[VariedInput] = []
-    problems = [] if vary else ["nothing to vary; write for example --vary damper.density"]
+    problems = InputProblems("parameters of the fit")
+    if not vary:
+        problems.lines.append("nothing to vary; write for example --vary damper.density")
     keys = {key.path: key for key in scene_keys(scene)}
     for text in vary:
-        name, _, bounds = text.partition("=")
-        try:
-            one = _parameter(scene, keys, name, bounds.strip())
+        name, _, bounds = (part.strip() for part in text.partition("="))
+        with problems.of(name):
+            one = _parameter(scene, keys, name, bounds)
             _check_ends(scene, one, own=bool(bounds))
             found.append(one)
-        except InputError as error:
-            problems.append(f"{name.strip()}: {error}")
-    paths = [path for one in found for path in one.paths]
-    problems += [f"{p}: varied twice" for p in dict.fromkeys(paths) if paths.count(p) > 1]
-    if problems:
-        raise InputError(
-            "parameters of the fit:\n" + "\n".join(f"  {problem}" for problem in problems)
-        )
+    problems.twice([path for one in found for path in one.paths], "varied twice")
+    problems.check()
     return tuple(found)
 
 
@@ -109,27 +104,8 @@ def _parameter(
     wide = _WIDE if set(kinds) == {_STIFFNESS} else _NARROW
     low, high = 1.0 / wide, wide
     if bounds:
-        ends = [end.strip() for end in bounds.split(":")]
-        if len(ends) != 2:
-            raise InputError(f"{bounds!r} are no bounds; write low:high, quantities or x0.1:x10")
-        low, high = (_factor(end, kinds[0], values[0]) for end in ends)
-    if not 0.0 < low < high:
-        raise InputError(f"{bounds!r}: write two bounds above 0, the lower one first")
+        low, high = (end.factor for end in read_range(bounds, kinds[0], values[0]))
     return VariedInput(paths, tuple(values), kinds[0], low, high)
-
-
-def _factor(end: str, kind: str, value: float) -> float:
-    if end.startswith("x"):
-        return parse_quantity(_plain(end[1:]), "fraction")
-    return parse_quantity(_plain(end) if kind == "fraction" else end, kind) / value
-
-
-def _plain(text: str) -> Any:
-    """A bare number as one: fractions may be without unit."""
-    try:
-        return float(text)
-    except ValueError:
-        return text
 
 
 def _input(scene: ForcedScene, keys: Mapping[str, SceneKey], path: str) -> tuple[str, float]:
@@ -142,17 +118,14 @@ def _input(scene: ForcedScene, keys: Mapping[str, SceneKey], path: str) -> tuple
 
 def _check_ends(scene: ForcedScene, one: VariedInput, *, own: bool) -> None:
     """Raise InputError where the scene refuses an end of the bounds."""
-    for factor in (one.low, one.high):
-        try:
-            # a positive stiffness is all it takes
-            read = scene_with if all(map(is_stiffness, one.paths)) else fitted_scene
-            read(scene, [one], np.log([factor]))
-        except InputError as error:
-            shown = quantity_text(factor * one.values[0], one.kind)
-            raise InputError(
-                f"the scene refuses {shown} ({one_line(error)}); to fix it: give "
-                f"{'other' if own else 'your own'} bounds, {one.paths[0]}=low:high"
-            ) from None
+    # a positive stiffness is all it takes
+    read = scene_with if all(map(is_stiffness, one.paths)) else fitted_scene
+    check_ends(
+        lambda value: read(scene, [one], np.log([value / one.values[0]])),
+        (one.low * one.values[0], one.high * one.values[0]),
+        one.kind,
+        f"give {'other' if own else 'your own'} bounds, {one.paths[0]}=low:high",
+    )
 
 
 def scene_with(scene: ForcedScene, parameters: Sequence[VariedInput], z: Array) -> ForcedScene:
@@ -217,13 +190,8 @@ def fitted_scene(
     InputError
         Where the scene refuses them.
     """
-    data = tomllib.loads(scene.text)
     changed: dict[str, Any] = dict(more)
     for one, factor in zip(parameters, np.exp(z), strict=True):
         for path, value in zip(one.paths, one.values, strict=True):
-            moved = float(value * factor)
-            changed[path] = moved if one.kind == "fraction" else quantity_text(moved, one.kind)
-    for known in scene.uncertain.values():
-        if known.path not in changed:
-            data = put_back(data, known.steps, known.given)
-    return load_scene(data, changed)  # type: ignore[no-any-return]
+            changed[path] = input_text(float(value * factor), one.kind)
+    return with_values(scene, changed)

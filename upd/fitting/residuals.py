@@ -4,7 +4,13 @@ With residuals r_i = (value_i - target_i) / scale_i and the logarithms z of the 
 
     min 1/2 |r(z)|^2,   low <= z <= high,
 
-by the trust-region reflective method.
+by the trust-region reflective method. Scales of measured curves are stated half-widths, or 95 %
+ones estimated from what the fit leaves.
+
+With residuals r of N values and p inputs, the noise sigma^2 = (a |H|)^2 + b^2 follows by
+`upd.measured.noise` and the half-width is t sigma, t of Student's distribution with N - p degrees
+of freedom at 95 %. It holds for independent errors: what the curve has and the model has not makes
+neighbouring residuals alike, and `CurveNoise.correlation` shows it.
 
 References
 ----------
@@ -21,10 +27,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import qmc
+from scipy.stats import t as student
 
 from upd.errors import ConvergenceError, UpdError, one_line
 from upd.fitting.responses import FitResponses
-from upd.fitting.weights import as_complex, first_noise, magnitude_of, noise_after
+from upd.fitting.targets import CurveTarget
+from upd.measured.noise import noise_of
 
 Array = NDArray[np.float64]
 #: half of the digits: below, a change of an exact number is rounding
@@ -37,6 +45,8 @@ FLAT = 1e-6
 EVALUATIONS = 100
 #: share of the room between the bounds that a start keeps away from them
 _ROOM = 1e-6
+#: probability with which an estimated half-width holds
+PROBABILITY = 0.95
 
 
 @dataclass(frozen=True)
@@ -49,8 +59,6 @@ class Start:
         (n,) ln(factor); the end is the begin where it failed.
     misfit : float
         |r|^2; infinite where it failed.
-    evaluations : int
-        Of the numbers and their derivatives.
     failure : str
         Why it failed, "" where it did not.
     """
@@ -58,7 +66,6 @@ class Start:
     begin: Array
     end: Array
     misfit: float
-    evaluations: int
     failure: str = ""
 
 
@@ -207,7 +214,7 @@ class Residuals:
         try:
             first = self(begin)
             if not free.size:
-                return Start(begin, begin, float((first**2).sum()), 1)
+                return Start(begin, begin, float((first**2).sum()))
             # with noise the misfit stays, and the last digits of z change nothing that is known
             small = self.rounding if not self.parts else max(self.rounding, FLAT)
             found = least_squares(
@@ -221,8 +228,8 @@ class Residuals:
                 max_nfev=EVALUATIONS,
             )
         except (UpdError, np.linalg.LinAlgError) as error:
-            return Start(begin, begin, np.inf, 0, one_line(error))
-        return Start(begin, whole(found.x), 2.0 * float(found.cost), int(found.nfev))
+            return Start(begin, begin, np.inf, one_line(error))
+        return Start(begin, whole(found.x), 2.0 * float(found.cost))
 
     def inside(self, z: Array) -> Array:
         """Strictly within the bounds, as the method asks for."""
@@ -238,3 +245,93 @@ class Residuals:
         first = np.clip(np.zeros(n), middle - 0.99 * inside, middle + 0.99 * inside)
         points = qmc.Halton(n, scramble=True, rng=0).random(max(count - 1, 0))
         return [first, *(self.low + points * (self.high - self.low))]
+
+
+@dataclass(frozen=True)
+class CurveNoise:
+    """How well a measured curve is taken to be known.
+
+    Attributes
+    ----------
+    relative, constant
+        Half-width of a part: of the value, and (m/s2)/N.
+    estimated
+        Whether from the residuals of the fit.
+    correlation
+        Of residuals of neighbouring points over their half-widths, 0 for independent errors.
+    limit
+        Three standard deviations of it for independent errors.
+    rms
+        Of the residuals, over the half-widths.
+    rounding
+        Whether the residuals are no more than what the model itself is off.
+    """
+
+    relative: float
+    constant: float
+    estimated: bool
+    correlation: float = 0.0
+    limit: float = 1.0
+    rms: float = 0.0
+    rounding: bool = False
+
+    @property
+    def white(self) -> bool:
+        """Whether the residuals may be independent errors, or are rounding."""
+        return self.rounding or abs(self.correlation) <= self.limit
+
+
+def first_noise(target: CurveTarget) -> CurveNoise:
+    """Before any fit: as stated, else each point by its own size."""
+    if target.stated:
+        return CurveNoise(target.relative or 0.0, target.constant or 0.0, False)
+    # down to where differences of the highest are rounding
+    floor = float(np.finfo(float).eps ** 0.5 * target.curve.magnitude.max())
+    return CurveNoise(1.0, floor, True)
+
+
+def as_complex(target: CurveTarget, parts: Array) -> NDArray[np.complex128]:
+    """Values from their parts (real, then imaginary; or magnitudes) along the first axis."""
+    if not target.curve.is_complex:
+        return parts.astype(complex)
+    real, imaginary = np.split(parts, 2)
+    return np.asarray(real + 1j * imaginary)
+
+
+def magnitude_of(target: CurveTarget, parts: Array) -> Array:
+    """(n,) of a computed curve."""
+    return np.abs(as_complex(target, parts))
+
+
+def noise_after(
+    target: CurveTarget, parts: Array, unknowns: float, free: int, least: float
+) -> CurveNoise:
+    """From what a fit leaves.
+
+    Parameters
+    ----------
+    parts
+        Of the fitted curve.
+    unknowns
+        Inputs that were fitted to this curve.
+    free
+        Values of all targets less inputs.
+    least
+        Part of a value that the model itself is off.
+    """
+    r = (parts - target.values).reshape(target.parts, -1)
+    size = magnitude_of(target, parts)
+    if target.stated:
+        relative, constant = target.relative or 0.0, target.constant or 0.0
+    else:
+        found = noise_of(r, size, unknowns)
+        factor = float(student.ppf(0.5 * (1.0 + PROBABILITY), max(free, 1)))
+        relative, constant = factor * max(found.relative, least), factor * found.constant
+    u = r / np.hypot(relative * size, constant)
+    square = float((u**2).sum())
+    near = float((u[:, 1:] * u[:, :-1]).sum()) / max(square, np.finfo(float).tiny)
+    limit = 3.0 / np.sqrt(u.size)
+    rms = float(np.sqrt(square / u.size))
+    left = float(np.linalg.norm(r) / np.linalg.norm(size))
+    stated = target.stated
+    return CurveNoise(relative, constant, not stated, near, float(limit), rms, left <= least)

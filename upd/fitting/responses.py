@@ -6,16 +6,16 @@ logarithm of the factor.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.forced.input_uncertainty import DataChange
+from upd.cache.journal import Journal
 from upd.errors import ConvergenceError
-from upd.fitting.friction import CurveWithFriction, PeakKey, PeakWithChanges
-from upd.fitting.journal import Journal
-from upd.fitting.limits import LimitNumbers, limit_curve
+from upd.fitting.friction import CurveWithFriction, PeakKey
+from upd.fitting.limits import LimitNumbers, limit_curve, number_of
 from upd.fitting.models import STEP, FittedModel, ModelSource
 from upd.fitting.parameters import VariedInput
 from upd.fitting.targets import (
@@ -71,18 +71,12 @@ class FitResponses:
         self.exact, self.cheap = self.source.exact, self.source.cheap
         self.stiffness = self.source.stiffness
         self._journal, self._needed = journal, needed
+        self._found: dict[bytes, tuple[Array, Array]] = {}
+        for line in () if journal is None else journal.lines:
+            z, value, slope = (np.array(one, float) for one in line)
+            self._found[z.tobytes()] = value, slope.reshape(len(value), len(z))
         self._kept: tuple[bytes, Array, Array] | None = None
-        self._friction = [_curve_at(ratio, targets) for ratio in targets.ratios]
-
-    @property
-    def evaluations(self) -> int:
-        """Models made."""
-        return self.source.made
-
-    @property
-    def curves(self) -> int:
-        """Curves with friction that were solved."""
-        return sum(one.solved for one in self._friction)
+        self.friction = [_curve_at(ratio, targets) for ratio in targets.ratios]
 
     def at(self, z: Array) -> tuple[Array, Array]:
         """The numbers, then the points of the curves, and their derivatives.
@@ -108,11 +102,12 @@ class FitResponses:
         key = z.tobytes()
         if self._kept is not None and self._kept[0] == key:
             return self._kept[1], self._kept[2]
-        found = None if self._journal is None else self._journal.find(z)
+        found = self._found.get(key)
         if found is None:
             found = self._solved(z)
             if self._journal is not None:
-                self._journal.keep(z, *found)
+                self._found[key] = found
+                self._journal.keep([z.tolist(), *(one.tolist() for one in found)])
         self._kept = (key, *found)
         return found
 
@@ -120,10 +115,6 @@ class FitResponses:
         """(m,) without derivatives."""
         z = np.asarray(z, float)
         return self._evaluate(z, self.source.at(z))[0]
-
-    def directions(self, z: Array) -> str:
-        """As `ModelSource.directions`."""
-        return self.source.directions(z)
 
     def _solved(self, z: Array) -> tuple[Array, Array]:
         made = self.source.at(z, changes=True)
@@ -149,7 +140,7 @@ class FitResponses:
         changes = [one.whole(model) for one in data]
         parts: list[tuple[Array, Array]] = []
         with threads_for(len(model.M)):
-            friction = {one.ratio: one.at(plan, model, data) for one in self._friction}
+            friction = {one.ratio: one.at(plan, model, data) for one in self.friction}
             limits = LimitNumbers(plan, model, changes)
             for one in self.targets.numbers:
                 try:
@@ -158,7 +149,11 @@ class FitResponses:
                     elif one.ratio is None:
                         v, s = limits(one.of)
                     else:
-                        v, s = _peak_number(one, friction[one.ratio][0])
+                        _, side, number, what = PEAK_NUMBERS[one.of]
+                        peak = friction[one.ratio][0][side, number]
+                        if isinstance(peak, ConvergenceError):
+                            raise peak
+                        v, s = number_of(peak, what)
                 except ConvergenceError:
                     if self._needed:
                         raise
@@ -177,7 +172,7 @@ class FitResponses:
         return np.concatenate(value), np.concatenate(slope)
 
     def _frequencies(self, ratio: float) -> Array:
-        return next(one.frequencies for one in self._friction if one.ratio == ratio)
+        return next(one.frequencies for one in self.friction if one.ratio == ratio)
 
     def _total(self, z: Array, one: FitTarget, data: Sequence[DataChange]) -> tuple[float, Array]:
         """A total of the right face, and its changes by known parameters."""
@@ -205,18 +200,6 @@ def _curve_at(ratio: float, targets: Targets) -> CurveWithFriction:
     over = [one.curve.frequency for one in targets.curves if one.curve.force_ratio == ratio]
     frequencies = np.unique(np.concatenate(over)) if over else np.zeros(0)
     return CurveWithFriction(ratio, list(peaks), frequencies)
-
-
-def _peak_number(
-    one: FitTarget, peaks: Mapping[PeakKey, PeakWithChanges | ConvergenceError]
-) -> tuple[float, Array]:
-    _, side, number, what = PEAK_NUMBERS[one.of]
-    peak = peaks[side, number]
-    if isinstance(peak, ConvergenceError):
-        raise peak
-    if what == "frequency":
-        return peak.frequency, peak.by_frequency
-    return peak.height, peak.by_height
 
 
 def _in_parts(target: CurveTarget, H: ComplexArray, dH: ComplexArray) -> tuple[Array, Array]:

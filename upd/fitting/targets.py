@@ -19,6 +19,7 @@ from upd.measured import MeasuredCurve, read_measured
 from upd.results.quantity import LEFT
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import SIDES, Side
+from upd.scene.ranges import InputProblems
 from upd.scene.uncertain import read_band
 from upd.units import parse_quantity, unit_inside
 
@@ -180,30 +181,28 @@ def read_targets(
         items = [_as_item(one) for one in to]
     numbers: list[FitTarget] = []
     curves: list[CurveTarget] = []
-    problems = [] if items else ['none given; write for example "stuck_in_phase=377 Hz"']
+    problems = InputProblems("targets of the fit")
+    if not items:
+        problems.lines.append('none given; write for example "stuck_in_phase=377 Hz"')
     for item in items:
         if isinstance(item, CurveTarget):
             curves.append(item)
             continue
         name, _, text = (part.strip() for part in item.partition("="))
-        try:
+        with problems.of(name):
             found = _curves(name, text, item.strip(), scene)
             if found is None:
                 numbers.append(_number(name, text))
             else:
                 curves += found
-        except InputError as error:
-            problems.append(f"{name}: {error}")
-    names = [one.name for one in numbers] + [one.name for one in curves]
-    problems += [f"{n}: given twice" for n in dict.fromkeys(names) if names.count(n) > 1]
+    problems.twice([*(one.name for one in numbers), *(one.name for one in curves)])
     bare = [one.name for one in numbers if one.half_width is None]
     if bare and (len(bare) < len(numbers) or curves):
-        problems.append(
+        problems.lines.append(
             f"{', '.join(bare)}: no half-width, though others have one or are curves; to fix it: "
             "write +- for all numbers, or for none and no curve"
         )
-    if problems:
-        raise InputError("targets of the fit:\n" + "\n".join(f"  {one}" for one in problems))
+    problems.check()
     return Targets(tuple(numbers), tuple(curves))
 
 

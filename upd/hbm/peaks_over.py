@@ -20,14 +20,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from upd.cache.arrays import load_arrays, save_arrays
+from upd.cache.journal import Journal
 from upd.errors import ConvergenceError
 from upd.hbm.parameter_change import ParameterChange
 from upd.hbm.peak_sensitivity import peak_derivatives
@@ -68,6 +67,15 @@ class PeakPoint(NamedTuple):
     by: Array
 
 
+def _as_list(p: PeakPoint) -> list[Any]:
+    return [p.frequency, p.log_height, p.slope, p.by.tolist()]
+
+
+def _from_list(kept: list[Any]) -> PeakPoint:
+    frequency, y, slope, by = kept
+    return PeakPoint(frequency, y, slope, np.array(by, float))
+
+
 #: the peaks of the whole curve at one F_C/F_E, by their names
 Peaks = Mapping[str, PeakPoint]
 
@@ -100,7 +108,7 @@ class PeaksOver:
     step
         s between the first curves.
     kept
-        File that keeps them, for a search that is begun again.
+        Keeps them, for a search that is begun again.
 
     Attributes
     ----------
@@ -118,7 +126,7 @@ class PeaksOver:
         low: float,
         high: float,
         step: float = SCAN_STEP,
-        kept: Path | None = None,
+        kept: Journal | None = None,
     ) -> None:
         self.curve_at, self.low, self.high, self._kept = curve_at, low, high, kept
         self.points: dict[float, Peaks] = {}
@@ -127,7 +135,8 @@ class PeaksOver:
         #: nodes with what is known there, slopes that are not from the nodes beside
         self._peaks: dict[float, Peaks] = {}
         self._curves_of = -1
-        self._load()
+        for place, known in () if kept is None else kept.lines:
+            self._add(place, known and {name: _from_list(p) for name, p in known.items()})
         self.resumed = len(self.points)
         for s in np.linspace(high, low, math.ceil((high - low) / step) + 1):
             self.look(float(s))
@@ -141,40 +150,22 @@ class PeaksOver:
         for at in (s, s + ASIDE, s - ASIDE):
             if not self._is_near(at, SAME):
                 found = self.curve_at(at)
-                if found is None:
-                    self.missed.add(at)
-                else:
-                    self.points[at] = found
-                self._save()
+                self._add(at, found)
+                if self._kept is not None:
+                    each = None if found is None else {k: _as_list(p) for k, p in found.items()}
+                    self._kept.keep([at, each])
             if any(abs(t - at) <= SAME for t in self.points):
                 break
         return True
 
+    def _add(self, s: float, found: Peaks | None) -> None:
+        if found is None:
+            self.missed.add(s)
+        else:
+            self.points[s] = found
+
     def _is_near(self, s: float, near: float) -> bool:
         return any(abs(t - s) <= near for t in (*self.points, *self.missed))
-
-    def _save(self) -> None:
-        if self._kept is None:
-            return
-        each = [(s, name, p) for s, peaks in self.points.items() for name, p in peaks.items()]
-        rows = [(s, p.frequency, p.log_height, p.slope, *p.by) for s, _, p in each]
-        arrays: dict[str, NDArray[np.generic]] = {
-            "curves": np.array([*self.points]),
-            "missed": np.array([*self.missed]),
-            "names": np.array([name for _, name, _ in each], str),
-            "peaks": np.array(rows),
-        }
-        save_arrays(self._kept, arrays)
-
-    def _load(self) -> None:
-        kept = None if self._kept is None else load_arrays(self._kept)
-        if kept is None:
-            return
-        found: dict[float, dict[str, PeakPoint]] = {float(s): {} for s in kept["curves"]}
-        for name, (s, f, y, slope, *by) in zip(kept["names"], kept["peaks"], strict=True):
-            found[float(s)][str(name)] = PeakPoint(f, y, slope, np.array(by))
-        self.points.update(found)
-        self.missed.update(map(float, kept["missed"]))
 
     def look_unless_known(self, s: float, near: float) -> bool:
         """As `look`, unless neighbours tell the peak there."""

@@ -5,7 +5,7 @@ found.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -53,6 +53,16 @@ class Tried:
     ends: tuple[float, float]
 
 
+def best_of(tried: Iterable[Tried]) -> Tried:
+    """The robust optimum."""
+    return min(tried, key=lambda one: one.best.log_worst)
+
+
+def nominal_of(tried: Iterable[Tried]) -> Tried:
+    """The nominal optimum."""
+    return min(tried, key=lambda one: one.nominal.log_worst)
+
+
 def is_along(values: Sequence[float], others: Sequence[float], k: int) -> bool:
     """Whether values are the same but for one of them.
 
@@ -69,24 +79,6 @@ def is_along(values: Sequence[float], others: Sequence[float], k: int) -> bool:
 
 
 @dataclass(frozen=True)
-class Reaches:
-    """How far F_C and the ends of the range of F_E may move, one for each of `GROWTHS`.
-
-    Attributes
-    ----------
-    centrifugal : tuple of (Reach, Reach)
-        F_C below and above [N]; empty where it is not chosen.
-    lowest, highest : tuple of Reach
-        F_E [N] down from the lower end of the range, up from the upper one; empty where no range
-        is asked for.
-    """
-
-    centrifugal: tuple[tuple[Reach, Reach], ...] = ()
-    lowest: tuple[Reach, ...] = ()
-    highest: tuple[Reach, ...] = ()
-
-
-@dataclass(frozen=True)
 class ChosenDamper:
     """The damper with the lowest worst peak, and what is known beside it.
 
@@ -100,14 +92,13 @@ class ChosenDamper:
         Name of the contact stiffness.
     tried : tuple of Tried
         All places of what is chosen beside F_C, in their order.
-    robust, nominal : int
-        Numbers of the best of them over all ranges, and with the scene's own values.
     refused : tuple of str
         Values that were not solved, with the reason.
     seconds : float
         Of this call.
-    reaches : Reaches
-        How far F_C and F_E may move from the robust optimum.
+    reaches : mapping
+        Name of a parameter -> how far it may move down and up from the robust optimum, for each of
+        `GROWTHS`: what sets F_C, and the ends of the range of F_E.
     robust_at_nominal : float
         Peak of the robust optimum with the scene's own values; nan where it is not known.
     nominal_at_worst : float
@@ -121,11 +112,9 @@ class ChosenDamper:
     objective: Objective
     stiffness: str
     tried: tuple[Tried, ...]
-    robust: int
-    nominal: int
     refused: tuple[str, ...]
     seconds: float
-    reaches: Reaches
+    reaches: Mapping[str, tuple[tuple[Reach, Reach], ...]]
     robust_at_nominal: float
     nominal_at_worst: float
     settled: tuple[bool, bool]
@@ -133,7 +122,7 @@ class ChosenDamper:
     @property
     def best(self) -> Tried:
         """The robust optimum."""
-        return self.tried[self.robust]
+        return best_of(self.tried)
 
     def along(self, k: int) -> list[tuple[float, Tried]]:
         """Values of one of the inputs chosen beside F_C and what was tried there, all others as at
@@ -150,7 +139,7 @@ class ChosenDamper:
     @property
     def plain(self) -> Tried:
         """The nominal optimum."""
-        return self.tried[self.nominal]
+        return nominal_of(self.tried)
 
     @property
     def centrifugal(self) -> float:

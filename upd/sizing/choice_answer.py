@@ -77,7 +77,7 @@ class BestDamper(FigureAnswer):
         )
         deciding = tuple(
             (
-                peak_of(p.name),
+                p.name,
                 Rounded(math.exp(best.log_centrifugal - p.s)),
                 Rounded(math.exp(p.s)),
                 Rounded(p.frequency, ".2f"),
@@ -151,11 +151,6 @@ def _height(value: float, exact: bool = True) -> str:
     if not math.isfinite(value):
         return "not known"
     return Rounded(value, text="{}" if exact else "at least {}")
-
-
-def peak_of(name: str) -> str:
-    """The mode of a branch, without the frequency that distinguishes it from others."""
-    return name.partition(",")[0]
 
 
 def _slopes(one: Sensitivity) -> str:

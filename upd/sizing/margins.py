@@ -136,9 +136,9 @@ def _reached(
         The last place.
     """
     for _ in range(ROUNDS):
-        at = _beyond(*read(), limit)
+        at = beyond(*read(), limit)
         while new := settle(end if math.isnan(at) else at, limit):
-            at = _beyond(*read(), limit)
+            at = beyond(*read(), limit)
         if new is None:
             return Reach(math.nan, "no whole curve was followed through on the way")
         if math.isnan(at) or not solve(at):
@@ -146,7 +146,7 @@ def _reached(
     return Reach(math.nan, f"whole curves and what is read between differ after {ROUNDS} of them")
 
 
-def _beyond(places: Array, values: Array, limit: float) -> float:
+def beyond(places: Array, values: Array, limit: float) -> float:
     """The first place beyond a limit; nan where there is none."""
     over = np.flatnonzero(values > limit)
     return float(places[over[0]]) if over.size else math.nan

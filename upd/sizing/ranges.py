@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from upd.errors import InputError, one_line
+from upd.errors import InputError
 from upd.results.answer_table import Rounded
-from upd.scene import ForcedScene, load_scene
+from upd.scene import ForcedScene
 from upd.scene.forced import FORCED
 from upd.scene.keys import scalar_input, scene_keys
-from upd.units import parse_quantity, quantity_text, unit_inside
+from upd.scene.ranges import InputProblems, check_ends, input_text, read_range, with_values
+from upd.units import unit_inside
 
 FORCE, CENTRIFUGAL = "excitation.force", "damper.centrifugal"
 #: inputs that set F_C = m r w^2 and nothing else, and the power of F_C in them
@@ -52,10 +52,14 @@ class InputRange:
         """Whether it changes F_C and nothing else."""
         return self.path == CENTRIFUGAL or self.path in TURNING
 
+    @property
+    def force_ends(self) -> tuple[tuple[str, float, float], tuple[str, float, float]]:
+        """Both ends of a range of F_E: names, values and the ways they may move."""
+        return (f"{self.path}, lowest", self.low, -1.0), (f"{self.path}, highest", self.high, 1.0)
+
     def text(self, value: float) -> Any:
         """A value as a scene takes it."""
-        number = float(value)
-        return number if self.kind == "fraction" else quantity_text(number, self.kind)
+        return input_text(value, self.kind)
 
     def shown(self, value: float) -> str:
         """A value with its unit, four digits of it."""
@@ -154,37 +158,33 @@ def read_ranges(
     """
     if getattr(scene, "analysis", "") != FORCED:
         raise InputError("a choice of damper needs a forced response; the scene is none")
-    problems: list[str] = []
+    problems = InputProblems("ranges")
     read: list[list[InputRange]] = []
     for word, given in (("over", over), ("for", during)):
-        found = []
+        found: list[InputRange] = []
         for text in _texts(given):
-            path, _, ends = text.partition("=")
-            try:
-                found.append(_range(scene, path.strip(), ends.strip()))
-            except InputError as error:
-                problems.append(f"{word} {path.strip()}: {error}")
+            path, _, ends = (part.strip() for part in text.partition("="))
+            with problems.of(f"{word} {path}"):
+                found.append(_range(scene, path, ends))
         read.append(found)
     chosen, counted = read
-    if not chosen and not problems:
-        problems.append(f"over: nothing to choose; write for example {CENTRIFUGAL}=50:2000")
-    paths = [one.path for one in (*chosen, *counted)]
-    problems += [f"{p}: given twice" for p in dict.fromkeys(paths) if paths.count(p) > 1]
+    if not chosen and not problems.lines:
+        problems.lines.append(f"over: nothing to choose; write for example {CENTRIFUGAL}=50:2000")
+    problems.twice([one.path for one in (*chosen, *counted)])
     if any(one.path == FORCE for one in chosen):
-        problems.append(f"over {FORCE}: excitation is not chosen; give it after for")
+        problems.lines.append(f"over {FORCE}: excitation is not chosen; give it after for")
     pressing = [one.path for one in chosen if one.only_centrifugal]
     if len(pressing) > 1:
-        problems.append(
+        problems.lines.append(
             f"over {', '.join(pressing)}: each sets F_C alone; give one, set the others"
         )
-    for one in counted:
-        if one.only_centrifugal:
-            problems.append(
-                f"for {one.path}: scales F_C; peaks depend on F_C/F_E: widen excitation.force by "
-                "the same factor instead"
-            )
-    if problems:
-        raise InputError("ranges:\n" + "\n".join(f"  {problem}" for problem in problems))
+    problems.lines += [
+        f"for {one.path}: scales F_C; peaks depend on F_C/F_E: widen excitation.force by the same "
+        "factor instead"
+        for one in counted
+        if one.only_centrifugal
+    ]
+    problems.check()
     return Ranges(scene, tuple(chosen), tuple(counted))
 
 
@@ -198,32 +198,16 @@ def _texts(given: str | Sequence[str] | Mapping[str, str]) -> list[str]:
 
 def _range(scene: ForcedScene, path: str, ends: str) -> InputRange:
     kind, nominal = _input(scene, path)
-    parts = [part.strip() for part in ends.split(":")]
-    if len(parts) != 2:
-        raise InputError(f"{ends!r} is no range; write low:high, for example {path}=1:2")
-    low, high = (_end(part, kind) for part in parts)
-    if not 0.0 < low < high:
-        raise InputError(f"{ends!r}: write two values above 0, the lower one first")
+    low, high = (end.value for end in read_range(ends, kind, nominal))
     found = InputRange(path, kind, low, high, nominal)
     if path not in (FORCE, CENTRIFUGAL):
-        for value in (low, high):
-            try:
-                with_values(scene, {path: found.text(value)})
-            except InputError as error:
-                raise InputError(
-                    f"the scene refuses {found.shown(value)} ({one_line(error)}); to fix it: give "
-                    "another range"
-                ) from None
+        check_ends(
+            lambda value: with_values(scene, {path: found.text(value)}),
+            (low, high),
+            kind,
+            "give another range",
+        )
     return found
-
-
-def _end(text: str, kind: str) -> float:
-    """A quantity, or a bare number in the unit inside."""
-    try:
-        number = float(text)
-    except ValueError:
-        return parse_quantity(text, kind)
-    return parse_quantity(number if kind == "fraction" else f"{number!r} {unit_inside(kind)}", kind)
 
 
 def _input(scene: ForcedScene, path: str) -> tuple[str, float]:
@@ -236,14 +220,3 @@ def _input(scene: ForcedScene, path: str) -> tuple[str, float]:
         return "force", scene.damper.centrifugal
     keys = {key.path: key for key in scene_keys(scene)}
     return scalar_input(scene, keys, path, (CENTRIFUGAL, FORCE))
-
-
-def with_values(scene: ForcedScene, values: Mapping[str, Any]) -> ForcedScene:
-    """The scene read again with some values, all others unchanged.
-
-    Raises
-    ------
-    InputError
-        Where the scene refuses them.
-    """
-    return load_scene(tomllib.loads(scene.text), dict(values))  # type: ignore[no-any-return]

@@ -25,7 +25,7 @@ from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.analyses.forced.statics import static_state
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
-from upd.cache.arrays import cache_folder
+from upd.cache.journal import Journal
 from upd.cache.sources import key_of, source_digest
 from upd.errors import InputError
 from upd.hbm.parameter_change import ParameterChange
@@ -33,8 +33,9 @@ from upd.hbm.peaks_over import Peaks, PeaksOver, peak_point
 from upd.linalg.parallel import threads_for
 from upd.progress import Stages
 from upd.scene import ForcedScene
-from upd.scene.quantities import UNKNOWN, Uncertainty
-from upd.sizing.ranges import InputRange, with_values
+from upd.scene.quantities import Uncertainty
+from upd.scene.ranges import one_model, with_values
+from upd.sizing.ranges import InputRange
 from upd.vary.inputs import InputEnds
 
 log = logging.getLogger(__name__)
@@ -53,36 +54,15 @@ def bare(scene: ForcedScene, stiffness: str) -> ForcedScene:
     InputError
         With everything for which peaks are no functions of F_C/F_E.
     """
-    problems = []
-    if scene.contact.model == "interface":
-        problems.append(
-            'contact.model: peaks are followed of contact points; set contact.model="springs"'
-        )
+    more = []
     if not scene.contact.loaded:
-        problems.append(
+        more.append(
             "contact.fit: with gaps at rest peaks do not depend on F_C/F_E alone; set "
             'contact.fit="loaded"'
         )
-    if scene.balance.harmonics == "adaptive":
-        problems.append("balance.harmonics: a followed peak keeps its harmonics; give a number")
     if scene.balance.method == "march":
-        problems.append('balance.method: peaks are those of harmonic balance; set "balance"')
-    if scene.wanted_accuracy is not None:
-        problems.append(
-            f'accuracy: a choice keeps one mesh; leave it out or set it to "{UNKNOWN}", and choose '
-            "the levels in the scene"
-        )
-    if problems:
-        raise InputError("scene:\n" + "\n".join(f"  {problem}" for problem in problems))
-    return replace(
-        scene,
-        want=("response",),
-        accuracy=UNKNOWN,
-        uncertain={},
-        measured={},
-        left_out=replace(scene.left_out, solve="no"),
-        contact=replace(scene.contact, stiffness=(stiffness,)),
-    )
+        more.append('balance.method: peaks are those of harmonic balance; set "balance"')
+    return replace(one_model(scene, stiffness, "a choice", more=more), want=("response",))
 
 
 class RigPeaks:
@@ -92,8 +72,6 @@ class RigPeaks:
     ----------
     scene
         As `bare` makes it.
-    stiffness
-        Name of its contact stiffness.
     ends
         F_C/F_E that may be asked for.
     step
@@ -112,7 +90,6 @@ class RigPeaks:
     def __init__(
         self,
         scene: ForcedScene,
-        stiffness: str,
         ends: tuple[float, float],
         step: float,
         parameters: tuple[tuple[InputRange, float], ...],
@@ -120,8 +97,8 @@ class RigPeaks:
         stages: Stages,
         report: Callable[[str], None],
     ) -> None:
-        self.scene, self.stiffness, self._report = scene, stiffness, report
-        self.curves = 0
+        self.scene, self._report, self.curves = scene, report, 0
+        (self.stiffness,) = scene.contact.stiffness
         plan = make_plan(scene)
         assert isinstance(plan, ForcedPlan)
         self.plan = plan
@@ -131,7 +108,7 @@ class RigPeaks:
                 bodies[key] = make_bodies(self.plan)
         self.bodies = bodies[key]
         with stages("blades", "static state and reduction"):
-            laws = face_laws(scene.stiffnesses[stiffness], stages)
+            laws = face_laws(scene.stiffnesses[self.stiffness], stages)
             state = static_state(self.plan, self.bodies, stages=stages)
             self.model: Model = make_model(self.plan, self.bodies, laws, state)
         e, force = scene.excitation, scene.damper.centrifugal / ends[1]
@@ -142,7 +119,7 @@ class RigPeaks:
                 changes.append(self._change(one, value, stages))
         self._changes = [change for change in changes if change is not None]
         self.known = tuple(change is not None for change in changes)
-        kept = cache_folder() / f"choice-{self._key(parameters)[:32]}.npz"
+        kept = Journal(f"choice-{self._key(parameters)[:32]}")
         low, high = map(math.log, ends)
         with threads_for(len(self.model.M)):
             stuck = linear_peaks(

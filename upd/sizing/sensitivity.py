@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,12 +12,15 @@ from scipy.interpolate import PchipInterpolator
 
 from upd.sizing.choice import GROWTHS, ChosenDamper, is_along
 from upd.sizing.least_worst import STILL
+from upd.sizing.margins import Reach, beyond
 from upd.sizing.ranges import FORCE, TURNING, InputRange
 from upd.sizing.worst_peak import WorstPeak
 
 Array = NDArray[np.float64]
 #: points between which curves are searched
 _FINE = 801
+#: at which bound F_C is
+_BOUNDS = {"at the lower bound": "lower", "at the upper bound": "upper"}
 
 
 @dataclass(frozen=True)
@@ -75,22 +79,24 @@ def _pressing(found: ChosenDamper, one: InputRange) -> Sensitivity:
     best, scene = found.best, found.ranges.scene
     power = TURNING.get(one.path, 1.0)
     slopes = [p.slope for p in best.best.deciding] or [math.nan]
-    within = []
-    for low, high in found.reaches.centrifugal:
-        within.append((one.value_at(low.end, scene), one.value_at(high.end, scene)))
-    withheld = [end.why for pair in found.reaches.centrifugal for end in pair if end.why]
+    reaches = found.reaches[one.path]
+    within = [
+        (one.value_at(low.end, scene), one.value_at(high.end, scene)) for low, high in reaches
+    ]
     return Sensitivity(
         one.path,
         one.value_at(found.centrifugal, scene),
         power * min(slopes),
         power * max(slopes),
         tuple(within),
-        best.best.status.removeprefix("at the ").removesuffix(" bound")
-        if best.best.status.startswith("at the")
-        else "",
+        _BOUNDS.get(best.best.status, ""),
         one,
-        tuple(dict.fromkeys(withheld)),
+        _withheld(reaches),
     )
+
+
+def _withheld(reaches: Sequence[tuple[Reach, Reach]]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(end.why for pair in reaches for end in pair if end.why))
 
 
 def _shape(found: ChosenDamper, one: InputRange, k: int) -> Sensitivity:
@@ -100,23 +106,25 @@ def _shape(found: ChosenDamper, one: InputRange, k: int) -> Sensitivity:
     y = np.array([tried.best.log_worst for _, tried in line])
     value = found.best.values[k]
     at_low, at_high = (abs(value - end) <= STILL * value for end in (one.low, one.high))
-    if len(x) < 2:
-        none = math.nan, math.nan
-        return Sensitivity(one.path, value, math.nan, math.nan, (none, none), "", one)
-    curve = PchipInterpolator(x, y)
     i = int(np.abs(x - value).argmin())
-    below = (y[i] - y[i - 1]) / math.log(x[i] / x[i - 1]) if i > 0 else math.nan
-    above = (y[i + 1] - y[i]) / math.log(x[i + 1] / x[i]) if i + 1 < len(x) else math.nan
-    within = []
-    for growth in GROWTHS:
-        ends = []
-        for end in (x[0], x[-1]):
-            grid = np.linspace(value, end, _FINE)
-            over = np.flatnonzero(curve(grid) > y[i] + math.log(growth))
-            ends.append(float(grid[over[0]]) if over.size else math.nan)
-        within.append((ends[0], ends[1]))
+
+    def end(way: int, growth: float) -> float:
+        grid = np.linspace(value, x[way], _FINE)
+        return beyond(grid, PchipInterpolator(x, y)(grid), y[i] + math.log(growth))
+
+    whole = len(x) > 1
+    within = tuple((end(0, g), end(-1, g)) if whole else (math.nan, math.nan) for g in GROWTHS)
     bound = "lower" if at_low else "upper" if at_high else ""
-    return Sensitivity(one.path, value, float(below), float(above), tuple(within), bound, one)
+    return Sensitivity(one.path, value, *_beside(x, y, i), within, bound, one)
+
+
+def _beside(x: Array, y: Array, i: int) -> tuple[float, float]:
+    """Differences dy / d ln x to the neighbours of a place below and above; nan without one."""
+    slope = np.diff(y) / np.diff(np.log(x))
+    return (
+        float(slope[i - 1]) if i > 0 else math.nan,
+        float(slope[i]) if i < len(slope) else math.nan,
+    )
 
 
 def _forces(found: ChosenDamper, one: InputRange) -> list[Sensitivity]:
@@ -126,15 +134,13 @@ def _forces(found: ChosenDamper, one: InputRange) -> list[Sensitivity]:
     best, weight = found.best, found.best.worst.weight
     c = best.best.log_centrifugal
     out = []
-    for word, end, way in (("lowest", one.low, -1.0), ("highest", one.high, 1.0)):
+    for name, end, _ in one.force_ends:
         f = math.log(end)
         near = [p for p in best.best.deciding if abs(c - p.s - f) < 10.0 * STILL]
         slope = sum(-p.slope * p.share for p in near) + weight * bool(near)
-        reaches = found.reaches.lowest if way < 0 else found.reaches.highest
-        within = [(r.end, math.nan) if way < 0 else (math.nan, r.end) for r in reaches]
-        withheld = tuple(dict.fromkeys(r.why for r in reaches if r.why))
-        name = f"{one.path}, {word}"
-        out.append(Sensitivity(name, end, slope, slope, tuple(within), "", one, withheld))
+        reaches = found.reaches[name]
+        within = tuple((low.end, high.end) for low, high in reaches)
+        out.append(Sensitivity(name, end, slope, slope, within, "", one, _withheld(reaches)))
     return out
 
 
@@ -159,12 +165,7 @@ def _unsure(found: ChosenDamper, one: InputRange) -> Sensitivity:
     line = sorted((w[k], y) for w, y in heights.items() if is_along(w, worst, k))
     grid, values = np.array(line).T
     top = int(values.argmax())
-    below, above = slope, slope
-    if math.isnan(slope):
-        ln = np.log(grid)
-        below = float((values[top] - values[top - 1]) / (ln[top] - ln[top - 1])) if top else slope
-        if top + 1 < len(grid):
-            above = float((values[top + 1] - values[top]) / (ln[top + 1] - ln[top]))
+    slopes = _beside(grid, values, top) if math.isnan(slope) else (slope, slope)
     none = math.nan, math.nan
     bound = "lower" if top == 0 else "upper" if top == len(grid) - 1 else ""
-    return Sensitivity(f"{one.path}, worst", worst[k], below, above, (none, none), bound, one)
+    return Sensitivity(f"{one.path}, worst", worst[k], *slopes, (none, none), bound, one)

@@ -151,11 +151,6 @@ class MotionState:
     eccentricity: float
     slides: Array
 
-    @property
-    def work(self) -> float:
-        """Work of friction per length of the blades' motion, N (mJ per mm)."""
-        return float(np.abs(self.T * self.slides).sum())
-
 
 @dataclass(frozen=True)
 class DamperStatics:

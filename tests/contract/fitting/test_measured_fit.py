@@ -23,7 +23,6 @@ from upd.fitting import (
     read_parameters,
     read_targets,
 )
-from upd.fitting.journal import Journal
 from upd.fitting.next_measurement import rank_measurements
 from upd.fitting.parameters import fitted_scene
 from upd.measured import MeasuredCurve
@@ -89,7 +88,7 @@ def test_what_a_curve_leaves_out_is_told_once(
     )
     for _ in range(3):
         made.value(np.zeros(2))
-    assert made.curves == 3
+    assert [one.solved for one in made.friction] == [3]
     told = [one.getMessage() for one in caplog.records if "harmonics above 1" in one.getMessage()]
     assert len(told) == 1
 
@@ -220,21 +219,6 @@ def test_a_fit_that_was_stopped_goes_on(
     assert not list(tmp_path.glob("fit-*.jsonl"))
 
 
-def test_a_journal_cut_short_is_read_as_far_as_it_goes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("UPD_CACHE", str(tmp_path))
-    first, z = Journal("a" * 40), np.array([0.1, 0.2])
-    first.keep(z, np.array([3.0]), np.array([[1.0, 2.0]]))
-    with first.path.open("a", encoding="utf-8") as file:
-        file.write("[[0.3")
-    again = Journal("a" * 40)
-    assert again.kept == 1
-    kept = again.find(z)
-    assert kept is not None
-    assert kept[1].tolist() == [[1.0, 2.0]]
-
-
 def test_further_measurements_are_ranked_by_what_they_leave(
     scene: ForcedScene, like: FitResponses
 ) -> None:
@@ -245,9 +229,7 @@ def test_further_measurements_are_ranked_by_what_they_leave(
     targets = read_targets(to)
     residuals = Residuals(FitResponses(scene, targets, parameters, like=like))
     none = np.zeros(2)
-    found = {
-        one.name: one for one in rank_measurements(scene, targets, parameters, residuals, none, ())
-    }
+    found = {one.name: one for one in rank_measurements(residuals, none, ())}
     best = next(iter(found.values()))
     assert best.then == min(one.then for one in found.values())
     one = found["stuck_out_of_phase"]

@@ -25,7 +25,7 @@ from upd.analyses.forced.linear_limits import linear_modes
 from upd.errors import InputError
 from upd.plot.png import png_size
 from upd.scene import load_scene
-from upd.sizing import BestDamper, choice_search
+from upd.sizing import BestDamper, search
 from upd.sizing.choice import Tried, is_along
 from upd.sizing.ranges import read_ranges
 from upd.sizing.sensitivity import sensitivities
@@ -140,9 +140,9 @@ def test_an_optimum_that_moves_with_every_look_is_compared_where_it_is(
         c = one.best.log_centrifugal
         return replace(one, best=replace(one.best, log_centrifugal=c - math.copysign(0.1, c - 2)))
 
-    monkeypatch.setattr(choice_search, "has_moved", lambda *_: True)
-    monkeypatch.setattr(choice_search, "_LOOKS", 1)
-    monkeypatch.setattr(choice_search, "_again", moved)
+    monkeypatch.setattr(search, "has_moved", lambda *_: True)
+    monkeypatch.setattr(search, "_LOOKS", 1)
+    monkeypatch.setattr(search, "_again", moved)
     told = upd.design(
         "asymmetric-response",
         minimise="peak",
@@ -154,7 +154,7 @@ def test_an_optimum_that_moves_with_every_look_is_compared_where_it_is(
     here = one.best.plain.solved_worst(one.best.best.log_centrifugal)
     assert one.robust_at_nominal == pytest.approx(math.exp(here), rel=1e-3)
     assert not math.isclose(here, one.best.nominal.log_worst, abs_tol=1e-2)
-    assert all(end.why for pair in one.reaches.centrifugal for end in pair)
+    assert all(end.why for pair in one.reaches["damper.centrifugal"] for end in pair)
     assert "is withheld: the optimum has moved with each of 1 looks" in " ".join(str(told).split())
 
 
@@ -278,7 +278,6 @@ def test_another_parameter_is_chosen(tmp_path: Path, monkeypatch: pytest.MonkeyP
         overrides=dict(TOY) | {"damper.centrifugal": "7 N"},
     ).found
     assert len(one.tried) >= 5
-    assert one.best.values == one.tried[one.robust].values
     assert one.worst == pytest.approx(min(math.exp(t.best.log_worst) for t in one.tried))
     assert one.centrifugal == pytest.approx(7.0)
     assert one.refused == ()
@@ -293,8 +292,8 @@ def test_several_parameters_are_chosen_and_stood(
 ) -> None:
     """Nothing that was tried is lower, and all corners count."""
     monkeypatch.setenv("UPD_CACHE", str(tmp_path))
-    monkeypatch.setattr(choice_search, "GRID", 2)
-    monkeypatch.setattr(choice_search, "MORE", 2)
+    monkeypatch.setattr(search, "GRID", 2)
+    monkeypatch.setattr(search, "MORE", 2)
     left, right = "stiffness.thesis.left.K_T", "stiffness.thesis.right.K_T"
     one = upd.design(
         "asymmetric-response",
@@ -332,8 +331,8 @@ def test_a_grid_of_one_of_several(
     monkeypatch.setenv("UPD_CACHE", str(tmp_path))
     # one harmonic is what time integration leaves: runs tell the balance here, as the choice does
     monkeypatch.setattr(peaks, "confirmed", lambda plan, model, curve: curve)
-    monkeypatch.setattr(choice_search, "GRID", 2)
-    monkeypatch.setattr(choice_search, "MORE", 2)
+    monkeypatch.setattr(search, "GRID", 2)
+    monkeypatch.setattr(search, "MORE", 2)
     one = upd.design(
         "asymmetric-response",
         minimise="peak",

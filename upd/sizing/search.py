@@ -1,4 +1,5 @@
-"""The damper whose worst peak over ranges of excitation and of an uncertain input is lowest.
+"""`upd.design`: the statics of a scene's damper, or the damper whose worst peak over ranges of
+excitation and of uncertain inputs is lowest.
 
 F_C is sought by `upd.sizing.least_worst` on the curves of one rig; what else is chosen makes a new
 rig for every value, tried on a grid and then by bounded minimisation between the neighbours of its
@@ -6,9 +7,7 @@ best. Several such inputs are moved by turns, the others at the best so far, and
 a turn led (R. Hooke, T. A. Jeeves, J. ACM 8 (1961) 212), until a turn gains nothing; where worst
 peaks have a ridge such a search may end on it.
 
-An input over whose range peaks count is taken at its ends, at the scene's own value, and where a
-parabola through these has its maximum between. Of several such inputs all corners of their ranges
-count, and the scene's own values.
+Of inputs over whose ranges peaks count all corners are taken, and the scene's own values.
 """
 
 from __future__ import annotations
@@ -17,10 +16,11 @@ import itertools
 import logging
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any, get_args
+from pathlib import Path
+from typing import Any, get_args, overload
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -30,13 +30,26 @@ from upd.analyses.seated.bodies import Bodies
 from upd.errors import ConvergenceError, InputError, one_line
 from upd.hbm.peaks_over import AGREES, SCAN_STEP
 from upd.linalg.parallel import threads_for
-from upd.progress import Listener, Stages
-from upd.scene import ForcedScene
-from upd.sizing.choice import GROWTHS, ChosenDamper, Objective, Reaches, Tried, is_along
-from upd.sizing.least_worst import LowestWorst, has_moved, lowest_worst
+from upd.progress import Listener, Stages, silent
+from upd.scene import AnyScene, ForcedScene
+from upd.scene.ranges import stiffness_of, with_values
+from upd.scene.read import as_scene
+from upd.sizing.choice import (
+    GROWTHS,
+    ChosenDamper,
+    Objective,
+    Tried,
+    best_of,
+    is_along,
+    nominal_of,
+)
+from upd.sizing.choice_answer import BestDamper
+from upd.sizing.least_worst import has_moved, lowest_worst
 from upd.sizing.margins import Reach, how_far, how_far_force
-from upd.sizing.ranges import FORCE, InputRange, Ranges, with_values
+from upd.sizing.ranges import FORCE, InputRange, Ranges, read_ranges
 from upd.sizing.rig_peaks import RigPeaks, bare
+from upd.sizing.statics import damper_statics
+from upd.sizing.statics_answer import DamperDesign
 from upd.sizing.worst_peak import COMPARED_STEP, WorstPeak
 
 log = logging.getLogger(__name__)
@@ -51,10 +64,85 @@ _LOOKS = 4
 _SHARE = 0.5
 #: beyond a range of F_E up to which its ends are sought, as ln F_E
 _REACH = 3.0
-#: values added where peaks are highest inside the range of an uncertain input
-_INSIDE = 3
 
 
+@overload
+def design(
+    scene: AnyScene | str | Path | Mapping[str, Any],
+    *,
+    overrides: Sequence[str] | Mapping[str, Any] = (),
+    out: str | Path | None = None,
+) -> DamperDesign: ...
+
+
+@overload
+def design(
+    scene: AnyScene | str | Path | Mapping[str, Any],
+    *,
+    minimise: Objective,
+    over: str | Sequence[str] | Mapping[str, str],
+    for_: str | Sequence[str] | Mapping[str, str] = (),
+    overrides: Sequence[str] | Mapping[str, Any] = (),
+    out: str | Path | None = None,
+    progress: Listener = silent,
+) -> BestDamper: ...
+
+
+def design(
+    scene: AnyScene | str | Path | Mapping[str, Any],
+    *,
+    minimise: Objective | None = None,
+    over: str | Sequence[str] | Mapping[str, str] = (),
+    for_: str | Sequence[str] | Mapping[str, str] = (),
+    overrides: Sequence[str] | Mapping[str, Any] = (),
+    out: str | Path | None = None,
+    progress: Listener = silent,
+) -> DamperDesign | BestDamper:
+    """Tell before any dynamics whether a scene's damper jams, lifts off or tilts, and what its
+    faces can carry; or, with ``minimise``, find the damper whose worst resonance peak is lowest.
+
+    Parameters
+    ----------
+    scene
+        A loaded scene, a ready name, a .toml path or a mapping: a forced response or, without
+        ``minimise``, a seated damper.
+    minimise
+        "peak": the highest accelerance of the right blade within the scene's band, in (m/s2) per
+        newton of F_E, as runs tell it: all levels of excitation count alike. "acceleration": the
+        highest acceleration, in m/s2: the strongest excitation counts most.
+    over
+        What is chosen, "damper.centrifugal=50:2000", a list of such or a mapping path -> range: one
+        input that sets F_C, and others, each of which multiplies the cost.
+    for_
+        What it has to stand, "excitation.force=0.5:5": F_E, and other inputs, all of whose corners
+        count.
+    overrides
+        "path=value" texts, or a mapping path -> value.
+    out
+        Folder that gets figure, numbers and report.html; None writes nothing.
+    progress
+        Called at the beginning and the end of every stage of a choice.
+
+    Raises
+    ------
+    InputError
+        For a bad scene or range, one without a damper between two blades, and a folder that cannot
+        be written.
+    ConvergenceError
+        Where no peak was followed far enough for a choice.
+    """
+    loaded = as_scene(scene, overrides)
+    if minimise is None:
+        if over or for_:
+            raise InputError('over and for_ belong to a choice: add minimise = "peak"')
+        found: DamperDesign | BestDamper = DamperDesign(loaded, damper_statics(loaded))
+    else:
+        ranges = read_ranges(loaded, over, for_)
+        found = BestDamper(loaded, choose_damper(ranges, minimise, progress))
+    return found if out is None else found.write(out)
+
+
+@quiet()
 def choose_damper(ranges: Ranges, objective: Objective, progress: Listener) -> ChosenDamper:
     """The damper whose worst peak over the ranges is lowest.
 
@@ -75,11 +163,6 @@ def choose_damper(ranges: Ranges, objective: Objective, progress: Listener) -> C
     ConvergenceError
         Where the worst peak is known nowhere.
     """
-    with quiet():
-        return _choose(ranges, objective, progress)
-
-
-def _choose(ranges: Ranges, objective: Objective, progress: Listener) -> ChosenDamper:
     begin = time.perf_counter()
     search = _Search(ranges, objective, progress)
     if ranges.shapes:
@@ -90,39 +173,28 @@ def _choose(ranges: Ranges, objective: Objective, progress: Listener) -> ChosenD
         raise ConvergenceError("; ".join(search.refused))
     tried = tuple(sorted(search.tried, key=lambda one: one.values))
     for _ in range(_LOOKS):
-        robust, nominal = _lowest(tried)
-        both = tried[robust], tried[nominal]
+        both = best_of(tried), nominal_of(tried)
         reaches, (here, there, settled) = search.reaches(both[0]), search.compared(*both)
         if not any(any(_moved(one)) for one in both):
             break
         # whole curves on the way have shown another optimum
         tried = tuple(map(_again, tried))
     else:
-        robust, nominal = _lowest(tried)
-        reaches = _withheld(reaches)
-        here, there, settled = search.compared(tried[robust], tried[nominal])
+        why = f"the optimum has moved with each of {_LOOKS} looks at whole curves"
+        lost = Reach(math.nan, why), Reach(math.nan, why)
+        reaches = {name: tuple(lost for _ in GROWTHS) for name in reaches}
+        here, there, settled = search.compared(best_of(tried), nominal_of(tried))
     return ChosenDamper(
         ranges,
         objective,
         search.stiffness,
         tried,
-        robust,
-        nominal,
         tuple(search.refused),
         time.perf_counter() - begin,
         reaches,
         here,
         there,
         settled,
-    )
-
-
-def _lowest(tried: Sequence[Tried]) -> tuple[int, int]:
-    """Numbers of the robust and of the nominal optimum."""
-    each = range(len(tried))
-    return (
-        min(each, key=lambda k: tried[k].best.log_worst),
-        min(each, key=lambda k: tried[k].nominal.log_worst),
     )
 
 
@@ -140,24 +212,9 @@ def _again(one: Tried) -> Tried:
     return one
 
 
-def _withheld(reaches: Reaches) -> Reaches:
-    """No reaches of an optimum that moves with every look."""
-    none = Reach(math.nan, f"the optimum has moved with each of {_LOOKS} looks at whole curves")
-    return Reaches(
-        tuple((none, none) for _ in reaches.centrifugal),
-        tuple(none for _ in reaches.lowest),
-        tuple(none for _ in reaches.highest),
-    )
-
-
 def _with(place: tuple[float, ...], k: int, value: float) -> tuple[float, ...]:
     """A place with one of its values changed."""
     return (*place[:k], value, *place[k + 1 :])
-
-
-def _corners(ranges: Sequence[InputRange]) -> list[tuple[float, ...]]:
-    """Of all ranges together."""
-    return list(itertools.product(*((one.low, one.high) for one in ranges)))
 
 
 def _grid(shape: InputRange) -> list[float]:
@@ -177,13 +234,9 @@ class _Search:
         self.ranges, self.progress = ranges, progress
         self.weight = float(objective == "acceleration")
         self.stages = Stages(progress)
-        paths = [one.path.split(".") for one in (*ranges.over, *ranges.during)]
-        named = list(dict.fromkeys(steps[1] for steps in paths if steps[0] == "stiffness"))
-        if len(named) > 1:
-            raise InputError(
-                f"ranges of several contact stiffnesses ({', '.join(named)}): give one"
-            )
-        self.stiffness = named[0] if named else next(iter(ranges.scene.stiffnesses))
+        self.stiffness = stiffness_of(
+            ranges.scene, [one.path for one in (*ranges.over, *ranges.during)]
+        )
         self.scene = bare(ranges.scene, self.stiffness)
         self.bodies: dict[str, Bodies] = {}
         self.tried: list[Tried] = []
@@ -213,7 +266,7 @@ class _Search:
 
     @property
     def _best(self) -> Tried:
-        return min(self.tried, key=lambda one: one.best.log_worst)
+        return best_of(self.tried)
 
     def by_turns(self) -> None:
         """What is chosen beside F_C, one input after the other."""
@@ -268,54 +321,50 @@ class _Search:
         forces = [*r.forces, *r.nominal_forces]
         window = ends[0] / max(forces), ends[1] / min(forces)
         own = tuple(one.nominal for one in r.unsure)
-        values = list(dict.fromkeys([*_corners(r.unsure), own]))
-        rigs = {w: self._rig(chosen, w, place, window) for w in sorted(values)}
-        while True:
-            counted = [
-                w
-                for w in rigs
-                if all(of.low <= v <= of.high for of, v in zip(r.unsure, w, strict=True))
-            ]
-            worst = WorstPeak([rigs[w].peaks for w in counted], r.forces, self.weight)
-            with self._searching(self._words(chosen), list(rigs.items())):
-                best = lowest_worst(worst, *ends)
-            inside = self._inside(counted, worst, best)
-            if inside is None or len(rigs) > len(values) + _INSIDE:
-                break
-            rigs[inside] = self._rig(chosen, inside, place, window)
+        corners = itertools.product(*((one.low, one.high) for one in r.unsure))
+        rigs = {w: self._rig(chosen, w, place, window) for w in sorted({*corners, own})}
+        counted = [
+            rig.peaks
+            for w, rig in rigs.items()
+            if all(of.low <= v <= of.high for of, v in zip(r.unsure, w, strict=True))
+        ]
+        worst = WorstPeak(counted, r.forces, self.weight)
+        with self._searching(self._words(chosen), list(rigs.items())):
+            best = lowest_worst(worst, *ends)
         plain = WorstPeak([rigs[own].peaks], r.nominal_forces, self.weight)
         words = f"{self._words(chosen)}, the scene's own values"
         with self._searching(words, list(rigs.items())):
             nominal = lowest_worst(plain, *ends, jump=COMPARED_STEP)
         return Tried(place, tuple(rigs.items()), worst, best, plain, nominal, ends)
 
-    def reaches(self, one: Tried) -> Reaches:
-        """How far F_C and F_E may move from the robust optimum.
+    def reaches(self, one: Tried) -> dict[str, tuple[tuple[Reach, Reach], ...]]:
+        """How far F_C and the ends of the range of F_E may move from the robust optimum.
 
         Parameters
         ----------
         one
             The optimum.
         """
-        counted = any(of.path == FORCE for of in self.ranges.during)
+        found, none, press = {}, Reach(math.nan), self.ranges.pressing
         with self._searching("how far the optimum reaches", one.rigs):
-            centrifugal = tuple(
-                (
-                    how_far(one.worst, one.best, growth, one.ends[0]),
-                    how_far(one.worst, one.best, growth, one.ends[1]),
-                )
-                for growth in GROWTHS
-                if one.ends[0] < one.ends[1]
-            )
-            lowest, highest = (
-                tuple(
-                    how_far_force(one.worst, one.best, growth, way, end * math.exp(way * _REACH))
+            if press is not None:
+                found[press.path] = tuple(
+                    (
+                        how_far(one.worst, one.best, growth, one.ends[0]),
+                        how_far(one.worst, one.best, growth, one.ends[1]),
+                    )
                     for growth in GROWTHS
-                    if counted
                 )
-                for way, end in zip((-1.0, 1.0), self.ranges.forces, strict=True)
-            )
-        return Reaches(centrifugal, lowest, highest)
+            for of in self.ranges.during:
+                if of.path == FORCE:
+                    for word, end, way in of.force_ends:
+                        bound = end * math.exp(way * _REACH)
+                        each = (
+                            how_far_force(one.worst, one.best, growth, way, bound)
+                            for growth in GROWTHS
+                        )
+                        found[word] = tuple((r, none) if way < 0.0 else (none, r) for r in each)
+        return found
 
     def compared(self, best: Tried, plain: Tried) -> tuple[float, float, tuple[bool, bool]]:
         """Peak of the robust optimum with the scene's own values, worst peak of the nominal one,
@@ -338,29 +387,6 @@ class _Search:
         with self.stages("search", detail), threads_for(len(rigs[0][1].model.M)):
             yield
 
-    def _inside(
-        self, counted: list[tuple[float, ...]], worst: WorstPeak, best: LowestWorst
-    ) -> tuple[float, ...] | None:
-        """Where a parabola through the three values about the worst has a higher peak inside."""
-        if len(self.ranges.unsure) != 1 or len(counted) < 3:
-            return None
-        (unsure,) = self.ranges.unsure
-        c = np.array([best.log_centrifugal])
-        each = [WorstPeak([one], self.ranges.forces, self.weight).at(c)[0] for one in worst.peaks]
-        given = np.array(counted)[:, 0]
-        order = np.argsort(given)
-        x = given[order]
-        y = np.array(each)[order]
-        k = int(np.clip(y.argmax(), 1, len(y) - 2))
-        a, b, _ = np.polyfit(x[k - 1 : k + 2], y[k - 1 : k + 2], 2)
-        if a >= 0.0:
-            return None
-        top = -b / (2.0 * a)
-        gain = np.polyval(np.polyfit(x[k - 1 : k + 2], y[k - 1 : k + 2], 2), top) - y.max()
-        near = np.abs(x - top).min() < CLOSE * (unsure.high - unsure.low)
-        inside = x[k - 1] < top < x[k + 1]
-        return (float(top),) if inside and gain > 10.0 * AGREES and not near else None
-
     def _rig(
         self,
         chosen: dict[str, object],
@@ -380,9 +406,7 @@ class _Search:
         # one curve in its window rules an F_C out: two curves in each are enough
         step = max(SCAN_STEP, _SHARE * math.log(r.forces[1] / r.forces[0]))
         with self.stages("peaks", words):
-            return RigPeaks(
-                scene, self.stiffness, window, step, tuple(given), self.bodies, self.stages, report
-            )
+            return RigPeaks(scene, window, step, tuple(given), self.bodies, self.stages, report)
 
     def _with(self, values: dict[str, object]) -> ForcedScene:
         if not values:

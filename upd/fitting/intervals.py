@@ -1,4 +1,5 @@
-"""What the targets of a fit leave unknown, to first order.
+"""What the targets of a fit leave unknown: to first order, and by profiles, one parameter moved and
+the others fitted.
 
 J = dr/dz at the answer shows what is known: with the singular values s and right singular vectors w
 of J diag(high - low), a share t of the room along w_i moves the residuals by s_i t. The covariance
@@ -20,14 +21,21 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from upd.errors import UpdError
-from upd.fitting.residuals import Residuals
+from upd.fitting.residuals import Residuals, Start
 
 Array = NDArray[np.float64]
 #: quantile of 95 % intervals
 _T = float(norm.ppf(0.975))
 #: shares of a first-order half-width by which its ends may be off: without a note; and such that
 #: a 95 % interval keeps its probability to half of its last digit, 2 t phi(t) share = 0.005
-TOLD, KEPT = 0.1, 0.005 / (2.0 * _T * float(norm.pdf(_T)))
+SHOWN, KEPT = 0.1, 0.005 / (2.0 * _T * float(norm.pdf(_T)))
+#: points of a profile to each side at most, and cuts of the interval that holds an end
+_POINTS, _CUTS = 40, 10
+_LONGER = 1.3
+#: first step of a profile, and how closely its ends are found, as shares of the half-width
+FIRST, _CLOSE = 0.25, 5e-3
+#: least share of an interval that is cut off
+_CUT = 0.05
 
 
 @dataclass(frozen=True)
@@ -143,3 +151,127 @@ def knowledge(residuals: Residuals, z: Array) -> Knowledge:
     error = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(error, error)
     return Knowledge(s, V, unknown, correlation, error)
+
+
+# -- profiles --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Sets of parameters that fit as well as the answer, one parameter moved, the others fitted.
+
+    Attributes
+    ----------
+    parameter : int
+        Which is moved.
+    z : ndarray
+        (k, n) sets, rising in the parameter moved.
+    """
+
+    parameter: int
+    z: Array
+
+
+def profile(
+    residuals: Residuals, known: Knowledge, best: Array, k: int, first: float = FIRST
+) -> Profile:
+    """The profile of one parameter, from the answer to both sides.
+
+    A set fits as well while |r|^2 rises by no more than 1, with half-widths: an interval in the
+    same multiple of standard deviations as they are; without, while the targets are met.
+
+    Parameters
+    ----------
+    residuals
+        Of the fit.
+    known
+        At the answer.
+    best
+        (n,) the answer.
+    k
+        Number of the parameter.
+    first
+        Step from the answer, as a share of the first-order half-width where there is one.
+    """
+    least = float((residuals(best) ** 2).sum())
+    span = float(residuals.high[k] - residuals.low[k])
+    step = span / _POINTS
+    if residuals.known and known.error is not None:
+        step = min(step, first * float(known.error[k]))
+
+    def fits(one: Start) -> bool:
+        if residuals.known:
+            return one.misfit - least <= 1.0
+        return bool(np.isfinite(one.misfit)) and residuals.met(one.end)
+
+    def at(place: float, near: Array) -> Start:
+        begin = near.copy()
+        begin[k] = place
+        others = np.arange(len(begin)) != k
+        begin[others] = residuals.inside(begin)[others]
+        return residuals.solve(begin, held=k)
+
+    sides = []
+    for sign, bound in ((-1.0, residuals.low[k]), (1.0, residuals.high[k])):
+        rows, here, length = [(best, 0.0)], best, step
+        for _ in range(_POINTS):
+            place = here[k] + sign * length
+            on_bound = bool(sign * (place - bound) >= 0.0)
+            one = at(float(bound) if on_bound else float(place), here)
+            if not fits(one):
+                rows += _closed_in(at, fits, rows[-1], one, k, least)
+                break
+            here = one.end
+            rows.append((here, one.misfit - least))
+            if on_bound:
+                break
+            length = min(length * _LONGER, span / _POINTS)
+        sides.append(rows)
+    low, high = sides
+    rows = [*reversed(low[1:]), *high]
+    return Profile(k, np.array([row for row, _ in rows]))
+
+
+def _closed_in(
+    at: Callable[[float, Array], Start],
+    fits: Callable[[Start], bool],
+    inside: tuple[Array, float],
+    outside: Start,
+    k: int,
+    least: float,
+) -> list[tuple[Array, float]]:
+    """Sets that fit as well, ever nearer to the end of a profile, with their rises.
+
+    The root of the rise is proportional to the distance where the misfit is quadratic: its chord
+    leads to where it is 1; where the outer set has none, the middle does.
+
+    Parameters
+    ----------
+    at
+        The set with a value of the parameter moved, from another set.
+    fits
+        Whether one fits as well.
+    inside
+        The last set that does, and its rise.
+    outside
+        One beyond the end.
+    k
+        Number of the parameter.
+    least
+        |r|^2 of the answer.
+    """
+    rows: list[tuple[Array, float]] = []
+    for _ in range(_CUTS):
+        z, rise = rows[-1] if rows else inside
+        low, high = float(z[k]), float(outside.end[k])
+        q, top = (math.sqrt(max(v, 0.0)) for v in (rise, outside.misfit - least))
+        wanted = 1.0 - 0.5 * _CLOSE
+        share = (wanted - q) / (top - q) if top > 1.0 and math.isfinite(top) else 0.5
+        one = at(low + min(max(share, _CUT), 1.0 - _CUT) * (high - low), z)
+        if not fits(one):
+            outside = one
+            continue
+        rows.append((one.end, one.misfit - least))
+        if 1.0 - _CLOSE <= math.sqrt(max(rows[-1][1], 0.0)) <= 1.0:
+            break
+    return rows
