@@ -20,7 +20,7 @@ from upd.plot.chart import Chart
 from upd.plot.matplotlib import chart_png, write_sheet
 from upd.plot.png import png_uri
 from upd.report.columns import whole_table
-from upd.report.page import render
+from upd.report.page import Section, Verdict, page_text, versions_text
 from upd.report.panels import make_panels
 from upd.results.answer_table import AnswerTable
 from upd.scene import AnyScene
@@ -120,11 +120,18 @@ class FigureAnswer(ABC):
         charts
             Those of its figure.
         """
+        word, kind = self.outcome
+        new = self.scene is not self.source
+        text = "The scene with the values that were found." if new else "The scene of the question."
+        sections = [
+            *(Section(table.heading, [table], kind="grid") for table in self.tables),
+            Section("Notes", texts=self.notes),
+            Section("Figures", panels=make_panels(charts, {})),
+            Section("Scene file", texts=[text], file=self._scene_file),
+        ]
         title = self.source.title or self.source.name
-        context = {"answer": self, "title": title, "text": self._scene_file}
-        return render(
-            "answer.html.j2", make_panels(charts, {}), [], context | {"versions": versions()}
-        )
+        verdict = Verdict(kind, word, f"{self.verdict}.")
+        return page_text(title, sections, verdict=verdict, footer=versions_text(versions()))
 
     @property
     def _scene_file(self) -> str:
