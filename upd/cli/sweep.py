@@ -5,20 +5,20 @@ from __future__ import annotations
 import math
 import re
 import textwrap
-from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.markup import escape
+from rich.text import Text
 
 from upd.batch.output import SweepResult
 from upd.batch.plan import SweepPlan
 from upd.cli.progress import counted, duration
 from upd.cli.tables import print_table
-from upd.labels import number, number_label, percent_of
-from upd.report.columns import TextColumn
-from upd.results.sampled import SampledNumber, sample_sentence
+from upd.report.columns import TextColumn, whole_table
+from upd.report.tables import sample_table
+from upd.results.sampled import sample_sentence
 
 #: Rows shown, and characters of a line of a head; the files hold all.
 _ROWS, _WIDTH = 30, 14
@@ -77,7 +77,7 @@ def print_sweep(console: Console, result: SweepResult) -> None:
         values = (_shown(result, number, column.values, k) for number in range(len(places)))
         head = _head(column.name, column.case, column.unit)
         columns.append(TextColumn(head, tuple(values), right=True, rank=k))
-    left_out = print_table(console, columns, told=False)
+    left_out = print_table(console, columns, named=False)
     hidden = len(plan.places) - _ROWS, len(left_out)
     if max(hidden) > 0:
         console.print(
@@ -89,48 +89,11 @@ def print_sweep(console: Console, result: SweepResult) -> None:
 
 def print_sample(console: Console, result: SweepResult) -> None:
     """What the sample makes of every number, and where the rest is."""
-    rows = result.sampled
-    columns = [
-        TextColumn("number", tuple(number_label(one.name) for one in rows), folds=_WIDTH),
-        TextColumn("case", tuple(one.case for one in rows), rank=1, folds=_WIDTH),
-        _numbers("as given", rows, lambda one: number(one.nominal)),
-        _numbers("first\norder", rows, lambda one: _band(one.first_order)),
-        _numbers("sample", rows, _sample_band),
-        _numbers("mean", rows, lambda one: number(one.mean), 3),
-        _numbers("standard\ndeviation", rows, lambda one: number(one.deviation), 4),
-        _numbers(_span(rows), rows, _middle, 2),
-        TextColumn("unit", tuple(one.unit for one in rows)),
-        TextColumn("compared", tuple(one.verdict for one in rows), folds=2 * _WIDTH),
-    ]
-    print_table(console, columns, title="Bands by the inputs, to first order and sampled")
-    console.print(escape(sample_sentence(rows)))
+    table = sample_table(result.sampled)
+    for line in (table.heading, *whole_table(table, console.width)):
+        console.print(Text(line), soft_wrap=True)
+    console.print(escape(sample_sentence(result.sampled)))
     _print_end(console, result)
-
-
-def _numbers(
-    head: str, rows: Sequence[SampledNumber], text: Callable[[SampledNumber], str], rank: int = 0
-) -> TextColumn:
-    return TextColumn(head, tuple(map(text, rows)), right=True, rank=rank)
-
-
-def _band(band: float | None) -> str:
-    return "" if band is None else f"±{percent_of(band)}"
-
-
-def _sample_band(one: SampledNumber) -> str:
-    """The sample's band and its sampling error."""
-    if one.band_low is None or one.band_high is None:
-        return _band(one.band)
-    return f"{_band(one.band)} ({100.0 * one.band_low:.2g} to {100.0 * one.band_high:.2g})"
-
-
-def _span(rows: Sequence[SampledNumber]) -> str:
-    """What the ends of a sample are."""
-    return "middle\n95 %" if all(one.resolved for one in rows) else "least to\nlargest"
-
-
-def _middle(one: SampledNumber) -> str:
-    return "" if one.low is None else f"{number(one.low)} to {number(one.high)}"
 
 
 def _print_end(console: Console, result: SweepResult) -> None:
@@ -163,7 +126,7 @@ def _print_failures(console: Console, result: SweepResult) -> None:
 
 
 def _shown(result: SweepResult, place: int, values: NDArray[np.float64], column: int) -> str:
-    """A number of a point; the first column says that it failed."""
+    """A number of a point; the first column marks one that failed."""
     if result.outcomes[place].failure:
         return "" if column else "failed"
     value = float(values[place])

@@ -1,12 +1,8 @@
 """A chart as data: what the page draws with plotly, matplotlib draws without it, and a comparison
 overlays.
 
-Each analysis package may have a module ``charts`` with two functions, both from the run folder's
-content alone:
-
-    charts(arrays, summary) -> list[Chart]
-    headline(rows) -> list[dict]    the 5 to 8 rows of summary["results"] that engineers ask for,
-                                    most important first
+Each analysis has a function ``charts(arrays, summary) -> list[Chart]`` that makes them from the run
+folder's content alone:
 
     arrays     group -> name -> `Variable`, as in result.nc
     summary    summary.json, with the scene file's tables under "scene_file"
@@ -16,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -254,7 +250,7 @@ class Chart:
         Name of the PNG file in the run folder, without ending, on whose sheet it stands; none
         when empty.
     sheet
-        Whether it stands on that sheet at all: of many cases the page shows all, a sheet the
+        Whether that sheet shows it at all: of many cases the page shows all, a sheet the
         first ones.
     columns, size
         Charts side by side on the sheet, and inches of each.
@@ -263,7 +259,7 @@ class Chart:
     note
         What to see, one sentence.
     detail
-        What a drawing says beside its case though charts are not told apart by it: the
+        What a drawing shows beside its case though no choice depends on it: the
         frequency of the peak, the damping.
     heading
         Of the place on the page; the title when empty.
@@ -289,16 +285,6 @@ class Chart:
     size: tuple[float, float] = (5.6, 4.4)
     detail: str = ""
     heading: str = ""
-
-
-class Charts(Protocol):
-    """The module ``charts`` of an analysis package."""
-
-    def charts(self, arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
-        """All charts of a run."""
-
-    def headline(self, results: list[Entry]) -> list[Entry]:
-        """The 5 to 8 numbers an engineer asks for."""
 
 
 #: states of a contact point, in the order of the values 0, 1, 2

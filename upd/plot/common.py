@@ -41,7 +41,7 @@ def lattice(group: Group, scale: float) -> tuple[Array, Array]:
 def pressure_map(group: Group, scale: float, *, top: float | None = None) -> Map:
     """Contact pressure; nothing where the contact is open.
 
-    ``top``: end of the colours, where only the edge goes on.
+    ``top``: end of the colours, above which only the edge is.
     """
     x, y = lattice(group, scale)
     p = np.asarray(group["pressure"].data)

@@ -20,7 +20,7 @@ def labelled(chart: Chart) -> NDArray[np.bool_]:
     """Which marks have words beside them, (n,).
 
     From the highest down, those whose words have room beside the words of the higher ones; the
-    page tells the others at the pointer.
+    page shows the others at the pointer.
     """
     x, y, tall = _parts(chart, "x"), _parts(chart, "y"), _heights(chart)
     shift = {"right": _WIDE / 2, "center": 0.0, "left": -_WIDE / 2}
@@ -40,12 +40,12 @@ def sides(chart: Chart) -> list[Literal["left", "center", "right"]]:
 
 def with_room(chart: Chart) -> Chart:
     """The chart with room for words above its highest mark, where the end of y is free."""
-    told = labelled(chart)
-    if chart.y.high is not None or not told.any():
+    shown = labelled(chart)
+    if chart.y.high is not None or not shown.any():
         return chart
     low, high = _ends(chart, "y")
     # where the part of the height above a mark is that of its words
-    ends = _parts(chart, "y")[told] / (1.0 - _heights(chart)[told])
+    ends = _parts(chart, "y")[shown] / (1.0 - _heights(chart)[shown])
     end = low + (high - low) * max(1.0, float(ends.max()))
     return replace(chart, y=replace(chart.y, high=10.0**end if _is_log(chart, "y") else end))
 

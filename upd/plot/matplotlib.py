@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import textwrap
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -18,9 +18,9 @@ from upd.plot.labels import with_room
 from upd.plot.style import (
     coordinates,
     is_log,
-    legend_names,
     log_ticks,
     log_view,
+    plain,
     tick_text,
     title_of,
 )
@@ -33,16 +33,12 @@ if TYPE_CHECKING:
 MOST_PANELS = 24
 #: dots per inch of a run folder's sheets, and of a page's pictures
 _DPI, _PAGE_DPI = 130, 110
-#: size in points of a title's letters, on two lines and on one axis, the least to which they
-#: shrink, and of ticks
-_TITLE, _TWO_LINES, _LEAST, _TICKS = 11.0, 10.0, 6.5, 9.0
-#: inches a title may reach over its axes on both sides together: what the sheet's right margin
-#: leaves
+#: points of the letters of titles and ticks, and mean width of a letter as a part of them
+_LETTERS, _WIDE = 9.0, 0.56
+#: inches a title may reach over its axes on both sides together
 _OVER = 0.45
 #: inches beside, and above and below, a wide map on its panel: labels, title and colour bar
 _BESIDE, _ABOVE = 1.05, 2.0
-#: width in points of a text in letters of a size in points
-Width = Callable[[str, float], float]
 
 
 def draw(chart: Chart, ax: Axes | None = None) -> Axes:
@@ -61,7 +57,6 @@ def draw(chart: Chart, ax: Axes | None = None) -> Axes:
         The axes drawn on.
     """
     # matplotlib is slow to import: only when something is drawn.
-    from upd.plot import matplotlib_around as around
     from upd.plot import matplotlib_parts as parts
     from upd.plot.sheet import own_axes
 
@@ -84,9 +79,9 @@ def draw(chart: Chart, ax: Axes | None = None) -> Axes:
     parts.draw_marks(chart.marks, ax)
     if chart.equal:
         ax.set_aspect("equal")
-    around.draw_legend(chart, legend_names(chart), ax)
+    parts.draw_legend(chart, ax)
     _titles(chart, ax)
-    around.draw_labels(chart, ax)
+    parts.draw_labels(chart, ax)
     return ax
 
 
@@ -103,7 +98,7 @@ def write_sheet(charts: Sequence[Chart], path: Path) -> list[Path]:
     Parameters
     ----------
     charts
-        Those that stand on a sheet (`Chart.sheet`) are drawn, at most `MOST_PANELS`, with the
+        Those of a sheet (`Chart.sheet`) are drawn, at most `MOST_PANELS`, with the
         columns and the size of the first.
     path
         PNG file.
@@ -111,7 +106,7 @@ def write_sheet(charts: Sequence[Chart], path: Path) -> list[Path]:
     Returns
     -------
     list of Path
-        ``path``, or nothing when no chart stands on the sheet.
+        ``path``, or nothing when no chart belongs to a sheet.
     """
     shown = [chart for chart in charts if chart.sheet]
     if not shown:
@@ -159,20 +154,12 @@ def _sheet(charts: Sequence[Chart], dpi: int) -> Figure:
     if all(is_wide(chart) for chart in charts):
         # Wide maps leave no empty place above each other.
         tall = min(tall, max(proportion(chart) for chart in charts) * (wide - _BESIDE) + _ABOVE)
-    return draw_sheet(
-        [partial(draw, chart) for chart in charts[:MOST_PANELS]],
-        first.columns,
-        (wide, tall),
-        dpi,
-        # only legends need a room that nobody knows before
-        fixed=not any(
-            legend_names(one) or any(m.states for m in one.maps) for one in charts[:MOST_PANELS]
-        ),
-    )
+    drawings = [partial(draw, chart) for chart in charts[:MOST_PANELS]]
+    return draw_sheet(drawings, first.columns, (wide, tall), dpi)
 
 
 def _grid(chart: Chart, ax: Axes) -> None:
-    ax.tick_params(labelsize=_TICKS)
+    ax.tick_params(labelsize=_LETTERS)
     if not (chart.maps or chart.bars):
         ax.grid(visible=True, which="major", color="#dddddd", lw=0.6)
         ax.set_axisbelow(True)
@@ -194,7 +181,7 @@ def _axis(chart: Chart, axis: Axis, name: Literal["x", "y"], ax: Axes) -> None:
         ax.margins(x=0.0)
     if axis.ticks:
         which.set_ticks(
-            [at for at, _ in axis.ticks], labels=[_plain(text) for _, text in axis.ticks]
+            [at for at, _ in axis.ticks], labels=[plain(text) for _, text in axis.ticks]
         )
     if axis.low is not None or axis.high is not None:
         # matplotlib would take the free end from the view of this moment: let it be that of all
@@ -215,67 +202,22 @@ def _log_axis(name: Literal["x", "y"], values: Array, ax: Axes) -> None:
 
 
 def _titles(chart: Chart, ax: Axes) -> None:
-    """Title and names of the axes, small enough for their place."""
+    """Title and names of the axes, in lines that their place holds."""
     figure, box = ax.figure.get_figure(root=True), ax.get_position(original=True)
     assert figure is not None
-    # Axes of one scale are lower than their place.
-    ax.apply_aspect()
-    box_height = ax.get_position().height
-    points = 72.0 / figure.dpi
-
-    def width(text: str, size: float) -> float:
-        # The title itself measures: letters on pixels differ by a tenth from their outlines.
-        ax.title.set(text=_plain(text), fontsize=size)
-        return float(ax.title.get_window_extent().width) * points
-
-    wide, tall = (
-        72.0 * figure.get_figwidth() * box.width,
-        72.0 * figure.get_figheight() * box_height,
-    )
-    ax.set_xlabel(_plain(chart.x.label), fontsize=shrunk(chart.x.label, wide, width))
-    ax.set_ylabel(_plain(chart.y.label), fontsize=shrunk(chart.y.label, tall + 36.0, width))
-    text, size = fitted(*title_of(chart), wide + 72.0 * _OVER, width)
+    across = int(72.0 * (figure.get_figwidth() * box.width + _OVER) / (_WIDE * _LETTERS))
+    upwards = int(72.0 * (figure.get_figheight() * box.height + _OVER) / (_WIDE * _LETTERS))
+    ax.set_xlabel(_lines(chart.x.label, across), fontsize=_LETTERS)
+    ax.set_ylabel(_lines(chart.y.label, upwards), fontsize=_LETTERS)
+    title, case = title_of(chart)
+    whole = f"{title}: {case}" if case else title
+    own_lines = case and across < len(whole) and max(len(title), len(case)) <= across
+    text = f"{title}\n{case}" if own_lines else whole
     # Its height given, matplotlib does not look for one: that costs a quarter of all drawing.
-    ax.set_title(_plain(text), fontsize=size, y=1.0)
+    ax.set_title(plain(text) if own_lines else _lines(text, across), fontsize=_LETTERS, y=1.0)
 
 
-def fitted(title: str, case: str, room: float, width: Width) -> tuple[str, float]:
-    """The title with its case on one or two lines, and the size of its letters in points, so that
-    no line is wider than ``room`` points.
-
-    ``width`` tells how wide a text is in letters of a size. What does not fit in the smallest
-    letters is cut.
-    """
-    title, case = title.strip(), case.strip()
-    whole = f"{title}: {case}" if case and title else title or case
-    if width(whole, _TITLE) <= room:
-        return whole, _TITLE
-    halves = textwrap.wrap(whole, max(len(whole) // 2 + 8, 12), max_lines=2, placeholder=" …") or [
-        whole
-    ]
-    # The case has its own line unless it, or the title, is much the longer.
-    own = [title, case] if case and title else halves
-    lines = own if all(width(line, _TWO_LINES) <= room for line in own) else halves
-    size = min(shrunk(line, room, width) for line in lines)
-    return "\n".join(_cut(line, size, room, width) for line in lines), size
-
-
-def _cut(line: str, size: float, room: float, width: Width) -> str:
-    while (found := width(line, size)) > room and len(line) > 2:
-        line = line[: min(int(len(line) * room / found), len(line) - 2)] + "…"
-    return line
-
-
-def shrunk(text: str, room: float, width: Width) -> float:
-    """Size of letters in points with which a line is no wider than ``room`` points, if that can be
-    read.
-    """
-    size = _TWO_LINES
-    while size > _LEAST and width(text, size) > room:
-        size -= 0.5
-    return size
-
-
-def _plain(text: str) -> str:
-    """Text matplotlib does not take for mathematics."""
-    return text.replace("$", r"\$")
+def _lines(text: str, letters: int) -> str:
+    """A text on at most two lines of so many letters; what does not fit is cut."""
+    lines = textwrap.wrap(text, max(letters, 12), max_lines=2, placeholder=" …")
+    return plain("\n".join(lines))

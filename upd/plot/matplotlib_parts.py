@@ -11,22 +11,28 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PathCollection
 from matplotlib.colors import ListedColormap
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.path import Path as Outline
 from matplotlib.transforms import IdentityTransform
 
 from upd.plot.chart import Area, Axis, Band, Chart, Map, Mark, Pies, Trace
+from upd.plot.labels import labelled, sides
 from upd.plot.style import (
     CROSS,
     PART_COLOURS,
     SHARE_COLOURS,
-    STATE_COLOURS,
     area_colour,
     band_colour,
     colour_of,
     colour_range,
     coordinates,
     even_levels,
+    legend_names,
     marker_area,
+    plain,
+    sector,
+    state_colours,
 )
 
 _STYLE: dict[str, dict[str, Any]] = {
@@ -41,10 +47,11 @@ _STYLE: dict[str, dict[str, Any]] = {
     "star": {"ls": "", "marker": "*", "ms": 13},
 }
 _BAR_HEIGHT, _LETTER = 0.6, 8
+#: points of the letters of a legend and of the words beside a mark, of what stands before an entry
+#: of a legend, and rows of it at most
+_SMALL, _HANDLE, _ROWS = 7.0, 32.0, 6
 #: width over height from which the colour bar of a map lies below it
 _WIDE_MAP = 1.6
-#: inches from a wide map to its colour bar, where the name of x stands, and the height of the bar
-BAR_PAD, BAR_TALL = 0.5, 0.12
 #: cells of a map of states along one side that have lines between them
 _FEW_CELLS = 32
 #: room below and above pies, as a part of their height
@@ -69,7 +76,7 @@ def draw_trace(t: Trace, ax: Axes) -> None:
 
 
 def draw_marks(marks: Sequence[Mark], ax: Axes) -> None:
-    """A dot at every mark; their words come last (`upd.plot.matplotlib_around.draw_labels`)."""
+    """A dot at every mark; their words come last (`draw_labels`)."""
     for mark in marks:
         ax.plot(mark.x, mark.y, "o", ms=3.5, color=colour_of(mark), zorder=4)
 
@@ -158,7 +165,7 @@ def draw_pies(pies: Pies, ax: Axes) -> None:
     for k, state in enumerate(pies.states):
         on = np.flatnonzero(pies.shares[:, k] > 0.0)
         if on.size:
-            sectors = [_sector(end[p, k] - pies.shares[p, k], end[p, k]) for p in on]
+            sectors = [Outline(sector(end[p, k] - pies.shares[p, k], end[p, k])) for p in on]
             places = np.column_stack([pies.x, pies.y])[on]
             drawn = PathCollection(
                 sectors,
@@ -182,13 +189,6 @@ def draw_pies(pies: Pies, ax: Axes) -> None:
     )
     ax.margins(0.12, 0.0)
     ax.autoscale_view()
-
-
-def _sector(begin: float, end: float) -> Outline:
-    """From the top clockwise, of diameter 1; ``begin`` and ``end`` as parts of the whole."""
-    angle = 2.0 * np.pi * (0.25 - np.linspace(begin, end, 41))
-    rim = 0.5 * np.column_stack([np.cos(angle), np.sin(angle)])
-    return Outline(rim if end - begin >= 1.0 else np.vstack([[0.0, 0.0], rim]), closed=False)
 
 
 def draw_scatters(chart: Chart, ax: Axes) -> None:
@@ -227,11 +227,6 @@ def draw_maps(chart: Chart, ax: Axes) -> None:
             bar = _bar(drawn, chart, m.value, ax, extend=_extend(chart.maps, low, high))
             if m.states:
                 bar.set_ticks(list(range(len(m.states))), labels=[plain(s) for s in m.states])
-
-
-def state_colours(m: Map) -> list[str]:
-    """Colours of the states of a map, in their order."""
-    return [SHARE_COLOURS.get(s, c) for s, c in zip(m.states, STATE_COLOURS, strict=False)]
 
 
 def _states(m: Map, ax: Axes) -> Any:
@@ -276,28 +271,14 @@ def _extend(maps: Sequence[Map], low: float, high: float) -> str:
     """Where values go on beyond the ends of the scale."""
     below = any(bool((m.z < low).any()) for m in maps if not m.states)
     above = any(bool((m.z > high).any()) for m in maps if not m.states)
-    return {
-        (False, False): "neither",
-        (True, False): "min",
-        (False, True): "max",
-        (True, True): "both",
-    }[below, above]
+    return ("neither", "min", "max", "both")[below + 2 * above]
 
 
 def _bar(drawn: Any, chart: Chart, axis: Axis, ax: Axes, extend: str = "neither") -> Any:
     """Colour bar: beside the axes, below those of a wide drawing."""
     place: dict[str, Any] = {"shrink": 0.85}
     if is_wide(chart):
-        figure = ax.figure.get_figure(root=True)
-        assert figure is not None
-        wide, tall = figure.get_size_inches() * ax.get_position().size
-        place = {
-            "location": "bottom",
-            "pad": BAR_PAD / tall,
-            "fraction": BAR_TALL / tall,
-            "aspect": wide / BAR_TALL,
-        }
-        place |= {"anchor": (0.5, 1.0), "panchor": (0.5, 0.0)}
+        place |= {"location": "bottom", "aspect": 40.0}
     # Contours have their own ends.
     if not hasattr(drawn, "levels"):
         place["extend"] = extend
@@ -320,6 +301,55 @@ def proportion(chart: Chart) -> float:
     return float(y / x) if x > 0.0 else 0.0
 
 
-def plain(text: str) -> str:
-    """Text matplotlib does not take for mathematics."""
-    return text.replace("$", r"\$")
+def draw_legend(chart: Chart, ax: Axes) -> None:
+    """Below the axes: an entry per name in the order of the names, and the states of maps."""
+    drawn, labels = ax.get_legend_handles_labels()
+    handles: dict[str, Any] = {
+        name: drawn[labels.index(plain(name))]
+        for name in legend_names(chart)
+        if plain(name) in labels
+    }
+    for state in (state for pies in chart.pies for state in pies.states):
+        handles[state] = Line2D([], [], marker="o", ls="", color=SHARE_COLOURS.get(state))
+    for m in () if is_wide(chart) else chart.maps:
+        for state, colour in zip(m.states, state_colours(m), strict=False):
+            handles[state] = Patch(facecolor=colour, edgecolor="#999999", lw=0.4)
+    if not handles:
+        return
+    figure = ax.figure.get_figure(root=True)
+    assert figure is not None
+    wide = 72.0 * figure.get_figwidth() * ax.get_position(original=True).width
+    columns = max(int(wide / (0.55 * _SMALL * max(map(len, handles)) + _HANDLE)), 1)
+    shown = dict(list(handles.items())[: _ROWS * columns - 1])
+    if more := len(handles) - len(shown):
+        shown |= {f"and {more} more": Line2D([], [], ls="")} if more > 1 else handles
+    what = [p.what for p in chart.pies if p.what]
+    ax.legend(
+        list(shown.values()),
+        [plain(name) for name in shown],
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.15),
+        ncols=min(columns, len(shown)),
+        frameon=False,
+        fontsize=_SMALL,
+        title=plain(f"sector: share of the cycle, size: {what[0]}") if what else None,
+        title_fontsize=_SMALL,
+    )
+
+
+def draw_labels(chart: Chart, ax: Axes) -> None:
+    """Words above the marks that have room for them."""
+    align = {"right": "left", "center": "center", "left": "right"}
+    for mark, shown, side in zip(chart.marks, labelled(chart), sides(chart), strict=True):
+        if shown:
+            ax.annotate(
+                plain(mark.text),
+                (mark.x, mark.y),
+                (0.0, 3.0),
+                textcoords="offset points",
+                ha=align[side],
+                va="bottom",
+                fontsize=_SMALL,
+                color=colour_of(mark),
+                bbox={"fc": "white", "ec": "none", "alpha": 0.7, "pad": 0.5},
+            )

@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch as LegendPatch
 from numpy.typing import NDArray
 
-from upd.mesh import FloatArray, IntArray, Mesh
+from upd.mesh import IntArray, Mesh
 from upd.mesh.boundary import boundary_quads
 from upd.mesh.sides import outward_area
-from upd.plot.modes import shaded_sides, view_axes
+from upd.plot.modes import frame_axes, shaded_sides, view_axes
 from upd.plot.sheet import Drawing, draw_sheet
 from upd.plot.style import COLOURS
 
@@ -38,14 +38,14 @@ def draw_meshes(meshes: Mapping[str, Mesh], title: str = "") -> Figure:
     those that look down as one sees them from below, each with what lies near them.
     """
     drawings: list[Drawing] = [partial(_draw, meshes=_apart(meshes), title=title, lines=_FAR_LINES)]
-    for up, told in ((True, "from above"), (False, "from below")):
+    for up, side in ((True, "from above"), (False, "from below")):
         seen = {name: mesh for name, mesh in meshes.items() if _looks(mesh) == up}
         if seen:
             drawings.append(
                 partial(
                     _draw,
                     meshes=seen,
-                    title=f"contact of {' and '.join(seen)}, {told}",
+                    title=f"contact of {' and '.join(seen)}, {side}",
                     lines=_NEAR_LINES,
                     elevation=_STEEP if up else -_STEEP,
                     among=list(meshes),
@@ -128,8 +128,9 @@ def _draw(
     ax.add_collection(surface)
     touched = np.concatenate(contact)
     flat = every @ axes[:2].T
-    _frame(ax, flat[touched] if among else flat[np.unique(shown)], _AROUND if among else 0.02)
-    ax.set_title(title, fontsize=11)
+    framed = flat[touched] if among else flat[np.unique(shown)]
+    margin = (_AROUND if among else 0.02) * float(np.ptp(framed, axis=0).max())
+    frame_axes(ax, framed, margin, title)
     if not among:
         _legend(ax, shades, contact=len(touched) > 0)
 
@@ -146,12 +147,3 @@ def _legend(ax: Axes, shades: Mapping[str, tuple[float, float, float]], *, conta
     ax.legend(
         handles=handles, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=4, frameon=False
     )
-
-
-def _frame(ax: Axes, flat: FloatArray, around: float) -> None:
-    """Limits around points of the picture, (n, 2), by a share of their extent."""
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    margin = around * float((high - low).max())
-    ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
-    ax.set_aspect("equal")
-    ax.set_axis_off()

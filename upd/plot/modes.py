@@ -72,7 +72,9 @@ def draw_mode(
     ax.add_collection(
         shaded_sides(points + SCALE * size / largest * u, faces, colours, axes), autolim=False
     )
-    return _framed(ax, points @ axes[:2].T, SCALE * size, title)
+    # around all points at rest: pictures side by side have one scale
+    frame_axes(ax, points @ axes[:2].T, SCALE * size, title)
+    return ax
 
 
 def _checked(meshes: Mapping[str, Mesh], shapes: Mapping[str, Any]) -> dict[str, FloatArray]:
@@ -184,12 +186,10 @@ def _outline(points: FloatArray, quads: IntArray, axes: FloatArray) -> LineColle
     return LineCollection(list(lines), colors=_OUTLINE, linewidths=0.6, zorder=1)
 
 
-def _framed(ax: Axes, flat: FloatArray, margin: float, title: str) -> Axes:
-    """Limits that hold every mode of the same bodies, so that pictures side by side have one
-    scale.
-    """
+def frame_axes(ax: Axes, flat: FloatArray, margin: float, title: str) -> None:
+    """Limits around points (n, 2) of a picture, without axes."""
     low, high = flat.min(axis=0) - margin, flat.max(axis=0) + margin
-    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=title)
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    ax.set_title(title, fontsize=11)
     ax.set_aspect("equal")
     ax.set_axis_off()
-    return ax

@@ -13,19 +13,16 @@ from typing import Any
 import numpy as np
 
 from upd.plot import plotly_parts as parts
-from upd.plot import plotly_places as places
 from upd.plot.chart import Array, Axis, Chart
 from upd.plot.labels import with_room
-from upd.plot.plotly_values import pack
+from upd.plot.plotly_parts import pack
 from upd.plot.style import coordinates, is_log, legend_names, log_ticks, log_view, tick_text
 
 __all__ = ["figure", "pack"]
 
 _GRID = "#e6e6e6"
-#: part of an axis beyond the data, as plotly leaves it
-_AIR = 0.05
-#: letters of an upright axis' name that have room
-_LETTERS = 42
+#: letters of an upright axis' name that have room, and pixels of a bar with its words
+_LETTERS, _ROW = 42, 54
 
 
 def figure(chart: Chart) -> dict[str, Any]:
@@ -39,33 +36,22 @@ def figure(chart: Chart) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``data`` and ``layout`` of a plotly figure; ``wide``, width over height of the drawing.
+        ``data`` and ``layout`` of a plotly figure; ``wide``, width over height of the drawing, and
+        ``least``, pixels that its height has at least.
     """
     chart = with_room(chart)
     names = {escape(name) for name in legend_names(chart)}
-    data = [
-        *places.maps(chart),
-        *(t for area in chart.areas for t in parts.area(chart, area)),
-        *parts.bars(chart),
-    ]
-    data += [parts.trace(chart, t) for t in chart.traces]
-    data += [
-        *places.pies(chart),
-        *places.scatters(chart),
-        *parts.marks(chart),
-        *(parts.band_entry(band) for band in chart.bands),
-    ]
-    told: set[str] = set()
+    data = list(parts.traces(chart))
     for trace in data:
-        name = trace.get("name", "")
         # Curves of one name, as of the contact faces of one load, have one entry.
-        trace["showlegend"] = trace.get("showlegend", True) and name in names - told
-        told |= {name} if trace["showlegend"] else set()
+        trace["showlegend"] = trace["name"] in names
+        names.discard(trace["name"])
     layout: dict[str, Any] = {
         "xaxis": _axis(chart, chart.x, coordinates(chart, "x")),
         "yaxis": _axis(chart, chart.y, coordinates(chart, "y"), _LETTERS),
         "hovermode": "closest",
-        "showlegend": bool(names),
+        "showlegend": any(trace["showlegend"] for trace in data),
+        "shapes": parts.shapes(chart),
     }
     if chart.equal:
         layout["yaxis"] |= {"scaleanchor": "x", "scaleratio": 1, "constrain": "domain"}
@@ -73,10 +59,8 @@ def figure(chart: Chart) -> dict[str, Any]:
     if chart.bars:
         layout |= {"barmode": "stack"}
         layout["yaxis"] |= parts.cases_axis(chart)
-    shapes = [shape for band in chart.bands for shape in parts.band(band)] + places.sectors(chart)
-    if shapes:
-        layout["shapes"] = shapes
-    return {"data": data, "layout": layout, "wide": _wide(chart)}
+    least = _ROW * sum(len(bars.cases) for bars in chart.bars)
+    return {"data": data, "layout": layout, "wide": _wide(chart), "least": least}
 
 
 def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[str, Any]:
@@ -103,7 +87,7 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
         # The last word may reach beyond the axis.
         out |= at | {"ticklabeloverflow": "allow"}
     if axis.low is not None or axis.high is not None:
-        out["range"] = _range(axis, values, log)
+        out["range"] = [_end(axis.low, log), _end(axis.high, log)]
     return out | {
         "linecolor": "#999999",
         "ticks": "outside",
@@ -114,25 +98,13 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
     }
 
 
-def _range(axis: Axis, values: Array, log: bool) -> list[float | None]:
-    """Ends of an axis as plotly takes them: logarithms on a logarithmic one.
-
-    Those of the data with their air where none is given, for plotly forgets one that stands alone;
-    nothing without data.
+def _end(value: float | None, log: bool) -> float | None:
+    """The end of an axis as plotly takes it: a logarithm on a logarithmic one; that of the data
+    where it is None.
     """
-    seen = np.log10(values[values > 0.0]) if log else values
-    ends: list[float | None] = [
-        None if value is None or (log and value <= 0.0) else math.log10(value) if log else value
-        for value in (axis.low, axis.high)
-    ]
-    if seen.size:
-        known = [
-            end if end is not None else float(f(seen))
-            for end, f in zip(ends, (np.min, np.max), strict=True)
-        ]
-        air = _AIR * (known[1] - known[0])
-        ends = [known[0] - air * (ends[0] is None), known[1] + air * (ends[1] is None)]
-    return ends
+    if value is None or not log:
+        return value
+    return math.log10(value) if value > 0.0 else None
 
 
 def _wide(chart: Chart) -> float:

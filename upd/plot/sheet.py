@@ -16,9 +16,6 @@ from upd.cache.files import whole_file
 Drawing = Callable[[Axes], Any]
 
 _DPI = 130
-#: inches around all axes (left, bottom, right, top) and between them: room for labels below and a
-#: title of two lines above
-_MARGINS, _GAP = (0.8, 0.6, 0.25, 0.5), 1.05
 
 
 def own_axes(ax: Axes | None) -> Axes:
@@ -35,28 +32,14 @@ def draw_sheet(
     columns: int,
     size: tuple[float, float] = (5.6, 4.4),
     dpi: int = _DPI,
-    *,
-    fixed: bool = True,
 ) -> Figure:
     """A figure of ``dpi`` dots per inch with each of ``drawings`` on axes of ``size`` inches,
     ``columns`` side by side.
-
-    Margins are ``fixed``, or as wide as what stands around the axes: that draws twice.
     """
     columns = min(columns, len(drawings))
     rows = -(-len(drawings) // columns)
-    w, h = size[0] * columns, size[1] * rows
-    figure = Figure(figsize=(w, h), dpi=dpi, layout=None if fixed else "constrained")
+    figure = Figure(figsize=(size[0] * columns, size[1] * rows), dpi=dpi, layout="constrained")
     FigureCanvasAgg(figure)
-    left, bottom, right, top = _MARGINS
-    wide = (w - left - right - _GAP * (columns - 1)) / columns
-    tall = (h - bottom - top - _GAP * (rows - 1)) / rows
-    if fixed:
-        figure.subplots_adjust(
-            *(left / w, bottom / h, 1.0 - right / w, 1.0 - top / h),
-            wspace=_GAP / wide,
-            hspace=_GAP / tall,
-        )
     for k, draw in enumerate(drawings):
         ax = figure.add_subplot(rows, columns, k + 1)
         draw(ax)

@@ -13,7 +13,7 @@ import numpy as np
 
 from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Mark, Scatter, Trace
 
-#: colours of curves: dark enough on white, told apart by colour-blind eyes too (Okabe and Ito 2008)
+#: colours of curves: dark enough on white, different to colour-blind eyes too (Okabe and Ito 2008)
 COLOURS = ("#1f5fa8", "#c1561a", "#2a8a68", "#a24b8f", "#6b6b6b", "#b38600", "#3fa0d0", "#8c2d2d")
 #: of maps of states: open, slip and stick in the order of `upd.plot.chart.STATES`, then others
 STATE_COLOURS = ("#f4f4f4", "#f0a35e", "#2b6cb0", "#8cc3a8", "#c9a0bd", "#c0695f")
@@ -41,6 +41,11 @@ def colour_of(part: Trace | Mark) -> str:
     return CLOSED if part.closed else COLOURS[part.colour % len(COLOURS)]
 
 
+def state_colours(m: Map) -> list[str]:
+    """Colours of the states of a map, in their order."""
+    return [SHARE_COLOURS.get(s, c) for s, c in zip(m.states, STATE_COLOURS, strict=False)]
+
+
 def band_colour(band: Band) -> str:
     """Colour of a band; without a number that of measurements, dashed that of limits."""
     if band.colour >= 0:
@@ -62,6 +67,11 @@ def title_of(chart: Chart) -> tuple[str, str]:
 
 def _written(text: str) -> str:
     return text.replace("muN", "µN")
+
+
+def plain(text: str) -> str:
+    """Text matplotlib does not take for mathematics."""
+    return text.replace("$", r"\$")
 
 
 def coordinates(chart: Chart, name: Literal["x", "y"]) -> Array:
@@ -169,10 +179,19 @@ def marker_area(size: Array) -> Array:
     return np.asarray(least + more * np.clip(size, 0.0, 1.0))
 
 
+def sector(begin: float, end: float) -> Array:
+    """Outline (n, 2) of a sector of a disc of the diameter 1, from the top clockwise; ``begin`` and
+    ``end`` as parts of the whole.
+    """
+    angle = 2.0 * np.pi * (0.25 - np.linspace(begin, end, 25))
+    rim = 0.5 * np.column_stack([np.cos(angle), np.sin(angle)])
+    return rim if end - begin >= 1.0 else np.vstack([[0.0, 0.0], rim])
+
+
 def legend_names(chart: Chart) -> list[str]:
     """Entries of the legend, each once.
 
-    None when the only one says what the title, the case or the axis says already.
+    None when the title, the case or the axis has the words of the only one already.
     """
     names = [t.entry or t.label for t in chart.traces] + [
         part.label for kind in (chart.areas, chart.bands) for part in kind
@@ -181,15 +200,5 @@ def legend_names(chart: Chart) -> list[str]:
         state for pies in chart.pies for state in pies.states
     ]
     found = [name for name in dict.fromkeys(names) if name]
-    told = " ".join((chart.title, chart.case, chart.y.name)).casefold()
-    return [] if len(found) == 1 and found[0].casefold() in told and not _explains(chart) else found
-
-
-def _explains(chart: Chart) -> bool:
-    """Whether a single entry tells which part of the drawing it is.
-
-    A line over a map, an area, a band.
-    """
-    return bool(chart.maps or chart.scatters or chart.areas or chart.bands) or any(
-        t.outline for t in chart.traces
-    )
+    shown = " ".join((chart.title, chart.case, chart.y.name)).casefold()
+    return [] if len(found) == 1 and found[0].casefold() in shown else found

@@ -175,10 +175,10 @@ def _fields(data: Mapping[str, NDArray[Any]], bodies: list[SurfaceBody]) -> list
     for label, unit, u, motion, largest in motions.values():
         length = tuple(np.linalg.norm(u[b.nodes], axis=1) for b in bodies)
         scale = 1e3 if unit else 1.0 / (largest or 1.0)
-        told = f"displacement, {label}" if unit else label
+        title = f"displacement, {label}" if unit else label
         out.append(
             Field(
-                told,
+                title,
                 "displacement",
                 "µm" if unit else "",
                 tuple(v * scale for v in length),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from upd.plot.chart import Array, Axis, Chart, Map, Trace
 
 #: charts on one sheet, and sheets, at most: more is no figure any more
 MOST_PANELS, MOST_SHEETS = 24, 24
-#: curves in one chart beside a map: more are not told apart
+#: curves in one chart beside a map: of more one loses track
 _CURVES = 8
 _SIZE = (5.0, 3.9)
 #: figure of all numbers over up to two parameters
@@ -144,18 +144,17 @@ def _multiples(varied: Sequence[Varied], number: FollowedNumber, grid: Array) ->
     outside = [p for p in varied if p not in inside]
     moved = np.moveaxis(grid, [varied.index(p) for p in [*outside, *inside]], range(grid.ndim))
     limits = float(np.nanmin(grid)), float(np.nanmax(grid))
-    look: dict[str, Any] = {"limits": limits, "figure": sheet_name(number), "columns": 3}
+    every = itertools.product(*(range(len(p.values)) for p in outside))
     charts = []
-    for index in itertools.islice(
-        itertools.product(*(range(len(p.values)) for p in outside)), MOST_PANELS
-    ):
-        place = ", ".join(
+    for index in itertools.islice(every, MOST_PANELS):
+        values = ", ".join(
             f"{short(p)} = {p.values[k]}" for p, k in zip(outside, index, strict=True)
         )
+        place = _Place(values, limits, sheet_name(number), 3)
         if len(inside) == 2:
-            charts.append(_map(inside[0], inside[1], number, moved[index], place=place, **look))
+            charts.append(_map(inside[0], inside[1], number, moved[index], place))
         else:
-            charts.append(_curves(inside[0], None, number, moved[index], place=place, **look))
+            charts.append(_curves(inside[0], None, number, moved[index], place))
     return charts
 
 
@@ -179,16 +178,37 @@ def _sheet_name(name: str, case: str) -> str:
     return f"{_FIGURE}-" + file_name(f"{name} ({case})" if case else name)
 
 
+class _Place(NamedTuple):
+    """Where a chart stands: the values of what is not drawn in it, the ends of its numbers that it
+    shares with others, its sheet, and charts side by side there.
+    """
+
+    values: str = ""
+    limits: tuple[float, float] | None = None
+    figure: str = _FIGURE
+    columns: int = 2
+
+    def chart(self, number: FollowedNumber, x: Axis, y: Axis, **more: Any) -> Chart:
+        """A chart there. Small multiples of one number share its title and are chosen by what
+        differs.
+        """
+        title, case = number_label(number.name), number.case
+        if self.values:
+            title, case = _title(number), self.values
+        shared: dict[str, Any] = {"figure": self.figure, "columns": self.columns, "size": _SIZE}
+        return Chart(title, x, y, case=case, **shared, **more)
+
+
+_ALONE = _Place()
+
+
 def _curves(
     x: Varied,
     other: Varied | None,
     number: FollowedNumber,
     values: Array,
+    place: _Place = _ALONE,
     *,
-    place: str = "",
-    limits: tuple[float, float] | None = None,
-    figure: str = _FIGURE,
-    columns: int = 2,
     sheet: bool = True,
 ) -> Chart:
     """Values over one parameter, one curve per value of ``other``."""
@@ -213,52 +233,30 @@ def _curves(
         for k, (label, y) in enumerate(zip(labels, curves, strict=True))
         if np.isfinite(y).any()
     ]
-    traces = [Trace(label, along[order][span], y, style, k) for k, label, y in drawn]
-    title, case = _names(number, place)
-    if not sheet:
-        # The map of the same number has the title itself.
-        title = f"{title} over {short(x)}"
-    return Chart(
-        title,
-        _abscissa(x),
-        _ordinate(number, limits),
-        tuple(traces),
-        (),
-        case,
-        figure,
-        sheet=sheet,
-        columns=columns,
-        size=_SIZE,
-    )
+    traces = tuple(Trace(label, along[order][span], y, style, k) for k, label, y in drawn)
+    y_axis = _ordinate(number, place.limits)
+    chart = place.chart(number, _abscissa(x), y_axis, traces=traces, sheet=sheet)
+    # The map of the same number has the title itself.
+    return chart if sheet else replace(chart, title=f"{chart.title} over {short(x)}")
 
 
 def _map(
-    x: Varied,
-    y: Varied,
-    number: FollowedNumber,
-    values: Array,
-    *,
-    place: str = "",
-    limits: tuple[float, float] | None = None,
-    figure: str = _FIGURE,
-    columns: int = 2,
+    x: Varied, y: Varied, number: FollowedNumber, values: Array, place: _Place = _ALONE
 ) -> Chart:
     """Filled map over two parameters: values (n_x, n_y)."""
     X, Y = np.array(x.numbers, float), np.array(y.numbers, float)
     i, j = np.argsort(X, kind="stable"), np.argsort(Y, kind="stable")
-    low, high = limits or (float(np.nanmin(values)), float(np.nanmax(values)))
+    low, high = place.limits or (float(np.nanmin(values)), float(np.nanmax(values)))
     same = high - low <= _SAME * max(abs(low), abs(high))
-    title, case = _names(number, place)
-    if same:
-        everywhere = f"{low:.5g} {unit_label(number.unit)}".rstrip() + " everywhere"
-        case = f"{case}, {everywhere}" if case else everywhere
     scale = Axis(number_label(number.name), unit_label(number.unit))
     m = Map(
         X[i], Y[j], values[np.ix_(i, j)], scale, low=low, top=low if same else high, contours=True
     )
-    return Chart(
-        title, _abscissa(x), _abscissa(y), (), (m,), case, figure, columns=columns, size=_SIZE
-    )
+    chart = place.chart(number, _abscissa(x), _abscissa(y), maps=(m,))
+    if not same:
+        return chart
+    everywhere = f"{low:.5g} {unit_label(number.unit)}".rstrip() + " everywhere"
+    return replace(chart, case=", ".join(filter(None, (chart.case, everywhere))))
 
 
 def short(parameter: Varied) -> str:
@@ -290,14 +288,6 @@ def _ordinate(number: FollowedNumber, limits: tuple[float, float] | None) -> Axi
     room = 0.05 * (high - low)
     ends = (low - room, high + room) if room > 0.0 else (None, None)
     return Axis(number_label(number.name), unit_label(number.unit), low=ends[0], high=ends[1])
-
-
-def _names(number: FollowedNumber, place: str) -> tuple[str, str]:
-    """Title and case of a chart.
-
-    Small multiples of one number share its title and are chosen by their place.
-    """
-    return (_title(number), place) if place else (number_label(number.name), number.case)
 
 
 def _title(number: FollowedNumber) -> str:

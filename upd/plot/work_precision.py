@@ -41,22 +41,14 @@ def work_precision_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
     list of Chart
         For each number and case that has an error: the errors in per cent over seconds and over
         memory. The first four numbers, with their first and last case (smallest and largest load),
-        stand on the sheet ``work_precision``; of a forced response, those with friction.
+        are on the sheet ``work_precision``; of a forced response, those with friction.
     """
-    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
-    for curve in curves:
-        groups.setdefault((str(curve["name"]), str(curve["case"])), []).append(curve)
-    # A number that no level moves has no error to show.
-    groups = {
-        key: group
-        for key, group in groups.items()
-        if any(np.any(np.abs(np.array(c["error"], float)) > 0.0) for c in group)
-    }
+    groups = _groups(curves)
     shown = _shown(list(groups))
     # Seconds and memory of both cases side by side, where every number has two.
     columns = 4 if len(shown) == 2 * len({name for name, _ in shown}) else 2
     return [
-        _chart(group, cost, axis, key in shown, columns)
+        _error_chart(group, cost, axis, key in shown, columns)
         for key, group in groups.items()
         for cost, axis in _COSTS
     ]
@@ -78,15 +70,30 @@ def change_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
         Two for each number that a level changes, all on the sheet ``work_precision``.
     """
     ways = list(dict.fromkeys(str(c["curve"]) for c in curves))
+    return [
+        _change_chart(group, ways, cost, axis)
+        for group in _groups(curves).values()
+        for cost, axis in _COSTS
+    ]
+
+
+def _groups(curves: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], list[Mapping[str, Any]]]:
+    """Curves of every number and case; a number that no level moves has no error to show."""
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for curve in curves:
         groups.setdefault((str(curve["name"]), str(curve["case"])), []).append(curve)
-    return [
-        _change_chart(group, ways, cost, axis)
-        for group in groups.values()
-        if any(any(c["error"]) for c in group)
-        for cost, axis in _COSTS
-    ]
+    return {
+        key: group
+        for key, group in groups.items()
+        if any(np.any(np.abs(np.array(c["error"], float)) > 0.0) for c in group)
+    }
+
+
+def _chart(first: Mapping[str, Any], heading: str, x: Axis, y: Axis, **more: Any) -> Chart:
+    """A chart of a number and case on the sheet of all of them."""
+    case = f"{number_label(str(first['name']))}, {first['case']}"
+    shared: dict[str, Any] = {"case": case, "heading": heading, "figure": "work_precision"}
+    return Chart(f"{heading}: {x.name}", x, y, size=(4.6, 3.5), **shared, **more)
 
 
 def _around(axis: Axis, values: Sequence[Array], room: float = 0.0) -> Axis:
@@ -117,19 +124,14 @@ def _change_chart(
         lines += [
             Band(str(c["against"]), "x", x, x, colour, dashed=True) for x in map(float, spent[~at])
         ]
-    first = group[0]
-    return Chart(
-        f"Change from {first['against']}, over {axis.name}",
+    return _chart(
+        group[0],
+        f"Change from {group[0]['against']}",
         _around(axis, [np.array(c[cost], float) for c in group]),
         _around(Axis("|change|", "%", log=True), [t.y for t in traces], _WORDS),
-        tuple(traces),
+        traces=tuple(traces),
         marks=tuple(marks),
         bands=tuple(lines),
-        case=f"{number_label(str(first['name']))}, {first['case']}",
-        figure="work_precision",
-        heading=f"Change from {first['against']}",
-        columns=2,
-        size=(4.6, 3.5),
     )
 
 
@@ -144,7 +146,7 @@ def _shown(keys: Sequence[tuple[str, str]]) -> set[tuple[str, str]]:
     return out
 
 
-def _chart(
+def _error_chart(
     group: Sequence[Mapping[str, Any]], cost: str, axis: Axis, sheet: bool, columns: int
 ) -> Chart:
     first, alone = group[0], len(group) == 1
@@ -164,22 +166,18 @@ def _chart(
     printed = first.get("thesis_error")
     percent = 100.0 * abs(printed) if printed else 0.0
     heights = [t.y[t.y > 0.0] for t in traces] + [np.array([percent])] * (percent > 0.0)
-    return Chart(
-        f"What accuracy costs: {axis.name}",
+    line = Band(f"thesis ({percent:.1f} %)", "y", percent, percent, dashed=True)
+    return _chart(
+        first,
+        "What accuracy costs",
         _around(axis, [t.x for t in traces]),
         _around(Axis("|error|", "%", log=True), heights, _WORDS),
-        tuple(traces),
+        traces=tuple(traces),
         marks=tuple(marks),
-        bands=(Band(f"thesis ({percent:.1f} %)", "y", percent, percent, dashed=True),)
-        if percent
-        else (),
-        case=f"{number_label(str(first['name']))}, {first['case']}",
+        bands=(line,) if percent else (),
         detail="" if alone else _reference(group),
-        figure="work_precision",
-        heading="What accuracy costs",
         sheet=sheet,
         columns=columns,
-        size=(4.6, 3.5),
     )
 
 

@@ -25,10 +25,10 @@ def write_report(folder: str | Path) -> Path:
     if (Path(folder) / "sweep.json").is_file():
         from upd.report.sweep_page import write_sweep_report
 
-        return write_sweep_report(folder)
-    from upd.report.page import write_report as write
+        return write_sweep_report(Path(folder))
+    from upd.report.run_page import write_run_report
 
-    return write(folder)
+    return write_run_report(Path(folder))
 
 
 def write_comparison(folders: Sequence[str | Path], path: str | Path) -> Path:

@@ -1,4 +1,4 @@
-"""Columns of a table in plain text: fitted to a width by leaving columns out, never digits."""
+"""Columns of a table in plain text: fitted to a width by omitting columns, never digits."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class TextColumn:
     right
         Flush right, as numbers are.
     rank
-        The column of the highest rank is left out first; one of rank 0 stays.
+        The column of the highest rank is omitted first; one of rank 0 stays.
     folds
         Characters to which words may be folded; 0 for numbers, which stay whole.
     """
@@ -110,11 +110,11 @@ def folded_head(words: str, least: int = 8) -> str:
     return "\n".join(lines)
 
 
-def whole_table(table: AnswerTable, width: int) -> list[str]:
+def whole_table(table: AnswerTable, width: int, *, cut: bool = False) -> list[str]:
     """Lines of a table with all its columns, at most ``width`` characters each.
 
     Words are folded where that is enough; else the columns that find no room stand below, beside
-    the first ones again.
+    the first ones again, or, where the table may be ``cut``, its last ones are left out.
     """
     columns = [
         TextColumn(
@@ -122,6 +122,8 @@ def whole_table(table: AnswerTable, width: int) -> list[str]:
         )
         for head, cells in zip(table.columns, zip(*table.rows, strict=True), strict=True)
     ]
+    while cut and len(columns) > 2 and _wide(columns) > width:
+        columns.pop()
     whole = _folded(columns, width)
     if _wide(whole) <= width:
         return _lines(whole)

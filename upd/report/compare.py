@@ -1,42 +1,25 @@
-"""Several run folders -> one page.
-
-Numbers side by side, the same charts overlaid, the lines in which the scenes differ.
+"""Several run folders -> one page: numbers side by side, the same charts overlaid, the entries in
+which the scenes differ.
 """
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Container, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from upd.errors import InputError
+from upd.labels import number, number_label, percent, shown, unit_label
 from upd.plot.chart import Axis, Chart, Entry
-from upd.plot.style import COLOURS, colour_range
+from upd.plot.style import colour_range
+from upd.report.error_budget import analysis_charts
 from upd.report.folder import RunFolder, read_run
-from upd.report.page import render, save, stages, verdict
-from upd.report.panels import charts_of, make_panels
-
-
-@dataclass(frozen=True)
-class Line:
-    """A number of several runs: one value per run, None where a run has none."""
-
-    name: str
-    case: str
-    unit: str
-    values: tuple[float | None, ...]
-    reference: float | None
-    source: str
-
-    @property
-    def spread(self) -> float | None:
-        """Largest difference from the first run, as a fraction."""
-        first = self.values[0]
-        if not first or any(v is None for v in self.values):
-            return None
-        return max((v / first - 1.0 for v in self.values[1:] if v is not None), key=abs)
+from upd.report.page import Section, write_page
+from upd.report.panels import make_panels
+from upd.report.run_page import verdict
+from upd.report.tables import filled, main_numbers
+from upd.results.answer_table import AnswerTable
 
 
 def write_comparison(folders: Sequence[str | Path], path: str | Path) -> Path:
@@ -48,13 +31,12 @@ def write_comparison(folders: Sequence[str | Path], path: str | Path) -> Path:
         raise InputError(f"{target}: a comparison is a page; give a name that ends in .html")
     runs = [read_run(Path(folder)) for folder in folders]
     names = run_names(runs)
-    charts = overlaid([charts_of(run).charts(run.arrays, run.summary) for run in runs], names)
-    save(target, render("compare.html.j2", make_panels(charts, {}), [], context(runs, names)))
-    return target
+    title = f"Comparison of {', '.join(names[:-1])} and {names[-1]}"
+    return write_page(target, title, comparison_sections(runs, names))
 
 
 def run_names(runs: Sequence[RunFolder]) -> list[str]:
-    """Names of the run folders, with as much of their paths as tells them apart."""
+    """Names of the run folders, with as much of their paths as makes them different."""
     paths = [run.path.resolve() for run in runs]
     if len(set(paths)) < len(paths):
         raise InputError("a folder is duplicated; to fix it: give each folder once")
@@ -64,52 +46,103 @@ def run_names(runs: Sequence[RunFolder]) -> list[str]:
     return [str(Path(*p.parts[-depth:])) for p in paths]
 
 
-def context(runs: Sequence[RunFolder], names: Sequence[str]) -> dict[str, Any]:
-    """What the template shows beside the figures."""
-    headlines = [
-        row for run in runs for row in charts_of(run).headline(list(run.summary["results"]))
-    ]
-    main = dict.fromkeys((row["name"], row["case"]) for row in headlines)
-    lines = numbers([run.summary["results"] for run in runs])
-    return {
-        "title": "Comparison of " + (", ".join(names[:-1]) + " and " + names[-1]),
-        "names": names,
-        "colours": [COLOURS[k % len(COLOURS)] for k in range(len(names))],
-        "titles": [run.summary["title"] or run.summary["scene"] for run in runs],
-        "verdicts": [verdict(run) for run in runs],
-        "headline": [line for line in lines if (line.name, line.case) in main],
-        "lines": [line for line in lines if (line.name, line.case) not in main],
-        "costs": costs([run.summary["cost"] for run in runs]),
-        "sizes": [sum(run.summary["size"].get("n_dof", {}).values()) for run in runs],
-        "scenes": marked([run.scene for run in runs]),
-        "differences": differences([run.summary["scene_file"] for run in runs]),
+def comparison_sections(runs: Sequence[RunFolder], names: Sequence[str]) -> list[Section]:
+    """The page of several runs."""
+    charts = overlaid([analysis_charts(run.arrays, run.summary) for run in runs], names)
+    scenes = [run.summary["scene_file"] for run in runs]
+    differ = differences(scenes)
+    main = {
+        (entry["name"], entry["case"])
+        for run in runs
+        for entry in main_numbers(run.summary["size"], run.summary["results"])
     }
+    first, others = numbers([run.summary["results"] for run in runs], names, main)
+    about = "Every run has one colour; points and lines are those of its own page."
+    return [
+        Section("Runs", [_runs_table(runs, names)]),
+        Section(
+            "In what the scenes differ",
+            [AnswerTable("In what the scenes differ", ("entry", *names), differ)],
+            texts=[] if differ else ["In nothing."],
+            kind="grid",
+        ),
+        Section(
+            "Main numbers",
+            [first],
+            texts=["A number without a unit is a ratio or a count."],
+            kind="grid",
+        ),
+        Section("Figures", panels=make_panels(charts, {}), texts=[about]),
+        Section("Cost", [_costs([run.summary["cost"] for run in runs], names)], kind="grid"),
+        Section("All other numbers", [others], folded=True, kind="grid"),
+        *(
+            Section(f"Scene file of {name}", file=run.scene, folded=True)
+            for name, run in zip(names, runs, strict=True)
+        ),
+    ]
 
 
-def numbers(results: Sequence[Sequence[Entry]]) -> list[Line]:
-    """Numbers of all runs, in the order of the first that has them."""
+def _runs_table(runs: Sequence[RunFolder], names: Sequence[str]) -> AnswerTable:
+    verdicts = [verdict(run.summary) for run in runs]
+    sizes = [sum(run.summary["size"].get("n_dof", {}).values()) for run in runs]
+    columns = {
+        "run": names,
+        "scene": [run.summary["title"] or run.summary["scene"] for run in runs],
+        "verdict": [f"{mark.word}. {mark.text}" for mark in verdicts],
+        "# degrees of freedom": [str(size) for size in sizes],
+    }
+    return filled("Runs", columns)
+
+
+def numbers(
+    results: Sequence[Sequence[Entry]], names: Sequence[str], main: Container[tuple[str, str]]
+) -> tuple[AnswerTable, AnswerTable]:
+    """Numbers of all runs side by side, in the order of the first run that has them: the main ones
+    (name and case), and all others.
+    """
     tables = [{(r["name"], r["case"]): r for r in rows} for rows in results]
-    keys = dict.fromkeys(key for table in tables for key in table)
-    out = []
-    for name, case in keys:
-        mine = [table.get((name, case)) for table in tables]
-        any_row = next(row for row in mine if row is not None)
-        references = {row["reference"] for row in mine if row is not None}
-        reference = references.pop() if len(references) == 1 else None
-        values = tuple(
-            None if row is None or row["value"] is None else float(row["value"]) for row in mine
-        )
-        out.append(
-            Line(
-                name,
-                case,
-                any_row["unit"],
-                values,
-                reference,
-                any_row["source"] if reference is not None else "",
-            )
-        )
-    return out
+    keys = list(dict.fromkeys(key for table in tables for key in table))
+    return (
+        _side_by_side("Main numbers", [key for key in keys if key in main], tables, names),
+        _side_by_side("All other numbers", [key for key in keys if key not in main], tables, names),
+    )
+
+
+def _side_by_side(
+    heading: str,
+    keys: Sequence[tuple[str, str]],
+    tables: Sequence[Mapping[tuple[str, str], Entry]],
+    names: Sequence[str],
+) -> AnswerTable:
+    found = [[table.get(key) for table in tables] for key in keys]
+    references = [{row["reference"] for row in rows if row is not None} for rows in found]
+    known = [next(row for row in rows if row is not None) for rows in found]
+    # runs of other loads have another reference
+    shared = [
+        row if len(values) == 1 else {**row, "reference": None}
+        for row, values in zip(known, references, strict=True)
+    ]
+    columns = {
+        "number": [number_label(name) for name, _ in keys],
+        "case": [case for _, case in keys],
+        **{
+            f"# {name}": ["" if (row := rows[k]) is None else shown(row) for rows in found]
+            for k, name in enumerate(names)
+        },
+        f"# largest difference from {names[0]}": [percent(_spread(rows)) for rows in found],
+        "# reference": [number(row["reference"], unit_label(row["unit"])) for row in shared],
+        "source": [row["source"] if row["reference"] is not None else "" for row in shared],
+    }
+    return filled(heading, columns)
+
+
+def _spread(rows: Sequence[Entry | None]) -> float | None:
+    """Largest difference from the first run, as a fraction."""
+    values = [None if row is None else row["value"] for row in rows]
+    first = values[0]
+    if not first or any(v is None for v in values):
+        return None
+    return float(max((v / first - 1.0 for v in values[1:]), key=abs))
 
 
 def overlaid(runs: Sequence[Sequence[Chart]], names: Sequence[str]) -> list[Chart]:
@@ -199,40 +232,25 @@ def _axis(axes: Sequence[Axis]) -> Axis:
     return replace(axes[0], low=low, high=high)
 
 
-def costs(tables: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[float | None]]]:
+def _costs(tables: Sequence[Mapping[str, Any]], names: Sequence[str]) -> AnswerTable:
     """Seconds of every stage, per run."""
-    per_run = [{s["name"]: float(s["seconds"]) for s in stages(table)} for table in tables]
-    names = dict.fromkeys(name for table in per_run for name in table)
-    return [(name, [table.get(name) for table in per_run]) for name in names]
+    stages: list[Mapping[str, float]] = [table.get("stages", {}) for table in tables]
+    keys = list(dict.fromkeys(name for table in stages for name in table))
+    columns = {"stage": keys} | {
+        f"# {name}": [f"{table[key]:.2f} s" if key in table else "" for key in keys]
+        for name, table in zip(names, stages, strict=True)
+    }
+    return filled("Cost", columns)
 
 
-def marked(texts: Sequence[str]) -> list[list[tuple[str, bool]]]:
-    """Lines of every scene file, each with whether it differs from the first scene (in the first:
-    from any other).
-    """
-    lines = [text.splitlines() for text in texts]
-    out = []
-    for k, mine in enumerate(lines):
-        others = lines[1:] if k == 0 else lines[:1]
-        same = set(range(len(mine)))
-        for other in others:
-            blocks = difflib.SequenceMatcher(
-                None, mine, other, autojunk=False
-            ).get_matching_blocks()
-            same &= {i for block in blocks for i in range(block.a, block.a + block.size)}
-        out.append([(line, i not in same) for i, line in enumerate(mine)])
-    return out
-
-
-def differences(scenes: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[str]]]:
-    """Entries of the scene files that are not the same in all runs.
-
-    Path and the value of every run.
+def differences(scenes: Sequence[Mapping[str, Any]]) -> tuple[tuple[str, ...], ...]:
+    """Entries of the scene files that are not the same in all runs: path and the value of every
+    run.
     """
     flat = [_flat(scene) for scene in scenes]
     paths = dict.fromkeys(path for entries in flat for path in entries)
-    found = [(path, [entries.get(path, "–") for entries in flat]) for path in paths]
-    return [(path, values) for path, values in found if len(set(values)) > 1]
+    rows = ((path, *(entries.get(path, "–") for entries in flat)) for path in paths)
+    return tuple(row for row in rows if len(set(row[1:])) > 1)
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, str]:

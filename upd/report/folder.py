@@ -12,30 +12,13 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from upd.cache.folders import plain_name
 from upd.errors import InputError
 from upd.plot.chart import Arrays, Group, Variable
 from upd.report.figures import FIGURES
 
-#: what a summary must have for a page
-_NEEDED = ("scene", "title", "status", "effects", "checks", "size", "cost", "results")
-_KINDS = {
-    "scene": str,
-    "title": str,
-    "status": str,
-    "effects": list,
-    "checks": list,
-    "size": dict,
-    "cost": dict,
-    "results": list,
-}
-_ENTRIES = {
-    "effects": ("name", "on", "why", "verdict"),
-    "checks": ("name", "case", "value", "limit", "says", "verdict"),
-    "results": ("name", "case", "case_fields", "value", "unit", "reference"),
-}
 _LOG_LINE = re.compile(r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$")
 _VERSIONS = "versions: "
 _PNG = b"\x89PNG\r\n\x1a\n"
@@ -62,6 +45,7 @@ _NOBODYS = (".DS_Store", "Thumbs.db", "desktop.ini")
 class LogLine:
     """One line of run.log."""
 
+    time: str
     level: str
     where: str
     text: str
@@ -106,13 +90,8 @@ class RunFolder:
 
     @property
     def started(self) -> str:
-        """When the run began, as its log says."""
-        try:
-            first = (self.path / "run.log").read_text("utf-8").partition("\n")[0]
-        except (OSError, UnicodeDecodeError):
-            return ""
-        found = _LOG_LINE.match(first)
-        return found["time"].partition(",")[0] if found else ""
+        """When the run began, by its log."""
+        return self.log[0].time if self.log else ""
 
 
 def is_run_file(entry: Path) -> bool:
@@ -185,11 +164,14 @@ def read_run(folder: Path) -> RunFolder:
             missing.append(f"result.nc: cannot be read ({problem})")
     else:
         missing.append("result.nc: is not there, so there are no curves")
+    pictures = {f.stem: f for f in sorted(folder.glob("*.png"))}
+    figures = {name: f for name, f in pictures.items() if is_png(f)}
+    missing += [f"{f.name}: is no PNG file" for name, f in pictures.items() if name not in figures]
     return RunFolder(
         path=folder,
         summary=summary | {"scene_file": _tables(scene, missing)},
         arrays=arrays,
-        figures={f.stem: f for f in sorted(folder.glob("*.png")) if _is_png(f, missing)},
+        figures=figures,
         scene=scene,
         log=_log(_text(folder / "run.log", missing)),
         missing=tuple(missing),
@@ -223,38 +205,93 @@ def read_arrays(path: Path) -> dict[str, Group]:
         return root | {name: read(group) for name, group in file.groups.items()}
 
 
+@dataclass
+class _EffectEntry:
+    name: str
+    on: bool
+    why: str
+    verdict: str
+
+
+@dataclass
+class _CheckEntry:
+    name: str
+    case: str
+    value: float | None
+    limit: float | None
+    says: str
+    verdict: str
+
+
+@dataclass
+class _NumberEntry:
+    name: str
+    case: str
+    case_fields: dict[str, Any]
+    value: float | None
+    unit: str
+    reference: float | None
+
+
+@dataclass
+class _Summary:
+    """What summary.json must have for a page."""
+
+    scene: str
+    title: str
+    status: str
+    effects: list[_EffectEntry]
+    checks: list[_CheckEntry]
+    size: dict[str, Any]
+    cost: dict[str, Any]
+    results: list[_NumberEntry]
+
+
 def _summary(folder: Path) -> dict[str, Any]:
-    path = folder / "summary.json"
+    return read_json(folder / "summary.json", _Summary, "run")
+
+
+def read_json(path: Path, schema: type, kind: Literal["run", "sweep"]) -> dict[str, Any]:
+    """The content of a JSON file of a folder that `upd run` or `upd sweep` wrote.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    schema
+        Dataclass of what it must have; there may be more.
+    kind
+        Of the folder.
+
+    Raises
+    ------
+    InputError
+        When there is none, or something of it is missing or of another kind.
+    """
+    # pydantic is slow to import: only when a folder is read
+    from pydantic import TypeAdapter, ValidationError
+
+    again = "run the scene again"
+    if kind == "sweep":
+        again = "start the same sweep again, finished points are kept"
     try:
-        summary = json.loads(path.read_text("utf-8"))
-    except FileNotFoundError:
+        found = json.loads(path.read_text("utf-8"))
+        TypeAdapter(schema).validate_python(found)
+    except (FileNotFoundError, NotADirectoryError):
         raise InputError(
-            f"{folder}: is no run folder (it has no summary.json); give the folder `upd run` wrote"
+            f"{path.parent}: is no {kind} folder (it has no {path.name}); give the folder "
+            f"`upd {kind}` wrote"
         ) from None
-    except NotADirectoryError:
-        raise InputError(f"{folder}: is a file; give the run folder it lies in") from None
     except OSError as problem:
         raise InputError(
             f"{path}: cannot be read ({problem.strerror}); check its permissions"
         ) from None
+    except ValidationError as problem:
+        places = dict.fromkeys(str((*e["loc"], "the whole")[0]) for e in problem.errors())
+        raise InputError(f"{path}: is damaged in {', '.join(places)}; {again}") from None
     except ValueError as problem:
-        raise InputError(f"{path}: is not JSON ({problem}); run the scene again") from None
-    lacking = [key for key in _NEEDED if not isinstance(summary, dict) or key not in summary]
-    if lacking:
-        raise InputError(f"{path}: lacks {', '.join(lacking)}; run the scene again")
-    damaged = [key for key, kind in _KINDS.items() if not isinstance(summary[key], kind)]
-    damaged += [
-        key
-        for key, needed in _ENTRIES.items()
-        if key not in damaged and not all(_has(e, needed) for e in summary[key])
-    ]
-    if damaged:
-        raise InputError(f"{path}: is damaged in {', '.join(damaged)}; run the scene again")
-    return dict(summary)
-
-
-def _has(entry: Any, keys: tuple[str, ...]) -> bool:
-    return isinstance(entry, dict) and all(key in entry for key in keys)
+        raise InputError(f"{path}: is not JSON ({problem}); {again}") from None
+    return dict(found)
 
 
 def _text(path: Path, missing: list[str]) -> str:
@@ -267,16 +304,13 @@ def _text(path: Path, missing: list[str]) -> str:
         return ""
 
 
-def _is_png(path: Path, missing: list[str]) -> bool:
+def is_png(path: Path) -> bool:
+    """Whether a file can be read and begins as every PNG does."""
     try:
         with path.open("rb") as file:
-            fine = file.read(len(_PNG)) == _PNG
-    except OSError as problem:
-        missing.append(f"{path.name}: cannot be read ({problem.strerror})")
+            return file.read(len(_PNG)) == _PNG
+    except OSError:
         return False
-    if not fine:
-        missing.append(f"{path.name}: is no PNG file")
-    return fine
 
 
 def _tables(text: str, missing: list[str]) -> dict[str, Any]:
@@ -289,4 +323,6 @@ def _tables(text: str, missing: list[str]) -> dict[str, Any]:
 
 def _log(text: str) -> tuple[LogLine, ...]:
     found = (_LOG_LINE.match(line) for line in text.splitlines())
-    return tuple(LogLine(m["level"], m["where"], m["text"]) for m in found if m)
+    return tuple(
+        LogLine(m["time"].partition(",")[0], m["level"], m["where"], m["text"]) for m in found if m
+    )

@@ -11,24 +11,22 @@ from dataclasses import dataclass, field, replace
 from html import escape
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from upd.analyses import analysis_named
 from upd.errors import ConvergenceError, InputError
-from upd.labels import number, number_label, percent, plus_minus, shown, unit_label
-from upd.report import generic
-from upd.report.answer import answer_tables, as_text
-from upd.report.answer import headline as main_numbers
-from upd.report.error_budget import budget_charts
-from upd.results import FAILED, OK, WARNED, Case, Check, Result, outcome_of
+from upd.report.answer import AnswerLine, Written, answer
+from upd.report.columns import text_width
+from upd.report.error_budget import run_charts
+from upd.report.tables import answer_tables, main_numbers
+from upd.results import FAILED, OK, Case, Check, Result, outcome_of
 from upd.results.answer_table import AnswerTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from upd.plot.chart import Arrays, Chart, Charts, Entry
+    from upd.plot.chart import Arrays, Chart, Entry
 
 #: charts of the figure nobody chose
 _MOST_CHARTS = 6
@@ -139,8 +137,14 @@ class RunResult:
         """
         return to_xarray(self)
 
+    def answer(self, width: int, *, full: bool = False) -> list[AnswerLine]:
+        """Its answer as the terminal prints it, in lines of ``width`` characters; with all numbers,
+        checks and sources of errors when ``full``.
+        """
+        return answer(self.summary(), width, Written(self.folder, self.faults), full=full)
+
     def __repr__(self) -> str:
-        return as_text(self)
+        return "\n".join(line.text for line in self.answer(text_width()))
 
     __str__ = __repr__
 
@@ -149,33 +153,18 @@ class RunResult:
 
 
 def as_html(result: RunResult) -> str:
-    """The same as a table; every text is escaped."""
+    """The same as tables; every text is escaped."""
     colour = {OK: "#1a7f37", FAILED: "#b42318"}.get(result.outcome, "#9a6700")
     tables = answer_tables(result.size, [r.as_dict() for r in result.results])
-    told = "".join(map(_table_html, tables)) or _headline_html(result)
-    if tables and result.outcome == WARNED:
-        # What warns is no part of the answer.
-        result = replace(result, status=WARNED)
+    good = sum(check.passed for check in result.checks)
+    folder = "" if result.folder is None else f"; run folder {result.folder}"
     return (
         f"<div><b>{escape(result.title or result.scene)}</b><br><span "
-        f"style='color:{colour}'>{escape(verdict(result))}</span>{told}"
+        f"style='color:{colour}'>{escape(result.status)}; {good} of {len(result.checks)} "
+        f"self-checks passed</span>{''.join(map(_table_html, tables))}"
         f"<small>{len(result.results)} numbers, {len(result.arrays)} groups of "
-        f"arrays{escape(_place(result))}</small></div>"
+        f"arrays{escape(folder)}</small></div>"
     )
-
-
-def _headline_html(result: RunResult) -> str:
-    """The main numbers as a table."""
-    lines = [
-        f"<tr><td style='text-align:left'>{escape(number_label(r['name']))}</td><td "
-        f"style='text-align:left'>{escape(r['case'])}</td>"
-        f"<td>{escape(shown(r))} {plus_minus(r)}</td>"
-        f"<td>{escape(number(r['reference'], unit_label(r['unit'])))}</td>"
-        f"<td>{escape(percent(r['error']))}</td></tr>"
-        for r in headline(result)
-    ]
-    head = "".join(f"<th>{h}</th>" for h in ("number", "case", "value", "reference", "difference"))
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
 
 
 def _table_html(table: AnswerTable) -> str:
@@ -196,29 +185,15 @@ def _table_html(table: AnswerTable) -> str:
     )
 
 
-def verdict(result: RunResult) -> str:
-    """How the run ended and what its self-checks say."""
-    bad = [c for c in result.checks if not c.passed]
-    told = f"{len(result.checks) - len(bad)} of {len(result.checks)} self-checks passed"
-    # A status that warns names them already.
-    named = [] if result.outcome == WARNED else bad
-    return f"{result.status}; {told}" + "".join(
-        f"; {c.verdict}: {c.name} {c.case}".rstrip() for c in named
-    )
-
-
 def headline(result: RunResult) -> list[Entry]:
     """The numbers an engineer asks for first."""
-    return main_numbers(result, [r.as_dict() for r in result.results])
+    return main_numbers(result.size, [r.as_dict() for r in result.results])
 
 
 def charts(result: RunResult) -> list[Chart]:
     """All charts of the run, the most important first."""
     summary = result.summary() | {"scene_file": tomllib.loads(result.scene_text)}
-    return [
-        *_module(result).charts(chart_arrays(result), summary),
-        *budget_charts(headline(result)),
-    ]
+    return run_charts(chart_arrays(result), summary)
 
 
 def plot(result: RunResult, title: str | None, case: str | None, ax: Axes | None) -> list[Axes]:
@@ -228,9 +203,9 @@ def plot(result: RunResult, title: str | None, case: str | None, ax: Axes | None
     chosen = _chosen(charts(result), title, case)
     if ax is not None:
         if len(chosen) > 1:
-            told = "; ".join(f"{c.title}, {c.case}" if c.case else c.title for c in chosen)
+            meant = "; ".join(f"{c.title}, {c.case}" if c.case else c.title for c in chosen)
             raise InputError(
-                f"plot: ax takes one chart, {len(chosen)} are meant ({told}); give title and case"
+                f"plot: ax takes one chart, {len(chosen)} are meant ({meant}); give title and case"
             )
         return [draw(chosen[0], ax)]
     import matplotlib.pyplot as plt
@@ -309,12 +284,3 @@ def chart_arrays(result: RunResult) -> Arrays:
             kept = data.astype(np.int8) if data.dtype == bool else data
             variables[name] = Variable(kept, dims, str(attributes.get("units", "")), rest)
     return out
-
-
-def _module(result: RunResult) -> Charts:
-    """The analysis that knows the charts of the result."""
-    return analysis_named(str(result.size.get("analysis", ""))) or cast("Charts", generic)
-
-
-def _place(result: RunResult) -> str:
-    return "" if result.folder is None else f"; run folder {result.folder}"

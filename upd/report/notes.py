@@ -1,48 +1,63 @@
-"""What warns, one sentence each: what it does to the numbers in the worst case, and the remedy."""
+"""What a run warns of: one sentence for every check that did not pass, with its remedy, and for
+every reason why numbers were not reached.
+"""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 from upd.labels import check_words, number_label
 from upd.plot.chart import Entry
-from upd.results import worst_checks
+from upd.results import worst_check
 
-#: notes that stand beside an answer; what matters less is told elsewhere
+#: notes beside an answer; what matters less is folded, or counted
 MOST_NOTES = 3
 
 
-def short_notes(checks: Iterable[Mapping[str, Any]], results: Iterable[Entry]) -> list[str]:
-    """One sentence for every name of the checks that did not pass, in its worst case, and for every
-    reason why numbers were not reached.
+def warnings(
+    checks: Iterable[Mapping[str, Any]], results: Iterable[Entry], most: int | None = None
+) -> list[str]:
+    """The sentences: a check in its worst case, which is named first.
 
     Parameters
     ----------
     checks, results
         As they stand in summary.json.
+    most
+        Cases and numbers that are named in each; all of them when None.
     """
-    told = []
-    for check in worst_checks(c for c in checks if c["verdict"] != "passed"):
-        remedy = f"; {check['remedy']}" if check["remedy"] else ""
-        told.append(f"{check['name']}{_of(check['case'])}: {check_words(check)}{remedy}")
+    failed: dict[str, list[Mapping[str, Any]]] = {}
+    for check in checks:
+        if check["verdict"] != "passed":
+            failed.setdefault(check["name"], []).append(check)
     lost: dict[str, list[Entry]] = {}
     for entry in results:
         if entry.get("withheld"):
             lost.setdefault(entry["withheld"], []).append(entry)
-    for reason, mine in lost.items():
-        more = f" and {len(mine) - 1} more" if len(mine) > 1 else ""
-        first = f"{number_label(mine[0]['name'])}{_of(mine[0]['case'])}"
-        told.append(f"{first}{more} not reached: {reason}")
-    return [_sentence(one) for one in told]
+    out = []
+    for name, mine in failed.items():
+        worst = worst_check(mine)
+        cases = _in_brackets(_listed([worst["case"], *(c["case"] for c in mine)], most))
+        remedy = f". {_capital(worst['remedy'])}" if worst.get("remedy") else ""
+        out.append(_capital(f"{name}{cases}: {check_words(worst)}{remedy}."))
+    for reason, numbers in lost.items():
+        names = _listed([number_label(entry["name"]) for entry in numbers], most)
+        cases = _in_brackets(_listed([entry["case"] for entry in numbers], most))
+        out.append(_capital(f"{names}{cases}: not reached, {reason}."))
+    return out
 
 
-def _of(case: str) -> str:
-    return f" ({case})" if case else ""
+def _listed(items: Iterable[str], most: int | None) -> str:
+    """Items, each once."""
+    found = [item for item in dict.fromkeys(items) if item]
+    more = [f"and {len(found) - most} more"] if most and len(found) > most else []
+    return "; ".join([*found[:most], *more])
 
 
-def _sentence(text: str) -> str:
-    """One sentence of several: a symbol that begins one keeps its letters."""
-    joined = re.sub(r"\. ([A-Z])(?=[a-z]|\s)", lambda found: f"; {found[1].lower()}", text)
-    return f"{joined[:1].upper()}{joined[1:].rstrip('.')}."
+def _in_brackets(text: str) -> str:
+    return f" ({text})" if text else ""
+
+
+def _capital(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}"

@@ -1,24 +1,19 @@
-"""Figures of a page: the run's PNG files beside the charts that show the same, each with a picture
-that needs no script.
+"""Figures of a page: the PNG files of a folder beside the charts that show the same, each with a
+picture that needs no script, and as many surfaces as the page has room for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-from upd.analyses import analysis_named
-from upd.plot.chart import Chart, Charts
+from upd.plot.chart import Chart
 from upd.plot.matplotlib import chart_png
 from upd.plot.plotly import figure
 from upd.plot.png import png_size, png_uri, small_png
-from upd.report import generic
-from upd.report.error_budget import budget_charts
-from upd.report.folder import RunFolder
+from upd.plot.surface import Surface, n_bytes, with_fields
 
 #: PNG file -> heading, for those that have no chart
 _HEADINGS = {
@@ -31,12 +26,8 @@ _HEADINGS = {
     "work_precision": "What accuracy costs",
     "dimensions": "Geometry and its dimensions",
 }
-#: bytes the PNG files may take before they are made smaller, and the widths in pixels they are then
-#: given, one after the other
-_ROOM_BYTES = 1_000_000
-_WIDTHS = (2400, 1600, 1100, 800)
-
-
+#: pixels of the width of a picture at most
+_WIDTH = 1600
 #: a picture wider than this has drawings side by side
 _SHEET_PIXELS = 1300
 
@@ -67,25 +58,12 @@ class Panel:
         return self.heading
 
 
-def charts_of(run: RunFolder) -> Charts:
-    """The analysis that knows the charts of the run; the generic one when it is not known."""
-    return analysis_named(str(run.summary["size"].get("analysis", ""))) or cast(Charts, generic)
-
-
-def run_panels(run: RunFolder) -> list[Panel]:
-    """All figures of a run, in the order of its charts; PNG files without a chart last."""
-    of, results = charts_of(run), run.summary["results"]
-    charts = of.charts(run.arrays, run.summary)
-    budget = budget_charts(of.headline(results) or generic.headline(results))
-    return make_panels([*charts, *budget], run.figures)
-
-
 def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Panel]:
     """Charts with the PNG files that show the same, then the other PNG files."""
     groups: dict[str, list[Chart]] = {}
     for chart in charts:
         groups.setdefault(chart.figure or chart.title, []).append(chart)
-    images = _images(figures)
+    images = {name: small_png(path, _WIDTH) for name, path in figures.items()}
     panels = [
         _panel(name, group[0].heading or group[0].title, images.get(name) or _drawn(group), group)
         for name, group in groups.items()
@@ -95,18 +73,6 @@ def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Pa
         for name, image in images.items()
         if name not in groups
     ]
-
-
-def _images(figures: Mapping[str, Path]) -> dict[str, bytes]:
-    """The PNG files, with a palette and smaller where the page would not hold them as they are."""
-    images = {name: f.read_bytes() for name, f in figures.items()}
-    with ThreadPoolExecutor() as pool:
-        for width in _WIDTHS:
-            if sum(map(len, images.values())) <= _ROOM_BYTES:
-                break
-            smaller = pool.map(partial(small_png, width=width), figures.values())
-            images = dict(zip(figures, smaller, strict=True))
-    return images
 
 
 def _panel(name: str, heading: str, png: bytes, group: list[Chart]) -> Panel:
@@ -151,3 +117,22 @@ def data(panels: Iterable[Panel]) -> dict[str, Any]:
         for p in panels
         if p.charts
     }
+
+
+def fitting(surfaces: Iterable[Surface], room: int) -> tuple[list[Surface], list[str]]:
+    """Surfaces that fit into ``room`` bytes, with as many of their fields as fit, and what had to
+    be left out, in words.
+    """
+    shown, left_out = [], []
+    for surface in surfaces:
+        n = len(surface.fields)
+        while n > 0 and n_bytes(with_fields(surface, n)) > room:
+            n -= 1
+        part = with_fields(surface, n)
+        if n_bytes(part) > room:
+            left_out.append(f"{surface.label}: too large for this page")
+            continue
+        left_out += [f"{f.label}: too large for this page" for f in surface.fields[n:]]
+        room -= n_bytes(part)
+        shown.append(part)
+    return shown, left_out

@@ -5,10 +5,9 @@ Nothing of it is trusted to be whole.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,32 +17,11 @@ from upd.errors import InputError
 from upd.labels import unit_label
 from upd.plot.chart import Array
 from upd.plot.sweep_charts import figure_names
+from upd.report.folder import is_png, read_json
 from upd.results.sampled import SampledNumber
 
 #: values of a parameter written one by one
 _FEW = 8
-_PNG = b"\x89PNG\r\n\x1a\n"
-_KINDS: dict[str, Any] = {
-    "scene": str,
-    "title": str,
-    "axes": list,
-    "followed": list,
-    "plan": dict,
-    "cost": dict,
-    "points": list,
-    "text": str,
-}
-_ENTRIES: dict[str, dict[str, Any]] = {
-    "axes": {"path": str, "unit": str, "values": list},
-    "followed": {"name": str, "case": str, "unit": str},
-    "points": {
-        "values": list,
-        "status": str,
-        "reason": str,
-        "warnings": list,
-        "seconds": (int, float),
-    },
-}
 
 
 @dataclass(frozen=True)
@@ -64,8 +42,8 @@ class Parameter:
         return self.path.rpartition(".")[2].replace("_", " ")
 
     @property
-    def told(self) -> str:
-        """The values in words, with their unit."""
+    def text(self) -> str:
+        """The values with their unit."""
         shown = [self.shown(k) for k in range(len(self.values))]
         unit = f" {unit_label(self.unit)}" if self.unit else ""
         if len(shown) <= _FEW:
@@ -117,102 +95,74 @@ class SweepFolder:
         return [SampledNumber(**one) for one in found]
 
 
+@dataclass
+class _SweepAxis:
+    path: str
+    unit: str
+    values: list[Any]
+
+
+@dataclass
+class _SweepFollowed:
+    name: str
+    case: str
+    unit: str
+
+
+@dataclass
+class _SweepPoint:
+    values: list[float | None]
+    status: str
+    reason: str
+    warnings: list[Any]
+    seconds: float
+
+
+@dataclass
+class _SweepCost:
+    this_call_s: float | None = None
+    peak_rss_mb: float | None = None
+    stages_s: dict[str, float | None] = field(default_factory=dict)
+
+
+@dataclass
+class _SweepSample:
+    seed: int
+    inputs: dict[str, Any]
+    numbers: list[SampledNumber]
+
+
+@dataclass
+class _Sweep:
+    """What sweep.json must have for a page."""
+
+    scene: str
+    title: str
+    axes: list[_SweepAxis]
+    followed: list[_SweepFollowed]
+    plan: dict[str, Any]
+    cost: _SweepCost
+    points: list[_SweepPoint]
+    text: str
+    sample: _SweepSample | None = None
+
+
 def read_sweep(folder: Path) -> SweepFolder:
     """Read sweep.json and find the figures. Raises InputError when it is missing or damaged."""
     path = folder / "sweep.json"
-    try:
-        data = json.loads(path.read_text("utf-8"))
-    except (FileNotFoundError, NotADirectoryError):
+    data = read_json(path, _Sweep, "sweep")
+    counts, m = [len(axis["values"]) for axis in data["axes"]], len(data["followed"])
+    n = min(counts, default=0) if "sample" in data else math.prod(counts)
+    if len(data["points"]) != n or any(len(p["values"]) != m for p in data["points"]):
         raise InputError(
-            f"{folder}: is no sweep folder (it has no sweep.json); give the folder `upd "
-            "sweep` wrote"
-        ) from None
-    except OSError as problem:
-        raise InputError(
-            f"{path}: cannot be read ({problem.strerror}); check its permissions"
-        ) from None
-    except ValueError as problem:
-        raise InputError(
-            f"{path}: is not JSON ({problem}); start the same sweep again, finished points are kept"
-        ) from None
-    problems = _faults(data)
-    if problems:
-        raise InputError(
-            f"{path}: is damaged in {', '.join(problems)}; start the same sweep again, "
-            "finished points are kept"
+            f"{path}: is damaged in points; start the same sweep again, finished points are kept"
         )
     parameters = tuple(_parameter(axis) for axis in data["axes"])
-    table = np.array(
-        [[np.nan if v is None else v for v in point["values"]] for point in data["points"]], float
-    )
+    table = np.array([point["values"] for point in data["points"]], float).reshape(n, m)
     names = figure_names((one["name"], one["case"]) for one in data["followed"])
     files = {name: folder / f"{name}.png" for name in sorted(names)}
-    figures = {name: file for name, file in files.items() if _is_png(file)}
-    return SweepFolder(
-        folder, data, parameters, table.reshape(len(data["points"]), len(data["followed"])), figures
-    )
-
-
-def _faults(data: Any) -> list[str]:
-    if not isinstance(data, dict):
-        return ["the whole"]
-    problems = [key for key, kind in _KINDS.items() if not isinstance(data.get(key), kind)]
-    problems += [
-        key
-        for key, kinds in _ENTRIES.items()
-        if key not in problems and not all(_fits(entry, kinds) for entry in data[key])
-    ]
-    if not problems and not _is_cost(data["cost"]):
-        problems = ["cost"]
-    if problems:
-        return problems
-    counts, m = [len(axis["values"]) for axis in data["axes"]], len(data["followed"])
-    n = math.prod(counts)
-    if "sample" in data:
-        if not _is_sample(data["sample"], m):
-            return ["sample"]
-        n = min(counts, default=0)
-    whole = len(data["points"]) == n and all(
-        len(p["values"]) == m and all(map(_is_value, p["values"])) for p in data["points"]
-    )
-    return [] if whole else ["points"]
-
-
-def _fits(entry: Any, kinds: Mapping[str, Any]) -> bool:
-    return isinstance(entry, dict) and all(
-        isinstance(entry.get(key), kind) for key, kind in kinds.items()
-    )
-
-
-def _is_sample(entry: Any, followed: int) -> bool:
-    if not isinstance(entry, dict) or not isinstance(entry.get("numbers"), list):
-        return False
-    names = {field.name for field in fields(SampledNumber)}
-    return len(entry["numbers"]) == followed and all(
-        isinstance(one, dict) and one.keys() == names for one in entry["numbers"]
-    )
-
-
-def _is_cost(entry: Mapping[str, Any]) -> bool:
-    taken = entry.get("stages_s", {})
-    numbers = [
-        entry.get("this_call_s"),
-        entry.get("peak_rss_mb"),
-        *(taken.values() if isinstance(taken, dict) else ["none"]),
-    ]
-    return all(map(_is_value, numbers))
-
-
-def _is_value(value: Any) -> bool:
-    return value is None or (isinstance(value, (int, float)) and not isinstance(value, bool))
-
-
-def _is_png(path: Path) -> bool:
-    try:
-        with path.open("rb") as file:
-            return file.read(len(_PNG)) == _PNG
-    except OSError:
-        return False
+    figures = {name: file for name, file in files.items() if is_png(file)}
+    return SweepFolder(folder, data, parameters, table, figures)
 
 
 def _parameter(axis: Mapping[str, Any]) -> Parameter:

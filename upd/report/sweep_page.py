@@ -1,7 +1,4 @@
-"""One sweep folder -> report.html.
-
-The grid, the table, figures, failures, cost and the scene on one page that needs nothing beside it.
-"""
+"""One sweep folder -> report.html: the grid, figures, failures, the table, cost and the scene."""
 
 from __future__ import annotations
 
@@ -11,30 +8,97 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from upd.labels import number_label, percent_of, unit_label
+import numpy as np
+
+from upd.labels import number, number_label, unit_label
 from upd.plot.sample_charts import sample_charts
 from upd.plot.sweep_charts import Followed, sheet_name, sweep_charts
-from upd.report.page import render, save, stages
+from upd.report.page import Section, Verdict, versions_text, write_page
 from upd.report.panels import Panel, make_panels
 from upd.report.sweep_folder import SweepFolder, read_sweep
-from upd.results.sampled import SampledNumber, sample_sentence
+from upd.report.tables import SAMPLE_HEADING, filled, sample_table, stage_table, with_unit
+from upd.results.answer_table import AnswerTable
+from upd.results.sampled import sample_sentence
 
 #: rows of the table on the page; all of them are in table.csv
 MOST_ROWS = 500
 #: different reasons of failures, and points named with each
 _REASONS, _NAMED = 30, 8
+_WARN = "Self-checks that warn"
 
 
-def write_sweep_report(folder: str | Path) -> Path:
+def write_sweep_report(folder: Path) -> Path:
     """Write report.html into a sweep folder, from what lies in it. Returns its path.
 
     Raises InputError when ``folder`` is no sweep folder, its sweep.json is damaged, or it cannot be
     written.
     """
-    sweep = read_sweep(Path(folder))
-    path = sweep.path / "report.html"
-    save(path, render("sweep.html.j2", sweep_panels(sweep), [], sweep_context(sweep)))
-    return path
+    sweep = read_sweep(folder)
+    data = sweep.data
+    versions = data.get("versions") or {"upd": data.get("version", "")}
+    return write_page(
+        sweep.path / "report.html",
+        f"{'Sample' if sweep.is_sample else 'Sweep'}: {data['title'] or data['scene']}",
+        sweep_sections(sweep),
+        verdict=verdict(data["points"]),
+        footer=f"Sweep folder {sweep.name}. {versions_text(versions)}",
+    )
+
+
+def sweep_sections(sweep: SweepFolder) -> list[Section]:
+    """The page of a sweep."""
+    data, points = sweep.data, sweep.data["points"]
+    reasons = [[p["reason"] or "no reason given"] * (p["status"] != "ok") for p in points]
+    panels = sweep_panels(sweep)
+    return [
+        _grid(sweep),
+        Section(
+            SAMPLE_HEADING,
+            [sample_table(sweep.sampled)],
+            texts=[f"{sample_sentence(sweep.sampled)} sample.csv has all digits."]
+            if sweep.sampled
+            else [],
+            kind="grid",
+        ),
+        Section("Failed points", [grouped("Failed points", sweep, reasons)]),
+        Section(_WARN, [grouped(_WARN, sweep, [p["warnings"] for p in points])]),
+        Section(
+            "Figures",
+            panels=panels,
+            texts=[]
+            if panels
+            else ["The sweep left no figures: nothing varies, or no point was solved."],
+        ),
+        Section("Table", [_points_table(sweep)], kind="tall"),
+        Section(
+            "Cost", [stage_table(data["cost"].get("stages_s", {}))], texts=_costs(data), kind="grid"
+        ),
+        Section(
+            "Scene file",
+            texts=["The scene of all points; the parameters above replace its entries."],
+            file=data["text"],
+        ),
+    ]
+
+
+def _grid(sweep: SweepFolder) -> Section:
+    """What was varied."""
+    columns = {
+        "parameter": [p.path for p in sweep.parameters],
+        "# number of values": [str(len(p.values)) for p in sweep.parameters],
+        "values": [p.text for p in sweep.parameters],
+    }
+    points = _counted(len(sweep.data["points"]))
+    if not sweep.is_sample:
+        every = "Every value with every other: " if len(sweep.parameters) > 1 else ""
+        return Section("Grid", [filled("Grid", columns)], texts=[f"{every}{points}."])
+    sample = sweep.data["sample"]
+    given = ", ".join(f"{path} = {value}" for path, value in sample["inputs"].items())
+    text = (
+        "Drawn evenly between the limits that the half-widths give, with seed "
+        f"{sample['seed']} (Latin hypercube), after the scene itself: {given}; {points}."
+    )
+    return Section("Sample", [filled("Sample", columns)], texts=[text])
 
 
 def sweep_panels(sweep: SweepFolder) -> list[Panel]:
@@ -42,11 +106,9 @@ def sweep_panels(sweep: SweepFolder) -> list[Panel]:
     if sweep.is_sample:
         return make_panels(sample_charts(sweep.sampled, list(sweep.table.T)), sweep.figures)
     numbers = followed(sweep)
-    over = (
-        "Followed numbers over "
-        f"{' and '.join(p.short for p in sweep.parameters if len(p.values) > 1)}"
-    )
-    headings = {"sweep": over} | {
+    varied = [p.short for p in sweep.parameters if len(p.values) > 1]
+    over = f"Followed numbers over {' and '.join(varied)}"
+    headings = {
         sheet_name(n): _title(c) for n, c in zip(numbers, sweep.data["followed"], strict=True)
     }
     panels = make_panels(sweep_charts(sweep.parameters, numbers), sweep.figures)
@@ -56,96 +118,49 @@ def sweep_panels(sweep: SweepFolder) -> list[Panel]:
 def followed(sweep: SweepFolder) -> list[Followed]:
     """The followed numbers with their values over the grid."""
     columns = zip(sweep.data["followed"], sweep.table.T, strict=True)
-    return [
-        Followed(column["name"], column["case"], column["unit"], values)
-        for column, values in columns
-    ]
+    return [Followed(c["name"], c["case"], c["unit"], values) for c, values in columns]
 
 
 def _title(column: Mapping[str, Any]) -> str:
     return number_label(column["name"]) + (f" ({column['case']})" if column["case"] else "")
 
 
-def sweep_context(sweep: SweepFolder) -> dict[str, Any]:
-    """What the template shows beside the figures."""
-    data, points = sweep.data, sweep.data["points"]
-    return {
-        "sweep": sweep,
-        "sampled": [_compared(one) for one in sweep.sampled],
-        "resolved": all(one.resolved for one in sweep.sampled),
-        "sample_says": sample_sentence(sweep.sampled),
-        "title": f"{'Sample' if sweep.is_sample else 'Sweep'}: {data['title'] or data['scene']}",
-        "verdict": verdict(points),
-        "reasons": grouped(
-            sweep,
-            ((p["reason"] or "no reason given",) if p["status"] != "ok" else () for p in points),
-        ),
-        "warnings": grouped(sweep, (p["warnings"] for p in points)),
-        "columns": [{"title": _title(c), "unit": c["unit"]} for c in data["followed"]],
-        "rows": [_row(sweep, k, place) for k, place in enumerate(sweep.places[:MOST_ROWS])],
-        "n_points": len(points),
-        "cost": cost(data),
-        "stages": stages({"stages": data["cost"].get("stages_s", {})}),
-        "notes": data["plan"].get("notes", []),
-        "versions": data.get("versions") or {"upd": data.get("version", "")},
-    }
-
-
-def _compared(one: SampledNumber) -> dict[str, Any]:
-    """A row of the sample's table: the number with the first-order band and the sampled one."""
-    ends = [percent_of(end) for end in (one.band_low, one.band_high) if end is not None]
-    return one.as_dict() | {
-        "title": number_label(one.name) + (f" ({one.case})" if one.case else ""),
-        "first_order": "" if one.first_order is None else f"±{percent_of(one.first_order)}",
-        "band": "" if one.band is None else f"±{percent_of(one.band)}",
-        "ends": " to ".join(ends),
-    }
-
-
-def verdict(points: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """Class of the mark, its word, and a sentence."""
-    failed, told = (
-        sum(p["status"] != "ok" for p in points),
-        sum(bool(p["warnings"]) for p in points),
-    )
-    says = f"{len(points) - failed} of {_counted(len(points))} done"
-    says += f", {failed} failed" if failed else ""
-    says += f", {told} with warnings." if told else "."
+def verdict(points: Sequence[Mapping[str, Any]]) -> Verdict:
+    """How the points ended."""
+    failed = sum(p["status"] != "ok" for p in points)
+    warned = sum(bool(p["warnings"]) for p in points)
     if points and failed == len(points):
-        return {
-            "kind": "failed",
-            "word": "Failed",
-            "says": f"None of {_counted(len(points))} could be solved.",
-        }
-    if failed:
-        return {"kind": "warning", "word": "Done in part", "says": says}
-    return {
-        "kind": "warning" if told else "passed",
-        "word": "Done, with warnings" if told else "Done",
-        "says": says,
-    }
+        text = f"None of {_counted(len(points))} could be solved."
+        return Verdict("failed", "Failed", text)
+    text = f"{len(points) - failed} of {_counted(len(points))} done"
+    text += f", {failed} failed" if failed else ""
+    text += f", {warned} with warnings." if warned else "."
+    if failed or warned:
+        return Verdict("warning", "Done in part" if failed else "Done, with warnings", text)
+    return Verdict("passed", "Done", text)
 
 
 def _counted(n: int) -> str:
     return f"{n} point{'' if n == 1 else 's'}"
 
 
-def grouped(sweep: SweepFolder, texts: Iterable[Iterable[str]]) -> list[dict[str, Any]]:
+def grouped(heading: str, sweep: SweepFolder, texts: Iterable[Iterable[str]]) -> AnswerTable:
     """Texts of the points, each once with the points it belongs to; the most frequent first."""
     found: dict[str, list[int]] = {}
     for k, mine in enumerate(texts):
         for text in mine:
             found.setdefault(str(text), []).append(k)
     ranked = sorted(found.items(), key=lambda item: -len(item[1]))[:_REASONS]
-    return [
-        {
-            "text": text,
-            "count": _counted(len(where)),
-            "points": "; ".join(_label(sweep, k) for k in where[:_NAMED]),
-            "more": max(len(where) - _NAMED, 0),
-        }
-        for text, where in ranked
-    ]
+    columns = {
+        "reason": [text for text, _ in ranked],
+        "# points": [str(len(where)) for _, where in ranked],
+        "which": [
+            "; ".join(_label(sweep, k) for k in where[:_NAMED])
+            + (f" and {len(where) - _NAMED} more" if len(where) > _NAMED else "")
+            for _, where in ranked
+        ],
+    }
+    return filled(heading, columns)
 
 
 def _label(sweep: SweepFolder, k: int) -> str:
@@ -155,37 +170,52 @@ def _label(sweep: SweepFolder, k: int) -> str:
     )
 
 
-def _row(sweep: SweepFolder, k: int, place: tuple[int, ...]) -> dict[str, Any]:
-    point = sweep.data["points"][k]
-    return {
-        "parameters": [p.shown(j) for p, j in zip(sweep.parameters, place, strict=True)],
-        "numbers": point["values"],
-        "failed": point["status"] != "ok",
-        "says": point["reason"]
-        if point["status"] != "ok"
-        else ", ".join(map(str, point["warnings"])),
-        "seconds": float(point["seconds"]),
+def _points_table(sweep: SweepFolder) -> AnswerTable:
+    """A row per point; numbers without a value at any point have no column."""
+    points, places = sweep.data["points"][:MOST_ROWS], sweep.places[:MOST_ROWS]
+    columns = {
+        f"# {with_unit(p.short, p.unit)}": [p.shown(place[k]) for place in places]
+        for k, p in enumerate(sweep.parameters)
     }
+    empty = []
+    for one, values in zip(sweep.data["followed"], sweep.table[: len(points)].T, strict=True):
+        if np.isnan(values).all():
+            empty.append(_title(one))
+            continue
+        columns[f"# {with_unit(_title(one), one['unit'])}"] = [
+            "" if np.isnan(v) else number(float(v)) for v in values
+        ]
+    columns |= {
+        "# time, s": [f"{float(p['seconds']):.2f}" for p in points],
+        "status": ["ok" if p["status"] == "ok" else "failed" for p in points],
+        "reason or warnings": [
+            ", ".join(map(str, p["warnings"])) if p["status"] == "ok" else p["reason"]
+            for p in points
+        ],
+    }
+    n = len(sweep.data["points"])
+    notes = [f"Without a value at every point: {'; '.join(empty)}."] * bool(empty)
+    notes += [f"The first {len(points)} of {n} points."] * (len(points) < n)
+    notes.append(
+        "table.csv in the sweep folder holds all points with all digits, sweep.nc the same as "
+        "arrays with named axes. A number without a unit is a ratio or a count."
+    )
+    return filled("Table", columns, " ".join(notes))
 
 
-def cost(data: Mapping[str, Any]) -> dict[str, Any]:
+def _costs(data: Mapping[str, Any]) -> list[str]:
     """Seconds of the points and of the last call, memory, workers."""
     seconds = [float(p["seconds"]) for p in data["points"]] or [0.0]
-    workers = data["plan"].get("workers", 0)
-    return {
-        "total": math.fsum(seconds),
-        "mean": math.fsum(seconds) / len(seconds),
-        "least": min(seconds),
-        "most": max(seconds),
-        "call": data["cost"].get("this_call_s"),
-        "memory": data["cost"].get("peak_rss_mb"),
-        "kept": data["plan"].get("kept", 0),
-        "where": _where(workers),
-        "threads": data["plan"].get("threads", 1),
-    }
-
-
-def _where(workers: Any) -> str:
-    if isinstance(workers, str):
-        return f"the cluster {workers}"
-    return f"{workers} process{'' if workers == 1 else 'es'}" if workers else "one process"
+    total, cost, plan = math.fsum(seconds), data["cost"], data["plan"]
+    text = (
+        f"{total / len(seconds):.2f} s per point ({min(seconds):.2f} to {max(seconds):.2f} s), "
+        f"{total:.1f} s for all points together"
+    )
+    if (memory := cost.get("peak_rss_mb")) is not None:
+        text += f", {memory:.0f} MB of memory at most"
+    if (call := cost.get("this_call_s")) is not None:
+        workers, kept = plan.get("workers", 0), plan.get("kept", 0)
+        where = f"the cluster {workers}" if isinstance(workers, str) else f"processes: {workers}"
+        text += f". Last call: {call:.1f} s; {where}; threads of each: {plan.get('threads', 1)}"
+        text += f"; points kept from earlier calls: {kept}" if kept else ""
+    return [f"{text}.", *(f"{note[:1].upper()}{note[1:]}." for note in plan.get("notes", []))]

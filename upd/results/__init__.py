@@ -24,7 +24,6 @@ from upd.results.status import (
     outcome_of,
     status_of,
     warned,
-    warning_details,
     warnings_of,
     with_fault,
 )
@@ -51,7 +50,6 @@ __all__ = [
     "shared_label",
     "status_of",
     "warned",
-    "warning_details",
     "warnings_of",
     "with_estimates",
     "with_fault",

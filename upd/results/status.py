@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from upd.labels import check_words, number_label
-from upd.results.check import Check, worst_check
+from upd.labels import number_label
+from upd.results.check import Check
 from upd.results.number import Result
 
 OK, WARNED, FAILED = "ok", "ok with warnings", "failed"
@@ -57,23 +57,6 @@ def warned(
 def warnings_of(checks: Sequence[Check], results: Sequence[Result]) -> list[str]:
     """What did not pass and what was not reached, one sentence per name with its cases."""
     return [_named(name, labels) for name, (_, labels) in warned(checks, results).items()]
-
-
-def warning_details(checks: Sequence[Check], results: Sequence[Result]) -> list[str]:
-    """As `warnings_of`, each with the worst of its values, its limit and remedy, or the reason.
-
-    What matters less stands later.
-    """
-    told = []
-    for name, (mine, labels) in warned(checks, results).items():
-        first = mine[0]
-        if isinstance(first, Result):
-            told.append(f"{_named(name, labels)}: {first.withheld}")
-            continue
-        worst = worst_check(c.as_dict() for c in mine if isinstance(c, Check))
-        remedy = f"; {worst['remedy']}" if worst["remedy"] else ""
-        told.append(f"{_named(f'{name}: {check_words(worst)}', labels)}{remedy}")
-    return told
 
 
 def _named(name: str, labels: Sequence[str]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -14,7 +15,8 @@ from upd.errors import InputError
 from upd.plot.chart import Entry
 from upd.plot.matplotlib import draw
 from upd.plot.plotly import figure as plotly_figure
-from upd.report.error_budget import budget_charts, budget_line, budget_rows
+from upd.report.error_budget import budget_charts
+from upd.report.tables import budget_table, error_parts
 from upd.results import Case, ErrorPart, InputPart, Result, with_parts
 from upd.scene import load_scene
 
@@ -67,9 +69,9 @@ def test_terminal_page_and_files_tell_them(sphere: upd.RunResult) -> None:
     assert f"MPa ±{100.0 * row.estimated_error:.2g} %" in text
     assert "Error of the maximum pressure: mesh" in text
     entry = row.as_dict()
-    assert budget_line(entry) in text.replace("\n  ", " ")
-    (told,) = budget_rows([entry])
-    assert (told.source, told.share) == ("mesh", pytest.approx(100.0))
+    (part,) = error_parts(entry)
+    assert part[:3] == ("mesh", row.estimated_error, pytest.approx(1.0))
+    assert "mesh" in budget_table([entry]).rows[0] and "100 %" in budget_table([entry]).rows[0]
     (chart,) = budget_charts([entry])
     assert chart.bars[0].parts["mesh"][0] == pytest.approx(100.0 * row.estimated_error)
 
@@ -119,7 +121,7 @@ def test_companions_that_fail_leave_a_reason(monkeypatch: pytest.MonkeyPatch) ->
     row = next(r for r in found.results if r.name == "K_N_secant_raw")
     assert row.estimated_error is None
     assert "cannot be meshed" in row.parts[0].basis
-    assert "not found" in budget_line(row.as_dict())
+    assert "not found" in str(budget_table([row.as_dict()]).rows)
 
 
 def test_an_accuracy_is_reached_on_the_cheapest_level() -> None:
@@ -187,16 +189,16 @@ def test_bars_of_inputs_are_as_long_as_the_band() -> None:
     (bars,) = chart.bars
     assert bars.cases == (
         "maximum pressure, F=200 N",
-        "by its inputs: 5 %; finer levels are money wasted",
+        "by its inputs: 5 %, more than its error",
         "approach, raw, F=200 N",
     )
-    assert bars.hatched == ("input loads.normal[0]", "input contact.friction")
+    assert set(bars.hatched) == {"input loads.normal[0]", "input contact.friction"}
     assert {name: list(values) for name, values in bars.parts.items()} == {
         "mesh": pytest.approx([1.0, 0.0, 2.0]),
         "input loads.normal[0]": pytest.approx([0.0, 3.2, 0.0]),
         "input contact.friction": pytest.approx([0.0, 1.8, 0.0]),
     }
-    assert "money wasted on 1 of 1 numbers" in chart.note
+    assert "Where that is more, finer levels do not" in chart.note
     picture = draw(chart)
     looks = {one.get_label(): one.patches[0].get_hatch() for one in picture.containers}
     assert looks["mesh"] is None
@@ -215,21 +217,24 @@ def test_inputs_have_bars_and_a_line_without_estimates_too() -> None:
         "maximum pressure, F=200 N: error not estimated",
         "by its inputs: 3 %",
     )
-    assert budget_line(entry) == (
-        "Inputs known within limits move the maximum pressure by 3 % (contact.friction 3 %)"
-    )
+    assert budget_table([entry]).rows[0][2:4] == ("input contact.friction", "3 %")
     lost = _entry(0.01, {"contact.friction": 0.03, "loads.normal[0]": math.nan})
     (chart,) = budget_charts([lost])
-    assert chart.bars[0].cases[1] == "by its inputs: not found for all of them"
+    assert chart.bars[0].cases[1] == "by its inputs: not found"
     assert list(chart.bars[0].parts) == ["mesh"]
     assert budget_charts([_entry(None, {})]) == []
 
 
-@pytest.mark.parametrize(("error", "wasted"), [(0.01, True), (0.05, False)])
-def test_line_says_when_finer_levels_are_money_wasted(error: float, wasted: bool) -> None:
+@pytest.mark.parametrize(("error", "more"), [(0.01, True), (0.05, False)])
+def test_an_answer_says_when_finer_levels_do_not_help(
+    error: float, more: bool, sphere: upd.RunResult
+) -> None:
     entry = _entry(error, {"contact.friction": 0.03})
-    line = budget_line(entry)
-    assert ("; finer levels are money wasted: inputs known" in line) == wasted
-    assert "move it by 3 %" in line
     (chart,) = budget_charts([entry])
-    assert ("money wasted" in chart.bars[0].cases[1]) == wasted
+    assert chart.bars[0].cases[1].endswith("more than its error") == more
+    inputs = (InputPart("contact.friction", 0.1, 0.03, "x"),)
+    mesh = (ErrorPart("mesh", error, "coarser", 3.0),)
+    numbers = tuple(with_parts(replace(r, inputs=inputs), mesh) for r in sphere.results)
+    lines = " ".join(line.text for line in replace(sphere, results=numbers).answer(200))
+    assert "input contact.friction 3 %" in lines
+    assert ("finer levels do not help" in lines) == more

@@ -17,7 +17,7 @@ from upd.analyses.seated.plan import make_plan as bare_plan
 from upd.analyses.seated.varied import MESH, PROBLEM, STEPS, levels
 from upd.errors import InputError
 from upd.mesh import recipes
-from upd.report.error_budget import budget_line, budget_rows
+from upd.report.tables import budget_table, error_parts
 from upd.results import Case, Result
 from upd.scene import load_scene
 from upd.vary.solve import varied_plan
@@ -75,9 +75,9 @@ def test_bounds_hold_against_finer_bodies_and_steps(wedge: upd.RunResult) -> Non
 def test_terminal_and_page_tell_them(wedge: upd.RunResult) -> None:
     row = next(r for r in wedge.results if r.name == "face_N")
     assert "normal force of the face 154.68 N ±" in repr(wedge)
-    told = budget_rows([row.as_dict()])
-    assert {one.source for one in told} == {NODES, MESH, STEPS, estimates.SOLVER}
-    assert all(one.half for one in told if one.source == NODES)
+    parts = error_parts(row.as_dict())
+    assert {source for source, *_ in parts} == {NODES, MESH, STEPS, estimates.SOLVER}
+    assert all(half for source, _, _, half, _ in parts if source == NODES)
 
 
 def test_finer_bodies_keep_the_nodes_of_the_faces() -> None:
@@ -126,7 +126,7 @@ def test_companions_that_fail_leave_a_reason(monkeypatch: pytest.MonkeyPatch) ->
     assert row.estimated_error is None
     assert [part.known for part in row.parts] == [True, False, True]
     assert "cannot be meshed" in row.parts[1].basis
-    assert "not found" in budget_line(row.as_dict())
+    assert "not found" in str(budget_table([row.as_dict()]).rows)
 
 
 def test_faces_that_cannot_be_coarser_say_so() -> None:

@@ -262,12 +262,9 @@ def test_all_failed(tmp_path: Path) -> None:
 
 def test_reasons_are_told_once_with_their_points(tmp_path: Path) -> None:
     made = read_sweep(_made(tmp_path / "s", {"F": [f"{k} N" for k in range(12)]}))
-    told = grouped(made, [["rare"] if k == 0 else ["often"] for k in range(12)])
-    assert [(e["text"], e["count"], e["more"]) for e in told] == [
-        ("often", "11 points", 3),
-        ("rare", "1 point", 0),
-    ]
-    assert told[1]["points"] == "F 0 N"
+    table = grouped("t", made, [["rare"] if k == 0 else ["often"] for k in range(12)])
+    assert [row[:2] for row in table.rows] == [("often", "11"), ("rare", "1")]
+    assert table.rows[0][2].endswith("F 8 N and 3 more") and table.rows[1][2] == "F 0 N"
 
 
 @pytest.mark.parametrize(
@@ -279,7 +276,7 @@ def test_verdict(failed: int, warned: int, kind: str) -> None:
         {"status": "failed" if k < failed else "ok", "warnings": ["w"] * (k < warned)}
         for k in range(3)
     ]
-    assert verdict(points)["kind"] == kind
+    assert verdict(points).kind == kind
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,10 @@ from rich.console import Console
 from upd.analyses import hertz
 from upd.analyses.base import CHOSEN_BY_ACCURACY
 from upd.cli.tables import print_result
-from upd.report.answer import answer_tables
 from upd.report.columns import whole_table
 from upd.report.notebook import RunResult
-from upd.report.notes import short_notes
+from upd.report.notes import warnings
+from upd.report.tables import answer_tables
 from upd.results import NO_CASE, Case, Check, Result, status_of, withheld
 from upd.results.answer_table import AnswerTable
 
@@ -126,40 +126,54 @@ def test_the_terminal_shows_the_tables_and_then_what_warns(told: RunResult, widt
         assert lines[at + 1 :][: len(shown := whole_table(table, width))] == shown
         assert table.note in text
     assert "Nothing" not in lines
-    assert "Checks: 0 of 10 passed." in lines
+    assert any(line.startswith("Self-checks: 0 of 10 passed") for line in lines)
     assert text.count("Warning: ") == 3
-    assert "Warning: Check 0 (F_C/F_E 3): motion left out = 3 (limit 1); take more." in text
-    assert lines[-1] == "4 more notes are told by --full."
-    assert "2 more" not in text
-    # All numbers beside the tables when asked.
-    assert "Peaks" in printed(bad, width, full=True)
-    assert "Self-checks" in map(str.strip, printed(bad, width, full=True))
+    assert "Warning: Check 0 (F_C/F_E 3; F_C/F_E 2): motion left out = 3 (limit 1). Take" in text
+    assert lines[-1] == "Warnings besides: 4, printed by --full."
+    # All numbers and all that warns beside the tables when asked.
+    full = printed(bad, width, full=True)
+    assert {"Peaks", "Self-checks", "What was simulated"} <= set(full)
+    assert " ".join(words(full)).count("Warning: ") == 7
 
 
 def test_a_run_without_warnings_ends_with_its_files(told: RunResult) -> None:
     good = replace(told, checks=(), status="ok")
     assert printed(good, 80)[-1].startswith("Run folder: ")
-    assert "more note" not in " ".join(printed(good, 80))
+    assert "besides" not in " ".join(printed(good, 80))
 
 
-def test_without_tables_nothing_changes(told: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_tables_there_are_the_main_numbers(
+    told: RunResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert answer_tables({"analysis": "another"}, []) == []
     assert answer_tables(told.size, []) == []
+    entries = [row.as_dict() for row in told.results]
+    assert answer_tables(told.size, entries) == [PEAKS, BEST, DEPENDS]
+    monkeypatch.setattr(hertz, "ANALYSIS", replace(hertz.ANALYSIS, answer=None))
+    assert [t.heading for t in answer_tables(told.size, entries)][:1] == ["Main numbers"]
+    monkeypatch.setattr(hertz, "ANALYSIS", replace(hertz.ANALYSIS, answer=lambda _: [PEAKS]))
     with_tables = printed(told, 80)
     monkeypatch.undo()
     assert printed(told, 80) != with_tables
     assert any(line.startswith("Self-checks: ") for line in printed(told, 80))
 
 
-def test_a_note_is_one_sentence() -> None:
-    bad = Check(
-        "truncation", Case(force_ratio=9.0), 2.0, 1.0, "motion", "It ends. Take 9. K_N", False
+def test_what_warns_is_named_with_its_worst_case_first() -> None:
+    bad, less = (
+        Check("truncation", Case(force_ratio=r), r, 1.0, "motion", "take 9", False)
+        for r in (9.0, 2.0)
     )
-    lost = Result("f", NO_CASE, float("nan"), "Hz", withheld="the path ended")
-    entries = [lost.as_dict(), lost.as_dict()]
-    assert short_notes([bad.as_dict()], entries) == [
-        "Truncation (F_C/F_E 9): motion = 2 (limit 1); It ends; take 9. K_N.",
-        "F and 1 more not reached: the path ended.",
+    lost = [
+        Result(name, NO_CASE, float("nan"), "Hz", withheld="the path ended").as_dict()
+        for name in ("f", "g", "f")
+    ]
+    assert warnings([less.as_dict(), bad.as_dict()], lost) == [
+        "Truncation (F_C/F_E 9; F_C/F_E 2): motion = 9 (limit 1). Take 9.",
+        "F; g: not reached, the path ended.",
+    ]
+    assert warnings([less.as_dict(), bad.as_dict()], lost, 1) == [
+        "Truncation (F_C/F_E 9; and 1 more): motion = 9 (limit 1). Take 9.",
+        "F; and 1 more: not reached, the path ended.",
     ]
 
 
@@ -178,7 +192,7 @@ def test_a_notebook_shows_the_tables(told: RunResult) -> None:
 def test_the_levels_that_an_accuracy_chose_stand_beside_the_tables(told: RunResult) -> None:
     chosen = {
         "name": CHOSEN_BY_ACCURACY[0],
-        "included": True,
+        "on": True,
         "why": "modes kept 20 of 10; rounds: two",
     }
     lines = printed(replace(told, effects=(chosen,)), 80)

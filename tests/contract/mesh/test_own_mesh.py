@@ -15,7 +15,7 @@ from upd.mesh import Mesh, recipes
 from upd.mesh.boundary import boundary_faces, boundary_quads
 from upd.mesh.export import write_mesh
 from upd.mesh.pairing import check_pairs
-from upd.results import warning_details
+from upd.report.notes import warnings
 
 EXAMPLES = Path(upd.__file__).parent / "scenes" / "examples"
 PARAMS = {"crown": 300.0, "divisions": 6}
@@ -208,7 +208,8 @@ def told_of(folder: Path, meshes: Mapping[str, Mesh], load: str = "400 N") -> st
         result = upd.run(folder / "mine.toml", report=False)
     except UpdError as error:
         return str(error)
-    return "; ".join(warning_details(result.checks, result.results))
+    entries = [row.as_dict() for row in result.results]
+    return "; ".join(warnings([check.as_dict() for check in result.checks], entries))
 
 
 def test_advice_is_for_a_file(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from html import unescape
 from pathlib import Path
 from types import ModuleType
 
@@ -17,10 +18,11 @@ import numpy as np
 import pytest
 
 from upd.errors import InputError
+from upd.labels import number_label
 from upd.report import notebook
+from upd.report.error_budget import run_charts
 from upd.report.folder import read_run
 from upd.report.notebook import RunResult
-from upd.report.panels import charts_of
 from upd.results import status_of
 
 
@@ -58,7 +60,8 @@ def test_table_escapes_what_a_scene_can_hold(sphere: RunResult) -> None:
     for word in ("<script", "<b>x", "<i>"):
         assert word not in table
     assert "&lt;script&gt;" in table
-    assert table.count("<tr>") == len(notebook.headline(sphere)) + 1
+    for entry in notebook.headline(sphere):
+        assert number_label(entry["name"]) in unescape(table)
     assert "µm" in table
 
 
@@ -69,13 +72,14 @@ def test_failed_checks_are_named(sphere: RunResult) -> None:
     bad = replace(sphere, checks=checks, status=status)
     assert repr(bad).startswith(f"hertz: failed: {first.name}")
     n = len(sphere.checks)
-    assert f"{n - 1} of {n} self-checks passed; {first.verdict}: {first.name}" in bad._repr_html_()
+    assert f"failed: {first.name}" in bad._repr_html_()
+    assert f"{n - 1} of {n} self-checks passed" in bad._repr_html_()
 
 
 def test_result_without_rows_and_arrays(sphere: RunResult) -> None:
     empty = replace(sphere, results=(), arrays={}, checks=(), folder=None)
     assert "all 0 numbers" in repr(empty)
-    assert "<tbody></tbody>" in empty._repr_html_()
+    assert "0 numbers, 0 groups" in empty._repr_html_() and "<table>" not in empty._repr_html_()
     with pytest.raises(InputError, match="no arrays to draw"):
         empty.plot()
 
@@ -119,10 +123,9 @@ def test_charts_are_those_of_the_run_folder(
     result = small_run(scene)
     assert result.folder is not None
     run = read_run(result.folder)
-    mine, theirs = notebook.charts(result), charts_of(run).charts(run.arrays, run.summary)
-    ours = [chart for chart in mine if chart.figure != "error_budget"]
-    assert [(c.title, c.case) for c in ours] == [(c.title, c.case) for c in theirs]
-    for a, b in zip(ours, theirs, strict=True):
+    mine, theirs = notebook.charts(result), run_charts(run.arrays, run.summary)
+    assert [(c.title, c.case) for c in mine] == [(c.title, c.case) for c in theirs]
+    for a, b in zip(mine, theirs, strict=True):
         for ta, tb in zip(a.traces, b.traces, strict=True):
             np.testing.assert_array_equal(ta.y, tb.y)
     assert len(result.plot()) == min(6, len({c.title for c in mine})) > 0

@@ -35,7 +35,7 @@
   function heightOf(figure, width) {
     const inner = Math.max(width - 90, 200) / figure.wide;
     const bar = hasBar(figure) ? 75 : 0, legend = figure.layout.showlegend ? twoLines : 0;
-    return Math.round(Math.min(Math.max(inner, bar ? 110 : 230), 440) + 90 + bar + legend);
+    return Math.round(Math.max(Math.min(Math.max(inner, bar ? 110 : 230), 440), figure.least) + 90 + bar + legend);
   }
 
   function layoutOf(figure, width) {
@@ -248,11 +248,9 @@
   }
 
   // ------------------------------------------------------------------ the rest of the page
-  function addCopy() {
-    const button = document.getElementById("copy-scene");
-    if (!button) return;
+  function addCopy(button) {
+    const text = button.parentElement.nextElementSibling;
     button.addEventListener("click", function () {
-      const text = document.getElementById("scene-text");
       const done = () => { button.textContent = "Copied"; };
       const byHand = () => { getSelection().selectAllChildren(text); };
       if (navigator.clipboard) navigator.clipboard.writeText(text.textContent).then(done, byHand); else byHand();
@@ -272,6 +270,6 @@
     waiting = setTimeout(() => drawn.filter((state) => state.place.clientWidth).forEach((state) => drawChart(state.place, state.figure)), 150);
   });
 
-  addCopy();
+  document.querySelectorAll("button.copy").forEach(addCopy);
   addPanels().then(addView).then(() => root.classList.add("ready"));
 })();

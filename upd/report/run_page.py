@@ -1,0 +1,219 @@
+"""One run folder -> report.html: numbers, figures, errors, checks, cost and the scene file."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from upd.analyses import analysis_named
+from upd.plot.surface import Surface, read_surface
+from upd.report.error_budget import run_charts
+from upd.report.folder import RunFolder, read_run
+from upd.report.notes import warnings
+from upd.report.page import Section, Verdict, versions_text, write_page
+from upd.report.panels import make_panels
+from upd.report.tables import (
+    all_numbers,
+    answer_tables,
+    budget_table,
+    checks_table,
+    effects_table,
+    filled,
+    main_numbers,
+    stage_table,
+)
+from upd.results import FAILED, outcome_of
+from upd.results.answer_table import AnswerTable
+
+log = logging.getLogger("upd.report")
+
+#: figures beside the tables of an answer; the others are folded
+_OPENED = 2
+#: records of the solvers, whose faults are among the checks, and of all modules of this package
+_SOLVER, _OURS = "upd.hbm", "upd."
+#: entries of a scene that its page begins with, in this order: words -> path
+_LEAD = {
+    "recipe": "geometry.recipe",
+    "friction": "contact.friction",
+    "contact model": "contact.model",
+    "normal force": "loads.normal",
+    "tangential force over µN": "loads.tangential",
+    "along": "loads.directions",
+    "centrifugal force": "loads.centrifugal",
+    "centrifugal force on the damper F_C": "damper.centrifugal",
+    "F_C/F_E": "excitation.centrifugal_to_force",
+    "F_E": "excitation.force",
+    "modes below": "modes.below",
+    "lowest F_C of seating": "seating.lowest",
+    "element": "mesh.element",
+}
+
+
+def write_run_report(folder: Path) -> Path:
+    """Write report.html into a run folder, from what lies in it. Returns its path.
+
+    Raises InputError when ``folder`` is no run folder or cannot be written.
+    """
+    run = read_run(folder)
+    surfaces = run_surfaces(run)
+    started = f", run on {run.started}" if run.started else ""
+    return write_page(
+        run.path / "report.html",
+        run.summary["title"] or run.summary["scene"],
+        run_sections(run, surfaces),
+        verdict=verdict(run.summary),
+        lead=lead(run.summary),
+        footer=f"Run folder {run.name}{started}. {versions_text(run.versions)}".rstrip(),
+        surfaces=surfaces,
+    )
+
+
+def run_sections(run: RunFolder, surfaces: Sequence[Surface]) -> list[Section]:
+    """The page of one run: where its analysis gives tables of an answer, it opens on them and all
+    else is folded.
+    """
+    summary, entries = run.summary, run.summary["results"]
+    size, cost = summary["size"], summary["cost"]
+    analysis = analysis_named(str(size.get("analysis", "")))
+    own = bool(analysis and analysis.answer and analysis.answer(entries))
+    panels = make_panels(run_charts(run.arrays, summary), run.figures)
+    opened = _OPENED if own else 0
+    tables = answer_tables(size, entries)
+    known = any(entry.get("estimated_error") is not None for entry in entries)
+    about = [
+        "Estimated errors (±) bound what mesh and methods leave in a number; the error budget "
+        "shows their sources."
+        if known
+        else 'No errors were estimated: leave accuracy = "unknown" out to see them.',
+        "A number without a unit is a ratio or a count.",
+    ]
+    nothing = Section("Main numbers", texts=["The run left no numbers."])
+    first = Section("Main numbers", tables, panels=panels[:opened], texts=about, opening=own)
+    figures = Section(
+        "More figures" if own else "Figures",
+        panels=panels[opened:],
+        texts=[] if panels or surfaces else ["The run left no figures."],
+        surfaces=bool(surfaces),
+        each_folded=own,
+    )
+    total = f"{cost['total_s']:.1f} s in all, {cost['peak_rss_mb']:.0f} MB of memory at most."
+    return [
+        first if tables else nothing,
+        Section("Warnings", notes=page_warnings(run)),
+        figures,
+        Section("Error budget", [budget_table(main_numbers(size, entries))], folded=own),
+        Section(
+            "What was simulated, what was left out",
+            [effects_table(summary["effects"]), checks_table(summary["checks"])],
+            folded=own,
+        ),
+        Section(
+            "Cost and mesh",
+            [stage_table(cost.get("stages", {})), *_mesh_tables(surfaces)],
+            texts=[total],
+            kind="grid",
+            folded=own,
+        ),
+        Section("All numbers", all_numbers(entries), folded=own, each_folded=True, kind="grid"),
+        Section(
+            "Scene file",
+            texts=[lead(summary)] * own + ["Save as scene.toml and run upd run scene.toml."],
+            file=run.scene,
+            folded=own,
+        ),
+    ]
+
+
+def _mesh_tables(surfaces: Sequence[Surface]) -> Iterator[AnswerTable]:
+    """Size and quality of the bodies of each file."""
+    for surface in surfaces:
+        columns = {
+            "body": [str(b["body"]) for b in surface.shape],
+            "# hexahedra": [str(b["hexahedra"]) for b in surface.shape],
+            "# nodes": [str(b["nodes"]) for b in surface.shape],
+            "# least scaled Jacobian": [f"{b['min']:.3f}" for b in surface.shape],
+            "# mean scaled Jacobian": [f"{b['mean']:.3f}" for b in surface.shape],
+            "# largest edge ratio": [f"{b['aspect']:.1f}" for b in surface.shape],
+        }
+        note = (
+            "Scaled Jacobian: 1 for a brick, 0 for a collapsed element. Edge ratio: longest over "
+            "shortest edge of an element."
+        )
+        yield filled(f"Mesh{', ' + surface.label if surface.label else ''}", columns, note)
+
+
+def verdict(summary: Mapping[str, Any]) -> Verdict:
+    """How a run ended, with its self-checks."""
+    status, checks = str(summary["status"]), summary["checks"]
+    if outcome_of(status) == FAILED:
+        return Verdict("failed", "Failed", status.removeprefix("failed: "))
+    counts = {kind: sum(c["verdict"] == kind for c in checks) for kind in ("passed", "warning")}
+    missing = sum(bool(entry.get("withheld")) for entry in summary["results"])
+    text = f"{counts['passed']} of {len(checks)} self-checks passed"
+    text += f", {counts['warning']} with a warning" if counts["warning"] else ""
+    text += f"; numbers not reached: {missing}" if missing else ""
+    # A folder from before whose status is "ok" may have checks that warn.
+    if counts["warning"] or missing:
+        return Verdict("warning", "Done, with warnings", f"{text}.")
+    return Verdict("passed", "Passed", f"{text}.")
+
+
+def lead(summary: Mapping[str, Any]) -> str:
+    """The main entries of the scene, and how large its model is."""
+    scene, size = summary["scene_file"], summary["size"]
+    parts = []
+    for words, path in _LEAD.items():
+        table, _, key = path.partition(".")
+        value = scene.get(table, {}).get(key)
+        if value:
+            listed = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+            parts.append(f"{words} {listed}")
+    parts.append(f"{sum(size.get('n_dof', {}).values())} degrees of freedom")
+    if size.get("n_pairs"):
+        parts.append(f"{size['n_pairs']} contact pairs")
+    if size.get("symmetry"):
+        parts.append(f"{size['symmetry']} model")
+    text = "; ".join(parts)
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def page_warnings(run: RunFolder) -> list[str]:
+    """What a run warns of, the warnings of its log that are no check's, and the files that could
+    not be read; each once.
+    """
+    checks, status = run.summary["checks"], run.summary["status"]
+    found = warnings(checks, run.summary["results"])
+    for line in run.log:
+        known = line.text == status or (checks and line.where.startswith(_SOLVER))
+        if line.level in ("WARNING", "ERROR", "CRITICAL") and not known:
+            ours = line.where.startswith(_OURS)
+            text = f"{line.text[:1].upper()}{line.text[1:]}"
+            found.append(text if ours else f"{line.where}: {line.text}")
+    return list(dict.fromkeys([*found, *run.missing]))
+
+
+def run_surfaces(run: RunFolder) -> list[Surface]:
+    """Surfaces of the run's VTU files: fields of a contact, else modes, else the bare mesh."""
+    contact = [f for f in (run.path / "fields.vtu", run.path / "mesh.vtu") if f.exists()][:1]
+    files = contact or sorted(
+        run.path.glob("modes_*.vtu"), key=lambda f: ("glued" not in f.stem, "asymmetric" in f.stem)
+    )
+    out = []
+    for file in files:
+        label = file.stem.removeprefix("modes_").replace("_", ", ")
+        try:
+            out.append(read_surface(file, _bodies(run, file.stem), label))
+        except (OSError, ValueError, KeyError) as problem:
+            log.warning("%s: no three-dimensional view (%s)", file.name, problem)
+    return out
+
+
+def _bodies(run: RunFolder, stem: str) -> list[str]:
+    """Bodies in the order of their numbers in the file."""
+    counts = run.summary["size"].get("n_dof", {})
+    names = list(dict.fromkeys(key.partition(",")[0] for key in counts))
+    if "glued" in stem:
+        return [n for n in names if n not in ("left", "right")] or names
+    return names

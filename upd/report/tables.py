@@ -1,0 +1,272 @@
+"""The numbers, errors, effects and checks of summary.json as tables: the terminal, the page and the
+notebook draw the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fnmatch import fnmatchcase
+from typing import Any
+
+from upd.analyses import analysis_named
+from upd.labels import (
+    check_number,
+    effect_word,
+    number,
+    number_label,
+    percent,
+    percent_of,
+    plus_minus,
+    shown,
+    unit_label,
+)
+from upd.plot.chart import Entry
+from upd.results import read_part, worst_checks
+from upd.results.answer_table import AnswerTable
+from upd.results.sampled import SampledNumber
+
+#: columns of numbers that a narrow terminal leaves out, the first one first
+SPARE = ("source", "thesis", "reference", "difference", "±")
+#: numbers of a run whose analysis is not known
+_MOST = 8
+#: cases that a table of several cases shows
+_CASES = 8
+#: heading of numbers that belong to no case
+_WHOLE = "whole run"
+SAMPLE_HEADING = "Bands by the inputs, to first order and sampled"
+
+
+def filled(heading: str, columns: Mapping[str, Sequence[str]], note: str = "") -> AnswerTable:
+    """A table of ``columns`` (head -> cells) without those that are empty in every row."""
+    kept = {head: cells for head, cells in columns.items() if any(cells)}
+    return AnswerTable(heading, tuple(kept), tuple(zip(*kept.values(), strict=True)), note)
+
+
+def main_numbers(size: Mapping[str, Any], entries: Sequence[Entry]) -> list[Entry]:
+    """The numbers an engineer asks for first; of an unknown analysis, those with a reference.
+
+    Parameters
+    ----------
+    size
+        Of the run: it names the analysis.
+    entries
+        Numbers as summary.json has them.
+    """
+    analysis = analysis_named(str(size.get("analysis", "")))
+    found = analysis.headline(entries) if analysis else []
+    return found or sorted(entries, key=lambda entry: entry["reference"] is None)[:_MOST]
+
+
+def answer_tables(size: Mapping[str, Any], entries: Sequence[Entry]) -> list[AnswerTable]:
+    """The tables that are the answer: those of the analysis of a run, else its main numbers and,
+    where several cases have the same numbers, a row for each of them.
+
+    Parameters
+    ----------
+    size
+        Of the run: it names the analysis.
+    entries
+        Numbers as summary.json has them.
+    """
+    analysis = analysis_named(str(size.get("analysis", "")))
+    own = analysis.answer(entries) if analysis and analysis.answer else []
+    if any(table.rows for table in own):
+        return [table for table in own if table.rows]
+    cases = _alike(entries, analysis.headline_names if analysis else ())
+    there = {(entry["name"], entry["case"]) for rows in cases for row in rows for entry in row}
+    main = [
+        entry
+        for entry in main_numbers(size, entries)
+        if not entry.get("withheld")
+        and (entry["reference"] is not None or (entry["name"], entry["case"]) not in there)
+    ]
+    tables = [number_table("Main numbers", main)] if main else []
+    return tables + [_case_table(rows) for rows in cases]
+
+
+def number_table(heading: str, entries: Iterable[Entry], case: str = "") -> AnswerTable:
+    """A row for every number; above those of another case than ``case``, a row with its label."""
+    rows: list[tuple[str, Entry | None]] = []
+    for entry in entries:
+        if entry["case"] != case:
+            case = entry["case"]
+            rows.append((case or _WHOLE, None))
+        rows.append((number_label(entry["name"]), entry))
+
+    def column(text: Callable[[Entry], str]) -> list[str]:
+        return ["" if entry is None else text(entry) for _, entry in rows]
+
+    return filled(
+        heading,
+        {
+            "number": [name for name, _ in rows],
+            "# value": column(shown),
+            "# ±": column(lambda e: plus_minus(e).lstrip("±")),
+            "# reference": column(lambda e: number(e["reference"])),
+            "# difference": column(lambda e: percent(e.get("error"))),
+            "# thesis": column(lambda e: percent(e.get("thesis_error"))),
+            "source": column(lambda e: e.get("why") or e.get("source", "")),
+        },
+    )
+
+
+def all_numbers(entries: Iterable[Entry]) -> list[AnswerTable]:
+    """All numbers, a table for every case."""
+    cases: dict[str, list[Entry]] = {}
+    for entry in entries:
+        cases.setdefault(str(entry["case"]), []).append(entry)
+    return [number_table(case or _WHOLE, rows, case) for case, rows in cases.items()]
+
+
+def _alike(entries: Sequence[Entry], patterns: Sequence[str]) -> list[list[list[Entry]]]:
+    """Cases that have the same of the numbers that matter, a row of numbers each; most numbers
+    first.
+    """
+    cases: dict[str, dict[str, Entry]] = {}
+    for entry in entries:
+        if any(fnmatchcase(entry["name"], one) for one in patterns):
+            cases.setdefault(entry["case"], {}).setdefault(entry["name"], entry)
+
+    def rank(name: str) -> int:
+        return next(k for k, one in enumerate(patterns) if fnmatchcase(name, one))
+
+    alike: dict[tuple[str, ...], list[list[Entry]]] = {}
+    for mine in cases.values():
+        order = tuple(sorted(mine, key=rank))
+        alike.setdefault(order, []).append([mine[name] for name in order])
+    several = [(names, rows) for names, rows in alike.items() if len(rows) > 1]
+    return [rows for _, rows in sorted(several, key=lambda table: -len(table[0]))]
+
+
+def _case_table(cases: Sequence[Sequence[Entry]]) -> AnswerTable:
+    """A row for each of the first cases, a column for every number."""
+    shown_cases = cases[: _CASES - (len(cases) > _CASES)]
+    columns = {"case": [row[0]["case"] for row in shown_cases]}
+    for k, entry in enumerate(cases[0]):
+        columns[f"# {with_unit(number_label(entry['name']), entry['unit'])}"] = [
+            f"{shown(row[k], unit=False)} {plus_minus(row[k])}".rstrip() for row in shown_cases
+        ]
+    more = len(cases) - len(shown_cases)
+    return filled("By case", columns, f"{more} more cases: see all numbers." if more else "")
+
+
+def effects_table(effects: Sequence[Mapping[str, Any]]) -> AnswerTable:
+    """What was simulated and what was not, with the checks of it."""
+    columns = {
+        "effect": [str(e["name"]) for e in effects],
+        "simulated": [effect_word(e) for e in effects],
+        "why": [str(e["why"]) for e in effects],
+        "check": [str(e.get("verdict") or "").partition(":")[0] for e in effects],
+    }
+    return filled("What was simulated", columns)
+
+
+def checks_table(checks: Iterable[Mapping[str, Any]]) -> AnswerTable:
+    """The worst case of every self-check."""
+    worst = worst_checks(checks)
+    columns = {
+        "self-check": [f"{c['name']}: {c['says']}" for c in worst],
+        "worst case": [c["case"] for c in worst],
+        "# value": [check_number(c, "value") for c in worst],
+        "# limit": [check_number(c, "limit") for c in worst],
+        "verdict": [c["verdict"] for c in worst],
+    }
+    return filled("Self-checks", columns)
+
+
+def error_parts(entry: Entry) -> list[tuple[str, float | None, float | None, str, str]]:
+    """Sources of a number's error and its uncertain inputs, each with those not found first and
+    then the largest: name, error, share of the sum of all errors, seconds that half of it costs,
+    how it was estimated.
+    """
+    total = entry.get("estimated_error")
+    errors = [
+        (
+            part["source"],
+            part["error"],
+            part["error"] / total if total and part["error"] is not None else None,
+            read_part(part).half_told,
+            part["basis"],
+        )
+        for part in entry.get("error_parts", ())
+    ]
+    inputs = [
+        (f"input {part['path']}", part["share"], None, "", part["basis"])
+        for part in entry.get("input_parts", ())
+    ]
+
+    def size(part: tuple[str, float | None, float | None, str, str]) -> float:
+        return float("-inf") if part[1] is None else -part[1]
+
+    return sorted(errors, key=size) + sorted(inputs, key=size)
+
+
+def inputs_exceed(entry: Entry) -> bool:
+    """Whether a number is known better than its inputs let it be."""
+    band, error = entry.get("input_error"), entry.get("estimated_error")
+    return band is not None and error is not None and band > error
+
+
+def budget_table(entries: Sequence[Entry]) -> AnswerTable:
+    """Sources of the errors of numbers, and what the inputs known within limits do to them."""
+    rows = [(entry, *part) for entry in entries for part in error_parts(entry)]
+    columns = {
+        "number": [number_label(entry["name"]) for entry, *_ in rows],
+        "case": [entry["case"] for entry, *_ in rows],
+        "source": [row[1] for row in rows],
+        "# error": [percent_of(row[2]) for row in rows],
+        "# share": ["" if row[3] is None else f"{100.0 * row[3]:.0f} %" for row in rows],
+        "# half of it costs": [row[4] for row in rows],
+        "how it was estimated": [row[5] for row in rows],
+    }
+    note = (
+        "The errors of all sources are added: their signs are not known. Independent inputs add as "
+        "squares. Half of it costs: seconds that the run would take longer."
+    )
+    return filled("Error budget", columns, note)
+
+
+def stage_table(seconds: Mapping[str, float]) -> AnswerTable:
+    """Seconds of every stage, and their share."""
+    total = sum(seconds.values()) or 1.0
+    columns = {
+        "stage": list(seconds),
+        "# seconds": [f"{s:.2f}" for s in seconds.values()],
+        "# share": [f"{100.0 * s / total:.0f} %" for s in seconds.values()],
+    }
+    return filled("Cost", columns)
+
+
+def with_unit(title: str, unit: str) -> str:
+    """A title with the unit of its numbers."""
+    return f"{title}, {unit_label(unit)}" if unit else title
+
+
+def sample_table(numbers: Sequence[SampledNumber]) -> AnswerTable:
+    """Every number with its first-order band and the sampled one."""
+
+    def band(value: float | None) -> str:
+        return "" if value is None else f"±{percent_of(value)}"
+
+    def ends(*values: float | None, text: Callable[[float], str] = number) -> str:
+        return " to ".join(text(value) for value in values if value is not None)
+
+    middle = "middle 95 %" if all(n.resolved for n in numbers) else "least to largest"
+    columns = {
+        "number": [
+            with_unit(number_label(n.name) + (f" ({n.case})" if n.case else ""), n.unit)
+            for n in numbers
+        ],
+        "# as given": [number(n.nominal) for n in numbers],
+        "# first order": [band(n.first_order) for n in numbers],
+        "# sample": [band(n.band) for n in numbers],
+        "# 95 % interval of the sample's band": [
+            ends(n.band_low, n.band_high, text=percent_of) for n in numbers
+        ],
+        "# mean": [number(n.mean) for n in numbers],
+        "# standard deviation": [number(n.deviation) for n in numbers],
+        f"# {middle}": [ends(n.low, n.high) for n in numbers],
+        "# points": [str(n.count) for n in numbers],
+        "compared": [n.verdict for n in numbers],
+    }
+    return filled(SAMPLE_HEADING, columns)
