@@ -264,7 +264,9 @@ def _points(m: Map, ax: Axes) -> None:
     x, y = np.meshgrid(m.x, m.y, indexing="ij")
     known = np.isfinite(m.z)
     ax.plot(x[known], y[known], "o", color="white", mec="#333333", mew=0.5, ms=3, clip_on=False)
-    ax.plot(x[~known], y[~known], "x", color=CROSS, ms=6, clip_on=False)
+    if not known.all():
+        # without points matplotlib's layout makes room for one in the corner of the sheet
+        ax.plot(x[~known], y[~known], "x", color=CROSS, ms=6, clip_on=False)
 
 
 def _extend(maps: Sequence[Map], low: float, high: float) -> str:

@@ -68,7 +68,7 @@ def answer(
     lines = _verdict(summary, width)
     analysis = analysis_named(str(size.get("analysis", "")))
     own = analysis is not None and analysis.answer is not None
-    for table in answer_tables(size, entries):
+    for table in answer_tables(size, entries) if own or not full else ():
         lines += _table(table, width, cut=not own)
     if full:
         for table in (

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from upd.cache.sources import versions
 from upd.plot.chart import Chart
 from upd.report.answer_folder import FigureAnswer
-from upd.report.page import render
+from upd.report.page import Section, Verdict, page_text, versions_text
 from upd.report.panels import make_panels
 
 
@@ -35,16 +35,12 @@ def answer_page(
     """
     word, kind = outcome
     text, text_is = scene
-    page: Mapping[str, object] = {
-        "title": title,
-        "word": word,
-        "kind": kind,
-        "says": f"{answer.verdict}.",
-        "tables": answer.tables,
-        "notes": answer.notes,
-        "text": text,
-        "text_is": text_is,
-    }
-    panels = make_panels(charts, {})
-    context: Mapping[str, object] = {"page": page, "title": title, "versions": versions()}
-    return render("answer.html.j2", panels, [], context)
+    tables = [Section(table.heading, [table], kind="grid") for table in answer.tables]
+    sections = [
+        *tables,
+        Section("Notes", texts=answer.notes),
+        Section("Figures", panels=make_panels(charts, {})),
+        Section("Scene file", texts=[text_is], file=text),
+    ]
+    verdict = Verdict(kind, word, f"{answer.verdict}.")
+    return page_text(title, sections, verdict=verdict, footer=versions_text(versions()))

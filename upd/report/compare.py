@@ -15,7 +15,7 @@ from upd.plot.chart import Axis, Chart, Entry
 from upd.plot.style import colour_range
 from upd.report.error_budget import analysis_charts
 from upd.report.folder import RunFolder, read_run
-from upd.report.page import Section, write_page
+from upd.report.page import Section, page_text, write_page
 from upd.report.panels import make_panels
 from upd.report.run_page import verdict
 from upd.report.tables import filled, main_numbers
@@ -32,7 +32,7 @@ def write_comparison(folders: Sequence[str | Path], path: str | Path) -> Path:
     runs = [read_run(Path(folder)) for folder in folders]
     names = run_names(runs)
     title = f"Comparison of {', '.join(names[:-1])} and {names[-1]}"
-    return write_page(target, title, comparison_sections(runs, names))
+    return write_page(target, page_text(title, comparison_sections(runs, names)))
 
 
 def run_names(runs: Sequence[RunFolder]) -> list[str]:

@@ -9,7 +9,7 @@ import fnmatch
 import json
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -37,6 +37,12 @@ RUN_FILES = (
     "curves/*.csv",
     *(f"{name}.png" for name in FIGURES),
 )
+Kind = Literal["run", "sweep"]
+#: kind of a folder -> what makes its files again
+_AGAIN: dict[Kind, str] = {
+    "run": "run the scene again",
+    "sweep": "start the same sweep again, finished points are kept",
+}
 #: names that the operating system or a viewer leaves
 _NOBODYS = (".DS_Store", "Thumbs.db", "desktop.ini")
 
@@ -251,7 +257,7 @@ def _summary(folder: Path) -> dict[str, Any]:
     return read_json(folder / "summary.json", _Summary, "run")
 
 
-def read_json(path: Path, schema: type, kind: Literal["run", "sweep"]) -> dict[str, Any]:
+def read_json(path: Path, schema: type, kind: Kind) -> dict[str, Any]:
     """The content of a JSON file of a folder that `upd run` or `upd sweep` wrote.
 
     Parameters
@@ -271,9 +277,6 @@ def read_json(path: Path, schema: type, kind: Literal["run", "sweep"]) -> dict[s
     # pydantic is slow to import: only when a folder is read
     from pydantic import TypeAdapter, ValidationError
 
-    again = "run the scene again"
-    if kind == "sweep":
-        again = "start the same sweep again, finished points are kept"
     try:
         found = json.loads(path.read_text("utf-8"))
         TypeAdapter(schema).validate_python(found)
@@ -288,10 +291,15 @@ def read_json(path: Path, schema: type, kind: Literal["run", "sweep"]) -> dict[s
         ) from None
     except ValidationError as problem:
         places = dict.fromkeys(str((*e["loc"], "the whole")[0]) for e in problem.errors())
-        raise InputError(f"{path}: is damaged in {', '.join(places)}; {again}") from None
+        raise damaged_file(path, places, kind) from None
     except ValueError as problem:
-        raise InputError(f"{path}: is not JSON ({problem}); {again}") from None
+        raise InputError(f"{path}: is not JSON ({problem}); {_AGAIN[kind]}") from None
     return dict(found)
+
+
+def damaged_file(path: Path, places: Iterable[str], kind: Kind) -> InputError:
+    """The error of a file that is damaged in these places."""
+    return InputError(f"{path}: is damaged in {', '.join(places)}; {_AGAIN[kind]}")
 
 
 def _text(path: Path, missing: list[str]) -> str:

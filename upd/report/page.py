@@ -36,9 +36,9 @@ _PARTS = Path(__file__).parent / "parts"
 
 
 class Verdict(NamedTuple):
-    """How it ended: the class of the mark, its word, and a sentence."""
+    """How it ended: passed, warning or failed, the word for it, and a sentence."""
 
-    kind: Literal["passed", "warning", "failed"]
+    kind: str
     word: str
     text: str
 
@@ -79,36 +79,13 @@ class Section(NamedTuple):
         return not (has_rows or self.notes or self.panels or self.texts or self.file)
 
 
-def write_page(
-    path: Path,
-    title: str,
-    sections: Sequence[Section],
-    *,
-    verdict: Verdict | None = None,
-    lead: str = "",
-    footer: str = "",
-    surfaces: Sequence[Surface] = (),
-) -> Path:
-    """Write a page, whole or not at all; returns its path. Sections without content are left out.
+def write_page(path: Path, html: str) -> Path:
+    """Write a page, whole or not at all; returns its path.
 
     Raises InputError when the place cannot be written.
     """
-    shown = [
-        section._replace(tables=[table for table in section.tables if table.rows])
-        for section in sections
-        if not section.is_empty
-    ]
-    context = {
-        "title": title,
-        "verdict": verdict,
-        "lead": lead,
-        "sections": shown,
-        "footer": footer,
-        "most_notes": MOST_NOTES,
-    }
-    panels = [panel for section in shown for panel in section.panels]
     try:
-        write_text(path, render("page.html.j2", panels, surfaces, context))
+        write_text(path, html)
     except OSError as problem:
         raise InputError(
             f"{path}: cannot be written ({problem.strerror}); make room there or choose "
@@ -117,12 +94,25 @@ def write_page(
     return path
 
 
-def render(
-    template: str, panels: Sequence[Panel], surfaces: Sequence[Surface], context: Mapping[str, Any]
+def page_text(
+    title: str,
+    sections: Sequence[Section],
+    *,
+    verdict: Verdict | None = None,
+    lead: str = "",
+    footer: str = "",
+    surfaces: Sequence[Surface] = (),
 ) -> str:
-    """The page as text: figures first, and as much of the surfaces as the limit leaves room for."""
-    script = _packed_plotly()
-    charts = data(panels)
+    """The page as HTML: figures first, and as much of the surfaces as the limit leaves room for.
+    Sections without content are omitted.
+    """
+    found = [
+        section._replace(tables=[table for table in section.tables if table.rows])
+        for section in sections
+        if not section.is_empty
+    ]
+    panels = [panel for section in found for panel in section.panels]
+    script, charts = _packed_plotly(), data(panels)
     used = (
         len(script)
         + len(_packed(_json({"panels": charts})))
@@ -132,10 +122,14 @@ def render(
     shown, left_out = fitting(surfaces, LIMIT_BYTES - used)
     return (
         _environment()
-        .get_template(template)
+        .get_template("page.html.j2")
         .render(
-            **context,
-            panels=panels,
+            title=title,
+            verdict=verdict,
+            lead=lead,
+            sections=found,
+            footer=footer,
+            most_notes=MOST_NOTES,
             surfaces=shown,
             surfaces_left_out=left_out,
             surface_image=png_uri(picture(shown[0])) if shown else "",

@@ -17,13 +17,8 @@ from upd.plot.surface import Surface, n_bytes, with_fields
 
 #: PNG file -> heading, for those that have no chart
 _HEADINGS = {
-    "contact_map": "Contact points at the peak",
-    "contact_law": "Contact points of the dynamic model",
-    "contact_open": "Nodes in contact",
-    "surface": "Deformed contact surface",
     "modes_free": "Mode shapes, free",
     "modes_glued": "Mode shapes, damper glued",
-    "work_precision": "What accuracy costs",
     "dimensions": "Geometry and its dimensions",
 }
 #: pixels of the width of a picture at most
@@ -43,19 +38,14 @@ class Panel:
     sheet
         Whether that picture has drawings side by side, which need the width of the page.
     charts
-        Title, note and the charts of that title, in the order of the page.
+        In the order of the page; those of one title share a place.
     """
 
     name: str
     heading: str
     image: str
     sheet: bool
-    charts: tuple[tuple[str, str, tuple[Chart, ...]], ...]
-
-    @property
-    def alt(self) -> str:
-        """Words for those who do not see the picture."""
-        return self.heading
+    charts: tuple[Chart, ...]
 
 
 def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Panel]:
@@ -77,7 +67,7 @@ def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Pa
 
 def _panel(name: str, heading: str, png: bytes, group: list[Chart]) -> Panel:
     width, _ = png_size(png)
-    return Panel(name, heading, png_uri(png), width > _SHEET_PIXELS, _titled(group))
+    return Panel(name, heading, png_uri(png), width > _SHEET_PIXELS, tuple(group))
 
 
 def _heading(name: str) -> str:
@@ -89,12 +79,6 @@ def _drawn(group: list[Chart]) -> bytes:
     return chart_png([chart for chart in group if chart.sheet][:6] or group[:6])
 
 
-def _titled(group: list[Chart]) -> tuple[tuple[str, str, tuple[Chart, ...]], ...]:
-    titles = dict.fromkeys(chart.title for chart in group)
-    found = {title: tuple(c for c in group if c.title == title) for title in titles}
-    return tuple((title, mine[0].note, mine) for title, mine in found.items())
-
-
 def _note(chart: Chart) -> str:
     """What stands under a chart: its detail as a sentence, and what to see."""
     detail = f"{chart.detail[:1].upper()}{chart.detail[1:]}." if chart.detail else ""
@@ -103,20 +87,16 @@ def _note(chart: Chart) -> str:
 
 def data(panels: Iterable[Panel]) -> dict[str, Any]:
     """What the page's script draws: panel -> list of {title, note, charts}."""
-    return {
-        p.name: [
-            {
-                "title": t,
-                "charts": [
-                    {"case": c.case.replace("muN", "µN"), "note": _note(c), "figure": figure(c)}
-                    for c in charts
-                ],
-            }
-            for t, _, charts in p.charts
-        ]
-        for p in panels
-        if p.charts
-    }
+    found: dict[str, list[dict[str, Any]]] = {}
+    for panel in panels:
+        for title in dict.fromkeys(chart.title for chart in panel.charts):
+            charts = [
+                {"case": c.case.replace("muN", "µN"), "note": _note(c), "figure": figure(c)}
+                for c in panel.charts
+                if c.title == title
+            ]
+            found.setdefault(panel.name, []).append({"title": title, "charts": charts})
+    return found
 
 
 def fitting(surfaces: Iterable[Surface], room: int) -> tuple[list[Surface], list[str]]:

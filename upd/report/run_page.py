@@ -12,7 +12,7 @@ from upd.plot.surface import Surface, read_surface
 from upd.report.error_budget import run_charts
 from upd.report.folder import RunFolder, read_run
 from upd.report.notes import warnings
-from upd.report.page import Section, Verdict, versions_text, write_page
+from upd.report.page import Section, Verdict, page_text, versions_text, write_page
 from upd.report.panels import make_panels
 from upd.report.tables import (
     all_numbers,
@@ -59,8 +59,7 @@ def write_run_report(folder: Path) -> Path:
     run = read_run(folder)
     surfaces = run_surfaces(run)
     started = f", run on {run.started}" if run.started else ""
-    return write_page(
-        run.path / "report.html",
+    html = page_text(
         run.summary["title"] or run.summary["scene"],
         run_sections(run, surfaces),
         verdict=verdict(run.summary),
@@ -68,6 +67,7 @@ def write_run_report(folder: Path) -> Path:
         footer=f"Run folder {run.name}{started}. {versions_text(run.versions)}".rstrip(),
         surfaces=surfaces,
     )
+    return write_page(run.path / "report.html", html)
 
 
 def run_sections(run: RunFolder, surfaces: Sequence[Surface]) -> list[Section]:

@@ -13,11 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from upd.errors import InputError
 from upd.labels import unit_label
 from upd.plot.chart import Array
 from upd.plot.sweep_charts import figure_names
-from upd.report.folder import is_png, read_json
+from upd.report.folder import damaged_file, is_png, read_json
 from upd.results.sampled import SampledNumber
 
 #: values of a parameter written one by one
@@ -153,10 +152,12 @@ def read_sweep(folder: Path) -> SweepFolder:
     data = read_json(path, _Sweep, "sweep")
     counts, m = [len(axis["values"]) for axis in data["axes"]], len(data["followed"])
     n = min(counts, default=0) if "sample" in data else math.prod(counts)
-    if len(data["points"]) != n or any(len(p["values"]) != m for p in data["points"]):
-        raise InputError(
-            f"{path}: is damaged in points; start the same sweep again, finished points are kept"
-        )
+    damaged = ["points"] * (
+        len(data["points"]) != n or any(len(p["values"]) != m for p in data["points"])
+    )
+    damaged += ["sample"] * ("sample" in data and len(data["sample"]["numbers"]) != m)
+    if damaged:
+        raise damaged_file(path, damaged, "sweep")
     parameters = tuple(_parameter(axis) for axis in data["axes"])
     table = np.array([point["values"] for point in data["points"]], float).reshape(n, m)
     names = figure_names((one["name"], one["case"]) for one in data["followed"])

@@ -13,7 +13,7 @@ import numpy as np
 from upd.labels import number, number_label, unit_label
 from upd.plot.sample_charts import sample_charts
 from upd.plot.sweep_charts import Followed, sheet_name, sweep_charts
-from upd.report.page import Section, Verdict, versions_text, write_page
+from upd.report.page import Section, Verdict, page_text, versions_text, write_page
 from upd.report.panels import Panel, make_panels
 from upd.report.sweep_folder import SweepFolder, read_sweep
 from upd.report.tables import SAMPLE_HEADING, filled, sample_table, stage_table, with_unit
@@ -36,13 +36,13 @@ def write_sweep_report(folder: Path) -> Path:
     sweep = read_sweep(folder)
     data = sweep.data
     versions = data.get("versions") or {"upd": data.get("version", "")}
-    return write_page(
-        sweep.path / "report.html",
+    html = page_text(
         f"{'Sample' if sweep.is_sample else 'Sweep'}: {data['title'] or data['scene']}",
         sweep_sections(sweep),
         verdict=verdict(data["points"]),
         footer=f"Sweep folder {sweep.name}. {versions_text(versions)}",
     )
+    return write_page(sweep.path / "report.html", html)
 
 
 def sweep_sections(sweep: SweepFolder) -> list[Section]:
