@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -46,34 +46,22 @@ def design(
         Folder; by default runs/design-NAME, or runs/choice-NAME.
     """
     from upd.scene import load_scene
-    from upd.sizing import design as statics_of
+    from upd.sizing import BestDamper, DamperDesign
+    from upd.sizing import design as design_damper
 
     loaded = load_scene(scene, set or [])
-    if minimise is not None:
-        _choice(loaded, minimise, over or [], for_ or [], out)
-        return
-    if over or for_:
+    if minimise is None and (over or for_):
         raise InputError("--over and --for belong to a choice: add --minimise peak")
-    found = statics_of(loaded)
+    found: DamperDesign | BestDamper
+    if minimise is None:
+        found = design_damper(loaded)
+    else:
+        with Live() as live:
+            found = design_damper(
+                loaded, minimise=minimise, over=over or [], for_=for_ or [], progress=live
+            )
     terminal.console.print(str(found), soft_wrap=True)
-    folder = out or Path("runs") / f"design-{loaded.name}"
-    found.write(folder)
-    terminal.console.print(f"Figure: {folder / 'design.png'}")
-
-
-def _choice(
-    loaded: Any,
-    minimise: Literal["peak", "acceleration"],
-    over: list[str],
-    for_: list[str],
-    out: Path | None,
-) -> None:
-    from upd.sizing import design as best_of
-
-    folder = out or Path("runs") / f"choice-{loaded.name}"
-    with Live() as live:
-        found = best_of(loaded, minimise=minimise, over=over, for_=for_, progress=live)
-    terminal.console.print(str(found), soft_wrap=True)
+    folder = out or Path("runs") / f"{found.figure}-{loaded.name}"
     found.write(folder)
     terminal.console.print(f"Report: {folder / 'report.html'}", soft_wrap=True)
-    terminal.console.print(f"Figure: {folder / 'choice.png'}", soft_wrap=True)
+    terminal.console.print(f"Figure: {folder / f'{found.figure}.png'}", soft_wrap=True)

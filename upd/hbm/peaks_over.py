@@ -314,7 +314,11 @@ class PeaksOver:
     def highest(self, a: float, b: float) -> float:
         """ln of the highest peak that is read between two places."""
         s = np.linspace(a, b, max(2, math.ceil((b - a) / JUMP_STEP) + 1))
-        return float(np.max([curve(s) for curve in self.curves().values()]))
+        return float(self.read(s).max())
+
+    def read(self, s: Array) -> Array:
+        """ln of the highest peak at places (n,); -inf where nothing is known."""
+        return np.asarray(np.max([curve(s) for curve in self.curves().values()], axis=0))
 
     def curves(self) -> dict[str, Callable[[Array], Array]]:
         """Name -> ln height over ln r; -inf where nothing is known."""
@@ -342,10 +346,6 @@ class PeaksOver:
         self._peaks.clear()
         self._peaks.update(peaks)
         return out
-
-    def distance(self, s: float) -> float:
-        """To the next node."""
-        return min((abs(t - s) for t in self.nodes), default=math.inf)
 
     # -- what decides ------------------------------------------------------------------------------
 

@@ -9,16 +9,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from upd.sizing.least_worst import LowestWorst
 from upd.sizing.margins import Reach
 from upd.sizing.ranges import Ranges
 from upd.sizing.rig_peaks import RigPeaks
 from upd.sizing.worst_peak import WorstPeak
 
-Array = NDArray[np.float64]
 #: what is minimised: peaks per newton of F_E, accelerations
 Objective = Literal["peak", "acceleration"]
 UNITS_OF: dict[Objective, str] = {"peak": "(m/s2)/N", "acceleration": "m/s2"}

@@ -101,34 +101,24 @@ def lowest_worst(worst: WorstPeak, low: float, high: float, jump: float = JUMP_S
             )
         c = _least(worst, known, ends[1])
         rounds += 1
-        if worst.surprises(c):
-            before = c
-            continue
-        guessed = float(worst.at(np.array([c]))[0])
-        deciding = worst.solved(c)
-        off = abs(worst.value(c, deciding[0]) - float(worst.at(np.array([c]))[0]))
-        off = max(off, abs(guessed - worst.value(c, deciding[0])))
-        solved.append((worst.value(c, deciding[0]), c))
+        guessed, deciding = worst.read(c), worst.solved(c)
+        y = worst.value(c, deciding[0])
+        off = max(abs(y - worst.read(c)), abs(y - guessed))
         near = abs(c - before) <= STILL or c in (known, ends[1])
         if off <= AGREES and near:
             # whole curves between may have higher peaks, and others hide lower ones
-            if worst.settle((c, c), solved[-1][0], jump=jump) or worst.explore(
-                (known, ends[1]), solved[-1][0]
-            ):
-                solved.pop()
+            if worst.settle((c, c), y, jump=jump) or worst.explore((known, ends[1]), y):
                 rounds -= 1
                 continue
             status = _status(c, ends, known)
-            return LowestWorst(
-                c, solved[-1][0], _shared(worst, c, deciding), status, (known, ends[1])
-            )
+            return LowestWorst(c, y, _shared(worst, c, deciding), status, (known, ends[1]))
+        solved.append((y, c))
         before = c
-    solved = solved or [(worst.value(c, worst.solved(c)[0]), c)]
     # later whole curves may have shown higher peaks at F_C that were solved before
     read = worst.at(np.array([c for _, c in solved]))
     _, c = min((max(y, float(now)), c) for (y, c), now in zip(solved, read, strict=True))
     deciding = worst.solved(c)
-    y = max(worst.value(c, deciding[0]), float(worst.at(np.array([c]))[0]))
+    y = max(worst.value(c, deciding[0]), worst.read(c))
     return LowestWorst(c, y, _shared(worst, c, deciding), "bracketed", (known, ends[1]))
 
 
@@ -143,9 +133,9 @@ def has_moved(worst: WorstPeak, found: LowestWorst, low: float, high: float) -> 
     low, high
         F_C [N] between which it was sought.
     """
-    here = float(worst.at(np.array([found.log_centrifugal]))[0])
+    here = worst.read(found.log_centrifugal)
     c = _least(worst, max(math.log(low), worst.known_from()), math.log(high))
-    least = float(worst.at(np.array([c]))[0])
+    least = worst.read(c)
     off = 2.0 * AGREES
     return here > found.log_worst + off or least < found.log_worst - off
 
@@ -168,13 +158,13 @@ def _least(worst: WorstPeak, low: float, high: float) -> float:
     i = int(values.argmin())
     a, b = grid[max(i - 1, 0)], min(grid[i] + (grid[1] - grid[0]), high)
     found = minimize_scalar(
-        lambda c: float(worst.at(np.array([c]))[0]),
+        worst.read,
         bounds=(a, b),
         method="bounded",
         options={"xatol": 0.1 * STILL},
     )
     candidates = [(float(found.fun), float(found.x))]
-    candidates += [(float(worst.at(np.array([c]))[0]), float(c)) for c in (grid[i], low, high)]
+    candidates += [(worst.read(c), float(c)) for c in (grid[i], low, high)]
     return min(candidates)[1]
 
 

@@ -5,13 +5,11 @@ They are kept on disk as they are solved: called again, a choice continues.
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
@@ -38,8 +36,6 @@ from upd.scene.ranges import one_model, with_values
 from upd.sizing.ranges import InputRange
 from upd.vary.inputs import InputEnds
 
-log = logging.getLogger(__name__)
-Array = NDArray[np.float64]
 #: half of the relative interval of central differences of data that are known in closed form
 STEP = 1e-3
 #: frequencies of a whole curve before it is refined where it bends: enough to see its peaks

@@ -150,7 +150,7 @@ def _unsure(found: ChosenDamper, one: InputRange) -> Sensitivity:
     """
     best, ranges = found.best, found.ranges
     k = ranges.unsure.index(one)
-    c = np.array([best.best.log_centrifugal])
+    c = best.best.log_centrifugal
     known = best.rigs[0][1].known
     place = len(ranges.shapes) + k
     slope = math.nan
@@ -158,9 +158,7 @@ def _unsure(found: ChosenDamper, one: InputRange) -> Sensitivity:
         j = sum(known[:place])
         slope = float(sum(p.share * p.by[j] for p in best.best.deciding if p.share > 0.0))
     weight = best.worst.weight
-    heights = {
-        w: float(WorstPeak([rig.peaks], ranges.forces, weight).at(c)[0]) for w, rig in best.rigs
-    }
+    heights = {w: WorstPeak([rig.peaks], ranges.forces, weight).read(c) for w, rig in best.rigs}
     worst = max(heights, key=lambda w: heights[w])
     line = sorted((w[k], y) for w, y in heights.items() if is_along(w, worst, k))
     grid, values = np.array(line).T

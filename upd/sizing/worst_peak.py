@@ -73,8 +73,11 @@ class WorstPeak:
 
     def at(self, c: Array) -> Array:
         """ln of the worst peak at ln F_C (n,), on the curves between solved points."""
-        f = self._forces()
-        return np.array([float(self.single(one, f).max()) for one in np.atleast_1d(c)])
+        return np.array([self.read(float(one)) for one in np.atleast_1d(c)])
+
+    def read(self, c: float) -> float:
+        """The same at one ln F_C."""
+        return float(self.single(c, self._forces()).max())
 
     def over(self, low: float, high: float) -> tuple[Array, Array]:
         """ln F_C from end to end, evenly, and ln of the worst peaks there, all at once: the largest
@@ -89,7 +92,7 @@ class WorstPeak:
         s = c[0] - self.f[1] + step * np.arange(len(c) + n)
         out = np.full(len(c), -math.inf)
         for one in self.peaks:
-            y = np.max([curve(s) for curve in one.curves().values()], axis=0) - self.weight * s
+            y = one.read(s) - self.weight * s
             window = sliding_window_view(y, n + 1).max(axis=1) if n else y
             out = np.maximum(out, window + self.weight * c)
         inside = c <= high + SAME
@@ -97,8 +100,7 @@ class WorstPeak:
 
     def single(self, c: float, f: Array) -> Array:
         """ln of the highest peak at ln F_C and every ln F_E (n,), on the curves."""
-        each = [curve(c - f) for one in self.peaks for curve in one.curves().values()]
-        return np.asarray(np.max(each, axis=0) + self.weight * f)
+        return np.asarray(np.max([one.read(c - f) for one in self.peaks], axis=0) + self.weight * f)
 
     def _forces(self) -> Array:
         """ln F_E of the range, closely."""
@@ -109,10 +111,10 @@ class WorstPeak:
         near the worst, and the highest within it where it is higher than both.
         """
         f = self._forces()
-        worst = float(self.at(np.array([c]))[0])
+        worst = self.read(c)
         found = []
         for k, one in enumerate(self.peaks):
-            y = np.max([curve(c - f) for curve in one.curves().values()], axis=0) + self.weight * f
+            y = one.read(c - f) + self.weight * f
             ends = [0, len(f) - 1] if f[-1] > f[0] else [0]
             found += [(k, float(c - f[i])) for i in ends if y[i] >= worst - _NEAR]
             top = int(y.argmax())
@@ -120,22 +122,6 @@ class WorstPeak:
                 # a maximum at a jump is its node
                 found.append((k, one.node(float(c - f[top]), FINE)))
         return found
-
-    def surprises(self, c: float) -> bool:
-        """Solve the deciding places at ln F_C, those farthest from whole curves first, up to one
-        that differs from what was read there: then others may decide, and elsewhere.
-
-        Returns
-        -------
-        bool
-            Whether one did.
-        """
-        places = sorted(self.places(c), key=lambda p: -self.peaks[p[0]].distance(p[1]))
-        for one, s in ((self.peaks[k], s) for k, s in places):
-            read, known = one.highest(s, s), len(one.nodes)
-            if abs(one.solve(s).y - read) > AGREES and len(one.nodes) > known:
-                return True
-        return False
 
     def solved(self, c: float) -> tuple[Deciding, ...]:
         """The deciding points at ln F_C, solved, worst first."""

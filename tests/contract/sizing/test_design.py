@@ -188,6 +188,8 @@ def test_command_tells_first_and_draws(
     assert limits[0] == pytest.approx(TAN_30) and limits[2] is None
     assert bounds["rows"][0][1:3] == [0.0, None]
     assert motions["rows"][0][3] == pytest.approx(F_C * math.cos(math.pi / 6.0))
+    page = (folder / "report.html").read_text()
+    assert "<h2>Friction</h2>" in page and "data:image/png" in page
     # again into the same folder
     assert call("design", "asymmetric-response") == 0
 
