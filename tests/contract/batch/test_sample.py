@@ -225,7 +225,7 @@ def test_command_prints_bands_and_verdict(
 ) -> None:
     settings = [f"--set={path}={json.dumps(value)}" for path, value in TINY.items()]
     settings.append('--set=loads.normal=["200 N +- 5 %"]')
-    command = ["sweep", "hertz", "--sample", "3", "--workers", "1", *settings]
+    command = ["sweep", "hertz", "--sample", "3", "--workers", "0", *settings]
     assert main_code([*command, "--plan-only", "--out", str(tmp_path / "s")]) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "4 points (a sample of 3 with seed 0, and the scene itself)" in told

@@ -211,12 +211,11 @@ def test_what_the_mesh_ladder_of_a_response_sets() -> None:
         list(response_meshes(own, None))
 
 
-def test_a_toy_response_converges_with_its_mesh_on_two_workers(tmp_path: Path) -> None:
+def test_a_toy_response_converges_with_its_mesh(tmp_path: Path) -> None:
     scene = load_scene("symmetric-response", STUCK)
     planned = plan_study(scene, "mesh", (0.5, 1))
-    found = run_study(scene, planned, tmp_path, workers=Workers(2, 1, fresh=True))
+    found = run_study(scene, planned, tmp_path, workers=Workers(0, 1))
     assert [one.outcome.failure for one in found.solved] == ["", ""]
-    assert len({one.outcome.where for one in found.solved}) == 2, "side by side"
     stuck = [one.values["stuck_out_of_phase", "thesis"] for one in found.solved]
     assert stuck[0] > stuck[1], "displacement elements are too stiff"
     swept = [

@@ -326,23 +326,6 @@ def test_a_single_run_keeps_no_condensation(own_cache: Path) -> None:
     assert not (own_cache / "condensed").exists()
 
 
-def test_processes_give_the_same_table_to_the_last_digit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    vary = ["contact.friction=0.2,0.4", "loads.normal=40 N,60 N"]
-    sweep("hertz", vary, overrides=TINY, out=tmp_path / "here", workers=0)
-    # A cache of its own: nothing is taken over.
-    monkeypatch.setenv("UPD_CACHE", str(tmp_path / "cache"))
-    found = sweep("hertz", vary, overrides=TINY, out=tmp_path / "pool", workers=2)
-    assert table(tmp_path / "pool") == table(tmp_path / "here")
-    assert len({outcome.where for outcome in found.outcomes}) == found.plan.workers.count
-    assert (
-        found.plan.workers.count * found.plan.workers.threads <= 2
-        or found.plan.workers.count == 1
-        or len(found.plan.groups) >= found.plan.workers.count
-    )
-
-
 def test_unknown_followed_number_ends_the_sweep_at_the_first_point(tmp_path: Path) -> None:
     with pytest.raises(
         InputError, match=r"--follow max_presure: no such number; there are .*max_pressure"

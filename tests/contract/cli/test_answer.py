@@ -45,17 +45,25 @@ _RESPONSE: Mapping[str, Any] = {
     "want": ["response", "contact_state", "hysteresis", "damper_motion"],
     "left_out.solve": "no",
 }
+_FEW_STEPS = {"seating.steps": 4, "moved.steps": 4}
 #: Ready scenes beside the small ones that all tests share.
 TOYS: Mapping[str, Mapping[str, Any]] = {
     "asymmetric": {
         "geometry.divisions": 4,
         "geometry.divisions_long": 9,
         "loads.tangential": [0.5],
+        "law.rows": 2,
+        "law.columns": 3,
+        "left_out.solve": "no",
     },
     "symmetric-response": _RESPONSE,
     "asymmetric-response": _RESPONSE,
-    "symmetric-seated": {"geometry.patch_along_y": 4, "geometry.patch_along_slope": 2},
-    "asymmetric-seated": {"geometry.pad_along_y": 4, "geometry.pad_along_slope": 2},
+    "symmetric-seated": {
+        "geometry.patch_along_y": 4,
+        "geometry.patch_along_slope": 2,
+        **_FEW_STEPS,
+    },
+    "asymmetric-seated": {"geometry.pad_along_y": 4, "geometry.pad_along_slope": 2, **_FEW_STEPS},
 }
 SCENES = (
     *("hertz", "symmetric", "asymmetric", "rig", "symmetric-response", "asymmetric-response"),
