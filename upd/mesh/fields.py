@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
-from typing import Any, Literal, get_args, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from upd.errors import InputError
 
@@ -151,7 +151,7 @@ class RecipeParameter:
     default
         None when it must be given.
     bounds
-        Whatever the other parameters are; "" when the recipe does not tell.
+        Whatever the other parameters are; "" when the recipe has none.
     here
         With the other parameters as they are; "" where that is all of ``bounds``.
     """
@@ -176,24 +176,26 @@ def table(params: Any, *, here: bool = True) -> list[RecipeParameter]:
 
 
 def _row(params: Any, f: Field[Any], kind: Any, *, here: bool) -> RecipeParameter:
-    value = getattr(params, f.name)
-    default = f.default if f.default is not MISSING else None
     bounds: Bounds = f.metadata.get("bounds", Bounds())
-    choices = f.metadata.get("choices") or get_args(kind) if _chosen(f, kind) else ()
-    unit = UNITS_INSIDE.get(str(f.metadata.get("quantity")), "")
+    choices = f.metadata.get("choices") or (get_args(kind) if get_origin(kind) is Literal else ())
+    return RecipeParameter(
+        f.name,
+        getattr(params, f.name),
+        None if f.default is MISSING else f.default,
+        UNITS_INSIDE.get(str(f.metadata.get("quantity")), ""),
+        ", ".join(map(str, choices)) if choices else bounds.text,
+        _here(params, f.name, bounds, choices) if here else "",
+    )
+
+
+def _here(params: Any, name: str, bounds: Bounds, choices: Sequence[Any]) -> str:
+    """What the other parameters leave of bounds or choices, "" where that is all."""
     if choices:
-        sound = [c for c in choices if not here or _passes(params, f.name, c)]
-        bounds_here = ", ".join(map(str, sound)) if len(sound) < len(choices) else ""
-        return RecipeParameter(
-            f.name, value, default, unit, ", ".join(map(str, choices)), bounds_here
-        )
+        sound = [str(c) for c in choices if _passes(params, name, c)]
+        return ", ".join(sound) if len(sound) < len(choices) else ""
+    value = getattr(params, name)
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    bounds_here = _interval(params, f.name, bounds) if number and here else ""
-    return RecipeParameter(f.name, value, default, unit, bounds.text, bounds_here)
-
-
-def _chosen(f: Field[Any], kind: Any) -> bool:
-    return "choices" in f.metadata or getattr(kind, "__origin__", None) is Literal
+    return _interval(params, name, bounds) if number else ""
 
 
 def _passes(params: Any, name: str, value: Any) -> bool:
