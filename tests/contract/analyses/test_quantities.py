@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 from rigs import undeclared
 
+from upd.analyses import analysis_named
 from upd.results import NO_CASE, Result
 from upd.results import quantities as q
 from upd.results.quantities import DECLARED, number_label, quantity_of
@@ -44,6 +45,14 @@ def test_a_name_is_of_one_quantity(n: str) -> None:
         if "{n}" in one.name and one.named(n) not in DECLARED:
             assert quantity_of(one.named(n)) == (one, n)
             assert quantity_of(one.on("left").named(n)) == (one.on("left"), n)
+
+
+@pytest.mark.parametrize("analysis", ["hertz", "flat", "modal", "seated", "forced"])
+def test_main_numbers_are_declared(analysis: str) -> None:
+    found = analysis_named(analysis)
+    assert found is not None
+    for name in (*found.headline_names, *found.verdict_names):
+        assert quantity_of(name.replace("?", "1"))[0].name in DECLARED
 
 
 def test_values_are_given_in_mm_and_come_in_the_unit() -> None:
