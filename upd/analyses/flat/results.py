@@ -18,6 +18,7 @@ from upd.analyses.contact.results import (
     shear_stiffness,
     stick_area,
 )
+from upd.analyses.contact.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.analyses.flat.maps import (
     contact_law,
     corner,
@@ -27,7 +28,6 @@ from upd.analyses.flat.maps import (
     whole_area,
 )
 from upd.analyses.flat.printed import printed_of
-from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.analyses.printed import with_printed
 from upd.mesh import IntArray, Mesh
 from upd.plot.chart import Entry

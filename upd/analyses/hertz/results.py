@@ -17,7 +17,7 @@ from upd.analyses.contact.results import (
     shear_stiffness,
     stick_area,
 )
-from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
+from upd.analyses.contact.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.analyses.printed import printed_of, with_printed
 from upd.contact.patch import consistent_average
 from upd.contact.stiffness import without_body

@@ -31,13 +31,13 @@ from upd.analyses.contact.loading import (
     tangential_compliance,
 )
 from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, unit_vector
-from upd.analyses.hertz.products import show_normal, show_tangential
-from upd.analyses.hertz.solution import (
+from upd.analyses.contact.solution import (
     CurvePoint,
     HertzNormalCase,
     HertzSolution,
     HertzTangentialCase,
 )
+from upd.analyses.hertz.products import show_normal, show_tangential
 from upd.contact.bulk import finite_body_share, half_space_mean
 from upd.contact.edge import located_area
 from upd.contact.model import Body, ContactModel
@@ -159,13 +159,13 @@ def _normal_case(
         average = force / patch.area()
         located = located_area(patch.X, patch.Y, average, gap, force > 0.0, solution.modulus)
     return HertzNormalCase(
-        load,
         result,
+        copies * result.stiffness,
+        load,
         force,
         gap,
         pressure,
         measure(patch, force, located, pressure),
-        copies * result.stiffness,
         state=state,
     )
 
