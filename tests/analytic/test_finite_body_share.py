@@ -7,7 +7,7 @@ import pytest
 
 import upd
 from upd.analyses.contact.scene_plan import make_plan
-from upd.analyses.hertz.solution import HertzSolution
+from upd.analyses.contact.solution import HertzSolution
 from upd.analyses.hertz.solve import solve_plan
 from upd.contact.bulk import finite_body_share, half_space_mean
 from upd.contact.patch import make_patch

@@ -17,8 +17,8 @@ from upd.analyses.contact.bodies import pressed
 from upd.analyses.contact.loading import load_point
 from upd.analyses.contact.plan import refined_growth
 from upd.analyses.contact.scene_plan import make_plan
+from upd.analyses.contact.solution import FlatSolution
 from upd.analyses.flat.results import band_centres
-from upd.analyses.flat.solution import FlatSolution
 from upd.analyses.flat.solve import solve_plan
 from upd.progress import Stages
 from upd.scene import load_scene

@@ -17,7 +17,7 @@ from scipy.sparse.linalg import spsolve
 import upd
 from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL
 from upd.analyses.contact.scene_plan import make_plan
-from upd.analyses.flat.solution import FlatSolution
+from upd.analyses.contact.solution import FlatSolution
 from upd.analyses.flat.solve import solve_plan as solve
 from upd.contact.model import Body, free_dofs
 from upd.mesh import Mesh

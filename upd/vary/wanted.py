@@ -376,7 +376,7 @@ def _name(key: Key) -> str:
 
 def _farthest(shares: Shares) -> str:
     key = max(shares, key=lambda key: _sum(shares[key]), default=None)
-    return "no number" if key is None else f"{_name(key)} {_times(_sum(shares[key]))}"
+    return "no bound yet" if key is None else f"{_name(key)} {_times(_sum(shares[key]))}"
 
 
 def _times(miss: float) -> str:

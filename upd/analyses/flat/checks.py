@@ -7,8 +7,8 @@ import numpy as np
 from upd.analyses.contact import checks as common
 from upd.analyses.contact import yielding
 from upd.analyses.contact.loading import contact_points_of, load_point
+from upd.analyses.contact.solution import FlatNormalCase, FlatSolution
 from upd.analyses.flat.maps import lattices
-from upd.analyses.flat.solution import FlatNormalCase, FlatSolution
 from upd.results import Check
 
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.analyses.contact.loading import contact_points_of
 from upd.analyses.contact.plan import NORMAL
-from upd.analyses.flat.solution import FlatNormalCase, FlatSolution
+from upd.analyses.contact.solution import FlatNormalCase, FlatSolution
 from upd.contact.edge import LocatedArea, located_area
 from upd.contact.law import ContactLaw, contact_points
 from upd.contact.normal import NormalContact

@@ -17,9 +17,9 @@ from upd.analyses.contact.output import (
     tangential_fields,
     write_meshes,
 )
+from upd.analyses.contact.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.analyses.flat.maps import FaceLattice, contact_law, corner, lattices, whole_area
 from upd.analyses.flat.results import band_middles, printed_of
-from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.contact.law import ContactLaw
 from upd.mesh import recipes
 from upd.results import ArrayGroup, Case, variable

@@ -14,6 +14,7 @@ from upd.analyses import printed
 from upd.analyses.contact.plan import direction_name
 from upd.analyses.contact.results import LOCATED, shear_stiffness
 from upd.analyses.contact.scene_plan import normal_loads
+from upd.analyses.contact.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.analyses.flat.maps import (
     contact_law,
     corner,
@@ -22,7 +23,6 @@ from upd.analyses.flat.maps import (
     tilt_stiffness,
     whole_area,
 )
-from upd.analyses.flat.solution import FlatNormalCase, FlatSolution, FlatTangentialCase
 from upd.mesh import IntArray, Mesh
 from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result

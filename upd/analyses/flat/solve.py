@@ -45,7 +45,7 @@ from upd.analyses.contact.plan import (
     unit_vector,
 )
 from upd.analyses.contact.scene_plan import DamperLoad, normal_loads
-from upd.analyses.flat.solution import (
+from upd.analyses.contact.solution import (
     FlatNormalCase,
     FlatSolution,
     FlatTangentialCase,
@@ -165,7 +165,7 @@ def _pressed_and_sheared(
         free = slope(states, F)
         answer = as_normal(state, held_stiffness(state) if arms.size else free)
         shares = {b.name: pressed_by(model, b, state.force) for b in (model.upper, model.lower)}
-        solution.normal.append(FlatNormalCase(load, answer, None, free, shares, state))
+        solution.normal.append(FlatNormalCase(answer, free, load, None, shares, state=state))
     solution.curve = [(F, as_normal(states[F], float("nan"))) for F in curve]
     for body in _bodies_alone(solution):
         alone = raised(model, mu, slope_loads(wanted), arms, body=body)
@@ -208,7 +208,7 @@ def _normal_case(
         for b in (model.upper, model.lower)
     }
     stiffness = tilted.free_stiffness if tilted is not None else answer.stiffness
-    return FlatNormalCase(load, answer, tilted, solution.plan.copies * stiffness, shares)
+    return FlatNormalCase(answer, solution.plan.copies * stiffness, load, tilted, shares)
 
 
 def solve_tangential(solution: FlatSolution, stages: Stages, steps: Array = PATH_SHARES) -> None:

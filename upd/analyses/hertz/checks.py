@@ -11,9 +11,9 @@ from upd.analyses.contact import checks as common
 from upd.analyses.contact import yielding
 from upd.analyses.contact.plan import NORMAL
 from upd.analyses.contact.scene_plan import has_mirror_planes, wider_patch
+from upd.analyses.contact.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.analyses.hertz.products import product_checks
 from upd.analyses.hertz.results import closed_form_traction, hertz_of
-from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.mesh import recipes
 from upd.results import NO_CASE, Check
 

@@ -21,6 +21,7 @@ from upd.analyses.contact.output import (
     tangential_fields,
     write_meshes,
 )
+from upd.analyses.contact.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.analyses.hertz.results import (
     beyond_3a,
     closed_form_traction,
@@ -28,7 +29,6 @@ from upd.analyses.hertz.results import (
     shear_compliance,
     stick_radius,
 )
-from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.labels import file_name
 from upd.reference import hertz_pressure, mindlin
 from upd.results import ArrayGroup, variable

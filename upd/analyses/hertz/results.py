@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.contact.results import LOCATED, shear_stiffness
-from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
+from upd.analyses.contact.solution import HertzNormalCase, HertzSolution, HertzTangentialCase
 from upd.analyses.printed import printed_of, with_printed
 from upd.contact.patch import consistent_average
 from upd.contact.stiffness import without_body

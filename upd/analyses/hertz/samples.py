@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.analyses.contact.solution import HertzNormalCase, HertzSolution
 from upd.analyses.contact.varied import has_neighbours, neighbours, plan_at
 from upd.analyses.hertz.results import make_results
-from upd.analyses.hertz.solution import HertzNormalCase, HertzSolution
 from upd.analyses.hertz.solve import solve_normal, solve_tangential
 from upd.errors import UpdError
 from upd.progress import Stages

@@ -31,18 +31,18 @@ from upd.analyses.contact.loading import (
     tangential_compliance,
 )
 from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, unit_vector
-from upd.analyses.hertz.products import show_normal, show_tangential
-from upd.analyses.hertz.solution import (
+from upd.analyses.contact.solution import (
     CurvePoint,
     HertzNormalCase,
     HertzSolution,
     HertzTangentialCase,
 )
+from upd.analyses.hertz.products import show_normal, show_tangential
 from upd.contact.bulk import finite_body_share, half_space_mean
 from upd.contact.edge import located_area
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact, normal_curve
-from upd.contact.patch import ContactMeasures, measure
+from upd.contact.patch import measure
 from upd.contact.stiffness import BodyShare, axis_half_space, axis_share
 from upd.contact.tangential import tangential_contact
 from upd.errors import MeshError
@@ -129,24 +129,14 @@ def solve_normal(solution: HertzSolution, stages: Stages) -> None:
         with stages("internal displacement", "back-substitution"):
             for case in solution.normal:
                 _internal_normal(solution, case)
-            solution.along = [_curve_point(solution, F, results[F]) for F in wanted if F > 0.0]
-    else:
-        solution.along = [
-            CurvePoint(F, results[F].approach, _measures(solution, results[F]), {})
-            for F in wanted
-            if F > 0.0
-        ]
-
-
-def _measures(solution: HertzSolution, result: NormalContact) -> ContactMeasures:
-    patch = solution.model.patch
-    return measure(patch, patch.whole(result.force, extensive=True))
+    solution.along = [_curve_point(solution, F, results[F]) for F in wanted if F > 0.0]
 
 
 def _curve_point(solution: HertzSolution, load: float, result: NormalContact) -> CurvePoint:
     """A point of the curve with both bodies' compression beyond 3a, where they have an axis."""
-    model, measures, beyond = solution.model, _measures(solution, result), {}
-    if solution.plan.scene.sphere_radius is not None:
+    plan, model, beyond = solution.plan, solution.model, {}
+    measures = measure(model.patch, model.patch.whole(result.force, extensive=True))
+    if plan.effect("internal displacement") and plan.scene.sphere_radius is not None:
         nodal = model.nodal(result.force)
         for body in (model.upper, model.lower):
             u = body.side * body.displacement(NORMAL, body.side * nodal)[:, 2]
@@ -169,13 +159,13 @@ def _normal_case(
         average = force / patch.area()
         located = located_area(patch.X, patch.Y, average, gap, force > 0.0, solution.modulus)
     return HertzNormalCase(
-        load,
         result,
+        copies * result.stiffness,
+        load,
         force,
         gap,
         pressure,
         measure(patch, force, located, pressure),
-        copies * result.stiffness,
         state=state,
     )
 
@@ -310,15 +300,12 @@ def _sheared(solution: HertzSolution, case: HertzNormalCase, directions: tuple[i
             moved = result.force, result.slip, result.displacement, result.stiffness
             solution.tangential.append(_tangential_case(solution, case, ratio, nodes, *moved))
     if scene.wants("cycle"):
-        ratio = scene.loads.cycle_amplitude
-        mine, peak, steps = (
-            Case(load=case.load, ratio=ratio),
-            ratio * scene.contact.friction * case.load / copies,
-            scene.loads.cycle_steps,
-        )
+        ratio, steps = scene.loads.cycle_amplitude, scene.loads.cycle_steps
+        own = Case(load=case.load, ratio=ratio)
+        peak = ratio * scene.contact.friction * case.load / copies
         solution.cycles.append(
             closed_loop(
-                mine, case.case, C, limit[loaded], peak=peak, steps=steps, unit=unit, copies=copies
+                own, case.case, C, limit[loaded], peak=peak, steps=steps, unit=unit, copies=copies
             )
         )
 
@@ -342,14 +329,10 @@ def _sheared_together(solution: HertzSolution, case: HertzNormalCase) -> None:
                 _together_case(solution, case, ratio, path.states[k], path.base)
             )
     if scene.wants("cycle"):
-        ratio = scene.loads.cycle_amplitude
-        mine, peak, steps = (
-            Case(load=case.load, ratio=ratio),
-            ratio * total,
-            scene.loads.cycle_steps,
-        )
+        ratio, steps = scene.loads.cycle_amplitude, scene.loads.cycle_steps
+        own = Case(load=case.load, ratio=ratio)
         solution.cycles.append(
-            coupled_loop(mine, case.case, state, peak=peak, steps=steps, unit=unit)
+            coupled_loop(own, case.case, state, peak=ratio * total, steps=steps, unit=unit)
         )
 
 
