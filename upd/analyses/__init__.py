@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from upd.analyses.base import Analysis, Plan
 from upd.scene import AnyScene
 from upd.vary.inputs import with_input_cost
-from upd.vary.ladder import Ladder
+
+if TYPE_CHECKING:
+    from upd.vary.ladder import Ladder
 
 #: what a scene or its recipe names as its analysis -> package
 _PACKAGES = {

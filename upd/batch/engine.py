@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections import Counter
+from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
@@ -272,13 +272,16 @@ class Job:
     group: str
 
 
-def _take(waiting: list[Job], own: str, opened: set[str]) -> Job:
+def _take(waiting: dict[str, deque[Job]], own: str, opened: set[str]) -> Job:
     """The next job of a worker: of its own group, else of an unopened one, else of the largest."""
-    left = Counter(job.group for job in waiting)
-    fresh = next((group for group in left if group not in opened), left.most_common(1)[0][0])
-    group = own if own in left else fresh
+    largest = max(waiting, key=lambda group: len(waiting[group]))
+    fresh = next((group for group in waiting if group not in opened), largest)
+    group = own if own in waiting else fresh
     opened.add(group)
-    return waiting.pop(next(k for k, job in enumerate(waiting) if job.group == group))
+    job = waiting[group].popleft()
+    if not waiting[group]:
+        del waiting[group]
+    return job
 
 
 def dispatch(
@@ -301,7 +304,9 @@ def dispatch(
     InputError, UpdError
         When a worker has other sources, or cannot run points; and whatever ``record`` raises.
     """
-    waiting, opened = list(jobs), set[str]()
+    waiting, opened = defaultdict[str, deque[Job]](deque), set[str]()
+    for job in jobs:
+        waiting[job.group].append(job)
     groups: dict[str, str] = {}
     running: dict[Future[str], tuple[str, Job]] = {}
     deaths: Counter[int] = Counter()
@@ -329,7 +334,7 @@ def dispatch(
             future.cancel()
             deaths[job.number] += 1
             if deaths[job.number] < ATTEMPTS:
-                waiting.insert(0, job)
+                waiting[job.group].appendleft(job)
             else:
                 record(job.number, Outcome(failure=_killed(deaths[job.number]), final=False))
 

@@ -81,10 +81,9 @@ def make_columns(outcomes: Sequence[Outcome], follow: Sequence[str]) -> list[Col
     parameters set an attribute of the cases (F=50 N, F=80 N), it is written as *: one value at
     every point, or the k-th smallest of as many values at every point.
     """
-    tables = [_by_name(outcome) for outcome in outcomes]
-    names = list(dict.fromkeys(name for table in tables for name in table))
+    names = list(dict.fromkeys(one.name for outcome in outcomes for one in outcome.results))
     chosen = [name for name in names if any(fnmatchcase(name, one) for one in follow)]
-    columns = [column for name in chosen or names for column in _columns(name, tables)]
+    columns = [column for name in chosen or names for column in _columns(name, outcomes)]
     return columns if chosen else columns[:_FEW]
 
 
@@ -101,13 +100,6 @@ def reasons(outcomes: Sequence[Outcome], columns: Sequence[Column]) -> list[str]
     return out
 
 
-def _by_name(outcome: Outcome) -> dict[str, list[PointResult]]:
-    table: dict[str, list[PointResult]] = {}
-    for one in outcome.results:
-        table.setdefault(one.name, []).append(one)
-    return table
-
-
 #: attributes of a case that a parameter of the sweep may set: numbers, of which a point may have
 #: several, and words; all others say which number it is
 _NUMBERS = ("load", "ratio", "force_ratio", "frequency", "part")
@@ -115,23 +107,18 @@ _WORDS = ("stiffness", "body", "direction", "friction", "arrangement")
 _Key = tuple[tuple[str, Any], ...]
 
 
-def _columns(name: str, tables: Sequence[Mapping[str, list[PointResult]]]) -> list[Column]:
-    found = [table.get(name, []) for table in tables]
+def _columns(name: str, outcomes: Sequence[Outcome]) -> list[Column]:
+    found = [[one for one in outcome.results if one.name == name] for outcome in outcomes]
     ranks = _set_by_parameters([[one.case for one in mine] for mine in found])
     rows: dict[_Key, dict[int, PointResult]] = {}
     for k, mine in enumerate(found):
-        seen: Counter[_Key] = Counter()
+        places = {field: of_points[k] for field, of_points in ranks.items()}
         for one in mine:
-            key = _key(one.case, [ranks[field][k] for field in ranks], list(ranks))
-            seen[key] += 1
-            if seen[key] > 1:
-                # the same number twice in a point: only its place differs
-                key = (*key, ("again", seen[key]))
-            rows.setdefault(key, {})[k] = one
+            rows.setdefault(_key(one.case, places), {})[k] = one
     joined = _with_known_modes(rows)
     # one value at every point: the label does not need it
     single = [field for field, places in ranks.items() if max(map(len, places)) == 1]
-    made = [_column(name, key, mine, tables, single) for key, mine in joined.items()]
+    made = [_column(name, key, mine, outcomes, single) for key, mine in joined.items()]
     titles, seen_titles, out = Counter(c.case for c in made), Counter[str](), []
     for column in made:
         seen_titles[column.case] += 1
@@ -154,10 +141,10 @@ def _set_by_parameters(cases: Sequence[Sequence[Case]]) -> dict[str, list[dict[A
     return out
 
 
-def _key(case: Case, places: Sequence[Mapping[Any, int]], fields: Sequence[str]) -> _Key:
+def _key(case: Case, places: Mapping[str, Mapping[Any, int]]) -> _Key:
     """What identifies a number among those of its name."""
     given = case.given()
-    for field, place in zip(fields, places, strict=True):
+    for field, place in places.items():
         if field in given:
             given[field] = ("place", place[given[field]])
     return tuple(sorted(given.items()))
@@ -172,7 +159,7 @@ def _with_known_modes(
     out = {key: dict(mine) for key, mine in rows.items()}
     for key, mine in rows.items():
         alike = [k for k in rows if k != key and _without(k, "mode") == key]
-        if alike and not any(_has(mine, k) for k in mine):
+        if alike and all(one.value is None for one in mine.values()):
             del out[key]
             for other in alike:
                 out[other] = {**mine, **out[other]}
@@ -183,23 +170,21 @@ def _without(key: _Key, *fields: str) -> _Key:
     return tuple(pair for pair in key if pair[0] not in fields)
 
 
-def _has(rows: Mapping[int, PointResult], k: int) -> bool:
-    return k in rows and rows[k].value is not None
-
-
 def _column(
     name: str,
     key: _Key,
     rows: Mapping[int, PointResult],
-    tables: Sequence[Mapping[str, list[PointResult]]],
+    outcomes: Sequence[Outcome],
     varying: Sequence[str],
 ) -> Column:
     cases = [one.case for one in rows.values()]
     cases = [case for case in cases if case.mode] or cases
-    values = [one.value if (one := rows.get(k)) else None for k in range(len(tables))]
+    values = [one.value if (one := rows.get(k)) else None for k in range(len(outcomes))]
     missing = [
-        "" if not tables[k] or value is not None else _why(rows.get(k), key, tables[k])
-        for k, value in enumerate(values)
+        "" if not results or value is not None else _why(rows.get(k), key, results)
+        for k, (value, results) in enumerate(
+            zip(values, (o.results for o in outcomes), strict=True)
+        )
     ]
     return Column(
         name,
@@ -212,20 +197,20 @@ def _column(
 
 
 #: attributes that tell numbers of one curve apart
-_WITHIN = ("mode", "peak", "side", "again")
+_WITHIN = ("mode", "peak", "side")
 
 
-def _why(one: PointResult | None, key: _Key, table: Mapping[str, list[PointResult]]) -> str:
+def _why(one: PointResult | None, key: _Key, results: Sequence[PointResult]) -> str:
     """Why a point has no value: its number's reason, or that of another which its curve lacks."""
     if one is not None:
         return one.withheld or "not finite"
-    results = [result for mine in table.values() for result in mine]
+    cases = [other.case.given() for other in results]
     fields = [field for field, value in key if isinstance(value, tuple)]
-    values = [{r.case.given()[f] for r in results if f in r.case.given()} for f in fields]
-    places = [{value: k for k, value in enumerate(sorted(mine))} for mine in values]
+    there = {field: {given[field] for given in cases if field in given} for field in fields}
+    places = {f: {value: k for k, value in enumerate(sorted(mine))} for f, mine in there.items()}
     mine = _without(key, *_WITHIN)
     for other in results:
-        if other.withheld and _without(_key(other.case, places, fields), *_WITHIN) == mine:
+        if other.withheld and _without(_key(other.case, places), *_WITHIN) == mine:
             return other.withheld
     return "not among the numbers of this point"
 

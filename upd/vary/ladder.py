@@ -19,7 +19,7 @@ from upd.vary.curves import (
     with_friction,
 )
 from upd.vary.outcome import SolvedPoint, matching
-from upd.vary.tables import TextTable, convergence_tables, cost_columns, level_table, make_table
+from upd.vary.tables import TextTable, convergence_tables, level_table, points_table
 from upd.vary.variation import Key, Overrides, Variation
 
 #: divisions, refinements, numbers of modes ...: the levels a user asks for; None: the usual ones
@@ -86,8 +86,7 @@ def accuracy_report(
     del scene
     known = {key for one in solved for key in one.estimates}
     keys = [key for key in matching(solved, names) if key in known]
-    costs = (("wanted", "r", lambda one: str(one.point.label)), *cost_columns())
-    tables = [make_table("What every accuracy costs", costs, solved)]
+    tables = [points_table(solved)]
     kinds: dict[str, Callable[[SolvedPoint], Mapping[Key, float]]] = {
         "Estimated error": lambda one: one.estimates,
         "True error": true_errors,

@@ -73,6 +73,11 @@ _POINTS: tuple[TableColumn, ...] = (
 )
 
 
+def points_table(solved: Sequence[SolvedPoint]) -> TextTable:
+    """The points and what they cost."""
+    return make_table("Points", _POINTS, solved)
+
+
 def convergence_tables(
     solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve]
 ) -> tuple[TextTable, TextTable]:
@@ -98,7 +103,7 @@ def convergence_tables(
         curves,
         spare=("against", "verdict", "error on each level"),
     )
-    return make_table("Points", _POINTS, solved), errors
+    return points_table(solved), errors
 
 
 def level_table(

@@ -36,7 +36,7 @@ _MESHES: Mapping[str, Mapping[int, tuple[int, ...]]] = {
 #: finer ones take half an hour to hours
 _USUAL = {"symmetric": (4, 6), "asymmetric": (3, 4)}
 #: elements whose faces of four nodes carry a contact node by node; the first stands in for others
-_NODE_BY_NODE = ("hex8i", "hex8")
+NODE_BY_NODE = ("hex8i", "hex8")
 #: curve of the levels on springs
 SPRINGS = "springs"
 #: numbers of a peak, their heads in a table, and the digits it shows
@@ -89,7 +89,7 @@ def _of_faces(scene: ForcedScene) -> Overrides:
     mine = scene.mesh.element
     return (
         ("contact.model", INTERFACE),
-        ("mesh.element", mine if mine in _NODE_BY_NODE else _NODE_BY_NODE[0]),
+        ("mesh.element", mine if mine in NODE_BY_NODE else NODE_BY_NODE[0]),
         ("balance.method", "march"),
     )
 

@@ -18,7 +18,7 @@ from typing import Any
 
 from upd.analyses.cost import NODES
 from upd.analyses.forced import compared_faces
-from upd.analyses.forced.compared_faces import at_ratio
+from upd.analyses.forced.compared_faces import NODE_BY_NODE, at_ratio
 from upd.analyses.forced.levels import FACES, count_of
 from upd.errors import InputError
 from upd.mesh import recipes
@@ -37,8 +37,6 @@ _REFINE: Mapping[str, tuple[float, ...]] = {
     "hex20": (0.5, 1, 2),
     "hex27": (0.5, 1),
 }
-#: elements whose faces of four nodes carry a contact node by node
-_NODE_BY_NODE = ("hex8i", "hex8")
 #: arrangement -> the most columns of points
 _COLUMNS: Mapping[str, int] = {"symmetric": 3, "asymmetric": 2}
 #: rows of points, where there are more than one: those of a face of two elements
@@ -107,7 +105,7 @@ def response_meshes(scene: ForcedScene, asked: Asked, *, vary: str = "mesh") -> 
             "to fix it: give it one, or run the scene with meshes of your own"
         )
     whole_faces = scene.contact.model != "springs"
-    known = _NODE_BY_NODE if whole_faces else tuple(_REFINE)
+    known = NODE_BY_NODE if whole_faces else tuple(_REFINE)
     refined = refinements(asked)
     # Gauss points do not hang on the mesh
     keeps = whole_faces or scene.contact.rule == GAUSS
