@@ -178,6 +178,11 @@ def number_label(name: str) -> str:
     return _LABELS.get(name, name.replace("_", " "))
 
 
+def number_title(name: str, case: str) -> str:
+    """Words for a number of a case."""
+    return f"{number_label(name)} ({case})" if case else number_label(name)
+
+
 def percent(value: float | None) -> str:
     """A fraction as a signed percentage."""
     return "" if value is None else f"{100.0 * value:+.2f} %"

@@ -14,6 +14,7 @@ from upd.labels import (
     effect_word,
     number,
     number_label,
+    number_title,
     percent,
     percent_of,
     plus_minus,
@@ -253,10 +254,7 @@ def sample_table(numbers: Sequence[SampledNumber]) -> AnswerTable:
 
     middle = "middle 95 %" if all(n.resolved for n in numbers) else "least to largest"
     columns = {
-        "number": [
-            with_unit(number_label(n.name) + (f" ({n.case})" if n.case else ""), n.unit)
-            for n in numbers
-        ],
+        "number": [with_unit(number_title(n.name, n.case), n.unit) for n in numbers],
         "# as given": [number(n.nominal) for n in numbers],
         "# first order": [band(n.first_order) for n in numbers],
         "# sample": [band(n.band) for n in numbers],
