@@ -18,9 +18,11 @@ from upd.plot.labels import with_room
 from upd.plot.style import (
     coordinates,
     is_log,
+    is_wide,
     log_ticks,
     log_view,
     plain,
+    proportion,
     tick_text,
     title_of,
 )
@@ -146,7 +148,6 @@ def write_sheets(charts: Iterable[Chart], folder: Path, *, keep: bool = False) -
 
 
 def _sheet(charts: Sequence[Chart], dpi: int) -> Figure:
-    from upd.plot.matplotlib_parts import is_wide, proportion
     from upd.plot.sheet import draw_sheet
 
     first = charts[0]

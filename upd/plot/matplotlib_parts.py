@@ -26,8 +26,8 @@ from upd.plot.style import (
     band_colour,
     colour_of,
     colour_range,
-    coordinates,
     even_levels,
+    is_wide,
     legend_names,
     marker_area,
     plain,
@@ -50,8 +50,6 @@ _BAR_HEIGHT, _LETTER = 0.6, 8
 #: points of the letters of a legend and of the words beside a mark, of what stands before an entry
 #: of a legend, and rows of it at most
 _SMALL, _HANDLE, _ROWS = 7.0, 32.0, 6
-#: width over height from which the colour bar of a map lies below it
-_WIDE_MAP = 1.6
 #: cells of a map of states along one side that have lines between them
 _FEW_CELLS = 32
 #: room below and above pies, as a part of their height
@@ -288,19 +286,6 @@ def _bar(drawn: Any, chart: Chart, axis: Axis, ax: Axes, extend: str = "neither"
     bar.set_label(plain(axis.label) if axis.name != "state" else "")
     bar.formatter.set_useOffset(False)
     return bar
-
-
-def is_wide(chart: Chart) -> bool:
-    """Whether a chart of one scale along both axes is so wide that its colour bar lies below it."""
-    return chart.equal and 0.0 < proportion(chart) < 1.0 / _WIDE_MAP
-
-
-def proportion(chart: Chart) -> float:
-    """Height over width of a chart with maps or coloured points; 0 of others."""
-    if not (chart.maps or chart.scatters):
-        return 0.0
-    x, y = np.ptp(coordinates(chart, "x")), np.ptp(coordinates(chart, "y"))
-    return float(y / x) if x > 0.0 else 0.0
 
 
 def draw_legend(chart: Chart, ax: Axes) -> None:

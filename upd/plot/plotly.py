@@ -16,13 +16,25 @@ from upd.plot import plotly_parts as parts
 from upd.plot.chart import Array, Axis, Chart
 from upd.plot.labels import with_room
 from upd.plot.plotly_parts import pack
-from upd.plot.style import coordinates, is_log, legend_names, log_ticks, log_view, tick_text
+from upd.plot.style import (
+    coordinates,
+    is_log,
+    legend_names,
+    log_ticks,
+    log_view,
+    proportion,
+    tick_text,
+)
 
 __all__ = ["figure", "pack"]
 
 _GRID = "#e6e6e6"
 #: letters of an upright axis' name that have room, and pixels of a bar with its words
 _LETTERS, _ROW = 42, 54
+#: width over height of a chart
+_WIDE = 1.5
+#: part of an axis beyond the data, as plotly leaves it
+_AIR = 0.05
 
 
 def figure(chart: Chart) -> dict[str, Any]:
@@ -59,8 +71,10 @@ def figure(chart: Chart) -> dict[str, Any]:
     if chart.bars:
         layout |= {"barmode": "stack"}
         layout["yaxis"] |= parts.cases_axis(chart)
+    # maps keep their own shape
+    wide = 1.0 / (chart.equal * proportion(chart) or 1.0 / _WIDE)
     least = _ROW * sum(len(bars.cases) for bars in chart.bars)
-    return {"data": data, "layout": layout, "wide": _wide(chart), "least": least}
+    return {"data": data, "layout": layout, "wide": wide, "least": least}
 
 
 def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[str, Any]:
@@ -87,7 +101,7 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
         # The last word may reach beyond the axis.
         out |= at | {"ticklabeloverflow": "allow"}
     if axis.low is not None or axis.high is not None:
-        out["range"] = [_end(axis.low, log), _end(axis.high, log)]
+        out["range"] = _range(axis, values, log)
     return out | {
         "linecolor": "#999999",
         "ticks": "outside",
@@ -98,19 +112,17 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
     }
 
 
-def _end(value: float | None, log: bool) -> float | None:
-    """The end of an axis as plotly takes it: a logarithm on a logarithmic one; that of the data
-    where it is None.
+def _range(axis: Axis, values: Array, log: bool) -> list[float]:
+    """Ends of an axis as plotly takes them: logarithms on a logarithmic one.
+
+    Those of the data with some air where none is given, for plotly does not keep one that is alone.
     """
-    if value is None or not log:
-        return value
-    return math.log10(value) if value > 0.0 else None
-
-
-def _wide(chart: Chart) -> float:
-    """Width over height of the drawing: maps keep their own shape."""
-    placed = [*chart.maps, *chart.scatters]
-    if not (chart.equal and placed):
-        return 1.5
-    x, y = (np.concatenate([np.asarray(getattr(p, name)) for p in placed]) for name in ("x", "y"))
-    return float(np.ptp(x) / np.ptp(y)) if np.ptp(y) > 0.0 else 1.5
+    seen = np.log10(values[values > 0.0]) if log else values
+    given = [
+        None if end is None or (log and end <= 0.0) else math.log10(end) if log else end
+        for end in (axis.low, axis.high)
+    ]
+    data = (float(seen.min()), float(seen.max())) if seen.size else (0.0, 1.0)
+    low, high = (d if end is None else end for end, d in zip(given, data, strict=True))
+    air = _AIR * (high - low)
+    return [low - air * (given[0] is None), high + air * (given[1] is None)]

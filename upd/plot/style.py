@@ -27,6 +27,8 @@ MEASURED, LIMIT = "#d98200", "#333333"
 _FEW_DECADES = 3
 #: decades with a tick each; of more not every one has a tick
 _MOST_DECADES = 8
+#: width over height from which the colour bar of a map lies below it
+_WIDE_MAP = 1.6
 #: largest over smallest value up to which a logarithmic axis has even steps
 _NARROW = 1.5
 #: area of a marker in square points: of the size 0, and what the size 1 adds. Few points have room
@@ -88,6 +90,19 @@ def coordinates(chart: Chart, name: Literal["x", "y"]) -> Array:
     ]
     found = np.concatenate([np.zeros(0), *(np.asarray(part, float).ravel() for part in parts)])
     return np.asarray(found[np.isfinite(found)])
+
+
+def proportion(chart: Chart) -> float:
+    """Height over width of a chart with maps or coloured points; 0 of others."""
+    if not (chart.maps or chart.scatters):
+        return 0.0
+    x, y = np.ptp(coordinates(chart, "x")), np.ptp(coordinates(chart, "y"))
+    return float(y / x) if x > 0.0 else 0.0
+
+
+def is_wide(chart: Chart) -> bool:
+    """Whether a chart of one scale along both axes is so wide that its colour bar lies below it."""
+    return chart.equal and 0.0 < proportion(chart) < 1.0 / _WIDE_MAP
 
 
 def is_log(axis: Axis, values: Array) -> bool:

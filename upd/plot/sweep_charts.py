@@ -11,7 +11,7 @@ import numpy as np
 
 from upd.labels import file_name, unit_label
 from upd.plot.chart import Array, Axis, Chart, Map, Trace
-from upd.results.quantities import number_label
+from upd.results.quantities import number_label, number_title
 
 #: charts on one sheet, and sheets, at most: more is no figure any more
 MOST_PANELS, MOST_SHEETS = 24, 24
@@ -151,7 +151,7 @@ def _multiples(varied: Sequence[Varied], number: FollowedNumber, grid: Array) ->
         values = ", ".join(
             f"{short(p)} = {p.values[k]}" for p, k in zip(outside, index, strict=True)
         )
-        place = _Place(values, limits, sheet_name(number), 3)
+        place = _Place(values, limits, sheet_name(number.name, number.case), 3)
         if len(inside) == 2:
             charts.append(_map(inside[0], inside[1], number, moved[index], place))
         else:
@@ -167,15 +167,11 @@ def figure_names(followed: Iterable[tuple[str, str]]) -> set[str]:
     followed
         Name and case of every followed number.
     """
-    return {_FIGURE, SAMPLE_FIGURE, *(_sheet_name(name, case) for name, case in followed)}
+    return {_FIGURE, SAMPLE_FIGURE, *(sheet_name(name, case) for name, case in followed)}
 
 
-def sheet_name(number: FollowedNumber) -> str:
+def sheet_name(name: str, case: str) -> str:
     """Name of the sheet of a number over more than two parameters, without ending."""
-    return _sheet_name(number.name, number.case)
-
-
-def _sheet_name(name: str, case: str) -> str:
     return f"{_FIGURE}-" + file_name(f"{name} ({case})" if case else name)
 
 
@@ -195,7 +191,7 @@ class _Place(NamedTuple):
         """
         title, case = number_label(number.name), number.case
         if self.values:
-            title, case = _title(number), self.values
+            title, case = number_title(number.name, number.case), self.values
         shared: dict[str, Any] = {"figure": self.figure, "columns": self.columns, "size": _SIZE}
         return Chart(title, x, y, case=case, **shared, **more)
 
@@ -224,7 +220,7 @@ def _curves(
         slice(solved[0], solved[-1] + 1) if x.numbers is not None and solved.size else slice(None)
     )
     labels = (
-        [_title(number)]
+        [number_title(number.name, number.case)]
         if other is None
         else [f"{short(other)} {_value(other, k)}" for k in range(len(other.values))]
     )
@@ -289,7 +285,3 @@ def _ordinate(number: FollowedNumber, limits: tuple[float, float] | None) -> Axi
     room = 0.05 * (high - low)
     ends = (low - room, high + room) if room > 0.0 else (None, None)
     return Axis(number_label(number.name), unit_label(number.unit), low=ends[0], high=ends[1])
-
-
-def _title(number: FollowedNumber) -> str:
-    return number_label(number.name) + (f" ({number.case})" if number.case else "")

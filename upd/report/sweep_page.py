@@ -18,7 +18,7 @@ from upd.report.panels import Panel, make_panels
 from upd.report.sweep_folder import SweepFolder, read_sweep
 from upd.report.tables import SAMPLE_HEADING, filled, sample_table, stage_table, with_unit
 from upd.results.answer_table import AnswerTable
-from upd.results.quantities import number_label
+from upd.results.quantities import number_title
 from upd.results.sampled import sample_sentence
 
 #: rows of the table on the page; all of them are in table.csv
@@ -109,9 +109,7 @@ def sweep_panels(sweep: SweepFolder) -> list[Panel]:
     numbers = followed(sweep)
     varied = [p.short for p in sweep.parameters if len(p.values) > 1]
     over = f"Followed numbers over {' and '.join(varied)}"
-    headings = {
-        sheet_name(n): _title(c) for n, c in zip(numbers, sweep.data["followed"], strict=True)
-    }
+    headings = {sheet_name(n.name, n.case): number_title(n.name, n.case) for n in numbers}
     panels = make_panels(sweep_charts(sweep.parameters, numbers), sweep.figures)
     return [replace(panel, heading=headings.get(panel.name, over)) for panel in panels]
 
@@ -120,10 +118,6 @@ def followed(sweep: SweepFolder) -> list[Followed]:
     """The followed numbers with their values over the grid."""
     columns = zip(sweep.data["followed"], sweep.table.T, strict=True)
     return [Followed(c["name"], c["case"], c["unit"], values) for c, values in columns]
-
-
-def _title(column: Mapping[str, Any]) -> str:
-    return number_label(column["name"]) + (f" ({column['case']})" if column["case"] else "")
 
 
 def verdict(points: Sequence[Mapping[str, Any]]) -> Verdict:
@@ -180,10 +174,11 @@ def _points_table(sweep: SweepFolder) -> AnswerTable:
     }
     empty = []
     for one, values in zip(sweep.data["followed"], sweep.table[: len(points)].T, strict=True):
+        title = number_title(one["name"], one["case"])
         if np.isnan(values).all():
-            empty.append(_title(one))
+            empty.append(title)
             continue
-        columns[f"# {with_unit(_title(one), one['unit'])}"] = [
+        columns[f"# {with_unit(title, one['unit'])}"] = [
             "" if np.isnan(v) else number(float(v)) for v in values
         ]
     columns |= {

@@ -22,7 +22,7 @@ from upd.labels import (
 from upd.plot.chart import Entry
 from upd.results import read_part, worst_checks
 from upd.results.answer_table import AnswerTable
-from upd.results.quantities import number_label
+from upd.results.quantities import number_label, number_title
 from upd.results.sampled import SampledNumber
 
 #: columns of numbers that a narrow terminal leaves out, the first one first
@@ -253,10 +253,7 @@ def sample_table(numbers: Sequence[SampledNumber]) -> AnswerTable:
 
     middle = "middle 95 %" if all(n.resolved for n in numbers) else "least to largest"
     columns = {
-        "number": [
-            with_unit(number_label(n.name) + (f" ({n.case})" if n.case else ""), n.unit)
-            for n in numbers
-        ],
+        "number": [with_unit(number_title(n.name, n.case), n.unit) for n in numbers],
         "# as given": [number(n.nominal) for n in numbers],
         "# first order": [band(n.first_order) for n in numbers],
         "# sample": [band(n.band) for n in numbers],

@@ -240,3 +240,8 @@ def number_label(name: str) -> str:
     """Words for the name of a number."""
     quantity, n = quantity_of(name)
     return quantity.label(n)
+
+
+def number_title(name: str, case: str) -> str:
+    """Words for a number of a case."""
+    return f"{number_label(name)} ({case})" if case else number_label(name)
