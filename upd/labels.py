@@ -140,6 +140,7 @@ _LABELS = {
     "share_slip": "slipping share of the cycle",
     "share_lift": "lifted share of the cycle",
     "points_always_stuck": "points that always stick",
+    "time_march_accelerance": "accelerance by time march",
     "damper_mass": "mass of the damper",
     "contact_points": "contact points",
     **{

@@ -80,8 +80,8 @@ def _rank_of(entry: Entry, slipping: set[tuple[Any, Any]]) -> tuple[bool, float]
 
 def answer(results: Sequence[Entry]) -> list[AnswerTable]:
     """Static state, peaks, the best damper, what the answer depends on most."""
-    known = [one for one in results if one["value"] is not None]
-    tables = [_static(known), _peaks(known, results), _best(known), _inputs(known)]
+    told = [one for one in results if one["value"] is not None]
+    tables = [_static(told), _peaks(told, results), _best(told), _inputs(told)]
     return [table for table in tables if table is not None]
 
 
@@ -202,7 +202,7 @@ def _peaks(results: Sequence[Entry], every: Sequence[Entry]) -> AnswerTable | No
 
 
 def _key(entry: Entry) -> tuple[Any, ...]:
-    """What distinguishes a peak from others."""
+    """What tells a peak apart from others."""
     fields = _fields(entry)
     return tuple(fields.get(n) for n in ("stiffness", "kind", "force_ratio", "mode", "choice"))
 
@@ -287,11 +287,11 @@ def _inputs(results: Sequence[Entry]) -> AnswerTable | None:
     rows: list[tuple[str, ...]] = [
         (
             name,
-            " or ".join(dict.fromkeys(end for end, *_ in found)),
-            _span(found, "frequency"),
-            _span(found, "accelerance"),
+            " or ".join(dict.fromkeys(end for end, *_ in told)),
+            _span(told, "frequency"),
+            _span(told, "accelerance"),
         )
-        for name, found in ranked[:_INPUTS]
+        for name, told in ranked[:_INPUTS]
     ]
     rows += list(_numerical(results))
     others = ", ".join(name for name, _ in ranked[_INPUTS:])
@@ -303,13 +303,13 @@ def _inputs(results: Sequence[Entry]) -> AnswerTable | None:
     return AnswerTable("What the answer depends on most", heads, tuple(rows), note)
 
 
-def _weight(found: Sequence[tuple[str, str, str, float]]) -> float:
+def _weight(told: Sequence[tuple[str, str, str, float]]) -> float:
     scale = {"frequency": _FREQUENCY, "accelerance": _HEIGHT}
-    return max(abs(value) / scale[kind] for _, _, kind, value in found)
+    return max(abs(value) / scale[kind] for _, _, kind, value in told)
 
 
-def _span(found: Sequence[tuple[str, str, str, float]], kind: str) -> str:
-    values = [value for _, _, k, value in found if k == kind]
+def _span(told: Sequence[tuple[str, str, str, float]], kind: str) -> str:
+    values = [value for _, _, k, value in told if k == kind]
     if not values:
         return ""
     low, high = min(values), max(values)

@@ -35,7 +35,7 @@ def peak_name(blade: Side, number: int) -> str:
 
 
 def reduction_name(blade: Side) -> str:
-    """Name of the number: how far a blade's highest peak is below its free one."""
+    """Name of the number that tells how far a blade's highest peak is below its free one."""
     return f"{LEFT * (blade == 'left')}reduction_of_free_peak"
 
 
