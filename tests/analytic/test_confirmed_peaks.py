@@ -172,7 +172,7 @@ def confirm(
 
     peak = CurvePeak(float(f[top]), float(size[top]), top, 1)
     very_top = Top(float(f[top]), float(size[top]), np.array([-1.0]), True)
-    found = peaks._confirmed(motion, curve, "right", peak, very_top, like)
+    found = peaks._confirmed(motion, curve, "right", peak, very_top, like, like is not None)
     return found, tried
 
 

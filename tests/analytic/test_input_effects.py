@@ -37,7 +37,7 @@ RIG: dict[str, Any] = LINES | {
 }
 #: F_C/F_E at which all sticks, and at which points of the out-of-phase mode slip
 STICKS, SLIPS = 1e5, 240.0
-NAMES = [one.name for one in INPUTS]
+NAMES = list(INPUTS)
 
 
 @cache

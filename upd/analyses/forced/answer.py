@@ -85,8 +85,8 @@ def _rank_of(entry: Entry, slipping: set[tuple[Any, Any]]) -> tuple[bool, float]
 
 def answer(results: Sequence[Entry]) -> list[AnswerTable]:
     """Static state, peaks, the best damper, what the answer depends on most."""
-    known = [one for one in results if one["value"] is not None]
-    tables = [_static(known), _peaks(known, results), _best(known), _inputs(known)]
+    told = [one for one in results if one["value"] is not None]
+    tables = [_static(told), _peaks(told, results), _best(told), _inputs(told)]
     return [table for table in tables if table is not None]
 
 
@@ -207,7 +207,7 @@ def _is(entry: Entry, quantity: Quantity) -> bool:
 
 
 def _key(entry: Entry) -> tuple[Any, ...]:
-    """What distinguishes a peak from others."""
+    """What tells a peak apart from others."""
     fields = _fields(entry)
     return tuple(fields.get(n) for n in ("stiffness", "kind", "force_ratio", "mode", "choice"))
 

@@ -40,7 +40,7 @@ class _Rule(NamedTuple):
     """Limit of a check, what its value is, and the remedy, a template."""
 
     limit: float
-    says: str
+    what: str
     remedy: str = "report this scene"
 
 
@@ -169,9 +169,9 @@ _NAMES = {
 
 def _check(rule: str, case: Case, value: float, **words: Any) -> Check:
     """A check by its rule; none ends the run: a curve that stopped early is kept."""
-    limit, says, remedy = _RULES[rule]
-    says, remedy = says.format(**words), remedy.format(**words)
-    return Check(_NAMES.get(rule, rule), case, value, limit, says, remedy, fatal=False)
+    limit, *texts = _RULES[rule]
+    what, remedy = (text.format(**words) for text in texts)
+    return Check(_NAMES.get(rule, rule), case, value, limit, what, remedy, fatal=False)
 
 
 def check_solution(solution: ForcedSolution) -> list[Check]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ LINEAR = "derivative of the linear answer"
 RAYLEIGH = "Rayleigh's quotient of the stuck mode"
 STATE = "static states at both ends"
 #: a number, its relative change by every input, how it was found
-Told = tuple[Key, Array, str]
+Derivative = tuple[Key, Array, str]
 
 
 @dataclass(frozen=True)
@@ -98,76 +99,51 @@ def input_changes(
 
 def _of_model(
     solution: ForcedSolution, name: str, data: Sequence[DataChange], numbers: Sequence[Result]
-) -> Iterator[Told]:
-    model = solution.models[name]
-    yield from _at_rest(name, model, data)
-    yield from _stuck_frequencies(solution, name, data)
+) -> Iterator[Derivative]:
+    """Forces of the faces at rest, stuck frequencies, peaks of the limits and of the curves."""
+    model, linear = solution.models[name], solution.linear[name]
+    whole = [one.whole(model) for one in data]
+    if model.state is not None:
+        for (letter, quantity), of in product(
+            (("N", q.STATIC_N), ("T", q.STATIC_T)), range(len(SIDES))
+        ):
+            size = getattr(model.state, letter)[of]
+            if size:
+                case = Case(stiffness=name, side=SIDES[of], choice=model.state.name)
+                change = np.array([getattr(one, f"state_{letter}")[of] for one in data])
+                yield (quantity.name, case), change / size, STATE
+    below = CANDIDATES * solution.plan.scene.excitation.stop
+    for number, (_, change) in stuck_frequencies(model, below, whole).items():
+        yield (number, Case(stiffness=name)), change, RAYLEIGH
     free: dict[Side, PeakChange] = {}
-    for kind in ("free", "stuck"):
-        for side, peak in _linear_peaks(solution, name, kind):
-            change = _linear_change(model, data, kind, side, peak)
-            if kind == "free" and (side not in free or change.size > free[side].size):
-                free[side] = change
-            case = Case(stiffness=name, kind=kind, mode=peak.mode)
-            yield from _named(side, peak.number, case, change, LINEAR)
+    for side in SIDES:
+        for peak in unmoved(linear.free_peaks[side]):
+            moved = _linear_change(model, whole, side, peak, False)
+            if side not in free or moved.size > free[side].size:
+                free[side] = moved
+            yield from _named(side, peak.number, Case(stiffness=name, kind="free"), moved, LINEAR)
+        for peak in solution.stuck_peaks(name, side):
+            moved = _linear_change(model, whole, side, peak, True)
+            case = Case(stiffness=name, kind="stuck", mode=peak.mode)
+            yield from _named(side, peak.number, case, moved, LINEAR)
     for curve in solution.curves:
         if curve.stiffness == name and not curve.empty:
             yield from _of_curve(solution, curve, data, free, numbers)
 
 
-def _named(side: Side, number: int, case: Case, change: PeakChange, basis: str) -> Iterator[Told]:
+def _linear_change(
+    model: Model, whole: Sequence[ParameterChange], side: Side, peak: CurvePeak, stuck: bool
+) -> PeakChange:
+    found = limit_peak(model, side, stuck, peak.frequency, whole)
+    by_frequency, by_height = found.by_frequency / found.frequency, found.by_height / found.height
+    return PeakChange(by_frequency, by_height, peak.height)
+
+
+def _named(
+    side: Side, number: int, case: Case, change: PeakChange, basis: str
+) -> Iterator[Derivative]:
     yield (q.PEAK_FREQUENCY.on(side).named(number), case), change.frequency, basis
     yield (q.PEAK_ACCELERANCE.on(side).named(number), case), change.height, basis
-
-
-def _at_rest(name: str, model: Model, data: Sequence[DataChange]) -> Iterator[Told]:
-    """Forces of the faces before vibration."""
-    state = model.state
-    for k, side in enumerate(SIDES) if state is not None else ():
-        assert state is not None
-        case = Case(stiffness=name, side=side, choice=state.name)
-        for number, size, of in (
-            (q.STATIC_N.name, state.N[k], "state_N"),
-            (q.STATIC_T.name, state.T[k], "state_T"),
-        ):
-            if size:
-                change = np.array([getattr(one, of)[k] for one in data]) / size
-                yield (number, case), change, STATE
-
-
-def _stuck_frequencies(
-    solution: ForcedSolution, name: str, data: Sequence[DataChange]
-) -> Iterator[Told]:
-    """The lowest stuck modes along x, in and out of phase."""
-    model = solution.models[name]
-    below = CANDIDATES * solution.plan.scene.excitation.stop
-    found = stuck_frequencies(model, below, [one.whole(model) for one in data])
-    for number, (_, change) in found.items():
-        yield (number, Case(stiffness=name)), change, RAYLEIGH
-
-
-def _linear_peaks(
-    solution: ForcedSolution, name: str, kind: str
-) -> Iterator[tuple[Side, CurvePeak]]:
-    linear = solution.linear.get(name)
-    for side in SIDES if linear is not None else ():
-        assert linear is not None
-        if kind == "free":
-            found = unmoved(linear.free_peaks[side])
-        else:
-            found = solution.stuck_peaks(name, side)
-        for peak in found:
-            yield side, peak
-
-
-def _linear_change(
-    model: Model, data: Sequence[DataChange], kind: str, side: Side, peak: CurvePeak
-) -> PeakChange:
-    changes = [one.whole(model) for one in data]
-    found = limit_peak(model, side, kind == "stuck", peak.frequency, changes)
-    return PeakChange(
-        found.by_frequency / found.frequency, found.by_height / found.height, peak.height
-    )
 
 
 def _of_curve(
@@ -176,7 +152,7 @@ def _of_curve(
     data: Sequence[DataChange],
     free: Mapping[Side, PeakChange],
     numbers: Sequence[Result],
-) -> Iterator[Told]:
+) -> Iterator[Derivative]:
     """Peaks of both blades of one curve, and how far the highest is below the free one."""
     for side in SIDES:
         highest: PeakChange | None = None

@@ -1,6 +1,6 @@
 """What the peaks of a response depend on most: inputs that are assumed, changed one at a time.
 
-Each input is a row of a table: what it is, and the models or choices that stand for its ends. The
+Each input is a row of a table: what it is, and the models that stand for its ends. The
 peaks of the curve with the lowest F_C/F_E are found again with each, on the run's own mesh.
 """
 
@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import partial
 
 import numpy as np
 
@@ -29,7 +29,6 @@ from upd.analyses.forced.peaks_again import (
 from upd.analyses.forced.statics import StaticState, state_of_ratio
 from upd.errors import InputError, one_line
 from upd.linalg.parallel import threads_for
-from upd.scene import ForcedScene
 from upd.scene.forced_contact import SIDES, Side
 from upd.vary.variation import Variation
 
@@ -68,8 +67,8 @@ class InputEffect:
     height: float
 
 
-def _stiffness(side: Side | None, of: str, plan: FoundPeaks) -> Iterator[Changed]:
-    model = plan.model
+def _stiffness(side: Side | None, of: str, peaks: FoundPeaks) -> Iterator[Changed]:
+    model = peaks.model
     law = model.contacts.law
     on = np.ones(len(model.face), bool) if side is None else model.face == SIDES.index(side)
     for factor in _STIFFNESS:
@@ -93,7 +92,7 @@ def _patch(peaks: FoundPeaks) -> Iterator[Changed]:
 
 def _friction(peaks: FoundPeaks) -> Iterator[Changed]:
     law = peaks.model.contacts.law
-    for factor in _FRICTION:
+    for factor in _FRICTION if np.any(law.mu) else ():
         mu = factor * law.mu
         made = replace(peaks.model.contacts, law=replace(law, mu=mu))
         yield f"mu {float(mu.max()):g}", replace(peaks.model, contacts=made)
@@ -139,41 +138,25 @@ def _damping(peaks: FoundPeaks) -> Iterator[Changed]:
         yield f"x {factor:g}", made
 
 
-class Input(NamedTuple):
-    """An input that is assumed: its words, when it applies, and its ends."""
-
-    name: str
-    applies: Callable[[ForcedScene], bool]
-    ends: Callable[[FoundPeaks], Iterator[Changed]]
-
-
-def _always(scene: ForcedScene) -> bool:
-    return True
-
-
-def _rubs(scene: ForcedScene) -> bool:
-    return scene.contact.friction > 0.0
-
-
-INPUTS = (
-    Input("K_T of the left face", _always, lambda p: _stiffness("left", "k_t", p)),
-    Input("K_T of the right face", _always, lambda p: _stiffness("right", "k_t", p)),
-    Input("K_N of both faces", _always, lambda p: _stiffness(None, "k_n", p)),
-    Input("height of the contact patch", _always, _patch),
-    Input("friction", _rubs, _friction),
-    Input("static friction before vibration", _rubs, _static),
-    Input("fit of the faces", _always, _fit),
-    Input("modal damping", _always, _damping),
-)
+#: input that is assumed -> its ends
+INPUTS: Mapping[str, Callable[[FoundPeaks], Iterator[Changed]]] = {
+    "K_T of the left face": partial(_stiffness, "left", "k_t"),
+    "K_T of the right face": partial(_stiffness, "right", "k_t"),
+    "K_N of both faces": partial(_stiffness, None, "k_n"),
+    "height of the contact patch": _patch,
+    "friction": _friction,
+    "static friction before vibration": _static,
+    "fit of the faces": _fit,
+    "modal damping": _damping,
+}
 
 
 def input_variants(few: FoundPeaks) -> list[Variant]:
     """Both ends of every input that applies."""
     return [
-        Variant(Variation(one.name, label), model, any_height=True)
-        for one in INPUTS
-        if one.applies(few.plan.scene)
-        for label, model in one.ends(few)
+        Variant(Variation(name, label), model, any_height=True)
+        for name, ends in INPUTS.items()
+        for label, model in ends(few)
     ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,50 +79,32 @@ def make_interface_model(
         plan.workers,
     )
     both = _side_by_side(parts, interface, excited)
-    Phi = both.shapes
-    G = interface.compliance - (Phi / (2.0 * np.pi * both.frequency) ** 2) @ Phi.T
+    Phi, frequency = both["shapes"], both["frequency"]
+    G = interface.compliance - (Phi / (2.0 * np.pi * frequency) ** 2) @ Phi.T
     inertia = np.zeros((6, 6))
     inertia[:3, :3], inertia[3:, 3:] = bodies.damper.mass * np.eye(3), bodies.damper.inertia
     kept = list(interface.kept)
     load = np.zeros(len(kept))
     load[kept.index(2)] = centrifugal / interface.copies
     return InterfaceModel(
-        both.frequency,
-        np.full(len(both.frequency), damping),
-        Phi,
-        0.5 * (G + G.T),
-        interface.columns,
-        inertia[np.ix_(kept, kept)],
-        load,
-        np.zeros(n),
-        np.full(n, friction),
-        both.places,
-        both.pushed,
-        both.seen_modes,
-        both.seen_contact,
-        both.seen_drive,
-        interface.copies,
+        damping=np.full(len(frequency), damping),
+        compliance=0.5 * (G + G.T),
+        columns=interface.columns,
+        mass=inertia[np.ix_(kept, kept)],
+        load=load,
+        gap=np.zeros(n),
+        friction=np.full(n, friction),
+        copies=interface.copies,
+        **both,
     )
-
-
-class _Blades(NamedTuple):
-    """Both blades' parts of an `InterfaceModel`, in its terms."""
-
-    frequency: Array
-    shapes: Array
-    places: Array
-    pushed: Array
-    seen_modes: Array
-    seen_contact: Array
-    seen_drive: Array
 
 
 def _side_by_side(
     parts: Sequence[tuple[Array, Array, Array, Array, Array]],
     interface: Interface,
     excited: Sequence[Side],
-) -> _Blades:
-    """The blades' parts of `_part` beside each other."""
+) -> dict[str, Array]:
+    """The blades' parts of `_part` beside each other, in the terms of `InterfaceModel`."""
     n, n_modes = interface.n, len(parts[0][0])
     m, L, K = 2 * n_modes, len(excited), len(SIDES) + len(excited)
     shapes, seen_modes, places = np.zeros((3, n, m)), np.zeros((K, m)), np.zeros((m, L))
@@ -145,15 +127,15 @@ def _side_by_side(
             places[mine, j] = seen[1]
             pushed[:, on, j] = rest[1]
             seen_drive[rows, j] = direct[:, 1] - (seen * flexible) @ seen[1]
-    return _Blades(
-        frequency,
-        shapes.reshape(3 * n, m),
-        places,
-        pushed.reshape(3 * n, L),
-        seen_modes,
-        seen_contact.reshape(K, 3 * n),
-        seen_drive,
-    )
+    return {
+        "frequency": frequency,
+        "shapes": shapes.reshape(3 * n, m),
+        "places": places,
+        "pushed": pushed.reshape(3 * n, L),
+        "seen_modes": seen_modes,
+        "seen_contact": seen_contact.reshape(K, 3 * n),
+        "seen_drive": seen_drive,
+    }
 
 
 def _part(

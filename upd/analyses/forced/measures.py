@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, Protocol
 
@@ -15,6 +15,7 @@ from upd.dynamics.peaks import find_peaks
 from upd.hbm import FrequencyResponse, Harmonics
 from upd.hbm.balance import Balance
 from upd.hbm.fourier import to_complex
+from upd.mesh import IntArray
 from upd.scene.forced_contact import SIDES, Side
 
 Array = NDArray[np.float64]
@@ -321,17 +322,29 @@ def loop_along_main(point: int, motion: Array, traction: Array, limit: Array, lo
 
 
 def place(model: Model) -> tuple[Array, Array]:
-    """Contact points in the frames of their faces.
+    """Contact points in the frames of their faces, as `in_faces`."""
+    return in_faces(model.position, model.face, [model.faces[side].frame for side in SIDES])
+
+
+def in_faces(position: Array, face: IntArray, frames: Iterable[Array]) -> tuple[Array, Array]:
+    """Points in the frames of their faces.
+
+    Parameters
+    ----------
+    position, face
+        (n, 3) mm, and (n,) index into SIDES.
+    frames
+        (3, 3) of each face.
 
     Returns
     -------
     along, up
-        (n_point,) along the damper, and up the slope from the lowest point of the face, mm.
+        (n,) along the damper, and up the slope from the lowest point of the face, mm.
     """
-    along, up = np.zeros(len(model.face)), np.zeros(len(model.face))
-    for k, side in enumerate(SIDES):
-        on = model.face == k
-        local = model.position[on] @ model.faces[side].frame.T
+    along, up = np.zeros(len(face)), np.zeros(len(face))
+    for k, frame in enumerate(frames):
+        on = face == k
+        local = position[on] @ frame.T
         along[on], up[on] = local[:, 1], local[:, 2] - local[:, 2].min()
     return along, up
 

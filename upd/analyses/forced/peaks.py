@@ -218,11 +218,14 @@ def confirmed(
     springs = make_springs(plan, model)
     steps = max(STEPS, time_steps(plan.scene))
     peaks = {side: list(curve.peaks[side]) for side in SIDES}
-    checked = []
+    checked: list[TimeCheck] = []
     for (side, number), top in loose:
         place = next(k for k, p in enumerate(peaks[side]) if p.number == number)
         integrate = partial(_stays, springs, model, curve, steps)
-        found = _confirmed(integrate, curve, side, peaks[side][place], top, like)
+        # the other blade's border lies on the same motion
+        near = like or next((c for c in checked if c.number == number and not c.at_top), None)
+        leaves = like is not None
+        found = _confirmed(integrate, curve, side, peaks[side][place], top, near, leaves)
         checked.append(found)
         if found.stays and not found.at_top:
             peaks[side][place] = peaks[side][place]._replace(
@@ -239,8 +242,17 @@ def _confirmed(
     peak: CurvePeak,
     top: Top,
     like: TimeCheck | None,
+    leaves: bool,
 ) -> TimeCheck:
-    """The top where it stays, else the highest motion down the path that does."""
+    """The top where it stays, else the highest motion down the path that does.
+
+    Parameters
+    ----------
+    like
+        As of `confirmed`, or of the other blade.
+    leaves
+        Whether the top is known to leave.
+    """
     starts, k = 0, SIDES.index(side)
     best = TimeCheck(side, peak.number, peak.mode, top.frequency, top.height, math.nan, peak.sample)
 
@@ -249,7 +261,7 @@ def _confirmed(
         starts += 1
         return integrate(x, f)
 
-    if like is None:
+    if not leaves:
         both = stays(top.x, top.frequency)
         if both is not None:
             balance, integrated = (float(one) for one in both[:, k])
@@ -258,13 +270,13 @@ def _confirmed(
             )
     size, f = np.abs(curve.accelerance[side]), curve.frequency
     ways = _downhill(curve, size, peak.sample)
-    if like is not None:
+    if like is not None and like.stays:
         ways = [way for way in ways if way[1] - way[0] == like.way] or ways
     for way in ways:
         # `low` leaves, `high` stays: steps that double from a known place, then bisection
         low, high, kept = 0, len(way), None
         at, step = high - 1, high
-        if like is not None:
+        if like is not None and like.stays:
             at, step = int(np.abs(size[way] - like.share * size[way[0]]).argmin()), 1
         while high - low > 1 and (kept is None or starts < 2 * _MOST_BISECTIONS):
             both = stays(curve.answer.x[way[at]], float(f[way[at]]))

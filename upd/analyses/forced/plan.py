@@ -299,25 +299,10 @@ def effects_of_points(scene: ForcedScene) -> list[Effect]:
     mu, b, c = scene.contact.friction, scene.balance, scene.contact
     adaptive, swept = b.harmonics == "adaptive", b.method == "march"
     samples = "power of two by rule" if b.samples == "auto" else f"{b.samples} a period"
-    whole = scene.mesh.symmetry == "full"
     return [
-        Effect(
-            "friction",
-            mu > 0.0,
-            f"Coulomb, mu = {mu:g}; a curve stuck everywhere is answered linearly"
-            if mu
-            else "mu = 0",
-            applies=mu > 0.0,
-        ),
+        _friction(mu, f"Coulomb, mu = {mu:g}; a curve stuck everywhere is answered linearly"),
         _along(scene),
-        Effect(
-            "motion odd about y = 0",
-            whole,
-            "the full model"
-            if whole
-            else "rig, load and contact are even about y = 0: an even motion excites no odd one",
-            applies=whole,
-        ),
+        _odd_motion(scene),
         _excited(scene),
         Effect("lift-off", True, "every point may open: N = max(0, k_n w)"),
         Effect("static balance", True, f"mean positions are unknowns; {_static_words(scene)}"),
@@ -349,27 +334,14 @@ def effects_of_points(scene: ForcedScene) -> list[Effect]:
     ]
 
 
-_IN_TIME = "of the blades; contact and damper in time"
-
-
 def effects_of_faces(scene: ForcedScene) -> list[Effect]:
     """Of contact by all nodes of both faces."""
-    mu, c, highest = scene.contact.friction, scene.contact, blade_harmonics(scene)
-    whole = scene.mesh.symmetry == "full"
+    mu, c = scene.contact.friction, scene.contact
+    harmonics_of_blades = f"0 to {blade_harmonics(scene)} of the blades; contact and damper in time"
     return [
-        Effect(
-            "friction",
-            mu > 0.0,
-            f"Coulomb, mu = {mu:g}, both directions, every node of both faces" if mu else "mu = 0",
-            applies=mu > 0.0,
-        ),
+        _friction(mu, f"Coulomb, mu = {mu:g}, both directions, every node of both faces"),
         Effect("normal and tangential coupling", True, "solved together at every step in time"),
-        Effect(
-            "motion odd about y = 0",
-            whole,
-            "the full model is integrated" if whole else "load and bodies are even about it",
-            applies=whole,
-        ),
+        _odd_motion(scene),
         _excited(scene),
         Effect("lift-off", True, "every node may open"),
         Effect("damper elasticity", True, "its deformation follows its forces statically"),
@@ -385,9 +357,21 @@ def effects_of_faces(scene: ForcedScene) -> list[Effect]:
         Effect("static balance", True, _static_words(scene), "static balance"),
         Effect("harmonics", True, "all: time integration")
         if scene.balance.method == "march"
-        else Effect("harmonics", True, f"0 to {highest} {_IN_TIME}", "truncation"),
+        else Effect("harmonics", True, harmonics_of_blades, "truncation"),
         *centrifugal_effects(scene),
     ]
+
+
+def _friction(mu: float, words: str) -> Effect:
+    return Effect("friction", mu > 0.0, words if mu else "mu = 0", applies=mu > 0.0)
+
+
+def _odd_motion(scene: ForcedScene) -> Effect:
+    """Motion that the half model does not have."""
+    whole = scene.mesh.symmetry == "full"
+    why = "rig, load and contact are even about y = 0: an even motion excites no odd one"
+    why = "the full model" if whole else why
+    return Effect("motion odd about y = 0", whole, why, applies=whole)
 
 
 def _excited(scene: ForcedScene) -> Effect:

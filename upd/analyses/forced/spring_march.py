@@ -169,29 +169,16 @@ def state_at(
     now = contact.march.force[:, :, 0]
     carried[:, _PLACES[now.shape[1] - 1]] = now
     f = np.ascontiguousarray(carried.T).ravel()
-    v = springs.modes @ speed[:n_blade]
-    return _standing(springs, q, v, moved[n_blade:], speed[n_blade:], pull[n_blade:], f, drive)
-
-
-def _standing(
-    springs: SpringMarch,
-    q: Array,
-    v: Array,
-    s: Array,
-    sv: Array,
-    sa: Array,
-    f: Array,
-    drive: Array,
-) -> InterfaceState:
-    """The state of these motions of modes and damper and forces (3 n,), slips that fit them."""
-    march, n = springs.march, springs.march.n
+    s, sv, sa = (part[n_blade:] for part in (moved, speed, pull))
+    # slips that fit these motions and forces
+    n = march.n
     w = march.columns @ s - march.compliance @ f - march.shapes @ q - march.pushed @ drive
     open_: NDArray[np.bool_] = f[:n] <= 0.0
     y = np.zeros_like(f)
     y[:n] = np.where(open_, np.minimum(w[:n] - march.gap, 0.0), 0.0)
     return InterfaceState(
         q,
-        v,
+        springs.modes @ speed[:n_blade],
         march.shapes.T @ f + march.places @ drive,
         s,
         sv,

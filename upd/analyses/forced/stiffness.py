@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -76,16 +76,8 @@ def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceLaw]:
 def mirrored(law: ContactLaw) -> ContactLaw:
     """The same points on the other blade: x turned round."""
     flip = np.array([-1.0, 1.0, 1.0])
-    kept = {
-        "k_n": law.k_n,
-        "k_t": law.k_t,
-        "preload": law.preload,
-        "area": law.area,
-        "source_tilt": law.source_tilt,
-    }
-    return ContactLaw(
-        position=law.position * flip, normal=law.normal * flip, tangents=law.tangents * flip, **kept
-    )
+    turned = {name: getattr(law, name) * flip for name in ("position", "normal", "tangents")}
+    return replace(law, **turned)
 
 
 def _is_law(group: ArrayGroup) -> bool:

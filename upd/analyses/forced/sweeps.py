@@ -22,6 +22,7 @@ from upd.analyses.forced.measures import (
     CurvePeak,
     Loop,
     accelerance_of,
+    in_faces,
     loop_along_main,
     losing_most,
     place,
@@ -162,11 +163,7 @@ def _contact(solution: ForcedSolution, name: str) -> tuple[ContactPlaces, Array,
 def faces_places(solution: ForcedSolution, name: str) -> ContactPlaces:
     """Nodes of whole faces in the frames of their faces."""
     of = solution.faces[name].of
-    along, up = np.zeros(of.n), np.zeros(of.n)
-    for k in range(len(SIDES)):
-        on = of.face == k
-        local = of.position[on] @ of.frame[k].T
-        along[on], up[on] = local[:, 1], local[:, 2] - local[:, 2].min()
+    along, up = in_faces(of.position, of.face, of.frame)
     return ContactPlaces(of.face, along, up, of.area, np.zeros(of.n))
 
 
