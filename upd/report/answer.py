@@ -69,7 +69,9 @@ def answer(
     lines = _verdict(summary, width)
     analysis = analysis_named(str(size.get("analysis", "")))
     own = analysis is not None and analysis.answer is not None
-    for table in answer_tables(size, entries) if own or not full else ():
+    tables = answer_tables(size, entries)
+    # a screen holds the main numbers and one table of cases
+    for table in tables if own else tables[:2] if not full else ():
         lines += _table(table, width, cut=not own)
     if full:
         for table in (

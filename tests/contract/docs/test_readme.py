@@ -272,7 +272,7 @@ def test_outputs_are_those_the_scenes_know() -> None:
     ):
         with pytest.raises(InputError) as caught:
             upd.load_scene(scene, {"want": ["zzzz"]})
-        known = str(caught.value).split("known: ")[1].split("\n")[0].split(", ")
+        known = str(caught.value).split("write one of ")[1].split("\n")[0].split(", ")
         assert [output.strip("`") for kind, output, _ in rows if kind in kinds] == known
 
 
