@@ -15,7 +15,7 @@ from upd.batch.engine import Watcher
 from upd.batch.plan import plan_sweep
 from upd.batch.sweeps import run_sweep
 from upd.errors import InputError
-from upd.hbm.peaks_over import SAME
+from upd.hbm.peaks.over import SAME
 from upd.scene import ForcedScene
 from upd.scene.quantities import FROM_FORCE, UNKNOWN
 from upd.scene.ranges import with_values

@@ -18,7 +18,7 @@ from scipy.linalg import eigh
 
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.spring_march import SpringMarch
-from upd.hbm.interface_state import InterfaceState
+from upd.hbm.faces.state import InterfaceState
 
 Array = NDArray[np.float64]
 #: largest angular frequency times the step; 2 is the limit of stability

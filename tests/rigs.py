@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from upd.analyses.forced.model import Model
     from upd.analyses.forced.spring_march import SpringMarch
     from upd.hbm import FrequencyResponse
-    from upd.hbm.interface_state import InterfaceState
+    from upd.hbm.faces.state import InterfaceState
     from upd.results import Result
 
 #: keys over a ready response

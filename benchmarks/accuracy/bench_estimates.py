@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.hbm import contacts
-from upd.hbm.fourier import analysis, harmonics, synthesis
-from upd.hbm.friction import harmonic_force
+from upd.hbm.core.fourier import analysis, harmonics, synthesis
+from upd.hbm.springs.friction import harmonic_force
 from upd.reference.friction import jenkins_harmonic
 from upd.vary.orders import estimate_error
 

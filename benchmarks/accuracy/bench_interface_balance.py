@@ -16,8 +16,8 @@ from upd.analyses import make_plan
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
-from upd.hbm.interface_balance import SHORTEST, TOLERANCE, interface_response
-from upd.hbm.newton import Settings
+from upd.hbm.core.newton import Settings
+from upd.hbm.faces.balance import SHORTEST, TOLERANCE, interface_response
 from upd.linalg.select import threads_used
 from upd.scene import load_scene
 

@@ -34,10 +34,10 @@ from upd.analyses.forced.statics import static_state
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
 from upd.hbm import FrequencyResponse
-from upd.hbm.interface_march import InterfaceMarch
-from upd.hbm.interface_settle import SteadyPoint, settle
-from upd.hbm.interface_state import InterfaceModel, InterfaceState
-from upd.hbm.peaks import climb
+from upd.hbm.faces.march import InterfaceMarch
+from upd.hbm.faces.settle import SteadyPoint, settle
+from upd.hbm.faces.state import InterfaceModel, InterfaceState
+from upd.hbm.springs.peak import climb
 from upd.scene import load_scene
 
 Row = dict[str, Any]

@@ -34,9 +34,9 @@ from upd.analyses.forced.spring_march import (
     spring_march,
     state_at,
 )
-from upd.hbm.interface_march import InterfaceMarch
-from upd.hbm.interface_settle import SteadyPoint, settle
-from upd.hbm.interface_state import InterfaceState
+from upd.hbm.faces.march import InterfaceMarch
+from upd.hbm.faces.settle import SteadyPoint, settle
+from upd.hbm.faces.state import InterfaceState
 
 Row = dict[str, Any]
 RIGHT = 1

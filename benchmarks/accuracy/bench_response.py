@@ -15,10 +15,10 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.plan import grid
 from upd.hbm import FrequencyResponse, contacts, frequency_response
-from upd.hbm.fourier import analysis, harmonics, synthesis
-from upd.hbm.friction import harmonic_force
-from upd.hbm.march import steady_state
-from upd.hbm.response import parabola
+from upd.hbm.core.fourier import analysis, harmonics, synthesis
+from upd.hbm.springs.friction import harmonic_force
+from upd.hbm.springs.response import parabola
+from upd.hbm.springs.time_integration import steady_state
 from upd.reference.den_hartog import den_hartog_amplitude
 from upd.reference.friction import (
     jenkins_harmonic,

@@ -18,8 +18,8 @@ from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.spring_march import make_springs
 from upd.errors import ConvergenceError
-from upd.hbm.interface_march import InterfaceMarch
-from upd.hbm.march import steady_state
+from upd.hbm.faces.march import InterfaceMarch
+from upd.hbm.springs.time_integration import steady_state
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 from upd.scene.forced_contact import SIDES

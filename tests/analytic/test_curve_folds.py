@@ -11,7 +11,7 @@ import pytest
 from upd.analyses.forced.curves import ForcedCurve, rising
 from upd.analyses.forced.peaks import _folds
 from upd.hbm import FrequencyResponse, contacts, frequency_response
-from upd.hbm.march import steady_state
+from upd.hbm.springs.time_integration import steady_state
 
 
 def path(frequency: Any, height: Any) -> ForcedCurve:

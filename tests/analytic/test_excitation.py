@@ -25,10 +25,10 @@ from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
 from upd.hbm import FrequencyResponse
-from upd.hbm.interface_march import InterfaceMarch
-from upd.hbm.interface_settle import settle
-from upd.hbm.interface_state import InterfaceModel
-from upd.hbm.march import steady_state
+from upd.hbm.faces.march import InterfaceMarch
+from upd.hbm.faces.settle import settle
+from upd.hbm.faces.state import InterfaceModel
+from upd.hbm.springs.time_integration import steady_state
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 from upd.scene.forced import ExcitationChoice, HarmonicForce
@@ -169,7 +169,7 @@ def test_energy_of_two_forces_and_harmonics_closes_with_slip() -> None:
 
 
 def test_the_march_settles_where_another_does_in_either_harmonic() -> None:
-    """Points slip; the other march is that of `upd.hbm.march`."""
+    """Points slip; the other march is that of `upd.hbm.springs.time_integration`."""
     marched = []
     for k in (1, 2):
         forces = (ONE, replace(OTHER, amplitude=0.5, phase=70.0))

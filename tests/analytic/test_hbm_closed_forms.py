@@ -16,8 +16,8 @@ from upd.hbm import (
     frequency_response,
     rigid_damper,
 )
-from upd.hbm.pieces import loop_area
-from upd.hbm.response import parabola
+from upd.hbm.springs.pieces import loop_area
+from upd.hbm.springs.response import parabola
 from upd.reference.den_hartog import den_hartog_amplitude
 from upd.reference.friction import (
     jenkins_optimum,

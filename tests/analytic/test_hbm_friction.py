@@ -10,10 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from upd.errors import InputError
-from upd.hbm.contact_points import contacts
-from upd.hbm.coulomb import LIFT, SLIP, STICK
-from upd.hbm.fourier import analysis, harmonics, sample_count, synthesis
-from upd.hbm.friction import Harmonic, Law, Start, harmonic_force, march
+from upd.hbm.core.fourier import analysis, harmonics, sample_count, synthesis
+from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
+from upd.hbm.springs.friction import Harmonic, Law, Start, harmonic_force, march
+from upd.hbm.springs.points import contacts
 from upd.reference.friction import jenkins_harmonic, jenkins_loop_area
 
 FloatArray = NDArray[np.float64]

@@ -9,23 +9,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-import upd.hbm.interface_corrector as corrector
-import upd.hbm.interface_equations as module
-import upd.hbm.interface_linear as linear
-import upd.hbm.interface_steps as steps
-import upd.hbm.kept_factors as kept_factors
+import upd.hbm.core.kept_factors as kept_factors
+import upd.hbm.faces.corrector as corrector
+import upd.hbm.faces.equations as module
+import upd.hbm.faces.linear as linear
+import upd.hbm.faces.steps as steps
 from upd.analyses import make_plan
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.errors import ConvergenceError, InputError
-from upd.hbm.interface_balance import InterfaceResponse, interface_response
-from upd.hbm.interface_equations import InterfaceEquations
-from upd.hbm.interface_newton import StrangerMovesError, evaluate
-from upd.hbm.interface_state import InterfaceModel, InterfaceState
-from upd.hbm.interface_step import OPEN, SLIP, STICK
-from upd.hbm.interface_sweep import stepped_sine
-from upd.hbm.newton import Settings
+from upd.hbm.core.newton import Settings
+from upd.hbm.faces.balance import InterfaceResponse, interface_response
+from upd.hbm.faces.equations import InterfaceEquations
+from upd.hbm.faces.newton import StrangerMovesError, evaluate
+from upd.hbm.faces.state import InterfaceModel, InterfaceState
+from upd.hbm.faces.step import OPEN, SLIP, STICK
+from upd.hbm.faces.sweep import stepped_sine
 from upd.scene import load_scene
 
 F_C, MU, DAMPING = 350.0, 0.6, 0.005

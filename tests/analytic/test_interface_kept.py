@@ -10,12 +10,12 @@ from upd.analyses import make_plan
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
-from upd.hbm.interface_equations import InterfaceEquations
-from upd.hbm.interface_kept import border, kept_inverses, kept_step
-from upd.hbm.interface_march import InterfaceMarch
-from upd.hbm.interface_settle import SteadyPoint, settle
-from upd.hbm.interface_state import InterfaceModel, InterfaceState
-from upd.hbm.interface_step import (
+from upd.hbm.faces.equations import InterfaceEquations
+from upd.hbm.faces.kept import border, kept_inverses, kept_step
+from upd.hbm.faces.march import InterfaceMarch
+from upd.hbm.faces.settle import SteadyPoint, settle
+from upd.hbm.faces.state import InterfaceModel, InterfaceState
+from upd.hbm.faces.step import (
     FEW,
     OPEN,
     SLIP,

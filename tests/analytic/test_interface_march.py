@@ -11,8 +11,8 @@ import pytest
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-import upd.hbm.interface_march as module
-import upd.hbm.interface_settle as settling
+import upd.hbm.faces.march as module
+import upd.hbm.faces.settle as settling
 from upd.analyses import make_plan
 from upd.analyses.forced.interface_model import (
     by_coulomb,
@@ -25,8 +25,8 @@ from upd.analyses.seated.interface import Interface, make_interface
 from upd.analyses.seated.lattice import lattice
 from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, mass, stiffness
-from upd.hbm.interface_march import InterfaceMarch
-from upd.hbm.interface_memory import (
+from upd.hbm.faces.march import InterfaceMarch
+from upd.hbm.faces.memory import (
     ACCEPTED,
     COUNTERS,
     PAUSE,
@@ -36,18 +36,18 @@ from upd.hbm.interface_memory import (
     Settling,
     memory,
 )
-from upd.hbm.interface_modes import modal_step, resolved
-from upd.hbm.interface_period import march_steps
-from upd.hbm.interface_periods import (
+from upd.hbm.faces.modes import modal_step, resolved
+from upd.hbm.faces.period import march_steps
+from upd.hbm.faces.periods import (
     PLAIN,
     UNSOLVED,
     jump,
     trial_failed,
 )
-from upd.hbm.interface_settle import settle
-from upd.hbm.interface_state import InterfaceModel, InterfaceState, resting
-from upd.hbm.interface_step import OPEN, SLIP, STICK, contact_scratch, contact_step, judge
-from upd.hbm.interface_sweep import stepped_sine
+from upd.hbm.faces.settle import settle
+from upd.hbm.faces.state import InterfaceModel, InterfaceState, resting
+from upd.hbm.faces.step import OPEN, SLIP, STICK, contact_scratch, contact_step, judge
+from upd.hbm.faces.sweep import stepped_sine
 from upd.linalg import modes
 from upd.linalg.compiled import compiled
 from upd.scene import load_scene

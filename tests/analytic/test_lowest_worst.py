@@ -17,7 +17,7 @@ from scipy.optimize import minimize_scalar
 
 from upd.cache.journal import Journal
 from upd.hbm import FrequencyResponse, contacts, frequency_response
-from upd.hbm.peaks_over import AGREES, JUMP_STEP, Deciding, PeakPoint, PeaksOver, peak_point
+from upd.hbm.peaks.over import AGREES, JUMP_STEP, Deciding, PeakPoint, PeaksOver, peak_point
 from upd.reference.friction import jenkins_peak
 from upd.sizing import LowestWorst, WorstPeak, least_worst, lowest_worst
 from upd.sizing.margins import STILL_AT, how_far, how_far_force

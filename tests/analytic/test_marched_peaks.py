@@ -25,9 +25,9 @@ from upd.analyses.forced.sweeps import (
     marched_loops,
     marched_shares,
 )
-from upd.hbm.interface_march import InterfaceMarch
-from upd.hbm.interface_record import period_of_sweep, recorded_period
-from upd.hbm.interface_step import OPEN, SLIP, STICK
+from upd.hbm.faces.march import InterfaceMarch
+from upd.hbm.faces.record import period_of_sweep, recorded_period
+from upd.hbm.faces.step import OPEN, SLIP, STICK
 from upd.plot.chart import Group, Variable
 from upd.progress import Stages, silent
 from upd.scene import load_scene

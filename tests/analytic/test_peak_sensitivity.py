@@ -13,14 +13,14 @@ import pytest
 
 from upd.errors import InputError
 from upd.hbm import climb, contacts, frequency_response
-from upd.hbm.balance import Balance
-from upd.hbm.coulomb import LIFT, SLIP, STICK
-from upd.hbm.fourier import harmonics
-from upd.hbm.modal import modal
-from upd.hbm.parameter_change import ParameterChange
-from upd.hbm.peak_sensitivity import _slopes, peak_derivatives
-from upd.hbm.pieces import loop_area
-from upd.hbm.starts import first_point, newton
+from upd.hbm.core.fourier import harmonics
+from upd.hbm.peaks.parameter_change import ParameterChange
+from upd.hbm.peaks.sensitivity import _slopes, peak_derivatives
+from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
+from upd.hbm.springs.modal import modal
+from upd.hbm.springs.pieces import loop_area
+from upd.hbm.springs.starts import first_point, newton
 from upd.reference.friction import jenkins_peak, jenkins_peak_frequency
 
 FloatArray = np.ndarray

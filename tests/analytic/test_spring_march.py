@@ -19,10 +19,10 @@ from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.spring_march import make_springs, spring_march
 from upd.analyses.forced.sweeps import both_ways, sweep_maxima
 from upd.errors import InputError
-from upd.hbm.interface_march import InterfaceMarch
-from upd.hbm.interface_settle import settle
-from upd.hbm.interface_sweep import stepped_sine
-from upd.hbm.march import steady_state
+from upd.hbm.faces.march import InterfaceMarch
+from upd.hbm.faces.settle import settle
+from upd.hbm.faces.sweep import stepped_sine
+from upd.hbm.springs.time_integration import steady_state
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 from upd.scene.forced_contact import SIDES

@@ -29,7 +29,7 @@ from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.contact.equilibrium import equilibrium
 from upd.errors import InputError
 from upd.hbm import contacts, frequency_response
-from upd.hbm.march import steady_state
+from upd.hbm.springs.time_integration import steady_state
 from upd.progress import Stages
 from upd.scene import load_scene
 

@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 from upd.hbm import Contacts, FrequencyResponse, contacts, frequency_response
-from upd.hbm.march import steady_state
-from upd.hbm.modal import modal
+from upd.hbm.springs.modal import modal
+from upd.hbm.springs.time_integration import steady_state
 
 M = np.diag([1.0, 1, 1, 1, 0.1, 0.1])
 C = np.diag([20.0] * 4 + [0, 0])

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from upd.hbm import condensed, contacts, harmonics
-from upd.hbm.balance import Balance
-from upd.hbm.coulomb import LIFT, STICK
-from upd.hbm.modal import modal
+from upd.hbm import contacts, harmonics
+from upd.hbm.springs import condensed
+from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.coulomb import LIFT, STICK
+from upd.hbm.springs.modal import modal
 
 MOVES, STICKS, OPEN = 0, 1, 2
 #: preloads that make a point of unit motion move, stick over the whole cycle, stay open

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from tests.literature.test_hbm_blade_damper_blade import Y2, response
 from tests.property.test_hbm_condensed import MOVES, OPEN, STICKS, problem
 from tests.stability.test_hbm_hard_cases import gap_oscillator
-from upd.hbm import condensed, kept_factors
-from upd.hbm.kept_factors import LEFT, LEFT_OF_TANGENT, KeptFactors
-from upd.hbm.newton import bordered_factors
+from upd.hbm.core import kept_factors
+from upd.hbm.core.kept_factors import LEFT, LEFT_OF_TANGENT, KeptFactors
+from upd.hbm.core.newton import bordered_factors
+from upd.hbm.springs import condensed
 
 
 class Dense(NamedTuple):

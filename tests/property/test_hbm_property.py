@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from upd.hbm import contacts, frequency_response, harmonics
-from upd.hbm.balance import Balance
-from upd.hbm.coulomb import LIFT, SLIP, STICK
-from upd.hbm.fourier import analysis, embed, synthesis
-from upd.hbm.friction import Start, harmonic_force
-from upd.hbm.modal import modal
+from upd.hbm.core.fourier import analysis, embed, synthesis
+from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
+from upd.hbm.springs.friction import Start, harmonic_force
+from upd.hbm.springs.modal import modal
 
 # Central differences: error h^2 from curvature of the radial return, eps/h from rounding; best h =
 # eps^(1/3), error about eps^(2/3).

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from upd.hbm import FrequencyResponse, adaptive, contacts, frequency_response
-from upd.hbm.adaptive import TRUNCATION, Whole
+from upd.hbm import FrequencyResponse, contacts, frequency_response
+from upd.hbm.springs import harmonics as adaptive
+from upd.hbm.springs.harmonics import TRUNCATION, Whole
 
 HZ = 1 / (2 * np.pi)
 BAND = np.linspace(0.8, 1.5, 71)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from upd.hbm import Contacts, FrequencyResponse, Settings, contacts, follow, frequency_response
-from upd.hbm.coulomb import SLIP
-from upd.hbm.friction import Start
-from upd.hbm.march import steady_state
-from upd.hbm.newton import solve
-from upd.hbm.starts import from_stuck
+from upd.hbm.core.newton import solve
+from upd.hbm.springs.coulomb import SLIP
+from upd.hbm.springs.friction import Start
+from upd.hbm.springs.starts import from_stuck
+from upd.hbm.springs.time_integration import steady_state
 
 HZ = 1 / (2 * np.pi)
 

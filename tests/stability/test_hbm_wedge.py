@@ -18,10 +18,10 @@ from upd.hbm import (
     frequency_response,
     rigid_damper,
 )
-from upd.hbm.balance import Balance
-from upd.hbm.march import steady_state
-from upd.hbm.modal import modal
-from upd.hbm.starts import from_stuck, newton, static_point
+from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.modal import modal
+from upd.hbm.springs.starts import from_stuck, newton, static_point
+from upd.hbm.springs.time_integration import steady_state
 
 S = np.sqrt(0.5)
 #: blade dofs x, z, rotation about y of the platform, which carries the core as a rigid body 45 mm

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from upd.hbm import Settings, follow
-from upd.hbm.newton import Function
+from upd.hbm.core.newton import Function
 
 Parts = tuple[np.ndarray, np.ndarray, np.ndarray]
 

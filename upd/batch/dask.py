@@ -122,22 +122,20 @@ class DaskCluster:
         self._client.close(timeout=5)
         if self._local is not None:
             self._local.close(timeout=10)
-        for name, level in self._levels.items():
-            logging.getLogger(name).setLevel(level)
+        for logger, level in self._levels.items():
+            logger.setLevel(level)
 
 
-def _quiet() -> dict[str, int]:
+def _quiet() -> dict[logging.Logger, int]:
     """Dask's loggers silenced, and their levels before.
 
     What goes wrong is reported once, by an error of ours.
     """
-    levels = {
-        name: logging.getLogger(name).level
-        for name in list(logging.root.manager.loggerDict)
-        if name.startswith("distributed")
-    }
-    for name in levels:
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    known = list(logging.root.manager.loggerDict)
+    loggers = [logging.getLogger(name) for name in known if name.startswith("distributed")]
+    levels = {logger: logger.level for logger in loggers}
+    for logger in levels:
+        logger.setLevel(logging.CRITICAL + 1)
     return levels
 
 

@@ -21,14 +21,14 @@ from upd.analyses.forced.paths import balance_of, fine_grid, quiet, respond
 from upd.analyses.forced.plan import ForcedPlan
 from upd.errors import ConvergenceError
 from upd.hbm import FrequencyResponse, climb
-from upd.hbm.balance import Balance
-from upd.hbm.parameter_change import ParameterChange
-from upd.hbm.peak_sensitivity import (
+from upd.hbm.peaks.parameter_change import ParameterChange
+from upd.hbm.peaks.sensitivity import (
     PeakDerivative,
     displacement_derivatives,
     peak_derivatives,
 )
-from upd.hbm.starts import first_point, newton, place_sliders
+from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.starts import first_point, newton, place_sliders
 from upd.scene.forced_contact import SIDES, Side
 
 Array = NDArray[np.float64]

@@ -26,8 +26,8 @@ from upd.analyses.forced.paths import balance_of
 from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.errors import ConvergenceError
 from upd.fitting.targets import PEAK_NUMBERS, STUCK_MODES
-from upd.hbm.parameter_change import ParameterChange
-from upd.hbm.peak_sensitivity import PeakDerivative
+from upd.hbm.peaks.parameter_change import ParameterChange
+from upd.hbm.peaks.sensitivity import PeakDerivative
 from upd.scene.forced_contact import Side
 
 Array = NDArray[np.float64]

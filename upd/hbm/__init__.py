@@ -15,16 +15,16 @@ Multi-harmonic balance, continuation, time-march cross-check.
 True
 """
 
-from upd.hbm.contact_points import Contacts, contacts
-from upd.hbm.continuation import Path, follow
-from upd.hbm.damper import RigidDamper, contact_rows, rigid_damper
-from upd.hbm.fourier import Harmonics, harmonics
-from upd.hbm.friction import Law
-from upd.hbm.march import SteadyState, steady_state
-from upd.hbm.newton import Settings
-from upd.hbm.path_step import State
-from upd.hbm.peaks import Peak, climb
-from upd.hbm.response import FrequencyResponse, frequency_response
+from upd.hbm.core.continuation import Path, follow
+from upd.hbm.core.fourier import Harmonics, harmonics
+from upd.hbm.core.newton import Settings
+from upd.hbm.core.path_step import State
+from upd.hbm.springs.damper import RigidDamper, contact_rows, rigid_damper
+from upd.hbm.springs.friction import Law
+from upd.hbm.springs.peak import Peak, climb
+from upd.hbm.springs.points import Contacts, contacts
+from upd.hbm.springs.response import FrequencyResponse, frequency_response
+from upd.hbm.springs.time_integration import SteadyState, steady_state
 
 __all__ = [
     "Contacts",

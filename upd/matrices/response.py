@@ -34,7 +34,7 @@ from scipy.sparse import csr_array
 from upd import hbm
 from upd.errors import InputError
 from upd.fem.damping import modal_damping
-from upd.hbm.modal import modal
+from upd.hbm.springs.modal import modal
 from upd.matrices.files import (
     COMPONENTS,
     DofMap,

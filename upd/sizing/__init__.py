@@ -4,7 +4,7 @@
 F_C whose worst peak is lowest from peaks of whole curves over F_C/F_E, of a rig or of any balance.
 """
 
-from upd.hbm.peaks_over import PeaksOver
+from upd.hbm.peaks.over import PeaksOver
 from upd.sizing.choice import ChosenDamper
 from upd.sizing.choice_answer import BestDamper
 from upd.sizing.least_worst import LowestWorst, lowest_worst

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.peaks_over import SAME
+from upd.hbm.peaks.over import SAME
 from upd.plot.chart import Axis, Band, Chart, Mark, Trace
 from upd.report.answer_folder import FigureAnswer
 from upd.results.answer_table import AnswerTable, Rounded

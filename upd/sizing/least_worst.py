@@ -24,7 +24,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from upd.errors import ConvergenceError
-from upd.hbm.peaks_over import AGREES, JUMP_STEP, SAME, Deciding
+from upd.hbm.peaks.over import AGREES, JUMP_STEP, SAME, Deciding
 from upd.sizing.worst_peak import WorstPeak
 
 #: how closely F_C is found, as its logarithm

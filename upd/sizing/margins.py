@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.peaks_over import SAME
+from upd.hbm.peaks.over import SAME
 from upd.sizing.least_worst import ROUNDS, LowestWorst
 from upd.sizing.worst_peak import FINE, WorstPeak
 

@@ -26,8 +26,8 @@ from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
 from upd.cache.journal import Journal
 from upd.cache.sources import key_of, source_digest
 from upd.errors import InputError
-from upd.hbm.parameter_change import ParameterChange
-from upd.hbm.peaks_over import Peaks, PeaksOver, peak_point
+from upd.hbm.peaks.over import Peaks, PeaksOver, peak_point
+from upd.hbm.peaks.parameter_change import ParameterChange
 from upd.linalg.parallel import threads_for
 from upd.progress import Stages
 from upd.scene import ForcedScene

@@ -28,7 +28,7 @@ from scipy.optimize import minimize_scalar
 from upd.analyses.forced.paths import quiet
 from upd.analyses.seated.bodies import Bodies
 from upd.errors import ConvergenceError, InputError, one_line
-from upd.hbm.peaks_over import AGREES, SCAN_STEP
+from upd.hbm.peaks.over import AGREES, SCAN_STEP
 from upd.linalg.parallel import threads_for
 from upd.progress import Listener, Stages, silent
 from upd.scene import AnyScene, ForcedScene

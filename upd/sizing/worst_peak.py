@@ -1,7 +1,7 @@
 r"""The worst peak over a range of F_E, as a function of F_C.
 
 Peaks h per unit of F_E depend on s = ln r = c - f alone, with c = ln F_C and f = ln F_E (see
-`upd.hbm.peaks_over`). The worst over f_1 <= f <= f_2,
+`upd.hbm.peaks.over`). The worst over f_1 <= f <= f_2,
 
     W(c) = max over s in [c - f_2, c - f_1] of y(s) + k (c - s),   y = ln h,
 
@@ -21,8 +21,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from upd.errors import ConvergenceError
-from upd.hbm.peaks import JUMP_HEIGHT
-from upd.hbm.peaks_over import (
+from upd.hbm.peaks.over import (
     AGREES,
     ANSWER_STEP,
     BESIDE,
@@ -31,6 +30,7 @@ from upd.hbm.peaks_over import (
     Deciding,
     PeaksOver,
 )
+from upd.hbm.springs.peak import JUMP_HEIGHT
 
 Array = NDArray[np.float64]
 #: how closely jumps are located, as ln(F_C/F_E), where an optimum is compared with another one
@@ -164,8 +164,8 @@ class WorstPeak:
         worst peaks between two ln F_C.
 
         Neighbours are too far apart with more than `ANSWER_STEP` between them, unless tangents of
-        both stay below a limit by the factor that makes another peak (`upd.hbm.peaks`); and with
-        more than a jump where tangents may reach the limit, if the neighbours are not of one branch
+        both stay below a limit by the factor that makes another peak (`upd.hbm.springs.peak`); and
+        with more than a jump where tangents may reach the limit, if the neighbours are not of one branch
         or their tangents meet above it.
 
         Parameters

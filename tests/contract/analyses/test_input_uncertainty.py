@@ -21,8 +21,8 @@ from upd.analyses.forced import paths, peaks
 from upd.analyses.forced.input_uncertainty import input_changes
 from upd.analyses.forced.solution import ForcedSolution
 from upd.hbm import Settings, climb
-from upd.hbm.balance import Balance
-from upd.hbm.starts import newton
+from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.starts import newton
 from upd.progress import Stages
 from upd.results import Case, InputPart, Result
 from upd.scene import load_scene

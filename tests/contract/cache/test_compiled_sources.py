@@ -7,22 +7,22 @@ from pathlib import Path
 
 import pytest
 
-from upd.hbm import interface_step
+from upd.hbm.faces import step as interface_step
 from upd.linalg import compiled as room
 from upd.linalg.compiled import sources_digest
 
 ROOT = Path(room.__file__).parents[2]
-LOOPS = "upd/hbm/interface_periods.py"
+LOOPS = "upd/hbm/faces/periods.py"
 
 
 @pytest.mark.parametrize(
     ("changed", "told"),
     [
-        ("upd/hbm/interface_periods.py", True),
-        ("upd/hbm/interface_period.py", True),
+        ("upd/hbm/faces/periods.py", True),
+        ("upd/hbm/faces/period.py", True),
         # two imports away
-        ("upd/hbm/interface_step.py", True),
-        ("upd/hbm/balance.py", False),
+        ("upd/hbm/faces/step.py", True),
+        ("upd/hbm/springs/balance.py", False),
     ],
 )
 def test_a_change_where_loops_come_from_is_told(changed: str, told: bool, tmp_path: Path) -> None:
@@ -47,9 +47,9 @@ def test_compiled_functions_lie_in_the_folder_of_their_sources(
 
 def test_a_module_may_lie_outside_the_package(tmp_path: Path) -> None:
     own = tmp_path / "own.py"
-    own.write_text("from upd.hbm.interface_step import judge\n")
+    own.write_text("from upd.hbm.faces.step import judge\n")
     before = sources_digest(own, ROOT)
-    own.write_text("from upd.hbm.interface_period import touch\n")
+    own.write_text("from upd.hbm.faces.period import touch\n")
     assert sources_digest(own, ROOT) != before
 
 

@@ -26,7 +26,7 @@ from upd.analyses.forced.plan import ForcedPlan, make_plan, time_steps
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.solve import solve
-from upd.hbm.fourier import harmonics, sample_count
+from upd.hbm.core.fourier import harmonics, sample_count
 from upd.progress import Stages
 from upd.results import Estimates, Result
 from upd.scene import ForcedScene

@@ -23,7 +23,7 @@ from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import BALANCE, StaticState
 from upd.analyses.forced.sweeps import TOLERANCE
 from upd.analyses.measured import fit_checks
-from upd.hbm.adaptive import TRUNCATION
+from upd.hbm.springs.harmonics import TRUNCATION
 from upd.results import Case, Check
 from upd.scene.forced_contact import SIDES
 
@@ -138,7 +138,7 @@ _RULES = {
         "{lost} of {count} frequencies did not settle: their amplitudes are those of the last "
         "period",
     ),
-    # steps damp where the damper rattles, see `upd.hbm.interface_march`: ten times what a settled
+    # steps damp where the damper rattles, see `upd.hbm.faces.march`: ten times what a settled
     # motion may still change
     "sweep energy": _Rule(
         10.0 * TOLERANCE,

@@ -15,9 +15,9 @@ from upd.analyses.forced.model import Array
 from upd.analyses.forced.statics import StaticState
 from upd.analyses.seated.interface import Interface
 from upd.hbm import FrequencyResponse
-from upd.hbm.interface_balance import InterfaceResponse
-from upd.hbm.interface_state import InterfaceModel, InterfaceState
-from upd.hbm.interface_sweep import SteppedSine
+from upd.hbm.faces.balance import InterfaceResponse
+from upd.hbm.faces.state import InterfaceModel, InterfaceState
+from upd.hbm.faces.sweep import SteppedSine
 from upd.results import Case
 from upd.scene.forced_contact import Side
 

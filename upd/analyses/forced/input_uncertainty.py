@@ -26,9 +26,9 @@ from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import StaticState, static_state
 from upd.analyses.seated.bodies import Bodies
 from upd.errors import ConvergenceError, UpdError, one_line
-from upd.hbm.parameter_change import ParameterChange
-from upd.hbm.peak_sensitivity import peak_derivatives
-from upd.hbm.starts import newton
+from upd.hbm.peaks.parameter_change import ParameterChange
+from upd.hbm.peaks.sensitivity import peak_derivatives
+from upd.hbm.springs.starts import newton
 from upd.linalg.parallel import threads_for
 from upd.progress import Stages
 from upd.results import Case, Result

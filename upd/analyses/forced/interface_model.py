@@ -1,4 +1,4 @@
-"""The rig as blades in modes and contact by whole faces, for `upd.hbm.interface_march`."""
+"""The rig as blades in modes and contact by whole faces, for `upd.hbm.faces.march`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from upd.analyses.seated.lattice import lattice, patch_frame
 from upd.contact import CoupledContact
 from upd.contact.coulomb import Coulomb
 from upd.errors import InputError
-from upd.hbm.interface_state import InterfaceModel, InterfaceState, resting
+from upd.hbm.faces.state import InterfaceModel, InterfaceState, resting
 from upd.linalg import factorise, modes
 from upd.linalg.parallel import in_parallel
 from upd.scene.forced_contact import SIDES, Side

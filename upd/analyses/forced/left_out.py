@@ -28,7 +28,7 @@ from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies
 from upd.fem import Material, mass, rigid_body_modes, stiffness
-from upd.hbm.contact_points import stuck_stiffness
+from upd.hbm.springs.points import stuck_stiffness
 from upd.linalg import factorise
 from upd.linalg.symmetric import Symmetric
 from upd.mesh import IntArray

@@ -29,9 +29,9 @@ from upd.analyses.forced.measures import (
 from upd.analyses.forced.mode_peaks import CANDIDATES, ModeShapes, numbered, shapes_along_x
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.plan import ForcedPlan, grid
-from upd.hbm.balance import Balance
-from upd.hbm.contact_points import stuck_stiffness
-from upd.hbm.interface_state import InterfaceModel
+from upd.hbm.faces.state import InterfaceModel
+from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.points import stuck_stiffness
 from upd.scene.forced_contact import SIDES, Side
 
 #: half-power widths on each side of a mode in which its peak is sought, and of a width between two

@@ -4,7 +4,7 @@ Of q = D^-1 F, D = K + i w C - w^2 M, with the adjoint z = D^-1 r of the output 
 
     d(r'q)/dp = z' (dF/dp - dD/dp q),
 
-and of its peak as `upd.hbm.peak_sensitivity` has it.
+and of its peak as `upd.hbm.peaks.sensitivity` has it.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.model import Array, ComplexArray, Model
-from upd.hbm.parameter_change import ParameterChange
-from upd.hbm.peak_sensitivity import PeakDerivative
+from upd.hbm.peaks.parameter_change import ParameterChange
+from upd.hbm.peaks.sensitivity import PeakDerivative
 from upd.scene.forced_contact import Side
 
 #: half of the difference over the frequency, as a share of it

@@ -13,8 +13,8 @@ from scipy.linalg import eigh
 from upd.analyses.forced.model import Model
 from upd.dynamics.peaks import find_peaks
 from upd.hbm import FrequencyResponse, Harmonics
-from upd.hbm.balance import Balance
-from upd.hbm.fourier import to_complex
+from upd.hbm.core.fourier import to_complex
+from upd.hbm.springs.balance import Balance
 from upd.mesh import IntArray
 from upd.scene.forced_contact import SIDES, Side
 

@@ -18,7 +18,7 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.measures import ComplexArray, CurvePeak, StuckMode
 from upd.analyses.forced.model import Array, Model
 from upd.hbm import FrequencyResponse
-from upd.hbm.fourier import to_complex
+from upd.hbm.core.fourier import to_complex
 
 #: share of the motion above which a mode has more than all others together
 MAJORITY = 0.5

@@ -32,8 +32,8 @@ from upd.analyses.forced.stiffness import FaceLaw, mirrored
 from upd.analyses.seated.bodies import Bodies
 from upd.fem import modal_damping
 from upd.hbm import Contacts, RigidDamper, contact_rows, contacts, rigid_damper
-from upd.hbm.contact_points import stuck_stiffness
-from upd.hbm.damper import attach
+from upd.hbm.springs.damper import attach
+from upd.hbm.springs.points import stuck_stiffness
 from upd.linalg.parallel import in_parallel
 from upd.mesh import IntArray
 from upd.scene import ForcedScene

@@ -14,8 +14,8 @@ from upd.analyses.forced.linear_limits import finer, linear_modes
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.hbm import FrequencyResponse, Settings, frequency_response, harmonics
-from upd.hbm.assembled import assembled
-from upd.hbm.balance import Balance
+from upd.hbm.springs.assembled import assembled
+from upd.hbm.springs.balance import Balance
 
 #: half width of the band around a peak in which it is looked for, as a share of its frequency, and
 #: the points in it

@@ -37,13 +37,13 @@ from upd.analyses.forced.plan import ForcedPlan, time_steps
 from upd.analyses.forced.spring_march import SpringMarch, make_springs, state_at
 from upd.errors import ConvergenceError, one_line
 from upd.hbm import climb
-from upd.hbm.balance import Balance
-from upd.hbm.coulomb import STICK
-from upd.hbm.fourier import to_complex
-from upd.hbm.interface_march import InterfaceMarch
-from upd.hbm.interface_settle import settle
-from upd.hbm.peaks import FIRST_REACH, is_near
-from upd.hbm.starts import newton
+from upd.hbm.core.fourier import to_complex
+from upd.hbm.faces.march import InterfaceMarch
+from upd.hbm.faces.settle import settle
+from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.coulomb import STICK
+from upd.hbm.springs.peak import FIRST_REACH, is_near
+from upd.hbm.springs.starts import newton
 from upd.scene.forced_contact import SIDES, Side
 
 log = logging.getLogger(__name__)

@@ -35,10 +35,10 @@ from upd.analyses.forced.peaks import climbed, confirmed, with_tops
 from upd.analyses.forced.plan import ForcedPlan
 from upd.errors import ConvergenceError, UpdError, one_line
 from upd.hbm import FrequencyResponse
-from upd.hbm.balance import Balance
-from upd.hbm.fourier import harmonics, sample_count
-from upd.hbm.peaks import FIRST_REACH, is_near
-from upd.hbm.starts import newton
+from upd.hbm.core.fourier import harmonics, sample_count
+from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.peak import FIRST_REACH, is_near
+from upd.hbm.springs.starts import newton
 from upd.linalg.parallel import threads_for
 from upd.scene.forced_contact import SIDES, Side
 from upd.vary.variation import Variation

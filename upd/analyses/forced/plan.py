@@ -19,8 +19,8 @@ from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.stiffness import check_sources, plans_to_solve
 from upd.analyses.seated.plan import centrifugal_effects
 from upd.cache.sources import key_of
-from upd.hbm.fourier import harmonics, sample_count
-from upd.hbm.kept_factors import SOLUTIONS, WORTH_KEEPING
+from upd.hbm.core.fourier import harmonics, sample_count
+from upd.hbm.core.kept_factors import SOLUTIONS, WORTH_KEEPING
 from upd.mesh import recipes
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import GAUSS

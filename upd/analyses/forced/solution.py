@@ -19,7 +19,7 @@ from upd.analyses.forced.peaks_again import FoundPeaks, PeaksAgain
 from upd.analyses.forced.performance import Performance, RatioPoint
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.seated.bodies import Bodies
-from upd.hbm.interface_record import RecordedPeriod
+from upd.hbm.faces.record import RecordedPeriod
 from upd.mesh import IntArray
 from upd.results import Case
 from upd.scene.forced_contact import Side

@@ -6,7 +6,7 @@ the blades' points, the modes phi and what they leave of the static compliance,
 
     G = diag(1/k_n, 1/k_t, 1/k_t) + R (K^-1 - phi Lambda^-1 phi') R',
 
-`upd.hbm.interface_march` then has the same points, forces and states as the harmonic balance,
+`upd.hbm.faces.march` then has the same points, forces and states as the harmonic balance,
 another discretisation in time, and another code for the contact.
 """
 
@@ -20,10 +20,10 @@ from scipy.linalg import eigh
 
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan, time_steps
-from upd.hbm.balance import Balance
-from upd.hbm.fourier import to_complex
-from upd.hbm.interface_state import InterfaceModel, InterfaceState, resting
-from upd.hbm.interface_step import OPEN, STICK
+from upd.hbm.core.fourier import to_complex
+from upd.hbm.faces.state import InterfaceModel, InterfaceState, resting
+from upd.hbm.faces.step import OPEN, STICK
+from upd.hbm.springs.balance import Balance
 from upd.scene.forced_contact import SIDES
 
 #: place of the normal and of the tangents a point has among normal, along, up

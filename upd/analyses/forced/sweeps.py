@@ -31,9 +31,9 @@ from upd.analyses.forced.mode_peaks import CANDIDATES, ModeShapes, numbered
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.plan import ForcedPlan, grid, time_steps
 from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
-from upd.hbm.interface_record import period_of_sweep
-from upd.hbm.interface_state import InterfaceModel, InterfaceState
-from upd.hbm.interface_sweep import SteppedSine, stepped_sine
+from upd.hbm.faces.record import period_of_sweep
+from upd.hbm.faces.state import InterfaceModel, InterfaceState
+from upd.hbm.faces.sweep import SteppedSine, stepped_sine
 from upd.linalg.parallel import threads_for
 from upd.progress import Stages
 from upd.scene.forced_contact import SIDES

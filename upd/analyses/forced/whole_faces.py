@@ -3,7 +3,7 @@
 No springs: the blades' and the damper's own elasticity, Signorini's and Coulomb's conditions on
 every matching node. Where the faces of the damper and the platforms come from, and which static
 state they are in, decides the answer as much as friction does. Curves by harmonic balance have
-blades in frequency, damper and contact in time, see `upd.hbm.interface_balance`: every node of both
+blades in frequency, damper and contact in time, see `upd.hbm.faces.balance`: every node of both
 faces with its past, as a sweep from the static state at rising frequency.
 """
 
@@ -34,8 +34,8 @@ from upd.analyses.forced.sweeps import both_ways
 from upd.analyses.seated.bodies import Bodies
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.errors import ConvergenceError, InputError
-from upd.hbm.interface_balance import InterfaceResponse, interface_response
-from upd.hbm.interface_state import InterfaceModel, InterfaceState, resting
+from upd.hbm.faces.balance import InterfaceResponse, interface_response
+from upd.hbm.faces.state import InterfaceModel, InterfaceState, resting
 from upd.progress import Stages
 from upd.scene.forced_contact import SIDES
 

@@ -17,11 +17,6 @@ _DIVISIONS = (12, 16, 20, 28, 40, 56)
 _ACCURACIES = (40.0, 10.0, 3.0)
 
 
-def _usual(plan: Plan[Any]) -> Sequence[int]:
-    del plan
-    return _DIVISIONS
-
-
 def _patches(plan: Plan[Any], levels: Sequence[int]) -> Iterator[Variation]:
     """The edge of the patch at constant node spacing."""
     del levels
@@ -34,6 +29,6 @@ def _patches(plan: Plan[Any], levels: Sequence[int]) -> Iterator[Variation]:
 
 
 LADDERS: Mapping[str, Ladder] = {
-    **ladders.ladders(_usual, CURVED_GOVERNING, _ACCURACIES),
-    "patch": ladders.on_meshes(_usual, _patches),
+    **ladders.ladders(lambda plan: _DIVISIONS, CURVED_GOVERNING, _ACCURACIES),
+    "patch": ladders.on_meshes(lambda plan: _DIVISIONS, _patches),
 }

@@ -1,0 +1,180 @@
+"""Newton's corrections of large equations from the factors of an earlier point.
+
+From one iterate to the next few points change what they do and the frequency moves little, so that
+the factors P of an earlier bordered Jacobian are nearly those of the present one, M: P^-1 M is the
+identity but for a few directions, and GMRES on
+
+    P^-1 M z = P^-1 r
+
+takes a few products with M and solutions with P in place of new factors, whose work grows with the
+cube of the unknowns. What it leaves is measured as Newton's corrections are, in scaled unknowns, so
+that no scaling of the equations enters.
+
+The determinant of M has the sign of that of P where P^-1 M has no negative eigenvalue, or an even
+number of them. Eigenvalues off 1 are what GMRES finds first, as Ritz values: where a real one of
+them is not positive, M is factored.
+
+References
+----------
+Y. Saad, Iterative Methods for Sparse Linear Systems (2003), 6.5 and 9.3; P. Deuflhard, Newton
+Methods for Nonlinear Problems (2004), 2.1.5; D. A. Knoll and D. E. Keyes, J. Comput. Phys. 193
+(2004) 357, for preconditioners that are kept.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.hbm.core.newton import BorderedFactors
+from upd.linalg.gmres import gmres
+
+FloatArray = NDArray[np.float64]
+
+#: what a correction leaves of the equations, in scaled unknowns: well below the shrinkage of
+#: corrections that spares a new Jacobian (`upd.hbm.core.newton.CHORD`), so that no more are needed
+LEFT = 1e-3
+#: the same of a tangent: paths go by its angles
+LEFT_OF_TANGENT = 1e-10
+#: unknowns below which factors take some hundredths of a second at most, and are taken anew
+WORTH_KEEPING = 1000
+#: a factorisation of n unknowns takes the time of n over this many solutions: 2 n^3 / 3 operations
+#: from the processor's cache against n^2 numbers from memory. Measured on one core: n / 4 at 1000
+#: unknowns, n / 13 at 2000, n / 18 at 3000, n / 21 at 4000, n / 23 at 6000; it weighs costs only,
+#: and below 4000 factors are renewed somewhat early.
+SOLUTIONS = 24.0
+
+
+class BorderedMatrix(Protocol):
+    """[[J, r_p], [normal]], in scaled unknowns, with the equations as they are."""
+
+    def product(self, z: FloatArray) -> FloatArray:
+        """What scaled unknowns z (n + 1,) give: the equations (n,) and the border."""
+
+    def factored(self) -> BorderedFactors:
+        """Its factors."""
+
+    @property
+    def sizes(self) -> FloatArray:
+        """Sizes of the unknowns, that of the parameter last (n + 1,)."""
+
+
+class KeptFactors:
+    """The newest factors of a path, and what solutions from them have taken.
+
+    Factors are taken anew as soon as corrections from them cost more than they did on average with
+    the factors themselves: from then on waiting longer would cost more.
+    """
+
+    def __init__(self) -> None:
+        self._factors: BorderedFactors | None = None
+        self._sizes = np.zeros(0)
+        self._spent, self._uses, self._newest = 0.0, 0, 0.0
+
+    def near(self, matrix: BorderedMatrix, unknowns: int) -> BorderedFactors:
+        """Factors of a matrix, or what solves with it from those that are kept.
+
+        Parameters
+        ----------
+        matrix : BorderedMatrix
+        unknowns : int
+            Rows of its factors.
+
+        Returns
+        -------
+        BorderedFactors
+        """
+        same = len(self._sizes) == len(matrix.sizes)
+        if not same or self._factors is None or self._factors.singular or self._dear:
+            return self.renewed(matrix, unknowns)
+        self._uses, self._newest = self._uses + 1, 0.0
+        return _Near(self, matrix, self._factors, self._sizes, unknowns)
+
+    @property
+    def _dear(self) -> bool:
+        return self._newest * max(self._uses, 1) > self._spent
+
+    def renewed(self, matrix: BorderedMatrix, unknowns: int) -> BorderedFactors:
+        """Factors of the matrix, kept from now on; parameters as of `near`."""
+        self._factors, self._sizes = matrix.factored(), matrix.sizes
+        self._spent, self._uses, self._newest = unknowns / SOLUTIONS, 1, 0.0
+        return self._factors
+
+    def forget(self) -> None:
+        """Let the factors go: the next ones are new."""
+        self._factors, self._sizes = None, np.zeros(0)
+
+    def __reduce__(self) -> tuple[type[KeptFactors], tuple[()]]:
+        # files and other processes do without them
+        return KeptFactors, ()
+
+    def note(self, solutions: int) -> None:
+        """Count solutions that a correction took."""
+        self._spent += solutions
+        self._newest += solutions
+
+
+class _Near:
+    """Solutions with a matrix from the factors of another; its own where these are too far."""
+
+    singular = False
+
+    def __init__(
+        self,
+        kept: KeptFactors,
+        matrix: BorderedMatrix,
+        factors: BorderedFactors,
+        sizes: FloatArray,
+        unknowns: int,
+    ) -> None:
+        self._kept, self._matrix, self._factors, self._unknowns = kept, matrix, factors, unknowns
+        # unknowns of the factors are scaled by sizes of their own
+        self._rescaled = sizes / matrix.sizes
+        self._own: BorderedFactors | None = None
+        self._right = True
+
+    @property
+    def sign(self) -> float:
+        """Sign of the determinant, up to a factor that never changes on a path."""
+        return self._factors.sign if self._own is None and self._right else self._renew().sign
+
+    @property
+    def ratio(self) -> float:
+        """Smallest over largest pivot, of the factors in use."""
+        return (self._own or self._factors).ratio
+
+    def _renew(self) -> BorderedFactors:
+        if self._own is None:
+            self._own = self._kept.renewed(self._matrix, self._unknowns)
+        return self._own
+
+    def _from_factors(self, b: FloatArray) -> FloatArray:
+        return self._factors.solve(b[:-1], float(b[-1])) * self._rescaled
+
+    def _found(self, b: FloatArray, left: float) -> FloatArray:
+        if self._own is None:
+            most = int(self._unknowns / SOLUTIONS / 2)
+            found = gmres(
+                lambda z: self._from_factors(self._matrix.product(z)),
+                self._from_factors(b),
+                left,
+                most,
+            )
+            self._kept.note(found.products + 1)
+            # of a pair neither changes the sign
+            real = found.ritz.real[found.ritz.imag == 0.0]
+            self._right = self._right and bool((real > 0.0).all())
+            if found.reached:
+                return found.x
+        return self._renew().solve(b[:-1], float(b[-1]))
+
+    def solve(self, r: FloatArray, last: float) -> FloatArray:
+        """Scaled correction for the residual r (n,) and the right-hand side of the border."""
+        return self._found(np.append(r, last), LEFT)
+
+    def tangent(self) -> FloatArray:
+        """Unit vector along the path, on the side the border points to."""
+        t = self._found(np.append(np.zeros(len(self._rescaled) - 1), 1.0), LEFT_OF_TANGENT)
+        return np.asarray(t / np.linalg.norm(t))

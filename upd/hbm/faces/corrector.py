@@ -1,0 +1,273 @@
+"""Newton's method for points of the balance by whole faces, in planes across its curve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.errors import ConvergenceError
+from upd.hbm.core.kept_factors import KeptFactors
+from upd.hbm.core.newton import Settings
+from upd.hbm.faces.equations import ContactPeriod, InterfaceEquations
+from upd.hbm.faces.newton import (
+    InterfaceEvaluation,
+    StrangerMovesError,
+    evaluate,
+    slips_for_good,
+)
+from upd.hbm.faces.state import FloatArray
+from upd.hbm.faces.step import SOLVED
+from upd.hbm.faces.steps import (
+    SHRINKS,
+    BroydenSteps,
+    KnownFactors,
+    NewtonSteps,
+    PlaneMatrix,
+)
+
+#: share of the correction before, two of which in a row end a correction: at it twelve would not
+#: take a step of the curve to the tolerance; it weighs costs against those of a shorter step
+WAVERS = 0.6
+#: unknowns from which on few directions are cheaper than a derivative. It only weighs costs
+MANY = 300
+
+#: share of the step before that one of Newton's has at most where it starts close enough to the
+#: answer: such steps are no reason for a shorter one along the curve (P. Deuflhard, Newton Methods
+#: for Nonlinear Problems, 2004, 2.1: contraction 1/4 keeps the iteration in its tube)
+FAST = 0.25
+
+
+@dataclass(frozen=True)
+class InterfacePlace:
+    """Where a curve stands.
+
+    Attributes
+    ----------
+    x : (u,) ndarray
+        Unknowns, solved.
+    p : float
+        Hz.
+    tangent : (u + 1,) ndarray
+        Onwards, scaled.
+    step : float
+        The next one.
+    iterations : int
+        Derivatives formed.
+    known : KnownFactors
+        Of the derivative there.
+    mobile : (n,) ndarray of bool
+        Nodes whose slips are among the unknowns.
+    """
+
+    x: FloatArray
+    p: float
+    tangent: FloatArray
+    step: float
+    iterations: int
+    known: KnownFactors
+    mobile: NDArray[np.bool_]
+
+
+class InterfaceCorrector:
+    """Newton's method for the equations.
+
+    Parameters
+    ----------
+    equations : InterfaceEquations
+    settings : Settings
+    p_scale : float
+        Size of the frequency [Hz].
+    """
+
+    def __init__(self, equations: InterfaceEquations, settings: Settings, p_scale: float) -> None:
+        self.equations, self.settings, self.p_scale = equations, settings, p_scale
+        self.kept = KeptFactors()
+
+    def correct(
+        self,
+        x: FloatArray,
+        p: float,
+        normal: FloatArray,
+        D: FloatArray,
+        past: FloatArray,
+        known: KnownFactors | None = None,
+    ) -> InterfacePlace | None:
+        """Newton's method in the plane across `normal` through a point; None where it fails.
+
+        The steps are whole ones. The factors at hand, of the point before or of an earlier step,
+        serve for further ones with Broyden's updates as long as these shrink fast. A node that has
+        left the place of its past to come to the verge of slipping, and is sent back beyond that
+        place, stays there.
+
+        Parameters
+        ----------
+        x : (u,) ndarray
+            Guess.
+        p : float
+            Its frequency.
+        normal : (u + 1,) ndarray
+            In scaled coordinates.
+        D : (u,) ndarray
+            Units of the unknowns.
+        past : (2 n,) ndarray
+            Slips at the point before.
+        known : KnownFactors, optional
+            Of a point near by, from which shorter steps can be taken where this one fails.
+        """
+        e, s = self.equations, self.settings
+        first = len(x) - len(e.tangents)
+        before = past[e.tangents - e.model.n].reshape(2, -1)
+        count, sizes, near = 0, [np.inf, np.inf], known is not None
+        steps: BroydenSteps | NewtonSteps | None = None
+        if known is not None and len(known.D) == len(D) < MANY:
+            steps = BroydenSteps(known, normal, D)
+        while True:
+            try:
+                found = evaluate(e, x, 2.0 * np.pi * p, past)
+            except ConvergenceError:
+                return None
+            except StrangerMovesError as more:
+                x, D, normal = self._with_more(more.moving, x, D, normal)
+                before = past[e.tangents - e.model.n].reshape(2, -1)
+                steps = None
+                continue
+            step = None
+            if steps is not None and steps.learns and steps.known.suits(found):
+                step = steps.next(found.residual)
+                if not float(np.linalg.norm(step)) <= SHRINKS * sizes[-1]:
+                    step = None
+            if step is None:
+                if count == 0:
+                    sizes = [np.inf, np.inf]
+                known = self._factors(found, normal, D)
+                if known is None:
+                    return None
+                steps = self._steps(known, normal, D)
+                step = steps.next(found.residual)
+                # steps in few directions cost little where they converge fast
+                fast = not steps.learns and float(np.linalg.norm(step)) <= FAST * sizes[-1]
+                count += count == 0 or not fast
+                if count > s.iterations:
+                    return None
+            sizes.append(float(np.linalg.norm(step)))
+            # nodes that change their states to and fro: a shorter step separates them
+            wavers = all(sizes[k] > WAVERS * sizes[k - 1] for k in (-1, -2))
+            assert steps is not None
+            # Newton's own that grow near a known point: there is a shorter step to be taken
+            grows = near and not steps.learns and not sizes[-1] < sizes[-2]
+            if wavers or grows or not sizes[-1] < sizes[-3]:
+                return None
+            slip = x[first:].reshape(2, -1)
+            x, p = x + step[:-1] * D, p + float(step[-1]) * self.p_scale
+            if self._stay(x[first:].reshape(2, -1), slip, before, found.period):
+                # the step taken is not the one that was asked for
+                steps = self._steps(steps.known, normal, D)
+            if float(np.abs(step).max()) * len(step) ** 0.5 <= s.tolerance:
+                # the way on is that of the answer, not of the point whose factors led to it
+                here = steps.known if steps.known.of is found else self._factors(found, normal, D)
+                if here is None:
+                    return None
+                return InterfacePlace(x, p, here.factors.tangent(), 0.0, count + 1, here, e.mobile)
+
+    def widened(self, at: InterfacePlace) -> InterfacePlace:
+        """The same place with the unknowns that there are now."""
+        e = self.equations
+        places = e.places_of(at.mobile)
+        tangent = np.append(e.widened(at.tangent[:-1], places, 0.0), at.tangent[-1])
+        return replace(at, x=e.widened(at.x, places), tangent=tangent, mobile=e.mobile)
+
+    def across(self, rate: float, x: FloatArray) -> FloatArray:
+        """Across the plane of one frequency, in the direction of travel, (u + 1,)."""
+        normal = np.zeros(len(x) + 1)
+        normal[-1] = np.sign(rate)
+        return normal
+
+    def scale(self, x: FloatArray) -> FloatArray:
+        """Sizes of the unknowns.
+
+        The largest coefficient of the motion is one, so is the mean displacement. The damper's
+        state and the slips are measured by the motion of the faces, and all of either together.
+
+        Parameters
+        ----------
+        x : (u,) ndarray
+
+        Returns
+        -------
+        (u,) ndarray
+        """
+        e = self.equations
+        q, rigid, _ = e.split(x)
+        still = float(np.abs(q[0]).max(initial=0.0))
+        # samples are solved to a share of their forces: a motion smaller than that, as the
+        # tolerance magnifies it, is not resolved to its own size
+        least = np.abs(e.drive @ e.model.places.T / e.model.omega**2).max()
+        least = max(float(least), SOLVED / self.settings.tolerance * still)
+        moving = max(float(np.abs(q[1:]).max()), least)
+        size = np.full(q.shape, moving)
+        size[0] = max(moving, still)
+        face = max(float(np.abs(e.model.shapes @ q[1:].T).max()), least * e.largest)
+        reach = np.abs(e.model.columns).max(axis=0)
+        damper = np.tile(face * rigid.size**0.5 / reach, 3)
+        return np.concatenate(
+            [
+                size.ravel(),
+                damper,
+                np.full(len(e.tangents), face * (2.0 * e.model.n) ** 0.5),
+            ]
+        )
+
+    def _with_more(
+        self, moving: NDArray[np.bool_], x: FloatArray, D: FloatArray, normal: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Unknowns, their units and a direction with the slips of more nodes among the unknowns."""
+        e = self.equations
+        places = e.let_move(moving)
+        more = e.widened(x, places)
+        units = self.scale(more)
+        units[places] = D
+        return more, units, np.append(e.widened(normal[:-1], places, 0.0), normal[-1])
+
+    def _factors(
+        self, found: InterfaceEvaluation, normal: FloatArray, D: FloatArray
+    ) -> KnownFactors | None:
+        """Of the derivative at a point; None where it has none, or is singular."""
+        if not found.linear.fine:
+            return None
+        matrix = PlaneMatrix(found, normal, D, self.p_scale)
+        factors = matrix.factored() if len(D) < MANY else self.kept.near(matrix, len(D))
+        return None if factors.singular else KnownFactors(factors, D, found)
+
+    @staticmethod
+    def _steps(
+        known: KnownFactors, normal: FloatArray, D: FloatArray
+    ) -> BroydenSteps | NewtonSteps:
+        """Corrections by the factors of a point."""
+        return BroydenSteps(known, normal, D) if len(D) < MANY else NewtonSteps(known, normal)
+
+    def _stay(
+        self, moved: FloatArray, slip: FloatArray, before: FloatArray, period: ContactPeriod
+    ) -> bool:
+        """Put back nodes that slip for good and are sent back beyond the place of their past.
+
+        Parameters
+        ----------
+        moved, slip, before : (2, c) ndarray
+            Slips of the nodes that may move: now, overwritten; in the period; in the past.
+        period : ContactPeriod
+
+        Returns
+        -------
+        bool
+            Whether there are such.
+        """
+        e = self.equations
+        after = period.slip[e.tangents - e.model.n].reshape(2, -1)
+        way = np.where(slip != before, slip, after) - before
+        moving = period.moving[e.mobile]
+        for_good = slips_for_good(e, period)[:, e.mobile].any(axis=0) | ~moving
+        back = (((moved - before) * way).sum(axis=0) <= 0.0) & for_good
+        moved[:, back] = before[:, back]
+        return bool(back.any())

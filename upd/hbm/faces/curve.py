@@ -1,0 +1,279 @@
+"""Walk along the curve of the balance by whole faces, over frequency.
+
+Arc length over all unknowns, with a corrector of its own, `upd.hbm.faces.corrector`: what
+sticks has a memory, so that the curve depends on the way along it, and every sample of every node
+puts a kink into it. A node's slips are taken among the unknowns from the first time it moves. Where
+the curve folds, or no step leads on, a motion whose frequency changes on must jump; the walk then
+marches in time at the next frequency, as a sweep would, and continues from the motion found there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from upd.errors import ConvergenceError
+from upd.hbm.core.newton import Settings
+from upd.hbm.faces.corrector import InterfaceCorrector, InterfacePlace
+from upd.hbm.faces.equations import InterfaceEquations
+from upd.hbm.faces.march import InterfaceMarch
+from upd.hbm.faces.point import InterfacePoint, read_point
+from upd.hbm.faces.state import EPS, FloatArray
+from upd.hbm.faces.sweep import settle
+from upd.hbm.springs.residuals import FREQUENCY_SHARE
+
+#: shortest step of the load on the way from rest to the first frequency's answer
+LEAST_LOAD = 1.0 / 64.0
+#: tolerances to which a motion is integrated before the balance is tried on it
+MARCHED = (1e-2, 1e-3)
+MOST_PERIODS = 2000
+#: difference of the blades' motions, relative, up to which balance and march are the same motion
+SAME = 0.1
+#: distance, over the size of the solution, from which a fold is not approached further: what its
+#: top may be off
+NEAR_FOLD = 0.005
+#: share of a step beyond a fold that the next one may have at most, so that the approach ends
+TURNED = 0.95
+#: share of a step without an answer that is tried next; it weighs costs
+FAILED = 0.25
+#: how far the corrector may move from the predicted point, in steps
+STRAY = 0.5
+
+
+class InterfaceCurve:
+    """A curve on its way."""
+
+    def __init__(
+        self,
+        equations: InterfaceEquations,
+        drive: ArrayLike,
+        settings: Settings,
+        mean: float,
+    ) -> None:
+        self.equations, self.settings = equations, settings
+        self.p_scale = FREQUENCY_SHARE * mean
+        self.corrector = InterfaceCorrector(equations, settings, self.p_scale)
+        self.places: list[InterfacePoint] = []
+        self.jumps: list[float] = []
+        #: numbers of the points after which it jumped; frequencies at which nothing was found
+        self.broken: list[int] = []
+        self.missed: list[float] = []
+        self.length = settings.first_step
+        model = equations.model
+        n, m, L = model.n, len(model.frequency), model.places.shape[1]
+        #: the model with its modes as outputs
+        self.modes = replace(
+            model,
+            seen_modes=np.eye(m),
+            seen_contact=np.zeros((m, 3 * n)),
+            seen_drive=np.zeros((m, L)),
+        )
+        self.drive = drive
+        self.moving = equations.start.copy()
+
+    def follow(self, f: FloatArray) -> tuple[str, str]:
+        """Status and message of the walk over the frequencies."""
+        way = 1.0 if f[-1] >= f[0] else -1.0
+        at = self._first(float(f[0]))
+        if at is not None:
+            at = self._begin(at, way)
+        missed = self.missed
+        if at is None:
+            missed.append(float(f[0]))
+        while at is None or (f[-1] - at.p) * way > 0.0:
+            if len(self.places) >= self.settings.most_points:
+                return "step limit", (
+                    f"{len(self.places)} points used before {f[-1]:.9g} Hz{self._told(missed)}"
+                )
+            if at is not None:
+                found = self._advance(at, f)
+                if found is not None and float(found.tangent[-1]) * way > 0.0:
+                    at = found
+                    self.places.append(self._kept(at))
+                    continue
+                if found is not None:
+                    before, after = float(at.tangent[-1]), float(found.tangent[-1])
+                    fold = self.length * before / (before - after)
+                    if fold > NEAR_FOLD:
+                        at = replace(at, step=min(fold - 0.5 * NEAR_FOLD, TURNED * self.length))
+                        continue
+            # a fold, or a place from which no step leads on: a motion must jump there
+            passed = max([p * way for p in missed] + [one.frequency * way for one in self.places])
+            ahead = f[f * way > passed]
+            if not len(ahead):
+                break
+            at = self._jump(float(ahead[0]))
+            if at is None:
+                missed.append(float(ahead[0]))
+                continue
+            self.jumps.append(at.p)
+            if self.places:
+                self.broken.append(len(self.places) - 1)
+            self.places.append(self._kept(at))
+            at = self._begin(at, way)
+        if missed and missed[-1] == f[-1]:
+            return "stopped", (
+                f"no periodic motion found at {f[-1]:.9g} Hz{self._told(missed)}; march there, or "
+                "take more samples"
+            )
+        return (
+            "complete",
+            f"reached {f[-1]:.9g} Hz in {len(self.places)} points{self._told(missed)}",
+        )
+
+    def _kept(self, at: InterfacePlace) -> InterfacePoint:
+        """The point of a place; a jump from there begins with its state."""
+        e, w = self.equations, 2.0 * np.pi * at.p
+        q, rigid, slip = e.split(at.x)
+        period = e.march(at.x, w)
+        self.moving = e.state_in(period, q, rigid, slip, w)
+        return read_point(e, period, q, rigid, slip, at.p, at.iterations)
+
+    def _told(self, missed: list[float]) -> str:
+        """Where it jumped, and where nothing was found."""
+        lists = [
+            (self.jumps, "after a jump, found by time march, at"),
+            (missed, "no periodic motion found at"),
+        ]
+        parts = [f"; {words} {', '.join(f'{p:.6g}' for p in at)} Hz" for at, words in lists if at]
+        return "".join(parts)
+
+    def _jump(self, f: float) -> InterfacePlace | None:
+        """March in time from the last point until the balance finds that motion.
+
+        Parameters
+        ----------
+        f : float
+            Hz.
+
+        Returns
+        -------
+        InterfacePlace or None
+            None where the march does not settle, or the balance finds another motion.
+        """
+        e = self.equations
+        march = InterfaceMarch(self.modes, f, self.drive, e.samples, e.fallback)
+        for tolerance in MARCHED:
+            try:
+                settled = settle(
+                    march, self.moving, tolerance, MOST_PERIODS, accelerate=True
+                ).settled
+                moving = self.moving.copy()
+                q = e.Q @ march.period(moving).output
+            except ConvergenceError:
+                return None
+            dt, at = march.dt, self.moving
+            e.slip = at.slip.copy()
+            e.known = None
+            rigid = np.array([at.s, dt * at.sv, dt**2 * at.sa])
+            x = e.joined(q, rigid, at.slip)
+            found = self._at_frequency(x, f)
+            if found is not None:
+                off = float(np.linalg.norm(e.split(found.x)[0][1:] - q[1:]))
+                if off <= SAME * float(np.linalg.norm(q[1:])):
+                    return found
+            if not settled:
+                break
+        return None
+
+    def _at_frequency(self, x: FloatArray, f: float) -> InterfacePlace | None:
+        """Newton's method at a frequency."""
+        return self.corrector.correct(
+            x, f, self.corrector.across(1.0, x), self.corrector.scale(x), self.equations.split(x)[2]
+        )
+
+    def _begin(self, at: InterfacePlace, way: float) -> InterfacePlace:
+        """The place with its tangent in the direction of travel, and the first step."""
+        tangent = at.tangent * np.sign(at.tangent[-1]) * way
+        return replace(at, tangent=tangent, step=self.settings.first_step)
+
+    def _advance(self, at: InterfacePlace, marks: FloatArray) -> InterfacePlace | None:
+        """One step; None when even the smallest fails.
+
+        There is a kink wherever a sample of a node changes its state, and what sticks has a memory,
+        so that neither turns of the tangent nor the sign of the determinant tell pieces of the
+        curve apart. A step is good where the corrector ends near the point it started from.
+        """
+        s, h, at = self.settings, at.step, self.corrector.widened(at)
+        past = self.equations.split(at.x)[2]
+        while h >= s.smallest_step:
+            D = self.corrector.scale(at.x)
+            normal, length, rate = at.tangent, h, float(at.tangent[-1]) * self.p_scale
+            ahead = marks[(marks - at.p) * np.sign(rate) > 4 * EPS * at.p]
+            mark = float(ahead[np.abs(ahead - at.p).argmin()]) if len(ahead) else np.inf
+            hit = abs(mark - at.p) <= h * abs(rate)
+            if hit:
+                length, normal = (mark - at.p) / rate, self.corrector.across(rate, at.x)
+            x = at.x + length * at.tangent[:-1] * D
+            p = mark if hit else at.p + length * rate
+            found = self.corrector.correct(x, p, normal, D, past, at.known)
+            at = self.corrector.widened(at)
+            if found is not None:
+                D = self.corrector.scale(at.x)
+                x = at.x + length * at.tangent[:-1] * D
+                off = np.append((found.x - x) / D, (found.p - p) / self.p_scale)
+                stray = float(np.linalg.norm(off)) / length
+                if stray <= STRAY and not hit and (found.p - mark) * rate > 0.0:
+                    # the corrector has passed a frequency that is asked for
+                    x = at.x + (mark - at.p) / (found.p - at.p) * (found.x - at.x)
+                    normal = self.corrector.across(rate, at.x)
+                    found = self.corrector.correct(x, mark, normal, D, past, found.known)
+                    at = self.corrector.widened(at)
+                if found is not None and stray <= STRAY:
+                    D = self.corrector.scale(at.x)
+                    self.length = length
+                    tangent = np.append(
+                        found.tangent[:-1] * D / self.corrector.scale(found.x), found.tangent[-1]
+                    )
+                    grow = min(
+                        s.wanted_iterations / found.iterations, STRAY / 2.0 / max(stray, EPS)
+                    )
+                    step = (h if hit else length) * float(np.clip(grow, 0.5, 2.0))
+                    return replace(
+                        found,
+                        tangent=tangent / np.linalg.norm(tangent),
+                        step=min(step, s.largest_step),
+                    )
+            # states that change to and fro ahead of a fold do so at half of the step as well
+            h = (FAILED if found is None else 0.5) * min(h, length)
+        return None
+
+    def _first(self, f: float) -> InterfacePlace | None:
+        """The load raised from rest in steps as long as Newton's method takes them.
+
+        A start that moves is integrated in time.
+        """
+        e = self.equations
+        moves = bool(e.start.v.any())
+        found = self._jump(f) if moves else self._raised(f) or self._jump(f)
+        if found is not None:
+            self.places.append(self._kept(found))
+        return found
+
+    def _raised(self, f: float) -> InterfacePlace | None:
+        """The answer by raising the load from rest."""
+        e, load, step, found = self.equations, 0.0, 1.0, None
+        q = np.zeros(e.shape)
+        q[0] = e.start.q
+        rigid = np.zeros((3, len(e.model.load)))
+        rigid[0] = e.start.s
+        slip, whole = e.slip.copy(), e.drive
+        try:
+            while load < 1.0:
+                trial = min(load + step, 1.0)
+                e.drive = trial * whole
+                e.forget()
+                found = self._at_frequency(e.joined(q, rigid, slip), f)
+                if found is None:
+                    step = 0.5 * (trial - load)
+                    if step < LEAST_LOAD:
+                        return None
+                    continue
+                (q, rigid, slip), load = e.split(found.x), trial
+                step *= 2.0 if found.iterations <= self.settings.wanted_iterations else 1.0
+        finally:
+            e.drive = whole
+            e.forget()
+        return found

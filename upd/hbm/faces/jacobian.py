@@ -1,0 +1,470 @@
+r"""Derivative of one period of contact and damper, by recursion through its samples, compiled.
+
+With db the change of w* - w_ref at a sample, the forces and the gaps and slips y of the dofs R that
+are not held change by (see `upd.hbm.faces.step`; P, Q the rows of the laws at its answer)
+
+    df = W db - W_R dy,    (P W_R - Q) dy = P W db,
+
+k rows for the k dofs of R. A node that sticks all the period may be asked to come to the verge of
+slipping at its sample of least margin l = mu f_n - |f_t|: there v df_t - mu df_n = l by a slip
+along v = f_t / |f_t|, and what that does by itself is a column of its own. What db is made of: dq
+of the blades, ds + du of the damper, the slips summed so far of the nodes that move in the period,
+and for the frequency B dJ (p - B' f)/2. Only the modal forces and the damper's resultants are
+wanted of df, so that a sample at which everything sticks costs no more than these.
+
+Nodes move in stretches. With z the slips summed so far of the nodes of R, and the gaps of the open
+ones, and those of the other nodes s_O, which only change where a stretch begins or ends,
+
+    (P W_R - Q) z = P (W db - W_O s_O) - Q z before,
+
+so that a sample costs the solution of k rows, and W_O s_O is carried along.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from upd.hbm.faces.step import OPEN, STICK, slip_rows
+from upd.linalg.compiled import compiled
+from upd.linalg.compiled_lu import factor_columns, invert_columns, solve_columns
+
+#: state of a node that is asked to come to the verge of slipping
+VERGE = 3
+
+
+@compiled
+def law_rows(  # type: ignore[no-untyped-def]
+    f, y, state, n, mu, rho_n, rho_t, on, nodes, cols, owner, P, left, keep, H, W
+):
+    """Dofs that are not held, the rows of their laws, and the matrix P W_R - Q.
+
+    Parameters
+    ----------
+    f, y : (3 n,) ndarray
+        Answer of a sample.
+    state : (n,) ndarray of int
+    n : int
+    mu, rho_n, rho_t : (n,) ndarray
+        Friction, weights of displacements against forces.
+    on : (n,) ndarray of int
+        The nodes that are not held, in the order of the rows.
+    nodes : int
+        How many.
+    cols : (k,) ndarray of int
+        Overwritten by the dofs.
+    owner : (k,) ndarray of int
+        Overwritten by the node of each.
+    P : (k, 3) ndarray
+        Overwritten: weights of the node's three forces in each row.
+    left : (k,) ndarray
+        Overwritten: what the row lacks [N].
+    keep : (k, 2) ndarray
+        Overwritten: -Q of each row, by the node's two slips.
+    H : (k, k) ndarray or larger
+        Overwritten.
+    W : (3 n, 3 n) ndarray
+
+    Returns
+    -------
+    int
+        Rows k.
+    """
+    k = 0
+    for o in range(nodes):
+        i = on[o]
+        for a in range(0 if state[i] == OPEN else 1, 3):
+            cols[k], owner[k] = a * n + i, i
+            k += 1
+    left[:k] = 0.0
+    keep[:k] = 0.0
+    row = 0
+    while row < k:
+        i = cols[row] % n
+        if state[i] == VERGE:
+            size = np.sqrt(f[n + i] ** 2 + f[2 * n + i] ** 2)
+            v1, v2 = f[n + i] / size, f[2 * n + i] / size
+            left[row] = mu[i] * f[i] - size
+            P[row, 0], P[row, 1], P[row, 2] = -mu[i], v1, v2
+            P[row + 1] = 0.0
+            for j in range(k):
+                H[row, j] = -mu[i] * W[i, cols[j]]
+                H[row, j] += v1 * W[n + i, cols[j]] + v2 * W[2 * n + i, cols[j]]
+                H[row + 1, j] = 0.0
+            # no slip across v; of the size of the other row
+            keep[row + 1, 0], keep[row + 1, 1] = -v2 * rho_t[i], v1 * rho_t[i]
+            H[row + 1, row], H[row + 1, row + 1] = keep[row + 1]
+            row += 2
+            continue
+        if state[i] == OPEN:
+            for a in range(3):
+                P[row + a] = 0.0
+                P[row + a, a] = 1.0
+                for j in range(k):
+                    H[row + a, j] = W[cols[row + a], cols[j]]
+            row += 3
+            continue
+        t11, t12, t21, t22, v1, v2, _, _ = slip_rows(f, y, i, n, mu[i], rho_n[i], rho_t[i])
+        for a in range(2):
+            t1, t2, v = (t11, t12, v1) if a == 0 else (t21, t22, v2)
+            P[row + a, 0] = -mu[i] * v
+            P[row + a, 1], P[row + a, 2] = (
+                (1.0 if a == 0 else 0.0) - t1,
+                (1.0 if a == 1 else 0.0) - t2,
+            )
+            keep[row + a, 0], keep[row + a, 1] = rho_t[i] * t1, rho_t[i] * t2
+            for j in range(k):
+                total = 0.0
+                for e in range(3):
+                    total += P[row + a, e] * W[e * n + i, cols[j]]
+                H[row + a, j] = total
+            for e in range(2):
+                H[row + a, row + e] += keep[row + a, e]
+        row += 2
+    return k
+
+
+@compiled
+def factor_period(  # type: ignore[no-untyped-def]
+    first_sample,
+    last_sample,
+    F,
+    Y,
+    S,
+    W,
+    Z,
+    mu,
+    rho_n,
+    rho_t,
+    at,
+    square,
+    cols,
+    owner,
+    P,
+    left,
+    keep,
+    PZ,
+    Z_rows,
+    factors,
+    pivots,
+):
+    """Rows of samples, and the factors of their matrices.
+
+    Parameters
+    ----------
+    first_sample, last_sample : int
+        From the first on, up to the one before the last.
+    F, Y, S
+        Answers of all samples, as `upd.hbm.faces.samples.given_blades` leaves them; states with
+        the verges.
+    W : (3 n, 3 n) ndarray
+        Inverse of A [N/mm]; symmetric.
+    Z : (3 n, m + r) ndarray
+        W (Phi, B).
+    mu, rho_n, rho_t : (n,) ndarray
+        Friction, weights of displacements against forces.
+    at, square : (N + 1,) ndarray of int
+        First row of each sample among all K, and first entry of its matrix among all.
+    cols, owner : (K,) ndarray of int
+        Overwritten: dofs, and the node of each.
+    P, left, keep : (K, 3), (K,), (K, 2) ndarray
+        Overwritten, as in `law_rows`.
+    PZ, Z_rows : (K, m + r) ndarray
+        Overwritten: P Z, and Z in the rows of the dofs.
+    factors : ndarray
+        Overwritten: LU of P W_R - Q of each sample, column by column, one after the other.
+    pivots : (K,) ndarray of int
+        Overwritten: rows that were exchanged.
+
+    Returns
+    -------
+    bool
+        False where a sample's system is singular.
+    """
+    n, wide = len(mu), Z.shape[1]
+    most = 0
+    for j in range(first_sample, last_sample):
+        most = max(most, at[j + 1] - at[j])
+    H = np.empty((most, most))
+    on = np.empty(n, np.int64)
+    for j in range(first_sample, last_sample):
+        a, b = at[j], at[j + 1]
+        k = b - a
+        if k == 0:
+            continue
+        count = 0
+        for i in range(n):
+            if S[j, i] != STICK:
+                on[count] = i
+                count += 1
+        law_rows(
+            F[j],
+            Y[j],
+            S[j],
+            n,
+            mu,
+            rho_n,
+            rho_t,
+            on,
+            count,
+            cols[a:b],
+            owner[a:b],
+            P[a:b],
+            left[a:b],
+            keep[a:b],
+            H,
+            W,
+        )
+        for row in range(a, b):
+            i = owner[row]
+            for e in range(wide):
+                Z_rows[row, e] = Z[cols[row], e]
+                PZ[row, e] = 0.0
+            for c in range(3):
+                if P[row, c] != 0.0:
+                    for e in range(wide):
+                        PZ[row, e] += P[row, c] * Z[c * n + i, e]
+        first = square[j]
+        for e in range(k):
+            for row in range(k):
+                factors[first + e * k + row] = H[row, e]
+        if not factor_columns(factors[first : first + k * k], pivots[a:b]):
+            return False
+    return True
+
+
+@compiled
+def invert_period(  # type: ignore[no-untyped-def]
+    first_sample, last_sample, at, square, factors, pivots
+):
+    """Factors of samples overwritten by inverses, column by column; parameters as above.
+
+    Returns
+    -------
+    bool
+        False where one is singular.
+    """
+    for j in range(first_sample, last_sample):
+        a, b = at[j], at[j + 1]
+        if b > a and not invert_columns(factors[square[j] : square[j + 1]], pivots[a:b]):
+            return False
+    return True
+
+
+@compiled
+def march_directions(  # type: ignore[no-untyped-def]
+    S,
+    W,
+    Z,
+    M,
+    moved,
+    place,
+    at,
+    square,
+    cols,
+    owner,
+    P,
+    left,
+    keep,
+    PZ,
+    Z_rows,
+    factors,
+    pivots,
+    inverted,
+    J,
+    late,
+    motion,
+    faster,
+    verge,
+    R,
+    slips,
+    forces,
+):
+    """March directions through the period: what they do to modal forces and end state.
+
+    Parameters
+    ----------
+    S, W, Z, at, square, cols, owner, P, left, keep, PZ, Z_rows, factors, pivots
+        As in `factor_period`.
+    inverted : bool
+        Whether the factors have been overwritten by inverses, which many directions share.
+    M : (m + r, m + r) ndarray
+        (Phi, B)' W (Phi, B).
+    moved : (2 c,) ndarray of int
+        Tangents of the nodes that move, first ones, then second ones.
+    place : (3 n,) ndarray of int
+        Number of each among them, or -1.
+    J : (r, r) ndarray
+        As in `upd.hbm.faces.samples.given_blades`.
+    late : (N, r) ndarray
+        dJ (p - B' f) of the samples, by the frequency.
+    motion : (N, m, C) ndarray
+        Changes of the blades' modes at the samples, in each of C directions.
+    faster, verge : (C,) ndarray
+        Changes of the frequency [rad/s]; share of what nodes on the verge do by themselves.
+    R : (3 r, C) ndarray
+        Change of the damper's state; overwritten by that after the period.
+    slips : (2 c, C) ndarray
+        The same of the slips of the nodes that move.
+    forces : (N, m, C) ndarray
+        Overwritten: changes of the modal forces.
+    """
+    N, n, C = len(S), S.shape[1], len(faster)
+    r, m, wide = len(J), motion.shape[1], Z.shape[1]
+    most = 0
+    for j in range(N):
+        most = max(most, at[j + 1] - at[j])
+    right, answer = np.empty((most, C)), np.empty((most, C))
+    u, db, out, part = (
+        np.empty((wide, C)),
+        np.empty((r, C)),
+        np.empty((wide, C)),
+        np.empty((wide, C)),
+    )
+    # (Phi, B)' W of the slips of nodes that are held, and W of them in the rows of the others
+    held, V = np.zeros((wide, C)), np.empty((3 * n, C))
+    for i in range(len(moved)):
+        for e in range(wide):
+            for c in range(C):
+                held[e, c] += Z[moved[i], e] * slips[i, c]
+    on = np.zeros(n, np.bool_)
+    for j in range(N):
+        for i in range(m):
+            for c in range(C):
+                u[i, c] = -motion[j, i, c]
+        for i in range(r):
+            for c in range(C):
+                u[m + i, c] = R[i, c] + R[r + i, c] + 0.5 * late[j, i] * faster[c]
+        _change_stretches(S[j], W, Z, moved, place, slips, held, V, on)
+        np.dot(M, u, out)
+        for e in range(wide):
+            for c in range(C):
+                out[e, c] -= held[e, c]
+        a, b = at[j], at[j + 1]
+        k = b - a
+        if k > 0:
+            rhs, z = right[:k], answer[:k]
+            np.dot(PZ[a:b], u, rhs)
+            for row in range(k):
+                i = owner[a + row]
+                for d in range(3):
+                    weight, other = P[a + row, d], d * n + i
+                    if weight != 0.0:
+                        for c in range(C):
+                            rhs[row, c] -= weight * V[other, c]
+                for d in range(2):
+                    weight, other = keep[a + row, d], place[(1 + d) * n + i]
+                    if weight != 0.0:
+                        for c in range(C):
+                            rhs[row, c] += weight * slips[other, c]
+                # P (dF - W dy) = left
+                weight = left[a + row]
+                if weight != 0.0:
+                    for c in range(C):
+                        rhs[row, c] -= weight * verge[c]
+            matrix = factors[square[j] : square[j + 1]]
+            if inverted:
+                np.dot(matrix.reshape(k, k).T, rhs, z)
+            else:
+                z[:] = rhs
+                solve_columns(matrix, pivots[a:b], z)
+            np.dot(Z_rows[a:b].T, z, part)
+            for e in range(wide):
+                for c in range(C):
+                    out[e, c] -= part[e, c]
+            for row in range(k):
+                if cols[a + row] >= n:
+                    other = place[cols[a + row]]
+                    for c in range(C):
+                        slips[other, c] = z[row, c]
+        for i in range(m):
+            for c in range(C):
+                forces[j, i, c] = out[i, c]
+        for i in range(r):
+            for c in range(C):
+                db[i, c] = late[j, i] * faster[c]
+            for e in range(r):
+                for c in range(C):
+                    db[i, c] -= J[i, e] * out[m + e, c]
+        for i in range(r):
+            for c in range(C):
+                R[i, c] += R[r + i, c] + 0.5 * db[i, c]
+                R[r + i, c] += 0.25 * R[2 * r + i, c] + 0.75 * db[i, c]
+                R[2 * r + i, c] = 0.5 * (R[2 * r + i, c] + db[i, c])
+
+
+@compiled
+def _change_stretches(  # type: ignore[no-untyped-def]
+    state, W, Z, moved, place, slips, held, V, on
+):
+    """Let stretches of motion begin and end.
+
+    Parameters
+    ----------
+    state : (n,) ndarray of int
+        At the sample.
+    W, Z, moved, place
+        As in `march_directions`.
+    slips : (2 c, C) ndarray
+        Of the nodes that move in the period.
+    held : (m + r, C) ndarray
+        (Phi, B)' W of the slips of nodes that are held; updated.
+    V : (3 n, C) ndarray
+        W of them, in the rows of the nodes that are not; updated.
+    on : (n,) ndarray of bool
+        Whether a node was not held at the sample before; overwritten.
+    """
+    n, C, wide = len(state), slips.shape[1], Z.shape[1]
+    changed, begun, going = 0, 0, 0
+    for i in range(n):
+        moves = state[i] != STICK
+        if moves != on[i]:
+            changed += 1
+            begun += moves
+        elif moves:
+            going += 1
+    if changed == 0:
+        return
+    # what nodes that change take from the slips of held ones, or add to them
+    part, who, a = np.empty((2 * changed, C)), np.empty(2 * changed, np.int64), 0
+    for i in range(n):
+        if (state[i] != STICK) != on[i]:
+            sign = 1.0 if state[i] == STICK else -1.0
+            for d in (n + i, 2 * n + i):
+                for c in range(C):
+                    part[a, c] = sign * slips[place[d], c]
+                for e in range(wide):
+                    for c in range(C):
+                        held[e, c] += Z[d, e] * part[a, c]
+                who[a] = d
+                a += 1
+    if going > 0:
+        rows, W_part = np.empty(3 * going, np.int64), np.empty((3 * going, 2 * changed))
+        row = 0
+        for i in range(n):
+            if on[i] and state[i] != STICK:
+                for d in (i, n + i, 2 * n + i):
+                    for a in range(2 * changed):
+                        W_part[row, a] = W[d, who[a]]
+                    rows[row] = d
+                    row += 1
+        more = np.dot(W_part, part)
+        for row in range(3 * going):
+            for c in range(C):
+                V[rows[row], c] += more[row, c]
+    if begun > 0:
+        rows, W_part = np.empty(3 * begun, np.int64), np.zeros((3 * begun, len(moved)))
+        row = 0
+        for i in range(n):
+            if not on[i] and state[i] != STICK:
+                for d in (i, n + i, 2 * n + i):
+                    for a in range(len(moved)):
+                        if state[moved[a] % n] == STICK:
+                            W_part[row, a] = W[d, moved[a]]
+                    rows[row] = d
+                    row += 1
+        more = np.dot(W_part, slips)
+        for row in range(3 * begun):
+            for c in range(C):
+                V[rows[row], c] = more[row, c]
+    for i in range(n):
+        on[i] = state[i] != STICK

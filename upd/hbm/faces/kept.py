@@ -1,0 +1,346 @@
+"""A step of contact by the inverse that was kept of the same sample a period ago, compiled.
+
+From period to period a sample changes little: most often the same nodes are open, stick and slip,
+and slips turn by a little. The rows of `upd.hbm.faces.step.contact_step` are the same then but
+for that, and the inverse of their matrix from an earlier period takes most of what the laws lack
+away, at k^2 for k rows instead of k^3. The residual of the laws shows how far each of these chord
+steps leads, so that the answer is as exact as that of Newton's method. Where nodes have changed
+their states, or slips turned too far, the matrix is formed and inverted anew.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from upd.hbm.faces.rows import add_rows
+from upd.hbm.faces.step import FEW, OPEN, SLIP, SOLVED, STICK, judge, newton_rows, slip_rows
+from upd.linalg.compiled import compiled, inlined
+
+#: a chord step must take at least this share of the misfit away; it only weighs costs
+CONTRACTS = 0.75
+#: inverses formed in a step, and chord steps, after which Newton's method
+MOST_FORMED, MOST_CHORDS = 8, 60
+#: rows of the largest matrix that is kept: 128 samples of them would take 370 MB
+MOST_ROWS = 600
+
+
+def kept_inverses(samples: int, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Room for the inverses of a period, none of them known.
+
+    Parameters
+    ----------
+    samples : int
+    n : int
+        Nodes.
+
+    Returns
+    -------
+    states : (N, n) ndarray of int
+        State of each node and whether the base has it open, -1 where there is no inverse.
+    inverses : (N, k) ndarray
+        One after the other, row by row; of no size where elimination is as fast.
+    """
+    rows = min(3 * n, MOST_ROWS)
+    return np.full((samples, n), -1), np.empty((samples, rows**2 if rows > FEW else 0))
+
+
+@compiled
+def kept_step(  # type: ignore[no-untyped-def]
+    sample,
+    x0,
+    Tt,
+    base,
+    one,
+    mu,
+    rho_n,
+    rho_t,
+    f,
+    y,
+    state,
+    kept,
+    inverses,
+    H,
+    cols,
+    sign,
+    b,
+    G,
+):
+    """Forces and relative motions of one step.
+
+    Parameters
+    ----------
+    sample : int
+        Of the period.
+    x0, Tt, base, one, mu, rho_n, rho_t
+        As in `contact_step`.
+    f, y : (3 n,) ndarray
+        Of the sample a period ago; overwritten by forces [N], and by minus gaps and slips [mm],
+        if there is an answer.
+    state : (n,) ndarray of int
+        Likewise.
+    kept, inverses
+        As of `kept_inverses`; overwritten.
+    H, cols, sign, b, G
+        Scratch, as in `contact_step`.
+
+    Returns
+    -------
+    int
+        Inverses formed, or -1 without an answer.
+    """
+    n = len(mu)
+    k, same = _unknowns(sample, base, one, state, kept, cols, sign)
+    if k <= FEW or k * k > inverses.shape[1]:
+        return -1
+    allowed = 0.0
+    for i in range(n):
+        if not base[one, i]:
+            allowed = max(allowed, SOLVED * max(abs(x0[i]), abs(x0[n + i]), abs(x0[2 * n + i])))
+    fs, ys, states, x = f.copy(), y.copy(), state.copy(), np.empty(3 * n)
+    z, left = np.empty(3 * n), np.empty(3 * n)
+    formed, before, turned, started = 0, np.inf, False, False
+    for _ in range(MOST_CHORDS):
+        if not same:
+            bordered = not turned and border(
+                sample, Tt, base, one, mu, rho_n, rho_t, fs, ys, states, kept, inverses
+            )
+            if not bordered:
+                k = newton_rows(
+                    x0, Tt, base, one, mu, rho_n, rho_t, fs, ys, states, H, cols, sign, b, G
+                )
+                kept[sample, 0] = -1
+                if formed == MOST_FORMED or k <= FEW or k * k > inverses.shape[1]:
+                    return -1
+                try:
+                    made = np.linalg.inv(H[:k, :k].copy())
+                except Exception:
+                    return -1
+                inverses[sample, : k * k] = made.ravel()
+                formed += 1
+            for i in range(n):
+                kept[sample, i] = 2 * states[i] + base[one, i]
+            k, same = _unknowns(sample, base, one, states, kept, cols, sign)
+            started, turned, before = False, False, np.inf
+        if not started:
+            for r in range(k):
+                z[r] = fs[cols[r]] if sign[r] < 0.0 else ys[cols[r]]
+            x[:] = x0
+            add_rows(x, -1.0, z, cols, k, Tt, one)
+            _split(x, z, base, one, cols, k, fs, ys)
+            started = True
+        _lacks(x, fs, ys, states, base, one, mu, rho_t, cols, k, left)
+        change = np.dot(inverses[sample, : k * k].reshape(k, k), left[:k])
+        for r in range(k):
+            z[r] += change[r]
+        add_rows(x, -1.0, change, cols, k, Tt, one)
+        _split(x, z, base, one, cols, k, fs, ys)
+        worst = judge(fs, ys, mu, rho_n, rho_t, states)
+        if not worst < np.inf:
+            kept[sample, 0] = -1
+            return -1
+        for d in range(3 * n):
+            allowed = max(allowed, SOLVED * abs(fs[d]))
+        for i in range(n):
+            if kept[sample, i] != 2 * states[i] + base[one, i]:
+                same = False
+        if same and worst <= allowed:
+            for i in range(n):
+                state[i] = states[i]
+                for d in (i, n + i, 2 * n + i):
+                    f[d] = 0.0 if states[i] == OPEN else fs[d]
+                    y[d] = ys[d]
+                    if states[i] == STICK or (states[i] == SLIP and d == i):
+                        y[d] = 0.0
+            return formed
+        if same and not worst <= (1.0 - CONTRACTS) * before:
+            same, turned = False, True
+        before = worst
+    return -1
+
+
+@compiled
+def _unknowns(sample, base, one, state, kept, cols, sign):  # type: ignore[no-untyped-def]
+    """Number of rows, and whether the inverse is for them; dofs and signs overwritten."""
+    n, k, same = len(state), 0, True
+    for i in range(n):
+        if kept[sample, i] != 2 * state[i] + base[one, i]:
+            same = False
+        if state[i] != (OPEN if base[one, i] else STICK):
+            for a in range(1 if state[i] == SLIP and not base[one, i] else 0, 3):
+                cols[k] = a * n + i
+                sign[k] = -1.0 if base[one, i] else 1.0
+                k += 1
+    return k, same
+
+
+@compiled
+def _split(x, z, base, one, cols, k, f, y):  # type: ignore[no-untyped-def]
+    """Forces and relative motions by what the base fixes and the unknowns; f, y overwritten."""
+    n = base.shape[1]
+    for d in range(3 * n):
+        f[d], y[d] = x[d], 0.0
+        if base[one, d % n]:
+            y[d], f[d] = x[d], 0.0
+    for r in range(k):
+        d = cols[r]
+        if base[one, d % n]:
+            f[d] = z[r]
+        else:
+            y[d] = z[r]
+
+
+@compiled
+def _lacks(  # type: ignore[no-untyped-def]
+    x, f, y, state, base, one, mu, rho_t, cols, k, left
+):
+    """What the rows of `newton_rows` lack at f and y, for the states; `left` is overwritten."""
+    n = len(mu)
+    for r in range(k):
+        d = cols[r]
+        i = d % n
+        left[r] = x[d]
+        if state[i] == SLIP and d >= n:
+            q1 = f[n + i] + rho_t[i] * y[n + i]
+            q2 = f[2 * n + i] + rho_t[i] * y[2 * n + i]
+            q = q1 if d < 2 * n else q2
+            left[r] = f[d] - mu[i] * f[i] * q / np.sqrt(q1 * q1 + q2 * q2)
+
+
+@compiled
+def border(  # type: ignore[no-untyped-def]
+    sample, Tt, base, one, mu, rho_n, rho_t, f, y, state, kept, inverses
+):
+    """Take the nodes that changed their states into the inverse; other rows stay as they are.
+
+    With M the matrix so far, E its rows that go, C what the rows that stay have of the unknowns
+    that come, and R, D the rows that come,
+
+        [M C E; R D 0; E' 0 0],   S = [D - R M^-1 C, -R M^-1 E; -E' M^-1 C, -E' M^-1 E],
+
+    is the matrix without the unknowns that go; as many rows as go and come are to be solved.
+
+    Parameters
+    ----------
+    sample, Tt, base, one, mu, rho_n, rho_t, kept, inverses
+        As in `kept_step`.
+    f, y, state : ndarray
+        The iterate.
+
+    Returns
+    -------
+    bool
+        False where the base is another one, or so many nodes changed that it would not pay.
+    """
+    n = len(mu)
+    was, cols = np.empty(3 * n, np.int64), np.empty(3 * n, np.int64)
+    # rows that go; rows that stay, where they were and where they are; rows that come
+    gone = np.empty(3 * n, np.int64)
+    stay, here = np.empty(3 * n, np.int64), np.empty(3 * n, np.int64)
+    new = np.empty(3 * n, np.int64)
+    k0, k, lost, added, common = 0, 0, 0, 0, 0
+    for i in range(n):
+        open_ = base[one, i]
+        code = kept[sample, i]
+        if code < 0 or code % 2 != open_:
+            return False
+        now = 2 * state[i] + open_
+        idle = 2 * (OPEN if open_ else STICK) + open_
+        before, after = 0, 0
+        if code != idle:
+            before = 2 if code == 2 * SLIP else 3
+        if now != idle:
+            after = 2 if now == 2 * SLIP else 3
+        if code == now:
+            for e in range(before):
+                stay[common], here[common] = k0 + e, k + e
+                common += 1
+        else:
+            for e in range(before):
+                gone[lost] = k0 + e
+                lost += 1
+            for e in range(after):
+                new[added] = k + e
+                added += 1
+        for e in range(before):
+            was[k0 + e] = (3 - before + e) * n + i
+        for e in range(after):
+            cols[k + e] = (3 - after + e) * n + i
+        k0, k = k0 + before, k + after
+    s = lost + added
+    if 2 * s > k0 or k * k > inverses.shape[1] or k <= FEW:
+        return False
+    B = inverses[sample, : k0 * k0].reshape(k0, k0)
+    # what unchanged rows have of new unknowns, and new rows of all
+    C, R, D = np.zeros((k0, added)), np.zeros((added, k0)), np.empty((added, added))
+    w, o = np.empty(3), np.empty(3)
+    for a in range(common):
+        d = was[stay[a]]
+        i = d % n
+        _weights(d, f, y, n, mu, rho_n, rho_t, state, base[one, i], w, o)
+        for e in range(added):
+            C[stay[a], e] = _entry(w, i, cols[new[e]], Tt, base, one)
+    for e in range(added):
+        d = cols[new[e]]
+        i = d % n
+        _weights(d, f, y, n, mu, rho_n, rho_t, state, base[one, i], w, o)
+        for a in range(common):
+            R[e, stay[a]] = _entry(w, i, was[stay[a]], Tt, base, one)
+        for a in range(added):
+            other = cols[new[a]]
+            D[e, a] = _entry(w, i, other, Tt, base, one)
+            if other % n == i:
+                D[e, a] -= o[other // n]
+    V, U = np.dot(B, C), np.dot(R, B)
+    S = np.empty((s, s))
+    S[:added, :added] = D - np.dot(R, V)
+    left, right = np.zeros((k, s)), np.zeros((s, k))
+    for g in range(lost):
+        for e in range(added):
+            S[e, added + g] = -U[e, gone[g]]
+            S[added + g, e] = -V[gone[g], e]
+        for h in range(lost):
+            S[added + g, added + h] = -B[gone[g], gone[h]]
+        for a in range(common):
+            left[here[a], added + g] = -B[stay[a], gone[g]]
+            right[added + g, here[a]] = -B[gone[g], stay[a]]
+    for e in range(added):
+        left[new[e], e], right[e, new[e]] = 1.0, 1.0
+        for a in range(common):
+            left[here[a], e] = -V[stay[a], e]
+            right[e, here[a]] = -U[e, stay[a]]
+    try:
+        made = np.dot(left, np.linalg.solve(S, right))
+    except Exception:
+        return False
+    for a in range(common):
+        for c in range(common):
+            made[here[a], here[c]] += B[stay[a], stay[c]]
+    inverses[sample, : k * k] = made.ravel()
+    return True
+
+
+@compiled
+def _weights(d, f, y, n, mu, rho_n, rho_t, state, open_, w, o):  # type: ignore[no-untyped-def]
+    """Row of a dof: weights of what the base fixes of its node, and of the node's unknowns."""
+    i, a = d % n, d // n
+    w[:], o[:] = 0.0, 0.0
+    if state[i] != SLIP or a == 0:
+        w[a] = 1.0
+        return
+    t11, t12, t21, t22, v1, v2, _, _ = slip_rows(f, y, i, n, mu[i], rho_n[i], rho_t[i])
+    t1, t2, v = (t11, t12, v1) if a == 1 else (t21, t22, v2)
+    p, q = (o, w) if open_ else (w, o)
+    p[0], p[1], p[2] = -mu[i] * v, -t1, -t2
+    p[a] += 1.0
+    q[1], q[2] = -rho_t[i] * t1, -rho_t[i] * t2
+
+
+@inlined
+def _entry(w, i, other, Tt, base, one):  # type: ignore[no-untyped-def]
+    """Of a row of node i, at the unknown of a dof."""
+    n = base.shape[1]
+    total = 0.0
+    for e in range(3):
+        if w[e] != 0.0:
+            total += w[e] * Tt[one, other, e * n + i]
+    return total

@@ -1,0 +1,397 @@
+r"""Time march of two blades with an elastic damper between them, contact by whole faces.
+
+The blades move in a few free-interface modes q; what the others add is static. The damper moves as
+a rigid body s about its centre of mass and deforms quasi-statically under its contact forces and
+its own inertia (inertia relief). With the forces f of all contact nodes (on the blades, normal and
+two tangents each), the modes Phi and the rigid columns B at the nodes,
+
+    q'' + 2 zeta omega q' + omega^2 q = Phi' f + P F(t),        M_D s'' = p - B' f,
+    w = B s - G f - Phi q - E F(t),       G = C - Phi Lambda^-1 Phi',
+
+where C is the static compliance of blades and damper, F the excitation, P the modes at its places,
+E what the modes left out add there, and p the centrifugal force. The relative motion w follows
+Signorini's and Coulomb's laws: gap g = h - w_n >= 0, f_n >= 0, g f_n = 0; |f_t| <= mu f_n, and the
+slip dw_t of a step has the direction of f_t and is zero where |f_t| < mu f_n. There are no springs
+between the faces, and no parameters but these.
+
+A step of length dt. Between its ends the modes swing exactly, under the mean of the forces at both:
+q_1 = q* + b Phi' f_1, q* known. A constant force does the work f (q_1 - q_0), so while nothing
+slips or opens, forces do no work on the contact, and no step length feeds energy in (forces that
+are straight within the step would: they make the linear-acceleration method, which rattles itself
+up on stiff contact). What averaging and holding take from the lowest harmonic of the excitation,
+the factor sin(x)/x, x = omega dt, is given back by dividing by it what the modal forces are beyond
+those at rest, which is a change of modal mass and keeps that energy balance: static state and that
+harmonic are exact. Modes that a step does not resolve are stepped implicitly, see
+`upd.hbm.faces.modes`, which lets them rest and follow exactly. The damper follows the WBZ-alpha
+method with full damping at infinite frequency, 2 s''_1 - s''_0 = M_D^-1 (p - B' f_1), Newmark's
+beta = 1 and gamma = 3/2, of second order, which damps the rattling of its mass on the faces that
+the step does not resolve: s_1 = s* - dt^2/2 M_D^-1 B' f_1. Together
+
+    w_1 = w* - A f_1,     A = G + Phi b Phi' + dt^2/2 B M_D^-1 B',
+
+a contact problem with a symmetric positive definite compliance and without rigid motions; see
+`upd.hbm.faces.step` for how it is solved. A node on a spring of its own that closes within the
+step has slipped until it touched: `upd.hbm.faces.period.touch`.
+
+References
+----------
+.. [1] R. R. Craig, A. J. Kurdila, Fundamentals of Structural Dynamics, 2nd ed., 17.5, 17.6
+       (residual flexibility, inertia relief).
+.. [2] W. L. Wood, M. Bossak, O. C. Zienkiewicz, Int. J. Numer. Methods Eng. 15 (1980) 1562.
+.. [3] J. Chung, G. M. Hulbert, J. Appl. Mech. 60 (1993) 371, its optimal WBZ-alpha.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from upd.errors import ConvergenceError
+from upd.hbm.faces.bases import suit_bases
+from upd.hbm.faces.kept import kept_inverses
+from upd.hbm.faces.modes import modal_step, resolved
+from upd.hbm.faces.period import Bases, Past, StepParts, march_steps
+from upd.hbm.faces.state import FloatArray, InterfaceModel, InterfaceState
+from upd.hbm.faces.step import OPEN, STICK, judge
+
+#: nodes a sample that a new base must spare; making it costs what some thousand nodes do
+PAYS = 0.25
+#: bases held, and what they may take
+MOST_BASES, BASES_BYTES = 8, 2**26
+#: Compliance A (3 n, 3 n), friction (n,) and w* - w_ref (3 n,) to forces f and y = (-g, dw) with
+#: w_ref + y = w* - A f, or None without an answer.
+Fallback = Callable[[FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray] | None]
+
+
+@dataclass(frozen=True)
+class InterfacePeriod:
+    """One period of a march.
+
+    Attributes
+    ----------
+    output : (N, K) ndarray
+        Outputs after each step [mm].
+    counts : (3,) ndarray
+        Share of open, sticking and slipping nodes, over nodes and samples.
+    newton : float
+        Newton steps a time step.
+    energy : (3,) ndarray
+        Work of the excitation, lost by damping, lost by friction, of the whole [N mm].
+    fallbacks : int
+        Steps that the slow solver had to finish.
+    force : (N, 3 n) ndarray
+        Contact forces after each step [N]; (0, ...) where not recorded.
+    state : (N, n) ndarray of int
+        States; likewise.
+    """
+
+    output: FloatArray
+    counts: FloatArray
+    newton: float
+    energy: FloatArray
+    fallbacks: int
+    force: FloatArray
+    state: NDArray[np.int64]
+
+
+class InterfaceMarch:
+    """The march at one frequency and number of samples: what all its steps share.
+
+    Parameters
+    ----------
+    model : InterfaceModel
+    frequency : float
+        Hz.
+    drive : (L, H) ndarray
+        Complex amplitudes on the whole of harmonics 1 to H at each place [N]:
+        F = sum_k Re(drive_k exp(i k 2 pi f t)).
+    samples : int
+        Steps in a period.
+    fallback : callable, optional
+        Solves a step where Newton's method cycles; see `Fallback`.
+    like : InterfaceMarch, optional
+        One at a frequency nearby, of whose last period the steps make use.
+    """
+
+    def __init__(
+        self,
+        model: InterfaceModel,
+        frequency: float,
+        drive: ArrayLike,
+        samples: int,
+        fallback: Fallback | None = None,
+        like: InterfaceMarch | None = None,
+    ) -> None:
+        self.fallback = fallback
+        self.model, self.frequency, self.samples = model, frequency, samples
+        self.dt = 1.0 / (frequency * samples)
+        amplitude = np.asarray(drive, complex)
+        amplitude = amplitude[:, None] if amplitude.ndim == 1 else amplitude
+        k = np.arange(1, amplitude.shape[1] + 1)
+        # the harmonics of the excitation; without any the first is looked at
+        self.orders = tuple(int(one) for one in k[np.any(amplitude != 0.0, axis=0)]) or (1,)
+        theta = 2.0 * np.pi * np.arange(samples + 1) / samples
+        wave = np.exp(1j * theta[:, None] * k) @ amplitude.T
+        self.drive = np.ascontiguousarray(wave.real / model.copies)
+        # sinc(x / pi) = sin(x) / x
+        self.sinc = float(np.sinc(2.0 * self.orders[0] * frequency * self.dt))
+        self.blades = modal_step(model.omega, model.damping, self.dt, 1.0 / self.sinc)
+        self.inverse_mass = np.linalg.inv(model.mass)
+        rigid = 0.5 * self.dt**2 * model.columns @ self.inverse_mass @ model.columns.T
+        A = model.compliance + (model.shapes * self.blades[3]) @ model.shapes.T + rigid
+        self.A = 0.5 * (A + A.T)
+        try:
+            factor = cho_factor(self.A, lower=True)
+        except np.linalg.LinAlgError as error:
+            raise ConvergenceError(
+                "interface march: the compliance of the step is not positive definite: more modes "
+                "were removed than the static compliance holds; use fewer modes a blade"
+            ) from error
+        W = cho_solve(factor, np.eye(3 * model.n))
+        self.W = np.ascontiguousarray(0.5 * (W + W.T))
+        taken = [model.shapes, model.columns, model.seen_contact.T, model.pushed]
+        self.taken = np.ascontiguousarray(np.hstack(taken))
+        moves = np.hstack([model.columns, -model.shapes, -model.pushed])
+        self.forces_by = np.ascontiguousarray((self.W @ moves).T)
+        diagonal = np.diagonal(self.A).reshape(3, model.n)
+        self.rho_n = 1.0 / diagonal[0]
+        self.rho_t = 2.0 / (diagonal[1] + diagonal[2])
+        n, alike = model.n, like is not None and like.samples == samples
+        self.steps = StepParts(
+            self.dt,
+            self.drive,
+            self.blades,
+            self.taken,
+            np.ascontiguousarray(self.inverse_mass, float),
+            np.ascontiguousarray(model.load, float),
+            np.ascontiguousarray(model.gap, float),
+            np.ascontiguousarray(model.friction, float),
+            self.rho_n,
+            self.rho_t,
+            2.0 * model.damping * model.omega,
+            np.ascontiguousarray(model.places, float),
+            np.where(resolved(model.omega, self.dt), self.sinc - 1.0, 0.0),
+            np.ascontiguousarray(model.seen_modes, float),
+            np.ascontiguousarray(model.seen_drive, float),
+            np.zeros(3 * n)
+            if model.springs is None
+            else np.ascontiguousarray(model.springs, float),
+        )
+        self.x0, self.work = np.zeros(3 * n), np.empty((3 * n, 3 * n))
+        self.known, self.which = False, np.zeros(samples, np.int64)
+        self.bases: Bases
+        if like is None or not alike or like.model.n != n:
+            self.past = Past(
+                np.empty((samples, 3 * n)),
+                np.empty((samples, 3 * n)),
+                np.zeros((samples, n), int),
+                *kept_inverses(samples, n),
+            )
+            self.rebase(np.zeros(n, bool))
+        else:
+            self._hold(like.bases.open)
+            self.which, self.past, self.known = like.which.copy(), like.past, like.known
+
+    @property
+    def base(self) -> NDArray[np.bool_]:
+        """(n,) the nodes that the first base has open."""
+        return np.asarray(self.bases.open[0])
+
+    @property
+    def Tt(self) -> FloatArray:
+        """(3 n, 3 n) transpose of T, of the first base."""
+        return np.asarray(self.bases.Tt[0])
+
+    @property
+    def Z(self) -> FloatArray:
+        """(r + m + L, 3 n) what the first base gives by motions and excitation."""
+        return np.asarray(self.bases.Z[0])
+
+    @property
+    def L(self) -> FloatArray:
+        """(3 n, 3 n) from forces of everything stuck and closed to what the first base gives."""
+        O = np.tile(self.base, 3)
+        L = np.eye(len(O))
+        if O.any():
+            S = np.linalg.inv(self.W[np.ix_(O, O)])
+            L[np.ix_(~O, O)], L[np.ix_(O, O)] = -self.W[np.ix_(~O, O)] @ S, S
+        return L
+
+    def rebase(self, open_: NDArray[np.bool_]) -> None:
+        """Choose which nodes the steps take for open until they find otherwise.
+
+        Any choice gives the same answers; the fewer nodes differ from it, the less they cost.
+
+        Parameters
+        ----------
+        open_ : (n,) ndarray of bool
+        """
+        self._hold(open_[None].copy())
+        self.which[:] = 0
+
+    def _hold(self, bases: NDArray[np.bool_]) -> None:
+        """Take these bases, (B, n)."""
+        made = [self._pivoted(one) for one in bases]
+        self.bases = Bases(
+            bases.copy(), np.array([T for T, _ in made]), np.array([Z for _, Z in made])
+        )
+
+    def _pivoted(self, open_: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
+        """Transpose of T, and Z, of a base."""
+        W, O = self.W, np.tile(open_, 3)
+        if not open_.any():
+            return W, self.forces_by
+        o, c = np.flatnonzero(O), np.flatnonzero(~O)
+        S = np.linalg.inv(W[np.ix_(o, o)])
+        Woc = W[np.ix_(o, c)]
+        up = S @ Woc
+        Tt, Z = np.empty_like(W), np.empty_like(self.forces_by)
+        Tt[np.ix_(c, c)] = W[np.ix_(c, c)] - Woc.T @ up
+        # T is symmetric but for the sign of what couples closed and open
+        Tt[np.ix_(o, c)], Tt[np.ix_(c, o)], Tt[np.ix_(o, o)] = -up, up.T, S
+        Z[:, o] = self.forces_by[:, o] @ S
+        Z[:, c] = self.forces_by[:, c] - self.forces_by[:, o] @ up
+        return Tt, Z
+
+    def period(self, at: InterfaceState, *, record: bool = False) -> InterfacePeriod:
+        """March one period; the state moves on.
+
+        Parameters
+        ----------
+        at : InterfaceState
+            Overwritten.
+        record : bool
+            Whether forces and states of all samples are kept.
+
+        Returns
+        -------
+        InterfacePeriod
+
+        Raises
+        ------
+        ConvergenceError
+            When a step has no answer that any of the solvers finds.
+        """
+        N = self.samples
+        out, sums, known = np.zeros((N, len(self.model.seen_modes))), np.zeros(4), self.known
+        done, given, fallbacks = 0, False, 0
+        while done < N:
+            done = march_steps(
+                done,
+                N,
+                given,
+                tuple(self.steps),
+                tuple(self.bases),
+                self.which,
+                at.arrays(),
+                known,
+                tuple(self.past),
+                self.x0,
+                self.work,
+                out,
+                sums,
+            )
+            given = done < N
+            if given:
+                self.finish_step(done, at)
+                fallbacks += 1
+        self.known = True
+        self.suit()
+        return self.period_of(out, sums, fallbacks, record=record)
+
+    def period_of(
+        self, out: FloatArray, sums: FloatArray, fallbacks: int, *, record: bool = False
+    ) -> InterfacePeriod:
+        """The last period from its outputs and sums.
+
+        Parameters
+        ----------
+        out, sums
+            As `upd.hbm.faces.period.march_steps` leaves them.
+        fallbacks : int
+        record : bool
+            Whether forces and states of all samples are kept.
+
+        Returns
+        -------
+        InterfacePeriod
+        """
+        N, n, past = self.samples, self.model.n, self.past
+        counts = np.array([(past.state == kind).sum() for kind in (OPEN, STICK)] + [0], float)
+        counts[2] = n * N - counts.sum()
+        return InterfacePeriod(
+            out,
+            counts / (n * N),
+            float(sums[3]) / N,
+            self.model.copies * sums[:3],
+            fallbacks,
+            past.force.copy() if record else np.zeros((0, 3 * n)),
+            past.state.copy() if record else np.zeros((0, n), np.int64),
+        )
+
+    def suit(self) -> None:
+        """For every sample the base that most of its nodes agree with; a new one where it pays."""
+        best = suit_bases(self.past.state, self.bases.open, self.which, PAYS)
+        if best >= 0:
+            self._add(self.past.state[best] == OPEN)
+            suit_bases(self.past.state, self.bases.open, self.which, np.inf)
+
+    def _add(self, open_: NDArray[np.bool_]) -> None:
+        """Add a base; where there are as many as may be, in place of another if that pays.
+
+        Parameters
+        ----------
+        open_ : (n,) ndarray of bool
+        """
+        bases, bytes_each = self.bases, self.W.nbytes
+        most = max(2, min(MOST_BASES, BASES_BYTES // bytes_each))
+        if len(bases.open) < most:
+            Tt, Z = self._pivoted(open_)
+            self.bases = Bases(
+                np.append(bases.open, open_[None], 0),
+                np.append(bases.Tt, Tt[None], 0),
+                np.append(bases.Z, Z[None], 0),
+            )
+            return
+        opens = self.past.state == OPEN
+        nodes = np.array([(opens != one).sum(axis=1) for one in (*bases.open, open_)])
+        with_ = [np.delete(nodes, k, axis=0).min(axis=0).sum() for k in range(len(bases.open))]
+        k = int(np.argmin(with_))
+        if with_[k] + PAYS * self.samples < nodes[:-1].min(axis=0).sum():
+            bases.open[k] = open_
+            bases.Tt[k], bases.Z[k] = self._pivoted(open_)
+
+    def finish_step(self, sample: int, at: InterfaceState) -> None:
+        """The step that Newton's method did not solve: forces into x0, the rest into `at`.
+
+        Parameters
+        ----------
+        sample : int
+            Before the step.
+        at : InterfaceState
+            Overwritten.
+
+        Raises
+        ------
+        ConvergenceError
+            When the solver behind has no answer, or there is none.
+        """
+        x0, base = self.x0, self.bases.open[self.which[sample]]
+        found = None
+        if self.fallback is not None:
+            # x0 = L F undone
+            O = np.tile(base, 3)
+            F = np.where(O, 0.0, x0) + self.W[:, O] @ x0[O]
+            found = self.fallback(self.A, self.model.friction, self.A @ F)
+        if found is None:
+            raise ConvergenceError(
+                f"interface march: a step at {self.frequency:g} Hz has no answer that Newton's "
+                "method or the solver behind it finds: take more samples a period, or less friction"
+            )
+        force, y = found
+        x0[:], at.y[:] = force, y
+        judge(x0, y, self.model.friction, self.rho_n, self.rho_t, at.state)

@@ -1,0 +1,241 @@
+"""What an answer left out, measured afterwards: sticking proven, truncation and aliasing."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from upd.hbm.core.fourier import Harmonics, analysis, harmonics, synthesis, to_complex
+from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.friction import March
+from upd.hbm.springs.points import stuck_stiffness
+
+FloatArray = NDArray[np.float64]
+EPS = float(np.finfo(float).eps)
+#: answers integrated at a time
+PORTION = 64
+
+
+def stuck_points(b: Balance, omega: FloatArray) -> NDArray[np.bool_]:
+    """Frequencies where the linear stuck answer solves the balance exactly.
+
+    It does where it keeps |T| <= mu N and N > 0 at every sample.
+
+    Parameters
+    ----------
+    b : Balance
+    omega : (n,) ndarray
+        Angular frequencies [rad/s].
+
+    Returns
+    -------
+    (n,) ndarray of bool
+    """
+    k, constant = stuck_stiffness(b.contacts), b.stuck_constant
+    # the friction cone is convex: a mean force outside it puts a sample outside at every frequency
+    mean = (
+        b.split(b.stuck(float(omega[0])))[0][..., 0] * k + constant
+        if b.harmonics.static
+        else constant
+    )
+    held = b.contacts.law.mu * mean[:, 0]
+    if np.any(np.hypot.reduce(mean[:, 1:], axis=1) > held + 1e3 * EPS * np.abs(held)):
+        return np.zeros(len(omega), dtype=bool)
+    return np.array([sticking_margin(b, b.stuck(float(w))) >= 1 for w in omega])
+
+
+def sticking_margin(b: Balance, x: FloatArray) -> float:
+    """Smallest mu N/|T| over the cycle of the stuck answer: it is exact from 1 up.
+
+    Parameters
+    ----------
+    b : Balance
+    x : (n_unknown,) ndarray
+        Unknowns of the stuck answer.
+
+    Returns
+    -------
+    float
+        0 where a contact opens.
+    """
+    N, T = _stuck_forces(b, x)
+    if np.any(N <= 0):
+        return 0.0
+    held = b.contacts.law.mu[:, None] * N
+    return float(np.min(held[T > 0] / T[T > 0], initial=np.inf))
+
+
+def sticking_preload(b: Balance, x: FloatArray) -> FloatArray:
+    """Preload to add for the stuck answer to be exact, with the static loads that balance it.
+
+    Parameters
+    ----------
+    b : Balance
+    x : (n_unknown,) ndarray
+        Unknowns of the stuck answer.
+
+    Returns
+    -------
+    (n_point,) ndarray
+        Preload [N]. Zero when the answer is exact already; infinite where a point without friction
+        carries a traction.
+    """
+    N, T = _stuck_forces(b, x)
+    mu = b.contacts.law.mu[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        needed = np.where(T > 0, T / mu, 0.0) - N
+    most = needed.max(axis=1)
+    # the edge of the cone is on it: a share of the force makes the start clear of it
+    return np.where(most > 0, most + EPS**0.5 * (np.abs(N).max(axis=1) + most), 0.0)
+
+
+def separated(b: Balance, omega: FloatArray) -> FloatArray | None:
+    """Unknowns of the free answer, bodies that nothing presses moved out of the way.
+
+    Every point stays open when R a + t <= gap - N_0/k_n - max w for some rigid amplitudes a and a
+    clearance t above rounding; the largest t comes from a linear programme of n_point rows.
+
+    Parameters
+    ----------
+    b : Balance
+    omega : (n,) ndarray
+        Angular frequencies [rad/s].
+
+    Returns
+    -------
+    (n, n_unknown) ndarray or None
+        None where contacts must close.
+    """
+    law = b.contacts.law
+    if np.any(law.k_n == 0) or np.any(b.rigid_load) or not b.harmonics.static:
+        return None
+    rows = b.Psi[:: 1 + b.contacts.tangents][:, b.modal.rigid]
+    out = np.array([b.free(float(w)) for w in omega])
+    motion = b.coefficients(out)[:, :, 0] @ b.E.T
+    room = law.gap - law.preload / law.k_n - motion.max(axis=(0, 2))
+    size = float(np.abs(room).max())
+    # on the edge rounding would close it
+    least = 1e3 * EPS * max(size, float(np.abs(motion).max()), float(np.abs(law.gap).max()))
+    a = np.zeros(rows.shape[1])
+    if rows.shape[1]:
+        # not farther than the rooms are wide: a loose body may be moved without end
+        found = linprog(
+            np.append(a, -1.0),
+            np.column_stack([rows, np.ones(len(rows))]),
+            room,
+            bounds=[*[(None, None)] * len(a), (None, size)],
+        )
+        if found.status != 0 or found.x is None or found.x[-1] < least:
+            return None
+        a = np.asarray(found.x[:-1], dtype=float)
+    elif room.min() < least:
+        return None
+    n, step = len(b.Psi), b.harmonics.size
+    out[:, : n * step : step] += b.Psi[:, b.modal.rigid] @ a
+    out[:, n * step :] += a
+    return out
+
+
+def _stuck_forces(b: Balance, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Normal force and size of the traction (n_point, n) over the cycle of the stuck answer."""
+    motion = b.split(x)[0] @ b.E.T
+    force = stuck_stiffness(b.contacts)[..., None] * motion + b.stuck_constant[..., None]
+    return force[:, 0], np.sqrt((force[:, 1:] ** 2).sum(axis=1))
+
+
+def missing(h: Harmonics) -> Harmonics:
+    """Harmonics that are not in the set, from 0 up to twice its highest plus three."""
+    return harmonics(k for k in range(2 * h.highest + 4) if k not in h.numbers)
+
+
+def truncation(
+    b: Balance, frequency: FloatArray, x: FloatArray, marched: March | None = None
+) -> FloatArray:
+    """Largest contact motion that the harmonics left out of the force would cause, relative.
+
+    Parameters
+    ----------
+    b : Balance
+    frequency : (n,) ndarray
+        [Hz]
+    x : (n, n_unknown) ndarray
+        Answers.
+    marched : March, optional
+        Their contact forces at the samples of the problem, where they are known.
+
+    Returns
+    -------
+    (n,) ndarray
+        Relative to the contact motion.
+    """
+    rest = missing(b.harmonics)
+    enough = b.samples > 2 * rest.highest
+    Q = analysis(rest, b.samples if enough else 4 * rest.highest)
+    E = b.E if enough else synthesis(b.harmonics, Q.shape[1])
+    stiffness, out = stuck_stiffness(b.contacts).ravel(), np.zeros(len(x))
+    known = marched if enough else None
+    for part in portions(len(x)) if known is None else [slice(0, len(x))]:
+        W = b.coefficients(x[part])
+        force = (b.marched(W, E) if known is None else known).coefficients(Q)
+        F = to_complex(force.reshape(len(W), len(b.Psi), -1), rest)
+        w = (2 * np.pi * frequency[part][:, None] * rest.dynamic).ravel()
+        eta = b.modal.solve(w, np.swapaxes(F, 1, 2).reshape(len(w), -1) @ b.Psi)
+        # the force of the motion added would bring most of it back: springs in series with the
+        # structure
+        motion = np.abs(eta @ b.Psi.T) / (1 + b.modal.drive_point(b.Psi, w) * stiffness)
+        size = np.abs(to_complex(W, b.harmonics)).max(axis=(1, 2, 3))
+        most = motion.reshape(len(W), -1).max(axis=1)
+        if rest.static:
+            mean = force.reshape(len(W), len(b.Psi), -1)[..., 0]
+            most = np.maximum(most, _mean_motion(b, mean).max(axis=1))
+        out[part] = most / np.where(size > 0, size, np.inf)
+    return out
+
+
+def _mean_motion(b: Balance, force: FloatArray) -> FloatArray:
+    """Contact motion (n, r) [mm] that mean contact forces (n, r) cause on closed contacts.
+
+    From (Lambda + Psi'k Psi) eta = Psi'f. Motions without any stiffness take the least stiffness
+    that rounding leaves.
+    """
+    stiffness = np.diag(np.where(b.modal.rigid, 0.0, b.modal.eigenvalues))
+    stiffness += b.Psi.T @ (stuck_stiffness(b.contacts).ravel()[:, None] * b.Psi)
+    values, vectors = np.linalg.eigh(stiffness)
+    values = np.maximum(values, len(values) * EPS * values[-1])
+    return np.asarray(np.abs((force @ b.Psi @ vectors / values) @ (b.Psi @ vectors).T))
+
+
+def aliasing(b: Balance, x: FloatArray, force: FloatArray) -> FloatArray:
+    """Largest change of the contact force with twice the samples, relative.
+
+    Parameters
+    ----------
+    b : Balance
+    x : (n, n_unknown) ndarray
+        Answers.
+    force : (n, n_point, 1 + d, size) ndarray
+        Coefficients of their contact forces [N].
+
+    Returns
+    -------
+    (n,) ndarray
+        Change of the coefficients, relative to the largest of them.
+    """
+    E, Q, out = (
+        synthesis(b.harmonics, 2 * b.samples),
+        analysis(b.harmonics, 2 * b.samples),
+        np.zeros(len(x)),
+    )
+    for part in portions(len(x)):
+        finer = b.marched(b.coefficients(x[part]), E).coefficients(Q)
+        size = np.abs(force[part]).max(axis=(1, 2, 3))
+        out[part] = np.abs(finer - force[part]).max(axis=(1, 2, 3)) / np.where(
+            size > 0, size, np.inf
+        )
+    return out
+
+
+def portions(n: int) -> list[slice]:
+    """Portions of many answers that keep the arrays of their marches small."""
+    return [slice(i, i + PORTION) for i in range(0, n, PORTION)]

@@ -1,0 +1,261 @@
+"""Contact with Coulomb friction at points: force and exact discrete Jacobian of a periodic motion.
+
+One point: relative displacement w = (w_n, w_t1, w_t2), w_n > 0 closing;
+N = max(0, N_0 + k_n (w_n - gap)); the traction is that of a spring k_t in series with a slider
+that holds up to mu N in any direction of the plane. The force opposes closing and sliding. Both
+come from one compiled march through the period, exact for a motion that is straight between the
+samples: see `upd.hbm.springs.interval` for what happens between them.
+
+References
+----------
+Return mapping as in plasticity: J. C. Simo and T. J. R. Hughes, Computational Inelasticity
+(1998), 1.4. Friction in three dimensions with variable normal load: C. Siewert et al., J. Eng.
+Gas Turbines Power 132 (2010) 082501.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.hbm.springs.coulomb import LIFT
+from upd.hbm.springs.period import GIVEN, LOWER, MID, UPPER, march_points
+
+FloatArray = NDArray[np.float64]
+Start = Literal["zero", "static", "mid", "upper", "lower"]
+
+START_CODE = {"zero": GIVEN, "static": GIVEN, "mid": MID, "upper": UPPER, "lower": LOWER}
+#: Friction in one direction forgets its start within one period; in two directions the memory fades
+#: geometrically while it slips.
+MOST_PERIODS = 40
+
+
+@dataclass(frozen=True)
+class Law:
+    """Parameters of the contact points.
+
+    The law itself is in `upd.hbm.springs.coulomb`, shared by harmonic balance and time
+    integration, and its closed form over a straight piece of the motion in `upd.hbm.springs.interval`. To add a law:
+
+    1. write its step beside `coulomb`, with the same arguments and results: the new force, its
+       derivative by the trial force (P11, P12, P22), the derivative by the limit (n1, n2) and the
+       state (STICK, SLIP, LIFT);
+    2. write what it does over an interval beside `friction_event`, with the same arguments and
+       results;
+    3. give `Law` the parameters it needs and a number that chooses it, and branch on that number in
+       `step` and in `upd.hbm.springs.period`;
+    4. add the law to the tests of the Jacobian in tests/property/test_hbm_property.py and of the
+       order in tests/analytic/test_hbm_friction.py.
+
+    Nothing else knows how the force comes about.
+
+    Attributes
+    ----------
+    k_n, k_t : (n_point,) ndarray
+        Normal and tangential stiffness [N/mm].
+    mu : (n_point,) ndarray
+        Friction coefficient.
+    preload : (n_point,) ndarray
+        N_0 [N].
+    gap : (n_point,) ndarray
+        Gap [mm].
+    """
+
+    k_n: FloatArray
+    k_t: FloatArray
+    mu: FloatArray
+    preload: FloatArray
+    gap: FloatArray
+
+    def tiled(self, n: int) -> Law:
+        """The same points n times over."""
+        return Law(*(np.tile(getattr(self, f.name), n) for f in fields(self)))
+
+
+@dataclass(frozen=True)
+class March:
+    """One period of the contact force, n samples.
+
+    Attributes
+    ----------
+    force : (n_point, 1 + d, n) ndarray
+        Normal force and tractions [N].
+    weighed : (n_point, 1 + d, n) ndarray
+        The same with the corners between the samples, which its coefficients are taken from [N].
+    state : (n_point, n) ndarray of int8
+        STICK, SLIP or LIFT.
+    slope : (n_point, 3, n) ndarray
+        Derivative of the weighed normal force by N_0 + k_n w at the sample before, at the sample
+        and at the one after.
+    tangent : (n_point, d, n, (1 + d) size) ndarray or None
+        Derivative of the weighed traction by the coefficients of the motion [N/mm].
+    periodic : (n_point,) ndarray of bool
+        Whether each point came back to its start.
+    periods : (n_point,) ndarray of int
+        The periods it took.
+    """
+
+    force: FloatArray
+    weighed: FloatArray
+    state: NDArray[np.int8]
+    slope: FloatArray
+    tangent: FloatArray | None
+    periodic: NDArray[np.bool_]
+    periods: NDArray[np.int64]
+
+    def coefficients(self, Q: FloatArray) -> FloatArray:
+        """Coefficients of the force.
+
+        Parameters
+        ----------
+        Q : (size, n) ndarray
+            Analysis matrix of the samples, see `upd.hbm.core.fourier.analysis`.
+
+        Returns
+        -------
+        (..., 1 + d, size) ndarray
+            Coefficients [N].
+        """
+        return self.weighed @ Q.T
+
+
+def march(
+    law: Law,
+    w: FloatArray,
+    E: FloatArray,
+    *,
+    start: Start = "zero",
+    slider: FloatArray | None = None,
+    jacobian: bool = True,
+) -> March:
+    """Periodic contact force of all points along a motion.
+
+    Parameters
+    ----------
+    law : Law
+    w : (n_point, 1 + d, n) ndarray
+        Relative displacements [mm] at n samples, d = 0, 1 or 2 tangents.
+    E : (n, size) ndarray
+        Synthesis matrix of the samples, see `upd.hbm.core.fourier.synthesis`.
+    start : {"zero", "static", "mid", "upper", "lower"}
+        Position of the sliders before the march: zero, given positions, the middle of the stuck
+        interval, or the traction at its upper or lower end along the first tangent.
+    slider : (n_point, 2) ndarray, optional
+        Slider positions [mm] before the march for start "zero" (not given) and "static".
+    jacobian : bool
+        Whether the derivative is wanted; it is exact for the discrete march, through all its
+        periods.
+
+    Returns
+    -------
+    March
+    """
+    n_point, rows, n = w.shape
+    size = E.shape[1]
+    force, weighed = np.zeros((n_point, rows, n)), np.zeros((n_point, rows, n))
+    state, slope = np.zeros((n_point, n), dtype=np.int8), np.zeros((n_point, 3, n))
+    tangent = np.zeros((n_point, rows - 1, n, rows * size) if jacobian else (1, 0, 0, 0))
+    periodic, periods = np.zeros(n_point, dtype=np.bool_), np.zeros(n_point, dtype=np.int64)
+    slider = np.zeros((n_point, 2)) if slider is None else slider
+    march_points(
+        w,
+        E,
+        law.k_n,
+        law.k_t,
+        law.mu,
+        law.preload,
+        law.gap,
+        START_CODE[start],
+        slider,
+        MOST_PERIODS,
+        jacobian,
+        force,
+        weighed,
+        state,
+        slope,
+        tangent,
+        periodic,
+        periods,
+    )
+    return March(force, weighed, state, slope, tangent if jacobian else None, periodic, periods)
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """Coefficients of the contact force.
+
+    Attributes
+    ----------
+    force : (n_point, 1 + d, size) ndarray
+        Coefficients [N].
+    jacobian : (n_point, 1 + d, size, 1 + d, size) ndarray or None
+        Derivative by the coefficients of the motion [N/mm].
+    march : March
+        The period they were taken from.
+    """
+
+    force: FloatArray
+    jacobian: FloatArray | None
+    march: March
+
+
+def harmonic_force(
+    law: Law,
+    X: FloatArray,
+    E: FloatArray,
+    Q: FloatArray,
+    *,
+    start: Start = "zero",
+    slider: FloatArray | None = None,
+    jacobian: bool = True,
+) -> Harmonic:
+    """Coefficients of the contact force for those of the motion (alternating frequency/time).
+
+    Parameters
+    ----------
+    law : Law
+    X : (n_point, 1 + d, size) ndarray
+        Coefficients of the relative displacements [mm].
+    E : (n, size) ndarray
+        Synthesis matrix of the samples.
+    Q : (size, n) ndarray
+        Analysis matrix of the samples.
+    start, slider, jacobian
+        As in `march`.
+
+    Returns
+    -------
+    Harmonic
+    """
+    n_point, rows, size = X.shape
+    result = march(
+        law, np.ascontiguousarray(X @ E.T), E, start=start, slider=slider, jacobian=jacobian
+    )
+    force = result.coefficients(Q)
+    if result.tangent is None:
+        return Harmonic(force, None, result)
+    J = np.zeros((n_point, rows, size, rows, size))
+    J[:, 0, :, 0, :] = law.k_n[:, None, None] * _normal_block(result, E, Q)
+    if rows > 1:
+        J[:, 1:] = np.matmul(Q, result.tangent).reshape(n_point, rows - 1, size, rows, size)
+    return Harmonic(force, J, result)
+
+
+def _normal_block(found: March, E: FloatArray, Q: FloatArray) -> FloatArray:
+    """Derivative of the normal force's coefficients by those of N_0 + k_n w, (n_point, size, size).
+
+    The identity where the contact never opens.
+    """
+    size = E.shape[1]
+    block = np.broadcast_to(np.eye(size), (len(found.state), size, size)).copy()
+    for p in np.flatnonzero((found.state == LIFT).any(axis=1)):
+        before, here, after = found.slope[p]
+        rows = here[:, None] * E
+        for beside, shift in ((before, -1), (after, 1)):
+            j = np.flatnonzero(beside)
+            rows[j] += beside[j, None] * E[(j + shift) % len(E)]
+        block[p] = Q @ rows
+    return block

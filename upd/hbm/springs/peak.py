@@ -1,0 +1,219 @@
+"""Resonance peaks of the nonlinear answer, located on the path.
+
+The path is cut by planes across its tangent; on each the corrector finds the solution, and the
+slope of the amplitude along the path shows the side of the peak. Folds do not matter, since no
+plane lies at a fixed frequency. Compare the peak continuation of M. Krack and J. Gross,
+Harmonic Balance for Nonlinear Vibration Problems (2019), ch. 4, which adds the condition as an
+equation and needs second derivatives.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+
+from upd.hbm.core.fourier import to_complex
+from upd.hbm.core.newton import Function, Settings, Solution, cross_section
+from upd.hbm.core.path_step import State, begin, direction_reversed, walk
+from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.residuals import FREQUENCY_SHARE, over_frequency, scale_of
+
+log = logging.getLogger(__name__)
+
+FloatArray = NDArray[np.float64]
+EPS = float(np.finfo(float).eps)
+#: first step along the path in search of the other side of a peak, and steps before the search is
+#: given up
+FIRST_REACH, MOST_STEPS = 0.01, 200
+#: position of a peak on the path, in units of its bracket
+POSITION = 1e-5
+#: change of frequency, and factor on the height per load, beyond which the next peak is another one
+JUMP_FREQUENCY, JUMP_HEIGHT = 0.03, 2.0
+
+
+@dataclass(frozen=True)
+class Peak:
+    """A local maximum of the amplitude on the path.
+
+    Attributes
+    ----------
+    frequency : float
+        [Hz]
+    amplitude : float
+        [mm]
+    x : (n_unknown,) ndarray
+        Unknowns.
+    status : str
+        "found" or why not.
+    """
+
+    frequency: float
+    amplitude: float
+    x: FloatArray
+    status: str
+
+    @property
+    def found(self) -> bool:
+        """Whether it is a maximum on the path."""
+        return self.status == "found"
+
+
+@dataclass(frozen=True)
+class _Measure:
+    """|one harmonic| of row @ q times frequency^power, over the unknowns and the frequency."""
+
+    b: Balance
+    modal_row: FloatArray
+    place: int
+    power: float = 0.0
+
+    def __call__(self, x: FloatArray, frequency: float) -> float:
+        return float(self.amplitude(x, frequency) * frequency**self.power)
+
+    def amplitude(self, x: FloatArray, frequency: float) -> float:
+        """|row @ q| alone, mm."""
+        b, j = self.b, self.place
+        F = to_complex(b.force(x).force.reshape(len(b.Psi), -1), b.harmonics)[:, j]
+        w = np.array([2 * np.pi * b.harmonics.dynamic[j] * frequency])
+        eta = b.modal.solve(w, b.loads[j : j + 1] - F @ b.Psi)[0]
+        return float(abs(eta @ self.modal_row))
+
+    def slope(self, x: FloatArray, p: float, direction: FloatArray) -> float:
+        """Derivative along a direction (n_unknown + 1,), by central differences."""
+        h = EPS ** (1 / 3)
+        return float(
+            (
+                self(x + h * direction[:-1], p + h * direction[-1])
+                - self(x - h * direction[:-1], p - h * direction[-1])
+            )
+            / (2 * h)
+        )
+
+
+def climb(
+    b: Balance,
+    row: ArrayLike,
+    x: FloatArray,
+    frequency: float,
+    reach: float = FIRST_REACH,
+    settings: Settings | None = None,
+    harmonic: int | None = None,
+    power: float = 0.0,
+) -> Peak:
+    """The peak of |row @ q| uphill from a solved point.
+
+    Parameters
+    ----------
+    b : Balance
+    row : (n_dof,) array_like
+        Weighs the displacements.
+    x : (n_unknown,) ndarray
+        Unknowns of the point.
+    frequency : float
+        Frequency of the point [Hz].
+    reach : float
+        First step, in scaled arclength.
+    settings : Settings, optional
+        Step control of the continuation.
+    harmonic : int, optional
+        Number of the harmonic; the lowest above 0 by default.
+    power : float
+        Of the frequency by which the amplitude is weighed: 2 for the peak of the acceleration.
+
+    Returns
+    -------
+    Peak
+        Its amplitude without that weight.
+
+    Raises
+    ------
+    InputError
+        For a harmonic that is not kept, or a row of another length.
+    """
+    s, measure = (
+        settings or Settings(),
+        _Measure(b, b.modal_row(row), b.harmonics.place(harmonic), power),
+    )
+    function, scale, p_scale = over_frequency(b), scale_of(b), FREQUENCY_SHARE * frequency
+
+    def slope(state: State) -> float:
+        return measure.slope(
+            state.x,
+            state.p,
+            np.append(state.tangent[:-1] * scale(state.x), state.tangent[-1] * p_scale),
+        )
+
+    def peak(state: State, status: str) -> Peak:
+        return Peak(state.p, measure.amplitude(state.x, state.p), state.x, status)
+
+    here = begin(function, x, frequency, scale, p_scale, s)._replace(step=reach)
+    here = here if slope(here) >= 0 else direction_reversed(here)
+    for _ in range(MOST_STEPS):
+        found, there = walk(function, here, scale, p_scale, s)
+        if found is None:
+            return peak(here, "no convergence along the path")
+        if slope(there) > 0:
+            here = there
+            continue
+        length = float(
+            np.hypot(
+                np.linalg.norm((there.x - here.x) / scale(here.x)), (there.p - here.p) / p_scale
+            )
+        )
+        top = _between(function, measure, here, length, scale(here.x), p_scale, s)
+        if top is not None:
+            return top
+        if length <= POSITION:
+            return max(peak(here, "found"), peak(there, "found"), key=lambda found: found.amplitude)
+        here = here._replace(step=length / 4)
+    return peak(here, f"still rising after {MOST_STEPS} steps")
+
+
+def _between(
+    function: Function,
+    measure: _Measure,
+    base: State,
+    reach: float,
+    D: FloatArray,
+    p_scale: float,
+    s: Settings,
+) -> Peak | None:
+    """The peak between the base and the plane at `reach`.
+
+    Root of the slope, or its jump where a contact changes state.
+    """
+    origin = Solution(base.x, base.p, base.tangent, 0, 0.0)
+    best = [origin]
+
+    def slope(share: float) -> float:
+        found = cross_section(function, origin, D, p_scale, base.tangent, share * reach, s)
+        if found.tangent is None:
+            raise ArithmeticError
+        best[0] = found
+        return measure.slope(
+            found.x, found.p, np.append(found.tangent[:-1] * D, found.tangent[-1] * p_scale)
+        )
+
+    try:
+        if slope(0.0) <= 0 or slope(1.0) >= 0:
+            return None
+        slope(brentq(slope, 0.0, 1.0, xtol=POSITION))
+    except ArithmeticError:
+        return None
+    return Peak(best[0].p, measure.amplitude(best[0].x, best[0].p), best[0].x, "found")
+
+
+def is_near(frequency: float, height: float) -> bool:
+    """Whether a peak may be another one with other data: neither its frequency nor its height has
+    jumped.
+
+    Parameters
+    ----------
+    frequency, height : float
+        Over those of the other.
+    """
+    return abs(frequency - 1.0) <= JUMP_FREQUENCY and 1.0 / JUMP_HEIGHT <= height <= JUMP_HEIGHT

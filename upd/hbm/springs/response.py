@@ -1,0 +1,570 @@
+"""Forced response over frequency: free, stuck and nonlinear.
+
+With fast exits that are checked, a status and a message.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, cast, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upd.errors import InputError
+from upd.hbm.core.fourier import Harmonics, harmonics, to_complex
+from upd.hbm.core.newton import Settings
+from upd.hbm.springs.assembled import assembled
+from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.damper import RigidDamper
+from upd.hbm.springs.friction import Start
+from upd.hbm.springs.harmonics import TRUNCATION, Whole, solve_adaptively, solve_curve
+from upd.hbm.springs.peak import climb
+from upd.hbm.springs.pieces import joined
+from upd.hbm.springs.points import Contacts
+from upd.hbm.springs.starts import newton
+from upd.linalg.parallel import threads_for
+
+log = logging.getLogger(__name__)
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+EPS = float(np.finfo(float).eps)
+#: largest change of the contact force with twice the samples before a warning
+ALIASING = 1e-2
+Status = Literal["complete", "not periodic", "harmonic limit", "stopped", "step limit"]
+
+
+@dataclass(frozen=True)
+class FrequencyResponse:
+    """Steady forced response along the solution path.
+
+    n points, in order of the path: frequencies repeat or turn back at folds. Coefficients are
+    [a0, a1, b1, a2, b2, ...] (no a0 without harmonic 0); those of harmonics a point was not solved
+    with are zero.
+
+    Attributes
+    ----------
+    balance : Balance
+        The condensed problem, with the most harmonics of the path.
+    frequency : (n,) ndarray
+        [Hz]
+    x : (n, n_unknown) ndarray
+        Unknowns.
+    contact_displacement : (n, n_point, 1 + d, size) ndarray
+        Coefficients of the relative displacements [mm].
+    contact_force : (n, n_point, 1 + d, size) ndarray
+        Coefficients of the contact forces [N].
+    state : (n, n_point, 3) ndarray
+        Shares of the cycle in stick, slip, lift-off.
+    energy : (n, n_point) ndarray
+        Energy lost per cycle [N mm].
+    linear : (n,) ndarray of bool
+        Answered by an exact linear solution.
+    truncation : (n,) ndarray
+        Contact motion that missing harmonics would cause, relative.
+    aliasing : (n,) ndarray
+        Change of the contact force with twice the samples, relative.
+    status : {"complete", "not periodic", "harmonic limit", "stopped", "step limit"}
+        "complete": the path reached the last frequency, its contact forces are periodic, and
+        adaptive harmonics suffice. "not periodic": it reached it, but at some points the contact
+        forces do not come back to their start. "harmonic limit": it reached it, but adaptive
+        harmonics do not suffice everywhere. "stopped", "step limit": it did not reach it.
+    message : str
+        Where and why the path ended, the harmonics of an adaptive answer, and warnings.
+    periodic : (n,) ndarray of bool
+        Whether the contact forces came back to their start.
+    highest_harmonic : (n,) ndarray of int
+        Highest harmonic each point was solved with.
+    """
+
+    balance: Balance
+    frequency: FloatArray
+    x: FloatArray
+    contact_displacement: FloatArray
+    contact_force: FloatArray
+    state: FloatArray
+    energy: FloatArray
+    linear: NDArray[np.bool_]
+    truncation: FloatArray
+    aliasing: FloatArray
+    status: Status
+    message: str
+    periodic: NDArray[np.bool_]
+    highest_harmonic: NDArray[np.int64]
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the path reached the last frequency."""
+        return self.status not in ("stopped", "step limit")
+
+    @property
+    def harmonics(self) -> Harmonics:
+        """Harmonics of the answer, the most of its points."""
+        return self.balance.harmonics
+
+    @cached_property
+    def coefficients(self) -> FloatArray:
+        """Coefficients of the displacement of all dofs (n, n_dof, size) [mm]."""
+        force = self.contact_force.reshape(
+            len(self.frequency), len(self.balance.Psi), self.harmonics.size
+        )
+        return self.balance.displacement(self._omega, force, self.balance.rigid_part(self.x))
+
+    def amplitude(self, row: ArrayLike, harmonic: int | None = None) -> FloatArray:
+        """Amplitude of one harmonic along the path.
+
+        Parameters
+        ----------
+        row : (n_dof,) array_like
+            Weighs the displacements: row @ q.
+        harmonic : int, optional
+            Number of the harmonic; the lowest above 0 by default, nearly always 1.
+
+        Returns
+        -------
+        (n,) ndarray
+            Amplitude [mm].
+
+        Raises
+        ------
+        InputError
+            For a harmonic that is not kept, or a row of another length.
+        """
+        self.balance.modal_row(row)
+        q = np.einsum("i,nis->ns", np.asarray(row, dtype=float), self.coefficients)
+        return np.abs(to_complex(q, self.harmonics)[:, self.harmonics.place(harmonic)])
+
+    def free(
+        self,
+        row: ArrayLike,
+        frequencies: ArrayLike | None = None,
+        harmonic: int | None = None,
+    ) -> FloatArray:
+        """Linear amplitude of one harmonic without contacts.
+
+        Parameters
+        ----------
+        row : (n_dof,) array_like
+            Weighs the displacements: row @ q.
+        frequencies : (k,) array_like, optional
+            [Hz]; those of the path by default.
+        harmonic : int, optional
+            Number of the harmonic; the lowest above 0 by default.
+
+        Returns
+        -------
+        (k,) ndarray
+            Amplitude [mm].
+        """
+        return self._linear(row, frequencies, harmonic, stuck=False)
+
+    def stuck(
+        self,
+        row: ArrayLike,
+        frequencies: ArrayLike | None = None,
+        harmonic: int | None = None,
+    ) -> FloatArray:
+        """Linear amplitude of one harmonic with all points closed, and sticking with friction.
+
+        Parameters
+        ----------
+        row : (n_dof,) array_like
+            Weighs the displacements: row @ q.
+        frequencies : (k,) array_like, optional
+            [Hz]; those of the path by default.
+        harmonic : int, optional
+            Number of the harmonic; the lowest above 0 by default.
+
+        Returns
+        -------
+        (k,) ndarray
+            Amplitude [mm].
+        """
+        return self._linear(row, frequencies, harmonic, stuck=True)
+
+    @cached_property
+    def energy_balance(self) -> FloatArray:
+        """(Work of excitation - viscous loss - contact loops) / work per cycle, (n,).
+
+        Zero up to the tolerance of the solver.
+        """
+        h, b, q = self.harmonics, self.balance, to_complex(self.coefficients, self.harmonics)
+        k = h.dynamic
+        work = np.pi * np.einsum("k,ki,nik->n", k, b.dynamic, q.conj()).imag
+        # modal velocities: the damping matrix is kept in the modes only
+        eta = np.einsum("ij,nik->njk", np.linalg.inv(b.modal.Phi).T, q)
+        c = np.diag(b.modal.damping) if b.modal.proportional else b.modal.damping
+        viscous = (
+            np.pi * self._omega * np.einsum("k,nik,ij,njk->n", k**2.0, eta.conj(), c, eta).real
+        )
+        total = np.abs(work) + np.abs(viscous) + self.energy.sum(axis=1)
+        return np.asarray(
+            (work - viscous - self.energy.sum(axis=1)) / np.where(total > 0, total, 1.0)
+        )
+
+    def peak(self, row: ArrayLike, harmonic: int | None = None) -> tuple[float, float]:
+        """Highest point of one harmonic: climbed to from the highest solved, else by a parabola.
+
+        The parabola through the highest point and its neighbours also serves where the highest
+        point is an end of the curve.
+
+        Parameters
+        ----------
+        row : (n_dof,) array_like
+            Weighs the displacements: row @ q.
+        harmonic : int, optional
+            Number of the harmonic; the lowest above 0 by default.
+
+        Returns
+        -------
+        frequency : float
+            [Hz]
+        amplitude : float
+            [mm]
+
+        Raises
+        ------
+        InputError
+            When the path has no point.
+        """
+        a = self.amplitude(row, harmonic)
+        if not len(a):
+            raise InputError(f"peak: the path has no point: {self.message}")
+        i = int(np.argmax(a))
+        x = self.x[i] if 0 < i < len(a) - 1 else None
+        if x is not None and self.highest_harmonic[i] < self.harmonics.highest:
+            x = newton(self.balance, x, float(self.frequency[i]))
+        if x is not None:
+            top = climb(self.balance, row, x, float(self.frequency[i]), harmonic=harmonic)
+            if top.found and top.amplitude >= a[i] * (1 - EPS**0.5):
+                return top.frequency, top.amplitude
+        return parabola(self.frequency, a)
+
+    @property
+    def _omega(self) -> FloatArray:
+        return 2 * np.pi * self.frequency
+
+    def _linear(
+        self, row: ArrayLike, frequencies: ArrayLike | None, harmonic: int | None, stuck: bool
+    ) -> FloatArray:
+        self.balance.modal_row(row)
+        f = self.frequency if frequencies is None else np.asarray(frequencies, dtype=float)
+        q = self.balance.linear_displacement(2 * np.pi * f, stuck, harmonic)
+        return np.asarray(np.abs(q @ np.asarray(row, dtype=float)))
+
+
+def parabola(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+    """Vertex of the parabola through the highest point and its neighbours.
+
+    Parameters
+    ----------
+    x, y : (n,) ndarray
+        Points of a curve.
+
+    Returns
+    -------
+    x, y : float
+        The vertex; the point itself at an end or a turning point.
+    """
+    i = int(np.argmax(y))
+    if 0 < i < len(x) - 1:
+        d0, d1 = x[i] - x[i - 1], x[i + 1] - x[i]
+        if d0 * d1 > 0:
+            s0, s1 = (y[i] - y[i - 1]) / d0, (y[i + 1] - y[i]) / d1
+            curve = (s1 - s0) / (d0 + d1)
+            slope = (s0 * d1 + s1 * d0) / (d0 + d1)
+            if curve < 0:
+                shift = -slope / (2 * curve)
+                return float(x[i] + shift), float(y[i] + slope * shift / 2)
+    return float(x[i]), float(y[i])
+
+
+def frequency_response(
+    M: ArrayLike,
+    C: ArrayLike,
+    K: ArrayLike,
+    contacts: Contacts,
+    *,
+    harmonic_force: ArrayLike | Mapping[int, ArrayLike],
+    frequencies: ArrayLike,
+    static_force: ArrayLike | None = None,
+    harmonics: Iterable[int] | Literal["adaptive"] = (0, 1),
+    samples: int | None = None,
+    damper: RigidDamper | None = None,
+    damper_rows: FloatArray | None = None,
+    start: Start = "zero",
+    slider: ArrayLike | None = None,
+    sweep_down: bool = False,
+    fast_exits: bool = True,
+    settings: Settings | None = None,
+) -> FrequencyResponse:
+    """Forced response of M q'' + C q' + K q = f(t) - B'f_c by multi-harmonic balance.
+
+    Parameters
+    ----------
+    M, C, K : (n, n) array_like
+        Mass [t], damping [N s/mm] and stiffness [N/mm], dense and symmetric; M positive definite, K
+        may be singular (a body held only by its contacts).
+    contacts : Contacts
+        The contact points and their rows B on the n dofs.
+    harmonic_force : (n,) array_like of complex, or mapping
+        Complex amplitude F of the first harmonic [N], f(t) = Re(F exp(i w t)); a mapping (harmonic
+        number -> amplitude) gives several harmonics.
+    frequencies : (n_f,) array_like
+        Frequencies [Hz], answered at these and between.
+    static_force : (n,) array_like, optional
+        [N]
+    harmonics : iterable of int, or "adaptive"
+        A set with or without 0; static loads need it. "adaptive" takes (0, 1) first, and more on
+        the stretches of the curve where those left out would move the contacts by more than 0.1 %.
+    samples : int, optional
+        Samples per period; by rule when None.
+    damper : RigidDamper, optional
+        Its dofs and its centrifugal force are appended.
+    damper_rows : (n_point, 1 + d, damper.n_dof) ndarray, optional
+        The damper's share of the rows, see `contact_rows`; comes together with `damper`.
+    start : {"zero", "static", "mid", "upper", "lower"}
+        Position of the sliders before the march, which decides the residual traction of points that
+        stick.
+    slider : (n_point, d) array_like, optional
+        Positions [mm] from which the starts "zero" and "static" begin instead of zero: -T_0 / k_t
+        carries the traction T_0 [N] where nothing has moved, a preload along the tangents.
+    sweep_down : bool
+        Go from the highest frequency to the lowest.
+    fast_exits : bool
+        Take the exact linear answers where they are proven.
+    settings : Settings, optional
+        Step control of the continuation.
+
+    Returns
+    -------
+    FrequencyResponse
+        A path that stops early is returned with its status, never raised.
+
+    Raises
+    ------
+    InputError
+        On bad input; all problems are named.
+
+    Examples
+    --------
+    A mass on a spring with a Jenkins element, without any other damping. With one
+    harmonic the peak is (mu N/k_t) / (1 - pi F/(4 mu N)); it is lowest at mu N = pi F/2, where it
+    is pi F/k_t:
+
+    >>> import numpy as np
+    >>> from upd.hbm import contacts, frequency_response
+    >>> jenkins = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=1.0, mu=1.0, preload=np.pi / 2)
+    >>> f0 = np.sqrt(1.5) / (2 * np.pi)
+    >>> answer = frequency_response(
+    ...     [[1.0]], [[0.0]], [[1.0]], jenkins,
+    ...     harmonic_force=[1.0], frequencies=np.array([0.9, 1.0, 1.1]) * f0, harmonics=(1,),
+    ...     samples=1024,
+    ... )
+    >>> answer.status
+    'complete'
+    >>> f, height = answer.peak([1.0])
+    >>> float(round(f / f0, 2)), float(round(height / np.pi, 3))
+    (1.0, 1.0)
+
+    There the slider dissipates 4 mu N (A - mu N/k_t) = pi^2 per cycle:
+
+    >>> bool(np.isclose(answer.energy.max(), np.pi**2, rtol=1e-3))
+    True
+    """
+    f = np.asarray(frequencies, dtype=float).ravel()
+    A = [_dense(name, a) for name, a in (("M", M), ("C", C), ("K", K))]
+    force = _force(harmonic_force)
+    n = len(A[0])
+    static = np.zeros(n) if static_force is None else np.asarray(static_force, dtype=float)
+    _require(f, static, force, contacts, n, (damper is None) == (damper_rows is None), start)
+    placed = None if slider is None else _sliders(slider, contacts)
+    first = _harmonics(range(max(force) + 1) if harmonics == "adaptive" else harmonics, force)
+    _require_static(first, static, damper)
+    problem = assembled(
+        A[0],
+        A[1],
+        A[2],
+        contacts,
+        force,
+        static,
+        joined_to=None if damper is None or damper_rows is None else (damper, damper_rows),
+        samples=samples,
+        start=start,
+        slider=placed,
+        fast_exits=fast_exits,
+    )
+    order = np.unique(f)[::-1] if sweep_down else np.unique(f)
+    adaptive = harmonics == "adaptive"
+    with threads_for(problem(first).size):
+        found = (
+            solve_adaptively(problem, first, order, fast_exits, settings)
+            if adaptive
+            else solve_curve(problem(first), order, fast_exits, settings)
+        )
+        for part in found.pieces:
+            part.balance.forget_factors()
+        return _answer(found, adaptive)
+
+
+def _answer(found: Whole, adaptive: bool) -> FrequencyResponse:
+    """The answer with its status, and warnings about what the path leaves out."""
+    whole, highest = joined(found.pieces)
+    worst, astray = whole.truncation.max(initial=0.0), int((~whole.periodic).sum())
+    status = found.status
+    if status == "complete" and adaptive and worst > TRUNCATION:
+        status = "harmonic limit"
+    if found.status == "complete" and astray:
+        status = "not periodic"
+    notes = []
+    if worst > (TRUNCATION if adaptive else 10 * TRUNCATION):
+        at = int(np.argmax(whole.truncation))
+        notes.append(
+            f"the omitted harmonics ({_omitted(whole.balance.harmonics)}) would move the contacts "
+            f"by up to {worst:.1%}: take more"
+            if not adaptive
+            else f"at {int((whole.truncation > TRUNCATION).sum())} points up to {highest.max()} "
+            f"harmonics are not enough: those left out would move the contacts by up to "
+            f"{worst:.1%} at {whole.frequency[at]:.6g} Hz"
+        )
+    if astray:
+        at = int(np.argmin(whole.periodic))
+        notes.append(
+            f"at {astray} of {len(highest)} points, the first at {whole.frequency[at]:.6g} Hz, the "
+            "contact forces do not come back to their start: their answers are no steady state; "
+            'to fix it: start = "mid", or fewer tangents'
+        )
+    if whole.aliasing.max(initial=0.0) > ALIASING:
+        notes.append(
+            "twice the samples change the contact force by up to "
+            f"{whole.aliasing.max():.1%}: take more samples"
+        )
+    for note in notes:
+        log.warning(note)
+    return FrequencyResponse(
+        whole.balance,
+        whole.frequency,
+        whole.x,
+        whole.displacement,
+        whole.force,
+        whole.state,
+        whole.energy,
+        whole.linear,
+        whole.truncation,
+        whole.aliasing,
+        cast(Status, status),
+        "; ".join([found.message, *notes]),
+        whole.periodic,
+        highest,
+    )
+
+
+def _omitted(h: Harmonics) -> str:
+    between = [k for k in range(h.highest) if k not in h.numbers]
+    return ", ".join([*map(str, between), f"above {h.highest}"])
+
+
+def _dense(name: str, A: ArrayLike) -> FloatArray:
+    if hasattr(A, "toarray"):
+        raise InputError(
+            f"frequency_response: {name} is sparse; to fix it: give {name}.toarray(), or large "
+            "matrices to upd.matrices.response.forced_response, which reduces them"
+        )
+    return np.asarray(A, dtype=float)
+
+
+def _require_static(h: Harmonics, static: FloatArray, damper: RigidDamper | None) -> None:
+    """Refuse static loads that no harmonic of the balance carries."""
+    loads = ["static_force"] if np.any(static) else []
+    loads += (
+        ["the damper's centrifugal force"] if damper is not None and np.any(damper.force) else []
+    )
+    if loads and not h.static:
+        raise InputError(
+            f"frequency_response: {' and '.join(loads)} would have no effect: harmonic 0 is not "
+            f"among {h.numbers}; to fix it: harmonics = {(0, *h.numbers)}"
+        )
+
+
+def _sliders(given: ArrayLike, points: Contacts) -> FloatArray:
+    """Places of the sliders along both tangents (n_point, 2)."""
+    place = np.asarray(given, dtype=float)
+    if place.shape != (points.n_point, points.tangents) or not np.all(np.isfinite(place)):
+        raise InputError(
+            f"frequency_response: slider has shape {place.shape}; to fix it: give a finite place "
+            f"of every point along every tangent, ({points.n_point}, {points.tangents})"
+        )
+    out = np.zeros((points.n_point, 2))
+    out[:, : points.tangents] = place
+    return out
+
+
+def _force(given: ArrayLike | Mapping[int, ArrayLike]) -> dict[int, ComplexArray]:
+    if isinstance(given, Mapping):
+        return {int(k): np.asarray(v, dtype=complex) for k, v in given.items()}
+    return {1: np.asarray(given, dtype=complex)}
+
+
+def _require(
+    f: FloatArray,
+    static: FloatArray,
+    force: dict[int, ComplexArray],
+    points: Contacts,
+    n: int,
+    paired: bool,
+    start: str,
+) -> None:
+    problems = (
+        []
+        if len(f) and np.all(np.isfinite(f)) and np.all(f > 0)
+        else ["frequencies must be finite and above 0"]
+    )
+    problems += (
+        [] if static.shape == (n,) else [f"static_force has shape {static.shape}, give ({n},)"]
+    )
+    problems += [
+        f"harmonic_force {k} has shape {v.shape}, give ({n},)"
+        for k, v in force.items()
+        if v.shape != (n,)
+    ]
+    problems += (
+        []
+        if all(k > 0 for k in force)
+        else ["harmonic_force belongs to harmonics above 0; the mean goes into static_force"]
+    )
+    problems += [
+        f"loads at {name} are not finite"
+        for name, v in [("static_force", static), *force.items()]
+        if not np.all(np.isfinite(v))
+    ]
+    problems += (
+        []
+        if points.rows.shape[2] == n
+        else [f"contact rows have {points.rows.shape[2]} columns, the system {n} dofs"]
+    )
+    problems += [] if paired else ["damper and damper_rows come together"]
+    problems += (
+        []
+        if start in get_args(Start)
+        else [f"start {start!r} is unknown; give one of {', '.join(get_args(Start))}"]
+    )
+    problems += [] if force else ["harmonic_force is empty; give the amplitude of a harmonic"]
+    if problems:
+        raise InputError("frequency_response: " + "; ".join(problems))
+
+
+def _harmonics(numbers: Iterable[int] | str, force: dict[int, ComplexArray]) -> Harmonics:
+    if isinstance(numbers, str):
+        raise InputError(f'harmonics: "{numbers}" is unknown; give numbers or "adaptive"')
+    h = harmonics(numbers)
+    missing = sorted(set(force) - set(h.numbers))
+    if missing:
+        raise InputError(
+            f"harmonics: the excitation acts in {', '.join(map(str, missing))}, not among "
+            f"{h.numbers}; to fix it: harmonics = {tuple(sorted({*h.numbers, *missing}))}"
+        )
+    return h

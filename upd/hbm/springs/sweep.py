@@ -1,0 +1,165 @@
+"""The curve over frequency.
+
+Exact stuck answers where proven, continuation over each stretch between.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upd.hbm.core.continuation import Path, follow
+from upd.hbm.core.newton import Settings
+from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.residuals import FREQUENCY_SHARE, over_frequency, scale_of, sizes_of
+from upd.hbm.springs.starts import first_point
+
+FloatArray = NDArray[np.float64]
+#: share of the range by which a path may come back behind the first frequency before it is ended
+BEHIND = 0.05
+#: difference, relative to their size, at which two answers at one frequency are different solutions
+OTHER_BRANCH = 1e-6
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Points of a sweep.
+
+    Attributes
+    ----------
+    p : (n,) ndarray
+        Frequencies [Hz].
+    x : (n, n_unknown) ndarray
+        Unknowns.
+    exact : (n,) ndarray of bool
+        Where the linear stuck answer was taken.
+    status : {"complete", "stopped", "step limit"}
+    message : str
+        Where and why the curve ended.
+    """
+
+    p: FloatArray
+    x: FloatArray
+    exact: NDArray[np.bool_]
+    status: str
+    message: str
+
+
+def sweep(
+    b: Balance,
+    f: FloatArray,
+    exact: NDArray[np.bool_],
+    guess: FloatArray | None = None,
+    settings: Settings | None = None,
+) -> Curve:
+    """The curve over frequency: exact stuck answers where proven, continuation over the rest.
+
+    Parameters
+    ----------
+    b : Balance
+    f : (n,) ndarray
+        Frequencies [Hz], rising or falling; answered in that order.
+    exact : (n,) ndarray of bool
+        Frequencies at which every point is proven to stick.
+    guess : (n_unknown,) ndarray, optional
+        Initial guess of the first point.
+    settings : Settings, optional
+        Step control of the continuation.
+
+    Returns
+    -------
+    Curve
+    """
+    parts: list[Curve] = []
+    i = 0
+    while i < len(f):
+        if exact[i]:
+            stop = i + int(np.argmin(np.append(exact[i:], False)))
+            x = np.array([b.stuck(2 * np.pi * v) for v in f[i:stop]])
+            parts.append(Curve(f[i:stop], x, np.ones(stop - i, dtype=bool), "complete", ""))
+            i = stop
+            continue
+        stop = i + int(np.argmax(np.append(exact[i:], True)))
+        part, i = _to_the_next(
+            b, f, i, stop, parts[-1].x[-1] if parts else guess, bool(parts), settings
+        )
+        parts.append(part)
+        if part.status != "complete":
+            break
+    p, x, e = (np.concatenate([getattr(c, name) for c in parts]) for name in ("p", "x", "exact"))
+    done = (
+        f"reached {f[-1]:.9g} Hz in {len(p)} points, {int(e.sum())} of them by the linear "
+        "stuck answer"
+    )
+    return Curve(p, x, e, parts[-1].status, parts[-1].message or done)
+
+
+def _to_the_next(
+    b: Balance,
+    f: FloatArray,
+    i: int,
+    stop: int,
+    x: FloatArray | None,
+    known: bool,
+    settings: Settings | None,
+) -> tuple[Curve, int]:
+    """Continuation over f[i:stop] and onto the next exact answer.
+
+    Arriving on another branch, it follows that to the end.
+    """
+    last = stop < len(f)
+    part = _stretch(b, f, list(range(i, stop + last)), x, known, settings)
+    if not last or part.status != "complete":
+        return part, stop
+    there, here = b.stuck(2 * np.pi * f[stop]), part.x[-1]
+    if float(np.abs((here - there) / sizes_of(b)(there)).max()) <= OTHER_BRANCH:
+        return Curve(part.p[:-1], part.x[:-1], part.exact[:-1], part.status, part.message), stop
+    return _stretch(b, f, list(range(i, len(f))), x, known, settings), len(f)
+
+
+def _stretch(
+    b: Balance,
+    f: FloatArray,
+    index: list[int],
+    x: FloatArray | None,
+    known: bool,
+    settings: Settings | None,
+) -> Curve:
+    """Continuation over the consecutive frequencies f[index].
+
+    From the solved point before them when `known`.
+    """
+    begin = f[index[0] - 1] if known else f[index[0]]
+    if not known:
+        x = first_point(b, begin, x, settings)
+    if x is None:
+        empty = np.zeros((0, b.size))
+        message = (
+            f"no solution found at {begin:.9g} Hz: start at a frequency far from resonance or "
+            "change the slider start"
+        )
+        return Curve(np.zeros(0), empty, np.zeros(0, dtype=bool), "stopped", message)
+    end, wanted = f[index[-1]], f[index]
+    p_scale = FREQUENCY_SHARE * float(np.mean(f))
+    if begin == end:
+        return Curve(np.array([begin]), x[None], np.zeros(1, dtype=bool), "complete", "")
+    path: Path = follow(
+        over_frequency(b),
+        (x, begin),
+        end,
+        scale=scale_of(b),
+        p_scale=p_scale,
+        wanted=wanted,
+        turned=float(f[0] - BEHIND * (f[-1] - f[0])),
+        settings=settings,
+    )
+    keep = slice(1, None) if known else slice(None)
+    return Curve(
+        path.p[keep],
+        path.x[keep],
+        np.zeros(len(path.p[keep]), dtype=bool),
+        path.status,
+        path.message if path.status != "complete" else "",
+    )
