@@ -165,8 +165,8 @@ class WorstPeak:
 
         Neighbours are too far apart with more than `ANSWER_STEP` between them, unless tangents of
         both stay below a limit by the factor that makes another peak (`upd.hbm.springs.peak`); and
-        with more than a jump where tangents may reach the limit, if the neighbours are not of one branch
-        or their tangents meet above it.
+        with more than a jump where tangents may reach the limit, if the neighbours are not of one
+        branch or their tangents meet above it.
 
         Parameters
         ----------

@@ -38,7 +38,8 @@ class Law:
     """Parameters of the contact points.
 
     The law itself is in `upd.hbm.springs.coulomb`, shared by harmonic balance and time
-    integration, and its closed form over a straight piece of the motion in `upd.hbm.springs.interval`. To add a law:
+    integration, and its closed form over a straight piece of the motion in
+    `upd.hbm.springs.interval`. To add a law:
 
     1. write its step beside `coulomb`, with the same arguments and results: the new force, its
        derivative by the trial force (P11, P12, P22), the derivative by the limit (n1, n2) and the
