@@ -16,6 +16,7 @@ from upd.plot.chart import Entry
 from upd.report.columns import whole_table
 from upd.report.notes import MOST_NOTES, warnings
 from upd.report.tables import (
+    MAIN,
     all_numbers,
     answer_tables,
     budget_table,
@@ -24,12 +25,16 @@ from upd.report.tables import (
     error_parts,
     inputs_exceed,
     main_numbers,
+    number_table,
+    reached_numbers,
     stage_table,
 )
 from upd.results import FAILED, WARNED, outcome_of, worst_check
 from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_label
 
+#: lines that fit on a screen
+LINES = 40
 #: mood of the line above numbers
 TITLE = "title"
 
@@ -66,13 +71,19 @@ def answer(
         With all numbers, effects, checks, sources of errors, sizes and stages.
     """
     size, entries = summary["size"], summary["results"]
-    lines = _verdict(summary, width)
+    lines, end = _verdict(summary, width), _end(summary, width, written, full=full)
     analysis = analysis_named(str(size.get("analysis", "")))
     own = analysis is not None and analysis.answer is not None
-    tables = answer_tables(size, entries)
-    # a screen holds the main numbers and one table of cases
-    for table in tables if own else tables[:2] if not full else ():
-        lines += _table(table, width, cut=not own)
+    tables = answer_tables(size, entries) if own or not full else []
+    blocks = [_table(table, width, cut=not own) for table in tables]
+    if tables and not own and sum(map(len, (lines, *blocks[:2], end))) >= LINES:
+        # no room for the first cases: the main numbers that are among them too
+        whole = number_table(MAIN, reached_numbers(size, entries))
+        blocks = [_table(whole, width, cut=True), *blocks[tables[0].heading == MAIN :]]
+    for k, block in enumerate(blocks):
+        # the tables of an analysis are whole; of others those that fit on a screen
+        if own or k == 0 or sum(map(len, (lines, block, end))) < LINES:
+            lines += block
     if full:
         for table in (
             *all_numbers(entries),
@@ -82,7 +93,7 @@ def answer(
             stage_table(summary["cost"].get("stages", {})),
         ):
             lines += _table(table, width)
-    return lines + _end(summary, width, written, full=full)
+    return lines + end
 
 
 def _table(table: AnswerTable, width: int, *, cut: bool = False) -> list[AnswerLine]:

@@ -33,6 +33,8 @@ _MOST = 8
 _CASES = 8
 #: heading of numbers that belong to no case
 _WHOLE = "whole run"
+#: heading of the main numbers
+MAIN = "Main numbers"
 SAMPLE_HEADING = "Bands by the inputs, to first order and sampled"
 
 
@@ -73,15 +75,19 @@ def answer_tables(size: Mapping[str, Any], entries: Sequence[Entry]) -> list[Ans
     if any(table.rows for table in own):
         return [table for table in own if table.rows]
     cases = _alike(entries, analysis.headline_names if analysis else ())
-    there = {(entry["name"], entry["case"]) for rows in cases for row in rows for entry in row}
+    there = {(entry["name"], entry["case"]) for rows in cases[:1] for row in rows for entry in row}
     main = [
         entry
-        for entry in main_numbers(size, entries)
-        if not entry.get("withheld")
-        and (entry["reference"] is not None or (entry["name"], entry["case"]) not in there)
+        for entry in reached_numbers(size, entries)
+        if entry["reference"] is not None or (entry["name"], entry["case"]) not in there
     ]
-    tables = [number_table("Main numbers", main)] if main else []
+    tables = [number_table(MAIN, main)] if main else []
     return tables + [_case_table(rows) for rows in cases]
+
+
+def reached_numbers(size: Mapping[str, Any], entries: Sequence[Entry]) -> list[Entry]:
+    """The main numbers without those that were not reached."""
+    return [entry for entry in main_numbers(size, entries) if not entry.get("withheld")]
 
 
 def number_table(heading: str, entries: Iterable[Entry], case: str = "") -> AnswerTable:

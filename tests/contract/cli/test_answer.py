@@ -17,6 +17,7 @@ from rich.console import Console
 import upd
 from upd import cli
 from upd.cli.tables import print_result, print_table
+from upd.report.answer import LINES
 from upd.report.columns import TextColumn, fitted, folded_head, text_lines
 from upd.report.notebook import RunResult, headline
 from upd.report.notes import MOST_NOTES, warnings
@@ -69,8 +70,6 @@ SCENES = (
     *("hertz", "symmetric", "asymmetric", "rig", "symmetric-response", "asymmetric-response"),
     *("symmetric-seated", "asymmetric-seated"),
 )
-#: lines that fit on a screen
-LINES = 40
 #: whose answer is tables of its own
 TABLES = ("symmetric-response", "asymmetric-response")
 
