@@ -26,6 +26,7 @@ from upd.vary.variation import Variation
 TINY = {
     "geometry.divisions": 8,
     "want": ["normal"],
+    "loads.normal": ["200 N"],
     "geometry.core_depth": 0.2,
     "left_out.solve": "no",
 }
