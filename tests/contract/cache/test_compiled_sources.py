@@ -41,7 +41,7 @@ def test_compiled_functions_lie_in_the_folder_of_their_sources(
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     folder = room._folder.__wrapped__(interface_step.__name__)
     digest = sources_digest(Path(interface_step.__file__), ROOT)[:16]
-    assert folder is not None and folder.name == f"interface_step-{digest}"
+    assert folder is not None and folder.name == f"step-{digest}"
     assert str(folder) in str(interface_step.judge.stats.cache_path)
 
 

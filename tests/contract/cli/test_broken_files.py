@@ -268,8 +268,8 @@ SUMMARIES: dict[str, tuple[bytes | None, str]] = {
     "empty": (b"", "is not JSON"),
     "cut": (json.dumps(SUMMARY).encode()[:40], "is not JSON"),
     "binary": (bytes(range(256)), "summary.json"),
-    "a list": (b"[1, 2]", "lacks"),
-    "keys missing": (b'{"scene": "a"}', "lacks"),
+    "a list": (b"[1, 2]", "damaged"),
+    "keys missing": (b'{"scene": "a"}', "damaged in title"),
     "wrong kinds": (json.dumps({**SUMMARY, "results": [1], "size": 3}).encode(), "summary.json"),
     "nothing in tables": (
         json.dumps({**SUMMARY, "checks": [{}], "results": [{}]}).encode(),

@@ -127,7 +127,10 @@ def test_configurations_of_the_rig(
     assert list(recipes.count(request.recipe, request.given)) == bodies
 
 
-def test_pairs_of_the_free_damper_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_pairs_of_the_free_damper_are_told(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "240")
     settings = [*SMALL["blade_rig"], "--no-picture"]
     assert call("blade_rig", *settings, "--damper", "free", "-o", "a.msh") == 0
     told = capsys.readouterr().out
@@ -180,7 +183,10 @@ def test_faults_are_told_before_anything_is_written(
     assert list(Path.cwd().iterdir()) == []
 
 
-def test_the_list_has_units_defaults_and_bounds(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_list_has_units_defaults_and_bounds(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "240")
     assert call("sphere_block", "--list", "--set", "radius=2 mm") == 0
     told = capsys.readouterr().out
     rows = {line.split()[0]: " ".join(line.split()) for line in told.splitlines() if line.strip()}
