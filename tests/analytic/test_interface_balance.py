@@ -11,9 +11,9 @@ import pytest
 
 import upd.hbm.core.kept_factors as kept_factors
 import upd.hbm.faces.corrector as corrector
+import upd.hbm.faces.corrector as steps
 import upd.hbm.faces.equations as module
 import upd.hbm.faces.linear as linear
-import upd.hbm.faces.steps as steps
 from upd.analyses import make_plan
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
 from upd.analyses.seated.bodies import make_bodies

@@ -25,7 +25,7 @@ from upd.analyses.seated.interface import Interface, make_interface
 from upd.analyses.seated.lattice import lattice
 from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, mass, stiffness
-from upd.hbm.faces.march import InterfaceMarch
+from upd.hbm.faces.march import InterfaceMarch, modal_step, resolved
 from upd.hbm.faces.memory import (
     ACCEPTED,
     COUNTERS,
@@ -36,7 +36,6 @@ from upd.hbm.faces.memory import (
     Settling,
     memory,
 )
-from upd.hbm.faces.modes import modal_step, resolved
 from upd.hbm.faces.period import march_steps
 from upd.hbm.faces.periods import (
     PLAIN,

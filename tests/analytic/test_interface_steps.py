@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from upd.hbm.core.newton import bordered_factors
+from upd.hbm.faces.corrector import BroydenSteps, KnownFactors, NewtonSteps
 from upd.hbm.faces.newton import InterfaceEvaluation
-from upd.hbm.faces.steps import BroydenSteps, KnownFactors, NewtonSteps
 
 FloatArray = NDArray[np.float64]
 U = 12

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upd.contact.checks import Problems, compliance_matrix, numbers, proven_factor
+from upd.contact.checks import Problems, compliance_matrix, few_threads, numbers, proven_factor
 from upd.contact.coulomb import Coulomb
 from upd.contact.coulomb_conditions import CoupledStep, Iterate
 from upd.contact.load_steps import CoupledHistory, LoadSteps, SolvedStep, offset_of
 from upd.contact.locking import carries
-from upd.contact.threads import few_threads
 from upd.errors import ConvergenceError, InputError
 
 FloatArray = NDArray[np.float64]

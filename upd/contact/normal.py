@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upd.contact.checks import Problems, compliance_matrix, numbers, unit_response
+from upd.contact.checks import Problems, compliance_matrix, few_threads, numbers, unit_response
 from upd.contact.qp import FREE, LOWER, BoxQP, FloatArray, Method, State
-from upd.contact.threads import few_threads
 
 BoolArray = NDArray[np.bool_]
 

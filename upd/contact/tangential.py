@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upd.contact.checks import Problems
+from upd.contact.checks import Problems, few_threads
 from upd.contact.qp import FloatArray, State
 from upd.contact.tangential_step import TangentialContact, TangentialHistory, TangentialSolver
-from upd.contact.threads import few_threads
 
 BoolArray = NDArray[np.bool_]
 

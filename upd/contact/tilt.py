@@ -27,10 +27,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import lapack, solve_triangular
 from scipy.spatial import ConvexHull
 
-from upd.contact.checks import EPS, Problems, compliance_matrix, numbers, unit_response
+from upd.contact.checks import EPS, Problems, compliance_matrix, few_threads, numbers, unit_response
 from upd.contact.normal import NormalContact
 from upd.contact.qp import FREE, FloatArray
-from upd.contact.threads import few_threads
 from upd.contact.tilt_newton import HALF_THE_DIGITS, TiltMinimiser, least_distance_and_multipliers
 from upd.errors import ConvergenceError
 

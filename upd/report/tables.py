@@ -25,8 +25,6 @@ from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_label, number_title
 from upd.results.sampled import SampledNumber
 
-#: columns of numbers that a narrow terminal leaves out, the first one first
-SPARE = ("source", "thesis", "reference", "difference", "±")
 #: numbers of a run whose analysis is not known
 _MOST = 8
 #: cases that a table of several cases shows

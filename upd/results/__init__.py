@@ -1,7 +1,20 @@
 """What a run leaves behind: cases, numbers with their errors, checks, and arrays in one file."""
 
 from upd.results.case import NO_CASE, Case, shared_label
-from upd.results.check import Check, left_out_check, worst_check, worst_checks
+from upd.results.check import (
+    FAILED,
+    OK,
+    WARNED,
+    Check,
+    left_out_check,
+    outcome_of,
+    status_of,
+    warned,
+    warnings_of,
+    with_fault,
+    worst_check,
+    worst_checks,
+)
 from upd.results.netcdf import ArrayGroup, read_netcdf, variable, write_netcdf
 from upd.results.number import (
     ErrorPart,
@@ -14,16 +27,6 @@ from upd.results.number import (
     with_estimates,
     with_inputs,
     with_parts,
-)
-from upd.results.status import (
-    FAILED,
-    OK,
-    WARNED,
-    outcome_of,
-    status_of,
-    warned,
-    warnings_of,
-    with_fault,
 )
 
 __all__ = [

@@ -20,7 +20,7 @@ from upd.fem.inertia import MassProperties, mass_properties
 from upd.mesh import FloatArray, Mesh
 from upd.mesh.pairing import check_pairs
 from upd.mesh.quality import quality
-from upd.mesh.stored import load_meshes, save_meshes
+from upd.mesh.recipes import load_meshes, save_meshes
 
 EPS = np.finfo(float).eps
 SMALL: dict[str, Any] = {"divisions": 3, "divisions_long": 6, "growth": 1.8}

@@ -288,3 +288,91 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
         )
     ]
     none_of(without)
+
+
+# -- sizes -----------------------------------------------------------------------------------------
+
+
+#: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
+ROOM_LINES = {
+    "analyses": 15890,
+    "hbm": 7740,
+    "contact": 4450,
+    "linalg": 3370,
+    "scene": 2340,
+    "plot": 2210,
+    "report": 2130,
+    "fitting": 1870,
+    "sizing": 1760,
+    "batch": 1620,
+    "mesh": 1460,
+    "vary": 1390,
+    "reference": 1190,
+    "cli": 980,
+    "measured": 880,
+    "reduction": 880,
+    "results": 880,
+    "fem": 860,
+    "matrices": 620,
+    "root": 600,
+    "cache": 440,
+    "dynamics": 360,
+    "scenes": 220,
+}
+#: totals of upd/
+MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 54100, 425, 3980, 505
+#: parameters of a function and fields of a class, outside the solver rooms
+MOST_PARAMETERS, MOST_FIELDS, SOLVER_ROOMS = 11, 20, ("hbm", "contact", "linalg")
+
+
+def code_lines(path: Path) -> int:
+    """Lines of a module without blank ones, comments and docstrings."""
+    docs: set[int] = set()
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef)) and ast.get_docstring(
+            node
+        ):
+            docs.update(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return sum(
+        bool(line.strip()) and not line.strip().startswith("#") and k not in docs
+        for k, line in enumerate(lines, 1)
+    )
+
+
+def test_rooms_stay_within_their_sizes() -> None:
+    sizes: dict[str, int] = defaultdict(int)
+    for path in modules("upd"):
+        parts = path.relative_to(ROOT / "upd").parts
+        sizes[parts[0] if len(parts) > 1 else "root"] += code_lines(path)
+    none_of(
+        f"upd/{room}: {size} lines of code, {ROOM_LINES.get(room, 0)} are allowed"
+        for room, size in sizes.items()
+        if size > ROOM_LINES.get(room, 0)
+    )
+
+
+def test_the_house_stays_within_its_size() -> None:
+    files = modules("upd")
+    nodes = [node for path in files for node in ast.walk(parsed(path))]
+    assert sum(map(code_lines, files)) <= MOST_LINES
+    assert len(files) <= MOST_FILES
+    assert sum(isinstance(node, ast.FunctionDef) for node in nodes) <= MOST_FUNCTIONS
+    assert sum(isinstance(node, ast.ClassDef) for node in nodes) <= MOST_CLASSES
+
+
+def test_functions_have_few_parameters_and_classes_few_fields() -> None:
+    found = []
+    for path in modules("upd"):
+        if path.relative_to(ROOT / "upd").parts[0] in SOLVER_ROOMS:
+            continue
+        for node in ast.walk(parsed(path)):
+            if isinstance(node, ast.FunctionDef):
+                a = node.args
+                if (count := len(a.posonlyargs + a.args + a.kwonlyargs)) > MOST_PARAMETERS:
+                    found.append(f"{place(path, node)}: {count} parameters")
+            if isinstance(node, ast.ClassDef):
+                fields = sum(isinstance(b, ast.AnnAssign) for b in node.body)
+                if fields > MOST_FIELDS:
+                    found.append(f"{place(path, node)}: {fields} fields")
+    none_of(found)

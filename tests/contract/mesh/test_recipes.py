@@ -18,7 +18,7 @@ from upd.cache.arrays import cache_folder
 from upd.errors import InputError, MeshError
 from upd.mesh import Mesh, recipes
 from upd.mesh.pairing import check_pairs
-from upd.mesh.stored import load_meshes
+from upd.mesh.recipes import load_meshes
 
 SMALL: dict[str, Any] = {"divisions": 4, "growth": 2.0}
 

@@ -41,11 +41,11 @@ from upd.analyses.contact.plan import (
     is_curved,
     unit_vector,
 )
+from upd.contact.checks import few_threads
 from upd.contact.model import ContactModel
 from upd.contact.normal import normal_contact
 from upd.contact.tangential import tangential_path
 from upd.contact.tangential_step import TangentialHistory
-from upd.contact.threads import few_threads
 from upd.contact.tilt import tilted_contact
 from upd.errors import InputError, UpdError
 from upd.progress import Stages

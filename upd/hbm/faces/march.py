@@ -22,7 +22,7 @@ up on stiff contact). What averaging and holding take from the lowest harmonic o
 the factor sin(x)/x, x = omega dt, is given back by dividing by it what the modal forces are beyond
 those at rest, which is a change of modal mass and keeps that energy balance: static state and that
 harmonic are exact. Modes that a step does not resolve are stepped implicitly, see
-`upd.hbm.faces.modes`, which lets them rest and follow exactly. The damper follows the WBZ-alpha
+`upd.hbm.faces.march`, which lets them rest and follow exactly. The damper follows the WBZ-alpha
 method with full damping at infinite frequency, 2 s''_1 - s''_0 = M_D^-1 (p - B' f_1), Newmark's
 beta = 1 and gamma = 3/2, of second order, which damps the rattling of its mass on the faces that
 the step does not resolve: s_1 = s* - dt^2/2 M_D^-1 B' f_1. Together
@@ -48,15 +48,84 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor, cho_solve, expm
 
 from upd.errors import ConvergenceError
 from upd.hbm.faces.bases import suit_bases
 from upd.hbm.faces.kept import kept_inverses
-from upd.hbm.faces.modes import modal_step, resolved
 from upd.hbm.faces.period import Bases, Past, StepParts, march_steps
 from upd.hbm.faces.state import FloatArray, InterfaceModel, InterfaceState
 from upd.hbm.faces.step import OPEN, STICK, judge
+
+#: steps in a period from which a mode is stepped exactly
+RESOLVED = 4
+
+
+def resolved(omega: FloatArray, dt: float) -> NDArray[np.bool_]:
+    """Whether modes have `RESOLVED` steps or more in a period.
+
+    Parameters
+    ----------
+    omega : (m,) ndarray
+        rad/s.
+    dt : float
+        s.
+
+    Returns
+    -------
+    (m,) ndarray of bool
+    """
+    return np.asarray(RESOLVED * omega * dt <= 2.0 * np.pi)
+
+
+def modal_step(omega: FloatArray, damping: FloatArray, dt: float, scale: float) -> FloatArray:
+    """A step of oscillators of mass 1, see the module.
+
+    Under the mean of the forces the first of the steady response's harmonics comes out smaller by
+    sin(x)/x, x = omega dt.
+
+    Parameters
+    ----------
+    omega, damping : (m,) ndarray
+        rad/s, ratio to critical.
+    dt : float
+        s.
+    scale : float
+        Of the forces on the modes that the steps resolve.
+
+    Returns
+    -------
+    (8, m) ndarray
+        q after by q, v, force before and after; v after by the same.
+    """
+    # x = (q, v dt), force dt^2: time in steps, so that all entries are alike
+    a = np.asarray(omega * dt)
+    A = np.zeros((len(a), 2, 2))
+    A[:, 0, 1] = 1.0
+    A[:, 1, 0], A[:, 1, 1] = -(a**2), -2.0 * damping * a
+    by = np.where(resolved(omega, dt)[:, None, None], _held(A, scale), _implicit(A))
+    units = np.array([[1.0, dt, dt**2, dt**2], [1.0 / dt, 1.0, dt, dt]])
+    return np.ascontiguousarray((by * units).transpose(1, 2, 0).reshape(8, -1))
+
+
+def _held(A: FloatArray, scale: float) -> FloatArray:
+    """(m, 2, 4) x after by x, force before and after, exact under the mean of the forces."""
+    E = np.zeros((len(A), 3, 3))
+    E[:, :2, :2], E[:, 1, 2] = A, 1.0
+    E = expm(E)
+    half = 0.5 * scale * E[:, :2, 2:]
+    return np.concatenate([E[:, :2, :2], half, half], axis=2)
+
+
+def _implicit(A: FloatArray) -> FloatArray:
+    """(m, 2, 4) the same by Lobatto IIIC."""
+    one, half = np.eye(2), 0.5 * A
+    stages = np.block([[one - half, half], [-half, one - half]])
+    right = np.zeros((4, 4))
+    right[:2, :2] = right[2:, :2] = one
+    right[1, 2:], right[3, 2:] = (0.5, -0.5), (0.5, 0.5)
+    return np.asarray(np.linalg.solve(stages, np.broadcast_to(right, stages.shape))[:, 2:])
+
 
 #: nodes a sample that a new base must spare; making it costs what some thousand nodes do
 PAYS = 0.25
