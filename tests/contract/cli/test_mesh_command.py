@@ -12,6 +12,7 @@ import pytest
 import upd
 from upd import cli
 from upd.analyses.meshing import mesh_request
+from upd.cli import terminal
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.fields import table
@@ -30,6 +31,8 @@ SMALL = {
 @pytest.fixture(autouse=True)
 def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    # no cell is folded, whatever width the terminal had when its console was made
+    monkeypatch.setattr(terminal.console, "width", 240)
 
 
 def call(*arguments: str) -> int:
@@ -127,10 +130,7 @@ def test_configurations_of_the_rig(
     assert list(recipes.count(request.recipe, request.given)) == bodies
 
 
-def test_pairs_of_the_free_damper_are_told(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "240")
+def test_pairs_of_the_free_damper_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     settings = [*SMALL["blade_rig"], "--no-picture"]
     assert call("blade_rig", *settings, "--damper", "free", "-o", "a.msh") == 0
     told = capsys.readouterr().out
@@ -183,10 +183,7 @@ def test_faults_are_told_before_anything_is_written(
     assert list(Path.cwd().iterdir()) == []
 
 
-def test_the_list_has_units_defaults_and_bounds(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "240")
+def test_the_list_has_units_defaults_and_bounds(capsys: pytest.CaptureFixture[str]) -> None:
     assert call("sphere_block", "--list", "--set", "radius=2 mm") == 0
     told = capsys.readouterr().out
     rows = {line.split()[0]: " ".join(line.split()) for line in told.splitlines() if line.strip()}
