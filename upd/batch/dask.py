@@ -61,7 +61,8 @@ class DaskCluster:
                 n_workers=int(local[1]),
                 threads_per_worker=1,
                 host="127.0.0.1",
-                dashboard_address=None,
+                # any free port: without an address dask takes 8787, which another may have
+                dashboard_address=":0",
                 worker_dashboard_address=None,
             )
         try:
