@@ -11,6 +11,7 @@ from pathlib import Path
 from upd import __version__
 from upd.errors import UpdError
 from upd.linalg import select
+from upd.linalg.compiled import kept_in
 from upd.mesh import recipes
 
 _PACKAGES = (
@@ -26,6 +27,7 @@ _PACKAGES = (
     "matplotlib",
 )
 _NO_MKL = 'not installed: pip install "upd[mkl]" makes the direct solver more than ten times faster'
+_NOT_KEPT = "compiled again at every start: set NUMBA_CACHE_DIR to a folder that can be written"
 
 
 def examine() -> list[tuple[str, str, bool]]:
@@ -43,6 +45,8 @@ def examine() -> list[tuple[str, str, bool]]:
         except metadata.PackageNotFoundError:
             rows.append((package, _NO_MKL if optional else "missing", optional))
     rows += [(name, str(value), True) for name, value in select.available().items()]
+    kept = kept_in("upd.linalg.lines")
+    rows.append(("compiled functions", f"kept in {kept.parent}" if kept else _NOT_KEPT, bool(kept)))
     try:
         rows.append(("gmsh libraries", recipes.gmsh_version(), True))
     except UpdError as error:

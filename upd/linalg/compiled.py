@@ -90,6 +90,15 @@ class _Kept(_FunctionCache):  # type: ignore[misc]
             _not_kept(getattr(error, "strerror", None) or type(error).__name__)
 
 
+def kept_in(module: str) -> Path | None:
+    """Folder of the compiled functions of a module; None where none can be written."""
+    folder = _folder(module)
+    if folder is None:
+        with contextlib.suppress(RuntimeError):
+            folder = Path(_FunctionCache(sources_digest).cache_path)
+    return folder if folder is not None and os.access(folder.parent, os.W_OK) else None
+
+
 @cache
 def _not_kept(reason: str) -> None:
     log.warning(

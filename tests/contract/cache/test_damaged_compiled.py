@@ -81,6 +81,7 @@ def test_no_folder_at_all_stops_nothing(
         raise RuntimeError("cannot cache function: no locator available")
 
     monkeypatch.setattr(FunctionCache, "__init__", nowhere)
+    assert room.kept_in("own_loops") is None
     assert load().twice(2.0) == 4.0
     assert load().twice(2.0) == 4.0
     [record] = caplog.records

@@ -298,7 +298,7 @@ ROOM_LINES = {
     "analyses": 15890,
     "hbm": 7740,
     "contact": 4450,
-    "linalg": 3370,
+    "linalg": 3380,
     "scene": 2340,
     "plot": 2210,
     "report": 2130,
