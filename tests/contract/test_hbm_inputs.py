@@ -144,3 +144,31 @@ def test_sets_of_harmonics() -> None:
     for bad in ((), 3, "13", (1, 2.5), None):
         with pytest.raises(InputError, match="harmonics"):
             harmonics(bad)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.5])
+def test_damping_that_feeds_energy_is_refused(mu: float) -> None:
+    joint = contacts([[0.0, 0.0]], [[1.0, 0.0]], k_n=0.0, k_t=1.0, mu=mu, preload=1.0)
+    for C in (-0.05 * np.eye(2), [[0.05, 0.2], [0.2, 0.05]]):
+        with pytest.raises(InputError, match="C feeds energy into a motion"):
+            frequency_response(
+                np.eye(2),
+                C,
+                np.eye(2),
+                joint,
+                harmonic_force=[1.0, 0.0],
+                frequencies=[0.1, 0.2],
+            )
+
+
+def test_no_damping_at_a_resonance_is_refused() -> None:
+    joint = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=3.0, mu=1.0, preload=1e9)
+    with pytest.raises(InputError, match="no damping at a resonance of the sticking contacts"):
+        frequency_response(
+            [[1.0]],
+            [[0.0]],
+            [[1.0]],
+            joint,
+            harmonic_force=[1.0],
+            frequencies=[2.0 / (2.0 * np.pi)],
+        )

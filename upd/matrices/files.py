@@ -4,16 +4,18 @@ it), .npz; with the map of the dofs.
 
 from __future__ import annotations
 
+import re
 from codecs import BOM_UTF8
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.io import mmread, mmwrite
+from scipy.io import mminfo, mmread, mmwrite
 from scipy.sparse import csr_array, load_npz, save_npz
 
 from upd.errors import InputError
@@ -22,6 +24,9 @@ from upd.mesh import IntArray
 
 COMPONENTS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
 _HARWELL_BOEING = (".hb", ".rsa", ".rua", ".matrix", ".hbmat")
+#: comments at the begin of a Matrix Market file, and numbers that scipy reads as others
+_HEAD = re.compile(rb"(?:[ \t]*(?:%[^\n]*)?\n)*")
+_OTHER_NUMBER = re.compile(rb"[0-9.][dD][-+0-9]|,")
 _HEADER = "! Matrix Eqn      Node      DOF"
 
 
@@ -331,11 +336,28 @@ def _write_market(path: Path, A: csr_array, title: str) -> None:
 
 
 def _read_market(path: Path) -> Any:
-    with path.open("rb") as file:
-        # Some editors begin a file with a mark of its encoding.
-        if file.read(len(BOM_UTF8)) != BOM_UTF8:
-            file.seek(0)
-        return mmread(file, spmatrix=False)
+    """A Matrix Market file, read by its name: of a file object scipy ends the process when it is
+    damaged, and it reads D exponents and decimal commas as other numbers.
+    """
+    content = path.read_bytes()
+    if content.startswith(BOM_UTF8):
+        # some editors begin a file with a mark of its encoding
+        with TemporaryDirectory() as folder:
+            plain = Path(folder) / "plain.mtx"
+            plain.write_bytes(content.removeprefix(BOM_UTF8))
+            return _read_market(plain)
+    rows, columns, entries, layout, field, _ = mminfo(path)
+    if field == "pattern":
+        raise ValueError('it is a "pattern" file: places without values')
+    # an entry takes two characters, and every row of K and M has one
+    least = entries if layout == "coordinate" else rows * columns // 2
+    if 2 * max(least, rows, columns) > len(content) + 2:
+        raise ValueError(f"{rows} x {columns} with {entries} entries do not fit in its size")
+    found = _OTHER_NUMBER.search(content, _HEAD.match(content).end())  # type: ignore[union-attr]
+    if found:
+        line = content.count(b"\n", 0, found.start()) + 1
+        raise ValueError(f"line {line} has a D exponent or a comma: write numbers as -1.5e+04")
+    return mmread(path, spmatrix=False)
 
 
 def _reader(path: Path) -> Callable[[Path], Any]:

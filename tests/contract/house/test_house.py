@@ -296,7 +296,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
     "analyses": 15890,
-    "hbm": 7740,
+    "hbm": 7760,
     "contact": 4450,
     "linalg": 3380,
     "scene": 2340,
@@ -313,7 +313,7 @@ ROOM_LINES = {
     "reduction": 880,
     "results": 880,
     "fem": 860,
-    "matrices": 620,
+    "matrices": 640,
     "root": 600,
     "cache": 440,
     "dynamics": 360,

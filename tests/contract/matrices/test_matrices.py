@@ -208,3 +208,36 @@ def test_text_files_of_windows_editors_load(ending: str, tmp_path: Path) -> None
     lines = map_file.read_bytes().split(b"\n", 1)[1].lstrip().replace(b"\n", b"\r\n")
     map_file.write_bytes(b"\xef\xbb\xbf" + lines)
     assert list(read_dof_map(map_file).dofs()) == [0, 4]
+
+
+_BANNER = "%%MatrixMarket matrix coordinate real symmetric\n% from another program, 2D\n2 2 3\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (_BANNER + "1 1 2.0D+04\n2 1 -1.0D+04\n2 2 2.0D+04\n", "line 4 has a D exponent"),
+        (
+            _BANNER + "1 1 20000,0\n2 1 -10000,0\n2 2 20000,0\n",
+            "line 4 has a D exponent or a comma",
+        ),
+        (
+            "%%MatrixMarket matrix coordinate pattern symmetric\n2 2 3\n1 1\n2 1\n2 2\n",
+            "places without values",
+        ),
+        ("1,1, 1,1, 2.0e+04\n2,1, 1,1, -1.0e+04\n2,1, 2,1, 1.0e+04\n", "banner"),
+        (_BANNER.replace("2 2 3", "2147483648 2147483648 3") + "1 1 1.0\n", "do not fit"),
+        (_BANNER.replace("2 2 3", "2 2 300000000000") + "1 1 1.0\n", "do not fit"),
+        ("\x00\x01\x02", "cannot be read"),
+        ("", "cannot be read"),
+    ],
+)
+def test_matrix_market_files_that_would_be_another_matrix(
+    text: str, says: str, tmp_path: Path
+) -> None:
+    """Some of these ended the process, others were read without a word."""
+    path = tmp_path / "K.mtx"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match="cannot be read") as caught:
+        read_matrix(path)
+    assert says in str(caught.value)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import LinAlgError, eigh
+from scipy.linalg import LinAlgError, eigh, eigvalsh
 
 from upd.errors import InputError
 
@@ -177,7 +177,7 @@ def modal(M: ArrayLike, C: ArrayLike, K: ArrayLike) -> Modal:
     Raises
     ------
     InputError
-        On shapes, symmetry, or an indefinite matrix; all problems are named.
+        On shapes, symmetry, an indefinite K or M, or a C that feeds energy into a motion.
     """
     matrices = {name: np.asarray(A, dtype=float) for name, A in (("M", M), ("C", C), ("K", K))}
     n = len(matrices["M"])
@@ -214,7 +214,14 @@ def modal(M: ArrayLike, C: ArrayLike, K: ArrayLike) -> Modal:
     # the low modes of a slender body lie 1e-10 below the highest: only what rounding itself may
     # leave counts as rigid
     rigid = values <= 10 * rounding
-    return Modal(Phi, np.where(rigid, 0.0, values), _damping(Phi, matrices["C"]), rigid)
+    damping = _damping(Phi, matrices["C"])
+    least = damping.min() if damping.ndim == 1 else eigvalsh((damping + damping.T) / 2)[0]
+    if least < -n * np.sqrt(EPS) * np.abs(damping).max():
+        raise InputError(
+            f"linear system: C feeds energy into a motion (x'C x = {least:.3g} for x'M x = 1): "
+            "nothing bounds its response; check its signs"
+        )
+    return Modal(Phi, np.where(rigid, 0.0, values), damping, rigid)
 
 
 def _damping(Phi: FloatArray, C: FloatArray) -> FloatArray:

@@ -257,7 +257,14 @@ class CondensedProblem:
             self.loads,
             slopes=False,
         )
-        w = np.linalg.solve(np.eye(c) + G * k, u[..., None])[..., 0].T
+        try:
+            w = np.linalg.solve(np.eye(c) + G * k, u[..., None])[..., 0].T
+        except np.linalg.LinAlgError:
+            raise InputError(
+                f"frequency_response: no damping at a resonance of the sticking contacts, "
+                f"{omega / (2.0 * np.pi):.6g} Hz: the response has no bound; give damping, or "
+                "leave this frequency out"
+            ) from None
         X = np.zeros((c, self.harmonics.size))
         X[:, o::2], X[:, o + 1 :: 2] = w.real, -w.imag
         if self.harmonics.static:
