@@ -242,6 +242,7 @@ def forced_response(
     ]
     if problems:
         raise InputError("forced_response: " + "; ".join(problems))
+    _refuse_penalties(model.K)
     below = _BEYOND * _highest(orders) * float(f.max(initial=0.0))
     reduced = _reduced(model, rows.used, modes, below, whole=damping is not None)
     if reduced is None:
@@ -433,6 +434,23 @@ def _blurred(K: FloatArray, M: FloatArray) -> int:
         ) from None
     rounding = len(values) * float(np.finfo(float).eps) * float(np.abs(values).max())
     return int((modal(M, np.zeros_like(K), K).rigid & (values > rounding)).sum())
+
+
+def _refuse_penalties(K: csr_array) -> None:
+    """Refuse entries on the diagonal beside which rounding loses the others: dofs that other
+    programs fix.
+    """
+    diagonal = K.diagonal()
+    order = np.argsort(diagonal)
+    order = order[diagonal[order] > 0.0]
+    jumps = np.flatnonzero(diagonal[order][1:] * np.finfo(float).eps > diagonal[order][:-1])
+    fixed = order[jumps[0] + 1 :] if len(jumps) else order[:0]
+    if len(fixed):
+        raise InputError(
+            f"forced_response: K has {diagonal[fixed[0]]:.3g} on the diagonal of "
+            f"{len(fixed)} dofs, the first {int(fixed.min())}, a penalty beside which rounding "
+            "loses the rest; leave these dofs out of K, M and C: they do not move"
+        )
 
 
 def _refuse_blurred(K: FloatArray, M: FloatArray) -> None:

@@ -313,7 +313,7 @@ ROOM_LINES = {
     "reduction": 880,
     "results": 880,
     "fem": 860,
-    "matrices": 640,
+    "matrices": 650,
     "root": 600,
     "cache": 440,
     "dynamics": 360,

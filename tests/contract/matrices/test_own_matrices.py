@@ -246,3 +246,31 @@ def test_map_file(tmp_path: Path) -> None:
         for dofs in (path, model.dofs)
     )
     np.testing.assert_array_equal(by_file.amplitude("tip"), by_map.amplitude("tip"))
+
+
+def chain_with(penalty: float) -> Any:
+    """A chain of four masses, its fixed end kept in K with a penalty on the diagonal."""
+    k, n = 1e4, 4
+    K = np.zeros((5, 5))
+    K[1:, 1:] = k * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+    K[0, 0], K[-1, -1] = penalty, k
+    return forced_response(
+        K,
+        1e-3 * np.eye(5),
+        C=np.diag([0.0, 0.1, 0.1, 0.1, 0.1]),
+        joints=[Joint(closing={}, sliding=[4], k_t=1e3, mu=0.5, preload=1e6)],
+        force={1: 1.0},
+        watch={"tip": 4},
+        frequencies=[150.0],
+    )
+
+
+@pytest.mark.parametrize("penalty", [1e8, 1e12, 1e16])
+def test_fixed_dofs_on_the_diagonal_do_not_move(penalty: float) -> None:
+    assert chain_with(penalty).amplitude("tip")[0] == pytest.approx(1.833e-4, rel=1e-3)
+
+
+@pytest.mark.parametrize("penalty", [1e20, 1e26, 1e36])
+def test_penalties_beside_which_rounding_loses_the_rest_are_refused(penalty: float) -> None:
+    with pytest.raises(InputError, match="on the diagonal of 1 dofs, the first 0, a penalty"):
+        chain_with(penalty)
