@@ -5,10 +5,13 @@ Our sources, a user's recipe file, and the versions of the libraries.
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import json
 import platform
-from collections.abc import Iterable, Mapping
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -16,6 +19,8 @@ from typing import Any
 
 #: libraries that numbers depend on
 _LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "pyamg", "numba", "pypardiso", "mkl")
+#: folders in which packages are installed
+_PACKAGES = frozenset({"site-packages", "dist-packages"})
 #: packages whose version a run writes into its log
 _LOGGED = ("numpy", "scipy", "scikit-fem", "gmsh", "pypardiso")
 
@@ -49,7 +54,7 @@ def _libraries() -> str:
 
 def source_digest(recipe: str = "") -> str:
     """SHA-256 of our sources, of the libraries' versions, and of a user's ``recipe`` when that is
-    the path of a file.
+    the path of a file, with all that it imports from outside the environment.
 
     Raises
     ------
@@ -58,8 +63,51 @@ def source_digest(recipe: str = "") -> str:
     """
     digest = hashlib.sha256(f"{_ours()}{_libraries()}".encode())
     if recipe.lower().endswith((".py", ".msh", ".inp")):
-        digest.update(Path(recipe).read_bytes())
+        for file in user_files(Path(recipe)):
+            digest.update(file.read_bytes())
     return digest.hexdigest()
+
+
+def user_files(recipe: Path) -> list[Path]:
+    """A user's file, and of a .py file all modules outside the environment that it imports, itself
+    or through others.
+
+    Raises
+    ------
+    OSError
+        When one of them cannot be read.
+    """
+    found, wanted = list[Path](), [recipe.resolve()]
+    while wanted:
+        file = wanted.pop()
+        if file in found:
+            continue
+        found.append(file)
+        for name in _imported(file) if file.suffix == ".py" else ():
+            for folder in (file.parent, *map(Path, sys.path)):
+                place = folder.joinpath(*name.split("."))
+                both = (place.with_suffix(".py"), place / "__init__.py")
+                wanted += [one.resolve() for one in both if one.is_file() and not _installed(one)]
+    return found
+
+
+def _imported(file: Path) -> Iterator[str]:
+    """Modules that a file imports, and what may be one."""
+    with suppress(SyntaxError, ValueError):
+        for node in ast.walk(ast.parse(file.read_bytes())):
+            if isinstance(node, ast.Import):
+                yield from (alias.name for alias in node.names)
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                yield from (node.module, *(f"{node.module}.{a.name}" for a in node.names))
+
+
+def _installed(file: Path) -> bool:
+    """Whether a module is of the environment or of this program."""
+    here = Path(__file__).resolve().parents[1]
+    homes = (sys.prefix, sys.base_prefix, here, here.with_name("geometry"))
+    return not _PACKAGES.isdisjoint(file.parts) or any(
+        file.resolve().is_relative_to(Path(home).resolve()) for home in homes
+    )
 
 
 def key_of(data: Mapping[str, Any]) -> str:

@@ -14,6 +14,7 @@ from pathlib import Path
 from types import ModuleType
 
 from upd.cache.arrays import cache_folder
+from upd.cache.sources import user_files
 from upd.errors import InputError, did_you_mean
 from upd.mesh.own_mesh import ENDINGS as MESH_ENDINGS
 from upd.mesh.own_mesh import recipe_of
@@ -87,12 +88,19 @@ def _read_mesh(path: str, digest: str) -> ModuleType:
 
 
 def _user_module(path: Path) -> ModuleType:
-    """The user's recipe file, run afresh whenever its text changed."""
+    """The user's recipe file, run afresh when its text or that of a module it imports changed."""
     source = _content(path, "a .py file")
     geometry_module("blocks")  # a recipe imports from our package: say so first when it is hidden
-    name = f"upd_recipe_{hashlib.sha256(str(path.resolve()).encode() + source).hexdigest()[:16]}"
+    files = user_files(path)
+    content = b"".join(file.read_bytes() for file in files)
+    name = f"upd_recipe_{hashlib.sha256(str(path.resolve()).encode() + content).hexdigest()[:16]}"
     if name in sys.modules:
         return sys.modules[name]
+    # what it imports may have changed since another recipe imported it
+    changed = {str(file) for file in files[1:]}
+    for known, loaded in list(sys.modules.items()):
+        if getattr(loaded, "__file__", "") in changed:
+            del sys.modules[known]
     _warn_first(path, name)
     module = ModuleType(name)
     module.__file__ = str(path.resolve())

@@ -15,9 +15,11 @@ import pytest
 
 from upd.cache import sources
 from upd.cache.arrays import cache_folder
+from upd.cache.sources import source_digest, user_files
 from upd.errors import InputError, MeshError
 from upd.mesh import Mesh, recipes
 from upd.mesh.pairing import check_pairs
+from upd.mesh.recipe_modules import module_of
 from upd.mesh.recipes import load_meshes
 
 SMALL: dict[str, Any] = {"divisions": 4, "growth": 2.0}
@@ -319,3 +321,26 @@ def test_library_does_not_load_gmsh_before_it_meshes() -> None:
 
 def test_gmsh_version_is_told() -> None:
     assert recipes.gmsh_version()[0].isdigit()
+
+
+def test_a_module_that_a_recipe_imports_is_part_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A changed helper is another recipe: in this process, and in the keys of what is kept."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    # within a second a file of the same size would be taken from its old bytecode
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    helper, further = tmp_path / "own_sizes.py", tmp_path / "own_units.py"
+    further.write_text("mm = 1.0\n")
+    helper.write_text("from own_units import mm\nWIDTH = 2.0 * mm\n")
+    recipe = tmp_path / "own_recipe.py"
+    recipe.write_text("import own_sizes\nWIDTH = own_sizes.WIDTH\n")
+    digests, widths = [source_digest(str(recipe))], [module_of(str(recipe)).WIDTH]
+    for file, text in ((further, "mm = 4.0\n"), (helper, "import own_units\nWIDTH = 3.0\n")):
+        file.write_text(text)
+        importlib.invalidate_caches()
+        digests.append(source_digest(str(recipe)))
+        widths.append(module_of(str(recipe)).WIDTH)
+    assert widths == [2.0, 8.0, 3.0]
+    assert len(set(digests)) == 3
+    assert user_files(recipe) == [recipe, helper, further]
