@@ -35,15 +35,19 @@ def test_missing_harmonics_between_count_and_are_named() -> None:
     assert "omitted harmonics (2, above 3)" in few.message
 
 
-def test_a_mean_force_on_a_body_without_stiffness_is_a_large_motion() -> None:
-    # nothing but the open contact holds the body against the mean force
+def test_a_mean_force_on_a_body_without_stiffness_moves_it_against_the_contact() -> None:
+    """Nothing but the contact, closed, holds it: mean force over k_n, relative to the amplitude."""
+    k_n, preload = 2.0, 0.05
     held = frequency_response(
         [[1.0]],
         [[0.02]],
         [[0.0]],
-        contacts([[1.0]], [[0.0]], k_n=2.0, k_t=1.0, mu=0.0, preload=0.05),
+        contacts([[1.0]], [[0.0]], k_n=k_n, k_t=1.0, mu=0.0, preload=preload),
         harmonic_force=[0.3],
         frequencies=np.array([0.1, 0.12]),
         harmonics=(1,),
     )
-    assert held.truncation[-1] > 0.05
+    amplitude = abs(held.amplitude([1.0])[-1])
+    w = amplitude * np.cos(np.linspace(0.0, 2.0 * np.pi, 4096, endpoint=False))
+    mean = np.maximum(0.0, preload + k_n * w).mean()
+    assert held.truncation[-1] == pytest.approx(mean / k_n / amplitude, rel=1e-3)

@@ -85,8 +85,8 @@ def _rank_of(entry: Entry, slipping: set[tuple[Any, Any]]) -> tuple[bool, float]
 
 def answer(results: Sequence[Entry]) -> list[AnswerTable]:
     """Static state, peaks, the best damper, what the answer depends on most."""
-    told = [one for one in results if one["value"] is not None]
-    tables = [_static(told), _peaks(told, results), _best(told), _inputs(told)]
+    reached = [one for one in results if one["value"] is not None]
+    tables = [_static(reached), _peaks(reached, results), _best(reached), _inputs(reached)]
     return [table for table in tables if table is not None]
 
 
