@@ -83,11 +83,12 @@ def user_files(recipe: Path) -> list[Path]:
         if file in found:
             continue
         found.append(file)
-        for name in _imported(file) if file.suffix == ".py" else ():
+        for name in _imported(file) if file.suffix == ".py" and not _installed(file) else ():
             for folder in (file.parent, *map(Path, sys.path)):
                 place = folder.joinpath(*name.split("."))
                 both = (place.with_suffix(".py"), place / "__init__.py")
-                wanted += [one.resolve() for one in both if one.is_file() and not _installed(one)]
+                files = [one.resolve() for one in both if one.is_file()]
+                wanted += [one for one in files if not _installed(one)]
     return found
 
 
@@ -102,12 +103,15 @@ def _imported(file: Path) -> Iterator[str]:
 
 
 def _installed(file: Path) -> bool:
-    """Whether a module is of the environment or of this program."""
+    """Whether a module, its path resolved, is of the environment or of this program."""
+    return not _PACKAGES.isdisjoint(file.parts) or any(map(file.is_relative_to, _homes()))
+
+
+@cache
+def _homes() -> tuple[Path, ...]:
     here = Path(__file__).resolve().parents[1]
     homes = (sys.prefix, sys.base_prefix, here, here.with_name("geometry"))
-    return not _PACKAGES.isdisjoint(file.parts) or any(
-        file.resolve().is_relative_to(Path(home).resolve()) for home in homes
-    )
+    return tuple(Path(home).resolve() for home in homes)
 
 
 def key_of(data: Mapping[str, Any]) -> str:

@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import stdtrit
 
 from upd.labels import percent_of
 from upd.results.number import InputPart
@@ -197,7 +197,7 @@ def _compared(
         still = not np.ptp(drawn)
         verdict = "nothing moves it" if still else f"{percent_of(plain)} where first order has none"
         return {"outcome": AGREES if still else DIFFERS, "verdict": verdict}
-    t = float(stats.t.ppf(1.0 - TAIL, n - 1))
+    t = float(stdtrit(n - 1, 1.0 - TAIL))
     left = (drawn - first) / abs(nominal)
     shift, shift_error = float(left.mean()), t * float(np.std(left, ddof=1)) / math.sqrt(n)
     log_ratio = 0.5 * float(np.log(np.var(drawn) / np.var(first))) if np.ptp(drawn) else -math.inf
