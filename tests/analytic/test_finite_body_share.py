@@ -7,8 +7,8 @@ import pytest
 
 import upd
 from upd.analyses.contact.scene_plan import make_plan
-from upd.analyses.contact.solution import HertzSolution
-from upd.analyses.hertz.solve import solve_plan
+from upd.analyses.contact.solution import ContactSolution
+from upd.analyses.contact.solve import solve_plan
 from upd.contact.bulk import finite_body_share, half_space_mean
 from upd.contact.patch import make_patch
 from upd.errors import MeshError
@@ -24,7 +24,7 @@ SMALL = {
 
 
 @cache
-def solved(growth: float, symmetry: str = "auto") -> HertzSolution:
+def solved(growth: float, symmetry: str = "auto") -> ContactSolution:
     settings = {**SMALL, "geometry.growth": growth, "mesh.symmetry": symmetry}
     return solve_plan(make_plan(upd.load_scene("hertz", settings)), Stages())
 
@@ -53,12 +53,12 @@ def test_share_is_that_of_a_solve_for_the_difference_of_the_fields() -> None:
     sides = [np.einsum("aq,fai->fqi", slope, x[faces]) for slope in slopes]
     outward = (np.cross(*sides) * (body.side * weights[:, None])).reshape(-1, 3)
     points = np.einsum("aq,fai->fqi", values, x[faces]).reshape(-1, 3)
-    traction = np.einsum("qij,qj->qi", boussinesq_stress(*points.T, case.load, 0.3), outward)
+    traction = np.einsum("qij,qj->qi", boussinesq_stress(*points.T, case.force, 0.3), outward)
     load = np.zeros((body.mesh.n_node, 3))
     nodal = np.einsum("aq,fqi->fai", values, traction.reshape(len(faces), -1, 3))
     np.add.at(load, faces.ravel(), -nodal.reshape(-1, 3) * into)
     w = np.zeros((body.mesh.n_node, 3))
-    u = np.stack(np.broadcast_arrays(*boussinesq(*x[distant].T, case.load, 2e5, 0.3)), axis=1)
+    u = np.stack(np.broadcast_arrays(*boussinesq(*x[distant].T, case.force, 2e5, 0.3)), axis=1)
     w[distant] = -u * into
     _, free = body.condensed[(2,)]
     K = body.K.whole()
@@ -130,7 +130,7 @@ def test_a_body_beyond_its_contact_plane_has_no_share() -> None:
         finite_body_share(
             bent,
             case.displacement[body.name],
-            case.force,
+            solution.model.patch.whole(case.solution.force, extensive=True),
             solution.model.patch,
             0.19,
             2e5,

@@ -17,9 +17,9 @@ from upd.analyses.contact.bodies import pressed
 from upd.analyses.contact.loading import load_point
 from upd.analyses.contact.plan import refined_growth
 from upd.analyses.contact.scene_plan import make_plan
-from upd.analyses.contact.solution import FlatSolution
-from upd.analyses.flat.results import band_centres
-from upd.analyses.flat.solve import solve_plan
+from upd.analyses.contact.solution import ContactSolution
+from upd.analyses.contact.solve import solve_plan
+from upd.analyses.contact.worn_zones import band_centres
 from upd.progress import Stages
 from upd.scene import load_scene
 from upd.vary.orders import estimate_error
@@ -39,7 +39,7 @@ both = pytest.mark.parametrize("scene", ["symmetric", "asymmetric"])
 
 
 @cache
-def solved(scene: str, divisions: int, held: str = "", **settings: Any) -> FlatSolution:
+def solved(scene: str, divisions: int, held: str = "", **settings: Any) -> ContactSolution:
     changes: dict[str, Any] = {
         "geometry.divisions": divisions,
         "geometry.divisions_long": LEVELS[scene][divisions],
@@ -53,7 +53,7 @@ def solved(scene: str, divisions: int, held: str = "", **settings: Any) -> FlatS
     return solve_plan(make_plan(load_scene(scene, changes)), Stages())
 
 
-def K_N(solution: FlatSolution) -> float:
+def K_N(solution: ContactSolution) -> float:
     (case,) = solution.normal
     return LOAD / case.solution.approach
 

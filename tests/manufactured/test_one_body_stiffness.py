@@ -17,8 +17,8 @@ from scipy.sparse.linalg import spsolve
 import upd
 from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL
 from upd.analyses.contact.scene_plan import make_plan
-from upd.analyses.contact.solution import FlatSolution
-from upd.analyses.flat.solve import solve_plan as solve
+from upd.analyses.contact.solution import ContactSolution
+from upd.analyses.contact.solve import solve_plan as solve
 from upd.contact.model import Body, free_dofs
 from upd.mesh import Mesh
 from upd.progress import Stages
@@ -68,7 +68,7 @@ def test_law_of_the_upper_body_is_that_of_a_rigid_platform(scene: str) -> None:
         assert upper.value(name) == pytest.approx(rigid.value(name), rel=1e-5), name
 
 
-def solved(scene: str) -> FlatSolution:
+def solved(scene: str) -> ContactSolution:
     plan = make_plan(load_scene(scene, {**COARSE[scene], **STIFFNESS}))
     return solve(plan, Stages())
 
@@ -117,7 +117,7 @@ def test_body_alone_by_its_own_finite_elements(scene: str) -> None:
     (case,), copies = solution.normal, solution.plan.copies
     results = {s.direction: s.of for s in solution.stuck}
     for body in (solution.model.upper, solution.model.lower):
-        alone = case.alone[body.name]
+        alone = case.alone[body.name].solution
         family = {c: dict(f.mirror) for f in solution.plan.families for c in f.components}
         force, u = moved(body, family[NORMAL], alone.contact, NORMAL)
         # A rigid plane pressed in by one: it pushes where it touches, and touches nowhere else.

@@ -1,4 +1,5 @@
-"""The analyses a scene can call for: packages with an ``ANALYSIS``, see `upd.analyses.base`.
+"""The analyses a scene can call for: packages with an ``ANALYSIS``, or two,
+see `upd.analyses.base`.
 
 The scene names the one it needs.
 """
@@ -16,34 +17,38 @@ from upd.vary.inputs import with_input_cost
 if TYPE_CHECKING:
     from upd.vary.ladder import Ladder
 
-#: what a scene or its recipe names as its analysis -> package
-_PACKAGES = {
+#: what a scene or its recipe names as its analysis -> name that run folders have of it
+_NAMES = {
     "curved contact": "hertz",
     "flat contact": "flat",
     "rig": "modal",
     "forced response": "forced",
     "seated damper": "seated",
 }
+#: packages with two analyses
+_PACKAGES = {"hertz": "contact", "flat": "contact"}
 
 
 def analysis_of(scene: AnyScene) -> Analysis:
     """The analysis that the scene names, or its recipe declares."""
-    return _package(_PACKAGES[scene.analysis])
+    return _analysis(_NAMES[scene.analysis])
 
 
 def analysis_named(name: str) -> Analysis | None:
     """The analysis of a run folder, by the name that the folder has of it; None for another."""
-    return _package(name) if name in _PACKAGES.values() else None
+    return _analysis(name) if name in _NAMES.values() else None
 
 
-def _package(name: str) -> Analysis:
-    found: Analysis = import_module(f"upd.analyses.{name}").ANALYSIS
+def _analysis(name: str) -> Analysis:
+    package = import_module(f"upd.analyses.{_PACKAGES.get(name, name)}")
+    found: Analysis = package.ANALYSES[name] if name in _PACKAGES else package.ANALYSIS
     return found
 
 
 def ladders_of(scene: AnyScene) -> Mapping[str, Ladder]:
     """What a convergence study of the scene can vary, by name."""
-    package = _PACKAGES[scene.analysis]
+    name = _NAMES[scene.analysis]
+    package = _PACKAGES.get(name, name)
     offered: Mapping[str, Ladder] = import_module(f"upd.analyses.{package}.ladders").LADDERS
     return {vary: ladder for vary, ladder in offered.items() if ladder.applies(scene)}
 

@@ -14,9 +14,9 @@ import pytest
 from upd import load_scene, make_plan, run
 from upd.analyses import ladders_of
 from upd.analyses.base import Plan
+from upd.analyses.contact import PROBLEM, WANTED
+from upd.analyses.contact.ladders import parameter_points, parameter_rows
 from upd.analyses.contact.varied import level_of
-from upd.analyses.flat.ladders import parameter_points, parameter_rows
-from upd.analyses.hertz import PROBLEM, WANTED
 from upd.batch.engine import Progress, Workers
 from upd.batch.store import PointStore
 from upd.batch.studies import plan_study, point_task, run_study, study, study_workers

@@ -10,8 +10,8 @@ from html import unescape
 import pytest
 from rich.console import Console
 
-from upd.analyses import hertz
 from upd.analyses.base import CHOSEN_BY_ACCURACY
+from upd.analyses.contact import ANALYSES
 from upd.cli.tables import print_result
 from upd.report.columns import whole_table
 from upd.report.notebook import RunResult
@@ -56,8 +56,10 @@ def told(
 ) -> Iterator[RunResult]:
     """A run whose analysis answers with tables."""
     tables = [PEAKS, BEST, DEPENDS, EMPTY]
-    monkeypatch.setattr(
-        hertz, "ANALYSIS", replace(hertz.ANALYSIS, answer=lambda entries: tables if entries else [])
+    monkeypatch.setitem(
+        ANALYSES,
+        "hertz",
+        replace(ANALYSES["hertz"], answer=lambda entries: tables if entries else []),
     )
     yield small_run("hertz")
 
@@ -150,9 +152,9 @@ def test_without_tables_there_are_the_main_numbers(
     assert answer_tables(told.size, []) == []
     entries = [row.as_dict() for row in told.results]
     assert answer_tables(told.size, entries) == [PEAKS, BEST, DEPENDS]
-    monkeypatch.setattr(hertz, "ANALYSIS", replace(hertz.ANALYSIS, answer=None))
+    monkeypatch.setitem(ANALYSES, "hertz", replace(ANALYSES["hertz"], answer=None))
     assert [t.heading for t in answer_tables(told.size, entries)][:1] == ["Main numbers"]
-    monkeypatch.setattr(hertz, "ANALYSIS", replace(hertz.ANALYSIS, answer=lambda _: [PEAKS]))
+    monkeypatch.setitem(ANALYSES, "hertz", replace(ANALYSES["hertz"], answer=lambda _: [PEAKS]))
     with_tables = printed(told, 80)
     monkeypatch.undo()
     assert printed(told, 80) != with_tables
@@ -185,7 +187,7 @@ def test_a_notebook_shows_the_tables(told: RunResult, monkeypatch: pytest.Monkey
         assert all(cell in unescape(html) for row in table.rows for cell in row)
     assert "maximum pressure" not in html
     evil = replace(BEST, heading="<b>", rows=(("<i>", "1"),))
-    monkeypatch.setattr(hertz, "ANALYSIS", replace(hertz.ANALYSIS, answer=lambda _: [evil]))
+    monkeypatch.setitem(ANALYSES, "hertz", replace(ANALYSES["hertz"], answer=lambda _: [evil]))
     html = told._repr_html_()
     assert "<i>" not in html and "<b><b>" not in html and "&lt;i&gt;" in html
 

@@ -277,15 +277,15 @@ def test_numbers_that_are_none_are_withheld_and_null(
 ) -> None:
     from dataclasses import replace
 
-    from upd.analyses import hertz
+    from upd.analyses.contact import ANALYSES
 
-    real = hertz.ANALYSIS.make_results
+    real = ANALYSES["hertz"].make_results
 
     def infinite(solution: Any) -> list[Any]:
         first, *rest = real(solution)
         return [replace(first, value=float("inf")), *rest]
 
-    monkeypatch.setattr(hertz, "ANALYSIS", replace(hertz.ANALYSIS, make_results=infinite))
+    monkeypatch.setitem(ANALYSES, "hertz", replace(ANALYSES["hertz"], make_results=infinite))
     found = run("hertz", overrides=TINY, out=tmp_path / "run", report=False)
     assert found.results[0].withheld
     assert found.status.startswith("ok with warnings")

@@ -1,22 +1,34 @@
-"""Self-checks that every contact of two bodies has.
+"""Self-checks of a contact: each number against its limit, with the remedy.
 
-Balance, one-sided contact, Coulomb's limit, the effects left out.
+One per line of physics the solver must not break: balance, one-sided contact, Coulomb's limit; and
+the size of the contact, the onset of yield, the effects left out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.contact.coupled import as_normal, opened_by_shear, shear_nodes
 from upd.analyses.contact.effects import beta_of, checks_of
-from upd.analyses.contact.loading import LoadPath, Sheared, tangential_compliance, tilt_arms
+from upd.analyses.contact.faces import rim_nodes
+from upd.analyses.contact.loading import (
+    LoadPath,
+    Sheared,
+    contact_points_of,
+    tangential_compliance,
+    tilt_arms,
+)
 from upd.analyses.contact.plan import NORMAL, ContactPlan
+from upd.analyses.contact.products import product_checks
+from upd.analyses.contact.scene_plan import has_mirror_planes, wider_patch
+from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
+from upd.analyses.contact.yielding import yield_checks
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
+from upd.mesh import recipes
 from upd.results import NO_CASE, Case, Check
 from upd.scene import Scene
 
@@ -182,7 +194,7 @@ def tangential_checks(case: Case, model: ContactModel, t: Sheared) -> list[Check
 
 
 def pressed_checks(
-    plan: ContactPlan, model: ContactModel, case: Any, carried: float, tilted: Array | None = None
+    plan: ContactPlan, model: ContactModel, case: NormalCase, carried: float, turned: Array
 ) -> list[Check]:
     """Of a normal load: `normal_checks`, and those of the shear that pressure alone makes.
 
@@ -192,15 +204,15 @@ def pressed_checks(
         A normal load of a solution.
     carried
         Sum of the contact forces on the whole contact, N.
-    tilted
+    turned
         (n,) mm that a free tilt adds to the approach.
     """
-    checks, turned = [], np.zeros(len(model.gap)) if tilted is None else tilted
+    checks: list[Check] = []
     if case.state is not None:
         nodes = shear_nodes(model, plan.scene.contact.friction, case.state)
         checks = tangential_checks(case.case, model, nodes)
         turned = turned - opened_by_shear(model, case.state)
-    C, load = model.compliance(NORMAL), case.case.load
+    C, load = model.compliance(NORMAL), case.force
     return [
         *checks,
         *normal_checks(
@@ -209,7 +221,7 @@ def pressed_checks(
     ]
 
 
-def sheared_checks(plan: ContactPlan, model: ContactModel, t: Any) -> list[Check]:
+def sheared_checks(plan: ContactPlan, model: ContactModel, t: TangentialCase) -> list[Check]:
     """Of a tangential load of a solution: `tangential_checks`, and where the pressure follows the
     shear `normal_checks` of the forces under it.
     """
@@ -221,7 +233,7 @@ def sheared_checks(plan: ContactPlan, model: ContactModel, t: Any) -> list[Check
     if t.state.motion[3:].size:
         turned = turned + tilt_arms(plan, model) @ t.state.motion[3:]
     C, carried = model.compliance(NORMAL), float(answer.unclipped.sum())
-    load = t.normal.case.load
+    load = t.normal.force
     return [
         *checks,
         *normal_checks(t.case, load, answer, C, model.gap, carried, {}, turned),
@@ -235,13 +247,20 @@ def loop_check(path: LoadPath) -> Check:
     return Check("loop area", path.case, error, 1e-2, "|loop area / slip work - 1|", remedy)
 
 
-def left_out_checks(solution: Any) -> list[Check]:
-    """Of the effects left out of a solution."""
+def _left_out_checks(solution: ContactSolution) -> list[Check]:
+    """Of the effects left out; they carry the names the plan gives them."""
     plan, scene = solution.plan, solution.plan.scene
     checks = checks_of(solution.left_out, scene)
     if plan.effect("friction") and not scene.coupled:
         checks.append(_coupling_check(scene))
-    return checks
+    text, remedy = (
+        "sum |df| / 2 F at T = mu N",
+        "gross slip would move much of the pressure: trust the first loading only",
+    )
+    return checks + [
+        Check("pressure moved by shear", case, value, 0.5, text, remedy, fatal=False)
+        for case, value in solution.moved.items()
+    ]
 
 
 def _coupling_check(scene: Scene) -> Check:
@@ -262,12 +281,8 @@ def _coupling_check(scene: Scene) -> Check:
     )
 
 
-def with_missing(plan: ContactPlan, checks: Sequence[Check]) -> list[Check]:
-    """The checks, and a failed one for every effect left out whose check was not made."""
-    return [*checks, *_missing(plan, {c.name for c in checks})]
-
-
 def _missing(plan: ContactPlan, made: set[str]) -> Iterable[Check]:
+    """A failed check for every effect left out whose check was not made."""
     for effect in plan.effects if plan.scene.left_out.solves else ():
         if effect.check and effect.word == "no" and effect.check not in made:
             yield Check(
@@ -278,3 +293,158 @@ def _missing(plan: ContactPlan, made: set[str]) -> Iterable[Check]:
                 f"the check of {effect.name} was not made",
                 "report this scene",
             )
+
+
+# -- size and place of the contact -----------------------------------------------------------------
+
+
+def _rim_check(solution: ContactSolution, case: NormalCase) -> Check:
+    """The contact must stay clear of the rim of the potential patch: beyond it nothing stops the
+    bodies from overlapping.
+    """
+    patch = solution.model.patch
+    half = 0.5 * min(np.ptp(patch.X), np.ptp(patch.Y))
+    # The gap gives the radius of curvature, h = r^2 / 2R at the rim; a flat patch (to rounding of
+    # its coordinates) has none.
+    gap = patch.whole(solution.model.gap)
+    corner = float(gap[0, len(patch.Y) // 2] - gap.min())
+    if corner <= 1e-9 * half:
+        return Check("patch rim", case.case, 0, 0, "the contact is flat: its rim belongs to it")
+    radius = half**2 / (2.0 * corner)
+    needed = 2.6 * float(np.cbrt(0.75 * case.force * radius / solution.modulus))
+    return Check(
+        "patch rim",
+        case.case,
+        rim_nodes(solution, case),
+        0,
+        "rim nodes in contact",
+        f"the contact reaches the rim of the {2 * half:.4g} mm patch: "
+        + wider_patch(solution.plan.scene, needed),
+    )
+
+
+def _resolution_check(solution: ContactSolution, case: NormalCase) -> Check:
+    scene, radius = solution.plan.scene, case.measures.radius_moment
+    spacing, width = solution.model.patch.spacing, float(np.ptp(solution.model.patch.X))
+    ways = ['geometry.patch to "auto"'] if recipes.has_parameter(scene.recipe, "patch") else []
+    if recipes.has_parameter(scene.recipe, "divisions"):
+        divisions = int(2 * np.ceil(1.5 * width / max(radius, 0.1 * spacing)))
+        ways.append(f"geometry.divisions to {divisions} or more")
+    finer = (
+        f"set {' or '.join(ways)}"
+        if ways
+        else f"mesh the contact surface with elements of {radius / 3.0:.3g} mm or less"
+    )
+    return Check(
+        "resolution",
+        case.case,
+        3.0 * spacing / max(radius, 1e-300),
+        1.0,
+        "3 h / a (a contact radius, h node spacing)",
+        "fewer than 3 nodes along the contact radius, so the numbers of this load are "
+        f"rough: {finer}",
+        fatal=False,
+    )
+
+
+def _curved_checks(solution: ContactSolution) -> list[Check]:
+    """Of a curved contact as a whole: symmetric, and small against its curvature."""
+    plan, scene, checks = solution.plan, solution.plan.scene, []
+    if not plan.effect("mirror symmetry") and has_mirror_planes(scene):
+        text, remedy = "|f - mirrored f| / max f", "the mesh or the load is not symmetric"
+        checks += [
+            Check("symmetric pressure", c.case, _asymmetry(solution, c), 1e-6, text, remedy)
+            for c in solution.normal
+            if c.force > 0.0
+        ]
+    checks.append(_steepness_check(solution))
+    if solution.no_shares:
+        text, remedy = solution.no_shares, "use a larger or finer body"
+        checks.append(Check("body compression", NO_CASE, 1, 0, text, remedy, fatal=False))
+    return checks
+
+
+def _steepness_check(solution: ContactSolution) -> Check:
+    radius = solution.plan.scene.sphere_radius
+    if radius is None:
+        text = "steepest slope of the gap where the bodies touch"
+        remedy = (
+            "the contact reaches where the faces are too steep for small-displacement theory: "
+            "lower the load"
+        )
+        return Check("slope in the contact", NO_CASE, _slope(solution), 0.2, text, remedy)
+    ratio = max(c.measures.radius_outermost for c in solution.normal) / radius
+    text = "outermost contact node / sphere radius"
+    remedy = "the contact is too large for small-displacement theory: lower the load"
+    return Check("contact radius against sphere", NO_CASE, ratio, 0.2, text, remedy)
+
+
+def _slope(solution: ContactSolution) -> float:
+    """Steepest slope of the undeformed gap at the nodes in contact, over all loads.
+
+    a / R for a sphere.
+    """
+    patch = solution.model.patch
+    gap = patch.whole(solution.model.gap)
+    steepness = np.hypot(*np.gradient(gap, patch.X, patch.Y))
+    touching = [steepness[patch.whole(c.solution.force) > 0.0] for c in solution.normal]
+    return max((float(s.max()) for s in touching if s.size), default=0.0)
+
+
+def _asymmetry(solution: ContactSolution, case: NormalCase) -> float:
+    f = solution.model.patch.whole(case.solution.force, extensive=True)
+    return float(max(np.abs(f - f[::-1]).max(), np.abs(f - f[:, ::-1]).max()) / f.max())
+
+
+def _moment_check(solution: ContactSolution, case: NormalCase, arms: Array) -> Check:
+    force, points = case.solution.force, contact_points_of(solution.model)[:, :2]
+    moment = float(np.abs(arms.T @ force).max())
+    return Check(
+        "moment balance",
+        case.case,
+        moment / (float(force.sum()) * float(np.ptp(points, axis=0).max())),
+        1e-8,
+        "moment about the load line / (F patch length)",
+        "report this",
+    )
+
+
+# -- all of them -----------------------------------------------------------------------------------
+
+
+def check_solution(solution: ContactSolution) -> list[Check]:
+    """All self-checks; the ones that replace a left-out effect carry the name the plan gives
+    them.
+    """
+    checks = [c for case in solution.normal for c in _normal_case_checks(solution, case)]
+    checks += [c for t in solution.tangential for c in _tangential_case_checks(solution, t)]
+    checks += [loop_check(path) for path in solution.paths if path.cycle]
+    checks += yield_checks(solution)
+    checks += _left_out_checks(solution)
+    if solution.curved:
+        checks += _curved_checks(solution)
+    return [*checks, *_missing(solution.plan, {c.name for c in checks})]
+
+
+def _normal_case_checks(solution: ContactSolution, case: NormalCase) -> list[Check]:
+    model, plan, force = solution.model, solution.plan, case.solution.force
+    checks = [_rim_check(solution, case)] if solution.curved else []
+    if not case.force > 0.0:
+        return checks
+    if solution.curved:
+        checks += product_checks(model, case.case, (NORMAL,), force)
+        checks.append(_resolution_check(solution, case))
+    arms = tilt_arms(plan, model)
+    turned = np.zeros(len(force)) if case.tilt is None else arms @ case.tilt
+    checks += pressed_checks(plan, model, case, plan.copies * float(force.sum()), turned)
+    return checks if case.tilt is None else [*checks, _moment_check(solution, case, arms)]
+
+
+def _tangential_case_checks(solution: ContactSolution, t: TangentialCase) -> list[Check]:
+    checks = sheared_checks(solution.plan, solution.model, t)
+    if not solution.curved:
+        return checks
+    tractions = np.zeros((len(t.nodes.components), len(solution.model.gap)))
+    tractions[:, t.nodes.loaded] = t.nodes.force.reshape(len(tractions), -1)
+    products = product_checks(solution.model, t.case, t.nodes.components, tractions.ravel())
+    return [*checks, *products]

@@ -1,95 +1,340 @@
-"""What every contact of two bodies leaves: arrays in result.nc, meshes and fields as VTU."""
+"""What a run of a contact leaves behind: arrays with their closed forms, contact points of a
+dynamic model, meshes with fields.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.analyses.contact.closed_forms import (
+    beyond_3a,
+    closed_form_traction,
+    hertz_of,
+    shear_compliance,
+    stick_radius,
+)
+from upd.analyses.contact.faces import FaceLattice, corner, lattices, tractions
+from upd.analyses.contact.law import contact_law
 from upd.analyses.contact.loading import LoadPath
-from upd.contact.model import ContactModel
-from upd.results import ArrayGroup, variable
+from upd.analyses.contact.results import printed_of
+from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
+from upd.analyses.contact.worn_zones import band_middles
+from upd.contact.law import ContactLaw
+from upd.labels import file_name
+from upd.mesh import recipes
+from upd.reference import hertz_pressure, mindlin
+from upd.results import ArrayGroup, Case, variable
 
 Array = NDArray[np.float64]
 Variables = dict[str, Any]
 XY = "x y"
+# Points of a closed form: across a contact (its ends are steep), along a curve.
+_ACROSS, _ALONG = 801, 201
+# How far beyond the contact radius tractions are drawn.
+_BEYOND = 1.3
 
 
-def lattice(x: Array, y: Array) -> Variables:
-    """Lattice lines in mm."""
-    return {"x": variable("x", x, "mm"), "y": variable("y", y, "mm")}
+def sizes(solution: ContactSolution) -> dict[str, int]:
+    """Contact pairs of the model and of all patches, mirror images included."""
+    return {
+        "n_pairs": len(solution.model.gap),
+        "n_pairs_whole_patch": sum(len(k.X) * len(k.Y) for k in lattices(solution)),
+    }
 
 
-def normal_fields(
-    pressure: Array, force: Array, gap: Array, closed: NDArray[np.bool_]
-) -> Variables:
+def arrays(solution: ContactSolution) -> dict[str, ArrayGroup]:
+    """Fields of every case and patch with their closed forms; curves, paths and contact points."""
+    out: dict[str, ArrayGroup] = {}
+    patches, (x, y) = lattices(solution), corner(solution)
+    for k in patches:
+        face: dict[str, str] = {"patch": k.name} if len(patches) > 1 else {}
+        lines = {"x": variable("x", k.X - x, "mm"), "y": variable("y", k.Y - y, "mm")}
+        cases = [("normal", c.case, _normal(solution, k, c)) for c in solution.normal]
+        cases += [("tangential", t.case, _tangential(solution, k, t)) for t in solution.tangential]
+        for content, case, fields in cases:
+            name = case.label + f" {k.name}" * bool(face)
+            out[name] = ArrayGroup(lines | fields, content=content, case=case, **face)
+    for path in solution.paths:
+        content = "cycle" if path.cycle else "path"
+        variables = {
+            "displacement": variable("step", path.displacement, "mm"),
+            "tangential_force": variable("step", path.load, "N"),
+            **(_deresiewicz(solution, path) if solution.curved else _limit(solution, path)),
+        }
+        out[f"{content} {path.case.label}"] = ArrayGroup(variables, content=content, case=path.case)
+    if solution.curve:
+        out["force-approach"] = ArrayGroup(_curve(solution), content="force-approach")
+    return out | _laws(solution)
+
+
+def _normal(solution: ContactSolution, k: FaceLattice, case: NormalCase) -> Variables:
     """Fields under a normal load, (n_x, n_y) in MPa, N and mm."""
+    on, pressure = case.solution.contact, solution.model.multipliers.pressure
+    out: Variables = {
+        "pressure": variable(XY, k.field(pressure(case.solution.force)), "MPa"),
+        "normal_force": variable(XY, k.field(case.solution.force, extensive=True), "N"),
+        "gap": variable(XY, k.field(case.solution.gap), "mm"),
+        "contact": variable(XY, k.field(on) > 0.0, flag_meanings="open contact"),
+    }
+    if case.state is not None:
+        traction = [pressure(c, on) for c in case.state.force[:, 1:].T]
+        out |= _sheared(k, traction, list(case.state.found.slip[-1].T), case.stick)
+    if solution.curved:
+        return out | _approach_split(case) | _hertz(solution, case)
+    out["worn_zone_middle"] = variable(
+        "worn_zone",
+        band_middles(solution),
+        "mm",
+        "middle of the bands of the damper that the load comes from",
+    )
+    upper = solution.model.upper
+    if upper.name in case.displacement:
+        # How far the contact nodes stay behind the distant set.
+        u = case.displacement[upper.name][upper.contact, 2]
+        whole = k.field(solution.model.multipliers.spread.T @ u)
+        out["surface_displacement"] = variable(XY, whole, "mm", body=upper.name)
+    return out
+
+
+def _sheared(
+    k: FaceLattice, traction: Sequence[Array], slip: Sequence[Array], stick: NDArray[np.bool_]
+) -> Variables:
+    """Fields under a tangential load, (n_x, n_y, n_direction) in MPa and mm."""
+    dims = f"{XY} direction"
     return {
-        "pressure": variable(XY, pressure, "MPa"),
-        "normal_force": variable(XY, force, "N"),
-        "gap": variable(XY, gap, "mm"),
-        "contact": variable(XY, closed, flag_meanings="open contact"),
+        "traction": variable(dims, np.stack([k.field(c) for c in traction], -1), "MPa"),
+        "slip": variable(dims, np.stack([k.field(c) for c in slip], -1), "mm"),
+        "stick": variable(XY, k.field(stick) > 0.0, flag_meanings="slip_or_open stick"),
     }
 
 
-def tangential_fields(traction: Array, slip: Array, stick: NDArray[np.bool_]) -> Variables:
-    """Fields under a tangential load, (n_x, n_y) or (n_x, n_y, n_direction) in MPa and mm."""
-    dims = f"{XY} direction" if traction.ndim == 3 else XY
+def _tangential(solution: ContactSolution, k: FaceLattice, t: TangentialCase) -> Variables:
+    traction = tractions(solution, t)
+    out = _sheared(k, traction, list(t.slip.T), t.stick)
+    if solution.curved and len(traction) == 1:
+        # One direction has no dimension of its own.
+        out["traction"] = variable(XY, k.field(traction[0]), "MPa")
+        out["slip"] = variable(XY, k.field(t.slip[:, 0]), "mm")
+    if t.state is not None:
+        # which coupled contact moves
+        pressure = solution.model.multipliers.pressure(np.maximum(t.pressed, 0.0))
+        out["pressure"] = variable(XY, k.field(pressure), "MPa")
+    return out | _cattaneo(solution, t)
+
+
+# -- closed forms ----------------------------------------------------------------------------------
+
+
+def _approach_split(case: NormalCase) -> Variables:
+    """The approach, what the bodies add to it, and what of it lies beyond depth 3a in each."""
+    out: Variables = {"approach": variable("", case.approach, "mm")}
+    if case.shares:
+        out["finite_body"] = variable(
+            "", case.finite_body, "mm", "approach of the finite, held bodies"
+        )
+        for body, share in case.shares.items():
+            out[f"compression_{file_name(body)}"] = variable(
+                "", share.compression, "mm", "approach beyond depth 3a", body=body
+            )
+    return out
+
+
+def _hertz(solution: ContactSolution, case: NormalCase) -> Variables:
+    hertz = hertz_of(solution, case.force)
+    if hertz is None:
+        return {}
+    x = np.linspace(-hertz.radius, hertz.radius, _ACROSS)
+    pressure = hertz_pressure(np.abs(x), hertz.radius, hertz.max_pressure)
     return {
-        "traction": variable(dims, traction, "MPa"),
-        "slip": variable(dims, slip, "mm"),
-        "stick": variable(XY, stick, flag_meanings="slip_or_open stick"),
+        "hertz_radius": variable("", hertz.radius, "mm"),
+        "hertz_approach": variable("", hertz.approach, "mm"),
+        "hertz_max_pressure": variable("", hertz.max_pressure, "MPa"),
+        "hertz_x": variable("hertz_x", x, "mm"),
+        "hertz_pressure": variable("hertz_x", pressure, "MPa"),
     }
 
 
-def path_group(path: LoadPath) -> tuple[str, ArrayGroup]:
-    """Name and variables of a tangential path."""
-    content = "cycle" if path.cycle else "path"
-    variables = {
-        "displacement": variable("step", path.displacement, "mm"),
-        "tangential_force": variable("step", path.load, "N"),
+def _cattaneo(solution: ContactSolution, t: TangentialCase) -> Variables:
+    hertz, c = hertz_of(solution, t.normal.force), stick_radius(solution, t)
+    if hertz is None or c is None:
+        return {}
+    out: Variables = {
+        "hertz_radius": variable("", hertz.radius, "mm"),
+        "mindlin_stick_radius": variable("", c, "mm"),
     }
-    return f"{content} {path.case.label}", ArrayGroup(variables, content=content, case=path.case)
+    closed = closed_form_traction(solution, t)
+    if closed is not None:
+        x = np.linspace(-_BEYOND * hertz.radius, _BEYOND * hertz.radius, _ACROSS)
+        out["mindlin_x"] = variable("mindlin_x", x, "mm")
+        out["mindlin_traction"] = variable("mindlin_x", closed(np.abs(x)), "MPa")
+    return out
 
 
-def curve_group(approach: Iterable[float], force: Iterable[float]) -> ArrayGroup:
-    """The force-approach curve in mm and N."""
-    variables = {
-        "approach": variable("point", list(approach), "mm"),
-        "normal_force": variable("point", list(force), "N"),
+def _deresiewicz(solution: ContactSolution, cycle: LoadPath) -> Variables:
+    """The closed loop +T* -> -T* -> +T*, and the bodies' share of the displacement."""
+    normal = next(case for case in solution.normal if case.case == cycle.normal)
+    out: Variables = {}
+    if normal.shear_shares:
+        out["finite_body_compliance"] = variable(
+            "", normal.finite_body_shear, "mm/N", "shear of the finite, held bodies"
+        )
+    hertz, ratio = hertz_of(solution, normal.force), cycle.case.ratio
+    if hertz is None or ratio is None:
+        return out
+    mu, C = solution.plan.scene.contact.friction, shear_compliance(solution)
+    peak = ratio * mu * normal.force
+    T = np.linspace(peak, -peak, _ALONG)
+    d = mindlin.unloading(T, peak, mu, normal.force, hertz.radius, C)
+    # Reloading is unloading seen from the other side.
+    out["mindlin_displacement"] = variable("mindlin_step", np.concatenate([d, -d]), "mm")
+    out["mindlin_force"] = variable("mindlin_step", np.concatenate([T, -T]), "N")
+    return out
+
+
+# -- force over approach ---------------------------------------------------------------------------
+
+
+def _curve(solution: ContactSolution) -> Variables:
+    """Force over approach in mm and N, with what goes with the load."""
+    points = solution.curve
+    d, F = (np.array([getattr(p, name) for p in points]) for name in ("approach", "force"))
+    if solution.curved:
+        # It starts where the faces meet.
+        d, F = np.insert(d, 0, solution.model.gap.min()), np.insert(F, 0, 0.0)
+        own = _approach_over_load(solution, d, F) | _along(solution)
+    else:
+        pressures = ("max_pressure", "mean_pressure")
+        own = {
+            name: variable("point", [getattr(p.measures, name) for p in points], "MPa")
+            for name in pressures
+        }
+        own["stiffness"] = variable("", solution.normal[0].stiffness, "N/mm")
+        own |= _printed(solution, "K_N", "_tangent_raw", solution.normal[0].case)
+    return {"approach": variable("point", d, "mm"), "normal_force": variable("point", F, "N")} | own
+
+
+def _approach_over_load(solution: ContactSolution, d: Array, F: Array) -> Variables:
+    out: Variables = {}
+    split = [case for case in solution.normal if case.shares]
+    if split:
+        # What the bodies add goes with the load.
+        bodies = split[-1].finite_body / split[-1].force * F
+        out["approach_contact"] = variable("point", d - bodies, "mm")
+    force = np.linspace(0.0, float(F[-1]), _ALONG)
+    hertz = [h for load in force[1:] if (h := hertz_of(solution, float(load))) is not None]
+    if hertz:
+        out["hertz_normal_force"] = variable("hertz_point", force, "N")
+        for name, unit in (("area", "mm2"), ("max_pressure", "MPa"), ("approach", "mm")):
+            closed = np.array([0.0, *(getattr(h, name) for h in hertz)])
+            out[f"hertz_{name}"] = variable("hertz_point", closed, unit)
+    return out
+
+
+def _along(solution: ContactSolution) -> Variables:
+    """Contact area, largest pressure and each body's compression at the loaded points."""
+    points, dims = solution.curve, "loaded_point"
+    out: Variables = {
+        "load": variable(dims, [p.force for p in points], "N"),
+        "contact_area": variable(dims, [p.measures.area for p in points], "mm2"),
+        "max_pressure": variable(dims, [p.measures.max_pressure for p in points], "MPa"),
+        "loaded_approach": variable(dims, [p.approach for p in points], "mm"),
     }
-    return ArrayGroup(variables, content="force-approach")
+    closed = [beyond_3a(solution, p.force) for p in points]
+    for body in points[0].compression:
+        name = f"compression_{file_name(body)}"
+        beyond = [p.compression[body] for p in points]
+        words = "approach beyond depth 3a"
+        out[name] = variable(dims, beyond, "mm", words, body=body)
+        if all(closed):
+            out[f"hertz_{name}"] = variable(dims, [c[body] for c in closed], "mm")
+    return out
 
 
-def write_meshes(
-    model: ContactModel, folder: Path, cases: Iterable[tuple[str, Array, Mapping[str, Array]]] = ()
-) -> None:
-    """Write mesh.vtu, and fields.vtu when there are ``cases``.
+# -- of flat faces ---------------------------------------------------------------------------------
 
-    Parameters
-    ----------
-    cases
-        Label, force (n,) in N at the contact points, and body -> displacement (n_node, 3) in mm.
+
+def _limit(solution: ContactSolution, path: LoadPath) -> Variables:
+    """Load of gross slip, and the printed stiffness."""
+    limit = solution.plan.scene.contact.friction * (path.normal.load or 0.0)
+    name = f"K_T{path.case.direction}"
+    return {
+        "friction_limit": variable("", limit, "N"),
+        **_printed(solution, name, "_initial_raw", path.case),
+    }
+
+
+def _printed(solution: ContactSolution, name: str, total: str, case: Case) -> Variables:
+    """The printed stiffness of the whole contact, where one is; one printed of a pad goes with all
+    of them.
     """
+    look_up = printed_of(solution.plan.scene)
+    whole, pad = (look_up(name + suffix, case.given()) for suffix in (total, "_per_pad"))
+    if whole:
+        return {"printed_stiffness": variable("", whole[0].value, "N/mm", source=whole[0].source)}
+    if pad:
+        n = len(lattices(solution))
+        source = f"{pad[0].source}, {n} pads"
+        return {"printed_stiffness": variable("", n * pad[0].value, "N/mm", source=source)}
+    return {}
+
+
+def _laws(solution: ContactSolution) -> dict[str, ArrayGroup]:
+    """The contact law of every normal load, in contact axes and, where the recipe tells the place,
+    in the rig's.
+    """
+    scene = solution.plan.scene
+    out: dict[str, ArrayGroup] = {}
+    for case in solution.normal if scene.wants("contact_law") else ():
+        law = contact_law(solution, case)
+        if law is not None:
+            placed = law.placed(*recipes.placement(scene.recipe, solution.plan.parameters))
+            groups = {
+                "contact law": law.to_arrays() | _report_places(solution, law),
+                "contact law in the rig": placed.to_arrays(),
+            }
+            for content, variables in groups.items():
+                name = f"{content} {case.case.label}"
+                out[name] = ArrayGroup(dict(variables), content=content, case=case.case)
+    return out
+
+
+def _report_places(solution: ContactSolution, law: ContactLaw) -> Variables:
+    """Places of the contact points in report axes, mm."""
+    places = law.position[:, :2] - corner(solution)
+    return {
+        f"report_{axis}": variable("contact_point", places[:, k], "mm")
+        for k, axis in enumerate("xy")
+    }
+
+
+# -- meshes ----------------------------------------------------------------------------------------
+
+
+def write_files(solution: ContactSolution, folder: Path) -> None:
+    """Write mesh.vtu, and fields.vtu when asked for."""
     # meshio is slow to import: only when files are wanted.
     from upd.mesh.export import write_fields, write_mesh
 
+    model, multipliers = solution.model, solution.model.multipliers
     bodies = (model.upper, model.lower)
     meshes = {b.name: b.mesh for b in bodies}
     write_mesh(meshes, folder / "mesh.vtu")
-    found = list(cases)
-    if not found:
+    cases = {f"{c.force:.6g}N": c for c in solution.normal}
+    if not solution.plan.scene.wants("fields") or not cases:
         return
-    data = {}
+    data: dict[str, dict[str, Array]] = {}
     for body in bodies:
-        fields = {f"displacement_{label}": u[body.name] for label, _, u in found if body.name in u}
-        contact = body.contact[model.multipliers.nodes]
-        for label, force, _ in found:
+        fields = data[body.name] = {}
+        for label, case in cases.items():
+            if body.name in case.displacement:
+                fields[f"displacement_{label}"] = case.displacement[body.name]
+        for label, case in cases.items():
             pressure = np.zeros(body.mesh.n_node)
-            pressure[contact] = model.multipliers.pressure(force)
+            pressure[body.contact[multipliers.nodes]] = multipliers.pressure(case.solution.force)
             fields[f"pressure_{label}"] = pressure
-        data[body.name] = fields
     write_fields(folder / "fields.vtu", meshes, data)

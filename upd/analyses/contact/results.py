@@ -1,32 +1,93 @@
-"""Numbers that every contact of two bodies has."""
+"""ContactSolution -> the flat list of numbers, each beside its closed form and what was printed of
+it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
+from typing import Any
 
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from upd.analyses import printed
+from upd.analyses.contact.closed_forms import (
+    beyond_3a,
+    closed_form_traction,
+    hertz_of,
+    loop_energy,
+    shear_compliance,
+    stick_radius,
+)
+from upd.analyses.contact.coupled import pressed_by
+from upd.analyses.contact.faces import area_of, lattices, tractions
+from upd.analyses.contact.law import contact_law, tilt_stiffness
+from upd.analyses.contact.plan import NORMAL, direction_name
+from upd.analyses.contact.scene_plan import normal_loads
+from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
+from upd.analyses.contact.worn_zones import band_middles, pressure_peaks
+from upd.contact.patch import consistent_average
+from upd.contact.stiffness import without_body
+from upd.mesh import recipes
 from upd.plot.chart import Entry
-from upd.results import Case, Result
+from upd.reference import HertzPoint, hertz_pressure, mindlin
+from upd.reference.printed import Lookup, Printed
+from upd.results import Case, ErrorPart, Result, with_parts
 from upd.results import quantities as q
+from upd.results.quantity import Quantity
+from upd.scene import Scene
 
-#: sources of numbers of a contact whose edge is located between nodes
-LOCATED = {
+_HERTZ, _MINDLIN = "Hertz", "Cattaneo-Mindlin"
+_HERTZ_3A = "Hertz, within 3a"
+# How errors were estimated.
+_BETTI = "Betti's theorem: displacements less those of half-spaces and of the bodies' share"
+# Sources of numbers of a contact whose edge is located between nodes.
+_LOCATED = {
     q.CONTACT_AREA.name: "edge located between nodes",
     q.MEAN_PRESSURE.name: "load over the located area",
     q.CONTACT_AREA_NODES.name: "tributary areas of the nodes in contact",
 }
+# Raw, and with the bulk compliance removed: one mesh's error is in both.
+_OF_APPROACH = (q.APPROACH.name, q.APPROACH_CONTACT.name)
+# Forces in N between which the slope of the force-approach curve should not change: dampers work
+# there.
+_WORKING = (50.0, 300.0)
+
+#: the numbers of a curved contact that matter, most important first
+CURVED_HEADLINE = (
+    "max_pressure",
+    "radius_moment",
+    "approach_contact",
+    "K_N_tangent",
+    "K_T_initial",
+    "tangential_displacement",
+    "stick_radius",
+    "cycle_energy",
+    "approach",
+    "mean_pressure",
+)
+#: and of a flat one
+FLAT_HEADLINE = (
+    "F_N",
+    "mean_pressure",
+    "max_pressure",
+    "closed_share",
+    "approach",
+    "K_N_per_pad",
+    "K_Tx_per_pad",
+    "K_Ty_per_pad",
+    "K_N_secant_raw",
+    "K_Tx_initial_raw",
+    "K_Ty_initial_raw",
+    "K_N_tangent_raw",
+    "approach_damper",
+    "approach_platform",
+    "law_k_n",
+    "cycle_energy",
+)
 _MOST, _FEWEST = 8, 5
 _RAW = "_raw"
-
-
-def shear_stiffness(case: Case, load: float, displacement: float, tangent: float) -> list[Result]:
-    """Tangent stiffness in N/mm under a tangential load in N, and the secant where there is a
-    load.
-    """
-    out = [q.K_T_TANGENT_RAW.of(tangent, case)]
-    if load > 0.0:
-        out.append(q.K_T_SECANT_RAW.of(load / displacement, case))
-    return out
 
 
 def pick(results: Sequence[Entry], names: Sequence[str], *, last: bool = False) -> list[Entry]:
@@ -52,3 +113,354 @@ def pick(results: Sequence[Entry], names: Sequence[str], *, last: bool = False) 
 
 def _first(results: Sequence[Entry], name: str) -> Entry | None:
     return next((entry for entry in results if fnmatchcase(entry["name"], name)), None)
+
+
+def make_results(solution: ContactSolution, *, misfits: bool = True) -> list[Result]:
+    """All numbers of a run, case by case; without the ``misfits`` of tractions from their closed
+    form where these would cost more than the contact.
+    """
+    scene = solution.plan.scene
+    out = _equilibrium(solution)
+    for case in solution.normal:
+        out += _normal(solution, case)
+        if scene.wants("stiffness") and case.force > 0.0:
+            out += _stiffness(solution, case)
+        if scene.wants("worn_zones"):
+            out += _worn_zones(solution, case)
+        if scene.wants("contact_law"):
+            out += _law(solution, case)
+        for t in (t for t in solution.tangential if t.normal is case):
+            out += _tangential(solution, t, misfits=misfits)
+        for path in (p for p in solution.paths if p.cycle and p.normal == case.case):
+            energy = loop_energy(solution, case.force)
+            by = "Mindlin-Deresiewicz"
+            out.append(_beside(q.CYCLE_ENERGY, path.slip_work, path.case, energy, by))
+    return printed.with_printed([*out, *_working_slope(solution)], printed_of(scene))
+
+
+def printed_of(scene: Scene) -> Lookup:
+    """What was printed of the scene's bodies.
+
+    Of a case with a normal load only where that is, to the newton it is printed with, a load of the
+    ready scene; tables of closed forms print their loads themselves.
+    """
+    look_up, ready = printed.printed_of(scene), printed.ready_scene(scene)
+    if ready is None or recipes.closed_form(scene.recipe):
+        return look_up
+    loads = {round(load.force) for load in normal_loads(ready)}
+
+    def under_load(name: str, case: Mapping[str, Any]) -> tuple[Printed, ...]:
+        load = case.get("load")
+        return look_up(name, case) if load is None or round(load) in loads else ()
+
+    return under_load
+
+
+def _beside(
+    quantity: Quantity, value: float, case: Case, closed: float | None, source: str, n: object = ""
+) -> Result:
+    """A number beside its closed form, where it has one."""
+    return quantity.of(value, case, closed, "" if closed is None else source, n=n)
+
+
+def _of(hertz: HertzPoint[float] | None, name: str) -> float | None:
+    return None if hertz is None else float(getattr(hertz, name))
+
+
+def _area(solution: ContactSolution, area: Quantity) -> Quantity:
+    """In um2 for a curved contact, in mm2 for flat faces."""
+    return area.in_unit("um2") if solution.curved else area
+
+
+def _equilibrium(solution: ContactSolution) -> list[Result]:
+    out = []
+    for load in (case.load for case in solution.normal):
+        if load.faces is not None:
+            case = Case(name="equilibrium", friction=load.state)
+            out += [
+                q.F_N.of(load.faces.normal_right, case),
+                q.F_T.of(load.faces.tangential_right, case),
+                q.F_N_OTHER_FACE.of(load.faces.normal_left, case),
+            ]
+    return out
+
+
+# -- normal loads ----------------------------------------------------------------------------------
+
+
+def _normal(solution: ContactSolution, case: NormalCase) -> list[Result]:
+    m, at, hertz = case.measures, case.case, hertz_of(solution, case.force)
+    radii = [
+        (q.RADIUS_MOMENT, m.radius_moment, "radius"),
+        (q.RADIUS_AREA, m.radius_area, "radius"),
+        (q.RADIUS_OUTERMOST, m.radius_outermost, "radius"),
+    ]
+    table = [
+        *(radii if solution.curved else ()),
+        (q.APPROACH, case.approach, "approach"),
+        (_area(solution, q.CONTACT_AREA), m.area, "area"),
+        (_area(solution, q.CONTACT_AREA_NODES), m.area_nodes, "area"),
+        (q.MAX_PRESSURE, m.max_pressure, "max_pressure"),
+        (q.MEAN_PRESSURE, m.mean_pressure, "mean_pressure"),
+    ]
+    located = _LOCATED if m.area_resolution is not None else {}
+    out = [
+        quantity.of(value, at, closed, _HERTZ)
+        if (closed := _of(hertz, name)) is not None
+        else quantity.of(value, at, source=located.get(quantity.name, ""))
+        for quantity, value, name in table
+    ]
+    if m.area_resolution is not None:
+        out.append(_area(solution, q.CONTACT_AREA_RESOLUTION).of(m.area_resolution, at))
+    if solution.plan.effect("friction"):
+        out.append(_area(solution, q.STICK_AREA).of(area_of(solution, case.stick), at))
+    if solution.curved:
+        out += _approach_split(solution, case, hertz)
+        return [_with_estimate(result, case) for result in out]
+    return out + _of_faces(solution, case)
+
+
+def _of_faces(solution: ContactSolution, case: NormalCase) -> list[Result]:
+    """Share of the faces in contact, what each body takes of the approach, and tilts."""
+    at, model, answer = case.case, solution.model, case.solution
+    whole = sum(float(k.area().sum()) for k in lattices(solution))
+    out = [q.CLOSED_SHARE.of(100.0 * case.measures.area_nodes / whole, at)]
+    for body in (model.upper, model.lower):
+        if case.state is None:
+            # f . (h + C f - d e) = 0, so the approach is the sum of the bodies' energies over the
+            # load (and of the gaps closed).
+            f, total = answer.force, float(answer.force.sum())
+            taken = float(f @ model.body_compliance(body, NORMAL) @ f) / total if total else 0.0
+        else:
+            taken = pressed_by(model, body, case.state.force)
+        out.append(q.APPROACH_OF.of(taken, at, n=body.name))
+    if case.tilt is not None:
+        out += [q.TILT_ABOUT_Y.of(case.tilt[0], at), q.TILT_ABOUT_X.of(case.tilt[1], at)]
+    return out
+
+
+def _with_estimate(result: Result, case: NormalCase) -> Result:
+    """The number with its estimated error where one mesh shows it: the approach."""
+    if result.name not in _OF_APPROACH or case.mesh_error is None:
+        return result
+    near, far = (abs(error) * q.APPROACH.scale / abs(result.value) for error in case.mesh_error)
+    parts = (
+        ErrorPart("mesh at the contact", near, _BETTI),
+        ErrorPart("mesh far away", far, _BETTI),
+    )
+    return with_parts(result, parts)
+
+
+def _approach_split(
+    solution: ContactSolution, case: NormalCase, hertz: HertzPoint[float] | None
+) -> list[Result]:
+    """The approach less the bodies' share, and within depth 3a."""
+    if not case.shares:
+        return []
+    at, phi = case.case, {body: s.compression for body, s in case.shares.items()}
+    far = sum(s.far_mesh for s in case.shares.values())
+    beyond = sum(beyond_3a(solution, case.force).values())
+    within = None if hertz is None else hertz.approach - beyond
+    left = case.approach - sum(phi.values())
+    whole = _of(hertz, "approach")
+    return [
+        _beside(q.APPROACH_CONTACT, case.approach - case.finite_body, at, whole, _HERTZ),
+        q.APPROACH_FINITE_BODY.of(case.finite_body, at),
+        q.APPROACH_FAR_MESH.of(far, at),
+        *(q.COMPRESSION_3A.of(value, at, n=body) for body, value in phi.items()),
+        _beside(q.APPROACH_WITHIN_3A, left, at, within, _HERTZ_3A),
+    ]
+
+
+# -- stiffness -------------------------------------------------------------------------------------
+
+
+def _stiffness(solution: ContactSolution, case: NormalCase) -> list[Result]:
+    hertz, at, secant = hertz_of(solution, case.force), case.case, case.force / case.approach
+    tangent_of, secant_of = _of(hertz, "tangent_stiffness"), _of(hertz, "secant_stiffness")
+    out = [
+        _beside(q.K_N_TANGENT_RAW, case.stiffness, at, tangent_of, _HERTZ),
+        _beside(q.K_N_SECANT_RAW, secant, at, secant_of, _HERTZ),
+    ]
+    if not solution.curved:
+        return out + _stiffness_of_faces(solution, case)
+    K_N = without_body(case.stiffness, case.finite_body / case.force)
+    if case.shares:
+        K_N_secant = without_body(secant, case.finite_body / case.force)
+        out += [
+            _within_3a(solution, case, hertz),
+            _beside(q.K_N_TANGENT, K_N, at, tangent_of, _HERTZ),
+            _beside(q.K_N_SECANT, K_N_secant, at, secant_of, _HERTZ),
+        ]
+    stuck = next(iter(solution.stuck_under(at)), None)
+    if stuck is None or hertz is None:
+        return out
+    closed = mindlin.initial_tangential_stiffness(hertz.radius, shear_compliance(solution))
+    out.append(q.K_T_INITIAL_RAW.of(stuck.total, at, closed, _MINDLIN))
+    if case.shear_shares:
+        K_T = without_body(stuck.total, case.finite_body_shear)
+        ratio = closed / hertz.tangent_stiffness
+        out += [
+            q.K_T_INITIAL.of(K_T, at, closed, _MINDLIN),
+            q.K_T_OVER_K_N.of(K_T / K_N, at, ratio, "Mindlin"),
+        ]
+    return out
+
+
+def _stiffness_of_faces(solution: ContactSolution, case: NormalCase) -> list[Result]:
+    """Nothing opened, each body alone, along each direction; and of one pad where several share
+    the contact: the total over their number.
+
+    That is each pad's own when they carry equal forces; otherwise their mean.
+    """
+    at, n, C = case.case, len(lattices(solution)), solution.model.compliance(NORMAL)
+    bonded = solution.plan.copies * float(cho_solve(cho_factor(C), np.ones(len(C))).sum())
+    out = [
+        q.K_N_BONDED.of(bonded, at),
+        *(
+            q.K_N_ALONE.of(case.force / one.solution.approach, at, n=body)
+            for body, one in case.alone.items()
+        ),
+    ]
+    pads = [q.K_N_PER_PAD.of(case.force / case.approach / n, at)]
+    for stuck in solution.stuck_under(at):
+        way = direction_name(stuck.direction)
+        out.append(q.K_T_ALL_STUCK.of(stuck.total, at, n=way))
+        out += [q.K_T_ALONE.of(value, at, n=f"{way}_{body}") for body, value in stuck.of.items()]
+        pads.append(q.K_T_PER_PAD.of(stuck.total / n, at, n=way))
+    return out + pads if n > 1 else out
+
+
+def finer(scene: Scene) -> str:
+    """How to get more nodes into a curved contact."""
+    if recipes.has_parameter(scene.recipe, "patch"):
+        return 'size the patch from the load (geometry.patch = "auto") or take a finer mesh'
+    return "mesh the contact surface finer"
+
+
+def _within_3a(
+    solution: ContactSolution, case: NormalCase, hertz: HertzPoint[float] | None
+) -> Result:
+    """Tangent stiffness of the approach within 3a, 1.5 F / d as F goes with d^1.5: what the thesis
+    takes for the contact's (its section 6.5).
+
+    23 % of a half-space's displacement lies beyond 3a, so it is 30 % above K_N by Hertz itself.
+    """
+    within = case.approach - sum(s.compression for s in case.shares.values())
+    # The rounding of a sum of three: nothing of the approach is left within 3a.
+    if within <= 4.0 * np.finfo(float).eps * case.approach:
+        reason = "the depth 3a lies within the first element under the contact"
+        return q.K_N_TANGENT_3A.withheld(case.case, f"{reason}; {finer(solution.plan.scene)}")
+    beyond = sum(beyond_3a(solution, case.force).values())
+    closed = None if hertz is None else 1.5 * case.force / (hertz.approach - beyond)
+    return _beside(q.K_N_TANGENT_3A, 1.5 * case.force / within, case.case, closed, _HERTZ_3A)
+
+
+def _working_slope(solution: ContactSolution) -> list[Result]:
+    """Spread of the slope of the force-approach curve of flat faces, (max - min) / mean."""
+    low, high = _WORKING
+    inside = [(p.force, p.approach) for p in solution.curve if low <= p.force <= high]
+    if solution.curved or len(inside) < 2:
+        return []
+    F, d = np.array(inside).T
+    slope = np.diff(F) / np.diff(d)
+    case = Case(name=f"F_N from {low:g} to {high:g} N")
+    return [q.SLOPE_SPREAD.of(np.ptp(slope) / slope.mean(), case)]
+
+
+# -- of flat faces ---------------------------------------------------------------------------------
+
+
+def _worn_zones(solution: ContactSolution, case: NormalCase) -> list[Result]:
+    """Where the pressure peaks, beside the bands of the damper that the load comes from.
+
+    The worn areas themselves are printed nowhere; the bands are the scene's own.
+    """
+    if case.force <= 0.0:
+        return []
+    peaks, bands = pressure_peaks(solution, case), band_middles(solution)
+    out = [q.PRESSURE_PEAKS.of(len(peaks), case.case)]
+    for i, (x, y) in enumerate(peaks):
+        nearest = min(bands, key=lambda c: abs(c - x)) if len(bands) == len(peaks) else None
+        source = "middle of the scene's loaded band" if nearest else ""
+        out.append(q.PRESSURE_PEAK_X.of(x, case.case, nearest, source, n=i + 1, exact=False))
+        out.append(q.PRESSURE_PEAK_Y.of(y, case.case, n=i + 1))
+    return out
+
+
+def _law(solution: ContactSolution, case: NormalCase) -> list[Result]:
+    law, at = contact_law(solution, case), case.case
+    if law is None:
+        return []
+    out = [
+        q.LAW_POINTS.of(law.n_point, at),
+        q.LAW_K_N.of(law.k_n.sum(), at),
+        *(q.LAW_K_T.of(law.k_t[:, i].sum(), at, n=axis) for i, axis in enumerate("xy")),
+        q.LAW_PRELOAD.of(law.preload.sum(), at),
+        *(q.LAW_LUMPING.of(law.tilt_error()[i], at, n=axis) for i, axis in enumerate("xy")),
+    ]
+    own = dict(zip("xy", law.tilt_stiffness(), strict=True))
+    if solution.plan.scene.law.bodies == "both":
+        for axis, true in tilt_stiffness(solution, case).items():
+            out.append(q.LAW_TILT.of(own[axis], at, true, "contact's own", n=axis))
+    return out
+
+
+# -- tangential loads ------------------------------------------------------------------------------
+
+
+def _tangential(solution: ContactSolution, t: TangentialCase, *, misfits: bool) -> Iterable[Result]:
+    area = area_of(solution, t.stick)
+    if solution.curved:
+        yield from _partial_slip(solution, t, area, misfits=misfits)
+    else:
+        yield q.TANGENTIAL_LOAD.of(t.load, t.case)
+        yield q.DISPLACEMENT.of(t.displacement, t.case)
+        yield q.STICK_SHARE.of(t.stick.sum() / max(1, (t.pressed > 0.0).sum()), t.case)
+    yield _area(solution, q.STICK_AREA).of(area, t.case)
+    yield q.K_T_TANGENT_RAW.of(t.stiffness, t.case)
+    if t.load > 0.0:
+        yield q.K_T_SECANT_RAW.of(t.load / t.displacement, t.case)
+
+
+def _partial_slip(
+    solution: ContactSolution, t: TangentialCase, area: float, *, misfits: bool
+) -> Iterable[Result]:
+    """Beside Cattaneo and Mindlin where they have a closed form."""
+    mu, N, c = solution.plan.scene.contact.friction, t.normal.force, stick_radius(solution, t)
+    hertz, closed = hertz_of(solution, N), None
+    if hertz is not None:
+        C = shear_compliance(solution)
+        closed = float(mindlin.displacement(t.load, mu, N, hertz.radius, C))
+    yield _beside(q.STICK_RADIUS, float(np.sqrt(area / np.pi)), t.case, c, _MINDLIN)
+    yield _beside(q.SHEAR_RAW, t.displacement, t.case, closed, _MINDLIN)
+    if t.normal.shear_shares:
+        bodies = t.load * t.normal.finite_body_shear
+        yield _beside(q.SHEAR, t.displacement - bodies, t.case, closed, _MINDLIN)
+    if misfits and hertz is not None:
+        yield from _misfits(solution, t, hertz)
+
+
+def _misfits(
+    solution: ContactSolution, t: TangentialCase, hertz: HertzPoint[float]
+) -> list[Result]:
+    """Root mean square difference of the traction from the closed form, over that of the closed
+    form and over that of mu p.
+    """
+    closed = closed_form_traction(solution, t)
+    if closed is None:
+        return []
+    patch, mu = solution.model.patch, solution.plan.scene.contact.friction
+    area, theirs = patch.area(), consistent_average(patch, closed)
+    limit = consistent_average(
+        patch, lambda r: mu * hertz_pressure(r, hertz.radius, hertz.max_pressure)
+    )
+    traction = tractions(solution, t)[0]
+    misfit = np.sqrt((area * (patch.whole(traction) - theirs) ** 2).sum())
+    lost = f"the contact lies between the nodes; {finer(solution.plan.scene)}"
+    return [
+        quantity.of(misfit / size, t.case, source=_MINDLIN)
+        if (size := float(np.sqrt((area * scale**2).sum()))) > 0.0
+        else quantity.withheld(t.case, lost)
+        for quantity, scale in ((q.MISFIT, theirs), (q.MISFIT_OF_LIMIT, limit))
+    ]

@@ -1,10 +1,12 @@
-"""What a run of a contact finds: its loads, its tangential loads, all of it.
+"""What a run of a contact finds: its normal loads, its tangential loads, all of it.
 
-A curved contact has its fields on the whole patch, a flat one at the nodes of the model.
+Fields are those of the model's contact nodes, (n,); mirror symmetry may make the model a part of
+the whole, which loads and stiffnesses are those of. `faces` has the fields on the whole contact.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,13 +15,14 @@ from numpy.typing import NDArray
 from upd.analyses.base import Resolved
 from upd.analyses.contact.coupled import CoupledState
 from upd.analyses.contact.loading import LoadPath, Sheared
-from upd.analyses.contact.plan import ContactPlan, direction_name
+from upd.analyses.contact.plan import ContactPlan, direction_name, is_curved
 from upd.analyses.contact.scene_plan import DamperLoad
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
 from upd.contact.patch import ContactMeasures
 from upd.contact.stiffness import BodyShare
 from upd.contact.tilt import TiltedContact
+from upd.reference import contact_modulus
 from upd.results import Case, Estimates
 
 Array = NDArray[np.float64]
@@ -27,25 +30,22 @@ Array = NDArray[np.float64]
 
 @dataclass
 class PressedContact:
-    """One normal load.
+    """Answer of both bodies under a normal load, or of one pressed by a rigid counterpart.
 
     Attributes
     ----------
-    solution
-        Of the model, which mirror symmetry may make a part of the whole.
     stiffness
         Tangent normal stiffness of the whole contact, N/mm.
     state
         With normal and tangential contact at once, the state it comes from.
-    displacement, reaction
-        By body: (n_node, 3) mm, N on its distant set.
+    tilted
+        With a free tilt, the answer it is a part of.
     """
 
     solution: NormalContact
     stiffness: float
-    state: CoupledState | None = field(default=None, kw_only=True)
-    displacement: dict[str, Array] = field(default_factory=dict, kw_only=True)
-    reaction: dict[str, float] = field(default_factory=dict, kw_only=True)
+    state: CoupledState | None = None
+    tilted: TiltedContact | None = None
 
     @property
     def stick(self) -> NDArray[np.bool_]:
@@ -54,55 +54,54 @@ class PressedContact:
         """
         return self.solution.contact if self.state is None else self.state.stick
 
-
-@dataclass
-class ContactSolution:
-    """All that was solved.
-
-    Attributes
-    ----------
-    left_out
-        Numbers solved again with effects left out.
-    estimates
-        Errors of the numbers, where the mesh was chosen by an accuracy.
-    """
-
-    plan: ContactPlan
-    model: ContactModel
-    left_out: list[Resolved] = field(default_factory=list, kw_only=True)
-    estimates: Estimates | None = field(default=None, kw_only=True)
+    @property
+    def tilt(self) -> Array | None:
+        """(2,) free tilts in rad; None where they are held."""
+        if self.tilted is not None:
+            return self.tilted.tilt
+        motion = np.zeros(0) if self.state is None else self.state.motion[3:]
+        return motion if motion.size else None
 
 
-# -- curved ----------------------------------------------------------------------------------------
-
-
-@dataclass
-class HertzNormalCase(PressedContact):
-    """One normal load: forces in N, gaps in mm, pressure in MPa on the whole patch, (len(X),
-    len(Y)).
+@dataclass(kw_only=True)
+class NormalCase(PressedContact):
+    """One normal load on the whole contact.
 
     Attributes
     ----------
-    shares
-        By body: its share of the approach.
-    shear_stiffness
-        N/mm along the load with every node stuck.
-    shear_shares
-        By body: its share of the tangential displacement, mm per N.
+    alone
+        By body: its answer at the same load, pressed by a rigid counterpart, where a stiffness
+        calls for it.
+    displacement, reaction
+        By body: (n_node, 3) mm, N on its distant set.
+    compression
+        By body: displacement at depth 3a, mm.
+    shares, shear_shares
+        By body: its share of the approach, and of the tangential displacement in mm per N.
     mesh_error
         Estimated error of the approach by the mesh near the contact and far from it, mm; None
         where the shares are not known.
     """
 
-    load: float
-    force: Array
-    gap: Array
-    pressure: Array
+    load: DamperLoad
     measures: ContactMeasures
+    alone: dict[str, PressedContact] = field(default_factory=dict)
+    displacement: dict[str, Array] = field(default_factory=dict)
+    reaction: dict[str, float] = field(default_factory=dict)
+    compression: dict[str, float] = field(default_factory=dict)
     shares: dict[str, BodyShare] = field(default_factory=dict)
-    shear_stiffness: float | None = None
     shear_shares: dict[str, BodyShare] = field(default_factory=dict)
     mesh_error: tuple[float, float] | None = None
+
+    @property
+    def force(self) -> float:
+        """N on the whole contact."""
+        return self.load.force
+
+    @property
+    def case(self) -> Case:
+        """The load."""
+        return self.load.case
 
     @property
     def approach(self) -> float:
@@ -119,121 +118,6 @@ class HertzNormalCase(PressedContact):
         """What the finite bodies add to the tangential displacement, mm per N."""
         return sum(s.finite_body for s in self.shear_shares.values())
 
-    @property
-    def case(self) -> Case:
-        """The load."""
-        return Case(load=self.load)
-
-
-@dataclass
-class HertzTangentialCase:
-    """One tangential load T = ratio mu N after one normal load.
-
-    Displacement in mm along it, and tangent dT/dd in N/mm of the whole contact at the present stick
-    set. Traction in MPa and slip in mm on the whole patch, (len(X), len(Y)), with a last axis of 2
-    for two directions; the pressure under it; what the solver left at the nodes, for checks, and
-    with normal and tangential contact at once its state.
-    """
-
-    normal: HertzNormalCase
-    ratio: float
-    load: float
-    displacement: float
-    stiffness: float
-    traction: Array
-    slip: Array
-    stick: NDArray[np.bool_]
-    pressure: Array
-    nodes: Sheared
-    state: CoupledState | None = None
-
-    @property
-    def traction_along(self) -> Array:
-        """(len(X), len(Y)) traction along the load, MPa."""
-        return self.traction[..., 0] if self.traction.ndim == 3 else self.traction
-
-    @property
-    def case(self) -> Case:
-        """Normal load and ratio."""
-        return Case(load=self.normal.load, ratio=self.ratio)
-
-
-@dataclass(frozen=True)
-class CurvePoint:
-    """One loaded point of the curve: N, mm, and what lies beyond depth 3a in each body, mm."""
-
-    load: float
-    approach: float
-    measures: ContactMeasures
-    compression: dict[str, float]
-
-
-@dataclass
-class HertzSolution(ContactSolution):
-    """All that was solved of a curved contact.
-
-    Attributes
-    ----------
-    modulus
-        Contact modulus E*, MPa.
-    curve
-        Approach in mm and normal force in N.
-    along
-        What else is known at the loaded points of the curve.
-    no_shares
-        Why the bodies' shares of the approach are not known.
-    """
-
-    modulus: float
-    normal: list[HertzNormalCase] = field(default_factory=list)
-    curve: list[tuple[float, float]] = field(default_factory=list)
-    along: list[CurvePoint] = field(default_factory=list)
-    tangential: list[HertzTangentialCase] = field(default_factory=list)
-    cycles: list[LoadPath] = field(default_factory=list)
-    no_shares: str = ""
-
-
-# -- flat ------------------------------------------------------------------------------------------
-
-
-@dataclass
-class FlatNormalCase(PressedContact):
-    """One normal load on the whole contact in N and its answer.
-
-    Attributes
-    ----------
-    approach_of
-        Approach in mm that each body takes: its mean displacement under the pressure, without
-        friction its share of the energy.
-    alone, alone_states
-        Answer of each body pressed at the same load by a rigid counterpart, where a stiffness
-        calls for it.
-    """
-
-    load: DamperLoad
-    tilted: TiltedContact | None
-    approach_of: dict[str, float]
-    alone: dict[str, NormalContact] = field(default_factory=dict)
-    alone_states: dict[str, CoupledState] = field(default_factory=dict)
-
-    @property
-    def force(self) -> float:
-        """N on the whole contact."""
-        return self.load.force
-
-    @property
-    def case(self) -> Case:
-        """The load."""
-        return self.load.case
-
-    @property
-    def tilt(self) -> Array | None:
-        """(2,) free tilts in rad; None where they are held."""
-        if self.tilted is not None:
-            return self.tilted.tilt
-        motion = np.zeros(0) if self.state is None else self.state.motion[3:]
-        return motion if motion.size else None
-
 
 @dataclass(frozen=True)
 class StuckContact:
@@ -242,6 +126,8 @@ class StuckContact:
 
     Attributes
     ----------
+    case
+        Normal load and, of flat faces, direction.
     total
         Tangential stiffness in N/mm.
     of
@@ -251,28 +137,24 @@ class StuckContact:
     """
 
     normal: Case
+    case: Case
     direction: float
     total: float
     of: dict[str, float]
     nodal: Array
 
-    @property
-    def case(self) -> Case:
-        """Normal load and direction."""
-        return replace(self.normal, direction=direction_name(self.direction))
-
 
 @dataclass
-class FlatTangentialCase:
-    """One tangential load T = ratio mu N in a direction (degrees from x), after one normal load.
+class TangentialCase:
+    """One tangential load T = ratio mu N in a direction, after one normal load.
 
-    Traction and slip (n, 1 or 2), normal forces under it (n,); what the solver left at the nodes,
-    for checks, and with normal and tangential contact at once its state.
+    Displacement in mm along it, and tangent dT/dd in N/mm of the whole contact at the present stick
+    set. Force in N and slip in mm, (n, 1 or 2), normal forces under it (n,); what the solver left
+    at the nodes, for checks, and with normal and tangential contact at once its state.
     """
 
-    normal: FlatNormalCase
-    direction: float
-    ratio: float
+    normal: NormalCase
+    case: Case
     load: float
     displacement: float
     stiffness: float
@@ -283,32 +165,59 @@ class FlatTangentialCase:
     nodes: Sheared
     state: CoupledState | None = None
 
-    @property
-    def case(self) -> Case:
-        """Normal load, direction and ratio."""
-        return replace(self.normal.case, direction=direction_name(self.direction), ratio=self.ratio)
-
 
 @dataclass
-class FlatSolution(ContactSolution):
-    """All that was solved of a flat contact.
+class ContactSolution:
+    """All that was solved.
 
     Attributes
     ----------
-    bonded
-        Normal stiffness in N/mm when no node may open.
     curve
-        Normal force in N and its answer.
+        Loaded points of the force-approach curve.
     stuck
         By normal load and direction.
+    paths
+        Tangential force over displacement, cycles among them.
     moved
         By normal load and direction: share of the normal forces that gross slip would move.
+    no_shares
+        Why the bodies' shares of the approach are not known.
+    left_out
+        Numbers solved again with effects left out.
+    estimates
+        Errors of the numbers, where the mesh was chosen by an accuracy.
     """
 
-    bonded: float = 0.0
-    normal: list[FlatNormalCase] = field(default_factory=list)
-    curve: list[tuple[float, NormalContact]] = field(default_factory=list)
+    plan: ContactPlan
+    model: ContactModel
+    normal: list[NormalCase] = field(default_factory=list)
+    curve: list[NormalCase] = field(default_factory=list)
     stuck: list[StuckContact] = field(default_factory=list)
-    tangential: list[FlatTangentialCase] = field(default_factory=list)
+    tangential: list[TangentialCase] = field(default_factory=list)
     paths: list[LoadPath] = field(default_factory=list)
     moved: dict[Case, float] = field(default_factory=dict)
+    no_shares: str = ""
+    left_out: list[Resolved] = field(default_factory=list)
+    estimates: Estimates | None = None
+
+    @property
+    def curved(self) -> bool:
+        """Whether the faces are curved."""
+        return is_curved(self.plan.scene)
+
+    @property
+    def modulus(self) -> float:
+        """Contact modulus E*, MPa."""
+        m1, m2 = (self.plan.scene.materials[b.name] for b in (self.model.upper, self.model.lower))
+        return contact_modulus(m1.E, m1.nu, m2.E, m2.nu)
+
+    def sheared_case(
+        self, normal: NormalCase, direction: float, ratio: float | None = None
+    ) -> Case:
+        """A normal load with a tangential one; a curved contact has one direction."""
+        name = "" if self.curved else direction_name(direction)
+        return replace(normal.case, direction=name, ratio=ratio)
+
+    def stuck_under(self, case: Case) -> Iterable[StuckContact]:
+        """Of a normal load, direction by direction."""
+        return (s for s in self.stuck if s.normal == case)

@@ -240,6 +240,11 @@ def _seconds(problem: Problem, plan: ContactPlan, one: Variation) -> float:
     return level.solve_seconds + neighbours_seconds(level)
 
 
+def governing(scene: Scene) -> tuple[str, ...]:
+    """Names of the numbers (shell patterns) that one accuracy for all is asked of."""
+    return CURVED_GOVERNING if is_curved(scene) else FLAT_GOVERNING
+
+
 def make_wanted(problem: Problem, governing: Sequence[str]) -> Wanted:
     """A contact whose mesh is chosen by an accuracy; ``governing``: names of the numbers (shell
     patterns) that one accuracy for all is asked of.

@@ -12,6 +12,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.analyses.contact.closed_forms import closed_form_traction, hertz_of
+from upd.analyses.contact.faces import lattices, tractions
+from upd.analyses.contact.solution import ContactSolution
 from upd.contact.model import Body, ContactModel
 from upd.contact.subsurface import MostStressed, most_stressed, partial_slip_ratio
 from upd.reference import HertzPoint, hertz_yield_load, hertz_yield_point
@@ -34,7 +37,7 @@ def limited(scene: Scene, model: ContactModel) -> Iterator[tuple[Body, float, fl
             yield body, material.yield_stress, material.nu
 
 
-def hertz_checks(
+def _hertz_checks(
     scene: Scene,
     model: ContactModel,
     case: Case,
@@ -65,7 +68,7 @@ def hertz_checks(
     return out
 
 
-def partial_slip_checks(
+def _partial_slip_checks(
     scene: Scene, model: ContactModel, case: Case, hertz: HertzPoint[float]
 ) -> list[Check]:
     """Of a sphere of the block's material under a tangential load along one direction: Hertz's
@@ -85,7 +88,7 @@ def partial_slip_checks(
     return out
 
 
-def half_space_checks(
+def _half_space_checks(
     scene: Scene,
     model: ContactModel,
     case: Case,
@@ -124,3 +127,31 @@ def half_space_checks(
 
 def _check(case: Case, body: str, value: float, text: str) -> Check:
     return Check("onset of yield", replace(case, body=body), value, 1.0, text, _REMEDY, fatal=False)
+
+
+def yield_checks(solution: ContactSolution) -> list[Check]:
+    """Of the bodies whose yield stress is given: by a closed form where there is one."""
+    scene, model = solution.plan.scene, solution.model
+    if not any(limited(scene, model)):
+        return []
+    pressure, faces, checks = model.multipliers.pressure, lattices(solution), []
+    for case in (c for c in solution.normal if c.force > 0.0):
+        hertz = hertz_of(solution, case.force)
+        if hertz is not None and scene.sphere_radius is not None:
+            radius, modulus = scene.sphere_radius, solution.modulus
+            checks += _hertz_checks(scene, model, case.case, hertz, radius, modulus)
+            continue
+        normal = pressure(case.solution.force)
+        fields = {k.name: (k.X, k.Y, [k.field(normal)]) for k in faces}
+        checks += _half_space_checks(scene, model, case.case, fields)
+    for t in solution.tangential:
+        hertz = hertz_of(solution, t.normal.force)
+        if hertz is not None and closed_form_traction(solution, t) is not None:
+            checks += _partial_slip_checks(scene, model, t.case, hertz)
+            continue
+        normal = pressure(np.maximum(t.pressed, 0.0))
+        shear = np.zeros((2, len(normal)))
+        shear[list(t.nodes.components)] = tractions(solution, t)
+        fields = {k.name: (k.X, k.Y, [k.field(f) for f in (normal, *shear)]) for k in faces}
+        checks += _half_space_checks(scene, model, t.case, fields)
+    return checks

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from upd.analyses.contact import ANALYSES
 from upd.analyses.contact.plan import ContactPlan
 from upd.analyses.contact.scene_plan import make_plan as make_contact_plan
-from upd.analyses.flat import ANALYSIS as FLAT
 from upd.cache.arrays import cache_folder
 from upd.cache.sources import source_digest
 from upd.contact.law import ContactLaw
@@ -31,6 +31,7 @@ from upd.scene.forced import ForcedScene
 from upd.scene.forced_contact import Side, StiffnessChoice
 
 log = logging.getLogger(__name__)
+FLAT = ANALYSES["flat"]
 
 
 @dataclass(frozen=True)

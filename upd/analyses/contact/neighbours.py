@@ -7,21 +7,20 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from upd.analyses.contact.solution import HertzNormalCase, HertzSolution
+from upd.analyses.contact.faces import rim_nodes
+from upd.analyses.contact.normal import solve_normal
+from upd.analyses.contact.results import make_results
+from upd.analyses.contact.solution import ContactSolution, NormalCase
+from upd.analyses.contact.tangential import solve_tangential
 from upd.analyses.contact.varied import has_neighbours, neighbours, plan_at
-from upd.analyses.hertz.results import make_results
-from upd.analyses.hertz.solve import solve_normal, solve_tangential
 from upd.errors import UpdError
 from upd.progress import Stages
 from upd.results import Case
 from upd.vary.scatter import Samples
 
-FloatArray = NDArray[np.float64]
 
-
-def sample(solution: HertzSolution) -> Samples:
+def sample(solution: ContactSolution) -> Samples:
     """The numbers of every loaded case at neighbouring loads.
 
     They move the contact's edge by up to one spacing of the lattice each way, on the same condensed
@@ -41,26 +40,26 @@ def sample(solution: HertzSolution) -> Samples:
         if not r.withheld and r.case.load
     }
     for case in solution.normal:
-        touching = int(np.count_nonzero(case.force > 0.0))
-        for t in neighbours(touching) if case.load > 0.0 else ():
-            for name, of, value in _values(solution, case, case.load * float(np.exp(t))):
-                key = name, replace(of, load=case.load)
+        touching = int(np.count_nonzero(solution.model.patch.whole(case.solution.force) > 0.0))
+        for t in neighbours(touching) if case.force > 0.0 else ():
+            for name, of, value in _values(solution, case, case.force * float(np.exp(t))):
+                key = name, replace(of, load=case.force)
                 if key in found:
                     found[key].append((t, value))
     return {key: np.array(rows) for key, rows in found.items()}
 
 
 def _values(
-    solution: HertzSolution, case: HertzNormalCase, load: float
+    solution: ContactSolution, case: NormalCase, load: float
 ) -> list[tuple[str, Case, float]]:
     """The numbers at a load near the case's; none where it is too large for the patch."""
-    near = HertzSolution(plan_at(solution.plan, (load,)), solution.model, solution.modulus)
+    near = ContactSolution(plan_at(solution.plan, (load,)), solution.model)
     try:
         solve_normal(near, Stages())
         (one,) = near.normal
-        if _at_rim(one.force):
+        if rim_nodes(near, one):
             return []
-        one.shares = {body: s.over(case.load / load) for body, s in case.shares.items()}
+        one.shares = {body: s.over(case.force / load) for body, s in case.shares.items()}
         one.shear_shares = case.shear_shares
         if near.plan.effect("friction"):
             solve_tangential(near, Stages())
@@ -70,8 +69,3 @@ def _values(
     except UpdError:
         # The load itself was solved: a neighbour that is not is a sample less.
         return []
-
-
-def _at_rim(force: FloatArray) -> bool:
-    rim = (force[0], force[-1], force[:, 0], force[:, -1])
-    return any(bool(np.any(side > 0.0)) for side in rim)
