@@ -112,7 +112,7 @@ def swept() -> ForcedSolution:
 
 
 def test_sweeps_jump_where_the_curve_folds(solution: ForcedSolution, swept: ForcedSolution) -> None:
-    up, down = swept.sweeps
+    up, down = swept.curves
     assert (up.way, down.way) == ("up", "down")
     assert up.found.status != "stopped" != down.found.status
     # the peak bends back: falling, the high motion lasts to lower frequencies
@@ -216,7 +216,7 @@ def test_samples_of_the_scene_are_the_steps_of_its_marches(
         counted.clear()
         up, _ = both_ways(plan, "thesis", curve.ratio, springs.march, springs.at_rest())
         assert set(counted) == {steps}
-        assert up.found.settled.all()
+        assert up.answer.settled.all()
 
 
 def test_maxima_of_a_sweep_are_its_own_points() -> None:

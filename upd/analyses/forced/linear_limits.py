@@ -5,7 +5,8 @@ Peaks are sought around their own modes: they do not depend on the frequencies a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -20,14 +21,21 @@ from upd.analyses.forced.excitation import Excitation
 from upd.analyses.forced.measures import (
     PEAKS_ABOVE,
     Array,
-    Balanced,
     ComplexArray,
     CurvePeak,
     StuckMode,
     chosen_peaks,
 )
-from upd.analyses.forced.mode_peaks import CANDIDATES, ModeShapes, numbered, shapes_along_x
+from upd.analyses.forced.mode_peaks import (
+    CANDIDATES,
+    ModeShapes,
+    numbered,
+    shapes_along_x,
+    tell_stuck_peaks,
+    unmoved,
+)
 from upd.analyses.forced.model import Model
+from upd.analyses.forced.paths import balance_of
 from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.hbm.faces.state import InterfaceModel
 from upd.hbm.springs.balance import Balance
@@ -131,9 +139,7 @@ def _top(height: Callable[[Array], Array], low: float, high: float) -> tuple[flo
     return float(found.x), -float(found.fun)
 
 
-def linear_peaks(
-    answer: Balanced, row: Array, force: float, grid: Array, stuck: bool
-) -> list[CurvePeak]:
+def linear_peaks(b: Balance, row: Array, force: float, grid: Array, stuck: bool) -> list[CurvePeak]:
     """Peaks of the accelerance without contacts or with all points stuck.
 
     Parameters
@@ -141,7 +147,7 @@ def linear_peaks(
     row
         (n_dof,) output.
     force
-        Excitation of the answer, N.
+        Its excitation, N.
     grid
         (n,) Hz, rising: the sweep.
     stuck
@@ -153,11 +159,11 @@ def linear_peaks(
         At most the two highest within the sweep, by rising frequency; heights in (m/s2)/N.
     """
     # a mode answers where the harmonic that is read meets it
-    k = measures.read_harmonic(answer)
-    modes, width = linear_modes(answer.balance, stuck)
+    k = measures.read_harmonic(b)
+    modes, width = linear_modes(b, stuck)
 
     def height(f: NDArray[np.float64]) -> Array:
-        return np.abs(measures.linear_accelerance(answer, row, force, f, stuck))
+        return np.abs(measures.linear_accelerance(b, row, force, f, stuck))
 
     f = around_modes(modes / k, width / k, float(grid[0]), float(grid[-1]))
     return exact_peaks(height, f, grid)
@@ -302,25 +308,19 @@ def linear_curves(
     return _limit(frequency, excitation.lowest, modes, blades, read)
 
 
-def linear_limits_of(
-    plan: ForcedPlan, model: Model, answer: measures.Balanced, force: float
-) -> LinearCurves:
-    """Free and stuck curves, peaks and modes.
-
-    Parameters
-    ----------
-    answer
-        Any of the model, with ``force``: its problem counts.
-    """
-    f, k = grid(plan), measures.read_harmonic(answer)
-    modes = {stuck: linear_modes(answer.balance, stuck) for stuck in (False, True)}
+def linear_of(plan: ForcedPlan, model: Model) -> LinearCurves:
+    """Free and stuck curves of a model, their peaks and modes."""
+    force = plan.scene.damper.centrifugal
+    b = balance_of(plan, model, force, (0, *model.excitation.harmonics))
+    f, k = grid(plan), model.excitation.lowest
+    modes = {stuck: linear_modes(b, stuck) for stuck in (False, True)}
     # finer around every mode: a drawn curve has its tops
     for at, width in modes.values():
         f = finer(f, at / k, width / k)
 
     def curves(stuck: bool) -> tuple[dict[Side, ComplexArray], dict[Side, list[CurvePeak]]]:
         def read(side: Side, f: Array) -> ComplexArray:
-            return measures.linear_accelerance(answer, model.row(side), force, f, stuck)
+            return measures.linear_accelerance(b, model.row(side), force, f, stuck)
 
         return _limit(f, k, modes[stuck], SIDES if stuck else model.excitation.free_blades, read)
 
@@ -328,3 +328,41 @@ def linear_limits_of(
     stuck, stuck_peaks = curves(True)
     below = CANDIDATES * plan.scene.excitation.stop
     return LinearCurves(f, free, stuck, measures.stuck_modes(model, below), free_peaks, stuck_peaks)
+
+
+def stuck_frequency(modes: Iterable[StuckMode], in_phase: bool) -> float:
+    """The lowest in Hz along x, in or out of phase; nan without."""
+    found = (m.frequency for m in modes if m.axis == "x" and m.in_phase == in_phase)
+    return next(found, math.nan)
+
+
+def limit_peaks(
+    plan: ForcedPlan, model: Model, linear: LinearCurves, kind: str, side: Side
+) -> list[CurvePeak]:
+    """Numbered peaks of a limit, "free" or "stuck", by rising frequency."""
+    own = sorted(getattr(linear, f"{kind}_peaks")[side], key=lambda p: p.frequency)
+    if kind == "free":
+        return unmoved(own)
+    named = tell_stuck_peaks(model, own, plan.scene.excitation.stop)
+    return sorted(named, key=lambda p: p.frequency)
+
+
+def fine_grid(
+    plan: ForcedPlan, model: Model, force: float, frequencies: Array | None = None
+) -> Array:
+    """Frequencies of the sweep in Hz, and finer ones around stuck modes where they are too coarse
+    for these.
+
+    Parameters
+    ----------
+    plan, model
+        Of the rig.
+    force
+        F_E, N.
+    frequencies
+        (n,) Hz in place of those of the sweep.
+    """
+    k = model.excitation.lowest
+    problem = balance_of(plan, model, force, (0, *model.excitation.harmonics))
+    modes, width = linear_modes(problem, True)
+    return finer(grid(plan) if frequencies is None else frequencies, modes / k, width / k)

@@ -17,10 +17,16 @@ from upd.analyses.forced.left_out import (
     highest_slipping,
 )
 from upd.analyses.forced.levels import COARSER, Laws, coarse_model, other_levels
+from upd.analyses.forced.linear_limits import linear_of
 from upd.analyses.forced.model import Model, make_model, preloaded
 from upd.analyses.forced.paths import quiet
 from upd.analyses.forced.peaks import solve_curve
-from upd.analyses.forced.peaks_again import FoundPeaks, Variant, linear_of, solve_again
+from upd.analyses.forced.peaks_again import (
+    FoundPeaks,
+    Variant,
+    run_peaks,
+    solve_again,
+)
 from upd.analyses.forced.performance import (
     RatioPoint,
     further_points,
@@ -116,7 +122,7 @@ def _swept_points(solution: ForcedSolution, stages: Stages) -> None:
         for ratio in plan.scene.excitation.centrifugal_to_force:
             with stages("sweeps", f"{name}, F_C/F_E {ratio:g}: up and down"):
                 start = springs.at_rest()
-                solution.sweeps += both_ways(plan, name, ratio, springs.march, start)
+                solution.curves += both_ways(plan, name, ratio, springs.march, start)
     march_peaks(solution, stages)
 
 
@@ -197,10 +203,10 @@ def _around(
     further: list[RatioPoint] = []
     for name, model in solution.models.items():
         mine = tuple(c for c in solution.curves if c.stiffness == name and not c.empty)
-        peaks = FoundPeaks(plan, model, solution.linear[name], mine)
-        solution.searched[name], bare = peaks, peaks.bare
+        found = tuple(peak for curve in mine for peak in run_peaks(curve))
+        peaks = FoundPeaks(plan, model, solution.linear[name], found)
         levels = solution.levels.setdefault(name, []) if variants[name] else []
-        work += [_Work(levels.append, solve_again, (bare, one)) for one in variants[name]]
+        work += [_Work(levels.append, solve_again, (peaks, one)) for one in variants[name]]
         if scene.left_out.solves:
             solution.omissions += elastic_changes(solution, name)
         if name == first:
@@ -208,7 +214,7 @@ def _around(
                 jobs = further_points(plan, model, with_curves(points, mine), points)
                 work += [_Work(further.append, *job) for job in jobs]
             if scene.wants("inputs") or scene.left_out.solves:
-                work += _at_few_harmonics(solution, name, laws[name])
+                work += _at_few_harmonics(solution, peaks, name, laws[name])
             if scene.wants("band"):
                 work += _band(solution, name)
     _done(beside, work)
@@ -219,9 +225,11 @@ def _around(
         )
 
 
-def _at_few_harmonics(solution: ForcedSolution, name: str, laws: Laws) -> Iterator[_Work]:
+def _at_few_harmonics(
+    solution: ForcedSolution, peaks: FoundPeaks, name: str, laws: Laws
+) -> Iterator[_Work]:
     """Inputs, and sliding along the damper, on the curve with the lowest F_C/F_E."""
-    scene, few = solution.plan.scene, few_harmonics(solution.searched[name])
+    scene, few = solution.plan.scene, few_harmonics(peaks)
     if few is None:
         return
     if scene.wants("inputs"):

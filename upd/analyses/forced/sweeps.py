@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from upd.analyses.forced.curves import SweptCurve, Way
+from upd.analyses.forced.curves import Curve, SweptCurve, Way
 from upd.analyses.forced.excitation import ComplexArray, Excitation, excitation_of
 from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.linear_limits import stuck_modes_of
@@ -81,7 +81,8 @@ def both_ways(
             )
             more = dict(zip(excitation.harmonics[1:], others, strict=True))
             peaks = {side: _peaks(found, np.abs(H[side]), modes) for side in SIDES}
-            out.append(SweptCurve(name, ratio, force, H, more, peaks, way, found))
+            seconds = float(found.seconds.sum())
+            out.append(Curve(name, ratio, force, H, more, peaks, found, seconds, way))
     return out
 
 
@@ -131,7 +132,7 @@ def march_peaks(solution: ForcedSolution, stages: Stages) -> None:
     """
     if not any(solution.plan.scene.wants(one) for one in WANTS):
         return
-    for sweep in solution.sweeps:
+    for sweep in (c for c in solution.curves if c.way):
         for top in sweep.peaks["right"]:
             with stages("time march", f"{sweep.case}, peak {top.number}: its last period"):
                 solution.marched.append(marched_peak(solution, sweep, top))
@@ -140,7 +141,7 @@ def march_peaks(solution: ForcedSolution, stages: Stages) -> None:
 def marched_peak(solution: ForcedSolution, sweep: SweptCurve, peak: CurvePeak) -> MarchedPeak:
     """The last period of a sweep at one of its peaks, integrated again and kept."""
     places, rest, kept = _contact(solution, sweep.stiffness)
-    period = period_of_sweep(sweep.found, peak.sample, by_coulomb)
+    period = period_of_sweep(sweep.answer, peak.sample, by_coulomb)
     motion = np.zeros((len(period.motion), MOTIONS))
     motion[:, kept] = period.motion - rest
     return MarchedPeak(sweep, peak, period, places, motion)
@@ -181,7 +182,7 @@ def marched_loops(one: MarchedPeak, count: int) -> list[Loop]:
         Loops at most.
     """
     period, out = one.period, []
-    friction = one.sweep.found.model.friction
+    friction = one.sweep.answer.model.friction
     for p in losing_most(period.loss, count):
         traction = period.force[:, 1:, p].T
         motion = period.slip[:, :, p].T + one.places.compliance[p] * traction

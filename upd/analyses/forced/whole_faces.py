@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.forced.curves import FacesCurve, LinearCurves, WholeFaces
+from upd.analyses.forced.curves import Curve, FacesCurve, LinearCurves, WholeFaces
 from upd.analyses.forced.excitation import ComplexArray, excitation_of
 from upd.analyses.forced.interface_model import (
     by_coulomb,
@@ -170,10 +170,10 @@ def solve_faces(solution: ForcedSolution, name: str, stages: Stages) -> None:
         if scene.balance.method == "march":
             with stages("sweeps", f"{words}, up and down"):
                 found = both_ways(solution.plan, name, ratio, faces.march, faces.start)
-                solution.sweeps += found
+                solution.curves += found
         else:
             with stages("friction", words):
-                solution.balanced.append(balance_curve(solution.plan, name, faces, ratio))
+                solution.curves.append(balance_curve(solution.plan, name, faces, ratio))
 
 
 def balance_curve(plan: ForcedPlan, name: str, faces: WholeFaces, ratio: float) -> FacesCurve:
@@ -207,7 +207,7 @@ def balance_curve(plan: ForcedPlan, name: str, faces: WholeFaces, ratio: float) 
     H, read = every.pop(excitation.lowest), found.amplitude[:, excitation.lowest]
     modes = stuck_modes_of(faces.march, CANDIDATES * plan.scene.excitation.stop)
     peaks = {side: _peaks(found, np.abs(H[side]), read, modes) for side in SIDES}
-    return FacesCurve(name, ratio, force, H, every, peaks, found)
+    return Curve(name, ratio, force, H, every, peaks, found, found.seconds)
 
 
 def _peaks(
