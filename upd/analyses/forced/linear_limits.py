@@ -19,7 +19,6 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.curves import LinearCurves
 from upd.analyses.forced.excitation import Excitation
 from upd.analyses.forced.measures import (
-    PEAKS_ABOVE,
     Array,
     ComplexArray,
     CurvePeak,
@@ -198,8 +197,8 @@ def stuck_system(march: InterfaceModel) -> tuple[Array, Array, Array]:
     return np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), shapes[:m], tips
 
 
-def stuck_modes_of(march: InterfaceModel, below: float) -> ModeShapes:
-    """Stuck modes that move the tips along x, on the outputs behind the tips.
+def stuck_modes_of(march: InterfaceModel, below: float) -> tuple[list[StuckMode], ModeShapes]:
+    """Stuck modes, and those that move the tips along x on the outputs behind the tips.
 
     Parameters
     ----------
@@ -209,9 +208,9 @@ def stuck_modes_of(march: InterfaceModel, below: float) -> ModeShapes:
         Hz; modes above are left out.
     """
     frequency, shapes, tips = stuck_system(march)
-    rows = march.seen_modes[len(SIDES) :]
-    found = shapes_along_x(np.eye(len(rows)), shapes, _told(frequency, tips, below))
-    return replace(found, shape=rows @ found.shape)
+    modes, rows = measures.modes_of_tips(frequency, tips, below), march.seen_modes[len(SIDES) :]
+    found = shapes_along_x(np.eye(len(rows)), shapes, modes)
+    return modes, replace(found, shape=rows @ found.shape)
 
 
 def stuck_peaks_of(
@@ -230,23 +229,7 @@ def stuck_peaks_of(
         return []
     f = excitation.lowest * np.array([one.frequency for one in peaks])
     motion = march.linear_response(f, excitation.read, stuck=True)[:, len(SIDES) :]
-    return numbered(stuck_modes_of(march, below), peaks, motion)
-
-
-def stuck_modes_list(march: InterfaceModel, below: float) -> list[StuckMode]:
-    """Stuck modes below ``below`` Hz."""
-    frequency, _, tips = stuck_system(march)
-    return _told(frequency, tips, below)
-
-
-def _told(frequency: Array, tips: Array, below: float) -> list[StuckMode]:
-    size = np.abs(tips).max(axis=0)
-    moved = size > PEAKS_ABOVE * size.max()
-    return [
-        StuckMode(float(f), "x" if x else "y", bool(tips[0, k] * tips[1, k] > 0.0))
-        for k, (f, x) in enumerate(zip(frequency, moved, strict=True))
-        if f < below
-    ]
+    return numbered(stuck_modes_of(march, below)[1], peaks, motion)
 
 
 def _limit(

@@ -219,8 +219,12 @@ def tell_modes(model: Model, values: Array, shapes: Array, below: float) -> list
     below
         Hz; modes above are left out.
     """
-    frequency = np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
     tips = np.array([model.row(side) @ shapes for side in SIDES])
+    return modes_of_tips(np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi), tips, below)
+
+
+def modes_of_tips(frequency: Array, tips: Array, below: float) -> list[StuckMode]:
+    """Modes (n,) below ``below`` Hz from the motion (2, n) of both tips along x."""
     # a mode across the blades does not move their probes along x: the size of a whole tip motion is
     # that of the modes below; far above, shapes of hardly any mass move more
     size = np.abs(tips).max(axis=0)

@@ -151,7 +151,7 @@ def _cost(
         damper = size["damper"]
         cost.dynamic_body(damper["hexes"], damper["nodes"], len(scene.stiffnesses))
     sources = plans_to_solve(scene)
-    cost.seconds += sum(plan.solve_seconds for plan in sources)
+    cost.seconds += sum(one.seconds - one.estimate_seconds - one.files_seconds for one in sources)
     cost.seconds += _curves_seconds(scene, size)
     cost.seconds += _files_seconds(scene)
     memory, workers = cost.side_by_side(min(2, cost.threads), 2)

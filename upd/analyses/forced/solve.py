@@ -42,9 +42,15 @@ from upd.analyses.forced.spring_march import make_springs
 from upd.analyses.forced.statics import StaticState, admissible, same, static_state
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.forced.sweeps import both_ways, march_peaks
-from upd.analyses.forced.whole_faces import INTERFACE, linear_limits, make_whole_faces, solve_faces
+from upd.analyses.forced.whole_faces import (
+    INTERFACE,
+    balance_curve,
+    linear_limits,
+    make_whole_faces,
+)
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import InputError, UpdError, one_line
+from upd.hbm.faces.state import InterfaceModel, InterfaceState
 from upd.linalg.parallel import threads_for
 from upd.linalg.processes import SideProcesses
 from upd.progress import Stages
@@ -67,7 +73,10 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
         if scene.contact.model == INTERFACE:
             _whole_faces(solution, stages)
         elif scene.balance.method == "march":
-            _swept_points(solution, stages)
+            _models(solution, stages)
+            for name, model in solution.models.items():
+                springs = make_springs(plan, model)
+                _sweep(solution, name, springs.march, springs.at_rest(), stages)
         else:
             with SideProcesses(*_MODULES) as beside:
                 _balanced_points(solution, beside, stages)
@@ -86,8 +95,26 @@ def _whole_faces(solution: ForcedSolution, stages: Stages) -> None:
     solution.faces[INTERFACE] = faces
     with stages("free and stuck", f"{faces.of.n} nodes"):
         solution.linear[INTERFACE] = linear_limits(plan, faces, grid(plan))
-    solve_faces(solution, INTERFACE, stages)
-    march_peaks(solution, stages)
+    if plan.scene.balance.method == "march":
+        _sweep(solution, INTERFACE, faces.march, faces.start, stages)
+        return
+    for ratio in plan.scene.excitation.centrifugal_to_force:
+        with stages("friction", f"F_C/F_E {ratio:g}: {faces.of.n} nodes"):
+            solution.curves.append(balance_curve(plan, INTERFACE, faces, ratio))
+
+
+def _sweep(
+    solution: ForcedSolution,
+    name: str,
+    march: InterfaceModel,
+    start: InterfaceState,
+    stages: Stages,
+) -> None:
+    """Sweeps up and down at every F_C/F_E, and their peaks."""
+    for ratio in solution.plan.scene.excitation.centrifugal_to_force:
+        with stages("sweeps", f"{name}, F_C/F_E {ratio:g}: up and down"):
+            solution.curves += both_ways(solution.plan, name, ratio, march, start)
+    march_peaks(solution, name, stages)
 
 
 def _models(solution: ForcedSolution, stages: Stages) -> Mapping[str, Laws]:
@@ -111,19 +138,6 @@ def _static(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> StaticState | N
     if not plan.scene.contact.loaded:
         return None
     return static_state(plan, bodies, stages=stages)
-
-
-def _swept_points(solution: ForcedSolution, stages: Stages) -> None:
-    """Sweeps up and down of contact points."""
-    _models(solution, stages)
-    plan = solution.plan
-    for name, model in solution.models.items():
-        springs = make_springs(plan, model)
-        for ratio in plan.scene.excitation.centrifugal_to_force:
-            with stages("sweeps", f"{name}, F_C/F_E {ratio:g}: up and down"):
-                start = springs.at_rest()
-                solution.curves += both_ways(plan, name, ratio, springs.march, start)
-    march_peaks(solution, stages)
 
 
 # -- harmonic balance ------------------------------------------------------------------------------

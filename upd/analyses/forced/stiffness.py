@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.contact.plan import ContactPlan
-from upd.analyses.contact.scene_plan import make_plan as make_contact_plan
-from upd.analyses.flat import ANALYSIS as FLAT
+from upd.analyses import analysis_of
+from upd.analyses.base import Plan
 from upd.cache.arrays import cache_folder, load_arrays, save_arrays
 from upd.cache.sources import key_of, source_digest
 from upd.contact.law import ContactLaw
@@ -140,11 +139,15 @@ def _damper(recipe: str, geometry: Mapping[str, Any]) -> DamperSizes | None:
     return recipes.damper_sizes(recipe, given)
 
 
-def plans_to_solve(scene: ForcedScene) -> list[ContactPlan]:
+def plans_to_solve(scene: ForcedScene) -> list[Plan[Any]]:
     """Plans of the contact scenes that give a stiffness and were not solved before."""
     scenes = [_contact_scene(c) for c in scene.stiffnesses.values() if c.scene is not None]
     found = {_kept_law(contact): contact for contact in scenes}
-    return [make_contact_plan(contact) for path, contact in found.items() if not path.exists()]
+    return [
+        analysis_of(contact).make_plan(contact)
+        for path, contact in found.items()
+        if not path.exists()
+    ]
 
 
 def _kept_law(scene: Scene) -> Path:
@@ -200,8 +203,9 @@ def _contact_scene(choice: StiffnessChoice) -> Scene:
 
 
 def _run(scene: Scene) -> ArrayGroup:
-    solution = FLAT.solve(FLAT.make_plan(scene), Stages())
-    for check in FLAT.check_solution(solution):
+    flat = analysis_of(scene)
+    solution = flat.solve(flat.make_plan(scene), Stages())
+    for check in flat.check_solution(solution):
         if not check.passed:
             log.warning(
                 "contact analysis %s: %s: %s = %.3g, limit %.3g",
@@ -216,4 +220,4 @@ def _run(scene: Scene) -> ArrayGroup:
                     f"stiffness: the contact analysis {scene.name} failed its check "
                     f"{check.name}; run it alone: upd run {scene.name}"
                 )
-    return _first(FLAT.arrays(solution), scene.name)
+    return _first(flat.arrays(solution), scene.name)

@@ -8,12 +8,13 @@ are read from the last period.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
-from upd.analyses.forced.curves import Curve, SweptCurve, Way
-from upd.analyses.forced.excitation import ComplexArray, Excitation, excitation_of
+from upd.analyses.forced.curves import Answer, Curve, SweptCurve, Way
+from upd.analyses.forced.excitation import ComplexArray, excitation_of
 from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.linear_limits import stuck_modes_of
 from upd.analyses.forced.measures import (
@@ -27,16 +28,16 @@ from upd.analyses.forced.measures import (
     losing_most,
     place,
 )
-from upd.analyses.forced.mode_peaks import CANDIDATES, ModeShapes, numbered
+from upd.analyses.forced.mode_peaks import CANDIDATES, numbered
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.plan import ForcedPlan, grid, time_steps
 from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
 from upd.hbm.faces.record import period_of_sweep
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
-from upd.hbm.faces.sweep import SteppedSine, stepped_sine
+from upd.hbm.faces.sweep import stepped_sine
 from upd.linalg.parallel import threads_for
 from upd.progress import Stages
-from upd.scene.forced_contact import SIDES
+from upd.scene.forced_contact import SIDES, Side
 
 #: how steady a motion has to be
 TOLERANCE = 1e-3
@@ -57,9 +58,9 @@ def both_ways(
     march, start
         What is integrated, and where it begins.
     """
-    scene, out = plan.scene, []
-    force, excitation = scene.damper.centrifugal / ratio, excitation_of(scene.excitation)
-    modes, frequency = stuck_modes_of(march, CANDIDATES * scene.excitation.stop), grid(plan)
+    out: list[SweptCurve] = []
+    scene, excitation, frequency = plan.scene, excitation_of(plan.scene.excitation), grid(plan)
+    force = scene.damper.centrifugal / ratio
     ways: tuple[tuple[Way, Array], ...] = (("up", frequency), ("down", frequency[::-1]))
     with threads_for(3 * march.n):
         for way, f in ways:
@@ -74,29 +75,45 @@ def both_ways(
                 fallback=by_coulomb,
                 accelerate=False,
             )
-            start, f = found.state, found.frequency
-            H, *others = (
-                {side: accelerance_of(moved[:, j], f, k, force) for j, side in enumerate(SIDES)}
-                for k, moved in _by_harmonic(found, excitation)
-            )
-            more = dict(zip(excitation.harmonics[1:], others, strict=True))
-            peaks = {side: _peaks(found, np.abs(H[side]), modes) for side in SIDES}
-            seconds = float(found.seconds.sum())
-            out.append(Curve(name, ratio, force, H, more, peaks, found, seconds, way))
+            start = found.state
+            moved = {k: found.harmonics[:, i] for i, k in enumerate(excitation.harmonics)}
+            moved[excitation.lowest] = found.amplitude
+            curve = Curve(name, ratio, force, {}, {}, {}, found, float(found.seconds.sum()), way)
+            out.append(with_outputs(plan, march, curve, moved, sweep_maxima))
     return out
 
 
-def _by_harmonic(found: SteppedSine, excitation: Excitation) -> Iterator[tuple[int, ComplexArray]]:
-    """Every harmonic excited, the lowest first, and the outputs' amplitudes in it."""
-    yield excitation.lowest, found.amplitude
-    for i, k in enumerate(excitation.harmonics[1:], 1):
-        yield k, found.harmonics[:, i]
+def with_outputs(
+    plan: ForcedPlan,
+    march: InterfaceModel,
+    curve: Curve[Answer],
+    moved: Mapping[int, ComplexArray],
+    maxima: Callable[[Array, Array], list[CurvePeak]],
+) -> Curve[Answer]:
+    """The curve with the accelerances of both blades and their peaks.
 
-
-def _peaks(found: SteppedSine, size: Array, modes: ModeShapes) -> tuple[CurvePeak, ...]:
-    maxima = sweep_maxima(found.frequency, size)
-    at = np.array([one.sample for one in maxima], int)
-    return tuple(numbered(modes, maxima, found.amplitude[at, len(SIDES) :]))
+    Parameters
+    ----------
+    march
+        Its outputs are the tips, then the coordinates of modes.
+    moved
+        Harmonic that is excited -> (n, K) mm of all outputs.
+    maxima
+        Frequencies and heights along the curve -> its local maxima.
+    """
+    excitation, stop = excitation_of(plan.scene.excitation), plan.scene.excitation.stop
+    (_, modes), f = stuck_modes_of(march, CANDIDATES * stop), curve.frequency
+    blades: dict[int, dict[Side, ComplexArray]] = {
+        k: {s: accelerance_of(u[:, j], f, k, curve.force) for j, s in enumerate(SIDES)}
+        for k, u in moved.items()
+    }
+    read, peaks = blades.pop(excitation.lowest), dict[Side, tuple[CurvePeak, ...]]()
+    for side in SIDES:
+        found = maxima(f, np.abs(read[side]))
+        at = np.array([one.sample for one in found], int)
+        motion = moved[excitation.lowest][at, len(SIDES) :]
+        peaks[side] = tuple(numbered(modes, found, motion))
+    return replace(curve, accelerance=read, more=blades, peaks=peaks)
 
 
 def sweep_maxima(frequency: Array, size: Array) -> list[CurvePeak]:
@@ -120,19 +137,11 @@ def sweep_maxima(frequency: Array, size: Array) -> list[CurvePeak]:
 WANTS = ("contact_state", "hysteresis", "damper_motion")
 
 
-def march_peaks(solution: ForcedSolution, stages: Stages) -> None:
-    """Add the last period of every sweep at every peak of the right blade.
-
-    Parameters
-    ----------
-    solution
-        With its sweeps.
-    stages
-        To tell.
-    """
+def march_peaks(solution: ForcedSolution, name: str, stages: Stages) -> None:
+    """Add the last period of every sweep of a stiffness at every peak of the right blade."""
     if not any(solution.plan.scene.wants(one) for one in WANTS):
         return
-    for sweep in (c for c in solution.curves if c.way):
+    for sweep in (c for c in solution.curves if c.stiffness == name):
         for top in sweep.peaks["right"]:
             with stages("time march", f"{sweep.case}, peak {top.number}: its last period"):
                 solution.marched.append(marched_peak(solution, sweep, top))

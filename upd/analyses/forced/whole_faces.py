@@ -9,32 +9,33 @@ faces with its past, as a sweep from the static state at rising frequency.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from upd.analyses.forced.curves import Curve, FacesCurve, LinearCurves, WholeFaces
-from upd.analyses.forced.excitation import ComplexArray, excitation_of
+from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.interface_model import (
     by_coulomb,
     make_interface_model,
     seated_start,
     worn_start,
 )
-from upd.analyses.forced.linear_limits import linear_curves, stuck_modes_list, stuck_modes_of
-from upd.analyses.forced.measures import PEAKS_ABOVE, CurvePeak, accelerance_of, path_maxima
-from upd.analyses.forced.mode_peaks import CANDIDATES, ModeShapes, numbered
+from upd.analyses.forced.linear_limits import linear_curves, stuck_modes_of
+from upd.analyses.forced.measures import PEAKS_ABOVE, CurvePeak, path_maxima
+from upd.analyses.forced.mode_peaks import CANDIDATES
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.plan import SAMPLES, ForcedPlan, blade_harmonics, grid
-from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.spring_march import SEEN
 from upd.analyses.forced.statics import GIVEN, SEATED, StaticState
-from upd.analyses.forced.sweeps import both_ways
+from upd.analyses.forced.sweeps import with_outputs
 from upd.analyses.seated.bodies import Bodies
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.errors import ConvergenceError, InputError
-from upd.hbm.faces.balance import InterfaceResponse, interface_response
+from upd.hbm.faces.balance import interface_response
 from upd.hbm.faces.state import InterfaceModel, InterfaceState, resting
 from upd.progress import Stages
 from upd.scene.forced_contact import SIDES
@@ -150,30 +151,8 @@ def linear_limits(plan: ForcedPlan, faces: WholeFaces, frequency: Array) -> Line
     excitation = excitation_of(plan.scene.excitation)
     free, free_peaks = linear_curves(faces.march, frequency, excitation, stuck=False)
     stuck, stuck_peaks = linear_curves(faces.march, frequency, excitation, stuck=True)
-    modes = stuck_modes_list(faces.march, CANDIDATES * plan.scene.excitation.stop)
+    modes, _ = stuck_modes_of(faces.march, CANDIDATES * plan.scene.excitation.stop)
     return LinearCurves(frequency, free, stuck, modes, free_peaks, stuck_peaks)
-
-
-def solve_faces(solution: ForcedSolution, name: str, stages: Stages) -> None:
-    """The curves at every F_C/F_E, by harmonic balance or by sweeps.
-
-    Parameters
-    ----------
-    solution
-        With the faces; curves are added to it.
-    name
-        Of the contact.
-    """
-    scene, faces = solution.plan.scene, solution.faces[name]
-    for ratio in scene.excitation.centrifugal_to_force:
-        words = f"{name}, F_C/F_E {ratio:g}: {faces.of.n} nodes"
-        if scene.balance.method == "march":
-            with stages("sweeps", f"{words}, up and down"):
-                found = both_ways(solution.plan, name, ratio, faces.march, faces.start)
-                solution.curves += found
-        else:
-            with stages("friction", words):
-                solution.curves.append(balance_curve(solution.plan, name, faces, ratio))
 
 
 def balance_curve(plan: ForcedPlan, name: str, faces: WholeFaces, ratio: float) -> FacesCurve:
@@ -197,35 +176,17 @@ def balance_curve(plan: ForcedPlan, name: str, faces: WholeFaces, ratio: float) 
         samples=SAMPLES if b.samples == "auto" else b.samples,
         fallback=by_coulomb,
     )
-    every = {
-        k: {
-            side: accelerance_of(found.amplitude[:, k, j], found.frequency, k, force)
-            for j, side in enumerate(SIDES)
-        }
-        for k in excitation.harmonics
-    }
-    H, read = every.pop(excitation.lowest), found.amplitude[:, excitation.lowest]
-    modes = stuck_modes_of(faces.march, CANDIDATES * plan.scene.excitation.stop)
-    peaks = {side: _peaks(found, np.abs(H[side]), read, modes) for side in SIDES}
-    return Curve(name, ratio, force, H, every, peaks, found, found.seconds)
+    moved = {k: found.amplitude[:, k] for k in excitation.harmonics}
+    curve = Curve(name, ratio, force, {}, {}, {}, found, found.seconds)
+    return with_outputs(plan, faces.march, curve, moved, partial(_maxima, found.jumps))
 
 
-def _peaks(
-    found: InterfaceResponse, size: Array, read: ComplexArray, modes: ModeShapes
-) -> tuple[CurvePeak, ...]:
-    if not len(size):
-        return ()
-    maxima = _maxima(found, size)
-    at = np.array([one.sample for one in maxima], int)
-    return tuple(numbered(modes, maxima, read[at, len(SIDES) :]))
-
-
-def _maxima(found: InterfaceResponse, size: Array) -> list[CurvePeak]:
+def _maxima(jumps: Sequence[int], frequency: Array, size: Array) -> list[CurvePeak]:
     """Local maxima of a curve; none is read across a jump, and a stretch may be highest where one
     ends it.
     """
-    out, begin, frequency = [], 0, found.frequency
-    for end in (*(i + 1 for i in found.jumps), len(size)):
+    out, begin = [], 0
+    for end in (*(i + 1 for i in jumps), len(size)):
         f, a = frequency[begin:end], size[begin:end]
         out += [one._replace(sample=one.sample + begin) for one in path_maxima(f, a, 0.0)]
         for i, inner, jumped in ((0, 1, begin > 0), (len(a) - 1, len(a) - 2, end < len(size))):
