@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from upd.analyses.forced.whole_faces import INTERFACE
+from upd.analyses.forced.interface_model import INTERFACE
 from upd.analyses.seated.varied import PATCH
 from upd.errors import InputError
 from upd.labels import percent

@@ -17,7 +17,7 @@ from scipy.optimize import minimize_scalar
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import LinearCurves
-from upd.analyses.forced.excitation import Excitation
+from upd.analyses.forced.excitation import Excitation, excitation_of
 from upd.analyses.forced.measures import (
     Array,
     ComplexArray,
@@ -289,6 +289,15 @@ def linear_curves(
 
     blades = SIDES if stuck else excitation.free_blades
     return _limit(frequency, excitation.lowest, modes, blades, read)
+
+
+def linear_of_faces(plan: ForcedPlan, march: InterfaceModel) -> LinearCurves:
+    """Curves without the damper, and with every node closed and sticking."""
+    frequency, excitation = grid(plan), excitation_of(plan.scene.excitation)
+    free, free_peaks = linear_curves(march, frequency, excitation, stuck=False)
+    stuck, stuck_peaks = linear_curves(march, frequency, excitation, stuck=True)
+    modes, _ = stuck_modes_of(march, CANDIDATES * plan.scene.excitation.stop)
+    return LinearCurves(frequency, free, stuck, modes, free_peaks, stuck_peaks)
 
 
 def linear_of(plan: ForcedPlan, model: Model) -> LinearCurves:

@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from upd.analyses.forced.inputs import effects_of, few_harmonics, input_variants
+from upd.analyses.forced.interface_model import INTERFACE, make_whole_faces
 from upd.analyses.forced.left_out import (
     along_changes,
     along_variant,
@@ -17,7 +18,7 @@ from upd.analyses.forced.left_out import (
     highest_slipping,
 )
 from upd.analyses.forced.levels import COARSER, Laws, coarse_model, other_levels
-from upd.analyses.forced.linear_limits import linear_of
+from upd.analyses.forced.linear_limits import linear_of, linear_of_faces
 from upd.analyses.forced.model import Model, make_model, preloaded
 from upd.analyses.forced.paths import quiet
 from upd.analyses.forced.peaks import solve_curve
@@ -36,18 +37,12 @@ from upd.analyses.forced.performance import (
     ratios_of,
     with_curves,
 )
-from upd.analyses.forced.plan import ForcedPlan, grid
+from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import BandPoint, ForcedSolution
 from upd.analyses.forced.spring_march import make_springs
 from upd.analyses.forced.statics import StaticState, admissible, same, static_state
 from upd.analyses.forced.stiffness import face_laws
-from upd.analyses.forced.sweeps import both_ways, march_peaks
-from upd.analyses.forced.whole_faces import (
-    INTERFACE,
-    balance_curve,
-    linear_limits,
-    make_whole_faces,
-)
+from upd.analyses.forced.sweeps import balance_curve, both_ways, march_peaks
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import InputError, UpdError, one_line
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
@@ -94,7 +89,7 @@ def _whole_faces(solution: ForcedSolution, stages: Stages) -> None:
     faces = make_whole_faces(plan, solution.bodies, stages)
     solution.faces[INTERFACE] = faces
     with stages("free and stuck", f"{faces.of.n} nodes"):
-        solution.linear[INTERFACE] = linear_limits(plan, faces, grid(plan))
+        solution.linear[INTERFACE] = linear_of_faces(plan, faces.march)
     if plan.scene.balance.method == "march":
         _sweep(solution, INTERFACE, faces.march, faces.start, stages)
         return

@@ -1,19 +1,24 @@
-"""Curves by time integration: stepped sine up and down, as in an experiment.
+"""Curves by time integration: stepped sine up and down, as in an experiment; and of whole faces.
 
 Where friction and lift-off leave several steady motions, a curve by harmonic balance follows one
 path through all of them. A sweep shows what a rig would: rising, the motion that the past below
 leads to; falling, the one from above. Contact states, loops and the damper's motion at their peaks
 are read from the last period.
+
+Whole faces by harmonic balance have blades in frequency, damper and contact in time, see
+`upd.hbm.faces.balance`: every node with its past, as a sweep from the static state at rising
+frequency.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from upd.analyses.forced.curves import Answer, Curve, SweptCurve, Way
+from upd.analyses.forced.curves import Answer, Curve, FacesCurve, SweptCurve, Way, WholeFaces
 from upd.analyses.forced.excitation import ComplexArray, excitation_of
 from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.linear_limits import stuck_modes_of
@@ -26,12 +31,14 @@ from upd.analyses.forced.measures import (
     in_faces,
     loop_along_main,
     losing_most,
+    path_maxima,
     place,
 )
 from upd.analyses.forced.mode_peaks import CANDIDATES, numbered
 from upd.analyses.forced.model import Array
-from upd.analyses.forced.plan import ForcedPlan, grid, time_steps
+from upd.analyses.forced.plan import SAMPLES, ForcedPlan, blade_harmonics, grid, time_steps
 from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
+from upd.hbm.faces.balance import interface_response
 from upd.hbm.faces.record import period_of_sweep
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
 from upd.hbm.faces.sweep import stepped_sine
@@ -131,6 +138,47 @@ def sweep_maxima(frequency: Array, size: Array) -> list[CurvePeak]:
     return [
         CurvePeak(float(frequency[i]), float(size[i]), int(i)) for i in inner if size[i] >= least
     ]
+
+
+def balance_curve(plan: ForcedPlan, name: str, faces: WholeFaces, ratio: float) -> FacesCurve:
+    """The balance from the static state along the sweep, rising.
+
+    Parameters
+    ----------
+    name
+        Of the contact.
+    ratio
+        F_C/F_E.
+    """
+    b, force = plan.scene.balance, plan.scene.damper.centrifugal / ratio
+    excitation = excitation_of(plan.scene.excitation)
+    found = interface_response(
+        faces.march,
+        grid(plan),
+        force * excitation.drive,
+        faces.start,
+        harmonics=blade_harmonics(plan.scene),
+        samples=SAMPLES if b.samples == "auto" else b.samples,
+        fallback=by_coulomb,
+    )
+    moved = {k: found.amplitude[:, k] for k in excitation.harmonics}
+    curve = Curve(name, ratio, force, {}, {}, {}, found, found.seconds)
+    return with_outputs(plan, faces.march, curve, moved, partial(_maxima, found.jumps))
+
+
+def _maxima(jumps: Sequence[int], frequency: Array, size: Array) -> list[CurvePeak]:
+    """Local maxima of a curve; none is read across a jump, and a stretch may be highest where one
+    ends it.
+    """
+    out, begin = [], 0
+    for end in (*(i + 1 for i in jumps), len(size)):
+        f, a = frequency[begin:end], size[begin:end]
+        out += [one._replace(sample=one.sample + begin) for one in path_maxima(f, a, 0.0)]
+        for i, inner, jumped in ((0, 1, begin > 0), (len(a) - 1, len(a) - 2, end < len(size))):
+            if jumped and (len(a) == 1 or a[i] > a[inner]):
+                out.append(CurvePeak(float(f[i]), float(a[i]), begin + i))
+        begin = end
+    return [one for one in out if one.height >= PEAKS_ABOVE * size.max()]
 
 
 #: outputs that are read from them
