@@ -8,11 +8,9 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from upd.analyses import analysis_of
 from upd.analyses.base import Plan
@@ -40,15 +38,12 @@ class FaceLaw:
     ----------
     K_N, K_T
         Totals, N/mm.
-    law
-        Contact law in the axes of its patch, when its own points are used.
     source
         Where the totals come from.
     """
 
     K_N: float
     K_T: float
-    law: ContactLaw | None = None
     source: str = "given"
 
 
@@ -65,17 +60,9 @@ def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceLaw]:
             out[side] = FaceLaw(given.K_N, given.K_T)
         else:
             assert law is not None
-            own = law if choice.points == "law" else None
             K_T = float(law.k_t.sum(axis=0).mean())
-            out[side] = FaceLaw(float(law.k_n.sum()), K_T, own, source)
+            out[side] = FaceLaw(float(law.k_n.sum()), K_T, source)
     return out
-
-
-def mirrored(law: ContactLaw) -> ContactLaw:
-    """The same points on the other blade: x turned round."""
-    flip = np.array([-1.0, 1.0, 1.0])
-    turned = {name: getattr(law, name) * flip for name in ("position", "normal", "tangents")}
-    return replace(law, **turned)
 
 
 def check_sources(scene: ForcedScene) -> None:
