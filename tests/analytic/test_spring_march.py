@@ -114,7 +114,7 @@ def swept() -> ForcedSolution:
 def test_sweeps_jump_where_the_curve_folds(solution: ForcedSolution, swept: ForcedSolution) -> None:
     up, down = swept.curves
     assert (up.way, down.way) == ("up", "down")
-    assert up.found.status != "stopped" != down.found.status
+    assert up.answer.status != "stopped" != down.answer.status
     # the peak bends back: falling, the high motion lasts to lower frequencies
     tops = [s.peaks["right"][-1] for s in (up, down)]
     assert tops[1].height > 1.1 * tops[0].height
