@@ -22,9 +22,7 @@ from rig_response import rig
 
 from upd.analyses.forced.levels import OFF_CONTACT, count_of, times
 from upd.analyses.forced.levels import graded as graded_mesh
-from upd.analyses.forced.linear_limits import linear_limits_of
-from upd.analyses.forced.measures import Unsolved
-from upd.analyses.forced.paths import balance_of
+from upd.analyses.forced.linear_limits import linear_of
 from upd.scene import load_scene
 
 Row = dict[str, Any]
@@ -71,10 +69,7 @@ def points() -> Iterator[Row]:
             bodies, halved = None, True
         made = rig("symmetric-response", bodies, **{"mesh.element": _ELEMENT, **changes})
         bodies = made.bodies
-        force = made.plan.scene.damper.centrifugal
-        numbers = (0, *made.model.excitation.harmonics)
-        answer = Unsolved(balance_of(made.plan, made.model, force, numbers))
-        modes = linear_limits_of(made.plan, made.model, answer, force).modes
+        modes = linear_of(made.plan, made.model).modes
         for in_phase, word in ((True, "in phase"), (False, "out of phase")):
             found = next(m.frequency for m in modes if m.axis == "x" and m.in_phase == in_phase)
             count = f"{made.model.contacts.n_point} points"
@@ -116,10 +111,7 @@ def graded() -> Iterator[Row]:
         begin = time.process_time()
         counts = {f"geometry.{k}": v for k, v in graded_mesh(scene, level).items()}
         made = rig("symmetric-response", **_gauss(GRADED_ROWS), **counts)
-        force = made.plan.scene.damper.centrifugal
-        numbers = (0, *made.model.excitation.harmonics)
-        answer = Unsolved(balance_of(made.plan, made.model, force, numbers))
-        modes = linear_limits_of(made.plan, made.model, answer, force).modes
+        modes = linear_of(made.plan, made.model).modes
         size = f"{made.bodies.blades['right'].K.shape[0]} dofs a blade"
         case = f"graded x {level:g}"
         free = float(np.min(made.model.frequency))

@@ -24,7 +24,7 @@ from rig_response import Rig, accelerance, rig
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
-from upd.analyses.forced.linear_limits import stuck_modes_list
+from upd.analyses.forced.linear_limits import stuck_modes_of
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import preloaded
 from upd.analyses.forced.paths import respond
@@ -288,7 +288,7 @@ def whole_faces(name: str) -> Iterator[Row]:
     glued = glued_frequencies(name)
     found = {}
     for count in MODES:
-        stuck = stuck_modes_list(made(F, count)[0], 1000.0)
+        stuck, _ = stuck_modes_of(made(F, count)[0], 1000.0)
         found[count] = {m.in_phase: m.frequency for m in reversed(stuck) if m.axis == "x"}
     for in_phase, words in ((True, "in phase"), (False, "out of phase")):
         mine, many = found[MODES[0]][in_phase], found[MODES[1]][in_phase]

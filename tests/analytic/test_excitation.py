@@ -106,7 +106,7 @@ def test_forces_in_phase_leave_out_the_out_of_phase_peak() -> None:
         model = excited(*forces)
         grid, found = np.linspace(380.0, 480.0, 101), answer(model, F[:1])
         for side in SIDES:
-            peaks = linear_peaks(found, model.row(side), STUCK, grid, True)
+            peaks = linear_peaks(found.balance, model.row(side), STUCK, grid, True)
             told = tell_stuck_peaks(model, peaks, plan.scene.excitation.stop)
             assert [one.mode for one in told] == modes
 
@@ -140,7 +140,7 @@ def test_the_second_harmonic_is_the_first_of_twice_the_frequency() -> None:
     for model, f, k in ((first, F, 1), (second, F / 2.0, 2)):
         found = answer(model, f)
         grid = np.linspace(380.0, 480.0, 101) / k
-        (peak,) = linear_peaks(found, model.row("right"), STUCK, grid, True)
+        (peak,) = linear_peaks(found.balance, model.row("right"), STUCK, grid, True)
         (told,) = tell_stuck_peaks(model, [peak], 480.0)
         damper = measures.damper_amplitude(found, model)[1]
         tops.append([k * peak.frequency, peak.height, told.mac, *damper[[0, 4]]])

@@ -10,7 +10,7 @@ import pytest
 
 from upd.analyses.forced.blade_parts import mirror_pairs
 from upd.analyses.forced.measures import chosen_peaks, path_maxima
-from upd.analyses.forced.points import free_points, lattice, lattice_points, line_groups
+from upd.analyses.forced.points import lattice, lattice_points, line_groups
 from upd.analyses.forced.statics import StaticState, point_preload
 from upd.errors import InputError
 from upd.fem import Material, mass_properties
@@ -65,28 +65,6 @@ def test_groups_keep_the_centre_and_a_linear_motion(meshes: dict[str, Mesh]) -> 
         assert grouped.weight @ grouped.position == pytest.approx(whole.weight @ whole.position)
         u = meshes["right"].points[grouped.nodes] @ gradient
         assert grouped.values @ u == pytest.approx(grouped.position @ gradient)
-
-
-def test_free_points_reproduce_the_quadratics_of_their_face(meshes: dict[str, Mesh]) -> None:
-    mesh = meshes["right"]
-    found = lattice(mesh)
-    A, corner = found.frame, mesh.points[found.nodes[0]]
-    rng = np.random.default_rng(1)
-    faces = mesh.faces["patch"][rng.integers(0, len(mesh.faces["patch"]), 6), :4]
-    share = rng.dirichlet(np.ones(4), 6)
-    position = np.einsum("mk,mkc->mc", share, mesh.points[faces])
-    points = free_points(mesh, position, np.ones(6), "right")
-
-    def field(x: np.ndarray) -> np.ndarray:
-        s, t = (x - corner) @ A[1], (x - corner) @ A[2]
-        return 1.0 + s - 2.0 * t + 0.1 * s**2 - 0.2 * s * t + 0.05 * t**2
-
-    assert points.values.sum(axis=1) == pytest.approx(np.ones(6))
-    assert points.values @ field(mesh.points[points.nodes]) == pytest.approx(
-        field(position), rel=1e-9
-    )
-    with pytest.raises(InputError, match="off the right patch"):
-        free_points(mesh, position + 5.0 * A[0], np.ones(6), "right")
 
 
 def test_seated_forces_hold_the_damper_without_friction(meshes: dict[str, Mesh]) -> None:

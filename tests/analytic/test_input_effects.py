@@ -16,7 +16,8 @@ from upd.analyses.forced.inputs import (
     few_harmonics,
     input_variants,
 )
-from upd.analyses.forced.peaks_again import FoundPeaks, linear_of, solve_again
+from upd.analyses.forced.linear_limits import linear_of
+from upd.analyses.forced.peaks_again import FoundPeaks, run_peaks, solve_again
 from upd.analyses.forced.solution import ForcedSolution
 from upd.progress import Stages, silent
 from upd.scene import load_scene
@@ -55,12 +56,13 @@ def solved(ratio: float, **more: Any) -> ForcedSolution:
 def effects(ratio: float, name: str, **more: Any) -> dict[tuple[str, int], InputEffect]:
     """End and number of the mode -> what it does."""
     s = solved(ratio, **more)
-    peaks = FoundPeaks(s.plan, s.models["thesis"], s.linear["thesis"], tuple(s.curves))
+    found = tuple(peak for curve in s.curves for peak in run_peaks(curve))
+    peaks = FoundPeaks(s.plan, s.models["thesis"], s.linear["thesis"], found)
     few = few_harmonics(peaks)
     assert few is not None
     mine = [one for one in input_variants(few) if one.of.source == name]
-    found = [one for variant in mine for one in effects_of(few, solve_again(few, variant))]
-    return {(one.label, one.number): one for one in found}
+    ends = [one for variant in mine for one in effects_of(few, solve_again(few, variant))]
+    return {(one.label, one.number): one for one in ends}
 
 
 def test_damping_divides_the_heights_of_stuck_peaks() -> None:

@@ -29,7 +29,7 @@ def test_peak_of_one_mode_in_closed_form(points: int, stuck: bool, stiffness: fl
     frequency, width = linear_modes(answer.balance, stuck)
     assert frequency == pytest.approx([f0], rel=1e-12)
     assert width == pytest.approx([2.0 * zeta * f0], rel=1e-12)
-    (peak,) = linear_peaks(answer, ROW, F, grid, stuck)
+    (peak,) = linear_peaks(answer.balance, ROW, F, grid, stuck)
     # w^2 / |w0^2 - w^2 + 2 i zeta w0 w| is highest at w0 / sqrt(1 - 2 zeta^2)
     assert peak.frequency == pytest.approx(f0 / np.sqrt(1.0 - 2.0 * zeta**2), rel=1e-7)
     exact = 1e-3 / (2.0 * zeta * np.sqrt(1.0 - zeta**2))
@@ -65,7 +65,7 @@ def test_peak_outside_the_sweep_is_none_of_it() -> None:
     answer = frequency_response(
         [[1.0]], [[C]], [[1.0]], slider, harmonic_force=[F], frequencies=grid, harmonics=(1,)
     )
-    assert linear_peaks(answer, ROW, F, grid, False) == []
+    assert linear_peaks(answer.balance, ROW, F, grid, False) == []
 
 
 def test_a_light_shape_far_above_does_not_turn_modes_across_the_blades() -> None:

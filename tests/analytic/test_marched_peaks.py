@@ -14,8 +14,8 @@ from rigs import state_of
 
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import measures
+from upd.analyses.forced.arrays import arrays
 from upd.analyses.forced.interface_model import by_coulomb
-from upd.analyses.forced.output import arrays
 from upd.analyses.forced.paths import respond
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution, MarchedPeak
@@ -65,10 +65,10 @@ def test_every_sweep_tells_the_contact(solution: ForcedSolution, one: MarchedPea
     """Losses and states of all nodes are those of the sweep at its peak."""
     assert [m.sweep.way for m in solution.marched] == ["up", "down"]
     assert one.peak in one.sweep.peaks["right"]
-    loss = one.sweep.found.energy[one.peak.sample, 2]
+    loss = one.sweep.answer.energy[one.peak.sample, 2]
     assert loss > 0.0
     assert one.period.energy == pytest.approx(loss, rel=1e-9)
-    lift, stick, slip = one.sweep.found.share[one.peak.sample]
+    lift, stick, slip = one.sweep.answer.share[one.peak.sample]
     assert one.period.share.mean(axis=0) == pytest.approx([stick, slip, lift])
     assert slip > 0.0 < lift
     # every face has as many points, and springs alike
@@ -81,7 +81,7 @@ def test_loops_are_closed_and_obey_coulomb(solution: ForcedSolution, one: Marche
     """
     k_t = solution.models["thesis"].contacts.law.k_t
     loops = marched_loops(one, 4)
-    start = one.sweep.found.starts[one.peak.sample].slip.reshape(2, -1)
+    start = one.sweep.answer.starts[one.peak.sample].slip.reshape(2, -1)
     assert [loop.point for loop in loops] == list(np.argsort(-one.period.loss))
     for loop in loops:
         d, T = loop.displacement, loop.traction
@@ -102,7 +102,7 @@ def test_loops_are_closed_and_obey_coulomb(solution: ForcedSolution, one: Marche
 
 def test_the_damper_follows_its_contact_forces(one: MarchedPeak) -> None:
     """Its motion ends where the march's own does; the mean of the forces on it is F_C."""
-    found = one.sweep.found
+    found = one.sweep.answer
     march = InterfaceMarch(found.model, one.frequency, found.drive, found.samples, by_coulomb)
     at = found.starts[one.peak.sample].copy()
     march.period(at)

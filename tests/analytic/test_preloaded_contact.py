@@ -12,11 +12,11 @@ import pytest
 from rigs import LINES
 
 from upd.analyses.forced import checks
-from upd.analyses.forced.linear_limits import linear_limits_of
-from upd.analyses.forced.measures import Unsolved, accelerance
+from upd.analyses.forced.linear_limits import linear_of
+from upd.analyses.forced.measures import accelerance
 from upd.analyses.forced.mode_peaks import stuck_motion
 from upd.analyses.forced.model import Model, make_model, preloaded
-from upd.analyses.forced.paths import balance_of, respond
+from upd.analyses.forced.paths import respond
 from upd.analyses.forced.plan import ForcedPlan, make_plan
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import static_state
@@ -78,8 +78,7 @@ def in_state(arrangement: str, name: str) -> Model:
 def far_from_stuck(plan: ForcedPlan, model: Model) -> float:
     """Largest difference from the stuck curve about its peaks, over its height there."""
     force = plan.scene.damper.centrifugal / TINY
-    problem = Unsolved(balance_of(plan, model, force, (0, 1)))
-    linear = linear_limits_of(plan, model, problem, force)
+    linear = linear_of(plan, model)
     worst = 0.0
     for peak in linear.stuck_peaks["right"]:
         f = peak.frequency * np.array([0.995, 1.0, 1.005])

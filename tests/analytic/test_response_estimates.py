@@ -15,17 +15,17 @@ from rigs import LINES
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import peaks_again
 from upd.analyses.forced import solve as solving
-from upd.analyses.forced.curves import ForcedCurve, Top
+from upd.analyses.forced.curves import PointCurve, Top
 from upd.analyses.forced.estimates import bound, estimate
 from upd.analyses.forced.levels import HARMONICS, MESH, MODES, POINTS, SAMPLES
 from upd.analyses.forced.model import make_model
+from upd.analyses.forced.other_points import carried, moved_points
 from upd.analyses.forced.peaks import climbed
 from upd.analyses.forced.peaks_again import (
-    RunPeak,
+    FoundPeaks,
     Variant,
-    carried,
-    moved_points,
     peak_on,
+    run_peaks,
     solve_again,
 )
 from upd.analyses.forced.solution import ForcedSolution
@@ -82,6 +82,12 @@ def slipping() -> Found:
 @pytest.fixture(scope="module")
 def sticking() -> Found:
     return solved(STICKS)
+
+
+def searched(solution: ForcedSolution) -> FoundPeaks:
+    """What is looked for again."""
+    found = tuple(peak for curve in solution.curves for peak in run_peaks(curve))
+    return FoundPeaks(solution.plan, solution.models["thesis"], solution.linear["thesis"], found)
 
 
 def parts_of(found: Found, name: str) -> dict[str, ErrorPart]:
@@ -244,7 +250,7 @@ def test_where_a_top_leaves_levels_are_taken_to_the_border(
     slipping: Found, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     solution = slipping[0]
-    (curve,), peaks = solution.curves, solution.searched["thesis"]
+    (curve,), peaks = solution.curves, searched(solution)
     top, key = top_of(slipping), ("right", 2)
     assert top.slips and curve.stayed("right", 2) is None
     assert curve.compared("right", 2) == (top.frequency, top.height)
@@ -256,17 +262,17 @@ def test_where_a_top_leaves_levels_are_taken_to_the_border(
     )
     leaves = replace(curve, checked=(check,))
     assert leaves.compared("right", 2) == (check.frequency, check.integrated)
-    seen: list[ForcedCurve] = []
+    seen: list[PointCurve] = []
 
-    def confirmed(plan: Any, model: Any, path: ForcedCurve, like: Any) -> ForcedCurve:
+    def confirmed(plan: Any, model: Any, path: PointCurve, like: Any) -> PointCurve:
         """Half of every height."""
         seen.append(path)
         lower = {s: tuple(p._replace(height=0.5 * p.height) for p in path.peaks[s]) for s in SIDES}
         return replace(path, peaks=lower)
 
     monkeypatch.setattr(peaks_again, "confirmed", confirmed)
-    run = RunPeak(curve, "right", 2, top)
-    found = peak_on(peaks, peaks.model, peaks.linear, run._replace(curve=leaves), None)
+    run, off = (next(p for p in run_peaks(c) if p.number == 2) for c in (curve, leaves))
+    found = peak_on(peaks, peaks.model, peaks.linear, off, None)
     assert found.frequency == pytest.approx(top.frequency, rel=1e-3)
     assert found.height == pytest.approx(0.5 * top.height, rel=1e-3)
     assert len(seen) == 1
@@ -277,7 +283,7 @@ def test_where_a_top_leaves_levels_are_taken_to_the_border(
     # maxima side by side of this flat top
     assert top.crowded
     monkeypatch.setattr(peaks_again, "BAND", 1e-4)
-    found = peak_on(peaks, peaks.model, peaks.linear, run._replace(curve=leaves), None)
+    found = peak_on(peaks, peaks.model, peaks.linear, off, None)
     assert found.height == pytest.approx(0.5 * top.height, rel=1e-2)
 
 
@@ -299,7 +305,7 @@ def test_a_level_that_fails_leaves_only_its_part(
         raise ConvergenceError("no motion was found")
 
     solution, numbers, estimates = slipping
-    (name, known), (peaks, *_) = next(iter(solution.levels.items())), solution.searched.values()
+    (name, known), peaks = next(iter(solution.levels.items())), searched(solution)
     for function in ("found_again", "peak_on"):
         monkeypatch.setattr(peaks_again, function, fails)
     variants = (

@@ -65,7 +65,7 @@ def test_the_stuck_march_is_the_stuck_blades(solution: ForcedSolution) -> None:
 
 def test_stuck_modes_are_those_of_the_whole_model(solution: ForcedSolution) -> None:
     march = make_springs(solution.plan, solution.models["thesis"]).march
-    told = stuck_modes_of(march, 1000.0)
+    _, told = stuck_modes_of(march, 1000.0)
     assert told.number[:2] == (1, 2)
     assert told.words[:2] == ("in phase", "out of phase")
 
@@ -112,9 +112,9 @@ def swept() -> ForcedSolution:
 
 
 def test_sweeps_jump_where_the_curve_folds(solution: ForcedSolution, swept: ForcedSolution) -> None:
-    up, down = swept.sweeps
+    up, down = swept.curves
     assert (up.way, down.way) == ("up", "down")
-    assert up.found.status != "stopped" != down.found.status
+    assert up.answer.status != "stopped" != down.answer.status
     # the peak bends back: falling, the high motion lasts to lower frequencies
     tops = [s.peaks["right"][-1] for s in (up, down)]
     assert tops[1].height > 1.1 * tops[0].height
@@ -216,7 +216,7 @@ def test_samples_of_the_scene_are_the_steps_of_its_marches(
         counted.clear()
         up, _ = both_ways(plan, "thesis", curve.ratio, springs.march, springs.at_rest())
         assert set(counted) == {steps}
-        assert up.found.settled.all()
+        assert up.answer.settled.all()
 
 
 def test_maxima_of_a_sweep_are_its_own_points() -> None:

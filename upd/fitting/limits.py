@@ -19,7 +19,7 @@ from upd.analyses.forced.linear_sensitivity import (
     linear_system,
     stuck_frequencies,
 )
-from upd.analyses.forced.measures import CurvePeak, Unsolved
+from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.mode_peaks import CANDIDATES, tell_stuck_peaks, unmoved
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.paths import balance_of
@@ -151,6 +151,6 @@ def _peaks(plan: ForcedPlan, model: Model, stuck: bool, side: Side) -> list[Curv
         return []
     force = plan.scene.damper.centrifugal
     problem = balance_of(plan, model, force, (0, *model.excitation.harmonics))
-    found = linear_peaks(Unsolved(problem), model.row(side), force, grid(plan), stuck)
+    found = linear_peaks(problem, model.row(side), force, grid(plan), stuck)
     stop = plan.scene.excitation.stop
     return tell_stuck_peaks(model, found, stop) if stuck else unmoved(found)

@@ -202,7 +202,7 @@ class StiffnessChoice:
     run
         Folder of a run of a contact scene, instead of the scene.
     points
-        "lattice": the totals of that law on the chosen points; "law": the law's own points.
+        "lattice": the totals of that law on the chosen points.
     bodies
         "upper": the damper's elasticity alone, the blades have their own; "both": that of the
         contact run (scene only).
@@ -215,7 +215,7 @@ class StiffnessChoice:
     right: FaceStiffness | None = None
     scene: str | None = None
     run: str | None = None
-    points: Literal["lattice", "law"] = "lattice"
+    points: Literal["lattice"] = "lattice"
     bodies: Literal["both", "upper"] = "upper"
 
     @property

@@ -66,7 +66,7 @@ def _force_problems(scene: ForcedScene) -> list[str]:
 
 
 def _springs_problems(scene: ForcedScene) -> list[str]:
-    """What springs have not: partly worn faces, Gauss points at lines or at points of a law."""
+    """What springs have not: partly worn faces, Gauss points at lines."""
     c, gauss = scene.contact, scene.contact.rule == GAUSS
     problems: list[str] = []
     add = problems.append
@@ -79,9 +79,6 @@ def _springs_problems(scene: ForcedScene) -> list[str]:
         add('contact.share: Gauss points have their own shares; write "area"')
     if gauss and not all(isinstance(one, int) for side in SIDES for one in c.lines(side)):
         add('contact.rule: "gauss" needs numbers of points, for example rows = 4 and columns = 2')
-    for name, s in scene.stiffness.items():
-        if gauss and s.points == "law" and name in (c.stiffness or scene.stiffness):
-            add(f'stiffness.{name}.points: Gauss points are not those of a law; write "lattice"')
     return problems
 
 
@@ -151,8 +148,6 @@ def _stiffness_problems(where: str, s: StiffnessChoice, arrangement: str) -> lis
             f"{where}: no stiffness for the {' and the '.join(without)} face; give K_N and K_T, or "
             "scene, or run"
         )
-    if not s.from_contact and s.points == "law":
-        add(f'{where}.points: "law" needs scene or run, the contact analysis whose points it means')
     if s.from_contact and arrangement == "asymmetric" and s.left is None:
         add(
             f"{where}: a contact analysis gives the pads on the right; the left face needs left = "

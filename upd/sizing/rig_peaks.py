@@ -15,7 +15,6 @@ from upd.analyses import make_plan
 from upd.analyses.forced import measures
 from upd.analyses.forced.input_uncertainty import data_change, is_known
 from upd.analyses.forced.linear_limits import linear_peaks
-from upd.analyses.forced.measures import Unsolved
 from upd.analyses.forced.mode_peaks import numbered_peaks, tell_stuck_peaks
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.paths import balance_of, path_settings, respond
@@ -118,9 +117,7 @@ class RigPeaks:
         kept = Journal(f"choice-{self._key(parameters)[:32]}")
         low, high = map(math.log, ends)
         with threads_for(len(self.model.M)):
-            stuck = linear_peaks(
-                Unsolved(self.balance), self.model.row("right"), force, grid(plan), True
-            )
+            stuck = linear_peaks(self.balance, self.model.row("right"), force, grid(plan), True)
             if not tell_stuck_peaks(self.model, stuck, e.stop):
                 raise InputError(
                     f"no stuck peak of the right blade between {e.start:g} and {e.stop:g} Hz; to "

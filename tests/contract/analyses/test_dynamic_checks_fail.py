@@ -75,9 +75,9 @@ def _add_sweeps(solution: ForcedSolution, f: float) -> None:
     near = replace(plan.scene.excitation, start=f - 6.0, stop=f + 6.0, points=10)
     beside = replace(plan, scene=replace(plan.scene, excitation=near))
     start = springs.at_rest()
-    solution.sweeps = both_ways(beside, "thesis", curve.ratio, springs.march, start)
-    top = solution.sweeps[0].peaks["right"][0]
-    solution.marched = [marched_peak(solution, solution.sweeps[0], top)]
+    solution.curves += both_ways(beside, "thesis", curve.ratio, springs.march, start)
+    sweep = solution.curves[1]
+    solution.marched = [marched_peak(solution, sweep, sweep.peaks["right"][0])]
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +98,9 @@ def with_answer(solution: ForcedSolution, **values: Any) -> ForcedSolution:
         side: accelerance(answer, solution.models["thesis"].row(side), curve.force)
         for side in curve.accelerance
     }
-    return replace(solution, curves=[replace(curve, answer=answer, accelerance=blades)])
+    return replace(
+        solution, curves=[replace(curve, answer=answer, accelerance=blades), *solution.curves[1:]]
+    )
 
 
 def _forces(s: ForcedSolution, factor: float, which: slice) -> ForcedSolution:
@@ -125,7 +127,9 @@ def _checked(s: ForcedSolution, **values: Any) -> ForcedSolution:
     """A peak's time integration, spoiled."""
     curve = s.curves[0]
     first, *others = curve.checked
-    return replace(s, curves=[replace(curve, checked=(replace(first, **values), *others))])
+    return replace(
+        s, curves=[replace(curve, checked=(replace(first, **values), *others)), *s.curves[1:]]
+    )
 
 
 def _level(source: str, factor: float) -> Callable[[ForcedSolution], ForcedSolution]:
@@ -173,8 +177,8 @@ def _omitted(name: str) -> Callable[[ForcedSolution], ForcedSolution]:
 
 
 def _swept(s: ForcedSolution, **values: Any) -> ForcedSolution:
-    one = s.sweeps[0]
-    return replace(s, sweeps=[replace(one, found=replace(one.found, **values)), *s.sweeps[1:]])
+    path, one, other = s.curves
+    return replace(s, curves=[path, replace(one, answer=replace(one.answer, **values)), other])
 
 
 SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
@@ -197,8 +201,8 @@ SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
     "confirmed by time integration, none stays": lambda s: _checked(s, integrated=np.nan),
     "performance complete": _cut_performance,
     "sweep complete": lambda s: _swept(s, status="stopped"),
-    "sweep settled": lambda s: _swept(s, settled=s.sweeps[0].found.settled & False),
-    "sweep energy": lambda s: _swept(s, energy=s.sweeps[0].found.energy * [1.05, 1.0, 1.0]),
+    "sweep settled": lambda s: _swept(s, settled=s.curves[1].answer.settled & False),
+    "sweep energy": lambda s: _swept(s, energy=s.curves[1].answer.energy * [1.05, 1.0, 1.0]),
     "loss by nodes": lambda s: replace(
         s,
         marched=[
@@ -331,7 +335,7 @@ def test_no_smaller_number_stands_for_one_not_reached(response: ForcedSolution) 
     none = RatioPoint(250.0, (), True)
     performance = replace(response.performances["thesis"], points=(none,))
     bare = replace(part.curves[0], peaks={"left": (), "right": ()}, tops={}, checked=(), folds=())
-    part = replace(part, curves=[bare], sweeps=[], marched=[])
+    part = replace(part, curves=[bare], marched=[])
     part = replace(part, performances={"thesis": performance})
     cut = with_answer(part, status="stopped", message="lost")
     results = [r for r in forced.ANALYSIS.make_results(cut) if r.withheld]
@@ -339,7 +343,7 @@ def test_no_smaller_number_stands_for_one_not_reached(response: ForcedSolution) 
     assert {"peak_2_frequency", "peak_2_accelerance", "best_ratio", "best_peak"} <= missing
     assert all(np.isnan(r.value) and r.as_dict()["value"] is None for r in results)
     mine = [r for r in results if r.name == "peak_2_accelerance"]
-    assert [r.withheld for r in mine] == [cut.curves[0].where]
+    assert [r.withheld for r in mine] == [cut.curves[0].stopped]
 
 
 def _switched(scene: str, overrides: list[str], effect: str, solution: Any) -> None:

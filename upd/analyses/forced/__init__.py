@@ -13,11 +13,11 @@ from upd.analyses.base import Analysis
 from upd.analyses.forced import (
     accuracy,
     answer,
+    arrays,
     charts,
     checks,
     estimates,
     input_uncertainty,
-    output,
     plan,
     results,
 )
@@ -39,6 +39,12 @@ def _on_one_thread(make: Callable[[ForcedSolution], Made]) -> Callable[[ForcedSo
     return made
 
 
+def _sizes(solution: ForcedSolution) -> dict[str, int]:
+    """Contact points of the first stiffness, or nodes of whole faces."""
+    points = [m.contacts.n_point for m in solution.models.values()]
+    return {"n_pairs": next(iter(points + [f.of.n for f in solution.faces.values()]), 0)}
+
+
 ANALYSIS = Analysis(
     name="forced",
     headline_names=answer.MAIN,
@@ -48,9 +54,10 @@ ANALYSIS = Analysis(
     solve=accuracy.solve_to_accuracy,
     make_results=_on_one_thread(results.make_results),
     check_solution=_on_one_thread(checks.check_solution),
-    arrays=_on_one_thread(output.arrays),
-    sizes=output.sizes,
-    write_files=output.write_files,
+    arrays=_on_one_thread(arrays.arrays),
+    sizes=_sizes,
+    # every figure is drawn from the arrays
+    write_files=lambda solution, folder: None,
     charts=charts.charts,
     headline=answer.headline,
     answer=answer.answer,

@@ -80,14 +80,11 @@ def _choice(
 
 
 def _raisable(scene: ForcedScene) -> bool:
-    """Whether Gauss points can stand for the scene's: not for lines that it names, nor for the
-    points of a contact law.
-    """
+    """Whether Gauss points can stand for the scene's: not for lines that it names."""
     return (
         scene.contact.rule != GAUSS
         and scene.contact.share == "area"
         and not lines_named(scene.contact)
-        and all(one.points != "law" for one in scene.stiffnesses.values())
     )
 
 

@@ -53,34 +53,31 @@ def headline(results: Sequence[Entry]) -> list[Entry]:
     """Peaks free and of the curve of the lowest F_C/F_E on which something slips, its reduction and
     loss, the best F_C/F_E, the stuck frequencies, the static forces of both faces.
     """
-    slipping = {
-        _curve_of(one) for one in results if one["name"] == "contact_slip" and (one["value"] or 0)
-    }
+    slipping = {_curve_of(one) for one in results if one["name"] == "contact_slip" and one["value"]}
+
+    def order(entry: Entry) -> tuple[bool, float]:
+        stiffness, ratio = _curve_of(entry)
+        return ratio is not None and (stiffness, ratio) not in slipping, float(ratio or 0.0)
+
     first: dict[tuple[str, str, str], Entry] = {}
-    for entry in sorted(results, key=lambda one: _rank_of(one, slipping)):
+    for entry in sorted(results, key=order):
         kind = _fields(entry).get("kind", "")
         side = _fields(entry).get("side", "") if entry["name"] in _FACES else ""
         # The peaks of the stuck curve are the stuck frequencies.
         if kind != "stuck":
             first.setdefault((entry["name"], kind, side), entry)
     ranked = [
-        (rank, key) for key in first for rank, one in enumerate(MAIN) if fnmatchcase(key[0], one)
+        (key[1] != "free", rank, key)
+        for key in first
+        for rank, one in enumerate(MAIN)
+        if fnmatchcase(key[0], one)
     ]
-    return [
-        first[key] for _, key in sorted(ranked, key=lambda pair: (pair[1][1] != "free", pair[0]))
-    ]
+    return [first[key] for *_, key in sorted(ranked)]
 
 
 def _curve_of(entry: Entry) -> tuple[Any, Any]:
     """Stiffness and F_C/F_E of a number; F_C/F_E is None for what belongs to no curve."""
     return _fields(entry).get("stiffness"), _fields(entry).get("force_ratio")
-
-
-def _rank_of(entry: Entry, slipping: set[tuple[Any, Any]]) -> tuple[bool, float]:
-    curve = _curve_of(entry)
-    if curve[1] is None:
-        return False, 0.0
-    return curve not in slipping, float(curve[1])
 
 
 def answer(results: Sequence[Entry]) -> list[AnswerTable]:
@@ -90,31 +87,26 @@ def answer(results: Sequence[Entry]) -> list[AnswerTable]:
     return [table for table in tables if table is not None]
 
 
-def _several(results: Sequence[Entry]) -> bool:
-    """Whether the run has more than one contact stiffness."""
-    return len({_fields(e).get("stiffness") for e in results if _fields(e).get("stiffness")}) > 1
-
-
 # -- static state ----------------------------------------------------------------------------------
 
 
 def _static(results: Sequence[Entry]) -> AnswerTable | None:
     """N and T of both faces, and whether the damper hangs."""
-    N, T = (
-        {
-            (_fields(e).get("stiffness"), _fields(e)["side"]): e
-            for e in results
-            if e["name"] == name and _fields(e).get("side")
-        }
-        for name in _FACES
-    )
-    if not N:
+    forces = [e for e in results if e["name"] in _FACES and _fields(e).get("side")]
+    mine = {
+        _fields(e)["side"]: e
+        for e in forces
+        if e["name"] == _FACES[0] and _fields(e).get("stiffness") == _fields(forces[0])["stiffness"]
+    }
+    if not mine:
         return None
-    stiffness = next(iter(N))[0]
-    mine = {side: (N[at], T[at]) for at in N if at[0] == stiffness for side in (at[1],)}
-    state = str(_fields(next(iter(mine.values()))[0]).get("choice", ""))
-    rows = tuple((side, f"{n['value']:.1f}", f"{t['value']:.1f}") for side, (n, t) in mine.items())
-    empty = [side for side, (n, _) in mine.items() if n["value"] == 0.0]
+    T = {side: _of(results, _FACES[1], _fields(n)) for side, n in mine.items()}
+    state = str(_fields(next(iter(mine.values()))).get("choice", ""))
+    rows = tuple(
+        (side, f"{n['value']:.1f}", "" if t is None else f"{t['value']:.1f}")
+        for (side, n), t in zip(mine.items(), T.values(), strict=True)
+    )
+    empty = [side for side, n in mine.items() if n["value"] == 0.0]
     note = f'Static state: "{state}".'
     if empty:
         note += (
@@ -134,52 +126,15 @@ def _peaks(results: Sequence[Entry], every: Sequence[Entry]) -> AnswerTable | No
     found = [e for e in results if _is(e, q.PEAK_FREQUENCY) and _fields(e).get("kind") != "stuck"]
     if not found:
         return None
-    at = {(e["name"], _key(e)): e for e in results}
-    several, rows = _several(found), list[tuple[str, ...]]()
-    free = max(
-        (
-            e["value"]
-            for e in results
-            if _is(e, q.PEAK_ACCELERANCE) and _fields(e).get("kind") == "free"
-        ),
-        default=math.nan,
-    )
-    folds = False
-    for e in sorted(found, key=lambda one: _order(one)):
-        fields, number = _fields(e), quantity_of(e["name"])[1]
-        height = at.get((q.PEAK_ACCELERANCE.named(number), _key(e)))
-        if height is None:
-            continue
-        ratio, kind = fields.get("force_ratio"), fields.get("kind", "")
-        case = "free" if kind == "free" else f"{ratio:g}" if ratio is not None else kind
-        if several:
-            case = f"{fields.get('stiffness')}, {case}"
-        if fields.get("choice"):
-            case += f", {fields['choice']}"
-        peak = {**fields, "peak": int(number)}
-        moved = [_of(results, one.name, peak) for one in (q.CONTACT_SLIP, q.CONTACT_LIFT)]
-        fold = _of(results, q.SWEEP_UP_ACCELERANCE.named(number), fields)
-        up = _of(results, q.SWEEP_UP_FREQUENCY.named(number), fields)
-        folds |= fold is not None
-        reference = e.get("reference")
-        rows.append(
-            (
-                case,
-                fields.get("mode") or ("one blade" if kind == "free" else f"peak {number}"),
-                f"{e['value']:.1f}",
-                _bound(e),
-                _height(height["value"]),
-                _bound(height),
-                ""
-                if kind == "free" or not math.isfinite(free)
-                else f"{100.0 * (height['value'] / free - 1.0):+.0f} %",
-                *("" if one is None else f"{one['value']:.0f} %" for one in moved),
-                f"{reference:g}" if reference is not None else "",
-                ""
-                if fold is None or up is None
-                else f"{_height(fold['value'])} at {up['value']:.1f}",
-            )
-        )
+    several = len({_fields(e).get("stiffness") for e in found}) > 1
+    heights = [e for e in results if _is(e, q.PEAK_ACCELERANCE)]
+    free = [e["value"] for e in heights if _fields(e).get("kind") == "free"]
+    rows = [
+        _peak_row(results, e, height, several, max(free, default=math.nan))
+        for e in sorted(found, key=_order)
+        for height in heights
+        if (height["name"], _fields(height)) == (_height_name(e), _fields(e))
+    ]
     heads: tuple[str, ...] = (
         "F_C/F_E",
         "mode",
@@ -193,7 +148,7 @@ def _peaks(results: Sequence[Entry], every: Sequence[Entry]) -> AnswerTable | No
         "# measured Hz",
         "# a sweep up reaches",
     )
-    if not folds:
+    if not any(row[-1] for row in rows):
         heads, rows = heads[:-1], [row[:-1] for row in rows]
     lost = [e for e in every if e["value"] is None and _is(e, q.PEAK_FREQUENCY)]
     note = "Right blade; shares of all contact points and of the cycle."
@@ -202,14 +157,44 @@ def _peaks(results: Sequence[Entry], every: Sequence[Entry]) -> AnswerTable | No
     return AnswerTable("Peaks", heads, tuple(rows), note)
 
 
+def _peak_row(
+    results: Sequence[Entry], e: Entry, height: Entry, several: bool, free: float
+) -> tuple[str, ...]:
+    """Cells of a peak from its frequency and height; ``free``: of the highest free peak."""
+    fields, number = _fields(e), quantity_of(e["name"])[1]
+    ratio, kind = fields.get("force_ratio"), fields.get("kind", "")
+    case = f"{ratio:g}" if ratio is not None else kind
+    if several:
+        case = f"{fields.get('stiffness')}, {case}"
+    if fields.get("choice"):
+        case += f", {fields['choice']}"
+    peak = {**fields, "peak": int(number)}
+    moved = [_of(results, one.name, peak) for one in (q.CONTACT_SLIP, q.CONTACT_LIFT)]
+    fold = _of(results, q.SWEEP_UP_ACCELERANCE.named(number), fields)
+    up = _of(results, q.SWEEP_UP_FREQUENCY.named(number), fields)
+    against = 100.0 * (height["value"] / free - 1.0)
+    reference = e.get("reference")
+    return (
+        case,
+        fields.get("mode") or ("one blade" if kind == "free" else f"peak {number}"),
+        f"{e['value']:.1f}",
+        _bound(e),
+        _height(height["value"]),
+        _bound(height),
+        f"{against:+.0f} %" if kind != "free" and math.isfinite(against) else "",
+        *("" if one is None else f"{one['value']:.0f} %" for one in moved),
+        f"{reference:g}" if reference is not None else "",
+        "" if fold is None or up is None else f"{_height(fold['value'])} at {up['value']:.1f}",
+    )
+
+
+def _height_name(entry: Entry) -> str:
+    """Name of the height of a peak of which this is the frequency."""
+    return q.PEAK_ACCELERANCE.named(quantity_of(entry["name"])[1])
+
+
 def _is(entry: Entry, quantity: Quantity) -> bool:
     return quantity_of(entry["name"])[0] == quantity
-
-
-def _key(entry: Entry) -> tuple[Any, ...]:
-    """What tells a peak apart from others."""
-    fields = _fields(entry)
-    return tuple(fields.get(n) for n in ("stiffness", "kind", "force_ratio", "mode", "choice"))
 
 
 def _order(entry: Entry) -> tuple[Any, ...]:

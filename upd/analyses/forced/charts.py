@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.forced.curve_arrays import (
+from upd.analyses.forced.arrays import (
     FRICTION,
     LINEAR,
     MARCHED,

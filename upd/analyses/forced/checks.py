@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import FacesCurve, ForcedCurve, SweptCurve, WholeFaces
+from upd.analyses.forced.curves import Curve, FacesCurve, PointCurve, SweptCurve, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.levels import HARMONICS, SAMPLES
 from upd.analyses.forced.model import Model
@@ -23,6 +23,8 @@ from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import BALANCE, StaticState
 from upd.analyses.forced.sweeps import TOLERANCE
 from upd.analyses.measured import fit_checks
+from upd.hbm.faces.balance import InterfaceResponse
+from upd.hbm.faces.sweep import SteppedSine
 from upd.hbm.springs.harmonics import TRUNCATION
 from upd.results import Case, Check
 from upd.scene.forced_contact import SIDES
@@ -191,17 +193,7 @@ def check_solution(solution: ForcedSolution) -> list[Check]:
         checks.append(_check("static balance", case, _off_balance(faces)))
         checks.append(_preloaded(case, faces.state, mu, least))
     for curve in solution.curves:
-        checks.append(_path(curve))
-        if not curve.empty:
-            levels = solution.levels.get(curve.stiffness, [])
-            checks += _curve_checks(curve, solution.models[curve.stiffness], levels)
-    for path in solution.balanced:
-        read = excitation_of(scene.excitation).lowest
-        checks.append(_path(path))
-        if not path.empty:
-            checks += check_faces_curve(path, scene.excitation.points, read)
-    for one in solution.sweeps:
-        checks += _sweep_checks(one)
+        checks += _curve_checks(solution, curve)
     checks += [
         _check("loss by nodes", one.case, one.off, frequency=one.frequency)
         for one in solution.marched
@@ -226,18 +218,29 @@ def _preloaded(case: Case, state: StaticState, mu: float, least: float) -> Check
     return _check("preloaded contact", case, float(bool(state.empty) or mobilised), what=what)
 
 
-def _path(curve: ForcedCurve | FacesCurve) -> Check:
+def _curve_checks(solution: ForcedSolution, curve: Curve[Any]) -> Iterator[Check]:
+    e = solution.plan.scene.excitation
+    if isinstance(curve.answer, SteppedSine):
+        yield from _sweep_checks(curve)
+        return
+    yield _path(curve)
+    if curve.empty:
+        return
+    if isinstance(curve.answer, InterfaceResponse):
+        yield from check_faces_curve(curve, e.points, excitation_of(e).lowest)
+    else:
+        levels = solution.levels.get(curve.stiffness, [])
+        yield from _point_checks(curve, solution.models[curve.stiffness], levels)
+
+
+def _path(curve: Curve[Any]) -> Check:
     if curve.stopped:
         return _check("path stopped", curve.case, 1.0, message=curve.answer.message)
-    astray = 0
-    if isinstance(curve, ForcedCurve):
-        astray = int((~curve.answer.periodic).sum())
+    astray = int((~curve.answer.periodic).sum()) if hasattr(curve.answer, "periodic") else 0
     return _check("path periodic", curve.case, float(astray), count=astray)
 
 
-def _curve_checks(
-    curve: ForcedCurve, model: Model, levels: Sequence[PeaksAgain]
-) -> Iterator[Check]:
+def _point_checks(curve: PointCurve, model: Model, levels: Sequence[PeaksAgain]) -> Iterator[Check]:
     answer, case = curve.answer, curve.case
     yield _check("residual of points", case, measures.residual_error(answer))
     yield _check("energy of points", case, float(np.abs(answer.energy_balance).max()))
@@ -246,7 +249,7 @@ def _curve_checks(
     yield from _integrated(curve)
 
 
-def _by_level(curve: ForcedCurve, levels: Sequence[PeaksAgain]) -> Iterator[Check]:
+def _by_level(curve: PointCurve, levels: Sequence[PeaksAgain]) -> Iterator[Check]:
     """Reported heights with more harmonics and with twice the samples."""
     more = {
         "harmonics": curve.answer.harmonics.highest + 4,
@@ -268,7 +271,7 @@ def _by_level(curve: ForcedCurve, levels: Sequence[PeaksAgain]) -> Iterator[Chec
             yield _check(rule, curve.case, max(changes), level=last.of.label, **more)
 
 
-def _integrated(curve: ForcedCurve) -> Iterator[Check]:
+def _integrated(curve: PointCurve) -> Iterator[Check]:
     """Reported peaks that no climb reached, or the one that time integration confirms worst."""
     for side in SIDES:
         for peak in curve.peaks.get(side, ()):
@@ -307,7 +310,7 @@ def _open_energy(energy: np.ndarray[Any, np.dtype[np.float64]]) -> Any:
 
 def _sweep_checks(one: SweptCurve) -> Iterator[Check]:
     """A sweep that came to its end, whose motions settled, and whose energy closes."""
-    found, count = one.found, len(one.found.settled)
+    found, count = one.answer, len(one.answer.settled)
     lost, loss = int((~found.settled).sum()), _open_energy(found.energy)[found.settled]
     stopped = float(found.status == "stopped")
     yield _check("sweep complete", one.case, stopped, message=found.message)

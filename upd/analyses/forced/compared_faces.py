@@ -8,23 +8,21 @@ mesh of the faces.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 from typing import NamedTuple
 
-from upd.analyses.forced.whole_faces import INTERFACE
+from upd.analyses.forced.interface_model import INTERFACE
 from upd.analyses.seated.varied import PATCH
 from upd.errors import InputError
 from upd.labels import percent
 from upd.plot.work_precision import change_charts
 from upd.results import Case
 from upd.results.quantities import PEAK_ACCELERANCE, PEAK_FREQUENCY, quantity_of
-from upd.results.quantity import Quantity
 from upd.scene import ForcedScene
 from upd.vary.curves import ConvergenceCurve, make_curve
 from upd.vary.ladder import Asked, Ladder, StudyReport, chosen_levels, even
 from upd.vary.outcome import PointResult, SolvedPoint, without_failed
-from upd.vary.tables import TableColumn, TextTable, cost_columns, make_table
-from upd.vary.variation import Overrides, Variation
+from upd.vary.tables import level_table, points_table
+from upd.vary.variation import Key, Overrides, Variation
 
 #: meshes of both faces: 60, 198 and 468 nodes of the symmetric damper's half (the last has the
 #: thesis's elements), 60, 196 and 460 of the asymmetric one's
@@ -39,10 +37,8 @@ _USUAL = {"symmetric": (4, 6), "asymmetric": (3, 4)}
 NODE_BY_NODE = ("hex8i", "hex8")
 #: curve of the levels on springs
 SPRINGS = "springs"
-#: numbers of a peak, their heads in a table, and the digits it shows
-_KINDS = {PEAK_FREQUENCY: ("frequency\nHz", 5), PEAK_ACCELERANCE: ("height\n(m/s2)/N", 4)}
-#: number of a peak, and which number of it
-PeakKey = tuple[int, Quantity]
+#: numbers of a peak that are compared
+_KINDS = (PEAK_FREQUENCY, PEAK_ACCELERANCE)
 
 
 def at_ratio(scene: ForcedScene) -> Overrides:
@@ -145,11 +141,12 @@ class LevelNumber(NamedTuple):
     ends: tuple[float, float] | None
     why: str
 
-    def text(self, digits: int) -> str:
+    @property
+    def text(self) -> str:
         """The number, both ends, or that one of the sweeps does not have it."""
         if self.ends is None:
             return "not reached"
-        low, high = (f"{value:.{digits}g}" for value in self.ends)
+        low, high = (f"{value:.5g}" for value in self.ends)
         if low != high:
             return f"{low} to {high}"
         return f"{low} or none" if self.why else low
@@ -162,22 +159,22 @@ class LevelNumber(NamedTuple):
         return max((mine / other - 1.0 for mine, other in pairs), key=abs)
 
 
-Numbers = Mapping[PeakKey, LevelNumber]
+#: name of a number -> what a level has of it
+Numbers = Mapping[str, LevelNumber]
 
 
 def peak_numbers(one: SolvedPoint) -> Numbers:
-    """Number of the peak and its frequency or accelerance -> what the level has of it.
+    """Frequencies and heights of the peaks of a level with friction.
 
     Peaks are numbered by the mode in which the blades move, so that numbers of levels whose
     contacts have other names belong together.
     """
-    found: dict[PeakKey, list[PointResult]] = {}
+    found: dict[str, list[PointResult]] = {}
     for result in one.outcome.results:
-        quantity, n = quantity_of(result.name)
         # curves of linear limits have no F_C/F_E
-        if quantity in _KINDS and result.case.force_ratio is not None:
-            found.setdefault((int(n), quantity), []).append(result)
-    return {key: _level_number(results) for key, results in found.items()}
+        if quantity_of(result.name)[0] in _KINDS and result.case.force_ratio is not None:
+            found.setdefault(result.name, []).append(result)
+    return {name: _level_number(results) for name, results in found.items()}
 
 
 def _level_number(results: Sequence[PointResult]) -> LevelNumber:
@@ -204,12 +201,12 @@ def change_curves(solved: Sequence[SolvedPoint]) -> Iterator[ConvergenceCurve]:
     for one in without_failed(solved):
         way = one.name if one.point.source == SPRINGS else INTERFACE
         ways.setdefault(way, []).append(one)
-    for key, reference in peak_numbers(fine).items() if fine else ():
+    for number, reference in peak_numbers(fine).items() if fine else ():
         if fine is None or reference.ends is None:
             continue
-        name = (key[1].named(key[0]), Case(mode=reference.mode))
+        name = (number, Case(mode=reference.mode))
         for way, points in ways.items():
-            numbers = [(one, peak_numbers(one).get(key)) for one in points]
+            numbers = [(one, peak_numbers(one).get(number)) for one in points]
             changes = [(one, n.change(reference)) for one, n in numbers if n is not None]
             known = [(one, change) for one, change in changes if change is not None]
             if known:
@@ -218,61 +215,38 @@ def change_curves(solved: Sequence[SolvedPoint]) -> Iterator[ConvergenceCurve]:
 
 
 def _report(scene: ForcedScene, solved: Sequence[SolvedPoint], names: Sequence[str]) -> StudyReport:
-    """What every level costs, then each peak on every level, then why sweeps lack one."""
+    """What every level costs, the peaks on every level, their changes, why sweeps lack one."""
     del scene, names
     fine, levels = finest(solved), {one.name: peak_numbers(one) for one in solved}
-    peaks = sorted({peak for numbers in levels.values() for peak, _ in numbers})
-    costs = (_LEVEL, ("nodes", "r", _nodes), *cost_columns(digits=1))
-    tables = [
-        make_table("What every contact costs", costs, solved),
-        *(_peak_table(solved, levels, peak, fine.name if fine else "") for peak in peaks),
-    ]
+    modes: dict[str, str] = {}
+    for name, found in ((name, n) for numbers in levels.values() for name, n in numbers.items()):
+        modes[name] = modes.get(name) or found.mode
+    keys: list[Key] = [(name, Case(mode=mode)) for name, mode in sorted(modes.items())]
+
+    def value(one: SolvedPoint, key: Key) -> str:
+        found = levels[one.name].get(key[0])
+        return "none" if found is None else found.text
+
+    def change(one: SolvedPoint, key: Key) -> str:
+        found = levels[one.name].get(key[0])
+        if found is None or fine is None or one is fine:
+            return ""
+        return percent(found.change(levels[fine.name].get(key[0])))
+
+    tables = [points_table(solved), level_table("Peaks", keys, solved, value)]
+    if fine is not None:
+        tables.append(level_table(f"Change from {fine.name}", keys, solved, change))
     # frequency and height share one reason
     reasons = dict.fromkeys(
-        f"{name}, peak {peak}: {number.why}"
+        f"{name}, peak {quantity_of(number)[1]}: {found.why}"
         for name, numbers in levels.items()
-        for (peak, _), number in numbers.items()
-        if number.why
+        for number, found in numbers.items()
+        if found.why
     )
     curves = tuple(change_curves(solved))
     return StudyReport(
         tuple(tables), fine is not None, tuple(reasons), curves, charts=change_charts
     )
-
-
-_LEVEL: TableColumn = ("contact", "l", lambda one: str(one.name))
-
-
-def _nodes(one: SolvedPoint) -> str:
-    """Points of the springs, or nodes of both faces, in the model that was solved."""
-    count = next((r.value for r in one.outcome.results if r.name == "contact_points"), None)
-    return "" if count is None else f"{count:.0f}"
-
-
-def _peak_table(
-    solved: Sequence[SolvedPoint], levels: Mapping[str, Numbers], peak: int, fine: str
-) -> TextTable:
-    """A row per level: frequency, height, and their change from the finest mesh."""
-
-    def value(key: PeakKey, digits: int, one: SolvedPoint) -> str:
-        found = levels[one.name].get(key)
-        return "none" if found is None else found.text(digits)
-
-    def change(key: PeakKey, one: SolvedPoint) -> str:
-        found = levels[one.name].get(key)
-        if found is None or not fine or one.name == fine:
-            return ""
-        return percent(found.change(levels[fine].get(key)))
-
-    columns = [_LEVEL]
-    for kind, (head, digits) in _KINDS.items():
-        key = (peak, kind)
-        columns.append((head, "r", partial(value, key, digits)))
-        columns.append(("its\nchange", "r", partial(change, key)))
-    modes = {n.mode for one in levels.values() for (k, _), n in one.items() if k == peak} - {""}
-    title = f"Peak {peak}" + f", {' or '.join(sorted(modes))}" * bool(modes)
-    title += f"; change from {fine}" * bool(fine)
-    return make_table(title, columns, solved)
 
 
 def _title(scene: ForcedScene, vary: str) -> str:

@@ -1,4 +1,4 @@
-"""Numbers of curves: by harmonic balance, of points and of whole faces, and of sweeps."""
+"""Numbers of curves: peaks, contact states, losses and motions there, what a curve took."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ import numpy as np
 
 from upd.analyses import printed
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import FacesCurve, ForcedCurve, SweptCurve
+from upd.analyses.forced.curves import Curve, PointCurve
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import ForcedSolution, MarchedPeak
 from upd.analyses.forced.sweeps import marched_damper, marched_shares
+from upd.hbm import FrequencyResponse
+from upd.hbm.faces.balance import InterfaceResponse
 from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result
 from upd.results import quantities as q
@@ -26,10 +28,9 @@ from upd.scene.forced_contact import SIDES, Side
 MEASURED_PEAK = q.FREE_PEAK_FREQUENCY.name
 #: by how much lower than the peak a sweep ends that is reported
 _LOWER = 0.01
-AnyCurve = ForcedCurve | FacesCurve | SweptCurve
 
 
-def _more_harmonics(curve: AnyCurve) -> Iterator[Result]:
+def _more_harmonics(curve: Curve[Any]) -> Iterator[Result]:
     """Highest points in the harmonics beside the one that is read, which has the numbered peaks."""
     for k, H in curve.more.items() if not curve.empty else ():
         for blade in SIDES[::-1]:
@@ -41,17 +42,46 @@ def _more_harmonics(curve: AnyCurve) -> Iterator[Result]:
             yield q.HARMONIC_ACCELERANCE.on(blade).of(height, curve.case, n=k)
 
 
-def curve_results(solution: ForcedSolution, curve: ForcedCurve) -> list[Result]:
-    """Peaks of a path of points, states, losses and damper motion there, what the path took."""
-    model, case = solution.models[curve.stiffness], curve.case
-    results = [*_of_curve(solution, curve), *_folds(curve), *_more_harmonics(curve)]
+def curve_results(solution: ForcedSolution, curve: Curve[Any]) -> list[Result]:
+    """Peaks of both blades, those not reached, the reduction; the contact at the right ones."""
+    case = curve.case
+    results = [
+        q.EXCITATION_FORCE.of(curve.force, case),
+        q.PATH_POINTS.of(len(curve.frequency), case),
+        q.CURVE_SECONDS.of(curve.seconds, case),
+        *(
+            one
+            for blade in SIDES[::-1]
+            for one in peak_results(solution, case, curve.peaks.get(blade, ()), blade)
+        ),
+        *_not_reached(solution, curve),
+        *(r for blade in SIDES[::-1] for r in _reduction(solution, curve, blade)),
+        *_folds(curve),
+        *_more_harmonics(curve),
+    ]
+    if isinstance(curve.answer, InterfaceResponse):
+        results.append(q.PATH_JUMPS.of(len(curve.answer.jumps), case))
     for peak in curve.peaks.get("right", ()):
-        at = replace(case, peak=peak.number, mode=peak.mode)
-        results += _at_point(solution, curve, model, at, peak.sample)
+        results += _at_peak(solution, curve, peak)
     return results
 
 
-def _folds(curve: ForcedCurve) -> Iterator[Result]:
+def _at_peak(solution: ForcedSolution, curve: Curve[Any], peak: CurvePeak) -> list[Result]:
+    """The contact at a peak: of points, of the last period of a sweep, or of the whole contact."""
+    at, i = replace(curve.case, peak=peak.number, mode=peak.mode), peak.sample
+    if isinstance(curve.answer, FrequencyResponse):
+        return _at_point(solution, curve, solution.models[curve.stiffness], at, i)
+    marched = [one for one in solution.marched if one.case == at]
+    if marched:
+        return _at_marched(solution, marched[0])
+    lift, stick, slip = curve.answer.share[i]
+    return [
+        *(one.of(value, at) for one, value in zip(q.SHARES, (stick, slip, lift), strict=True)),
+        q.FRICTION_ENERGY.of(curve.answer.energy[i, 2], at),
+    ]
+
+
+def _folds(curve: Curve[Any]) -> Iterator[Result]:
     """What a slow sweep up reaches where it jumps past the peak of a mode: by the largest of the
     jumps that are nearest to that peak.
     """
@@ -71,74 +101,25 @@ def _folds(curve: ForcedCurve) -> Iterator[Result]:
             yield q.SWEEP_UP_ACCELERANCE.of(fold.reached, case, n=peak.number)
 
 
-def balanced_results(solution: ForcedSolution, curve: FacesCurve) -> list[Result]:
-    """Peaks of whole faces by harmonic balance, states and losses there, what the curve took."""
-    case = curve.case
-    results = [
-        *_of_curve(solution, curve),
-        q.PATH_JUMPS.of(len(curve.answer.jumps), case),
-        *_more_harmonics(curve),
-    ]
-    for peak in curve.peaks["right"]:
-        at, i = replace(case, peak=peak.number, mode=peak.mode), peak.sample
-        results += whole_contact_results(at, curve.answer.share[i], curve.answer.energy[i, 2])
-    return results
-
-
-def swept_results(solution: ForcedSolution, sweep: SweptCurve) -> list[Result]:
-    """Peaks of a sweep, states and losses there, what the sweep took."""
-    case = sweep.case
-    results = [*_of_curve(solution, sweep), *_more_harmonics(sweep)]
-    known = {(m.sweep.case, m.peak.number) for m in solution.marched}
-    for peak in sweep.peaks["right"]:
-        if (case, peak.number) not in known:
-            at, i = replace(case, peak=peak.number, mode=peak.mode), peak.sample
-            results += whole_contact_results(at, sweep.found.share[i], sweep.found.energy[i, 2])
-    for marched in solution.marched:
-        if marched.sweep.case == case:
-            results += _at_marched(solution, marched)
-    return results
-
-
-def _of_curve(solution: ForcedSolution, curve: AnyCurve) -> list[Result]:
-    """What every curve has: its size, peaks of both blades, those not reached, the reduction."""
-    case = curve.case
-    return [
-        q.EXCITATION_FORCE.of(curve.force, case),
-        q.PATH_POINTS.of(len(curve.frequency), case),
-        q.CURVE_SECONDS.of(curve.seconds, case),
-        *(
-            one
-            for blade in SIDES[::-1]
-            for one in peak_results(solution, case, curve.peaks.get(blade, ()), blade)
-        ),
-        *_not_reached(solution, curve),
-        *(r for blade in SIDES[::-1] for r in _reduction(solution, curve, blade)),
-    ]
-
-
-def _not_reached(solution: ForcedSolution, curve: AnyCurve) -> list[Result]:
+def _not_reached(solution: ForcedSolution, curve: Curve[Any]) -> list[Result]:
     """Peaks of the stuck curve that the curve lacks, where it ended early or has none."""
     e, wanted = solution.plan.scene.excitation, solution.stuck_peaks(curve.stiffness)
     found = {peak.number for peak in curve.peaks.get("right", ())}
     modes = {peak.number: peak.mode for peak in wanted} or {1: ""}
-    if curve.stopped:
-        reason = curve.where
-    elif not found:
+    reason = curve.stopped
+    if not reason and not found:
         reason = f"no peak between {e.start:g} and {e.stop:g} Hz: widen excitation.start and stop"
         modes = dict(list(modes.items())[:1])
-    else:
-        # two modes may have grown into one peak: the curve shows all there are
-        return []
+    # two modes may have grown into one peak: a whole curve shows all there are
     return [
         quantity.withheld(replace(curve.case, mode=mode), reason, n=number)
         for number, mode in modes.items()
-        if number not in found
+        if reason and number not in found
         for quantity in (q.PEAK_FREQUENCY, q.PEAK_ACCELERANCE)
     ]
 
 
-def _reduction(solution: ForcedSolution, curve: AnyCurve, blade: Side) -> list[Result]:
+def _reduction(solution: ForcedSolution, curve: Curve[Any], blade: Side) -> list[Result]:
     """How far the highest point of a blade's curve is below its free peak."""
     linear = solution.linear.get(curve.stiffness)
     free = linear.free_peaks[blade] if linear else []
@@ -148,7 +129,7 @@ def _reduction(solution: ForcedSolution, curve: AnyCurve, blade: Side) -> list[R
     top = max(peak.height for peak in free)
     size = np.abs(curve.accelerance[blade])
     f, peaks = curve.frequency, [peak.height for peak in curve.peaks[blade]]
-    reason = f"{curve.where}; the highest point may lie beyond" if curve.stopped else ""
+    reason = f"{curve.stopped}; the highest point may lie beyond" if curve.stopped else ""
     if not reason and f[int(size.argmax())] in (f.min(), f.max()):
         reason = (
             "the highest point is an end of the sweep, so the resonance lies outside: widen "
@@ -161,7 +142,7 @@ def _reduction(solution: ForcedSolution, curve: AnyCurve, blade: Side) -> list[R
 
 
 def _at_point(
-    solution: ForcedSolution, curve: ForcedCurve, model: Model, at: Case, i: int
+    solution: ForcedSolution, curve: PointCurve, model: Model, at: Case, i: int
 ) -> list[Result]:
     """Contact state, losses and damper motion at point i of the path."""
     scene, answer = solution.plan.scene, curve.answer
@@ -244,23 +225,6 @@ def peak_results(
         if not case.kind and blade == "right":
             results.append(q.PEAK_MAC.of(peak.mac, mine, n=n))
     return results
-
-
-def whole_contact_results(case: Case, share: Array, energy: float) -> list[Result]:
-    """States and friction loss of the whole contact.
-
-    Parameters
-    ----------
-    share
-        (3,) of lift, stick and slip.
-    energy
-        N mm a period.
-    """
-    lift, stick, slip = share
-    return [
-        *(one.of(value, case) for one, value in zip(q.SHARES, (stick, slip, lift), strict=True)),
-        q.FRICTION_ENERGY.of(energy, case),
-    ]
 
 
 def motion_results(case: Case, static: Array, amplitude: Array) -> list[Result]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal, NamedTuple
+from typing import Generic, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,56 +45,6 @@ class LinearCurves:
     modes: list[StuckMode]
     free_peaks: Mapping[Side, list[CurvePeak]]
     stuck_peaks: Mapping[Side, list[CurvePeak]]
-
-
-@dataclass(frozen=True)
-class FrictionCurve:
-    """What every curve with friction has, whichever way it was found.
-
-    Attributes
-    ----------
-    stiffness
-        Name of the contact stiffness.
-    ratio
-        F_C/F_E.
-    force
-        F_E, N.
-    accelerance
-        Side -> (n,) of the blade in the lowest harmonic excited, (m/s2)/N.
-    more
-        Other harmonics that are excited -> the same in these.
-    peaks
-        Side -> peaks by the numbers of their modes: what is reported.
-    """
-
-    stiffness: str
-    ratio: float
-    force: float
-    accelerance: Mapping[Side, ComplexArray]
-    more: Mapping[int, Mapping[Side, ComplexArray]]
-    peaks: Mapping[Side, tuple[CurvePeak, ...]]
-
-    @property
-    def case(self) -> Case:
-        """What its numbers and arrays belong to."""
-        return Case(stiffness=self.stiffness, force_ratio=self.ratio)
-
-    @property
-    def frequency(self) -> Array:
-        """(n,) Hz along the curve."""
-        raise NotImplementedError
-
-    @property
-    def empty(self) -> bool:
-        """Whether not one point was found."""
-        return not len(self.frequency)
-
-    @property
-    def where(self) -> str:
-        """How far a curve that stopped came, in words."""
-        if self.empty:
-            return "the path found no point"
-        return f"the path stopped at {self.frequency.max():.4g} Hz"
 
 
 class Top(NamedTuple):
@@ -198,16 +148,36 @@ class Fold(NamedTuple):
     at: float
 
 
+#: harmonic balance of points or of whole faces, or a sweep
+Answer = TypeVar("Answer", FrequencyResponse, InterfaceResponse, SteppedSine)
+#: ways along which a curve is swept; "" by harmonic balance
+Way = Literal["", "up", "down"]
+
+
 @dataclass(frozen=True)
-class ForcedCurve(FrictionCurve):
-    """One curve with friction by harmonic balance.
+class Curve(Generic[Answer]):
+    """One curve with friction, whichever way it was found.
 
     Attributes
     ----------
+    stiffness
+        Name of the contact stiffness.
+    ratio
+        F_C/F_E.
+    force
+        F_E, N.
+    accelerance
+        Side -> (n,) of the blade in the lowest harmonic excited, (m/s2)/N.
+    more
+        Other harmonics that are excited -> the same in these.
+    peaks
+        Side -> peaks by the numbers of their modes: what is reported.
     answer
-        The path in frequency.
+        The path in frequency, or the steady motions of a sweep in their order.
     seconds
         It took.
+    way
+        Of a sweep.
     tops
         Blade and number of a peak -> its top by harmonic balance.
     checked
@@ -216,11 +186,46 @@ class ForcedCurve(FrictionCurve):
         Along the path.
     """
 
-    answer: FrequencyResponse
+    stiffness: str
+    ratio: float
+    force: float
+    accelerance: Mapping[Side, ComplexArray]
+    more: Mapping[int, Mapping[Side, ComplexArray]]
+    peaks: Mapping[Side, tuple[CurvePeak, ...]]
+    answer: Answer
     seconds: float
+    way: Way = ""
     tops: Mapping[tuple[Side, int], Top] = field(default_factory=dict)
     checked: tuple[TimeCheck, ...] = ()
     folds: tuple[Fold, ...] = ()
+
+    @property
+    def case(self) -> Case:
+        """What its numbers and arrays belong to."""
+        choice = f"sweep {self.way}" if self.way else ""
+        return Case(stiffness=self.stiffness, force_ratio=self.ratio, choice=choice)
+
+    @property
+    def frequency(self) -> Array:
+        """(n,) Hz along the curve."""
+        return self.answer.frequency
+
+    @property
+    def empty(self) -> bool:
+        """Whether not one point was found."""
+        return not len(self.frequency)
+
+    @property
+    def stopped(self) -> str:
+        """Why peaks may be missing: how far a curve that ended early came; "" of a whole one."""
+        name = self.case.choice or "path"
+        if self.answer.status in ("stopped", "step limit"):
+            if self.empty:
+                return f"the {name} found no point"
+            last = self.frequency[-1] if self.way else self.frequency.max()
+            return f"the {name} stopped at {last:.4g} Hz"
+        missed = ", ".join(f"{f:.4g}" for f in getattr(self.answer, "missed", ()))
+        return f"the {name} has no motion at {missed} Hz" if missed else ""
 
     def stayed(self, side: Side, number: int) -> TimeCheck | None:
         """The highest motion that stays, where the top of a peak leaves; None where it stays."""
@@ -237,21 +242,17 @@ class ForcedCurve(FrictionCurve):
         return (top.frequency, top.height) if top is not None else None
 
     @property
-    def frequency(self) -> Array:
-        """(n,) Hz along the path."""
-        return self.answer.frequency
-
-    @property
-    def stopped(self) -> bool:
-        """Whether the path ended before the end of the sweep."""
-        return not self.answer.arrived
-
-    @property
     def rising(self) -> NDArray[np.bool_]:
         """(n,) whether the frequency rises along the path: between two folds, where it falls, the
         motion is unstable.
         """
         return rising(self.frequency)
+
+
+#: a curve of contact points, and of whole faces, by harmonic balance; a sweep
+PointCurve = Curve[FrequencyResponse]
+FacesCurve = Curve[InterfaceResponse]
+SweptCurve = Curve[SteppedSine]
 
 
 def rising(frequency: Array) -> NDArray[np.bool_]:
@@ -295,88 +296,3 @@ class WholeFaces:
     march: InterfaceModel
     start: InterfaceState
     state: StaticState
-
-
-@dataclass(frozen=True)
-class FacesCurve(FrictionCurve):
-    """One curve of whole faces by harmonic balance, from the static state at rising frequency.
-
-    Attributes
-    ----------
-    answer
-        The motions along the curve.
-    """
-
-    answer: InterfaceResponse
-    folds: ClassVar[tuple[Fold, ...]] = ()
-
-    @property
-    def seconds(self) -> float:
-        """It took."""
-        return self.answer.seconds
-
-    @property
-    def frequency(self) -> Array:
-        """(k,) Hz along the curve."""
-        return self.answer.frequency
-
-    @property
-    def stopped(self) -> bool:
-        """Whether motions are missing at frequencies asked for."""
-        return not self.answer.arrived or bool(self.answer.missed)
-
-    @property
-    def where(self) -> str:
-        """How far it came, in words."""
-        if self.empty or not self.answer.arrived:
-            return super().where
-        at = ", ".join(f"{f:.4g}" for f in self.answer.missed)
-        return f"the path has no motion at {at} Hz"
-
-
-#: ways along which a curve is swept
-Way = Literal["up", "down"]
-
-
-@dataclass(frozen=True)
-class SweptCurve(FrictionCurve):
-    """Steady motions by time integration, at one frequency after the other.
-
-    Attributes
-    ----------
-    way
-        Rising or falling frequency.
-    found
-        The motions in their order.
-    """
-
-    way: Way
-    found: SteppedSine
-    folds: ClassVar[tuple[Fold, ...]] = ()
-
-    @property
-    def case(self) -> Case:
-        """What its numbers and arrays belong to."""
-        choice = f"sweep {self.way}"
-        return Case(stiffness=self.stiffness, force_ratio=self.ratio, choice=choice)
-
-    @property
-    def frequency(self) -> Array:
-        """(k,) Hz in the order of the sweep."""
-        return self.found.frequency
-
-    @property
-    def seconds(self) -> float:
-        """It took."""
-        return float(self.found.seconds.sum())
-
-    @property
-    def stopped(self) -> bool:
-        """Whether the sweep ended before its last frequency."""
-        return self.found.status == "stopped"
-
-    @property
-    def where(self) -> str:
-        """How far a sweep that stopped came, in words."""
-        at = f"at {self.frequency[-1]:.4g} Hz" if len(self.frequency) else "at its first frequency"
-        return f"the sweep {self.way} stopped {at}"

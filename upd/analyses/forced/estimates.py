@@ -19,11 +19,11 @@ from dataclasses import replace
 
 from upd.analyses.forced.curves import TimeCheck
 from upd.analyses.forced.levels import HARMONICS, MESH, MODES, POINTS, SAMPLES, TIME
+from upd.analyses.forced.linear_limits import limit_peaks
 from upd.analyses.forced.peaks_again import (
     STUCK_MODE,
     PeaksAgain,
     Place,
-    limit_peaks,
     stuck_places,
 )
 from upd.analyses.forced.solution import ForcedSolution
@@ -85,10 +85,10 @@ def _own(
     """Place, case, frequency and height of every peak that levels are compared with, and what time
     integration makes of it.
     """
-    peaks = solution.searched[name]
+    limits = solution.plan, solution.models[name], solution.linear[name]
     for kind in ("free", "stuck"):
         for side in SIDES:
-            for peak in limit_peaks(peaks, kind, side):
+            for peak in limit_peaks(*limits, kind, side):
                 case = Case(stiffness=name, kind=kind, mode=peak.mode)
                 yield (kind, side, peak.number), case, (peak.frequency, peak.height), None
     for curve in (c for c in solution.curves if c.stiffness == name):

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.forced.curves import ForcedCurve
+from upd.analyses.forced.curves import PointCurve
 from upd.analyses.forced.linear_sensitivity import limit_peak, stuck_frequencies
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.mode_peaks import CANDIDATES, unmoved
@@ -148,7 +148,7 @@ def _named(
 
 def _of_curve(
     solution: ForcedSolution,
-    curve: ForcedCurve,
+    curve: PointCurve,
     data: Sequence[DataChange],
     free: Mapping[Side, PeakChange],
     numbers: Sequence[Result],
@@ -178,7 +178,7 @@ def _of_curve(
 
 def _at_top(
     solution: ForcedSolution,
-    curve: ForcedCurve,
+    curve: PointCurve,
     data: Sequence[DataChange],
     side: Side,
     peak: CurvePeak,

@@ -14,21 +14,20 @@ from functools import partial
 
 import numpy as np
 
-from upd.analyses.forced.curves import Top
 from upd.analyses.forced.model import Model, preloaded
+from upd.analyses.forced.other_points import nearer
 from upd.analyses.forced.paths import balance_of
 from upd.analyses.forced.peaks_again import (
     NOT_FOUND,
     FoundPeaks,
     PeaksAgain,
-    RunPeak,
     Variant,
     found_again,
-    moved,
 )
 from upd.analyses.forced.statics import StaticState, state_of_ratio
 from upd.errors import InputError, one_line
 from upd.linalg.parallel import threads_for
+from upd.results import Case
 from upd.scene.forced_contact import SIDES, Side
 from upd.vary.variation import Variation
 
@@ -53,7 +52,7 @@ class InputEffect:
     ----------
     name, label
         Of the input; its value.
-    number, mode
+    case, number
         Of the right blade's peak.
     frequency, height
         Relative changes.
@@ -61,8 +60,8 @@ class InputEffect:
 
     name: str
     label: str
+    case: Case
     number: int
-    mode: str
     frequency: float
     height: float
 
@@ -79,7 +78,7 @@ def _stiffness(side: Side | None, of: str, peaks: FoundPeaks) -> Iterator[Change
 
 def _patch(peaks: FoundPeaks) -> Iterator[Changed]:
     """The same stiffness and forces on the middle of each face."""
-    made = moved(peaks.model, _PATCH)
+    made = nearer(peaks.model, _PATCH)
     if made is None or made.state is None:
         return
     try:
@@ -170,55 +169,31 @@ def effects_of(few: FoundPeaks, found: PeaksAgain) -> list[InputEffect]:
     found
         The peaks with that end.
     """
-    (curve,) = few.curves
     out = []
-    for peak in curve.peaks["right"]:
-        again = found.peaks.get((curve.ratio, "right", peak.number), NOT_FOUND)
-        out.append(
-            InputEffect(
-                found.of.source,
-                found.of.label,
-                peak.number,
-                peak.mode,
-                again.frequency / peak.frequency - 1.0,
-                again.height / peak.height - 1.0,
-            )
-        )
+    for one in few.peaks:
+        again = found.peaks.get((one.ratio, one.blade, one.number), NOT_FOUND)
+        change = (new / old - 1.0 for new, old in zip(again, one.top[:2], strict=True))
+        case = replace(one.case, mode=one.mode)
+        out.append(InputEffect(found.of.source, found.of.label, case, one.number, *change))
     return out
 
 
 def few_harmonics(peaks: FoundPeaks) -> FoundPeaks | None:
-    """The curve with the lowest F_C/F_E and its right blade's peaks, with few harmonics; None
+    """The right blade's peaks of the curve with the lowest F_C/F_E, with few harmonics; None
     without peaks.
     """
-    curve = min(peaks.curves, key=lambda c: c.ratio, default=None)
-    if curve is None:
-        return None
-    old, model = curve.answer.balance, peaks.model
-    numbers = range(min(max(FEW_HARMONICS, *model.excitation.harmonics), old.harmonics.highest) + 1)
-    b = balance_of(peaks.plan, model, curve.force, numbers)
-    tops: dict[tuple[Side, int], Top] = {}
-    with threads_for(len(model.M)):
-        for (side, number), top in curve.tops.items():
-            if side == "right":
-                x, one = b.embedded(top.x, old), RunPeak(curve, side, number, top)
-                found = found_again(peaks, model, one, b, x, any_height=True)
-                if math.isfinite(found.height):
-                    tops[side, number] = top._replace(
-                        frequency=found.frequency, height=found.height, x=x
-                    )
-    right = tuple(
-        peak._replace(
-            frequency=tops["right", peak.number].frequency, height=tops["right", peak.number].height
-        )
-        for peak in curve.peaks["right"]
-        if ("right", peak.number) in tops
-    )
-    curve = replace(
-        curve,
-        answer=replace(curve.answer, balance=b),
-        peaks={"left": (), "right": right},
-        tops=tops,
-        checked=(),
-    )
-    return replace(peaks, curves=(curve,)).bare if tops else None
+    lowest = min((one.ratio for one in peaks.peaks), default=math.nan)
+    model, out = peaks.model, []
+    for one in peaks.peaks:
+        if one.ratio != lowest or one.blade != "right":
+            continue
+        old, top = one.balance, one.top
+        most = min(max(FEW_HARMONICS, *model.excitation.harmonics), old.harmonics.highest)
+        with threads_for(len(model.M)):
+            b = balance_of(peaks.plan, model, one.force, range(most + 1))
+            x = b.embedded(top.x, old)
+            found = found_again(peaks, model, one, b, x, any_height=True)
+        if math.isfinite(found.height):
+            top = top._replace(frequency=found.frequency, height=found.height, x=x)
+            out.append(one._replace(balance=b, top=top, check=None, other=None))
+    return peaks._replace(peaks=tuple(out)) if out else None

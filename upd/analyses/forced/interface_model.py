@@ -1,4 +1,10 @@
-"""The rig as blades in modes and contact by whole faces, for `upd.hbm.faces.march`."""
+"""Both faces of the damper node by node: the equations, and where they begin.
+
+The rig as blades in modes and contact by whole faces, for `upd.hbm.faces.march`. No springs: the
+blades' and the damper's own elasticity, Signorini's and Coulomb's conditions on every matching
+node. Where the faces of the damper and the platforms come from, and which static state they are in,
+decides the answer as much as friction does.
+"""
 
 from __future__ import annotations
 
@@ -11,20 +17,124 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import Plan
+from upd.analyses.forced.curves import WholeFaces
+from upd.analyses.forced.excitation import excitation_of
+from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.spring_march import SEEN
+from upd.analyses.forced.statics import GIVEN, SEATED, StaticState
 from upd.analyses.seated.bodies import Blade, Bodies
-from upd.analyses.seated.interface import Interface
+from upd.analyses.seated.interface import Interface, make_interface
 from upd.analyses.seated.lattice import lattice, patch_frame
 from upd.contact import CoupledContact
 from upd.contact.coulomb import Coulomb
-from upd.errors import InputError
+from upd.errors import ConvergenceError, InputError
 from upd.hbm.faces.state import InterfaceModel, InterfaceState, resting
 from upd.linalg import factorise, modes
 from upd.linalg.parallel import in_parallel
+from upd.progress import Stages
 from upd.scene.forced_contact import SIDES, Side
 
 Array = NDArray[np.float64]
+#: name of the contact that is no table of stiffnesses
+INTERFACE = "interface"
+#: load steps in which F_C is raised
+_STEPS = 12
 #: modes a blade: stuck frequencies are then within 0.005 % of those with 14
 MODES = 5
+
+
+def make_whole_faces(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> WholeFaces:
+    """Condense the bodies on both faces and put the damper into its static state.
+
+    Raises
+    ------
+    InputError
+        Where the static state does not exist on these faces.
+    """
+    scene = plan.scene
+    F, mu = scene.damper.centrifugal, scene.contact.friction
+    with stages("condensation", "both blades and the damper on the nodes of both faces"):
+        of = make_interface(plan, bodies)
+        made = make_interface_model(
+            plan,
+            bodies,
+            of,
+            friction=mu,
+            centrifugal=F,
+            damping=scene.excitation.damping,
+            excited=excitation_of(scene.excitation).blades,
+        )
+        # every mode is of one blade, those of the left one first
+        on = np.repeat(np.eye(len(SIDES)), len(made.frequency) // len(SIDES), axis=0)
+        made = replace(made, damping=scene.modal_damping(made.frequency, on))
+    with stages("static state", f"{_name(scene.contact.static)}, {of.n} nodes"):
+        march, start = _begin(made, of, scene.contact.worn, scene.contact.static, F, mu)
+    forces = of.copies * np.stack(
+        [start.f.reshape(3, -1)[:, of.face == k].sum(axis=1) for k in range(len(SIDES))]
+    )
+    state = StaticState(_name(scene.contact.static), forces[:, 0], forces[:, 2])
+    return WholeFaces(of, _seen(march, SEEN * scene.excitation.stop), start, state)
+
+
+def _name(static: Any) -> str:
+    return static if isinstance(static, str) else GIVEN
+
+
+def _begin(
+    model: InterfaceModel, of: Interface, worn: float, static: Any, F: float, mu: float
+) -> tuple[InterfaceModel, InterfaceState]:
+    """The model with its gap, and the damper at rest under F_C."""
+    if static in (SEATED, "frictionless"):
+        gap = worn * of.worn_gap(F) if worn else np.zeros(of.n)
+        loads = F * np.arange(1, _STEPS + 1) / _STEPS if static == SEATED else np.array([F])
+        try:
+            found = of.seat(mu if static == SEATED else 0.0, loads, gap=gap)
+        except ConvergenceError as error:
+            raise InputError(
+                f'contact.static: "{static}" was not solved on these faces ({error}); to fix it: '
+                "take another static state or contact.fit"
+            ) from error
+        model = replace(model, gap=gap)
+        if static == SEATED:
+            return model, seated_start(model, found)
+        # without friction nothing keeps account of what slipped: it sticks from where it lies
+        last = found.history
+        w = of.columns @ last.motion - of.compliance @ last.force.T.ravel()
+        slip = w.reshape(3, -1)[1:].T
+        return model, resting(model, last.force, slip, last.gap, last.motion)
+    if worn < 1.0:
+        raise InputError(
+            f"contact.static: {_name(static)!r} is a state of faces worn in; to fix it: "
+            'contact.fit = "worn", or contact.static = "seated" or "frictionless"'
+        )
+    named = {"opposing": mu, "reversed": -mu}
+    ratio = named[static] if isinstance(static, str) else _both(static)
+    return worn_start(model, of, F, ratio)
+
+
+def _both(static: Any) -> float:
+    """T/N that both faces share."""
+    left, right = (static[side] for side in SIDES)
+    if not isinstance(left, float) or left != right:
+        raise InputError(
+            "contact.static: worn faces node by node take one T/N for both; to fix it: give the "
+            'same ratio to left and right, or contact.static = "seated"'
+        )
+    return left
+
+
+def _seen(model: InterfaceModel, below: float) -> InterfaceModel:
+    """The model with the tips and the coordinates of its modes below a frequency as outputs."""
+    low = np.flatnonzero(model.frequency < below)
+    rows = np.eye(len(model.frequency))[low]
+    tips = len(SIDES)
+    n, places = 3 * model.n, model.places.shape[1]
+    return replace(
+        model,
+        seen_modes=np.vstack([model.seen_modes[:tips], rows]),
+        seen_contact=np.vstack([model.seen_contact[:tips], np.zeros((len(low), n))]),
+        seen_drive=np.vstack([model.seen_drive[:tips], np.zeros((len(low), places))]),
+    )
 
 
 def make_interface_model(

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from upd.analyses.base import Resolved
 from upd.analyses.forced.blade_parts import MIRROR_SIGNS
+from upd.analyses.forced.linear_limits import stuck_frequency
 from upd.analyses.forced.measures import StuckMode, tell_modes
 from upd.analyses.forced.model import Array, Model, make_model
 from upd.analyses.forced.peaks_again import (
@@ -21,7 +22,6 @@ from upd.analyses.forced.peaks_again import (
     FoundPeaks,
     PeaksAgain,
     Variant,
-    stuck_frequency,
 )
 from upd.analyses.forced.plan import ALONG, ELASTIC, ForcedPlan
 from upd.analyses.forced.solution import ForcedSolution
@@ -56,12 +56,10 @@ def along_variant(
 
 def highest_slipping(few: FoundPeaks) -> FoundPeaks | None:
     """The highest peak on which a point slips alone; None without one."""
-    (curve,) = few.curves
-    tops = {at: top for at, top in curve.tops.items() if top.slips}
-    if not tops:
+    slipping = [one for one in few.peaks if one.top.slips]
+    if not slipping:
         return None
-    at = max(tops, key=lambda one: tops[one].height)
-    return replace(few, curves=(replace(curve, tops={at: tops[at]}),))
+    return few._replace(peaks=(max(slipping, key=lambda one: one.top.height),))
 
 
 def along_changes(few: FoundPeaks, found: PeaksAgain) -> list[Resolved]:
@@ -74,13 +72,11 @@ def along_changes(few: FoundPeaks, found: PeaksAgain) -> list[Resolved]:
     found
         The peak with `along_variant`.
     """
-    (curve,) = few.curves
-    (((side, number), top),) = curve.tops.items()
-    again = found.peaks.get((curve.ratio, side, number), NOT_FOUND)
-    mode = next(one.mode for one in curve.peaks[side] if one.number == number)
-    case, remedy = replace(curve.case, mode=mode), 'set contact.directions = "two"'
+    (one,) = few.peaks
+    top, again = one.top, found.peaks.get((one.ratio, one.blade, one.number), NOT_FOUND)
+    case, remedy = replace(one.case, mode=one.mode), 'set contact.directions = "two"'
     return [
-        Resolved(ALONG, f"peak_{number}_{kind}", case, before, after, unit, remedy)
+        Resolved(ALONG, f"peak_{one.number}_{kind}", case, before, after, unit, remedy)
         for kind, unit, before, after in (
             ("accelerance", "(m/s2)/N", top.height, again.height),
             ("frequency", "Hz", top.frequency, again.frequency),

@@ -139,7 +139,7 @@ def other_levels(plan: ForcedPlan, base: Model, bodies: Bodies, laws: Laws) -> l
         fewer = replace(scene.reduction, modes=count // 2)
         of = Variation(MODES, f"{count // 2} modes a blade", size=count / (count // 2))
         wanted.append((of, replace(scene, reduction=fewer)))
-    for label, size, contact in _contact_levels(scene.contact, laws):
+    for label, size, contact in _contact_levels(scene.contact):
         of = Variation(POINTS, label, size=size)
         wanted.append((of, replace(scene, contact=contact)))
     out = []
@@ -168,17 +168,16 @@ def with_gauss(contact: FrictionChoice, rows: int, columns: int) -> FrictionChoi
     return replace(contact, rule=GAUSS, rows=rows, columns=columns, share="area", **given)
 
 
-def _contact_levels(contact: FrictionChoice, laws: Laws) -> list[tuple[str, float, FrictionChoice]]:
+def _contact_levels(contact: FrictionChoice) -> list[tuple[str, float, FrictionChoice]]:
     """More Gauss points than the run has; Gauss points where it has lattice lines of whole faces.
 
-    The points of a contact law, and lines that the scene names, are a choice of the patch: they
-    have no finer level.
+    Lines that the scene names are a choice of the patch: they have no finer level.
     """
     if contact.rule == GAUSS:
         row, column = int(contact.rows), int(contact.columns)
         counts = [(math.ceil(more * row), column) for more in MORE_ROWS]
     else:
-        if lines_named(contact) or any(law.law is not None for law in laws.values()):
+        if lines_named(contact):
             return []
         row, counts = _LATTICE, [(rows, 2) for rows in _GAUSS_ROWS]
     return [

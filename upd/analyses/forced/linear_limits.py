@@ -5,7 +5,8 @@ Peaks are sought around their own modes: they do not depend on the frequencies a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -16,18 +17,24 @@ from scipy.optimize import minimize_scalar
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import LinearCurves
-from upd.analyses.forced.excitation import Excitation
+from upd.analyses.forced.excitation import Excitation, excitation_of
 from upd.analyses.forced.measures import (
-    PEAKS_ABOVE,
     Array,
-    Balanced,
     ComplexArray,
     CurvePeak,
     StuckMode,
     chosen_peaks,
 )
-from upd.analyses.forced.mode_peaks import CANDIDATES, ModeShapes, numbered, shapes_along_x
+from upd.analyses.forced.mode_peaks import (
+    CANDIDATES,
+    ModeShapes,
+    numbered,
+    shapes_along_x,
+    tell_stuck_peaks,
+    unmoved,
+)
 from upd.analyses.forced.model import Model
+from upd.analyses.forced.paths import balance_of
 from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.hbm.faces.state import InterfaceModel
 from upd.hbm.springs.balance import Balance
@@ -131,9 +138,7 @@ def _top(height: Callable[[Array], Array], low: float, high: float) -> tuple[flo
     return float(found.x), -float(found.fun)
 
 
-def linear_peaks(
-    answer: Balanced, row: Array, force: float, grid: Array, stuck: bool
-) -> list[CurvePeak]:
+def linear_peaks(b: Balance, row: Array, force: float, grid: Array, stuck: bool) -> list[CurvePeak]:
     """Peaks of the accelerance without contacts or with all points stuck.
 
     Parameters
@@ -141,7 +146,7 @@ def linear_peaks(
     row
         (n_dof,) output.
     force
-        Excitation of the answer, N.
+        Its excitation, N.
     grid
         (n,) Hz, rising: the sweep.
     stuck
@@ -153,11 +158,11 @@ def linear_peaks(
         At most the two highest within the sweep, by rising frequency; heights in (m/s2)/N.
     """
     # a mode answers where the harmonic that is read meets it
-    k = measures.read_harmonic(answer)
-    modes, width = linear_modes(answer.balance, stuck)
+    k = measures.read_harmonic(b)
+    modes, width = linear_modes(b, stuck)
 
     def height(f: NDArray[np.float64]) -> Array:
-        return np.abs(measures.linear_accelerance(answer, row, force, f, stuck))
+        return np.abs(measures.linear_accelerance(b, row, force, f, stuck))
 
     f = around_modes(modes / k, width / k, float(grid[0]), float(grid[-1]))
     return exact_peaks(height, f, grid)
@@ -192,8 +197,8 @@ def stuck_system(march: InterfaceModel) -> tuple[Array, Array, Array]:
     return np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), shapes[:m], tips
 
 
-def stuck_modes_of(march: InterfaceModel, below: float) -> ModeShapes:
-    """Stuck modes that move the tips along x, on the outputs behind the tips.
+def stuck_modes_of(march: InterfaceModel, below: float) -> tuple[list[StuckMode], ModeShapes]:
+    """Stuck modes, and those that move the tips along x on the outputs behind the tips.
 
     Parameters
     ----------
@@ -203,9 +208,9 @@ def stuck_modes_of(march: InterfaceModel, below: float) -> ModeShapes:
         Hz; modes above are left out.
     """
     frequency, shapes, tips = stuck_system(march)
-    rows = march.seen_modes[len(SIDES) :]
-    found = shapes_along_x(np.eye(len(rows)), shapes, _told(frequency, tips, below))
-    return replace(found, shape=rows @ found.shape)
+    modes, rows = measures.modes_of_tips(frequency, tips, below), march.seen_modes[len(SIDES) :]
+    found = shapes_along_x(np.eye(len(rows)), shapes, modes)
+    return modes, replace(found, shape=rows @ found.shape)
 
 
 def stuck_peaks_of(
@@ -224,23 +229,7 @@ def stuck_peaks_of(
         return []
     f = excitation.lowest * np.array([one.frequency for one in peaks])
     motion = march.linear_response(f, excitation.read, stuck=True)[:, len(SIDES) :]
-    return numbered(stuck_modes_of(march, below), peaks, motion)
-
-
-def stuck_modes_list(march: InterfaceModel, below: float) -> list[StuckMode]:
-    """Stuck modes below ``below`` Hz."""
-    frequency, _, tips = stuck_system(march)
-    return _told(frequency, tips, below)
-
-
-def _told(frequency: Array, tips: Array, below: float) -> list[StuckMode]:
-    size = np.abs(tips).max(axis=0)
-    moved = size > PEAKS_ABOVE * size.max()
-    return [
-        StuckMode(float(f), "x" if x else "y", bool(tips[0, k] * tips[1, k] > 0.0))
-        for k, (f, x) in enumerate(zip(frequency, moved, strict=True))
-        if f < below
-    ]
+    return numbered(stuck_modes_of(march, below)[1], peaks, motion)
 
 
 def _limit(
@@ -302,25 +291,28 @@ def linear_curves(
     return _limit(frequency, excitation.lowest, modes, blades, read)
 
 
-def linear_limits_of(
-    plan: ForcedPlan, model: Model, answer: measures.Balanced, force: float
-) -> LinearCurves:
-    """Free and stuck curves, peaks and modes.
+def linear_of_faces(plan: ForcedPlan, march: InterfaceModel) -> LinearCurves:
+    """Curves without the damper, and with every node closed and sticking."""
+    frequency, excitation = grid(plan), excitation_of(plan.scene.excitation)
+    free, free_peaks = linear_curves(march, frequency, excitation, stuck=False)
+    stuck, stuck_peaks = linear_curves(march, frequency, excitation, stuck=True)
+    modes, _ = stuck_modes_of(march, CANDIDATES * plan.scene.excitation.stop)
+    return LinearCurves(frequency, free, stuck, modes, free_peaks, stuck_peaks)
 
-    Parameters
-    ----------
-    answer
-        Any of the model, with ``force``: its problem counts.
-    """
-    f, k = grid(plan), measures.read_harmonic(answer)
-    modes = {stuck: linear_modes(answer.balance, stuck) for stuck in (False, True)}
+
+def linear_of(plan: ForcedPlan, model: Model) -> LinearCurves:
+    """Free and stuck curves of a model, their peaks and modes."""
+    force = plan.scene.damper.centrifugal
+    b = balance_of(plan, model, force, (0, *model.excitation.harmonics))
+    f, k = grid(plan), model.excitation.lowest
+    modes = {stuck: linear_modes(b, stuck) for stuck in (False, True)}
     # finer around every mode: a drawn curve has its tops
     for at, width in modes.values():
         f = finer(f, at / k, width / k)
 
     def curves(stuck: bool) -> tuple[dict[Side, ComplexArray], dict[Side, list[CurvePeak]]]:
         def read(side: Side, f: Array) -> ComplexArray:
-            return measures.linear_accelerance(answer, model.row(side), force, f, stuck)
+            return measures.linear_accelerance(b, model.row(side), force, f, stuck)
 
         return _limit(f, k, modes[stuck], SIDES if stuck else model.excitation.free_blades, read)
 
@@ -328,3 +320,41 @@ def linear_limits_of(
     stuck, stuck_peaks = curves(True)
     below = CANDIDATES * plan.scene.excitation.stop
     return LinearCurves(f, free, stuck, measures.stuck_modes(model, below), free_peaks, stuck_peaks)
+
+
+def stuck_frequency(modes: Iterable[StuckMode], in_phase: bool) -> float:
+    """The lowest in Hz along x, in or out of phase; nan without."""
+    found = (m.frequency for m in modes if m.axis == "x" and m.in_phase == in_phase)
+    return next(found, math.nan)
+
+
+def limit_peaks(
+    plan: ForcedPlan, model: Model, linear: LinearCurves, kind: str, side: Side
+) -> list[CurvePeak]:
+    """Numbered peaks of a limit, "free" or "stuck", by rising frequency."""
+    own = sorted(getattr(linear, f"{kind}_peaks")[side], key=lambda p: p.frequency)
+    if kind == "free":
+        return unmoved(own)
+    named = tell_stuck_peaks(model, own, plan.scene.excitation.stop)
+    return sorted(named, key=lambda p: p.frequency)
+
+
+def fine_grid(
+    plan: ForcedPlan, model: Model, force: float, frequencies: Array | None = None
+) -> Array:
+    """Frequencies of the sweep in Hz, and finer ones around stuck modes where they are too coarse
+    for these.
+
+    Parameters
+    ----------
+    plan, model
+        Of the rig.
+    force
+        F_E, N.
+    frequencies
+        (n,) Hz in place of those of the sweep.
+    """
+    k = model.excitation.lowest
+    problem = balance_of(plan, model, force, (0, *model.excitation.harmonics))
+    modes, width = linear_modes(problem, True)
+    return finer(grid(plan) if frequencies is None else frequencies, modes / k, width / k)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 
 from upd.analyses.forced.model import Model
 from upd.dynamics.peaks import find_peaks
-from upd.hbm import FrequencyResponse, Harmonics
+from upd.hbm import FrequencyResponse
 from upd.hbm.core.fourier import to_complex
 from upd.hbm.springs.balance import Balance
 from upd.mesh import IntArray
@@ -57,38 +57,14 @@ class Loop:
     energy: float
 
 
-class Balanced(Protocol):
-    """What linear answers are read from: an answer, or its problem alone."""
-
-    @property
-    def balance(self) -> Balance:
-        """The problem."""
-
-    @property
-    def harmonics(self) -> Harmonics:
-        """Its harmonics."""
-
-
-@dataclass(frozen=True)
-class Unsolved:
-    """A problem without an answer."""
-
-    balance: Balance
-
-    @property
-    def harmonics(self) -> Harmonics:
-        """Its harmonics."""
-        return self.balance.harmonics
-
-
-def read_place(answer: Balanced) -> int:
+def read_place(b: Balance) -> int:
     """Place of the lowest harmonic that is excited, among those above 0."""
-    return int(np.flatnonzero(np.any(answer.balance.dynamic != 0.0, axis=1))[0])
+    return int(np.flatnonzero(np.any(b.dynamic != 0.0, axis=1))[0])
 
 
-def read_harmonic(answer: Balanced) -> int:
+def read_harmonic(b: Balance) -> int:
     """Number of the lowest harmonic that is excited."""
-    return int(answer.harmonics.dynamic[read_place(answer)])
+    return int(b.harmonics.dynamic[read_place(b)])
 
 
 def accelerance(
@@ -112,7 +88,7 @@ def accelerance(
     ComplexArray
         (n,) along the path, (m/s2)/N.
     """
-    k = read_harmonic(answer) if harmonic is None else harmonic
+    k = read_harmonic(answer.balance) if harmonic is None else harmonic
     j = answer.harmonics.place(k)
     u = to_complex(np.einsum("i,nis->ns", row, answer.coefficients), answer.harmonics)[:, j]
     return np.asarray(-((2 * np.pi * k * answer.frequency) ** 2) * u * _M / force)
@@ -126,7 +102,7 @@ def accelerance_of(
 
 
 def linear_accelerance(
-    answer: Balanced,
+    b: Balance,
     row: Array,
     force: float,
     frequency: Array,
@@ -139,7 +115,7 @@ def linear_accelerance(
     row
         (n_dof,) output.
     force
-        Excitation of the answer, N.
+        Its excitation, N.
     frequency
         (n,) Hz.
     stuck
@@ -150,9 +126,9 @@ def linear_accelerance(
     ComplexArray
         (n,) in (m/s2)/N.
     """
-    k = read_harmonic(answer)
+    k = read_harmonic(b)
     omega = 2 * np.pi * frequency
-    moved = answer.balance.linear_displacement(omega, stuck, k) @ row
+    moved = b.linear_displacement(omega, stuck, k) @ row
     return np.asarray(-((k * omega) ** 2) * moved * _M / force)
 
 
@@ -243,8 +219,12 @@ def tell_modes(model: Model, values: Array, shapes: Array, below: float) -> list
     below
         Hz; modes above are left out.
     """
-    frequency = np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
     tips = np.array([model.row(side) @ shapes for side in SIDES])
+    return modes_of_tips(np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi), tips, below)
+
+
+def modes_of_tips(frequency: Array, tips: Array, below: float) -> list[StuckMode]:
+    """Modes (n,) below ``below`` Hz from the motion (2, n) of both tips along x."""
     # a mode across the blades does not move their probes along x: the size of a whole tip motion is
     # that of the modes below; far above, shapes of hardly any mass move more
     size = np.abs(tips).max(axis=0)
@@ -354,7 +334,7 @@ def damper_amplitude(answer: FrequencyResponse, model: Model) -> Array:
     (n, 6) in mm and rad.
     """
     q = model.damper_dofs(answer.coefficients)
-    first = answer.harmonics.offset + 2 * read_place(answer)
+    first = answer.harmonics.offset + 2 * read_place(answer.balance)
     return np.asarray(np.hypot(q[:, :, first], q[:, :, first + 1]))
 
 
@@ -375,7 +355,7 @@ def damper_motion(answer: FrequencyResponse, model: Model, i: int) -> tuple[Arra
     """
     q = model.damper_dofs(answer.coefficients[i])
     static = q[:, 0] if answer.harmonics.static else np.zeros(6)
-    return static.copy(), np.abs(to_complex(q, answer.harmonics)[:, read_place(answer)])
+    return static.copy(), np.abs(to_complex(q, answer.harmonics)[:, read_place(answer.balance)])
 
 
 def rest_error(answer: FrequencyResponse, model: Model) -> float:

@@ -179,7 +179,7 @@ def numbered(
 
 def first_harmonic(answer: FrequencyResponse, points: NDArray[np.int64]) -> ComplexArray:
     """Amplitudes (m, n_dof) of all dofs at some points of a path, lowest harmonic excited, mm."""
-    j = measures.read_place(answer)
+    j = measures.read_place(answer.balance)
     found = [to_complex(answer.coefficients[i], answer.harmonics)[:, j] for i in points]
     return np.asarray(found)
 

@@ -26,9 +26,9 @@ from upd.analyses.forced.blade_parts import (
 )
 from upd.analyses.forced.excitation import Excitation, excitation_of
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.points import FacePoints, free_points, gauss_points, lattice_points
+from upd.analyses.forced.points import FacePoints, gauss_points, lattice_points
 from upd.analyses.forced.statics import StaticState, point_preload, static_state
-from upd.analyses.forced.stiffness import FaceLaw, mirrored
+from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies
 from upd.fem import modal_damping
 from upd.hbm import Contacts, RigidDamper, contact_rows, contacts, rigid_damper
@@ -166,7 +166,7 @@ def make_model(
         The static state, with contact.fit = "loaded"; that of the scene when None.
     """
     scene = plan.scene
-    whole = {side: _face(scene, bodies, side, laws[side]) for side in SIDES}
+    whole = {side: _face(scene, bodies, side) for side in SIDES}
     small, pairs = _reduced_blades(plan, bodies, whole)
     half = pairs is not None or bodies.half
     faces = {side: pairs[side].face(whole[side]) for side in SIDES} if pairs else whole
@@ -284,7 +284,10 @@ def _stiffnesses(
     pairs: Mapping[Side, MirrorPairs] | None,
 ) -> list[Array]:
     """k_n and k_t of all points, of pairs together."""
-    sized = {side: _points(faces[side], laws[side]) for side in SIDES}
+    sized = {
+        side: (laws[side].K_N * faces[side].weight, laws[side].K_T * faces[side].weight)
+        for side in SIDES
+    }
     if pairs is not None:
         sized = {s: (pairs[s].total(k_n), pairs[s].total(k_t)) for s, (k_n, k_t) in sized.items()}
     return [np.concatenate([sized[side][j] for side in SIDES]) for j in range(2)]
@@ -335,27 +338,12 @@ def _along_change(
     return float(np.abs(found[1] / found[0] - 1.0).max())
 
 
-def _face(scene: ForcedScene, bodies: Bodies, side: Side, law: FaceLaw) -> FacePoints:
+def _face(scene: ForcedScene, bodies: Bodies, side: Side) -> FacePoints:
     mesh = bodies.blades[side].mesh
-    if law.law is not None:
-        # The law's origin is the middle of its patch, on the right platform; x along the damper, z
-        # into it.
-        patch = lattice_points(bodies.blades["right"].mesh, "all", "all", "right")
-        normal, along, up = patch.frame
-        placed = law.law.placed(patch.weight @ patch.position, np.array([-along, up, -normal]))
-        placed = placed if side == "right" else mirrored(placed)
-        return free_points(mesh, placed.position, placed.k_n, side)
     lines = scene.contact.lines(side)
     if scene.contact.rule == GAUSS:
         return gauss_points(mesh, *lines, side)
     return lattice_points(mesh, *lines, side, scene.contact.share == "equal")
-
-
-def _points(face: FacePoints, law: FaceLaw) -> tuple[Array, Array]:
-    """k_n and k_t (m,) of the points; one k_t for both directions: the mean of a law's two."""
-    if law.law is not None:
-        return law.law.k_n, law.law.k_t.mean(axis=1)
-    return law.K_N * face.weight, law.K_T * face.weight
 
 
 def _reduced(plan: ForcedPlan, bodies: Bodies, side: Side, face: FacePoints) -> BladePart:

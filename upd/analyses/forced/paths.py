@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.forced.linear_limits import finer, linear_modes
 from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.plan import ForcedPlan, grid
+from upd.analyses.forced.plan import ForcedPlan
 from upd.hbm import FrequencyResponse, Settings, frequency_response, harmonics
 from upd.hbm.springs.assembled import assembled
 from upd.hbm.springs.balance import Balance
@@ -28,27 +27,6 @@ LEAST_POINTS, MOST_POINTS = 1800, 4
 #: steps of a path whose tops are climbed to afterwards: half the points of the usual ones, and tops
 #: between them that differ by 0.2 % in height
 LONG_STEPS = Settings(angle=0.7, kink_step=0.1, wanted_iterations=8)
-
-
-def fine_grid(
-    plan: ForcedPlan, model: Model, force: float, frequencies: Array | None = None
-) -> Array:
-    """Frequencies of the sweep in Hz, and finer ones around stuck modes where they are too coarse
-    for these.
-
-    Parameters
-    ----------
-    plan, model
-        Of the rig.
-    force
-        F_E, N.
-    frequencies
-        (n,) Hz in place of those of the sweep.
-    """
-    k = model.excitation.lowest
-    problem = balance_of(plan, model, force, (0, *model.excitation.harmonics))
-    modes, width = linear_modes(problem, True)
-    return finer(grid(plan) if frequencies is None else frequencies, modes / k, width / k)
 
 
 def path_settings(points: int) -> Settings:
@@ -129,27 +107,6 @@ def balance_of(
         slider=slider,
     )
     return problem(harmonics(numbers))
-
-
-def balance_like(
-    plan: ForcedPlan,
-    model: Model,
-    force: float,
-    old: Balance,
-    numbers: Sequence[int],
-    samples: int | None,
-) -> Balance:
-    """The run's own problem with other harmonics or samples.
-
-    Parameters
-    ----------
-    old
-        The problem of the run, from whose static state sliders start where the scene asks for it.
-    force, numbers, samples
-        As of `balance_of`.
-    """
-    b = balance_of(plan, model, force, numbers, samples)
-    return b.with_sliders("static", old.slider) if old.start == "static" else b
 
 
 @contextmanager

@@ -21,18 +21,20 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import (
     AT_TOP,
+    Curve,
     Fold,
-    ForcedCurve,
     LinearCurves,
+    PointCurve,
     TimeCheck,
     Top,
     rising,
 )
 from upd.analyses.forced.interface_model import by_coulomb
+from upd.analyses.forced.linear_limits import fine_grid
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.mode_peaks import numbered_peaks
 from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.paths import fine_grid, respond
+from upd.analyses.forced.paths import respond
 from upd.analyses.forced.plan import ForcedPlan, time_steps
 from upd.analyses.forced.spring_march import SpringMarch, make_springs, state_at
 from upd.errors import ConvergenceError, one_line
@@ -65,7 +67,7 @@ _MOST_BISECTIONS = 8
 
 def solve_curve(
     plan: ForcedPlan, model: Model, linear: LinearCurves, name: str, ratio: float
-) -> ForcedCurve:
+) -> PointCurve:
     """One curve with its peaks, each confirmed where a point slips or opens.
 
     Parameters
@@ -82,7 +84,7 @@ def solve_curve(
         for k in model.excitation.harmonics
     }
     read = H.pop(model.excitation.lowest)
-    curve = ForcedCurve(name, ratio, force, read, H, {}, answer, time.perf_counter() - begin)
+    curve = Curve(name, ratio, force, read, H, {}, answer, time.perf_counter() - begin)
     if curve.empty:
         return curve
     curve = with_tops(plan, model, linear, curve)
@@ -94,8 +96,8 @@ def solve_curve(
 
 
 def with_tops(
-    plan: ForcedPlan, model: Model, linear: LinearCurves, curve: ForcedCurve
-) -> ForcedCurve:
+    plan: ForcedPlan, model: Model, linear: LinearCurves, curve: PointCurve
+) -> PointCurve:
     """The curve with its peaks between the points of the path."""
     stop, answer = plan.scene.excitation.stop, curve.answer
     peaks: dict[Side, tuple[CurvePeak, ...]] = {}
@@ -112,7 +114,7 @@ def with_tops(
     return replace(curve, peaks=peaks, tops=tops)
 
 
-def _crowded(curve: ForcedCurve, size: Array, peak: CurvePeak) -> bool:
+def _crowded(curve: PointCurve, size: Array, peak: CurvePeak) -> bool:
     """Whether the path has more maxima about a peak that are nearly as high."""
     f = curve.frequency
     maxima = measures.path_maxima(f, size)
@@ -125,7 +127,7 @@ def _crowded(curve: ForcedCurve, size: Array, peak: CurvePeak) -> bool:
 
 
 def _top(
-    model: Model, linear: LinearCurves, curve: ForcedCurve, side: Side, peak: CurvePeak
+    model: Model, linear: LinearCurves, curve: PointCurve, side: Side, peak: CurvePeak
 ) -> Top | None:
     a, i = curve.answer, peak.sample
     if a.linear[max(i - 1, 0) : i + 2].all():
@@ -172,7 +174,7 @@ def climbed(
 # -- folds -----------------------------------------------------------------------------------------
 
 
-def _folds(curve: ForcedCurve) -> Iterator[Fold]:
+def _folds(curve: PointCurve) -> Iterator[Fold]:
     """Where the path turns back, with the height that a slow sweep jumps to."""
     f, size = curve.frequency, np.abs(curve.accelerance["right"])
     up = rising(f)
@@ -202,8 +204,8 @@ def _folds(curve: ForcedCurve) -> Iterator[Fold]:
 
 
 def confirmed(
-    plan: ForcedPlan, model: Model, curve: ForcedCurve, like: TimeCheck | None = None
-) -> ForcedCurve:
+    plan: ForcedPlan, model: Model, curve: PointCurve, like: TimeCheck | None = None
+) -> PointCurve:
     """The curve with its peaks where a point slips or opens as time integration confirms them.
 
     Parameters
@@ -237,7 +239,7 @@ def confirmed(
 
 def _confirmed(
     integrate: Callable[[Array, float], Array | None],
-    curve: ForcedCurve,
+    curve: PointCurve,
     side: Side,
     peak: CurvePeak,
     top: Top,
@@ -308,7 +310,7 @@ def _confirmed(
     return replace(best, starts=starts)
 
 
-def _downhill(curve: ForcedCurve, size: Array, top: int) -> list[list[int]]:
+def _downhill(curve: PointCurve, size: Array, top: int) -> list[list[int]]:
     """Points of the path from a top down to half its power on either side, the side first on which
     the frequency rises along the path.
     """
@@ -323,7 +325,7 @@ def _downhill(curve: ForcedCurve, size: Array, top: int) -> list[list[int]]:
 
 
 def _stays(
-    springs: SpringMarch, model: Model, curve: ForcedCurve, steps: int, x: Array, f: float
+    springs: SpringMarch, model: Model, curve: PointCurve, steps: int, x: Array, f: float
 ) -> Array | None:
     """Heights (2, 2) of the blades by harmonic balance and by time integration that starts there,
     (m/s2)/N; None where the integration leaves.

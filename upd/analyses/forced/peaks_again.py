@@ -10,24 +10,24 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import ForcedCurve, LinearCurves, TimeCheck, Top
-from upd.analyses.forced.linear_limits import linear_limits_of
-from upd.analyses.forced.measures import CurvePeak, StuckMode, Unsolved, stuck_modes
-from upd.analyses.forced.mode_peaks import CANDIDATES, numbered_peaks, tell_stuck_peaks, unmoved
+from upd.analyses.forced.curves import Curve, LinearCurves, PointCurve, TimeCheck, Top
+from upd.analyses.forced.linear_limits import limit_peaks, linear_of, stuck_frequency
+from upd.analyses.forced.measures import CurvePeak, StuckMode, stuck_modes
+from upd.analyses.forced.mode_peaks import CANDIDATES, numbered_peaks
 from upd.analyses.forced.model import Array, Model
+from upd.analyses.forced.other_points import carried, moved_points
 from upd.analyses.forced.paths import (
     BAND,
     BAND_POINTS,
     LONG_STEPS,
     SWEEP_POINTS,
-    balance_like,
     balance_of,
     respond,
 )
@@ -40,6 +40,7 @@ from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.peak import FIRST_REACH, is_near
 from upd.hbm.springs.starts import newton
 from upd.linalg.parallel import threads_for
+from upd.results import Case
 from upd.scene.forced_contact import SIDES, Side
 from upd.vary.variation import Variation
 
@@ -65,50 +66,78 @@ class Found(NamedTuple):
 NOT_FOUND = Found(math.nan, math.nan)
 
 
-@dataclass(frozen=True)
-class FoundPeaks:
-    """What is looked for again, by one contact stiffness.
+class RunPeak(NamedTuple):
+    """The peak of a mode on a curve of the run with friction.
 
     Attributes
     ----------
-    plan, model
-        Of the run.
-    linear
-        Its linear limits.
-    curves
-        With their peaks and tops.
+    case, force
+        Of the curve; F_E, N.
+    balance
+        Its problem.
+    blade, number, mode
+        The right blade where that has one.
+    top
+        By harmonic balance.
+    check
+        The highest motion that stays, where the top leaves; None where it stays.
+    own, other
+        What levels are compared with, of this blade and of the other one; None without.
     """
+
+    case: Case
+    force: float
+    balance: Balance
+    blade: Side
+    number: int
+    mode: str
+    top: Top
+    check: TimeCheck | None = None
+    own: Found = NOT_FOUND
+    other: Found | None = None
+
+    @property
+    def ratio(self) -> float:
+        """F_C/F_E."""
+        return float(self.case.force_ratio or 0.0)
+
+    def places(self, again: Found) -> dict[Place, Found]:
+        """The peak found again, and the other blade's of the same mode: it changes alike."""
+        out: dict[Place, Found] = {(self.ratio, self.blade, self.number): again}
+        if self.other is not None:
+            f, height = again.frequency / self.own[0], again.height / self.own[1]
+            other: Side = "left" if self.blade == "right" else "right"
+            out[self.ratio, other, self.number] = Found(f * self.other[0], height * self.other[1])
+        return out
+
+
+class FoundPeaks(NamedTuple):
+    """What is looked for again: model, linear limits and peaks of one contact stiffness."""
 
     plan: ForcedPlan
     model: Model
     linear: LinearCurves
-    curves: tuple[ForcedCurve, ...]
-
-    @property
-    def bare(self) -> FoundPeaks:
-        """Without what is not needed of the curves: less to send."""
-        return replace(self, curves=tuple(_bare(one) for one in self.curves))
+    peaks: tuple[RunPeak, ...]
 
 
-def _bare(curve: ForcedCurve) -> ForcedCurve:
-    a = curve.answer
-    nothing = {name: getattr(a, name)[:0] for name in _ALONG}
-    return replace(curve, answer=replace(a, **nothing), accelerance={}, more={})
-
-
-_ALONG = (
-    "frequency",
-    "x",
-    "contact_displacement",
-    "contact_force",
-    "state",
-    "energy",
-    "linear",
-    "truncation",
-    "aliasing",
-    "periodic",
-    "highest_harmonic",
-)
+def run_peaks(curve: PointCurve) -> Iterator[RunPeak]:
+    """The peak of every mode once, of the right blade where that has one."""
+    for number in dict.fromkeys(number for _, number in curve.tops):
+        side: Side = "right" if ("right", number) in curve.tops else "left"
+        mode = next(p.mode for p in curve.peaks[side] if p.number == number)
+        own, other = (curve.compared(s, number) for s in (side, *(o for o in SIDES if o != side)))
+        yield RunPeak(
+            curve.case,
+            curve.force,
+            curve.answer.balance,
+            side,
+            number,
+            mode,
+            curve.tops[side, number],
+            curve.stayed(side, number),
+            NOT_FOUND if own is None else Found(*own),
+            None if own is None or other is None else Found(*other),
+        )
 
 
 class Variant(NamedTuple):
@@ -161,15 +190,6 @@ class PeaksAgain(NamedTuple):
     why: str = ""
 
 
-class RunPeak(NamedTuple):
-    """A peak of a curve of the run with friction: its blade, the number of its mode, its top."""
-
-    curve: ForcedCurve
-    blade: Side
-    number: int
-    top: Top
-
-
 def solve_again(peaks: FoundPeaks, variant: Variant) -> PeaksAgain:
     """The peaks of the run with one thing changed; a fault becomes its reason."""
     of, model, why = variant.of, variant.model, variant.why
@@ -194,58 +214,25 @@ def solve_again(peaks: FoundPeaks, variant: Variant) -> PeaksAgain:
         except UpdError as error:
             return nothing._replace(why=one_line(error))
         move = None if model is None else moved_points(peaks.model, model)
-        for curve in peaks.curves:
-            for one in _first_blades(curve):
-                try:
-                    if model is None:
-                        again = _other_balance(peaks, variant, one)
-                    elif one.top.slips or variant.any_height:
-                        ratio = expected(peaks.linear, modes, free, one)
-                        again = peak_on(peaks, model, linear, one, move, ratio, variant.any_height)
-                    else:
-                        again = found.get(("stuck", one.blade, one.number), NOT_FOUND)
-                except UpdError as error:
-                    why = one_line(error)
-                    log.info("%s, %s, %s: %s", of.source, of.label, curve.case, why)
-                    again = NOT_FOUND
-                if again is not None:
-                    found |= _both_blades(one, again)
+        for one in peaks.peaks:
+            try:
+                if model is None:
+                    again = _other_balance(peaks, variant, one)
+                elif one.top.slips or variant.any_height:
+                    ratio = expected(peaks.linear, modes, free, one)
+                    again = peak_on(peaks, model, linear, one, move, ratio, variant.any_height)
+                else:
+                    again = found.get(("stuck", one.blade, one.number), NOT_FOUND)
+            except UpdError as error:
+                why = one_line(error)
+                log.info("%s, %s, %s: %s", of.source, of.label, one.case, why)
+                again = NOT_FOUND
+            if again is not None:
+                found |= one.places(again)
     return PeaksAgain(of, found, time.perf_counter() - begin, why)
 
 
-def _first_blades(curve: ForcedCurve) -> Iterator[RunPeak]:
-    """Every mode's peak once, of the right blade where that has one."""
-    for number in dict.fromkeys(number for _, number in curve.tops):
-        side: Side = "right" if ("right", number) in curve.tops else "left"
-        yield RunPeak(curve, side, number, curve.tops[side, number])
-
-
-def _both_blades(one: RunPeak, again: Found) -> dict[Place, Found]:
-    """A peak, and the other blade's of the same mode: it changes alike."""
-    ratio, number = one.curve.ratio, one.number
-    out: dict[Place, Found] = {(ratio, one.blade, number): again}
-    other: Side = "left" if one.blade == "right" else "right"
-    own, first = one.curve.compared(other, number), one.curve.compared(one.blade, number)
-    if own is not None and first is not None:
-        f, height = again.frequency / first[0], again.height / first[1]
-        out[ratio, other, number] = Found(f * own[0], height * own[1])
-    return out
-
-
 # -- linear limits ---------------------------------------------------------------------------------
-
-
-def linear_of(plan: ForcedPlan, model: Model) -> LinearCurves:
-    """The linear limits of a model."""
-    force = plan.scene.damper.centrifugal
-    problem = balance_of(plan, model, force, (0, *model.excitation.harmonics))
-    return linear_limits_of(plan, model, Unsolved(problem), force)
-
-
-def stuck_frequency(modes: Iterable[StuckMode], in_phase: bool) -> float:
-    """The lowest in Hz along x, in or out of phase; nan without."""
-    found = (m.frequency for m in modes if m.axis == "x" and m.in_phase == in_phase)
-    return next(found, math.nan)
 
 
 def _free(linear: LinearCurves) -> float:
@@ -262,22 +249,13 @@ def stuck_places(modes: Sequence[StuckMode]) -> dict[Place, Found]:
     }
 
 
-def limit_peaks(peaks: FoundPeaks, kind: str, side: Side) -> list[CurvePeak]:
-    """Numbered peaks of a limit of the run, by rising frequency."""
-    own = sorted(getattr(peaks.linear, f"{kind}_peaks")[side], key=lambda p: p.frequency)
-    if kind == "free":
-        return unmoved(own)
-    named = tell_stuck_peaks(peaks.model, own, peaks.plan.scene.excitation.stop)
-    return sorted(named, key=lambda p: p.frequency)
-
-
 def _limits_again(peaks: FoundPeaks, linear: LinearCurves) -> Iterator[tuple[Place, Found]]:
     """Peaks of other limits by rising frequency, with the numbers they have in the run."""
     for kind in ("free", "stuck"):
         for side in SIDES:
             own = getattr(peaks.linear, f"{kind}_peaks")[side]
             other = sorted(getattr(linear, f"{kind}_peaks")[side], key=lambda p: p.frequency)
-            for one, peak in zip(limit_peaks(peaks, kind, side), other, strict=False):
+            for one, peak in zip(limit_peaks(*peaks[:3], kind, side), other, strict=False):
                 if len(own) == len(other):
                     yield (kind, side, one.number), Found(peak.frequency, peak.height)
 
@@ -311,12 +289,15 @@ def _other_balance(peaks: FoundPeaks, variant: Variant, one: RunPeak) -> Found |
     """A peak with more harmonics or samples; None where neither matters: all sticks, or the height
     is that of a time integration.
     """
-    curve, top, old = one.curve, one.top, one.curve.answer.balance
-    if not top.slips or curve.stayed(one.blade, one.number) is not None:
+    top, old = one.top, one.balance
+    if not top.slips or one.check is not None:
         return None
     numbers = range(old.harmonics.highest + variant.more + 1)
     samples = max(variant.finer * old.samples, sample_count(harmonics(numbers)))
-    b = balance_like(peaks.plan, peaks.model, curve.force, old, numbers, samples)
+    b = balance_of(peaks.plan, peaks.model, one.force, numbers, samples)
+    if old.start == "static":
+        # from the static state of the run
+        b = b.with_sliders("static", old.slider)
     return found_again(peaks, peaks.model, one, b, b.embedded(top.x, old))
 
 
@@ -343,11 +324,10 @@ def peak_on(
     any_height
         As of `Variant`.
     """
-    old, top = one.curve.answer.balance, one.top
-    check = one.curve.stayed(one.blade, one.number)
-    if check is not None:
-        return _confirmed_again(peaks.plan, model, linear, one, check, ratio)
-    b = balance_of(peaks.plan, model, one.curve.force, old.harmonics.numbers, old.samples)
+    old, top = one.balance, one.top
+    if one.check is not None:
+        return _confirmed_again(peaks.plan, model, linear, one, one.check, ratio)
+    b = balance_of(peaks.plan, model, one.force, old.harmonics.numbers, old.samples)
     same = move is None and b.contacts.tangents == old.contacts.tangents
     x = top.x if same else carried(b, old, top.x, move)
     return found_again(peaks, model, one, b, x, ratio, any_height)
@@ -367,17 +347,16 @@ def _confirmed_again(
     key = check.blade, check.number
 
     def stable(answer: FrequencyResponse) -> Iterator[CurvePeak]:
-        force = one.curve.force
-        blades = {s: measures.accelerance(answer, model.row(s), force) for s in SIDES}
-        path = replace(one.curve, answer=answer, accelerance=blades, peaks={}, tops={}, checked=())
+        blades = {s: measures.accelerance(answer, model.row(s), one.force) for s in SIDES}
+        path = Curve(one.case.stiffness, one.ratio, one.force, blades, {}, {}, answer, 0.0)
         path = with_tops(plan, model, linear, path)
         # the other blade changes alike
         tops = {at: top for at, top in path.tops.items() if at == key}
         path = confirmed(plan, model, replace(path, tops=tops), check)
         return iter(path.peaks[check.blade] if tops else ())
 
-    f, old = ratio * check.frequency, one.curve.answer.balance
-    return _on_a_path(plan, model, one, old, f, check.integrated, 2 * BAND, stable)
+    f = ratio * check.frequency
+    return _on_a_path(plan, model, one, one.balance, f, check.integrated, 2 * BAND, stable)
 
 
 def found_again(
@@ -399,7 +378,7 @@ def found_again(
     ratio, any_height
         As of `peak_on`.
     """
-    top, force = one.top, one.curve.force
+    top, force = one.top, one.force
     for factor in dict.fromkeys((ratio, 1.0)) if not top.crowded else ():
         f = factor * top.frequency
         start = newton(b, x, f)
@@ -449,7 +428,7 @@ def _on_a_path(
     ):
         given = {"harmonics": b.harmonics.numbers, "samples": b.samples, "settings": settings}
         try:
-            answer = respond(plan, model, one.curve.force, band, **given)
+            answer = respond(plan, model, one.force, band, **given)
         except ConvergenceError as error:
             log.info("band about %.6g Hz: %s", f, one_line(error))
             continue
@@ -458,126 +437,3 @@ def _on_a_path(
             if peak.number == one.number and near:
                 return Found(peak.frequency, peak.height)
     return NOT_FOUND
-
-
-# -- motions and points on other models ------------------------------------------------------------
-
-
-def moved_points(base: Model, other: Model) -> Array | None:
-    """(n, n_base) displacements of a model's points from those of the run's, on the same faces, by
-    straight lines up the slope; None where the points are the same.
-    """
-    if np.array_equal(base.position.shape, other.position.shape) and np.allclose(
-        _up(base), _up(other), atol=1e-6 * float(np.ptp(_up(base)) or 1.0)
-    ):
-        return None
-    out = np.zeros((other.contacts.n_point, base.contacts.n_point))
-    for k in range(len(SIDES)):
-        mine, new = np.flatnonzero(base.face == k), np.flatnonzero(other.face == k)
-        x, s = _up(base)[mine], _up(other)[new]
-        rows = np.unique(np.round(x, 9))
-        weight = straight(rows, s)
-        for j, row in enumerate(rows):
-            on = mine[np.isclose(x, row, atol=1e-8 * max(np.ptp(x), 1.0))]
-            # along the damper the motion hardly changes: the mean of the row's points
-            out[np.ix_(new, on)] = weight[:, j : j + 1] / len(on)
-    return out
-
-
-def _up(model: Model) -> Array:
-    """(n,) places up the slope from the middle of each face, mm."""
-    out = np.zeros(len(model.face))
-    for k, side in enumerate(SIDES):
-        on, face = model.face == k, model.faces[side]
-        local = face.position @ face.frame[2]
-        out[on] = local - face.weight @ local
-    return out
-
-
-def carried(b: Balance, old: Balance, x: Array, move: Array | None) -> Array:
-    """Unknowns of a motion on another model: the same motion of its points, and the rigid motion
-    that goes with it.
-
-    Parameters
-    ----------
-    move
-        As of `peak_on`. A model with both sliding directions does not move along the damper.
-    """
-    W, rest = old.split(x)
-    if b.contacts.tangents > old.contacts.tangents:
-        W = np.insert(W, 1, 0.0, axis=1)
-    if move is None:
-        return np.concatenate([W.ravel(), rest])
-    moved = np.einsum("pq,qdk->pdk", move, W)
-    flat = np.concatenate([moved.ravel(), np.zeros(b.rigid)])
-    if not b.rigid:
-        return flat
-    F = b.force(flat, False).force.reshape(len(b.Psi), -1)
-    rows = b.Psi[:, b.modal.rigid]
-    mean = moved.reshape(len(b.Psi), -1)[:, 0] + b.G0 @ F[:, 0] - b.u0
-    a = np.linalg.lstsq(rows, mean, rcond=None)[0]
-    return np.concatenate([moved.ravel(), a])
-
-
-def moved(model: Model, factor: float) -> Model | None:
-    """The model with its points nearer to the middle of each face, up the slope.
-
-    The motion of a point between others is theirs by straight lines: that of a face under a rigid
-    damper is nearly one. Stiffness and static forces stay with the points.
-
-    Parameters
-    ----------
-    factor
-        On the places up the slope from the middle of a face, at most 1.
-
-    Returns
-    -------
-    Model or None
-        None where the points are in one row.
-    """
-    n = model.contacts.n_point
-    at = np.zeros((n, n))
-    faces = {}
-    for k, side in enumerate(SIDES):
-        face, on = model.faces[side], np.flatnonzero(model.face == k)
-        up = _up(model)[on]
-        rows = np.unique(np.round(up, 6))
-        if len(rows) < 2:
-            return None
-        weight = straight(rows, factor * rows)
-        row = np.abs(up[:, None] - rows).argmin(axis=1)
-        column = face.position @ face.frame[1]
-        mine = np.zeros((len(on), len(on)))
-        for i in range(len(on)):
-            # the points of every row nearest along the damper
-            for j in range(len(rows)):
-                there = np.flatnonzero(row == j)
-                near = there[np.abs(column[there] - column[i]).argmin()]
-                mine[i, near] += weight[row[i], j]
-        at[np.ix_(on, on)] = mine
-        faces[side] = replace(face, position=mine @ face.position, values=mine @ face.values)
-
-    def rows_of(of: Array) -> Array:
-        return np.ascontiguousarray(np.einsum("gp,pdn->gdn", at, of))
-
-    contacts = replace(model.contacts, rows=rows_of(model.contacts.rows))
-    return replace(model, contacts=contacts, damper_rows=rows_of(model.damper_rows), faces=faces)
-
-
-def straight(rows: Array, s: Array) -> Array:
-    """(m, n) values at s by straight lines between rows, and beyond their ends.
-
-    Parameters
-    ----------
-    rows
-        (n,) rising.
-    s
-        (m,).
-    """
-    if len(rows) == 1:
-        return np.ones((len(s), 1))
-    k = np.clip(np.searchsorted(rows, s) - 1, 0, len(rows) - 2)
-    share = (s - rows[k]) / (rows[k + 1] - rows[k])
-    out = np.zeros((len(s), len(rows)))
-    out[np.arange(len(s)), k], out[np.arange(len(s)), k + 1] = 1.0 - share, share
-    return out

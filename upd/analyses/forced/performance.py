@@ -15,14 +15,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import ForcedCurve, LinearCurves
+from upd.analyses.forced.curves import LinearCurves, PointCurve
+from upd.analyses.forced.linear_limits import fine_grid
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.mode_peaks import numbered_peaks
 from upd.analyses.forced.model import Model
-from upd.analyses.forced.paths import LONG_STEPS, SWEEP_POINTS, fine_grid, respond
+from upd.analyses.forced.paths import LONG_STEPS, SWEEP_POINTS, respond
 from upd.analyses.forced.plan import ForcedPlan
 from upd.linalg.parallel import threads_for
 from upd.linalg.processes import Job
+from upd.results import Case, Result, variable
+from upd.results import quantities as q
 from upd.scene.forced_contact import SIDES, Side
 
 #: points of a path from one end, before that from the other is taken
@@ -140,7 +143,7 @@ def peaks_at(
     return RatioPoint(ratio, tuple(found.values()), whole)
 
 
-def of_curve(curve: ForcedCurve) -> RatioPoint:
+def of_curve(curve: PointCurve) -> RatioPoint:
     """The peaks of a curve of the run."""
     found = [p._replace(blade=s) for s in SIDES for p in curve.peaks[s]]
     return RatioPoint(curve.ratio, tuple(found), not curve.stopped)
@@ -173,7 +176,7 @@ def beside_best(points: Sequence[RatioPoint]) -> list[float]:
     return [math.sqrt(a * b) for a, b in pairs]
 
 
-def with_curves(points: Sequence[RatioPoint], curves: Iterable[ForcedCurve]) -> list[RatioPoint]:
+def with_curves(points: Sequence[RatioPoint], curves: Iterable[PointCurve]) -> list[RatioPoint]:
     """Points solved by `peaks_at` and those of the run's curves, of the same contact stiffness."""
     own = [of_curve(one) for one in curves if not one.empty]
     # of two of the same F_C/F_E the one that arrived
@@ -243,3 +246,70 @@ def _best(points: Iterable[RatioPoint]) -> RatioPoint | None:
 
 def _same(a: float, b: float) -> bool:
     return math.isclose(a, b, rel_tol=1e-6)
+
+
+# -- numbers and arrays ----------------------------------------------------------------------------
+
+
+def performance_results(name: str, found: Performance) -> list[Result]:
+    """F_C/F_E reached, the best one with its highest peak, and what a factor 2 costs."""
+    case, known = Case(stiffness=name, name="performance"), found.known
+    results = []
+    if known:
+        results = [
+            q.LOWEST_RATIO.of(known[0].ratio, case),
+            q.HIGHEST_RATIO.of(known[-1].ratio, case),
+        ]
+    best, twice = found.best, found.factor_two()
+    if best is None or best.worst is None or twice is None:
+        reason = "no curve has a peak: widen excitation.start and stop"
+        return results + [quantity.withheld(case, reason) for quantity in q.BEST]
+    results.append(q.BEST_INSIDE.of(found.inside, case))
+    worst = best.worst
+    at = replace(case, mode=worst.mode, blade=worst.blade)
+    values = (
+        best.ratio,
+        worst.height,
+        worst.frequency,
+        1.0 - worst.height / found.free,
+        *(one - 1.0 for one in twice),
+    )
+    return results + [
+        quantity.of(value, at)
+        for quantity, value in zip(q.BEST, values, strict=True)
+        if np.isfinite(value)
+    ]
+
+
+def performance_arrays(found: Performance) -> dict[str, Any]:
+    """Peaks of both blades over F_C/F_E, nan where a mode has none; the highest, and the limits."""
+    points, at = found.known, "point"
+    ratio = np.array([one.ratio for one in points])
+    modes = {(p.blade, p.number): p.mode for one in points for p in one.peaks}
+    out: dict[str, Any] = {
+        "ratio": variable(at, ratio, "1", "F_C/F_E"),
+        "highest_accelerance": variable(
+            at,
+            [one.worst.height for one in points if one.worst is not None],
+            "(m/s2)/N",
+            "highest peak of both blades and all modes",
+        ),
+        "free_peak": variable("", found.free, "(m/s2)/N"),
+        "stuck_peak": variable("", found.stuck, "(m/s2)/N"),
+    }
+    for (blade, number), mode in sorted(modes.items()):
+        rows = np.full((2, len(points)), np.nan)
+        for k, one in enumerate(points):
+            for p in one.peaks:
+                if (p.blade, p.number) == (blade, number):
+                    rows[:, k] = p.frequency, p.height
+        about = {"mode": mode, "blade": blade}
+        out[f"peak_{number}_frequency_{blade}"] = variable(at, rows[0], "Hz", **about)
+        out[f"peak_{number}_accelerance_{blade}"] = variable(at, rows[1], "(m/s2)/N", **about)
+    best = found.best
+    if best is not None and best.worst is not None:
+        out |= {
+            "best_ratio": variable("", best.ratio, "1", "F_C/F_E"),
+            "best_accelerance": variable("", best.worst.height, "(m/s2)/N"),
+        }
+    return out

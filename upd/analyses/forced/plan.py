@@ -30,47 +30,29 @@ Array = NDArray[np.float64]
 #: harmonics of the blades and samples in a period where the scene leaves them to the rule: two
 #: more harmonics change peaks by up to 0.5 %, twice the samples by 0.05 %
 HARMONICS, SAMPLES = 3, 128
-# Newton iterations of a curve on which nodes move, counted on the rig at F_C/F_E 600 and 194 with
-# 60 and 198 nodes; of one sample the time for each contact dof that moves, a share of all, and the
-# flops of its rows, solved for the unknowns.
-_ITERATIONS, _MOVED_S, _MOVING = 250.0, 2e-6, 0.2
 #: checks of omitted effects; each solves a number again with the effect
 ALONG = "sliding along y"
 ELASTIC = "elastic damper"
-# Counted and timed on the ready scenes, their elements and harmonics, one thread. A point of a path
-# that sticks, per contact point.
-_STUCK_S = 1.9e-4
-# A Newton step with new factors, and the steps beside it that go on with these: its small calls,
-# each contact point, and each of its samples; the products for each entry of the Jacobian, times of
-# its LU. About half of the points stick or are open over the whole cycle and are left out of the
-# last two.
-_STEP_S, _POINT_STEP_S, _SAMPLE_S, _ENTRY_S, _STEP_LU = 4.5e-4, 1.9e-5, 2e-7, 1.7e-8, 0.55
-# Of large ones, steps for each new factor, and solutions with the kept ones in a step. Counted on
-# F_C/F_E 194 with 64 rows of Gauss points a face, harmonics to 7 (2943 unknowns): 150 factors, 5500
-# corrections, 24635 products. Rigs of 64 and 128 points with fewer harmonics take 4 to 5 steps a
-# factor and 18 solutions a step (`benchmarks/speed/bench_response.py`).
+# Counted and timed on the ready scenes with one thread. A Newton step with new factors: its small
+# calls, each contact point and each of its samples, each entry of the Jacobian, times of its LU. Of
+# large ones, steps for each new factor, and solutions with the kept ones in a step.
+_STEP_S, _POINT_S, _SAMPLE_S, _ENTRY_S, _STEP_LU = 4.5e-4, 1.9e-5, 2e-7, 1.7e-8, 0.55
 _STEPS_KEPT, _SOLVED = 10.0, 19.0
-# Newton steps of a curve over F_C/F_E: points that begin or end to slip are kinks of the path. Both
-# faces of the symmetric damper slip, of the asymmetric one mostly the slope; finer lattices have no
-# more kinks. At most so many per frequency asked for, and to begin with.
-_KINKS = {"symmetric": 3.3e5, "asymmetric": 1.1e5}
-_MOST, _LEAST = 12.0, 800.0
-# Of these steps, the share that goes with the frequencies asked for in a unit of the logarithm, and
-# how many of them that was counted with (1.3 points of the path for each, 1196 in all).
-_ASKED_SHARE, _ASKED = 0.43, 400.0 / math.log(500.0 / 280.0)
+# Newton steps of a curve over F_C/F_E (points that begin or end to slip are kinks of its path), and
+# for each frequency asked for.
+_KINKS = {"symmetric": 1.2e5, "asymmetric": 1.1e5}
+# What is solved again around the peaks, and the coarser meshes, over the run.
+_AROUND = 0.4
 # Lines of contact points up the slope of a patch whose rows are all taken, at refine 1.
 _ROWS = {"symmetric": 5.0, "asymmetric": 4.0}
-# Whole faces: sweeps of each F_C/F_E; frequencies of one for each unit of the logarithm, with those
-# beside peaks; time steps at each; of a step the calls, and the time for each dof of the contact;
-# dense products and factors of one frequency; matrices of all dofs at a time.
-_WAYS, _CLOSER, _MARCHED = 2.0, 130.0, 3.2e4
-_AT_ONCE_S, _DOF_S, _FACTORS, _MATRICES = 4e-6, 1.5e-7, 4.0, 10.0
-# Sweeps of contact points: periods at each frequency until it settles; of a time step what it
-# always takes, and what each point does.
-_PERIODS, _SPRING_S, _POINT_S = 150.0, 1.2e-6, 4e-8
-# Seconds of a curve that each F_C/F_E of a performance curve takes; of the curves those of what is
-# solved again around the peaks: levels, inputs, effects left out.
-_RATIO, _AROUND, _PEAK_STEPS, _MESHES = 2.0, 4.0, 300.0, 0.3
+# Sweeps: periods at each frequency until it settles; seconds of a time step, of each point there.
+_PERIODS, _MARCH_S, _MARCH_POINT_S = 150.0, 1.2e-6, 4e-8
+# Whole faces by sweeps: frequencies of one in a unit of the logarithm, time steps at each, seconds
+# of a step and of each dof of the contact there; dense products of one frequency.
+_CLOSER, _MARCHED, _FACES_S, _DOF_S, _FACTORS = 130.0, 3.2e4, 4e-6, 1.5e-7, 4.0
+# By the balance: Newton iterations of a curve, seconds of one sample for each dof that moves, share
+# of those; matrices of all dofs at a time.
+_ITERATIONS, _MOVED_S, _MOVING, _MATRICES = 250.0, 2e-6, 0.2, 10.0
 # Figures, files and page, and those of a curve.
 _FILES_S, _CURVE_S = 4.0, 1.0
 #: time steps in a period of a time integration where the scene names none
@@ -100,7 +82,8 @@ def make_plan(scene: ForcedScene) -> ForcedPlan:
         body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()
     }
     cost, memory, workers = _whole_faces_cost(scene, size) if whole else _cost(scene, size)
-    again = 0.0 if whole else _around_seconds(scene, size, cost.seconds)
+    solves = not whole and scene.balance.method == "balance"
+    again = _AROUND * cost.seconds * (solves and (scene.estimates or scene.left_out.solves))
     return ForcedPlan(
         scene,
         parameters,
@@ -125,12 +108,15 @@ def _whole_faces_cost(
         cost.dynamic_body(count["hexes"], count["nodes"])
         cost.condensed(f"{body}, compliance", count["hexes"], count["nodes"], 3 * count["contact"])
     m = 3.0 * (size["left"]["contact"] + size["right"]["contact"])
-    e = scene.excitation
-    ways = _WAYS * (scene.balance.method == "march")
-    solved = ways * len(e.centrifugal_to_force) * _CLOSER * math.log(e.stop / e.start)
-    cost.seconds += balance_seconds(scene, m)
-    cost.seconds += solved * _MARCHED * (_AT_ONCE_S + _DOF_S * m)
-    cost.seconds += solved * dense_s(_FACTORS * m**3)
+    e, curves = scene.excitation, len(scene.excitation.centrifugal_to_force)
+    if scene.balance.method == "march":
+        solved = 2.0 * curves * _CLOSER * math.log(e.stop / e.start)
+        cost.seconds += solved * _MARCHED * (_FACES_S + _DOF_S * m)
+        cost.seconds += solved * dense_s(_FACTORS * m**3)
+    else:
+        samples = SAMPLES if scene.balance.samples == "auto" else int(scene.balance.samples)
+        moving, rows = _ITERATIONS * curves * samples * (scene.contact.friction > 0.0), _MOVING * m
+        cost.seconds += moving * _MOVED_S * rows + dense_s(moving * 2.0 * rows**2 * m)
     cost.seconds += _files_seconds(scene)
     cost.kept_bytes += _MATRICES * 8.0 * m**2
     memory, workers = cost.side_by_side(min(2, cost.threads), 2)
@@ -165,7 +151,7 @@ def _cost(
         damper = size["damper"]
         cost.dynamic_body(damper["hexes"], damper["nodes"], len(scene.stiffnesses))
     sources = plans_to_solve(scene)
-    cost.seconds += sum(plan.solve_seconds for plan in sources)
+    cost.seconds += sum(one.seconds - one.estimate_seconds - one.files_seconds for one in sources)
     cost.seconds += _curves_seconds(scene, size)
     cost.seconds += _files_seconds(scene)
     memory, workers = cost.side_by_side(min(2, cost.threads), 2)
@@ -193,39 +179,25 @@ def reduced(
 
 def _curves_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
     """All curves of the run, and those of the performance curve."""
+    e, points = scene.excitation, _points(scene, size)
     if scene.balance.method == "march":
-        return _sweep_seconds(scene, size)
-    asked, e = scene.excitation.points, scene.excitation
-    points, step = _points(scene, size), _step_seconds(scene, size)
-    stuck = _STUCK_S * points * asked * len(e.centrifugal_to_force)
-    dense = asked / math.log(e.stop / e.start) / _ASKED
-    kinks = _KINKS[scene.arrangement] * (1.0 - _ASKED_SHARE + _ASKED_SHARE * dense)
-    rubs = scene.contact.friction > 0.0
-
-    def steps(ratio: float) -> float:
-        return min(kinks / ratio, _LEAST + _MOST * asked) * rubs
-
-    seconds = len(scene.stiffnesses) * (stuck + step * sum(map(steps, e.centrifugal_to_force)))
+        solved = 2.0 * e.points * len(scene.stiffnesses) * len(e.centrifugal_to_force)
+        return solved * _PERIODS * time_steps(scene) * (_MARCH_S + _MARCH_POINT_S * points)
+    kinks = _KINKS[scene.arrangement] * (scene.contact.friction > 0.0)
+    steps = sum(kinks / ratio + e.points for ratio in e.centrifugal_to_force)
+    steps *= len(scene.stiffnesses)
     if scene.wants("performance"):
         c = scene.performance
-        seconds += _RATIO * c.points * step * steps(math.sqrt(c.lowest * c.highest))
-    return seconds
+        steps += c.points * (kinks / math.sqrt(c.lowest * c.highest) + e.points)
+    return steps * _step_seconds(scene, size)
 
 
-def _around_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]], run: float) -> float:
-    """What is solved again around the peaks: a part of the run, and the coarser meshes."""
-    if scene.balance.method == "march" or not (scene.estimates or scene.left_out.solves):
-        return 0.0
-    steps = _AROUND * _PEAK_STEPS * _step_seconds(scene, size) * len(scene.stiffnesses)
-    return (scene.contact.friction > 0.0) * steps + _MESHES * run * scene.estimates
-
-
-def _sweep_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
-    """Sweeps up and down of every curve."""
-    e = scene.excitation
-    solved = 2.0 * e.points * len(scene.stiffnesses) * len(e.centrifugal_to_force)
-    step = _SPRING_S + _POINT_S * _points(scene, size)
-    return solved * _PERIODS * time_steps(scene) * step
+def blade_harmonics(scene: ForcedScene) -> int:
+    """The highest of the balance; of adaptive ones a usual one."""
+    asked = scene.balance.harmonics
+    if asked == "adaptive":
+        return max(HARMONICS, scene.excitation.highest_harmonic)
+    return int(asked)
 
 
 def time_steps(scene: ForcedScene) -> int:
@@ -246,7 +218,7 @@ def _step_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> 
     if n > WORTH_KEEPING:
         factors = min(factors, factors / _STEPS_KEPT + _SOLVED * factor * SOLUTIONS / n)
     count = sample_count(harmonics(range(highest + 1)), None if given == "auto" else given)
-    return _STEP_S + (_POINT_STEP_S + _SAMPLE_S * count) * points + factors
+    return _STEP_S + (_POINT_S + _SAMPLE_S * count) * points + factors
 
 
 def _points(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
@@ -404,33 +376,3 @@ def _along(scene: ForcedScene) -> Effect:
     )
     check = ALONG if scene.left_out.solves and scene.balance.method == "balance" else ""
     return Effect(name, False, why, check, ("contact.directions=two",), applies=c.friction > 0.0)
-
-
-# -- whole faces by harmonic balance ---------------------------------------------------------------
-
-
-def blade_harmonics(scene: ForcedScene) -> int:
-    """The highest of the balance; of adaptive ones a usual one."""
-    asked = scene.balance.harmonics
-    if asked == "adaptive":
-        return max(HARMONICS, scene.excitation.highest_harmonic)
-    return int(asked)
-
-
-def balance_seconds(scene: ForcedScene, dofs: float) -> float:
-    """Seconds of all curves by the balance.
-
-    Parameters
-    ----------
-    scene
-        With whole faces.
-    dofs
-        Of the contact.
-    """
-    b, e = scene.balance, scene.excitation
-    if b.method == "march" or scene.contact.friction == 0.0:
-        return 0.0
-    samples = SAMPLES if b.samples == "auto" else int(b.samples)
-    rows = _MOVING * dofs
-    evaluations = _ITERATIONS * len(e.centrifugal_to_force) * samples
-    return evaluations * _MOVED_S * rows + dense_s(evaluations * 2.0 * rows**2 * dofs)

@@ -1,5 +1,4 @@
-"""Contact points on a blade's patch: lattice nodes by row and column, means over groups of them, or
-any points by shape functions; and Gauss points.
+"""Contact points on a blade's patch: nodes of its lattice, means over groups of them, Gauss points.
 
 Gauss points are contact points by polynomials: mean motions that no mesh changes.
 
@@ -29,25 +28,18 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from skfem import ElementQuad1, ElementQuad2, ElementQuadS2
 
 from upd.analyses.seated.bodies import is_half
 from upd.analyses.seated.lattice import lattice, patch_frame
 from upd.errors import InputError
-from upd.fem.elements import match_nodes
-from upd.fem.surface import FACE_NODES, face_moments
+from upd.fem.surface import face_moments
 from upd.mesh import FloatArray, IntArray, Mesh
-
-_FAMILIES = {4: ElementQuad1, 8: ElementQuadS2, 9: ElementQuad2}
-#: Newton steps to find a point in a face, which is nearly a parallelogram
-_MOST_STEPS = 20
 
 
 @dataclass(frozen=True)
@@ -176,83 +168,6 @@ def lattice_points(
     return FacePoints(
         values @ mesh.points[nodes], found.frame, total / total.sum(), nodes, values, lines
     )
-
-
-def free_points(mesh: Mesh, position: FloatArray, weight: FloatArray, side: str) -> FacePoints:
-    """Points anywhere on the patch, moving by the shape functions of the element face each lies in.
-
-    Parameters
-    ----------
-    position
-        (m, 3) mm.
-    weight
-        (m,) shares of the face's stiffness, of any sum.
-
-    Raises
-    ------
-    InputError
-        For a point off the patch.
-    """
-    faces = mesh.faces["patch"]
-    inside = shape_functions(faces.shape[1])
-    nodes = np.unique(faces)
-    values = np.zeros((len(position), len(nodes)))
-    for i, x in enumerate(position):
-        face, shape = _locate(mesh.points, faces, x, inside)
-        if face < 0:
-            raise InputError(
-                f"contact points: ({', '.join(f'{v:.4g}' for v in x)}) mm is off the "
-                f"{side} patch; contact run and rig differ"
-            )
-        values[i, np.searchsorted(nodes, faces[face])] = shape
-    used = np.flatnonzero(np.abs(values).max(axis=0) > np.sqrt(np.finfo(float).eps))
-    lines = np.full((len(position), 2), -1, dtype=np.int64)
-    return FacePoints(
-        position, patch_frame(mesh), weight / weight.sum(), nodes[used], values[:, used], lines
-    )
-
-
-Shape = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-
-
-def shape_functions(n_node: int) -> Shape:
-    """Values (n_node,) and gradients (n_node, 2) at a point (2,) of the unit square, in our node
-    order.
-    """
-    element = _FAMILIES[n_node]()
-    local = match_nodes(FACE_NODES[:n_node], np.asarray(element.doflocs))
-
-    def at(s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        pairs = [element.lbasis(s[:, None], int(a)) for a in local]
-        return np.array([float(v[0]) for v, _ in pairs]), np.array(
-            [np.asarray(g)[:, 0] for _, g in pairs]
-        )
-
-    return at
-
-
-def _locate(
-    points: FloatArray, faces: IntArray, x: FloatArray, shape: Shape
-) -> tuple[int, FloatArray]:
-    """Face that holds x and the shape functions there, or -1. Nearest centres first."""
-    centres = points[faces[:, :4]].mean(axis=1)
-    for face in np.argsort(np.linalg.norm(centres - x, axis=1))[:9]:
-        X = points[faces[face]]
-        s = np.array([0.5, 0.5])
-        for _ in range(_MOST_STEPS):
-            value, gradient = shape(s)
-            step = np.linalg.lstsq(X.T @ gradient, x - X.T @ value, rcond=None)[0]
-            s = s + step
-            if np.abs(step).max() < np.sqrt(np.finfo(float).eps):
-                break
-        value, _ = shape(s)
-        size = float(np.ptp(X, axis=0).max())
-        # a point of another mesh lies on the face to the digits that turning left, a border belongs
-        # to both faces
-        near = np.finfo(float).eps ** 0.25
-        if (np.abs(s - 0.5) <= 0.5 + near).all() and np.linalg.norm(X.T @ value - x) <= near * size:
-            return int(face), value
-    return -1, np.zeros(faces.shape[1])
 
 
 _HALF = float(np.finfo(float).eps) ** 0.5

@@ -4,25 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from upd.analyses import measured
 from upd.analyses.forced import measures
-from upd.analyses.forced.curve_results import (
-    balanced_results,
-    curve_results,
-    peak_results,
-    swept_results,
-)
-from upd.analyses.forced.curves import FrictionCurve, LinearCurves, WholeFaces
+from upd.analyses.forced.curve_results import curve_results, peak_results
+from upd.analyses.forced.curves import Curve, LinearCurves, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.inputs import InputEffect
 from upd.analyses.forced.linear_limits import linear_curves
 from upd.analyses.forced.mode_peaks import unmoved
 from upd.analyses.forced.model import Array, ComplexArray, Model
 from upd.analyses.forced.paths import balance_of
-from upd.analyses.forced.performance import Performance
+from upd.analyses.forced.performance import performance_results
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import StaticState
 from upd.analyses.measured import FREE, STUCK, Computed
@@ -46,15 +42,11 @@ def make_results(solution: ForcedSolution) -> list[Result]:
         results += _linear_results(solution, name, linear)
     for curve in solution.curves:
         results += curve_results(solution, curve)
-    for one in solution.balanced:
-        results += balanced_results(solution, one)
-    for sweep in solution.sweeps:
-        results += swept_results(solution, sweep)
     results += _band_results(solution)
     for name, performance in solution.performances.items():
-        results += _performance_results(name, performance)
-    for name, effects in solution.effects.items():
-        results += _input_results(solution, name, effects)
+        results += performance_results(name, performance)
+    for effects in solution.effects.values():
+        results += _input_results(effects)
     return results + measured_results(solution)
 
 
@@ -140,58 +132,18 @@ def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -
     return results
 
 
-def _performance_results(name: str, found: Performance) -> list[Result]:
-    """F_C/F_E reached, the best one with its highest peak, and what a factor 2 costs."""
-    case, known = Case(stiffness=name, name="performance"), found.known
-    results = []
-    if known:
-        results = [
-            q.LOWEST_RATIO.of(known[0].ratio, case),
-            q.HIGHEST_RATIO.of(known[-1].ratio, case),
-        ]
-    best, twice = found.best, found.factor_two()
-    if best is None or best.worst is None or twice is None:
-        reason = "no curve has a peak: widen excitation.start and stop"
-        return results + [quantity.withheld(case, reason) for quantity in q.BEST]
-    results.append(q.BEST_INSIDE.of(found.inside, case))
-    worst = best.worst
-    at = replace(case, mode=worst.mode, blade=worst.blade)
-    values = (
-        best.ratio,
-        worst.height,
-        worst.frequency,
-        1.0 - worst.height / found.free,
-        *(one - 1.0 for one in twice),
-    )
-    return results + [
-        quantity.of(value, at)
-        for quantity, value in zip(q.BEST, values, strict=True)
+def _input_results(effects: Sequence[InputEffect]) -> list[Result]:
+    """Change of a peak by each end of each input."""
+    # without such a peak near there is no change to report
+    return [
+        quantity.of(value, replace(one.case, choice=f"{one.name}: {one.label}"), n=one.number)
+        for one in effects
+        for quantity, value in (
+            (q.FREQUENCY_CHANGE, one.frequency),
+            (q.ACCELERANCE_CHANGE, one.height),
+        )
         if np.isfinite(value)
     ]
-
-
-def _input_results(
-    solution: ForcedSolution, name: str, effects: Sequence[InputEffect]
-) -> list[Result]:
-    """Change of a peak by each end of each input."""
-    curves = [c for c in solution.curves if c.stiffness == name and not c.empty]
-    if not curves:
-        return []
-    ratio, out = min(c.ratio for c in curves), []
-    for one in effects:
-        case = Case(
-            stiffness=name, force_ratio=ratio, mode=one.mode, choice=f"{one.name}: {one.label}"
-        )
-        # without such a peak near there is no change to report
-        out += [
-            quantity.of(value, case, n=one.number)
-            for quantity, value in (
-                (q.FREQUENCY_CHANGE, one.frequency),
-                (q.ACCELERANCE_CHANGE, one.height),
-            )
-            if np.isfinite(value)
-        ]
-    return out
 
 
 def measured_results(solution: ForcedSolution) -> list[Result]:
@@ -233,10 +185,9 @@ def _computed(solution: ForcedSolution, choice: MeasuredChoice) -> Iterator[Comp
             band = (scene.excitation.start, scene.excitation.stop)
             yield Computed(case, band, _linear_at(solution, name, side, stuck), told)
         return
-    curves: list[FrictionCurve] = [*solution.curves, *solution.balanced, *solution.sweeps]
     # as the labels of curves tell them apart
     wanted = f"{choice.centrifugal_to_force:.6g}"
-    for c in curves:
+    for c in solution.curves:
         if f"{c.ratio:.6g}" == wanted and len(c.frequency) >= LEAST_POINTS:
             yield _with_friction(c, side)
 
@@ -252,11 +203,11 @@ def _linear_at(
     model, plan = solution.models[name], solution.plan
     force = plan.scene.damper.centrifugal
     numbers = (0, *model.excitation.harmonics)
-    problem, row = measures.Unsolved(balance_of(plan, model, force, numbers)), model.row(side)
+    problem, row = balance_of(plan, model, force, numbers), model.row(side)
     return lambda f: measures.linear_accelerance(problem, row, force, f, stuck)
 
 
-def _with_friction(c: FrictionCurve, side: Side) -> Computed:
+def _with_friction(c: Curve[Any], side: Side) -> Computed:
     """A curve with friction, between its points by straight lines."""
     f, H = c.frequency, c.accelerance[side]
     way = slice(None) if f[-1] > f[0] else slice(None, None, -1)

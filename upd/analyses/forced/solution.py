@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from upd.analyses.base import Resolved
-from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, SweptCurve, WholeFaces
+from upd.analyses.forced.curves import Curve, LinearCurves, SweptCurve, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.inputs import InputEffect
 from upd.analyses.forced.linear_limits import stuck_peaks_of
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.mode_peaks import CANDIDATES, tell_stuck_peaks
 from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.peaks_again import FoundPeaks, PeaksAgain
+from upd.analyses.forced.peaks_again import PeaksAgain
 from upd.analyses.forced.performance import Performance, RatioPoint
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.seated.bodies import Bodies
@@ -78,7 +79,7 @@ class MarchedPeak:
         """Of the losses of all nodes from that of the sweep at this point, over the work of the
         excitation and all losses there.
         """
-        own = self.sweep.found.energy[self.peak.sample]
+        own = self.sweep.answer.energy[self.peak.sample]
         return abs(self.period.energy - float(own[2])) / max(float(np.abs(own).sum()), _TINY)
 
 
@@ -102,16 +103,13 @@ class ForcedSolution:
     bodies: Bodies | None = None
     models: dict[str, Model] = field(default_factory=dict)
     linear: dict[str, LinearCurves] = field(default_factory=dict)
-    curves: list[ForcedCurve] = field(default_factory=list)
+    curves: list[Curve[Any]] = field(default_factory=list)
     faces: dict[str, WholeFaces] = field(default_factory=dict)
-    balanced: list[FacesCurve] = field(default_factory=list)
-    sweeps: list[SweptCurve] = field(default_factory=list)
     marched: list[MarchedPeak] = field(default_factory=list)
     band: list[BandPoint] = field(default_factory=list)
     performances: dict[str, Performance] = field(default_factory=dict)
     omissions: list[Resolved] = field(default_factory=list)
     levels: dict[str, list[PeaksAgain]] = field(default_factory=dict)
-    searched: dict[str, FoundPeaks] = field(default_factory=dict)
     effects: dict[str, list[InputEffect]] = field(default_factory=dict)
 
     @property
@@ -132,7 +130,7 @@ class ForcedSolution:
             return stuck_peaks_of(march, peaks, CANDIDATES * stop, excitation)
         return tell_stuck_peaks(self.models[stiffness], linear.stuck_peaks[blade], stop)
 
-    def marked_points(self, curve: ForcedCurve | FacesCurve) -> list[tuple[int, str, int]]:
+    def marked_points(self, curve: Curve[Any]) -> list[tuple[int, str, int]]:
         """Number, mode and point of the path of the right blade's peaks.
 
         Number 0 and the highest point of a curve without a peak.

@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from upd.analyses.forced.inputs import effects_of, few_harmonics, input_variants
+from upd.analyses.forced.interface_model import INTERFACE, make_whole_faces
 from upd.analyses.forced.left_out import (
     along_changes,
     along_variant,
@@ -17,10 +18,16 @@ from upd.analyses.forced.left_out import (
     highest_slipping,
 )
 from upd.analyses.forced.levels import COARSER, Laws, coarse_model, other_levels
+from upd.analyses.forced.linear_limits import linear_of, linear_of_faces
 from upd.analyses.forced.model import Model, make_model, preloaded
 from upd.analyses.forced.paths import quiet
 from upd.analyses.forced.peaks import solve_curve
-from upd.analyses.forced.peaks_again import FoundPeaks, Variant, linear_of, solve_again
+from upd.analyses.forced.peaks_again import (
+    FoundPeaks,
+    Variant,
+    run_peaks,
+    solve_again,
+)
 from upd.analyses.forced.performance import (
     RatioPoint,
     further_points,
@@ -30,15 +37,15 @@ from upd.analyses.forced.performance import (
     ratios_of,
     with_curves,
 )
-from upd.analyses.forced.plan import ForcedPlan, grid
+from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import BandPoint, ForcedSolution
 from upd.analyses.forced.spring_march import make_springs
 from upd.analyses.forced.statics import StaticState, admissible, same, static_state
 from upd.analyses.forced.stiffness import face_laws
-from upd.analyses.forced.sweeps import both_ways, march_peaks
-from upd.analyses.forced.whole_faces import INTERFACE, linear_limits, make_whole_faces, solve_faces
+from upd.analyses.forced.sweeps import balance_curve, both_ways, march_peaks
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import InputError, UpdError, one_line
+from upd.hbm.faces.state import InterfaceModel, InterfaceState
 from upd.linalg.parallel import threads_for
 from upd.linalg.processes import SideProcesses
 from upd.progress import Stages
@@ -61,7 +68,10 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
         if scene.contact.model == INTERFACE:
             _whole_faces(solution, stages)
         elif scene.balance.method == "march":
-            _swept_points(solution, stages)
+            _models(solution, stages)
+            for name, model in solution.models.items():
+                springs = make_springs(plan, model)
+                _sweep(solution, name, springs.march, springs.at_rest(), stages)
         else:
             with SideProcesses(*_MODULES) as beside:
                 _balanced_points(solution, beside, stages)
@@ -79,9 +89,27 @@ def _whole_faces(solution: ForcedSolution, stages: Stages) -> None:
     faces = make_whole_faces(plan, solution.bodies, stages)
     solution.faces[INTERFACE] = faces
     with stages("free and stuck", f"{faces.of.n} nodes"):
-        solution.linear[INTERFACE] = linear_limits(plan, faces, grid(plan))
-    solve_faces(solution, INTERFACE, stages)
-    march_peaks(solution, stages)
+        solution.linear[INTERFACE] = linear_of_faces(plan, faces.march)
+    if plan.scene.balance.method == "march":
+        _sweep(solution, INTERFACE, faces.march, faces.start, stages)
+        return
+    for ratio in plan.scene.excitation.centrifugal_to_force:
+        with stages("friction", f"F_C/F_E {ratio:g}: {faces.of.n} nodes"):
+            solution.curves.append(balance_curve(plan, INTERFACE, faces, ratio))
+
+
+def _sweep(
+    solution: ForcedSolution,
+    name: str,
+    march: InterfaceModel,
+    start: InterfaceState,
+    stages: Stages,
+) -> None:
+    """Sweeps up and down at every F_C/F_E, and their peaks."""
+    for ratio in solution.plan.scene.excitation.centrifugal_to_force:
+        with stages("sweeps", f"{name}, F_C/F_E {ratio:g}: up and down"):
+            solution.curves += both_ways(solution.plan, name, ratio, march, start)
+    march_peaks(solution, name, stages)
 
 
 def _models(solution: ForcedSolution, stages: Stages) -> Mapping[str, Laws]:
@@ -105,19 +133,6 @@ def _static(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> StaticState | N
     if not plan.scene.contact.loaded:
         return None
     return static_state(plan, bodies, stages=stages)
-
-
-def _swept_points(solution: ForcedSolution, stages: Stages) -> None:
-    """Sweeps up and down of contact points."""
-    _models(solution, stages)
-    plan = solution.plan
-    for name, model in solution.models.items():
-        springs = make_springs(plan, model)
-        for ratio in plan.scene.excitation.centrifugal_to_force:
-            with stages("sweeps", f"{name}, F_C/F_E {ratio:g}: up and down"):
-                start = springs.at_rest()
-                solution.sweeps += both_ways(plan, name, ratio, springs.march, start)
-    march_peaks(solution, stages)
 
 
 # -- harmonic balance ------------------------------------------------------------------------------
@@ -197,10 +212,10 @@ def _around(
     further: list[RatioPoint] = []
     for name, model in solution.models.items():
         mine = tuple(c for c in solution.curves if c.stiffness == name and not c.empty)
-        peaks = FoundPeaks(plan, model, solution.linear[name], mine)
-        solution.searched[name], bare = peaks, peaks.bare
+        found = tuple(peak for curve in mine for peak in run_peaks(curve))
+        peaks = FoundPeaks(plan, model, solution.linear[name], found)
         levels = solution.levels.setdefault(name, []) if variants[name] else []
-        work += [_Work(levels.append, solve_again, (bare, one)) for one in variants[name]]
+        work += [_Work(levels.append, solve_again, (peaks, one)) for one in variants[name]]
         if scene.left_out.solves:
             solution.omissions += elastic_changes(solution, name)
         if name == first:
@@ -208,7 +223,7 @@ def _around(
                 jobs = further_points(plan, model, with_curves(points, mine), points)
                 work += [_Work(further.append, *job) for job in jobs]
             if scene.wants("inputs") or scene.left_out.solves:
-                work += _at_few_harmonics(solution, name, laws[name])
+                work += _at_few_harmonics(solution, peaks, name, laws[name])
             if scene.wants("band"):
                 work += _band(solution, name)
     _done(beside, work)
@@ -219,9 +234,11 @@ def _around(
         )
 
 
-def _at_few_harmonics(solution: ForcedSolution, name: str, laws: Laws) -> Iterator[_Work]:
+def _at_few_harmonics(
+    solution: ForcedSolution, peaks: FoundPeaks, name: str, laws: Laws
+) -> Iterator[_Work]:
     """Inputs, and sliding along the damper, on the curve with the lowest F_C/F_E."""
-    scene, few = solution.plan.scene, few_harmonics(solution.searched[name])
+    scene, few = solution.plan.scene, few_harmonics(peaks)
     if few is None:
         return
     if scene.wants("inputs"):

@@ -5,33 +5,29 @@ Totals from the scene, or the contact law of a contact analysis, run here or rea
 
 from __future__ import annotations
 
-import hashlib
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from upd.analyses.contact import ANALYSES
-from upd.analyses.contact.plan import ContactPlan
-from upd.analyses.contact.scene_plan import make_plan as make_contact_plan
-from upd.cache.arrays import cache_folder
-from upd.cache.sources import source_digest
+from upd.analyses import analysis_of
+from upd.analyses.base import Plan
+from upd.cache.arrays import cache_folder, load_arrays, save_arrays
+from upd.cache.sources import key_of, source_digest
 from upd.contact.law import ContactLaw
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.damper import DamperSizes
 from upd.progress import Stages
-from upd.results import ArrayGroup, read_netcdf, write_netcdf
+from upd.results import ArrayGroup, read_netcdf
 from upd.scene import Scene, load_scene
 from upd.scene.contact import CONTACT_WANTS
 from upd.scene.forced import ForcedScene
-from upd.scene.forced_contact import Side, StiffnessChoice
+from upd.scene.forced_contact import SIDES, Side, StiffnessChoice
 
 log = logging.getLogger(__name__)
-FLAT = ANALYSES["flat"]
 
 
 @dataclass(frozen=True)
@@ -42,15 +38,12 @@ class FaceLaw:
     ----------
     K_N, K_T
         Totals, N/mm.
-    law
-        Contact law in the axes of its patch, when its own points are used.
     source
         Where the totals come from.
     """
 
     K_N: float
     K_T: float
-    law: ContactLaw | None = None
     source: str = "given"
 
 
@@ -61,29 +54,15 @@ def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceLaw]:
     """
     law, source = _law(choice, stages) if choice.from_contact else (None, "")
     out: dict[Side, FaceLaw] = {}
-    sides: tuple[Side, Side] = ("left", "right")
-    for side in sides:
+    for side in SIDES:
         given = choice.face(side)
         if given is not None:
             out[side] = FaceLaw(given.K_N, given.K_T)
         else:
             assert law is not None
-            own = law if choice.points == "law" else None
             K_T = float(law.k_t.sum(axis=0).mean())
-            out[side] = FaceLaw(float(law.k_n.sum()), K_T, own, source)
+            out[side] = FaceLaw(float(law.k_n.sum()), K_T, source)
     return out
-
-
-def mirrored(law: ContactLaw) -> ContactLaw:
-    """The same points on the other blade: x turned round."""
-    flip = np.array([-1.0, 1.0, 1.0])
-    turned = {name: getattr(law, name) * flip for name in ("position", "normal", "tangents")}
-    return replace(law, **turned)
-
-
-def _is_law(group: ArrayGroup) -> bool:
-    """Whether a group holds a contact law."""
-    return group.attributes.get("content") == "contact law"
 
 
 def check_sources(scene: ForcedScene) -> None:
@@ -108,29 +87,26 @@ def _scene_of_run(folder: Path) -> Scene | None:
     """The contact scene of a run folder; None when the folder does not hold it any more, or not as
     this version reads it.
     """
-    try:
+    with suppress(InputError):
         scene = load_scene(folder / "scene.toml")
-    except InputError:
-        return None
-    return scene if scene.analysis in CONTACT_WANTS else None
+        return scene if scene.analysis in CONTACT_WANTS else None
+    return None
 
 
 def _check_damper(scene: ForcedScene, source: str, contact: Scene | None) -> None:
     """Raise InputError when the contact is that of another damper: its stiffness is not this
     one's. A damper that cannot be compared gives a warning.
     """
-    own = {**scene.geometry, "arrangement": scene.arrangement}
-    rig, other = _damper(scene.recipe, own), None
-    if contact is not None:
-        other = _damper(contact.recipe, contact.geometry)
+    rig = _damper(scene.recipe, {**scene.geometry, "arrangement": scene.arrangement})
+    other = None if contact is None else _damper(contact.recipe, contact.geometry)
     if rig is None or other is None:
-        recipe = scene.recipe if rig is None else getattr(contact, "recipe", None)
-        why = (
-            f"the recipe {recipe} does not tell the damper's sizes: add a function "
-            "damper_sizes(params)"
-            if recipe is not None
-            else "its folder holds no scene.toml that can be read"
-        )
+        why = "its folder holds no scene.toml that can be read"
+        if rig is None or contact is not None:
+            recipe = scene.recipe if contact is None or rig is None else contact.recipe
+            why = (
+                f"the recipe {recipe} does not tell the damper's sizes: add a function "
+                "damper_sizes(params)"
+            )
         log.warning(
             "contact stiffness from %s: not compared with the rig's damper; %s", source, why
         )
@@ -150,27 +126,25 @@ def _damper(recipe: str, geometry: Mapping[str, Any]) -> DamperSizes | None:
     return recipes.damper_sizes(recipe, given)
 
 
-def plans_to_solve(scene: ForcedScene) -> list[ContactPlan]:
+def plans_to_solve(scene: ForcedScene) -> list[Plan[Any]]:
     """Plans of the contact scenes that give a stiffness and were not solved before."""
-    found: dict[Path, ContactPlan] = {}
-    for choice in scene.stiffnesses.values():
-        if choice.scene is not None:
-            contact = _contact_scene(choice)
-            kept = _kept_law(contact)
-            if not kept.exists():
-                found[kept] = make_contact_plan(contact)
-    return list(found.values())
+    scenes = [_contact_scene(c) for c in scene.stiffnesses.values() if c.scene is not None]
+    found = {_kept_law(contact): contact for contact in scenes}
+    return [
+        analysis_of(contact).make_plan(contact)
+        for path, contact in found.items()
+        if not path.exists()
+    ]
 
 
 def _kept_law(scene: Scene) -> Path:
     """Where the law of a contact scene is kept once it is solved."""
-    key = hashlib.sha256(
-        f"contact law {scene.text}{source_digest(scene.recipe)}".encode()
-    ).hexdigest()
-    return cache_folder() / f"law-{key[:32]}.nc"
+    key = key_of({"contact law": scene.text, "sources": source_digest(scene.recipe)})
+    return cache_folder() / f"law-{key[:32]}.npz"
 
 
 def _law(choice: StiffnessChoice, stages: Stages) -> tuple[ContactLaw, str]:
+    """The law of a finished run, or of a contact scene's first load, kept on disk; its source."""
     if choice.run is not None:
         path = Path(choice.run) / "result.nc"
         try:
@@ -180,19 +154,24 @@ def _law(choice: StiffnessChoice, stages: Stages) -> tuple[ContactLaw, str]:
                 f"stiffness: no contact law in {path} ({error}); give the folder of a "
                 "finished contact run"
             ) from None
-        return _first(groups, str(path)), f"run {choice.run}"
-    assert choice.scene is not None
-    return _solved(choice, stages), f"scene {Path(choice.scene).stem}"
+        return ContactLaw.from_arrays(_first(groups, str(path))), f"run {choice.run}"
+    scene = _contact_scene(choice)
+    kept = _kept_law(scene)
+    with stages("contact stiffness", f"{scene.name}, {choice.bodies} bodies"):
+        arrays = load_arrays(kept)
+        if arrays is None:
+            arrays = {name: variable[1] for name, variable in _run(scene).items()}
+            save_arrays(kept, arrays)
+    return ContactLaw.from_arrays(arrays), f"scene {Path(choice.scene or '').stem}"
 
 
-def _first(groups: Mapping[str, ArrayGroup], where: str) -> ContactLaw:
-    found = [arrays for arrays in groups.values() if _is_law(arrays)]
-    if not found:
-        raise InputError(
-            f'stiffness: {where} holds no contact law; run the contact with "contact_law" '
-            "among want"
-        )
-    return ContactLaw.from_arrays(found[0])
+def _first(groups: Mapping[str, ArrayGroup], where: str) -> ArrayGroup:
+    for group in groups.values():
+        if group.attributes.get("content") == "contact law":
+            return group
+    raise InputError(
+        f'stiffness: {where} holds no contact law; run the contact with "contact_law" among want'
+    )
 
 
 def _contact_scene(choice: StiffnessChoice) -> Scene:
@@ -210,27 +189,10 @@ def _contact_scene(choice: StiffnessChoice) -> Scene:
     return changed
 
 
-def _solved(choice: StiffnessChoice, stages: Stages) -> ContactLaw:
-    """The law of the contact scene's first load, from an earlier run of the same scene and code
-    when there is one.
-    """
-    scene = _contact_scene(choice)
-    kept = _kept_law(scene)
-    with stages("contact stiffness", f"{scene.name}, {choice.bodies} bodies"):
-        try:
-            return _first(read_netcdf(kept), str(kept))
-        except (OSError, InputError, KeyError):
-            groups = _run(scene)
-        _keep(kept, groups)
-        group = next(iter(groups.values()), None)
-    if group is None:
-        return _first({}, scene.name)
-    return ContactLaw.from_arrays({name: variable[1] for name, variable in group.items()})
-
-
-def _run(scene: Scene) -> dict[str, ArrayGroup]:
-    solution = FLAT.solve(FLAT.make_plan(scene), Stages())
-    for check in FLAT.check_solution(solution):
+def _run(scene: Scene) -> ArrayGroup:
+    flat = analysis_of(scene)
+    solution = flat.solve(flat.make_plan(scene), Stages())
+    for check in flat.check_solution(solution):
         if not check.passed:
             log.warning(
                 "contact analysis %s: %s: %s = %.3g, limit %.3g",
@@ -245,12 +207,4 @@ def _run(scene: Scene) -> dict[str, ArrayGroup]:
                     f"stiffness: the contact analysis {scene.name} failed its check "
                     f"{check.name}; run it alone: upd run {scene.name}"
                 )
-    return {name: group for name, group in FLAT.arrays(solution).items() if _is_law(group)}
-
-
-def _keep(path: Path, groups: Mapping[str, ArrayGroup]) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_netcdf(path, groups)
-    except OSError as error:
-        log.warning("contact law not kept in %s (%s): it is solved again next time", path, error)
+    return _first(flat.arrays(solution), scene.name)

@@ -1,19 +1,25 @@
-"""Curves by time integration: stepped sine up and down, as in an experiment.
+"""Curves by time integration: stepped sine up and down, as in an experiment; and of whole faces.
 
 Where friction and lift-off leave several steady motions, a curve by harmonic balance follows one
 path through all of them. A sweep shows what a rig would: rising, the motion that the past below
 leads to; falling, the one from above. Contact states, loops and the damper's motion at their peaks
 are read from the last period.
+
+Whole faces by harmonic balance have blades in frequency, damper and contact in time, see
+`upd.hbm.faces.balance`: every node with its past, as a sweep from the static state at rising
+frequency.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from upd.analyses.forced.curves import SweptCurve, Way
-from upd.analyses.forced.excitation import ComplexArray, Excitation, excitation_of
+from upd.analyses.forced.curves import Answer, Curve, FacesCurve, SweptCurve, Way, WholeFaces
+from upd.analyses.forced.excitation import ComplexArray, excitation_of
 from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.linear_limits import stuck_modes_of
 from upd.analyses.forced.measures import (
@@ -25,18 +31,20 @@ from upd.analyses.forced.measures import (
     in_faces,
     loop_along_main,
     losing_most,
+    path_maxima,
     place,
 )
-from upd.analyses.forced.mode_peaks import CANDIDATES, ModeShapes, numbered
+from upd.analyses.forced.mode_peaks import CANDIDATES, numbered
 from upd.analyses.forced.model import Array
-from upd.analyses.forced.plan import ForcedPlan, grid, time_steps
+from upd.analyses.forced.plan import SAMPLES, ForcedPlan, blade_harmonics, grid, time_steps
 from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
+from upd.hbm.faces.balance import interface_response
 from upd.hbm.faces.record import period_of_sweep
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
-from upd.hbm.faces.sweep import SteppedSine, stepped_sine
+from upd.hbm.faces.sweep import stepped_sine
 from upd.linalg.parallel import threads_for
 from upd.progress import Stages
-from upd.scene.forced_contact import SIDES
+from upd.scene.forced_contact import SIDES, Side
 
 #: how steady a motion has to be
 TOLERANCE = 1e-3
@@ -57,9 +65,9 @@ def both_ways(
     march, start
         What is integrated, and where it begins.
     """
-    scene, out = plan.scene, []
-    force, excitation = scene.damper.centrifugal / ratio, excitation_of(scene.excitation)
-    modes, frequency = stuck_modes_of(march, CANDIDATES * scene.excitation.stop), grid(plan)
+    out: list[SweptCurve] = []
+    scene, excitation, frequency = plan.scene, excitation_of(plan.scene.excitation), grid(plan)
+    force = scene.damper.centrifugal / ratio
     ways: tuple[tuple[Way, Array], ...] = (("up", frequency), ("down", frequency[::-1]))
     with threads_for(3 * march.n):
         for way, f in ways:
@@ -74,28 +82,45 @@ def both_ways(
                 fallback=by_coulomb,
                 accelerate=False,
             )
-            start, f = found.state, found.frequency
-            H, *others = (
-                {side: accelerance_of(moved[:, j], f, k, force) for j, side in enumerate(SIDES)}
-                for k, moved in _by_harmonic(found, excitation)
-            )
-            more = dict(zip(excitation.harmonics[1:], others, strict=True))
-            peaks = {side: _peaks(found, np.abs(H[side]), modes) for side in SIDES}
-            out.append(SweptCurve(name, ratio, force, H, more, peaks, way, found))
+            start = found.state
+            moved = {k: found.harmonics[:, i] for i, k in enumerate(excitation.harmonics)}
+            moved[excitation.lowest] = found.amplitude
+            curve = Curve(name, ratio, force, {}, {}, {}, found, float(found.seconds.sum()), way)
+            out.append(with_outputs(plan, march, curve, moved, sweep_maxima))
     return out
 
 
-def _by_harmonic(found: SteppedSine, excitation: Excitation) -> Iterator[tuple[int, ComplexArray]]:
-    """Every harmonic excited, the lowest first, and the outputs' amplitudes in it."""
-    yield excitation.lowest, found.amplitude
-    for i, k in enumerate(excitation.harmonics[1:], 1):
-        yield k, found.harmonics[:, i]
+def with_outputs(
+    plan: ForcedPlan,
+    march: InterfaceModel,
+    curve: Curve[Answer],
+    moved: Mapping[int, ComplexArray],
+    maxima: Callable[[Array, Array], list[CurvePeak]],
+) -> Curve[Answer]:
+    """The curve with the accelerances of both blades and their peaks.
 
-
-def _peaks(found: SteppedSine, size: Array, modes: ModeShapes) -> tuple[CurvePeak, ...]:
-    maxima = sweep_maxima(found.frequency, size)
-    at = np.array([one.sample for one in maxima], int)
-    return tuple(numbered(modes, maxima, found.amplitude[at, len(SIDES) :]))
+    Parameters
+    ----------
+    march
+        Its outputs are the tips, then the coordinates of modes.
+    moved
+        Harmonic that is excited -> (n, K) mm of all outputs.
+    maxima
+        Frequencies and heights along the curve -> its local maxima.
+    """
+    excitation, stop = excitation_of(plan.scene.excitation), plan.scene.excitation.stop
+    (_, modes), f = stuck_modes_of(march, CANDIDATES * stop), curve.frequency
+    blades: dict[int, dict[Side, ComplexArray]] = {
+        k: {s: accelerance_of(u[:, j], f, k, curve.force) for j, s in enumerate(SIDES)}
+        for k, u in moved.items()
+    }
+    read, peaks = blades.pop(excitation.lowest), dict[Side, tuple[CurvePeak, ...]]()
+    for side in SIDES:
+        found = maxima(f, np.abs(read[side]))
+        at = np.array([one.sample for one in found], int)
+        motion = moved[excitation.lowest][at, len(SIDES) :]
+        peaks[side] = tuple(numbered(modes, found, motion))
+    return replace(curve, accelerance=read, more=blades, peaks=peaks)
 
 
 def sweep_maxima(frequency: Array, size: Array) -> list[CurvePeak]:
@@ -115,23 +140,56 @@ def sweep_maxima(frequency: Array, size: Array) -> list[CurvePeak]:
     ]
 
 
+def balance_curve(plan: ForcedPlan, name: str, faces: WholeFaces, ratio: float) -> FacesCurve:
+    """The balance from the static state along the sweep, rising.
+
+    Parameters
+    ----------
+    name
+        Of the contact.
+    ratio
+        F_C/F_E.
+    """
+    b, force = plan.scene.balance, plan.scene.damper.centrifugal / ratio
+    excitation = excitation_of(plan.scene.excitation)
+    found = interface_response(
+        faces.march,
+        grid(plan),
+        force * excitation.drive,
+        faces.start,
+        harmonics=blade_harmonics(plan.scene),
+        samples=SAMPLES if b.samples == "auto" else b.samples,
+        fallback=by_coulomb,
+    )
+    moved = {k: found.amplitude[:, k] for k in excitation.harmonics}
+    curve = Curve(name, ratio, force, {}, {}, {}, found, found.seconds)
+    return with_outputs(plan, faces.march, curve, moved, partial(_maxima, found.jumps))
+
+
+def _maxima(jumps: Sequence[int], frequency: Array, size: Array) -> list[CurvePeak]:
+    """Local maxima of a curve; none is read across a jump, and a stretch may be highest where one
+    ends it.
+    """
+    out, begin = [], 0
+    for end in (*(i + 1 for i in jumps), len(size)):
+        f, a = frequency[begin:end], size[begin:end]
+        out += [one._replace(sample=one.sample + begin) for one in path_maxima(f, a, 0.0)]
+        for i, inner, jumped in ((0, 1, begin > 0), (len(a) - 1, len(a) - 2, end < len(size))):
+            if jumped and (len(a) == 1 or a[i] > a[inner]):
+                out.append(CurvePeak(float(f[i]), float(a[i]), begin + i))
+        begin = end
+    return [one for one in out if one.height >= PEAKS_ABOVE * size.max()]
+
+
 #: outputs that are read from them
 WANTS = ("contact_state", "hysteresis", "damper_motion")
 
 
-def march_peaks(solution: ForcedSolution, stages: Stages) -> None:
-    """Add the last period of every sweep at every peak of the right blade.
-
-    Parameters
-    ----------
-    solution
-        With its sweeps.
-    stages
-        To tell.
-    """
+def march_peaks(solution: ForcedSolution, name: str, stages: Stages) -> None:
+    """Add the last period of every sweep of a stiffness at every peak of the right blade."""
     if not any(solution.plan.scene.wants(one) for one in WANTS):
         return
-    for sweep in solution.sweeps:
+    for sweep in (c for c in solution.curves if c.stiffness == name):
         for top in sweep.peaks["right"]:
             with stages("time march", f"{sweep.case}, peak {top.number}: its last period"):
                 solution.marched.append(marched_peak(solution, sweep, top))
@@ -140,7 +198,7 @@ def march_peaks(solution: ForcedSolution, stages: Stages) -> None:
 def marched_peak(solution: ForcedSolution, sweep: SweptCurve, peak: CurvePeak) -> MarchedPeak:
     """The last period of a sweep at one of its peaks, integrated again and kept."""
     places, rest, kept = _contact(solution, sweep.stiffness)
-    period = period_of_sweep(sweep.found, peak.sample, by_coulomb)
+    period = period_of_sweep(sweep.answer, peak.sample, by_coulomb)
     motion = np.zeros((len(period.motion), MOTIONS))
     motion[:, kept] = period.motion - rest
     return MarchedPeak(sweep, peak, period, places, motion)
@@ -181,7 +239,7 @@ def marched_loops(one: MarchedPeak, count: int) -> list[Loop]:
         Loops at most.
     """
     period, out = one.period, []
-    friction = one.sweep.found.model.friction
+    friction = one.sweep.answer.model.friction
     for p in losing_most(period.loss, count):
         traction = period.force[:, 1:, p].T
         motion = period.slip[:, :, p].T + one.places.compliance[p] * traction

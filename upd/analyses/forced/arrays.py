@@ -1,28 +1,30 @@
-"""Arrays of curves by harmonic balance and by sweeps, of linear limits, of peaks over F_C/F_E."""
+"""Arrays of a forced response for result.nc.
+
+Curves, linear limits, contact points, states, energies, loops, peaks over F_C/F_E.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import (
-    FacesCurve,
-    ForcedCurve,
-    FrictionCurve,
-    LinearCurves,
-    SweptCurve,
-)
-from upd.analyses.forced.excitation import Excitation, excitation_of
+from upd.analyses.forced.curve_results import measured_peaks
+from upd.analyses.forced.curves import Curve, FacesCurve, LinearCurves, PointCurve, SweptCurve
+from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.model import Array
-from upd.analyses.forced.performance import Performance
+from upd.analyses.forced.model import Array, Model
+from upd.analyses.forced.performance import performance_arrays
 from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
-from upd.analyses.forced.sweeps import face_shares, marched_damper, marched_loops
-from upd.analyses.measured import accelerance_array
-from upd.results import variable
+from upd.analyses.forced.sweeps import face_shares, faces_places, marched_damper, marched_loops
+from upd.analyses.measured import accelerance_array, measured_arrays
+from upd.hbm import FrequencyResponse
+from upd.hbm.faces.balance import InterfaceResponse
+from upd.mesh import IntArray
+from upd.results import ArrayGroup, Case, variable
 from upd.scene.forced_contact import SIDES
 
 Variables = dict[str, Any]
@@ -33,13 +35,99 @@ PERFORMANCE, SWEEP, MARCHED = "performance", "sweep", "marched peaks"
 N_LOOPS = 4
 
 
-def _accelerances(curve: FrictionCurve) -> Variables:
-    """Both blades in every harmonic that is excited."""
-    return {f"accelerance_{side}": accelerance_array(curve.accelerance[side]) for side in SIDES} | {
-        f"accelerance_{side}_harmonic_{k}": accelerance_array(H[side])
-        for k, H in curve.more.items()
-        for side in SIDES
+def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
+    """Arrays for result.nc.
+
+    Returns
+    -------
+    dict
+        Group -> variable -> (dimensions, array, attributes). Contents: "points" and "linear" of
+        every stiffness, "friction" of every curve, "sweep" and "marched peaks" of every sweep (the
+        latter what the contact does at its peaks), "performance", the "measured" peaks, and every
+        "measured curve".
+    """
+    out: dict[str, ArrayGroup] = {}
+    scene = solution.plan.scene
+
+    def add(content: str, case: Case | str, variables: Variables) -> None:
+        """A group of a case, or of a stiffness."""
+        mine = case if isinstance(case, Case) else Case(stiffness=case)
+        out[f"{content} {case}"] = ArrayGroup(variables, content=content, case=mine)
+
+    for name, model in solution.models.items():
+        add(POINTS, name, _points(model))
+    for name in solution.faces if scene.wants("contact_state") else ():
+        add(POINTS, name, _nodes(solution, name))
+    for name, linear in solution.linear.items():
+        add(LINEAR, name, _linear_arrays(solution, linear))
+    for curve in (c for c in solution.curves if not c.empty):
+        add(SWEEP if curve.way else FRICTION, curve.case, _curve_arrays(solution, curve))
+    for case, marched in groupby(solution.marched, lambda one: one.sweep.case):
+        add(MARCHED, case, marched_arrays(solution, list(marched)))
+    for name, performance in solution.performances.items():
+        add(PERFORMANCE, name, performance_arrays(performance))
+    out |= measured_arrays(scene.measured) if out else {}
+    measured = measured_peaks(solution.plan)
+    if measured and out:
+        source = ", ".join(dict.fromkeys(one.source for one in measured))
+        frequency = variable("peak", [one.value for one in measured], "Hz", source=source)
+        out["measured peaks"] = ArrayGroup({"frequency": frequency}, content=MEASURED)
+    return out
+
+
+def _points(model: Model) -> Variables:
+    law, at = model.contacts.law, "contact_point"
+    return _places(model.position, model.face, *measures.place(model)) | {
+        "k_n": variable(at, law.k_n, "N/mm"),
+        "k_t": variable(at, law.k_t, "N/mm"),
+        "static_force": variable(
+            f"{at} static_component",
+            np.column_stack([law.preload, model.traction]),
+            "N",
+            "before vibration: normal force, then tractions",
+        ),
     }
+
+
+def _nodes(solution: ForcedSolution, name: str) -> Variables:
+    """Nodes of whole faces, in the variables of contact points without springs."""
+    of, places = solution.faces[name].of, faces_places(solution, name)
+    area = {"area": variable("contact_point", places.weight, "mm2")}
+    return _places(of.position, places.face, places.along, places.up) | area
+
+
+def _places(position: Array, face: IntArray, along: Array, up: Array) -> Variables:
+    """Where contact points lie: in space, and in the frames of their faces."""
+    at, low = "contact_point", "place up the slope, from the lowest point of the face"
+    return {
+        "position": variable(f"{at} component", position, "mm"),
+        "face": variable(at, face, flag_meanings="left right"),
+        "along": variable(at, along, "mm", "place along the damper"),
+        "up": variable(at, up, "mm", low),
+    }
+
+
+def _curve_arrays(solution: ForcedSolution, curve: Curve[Any]) -> Variables:
+    """A curve: accelerance of both blades in every harmonic that is excited, its peaks, and what
+    its method knows of the contact.
+    """
+    a = curve.answer
+    out: Variables = {
+        "frequency": variable(
+            "frequency", curve.frequency, "Hz", status=a.status, message=a.message
+        ),
+        "excitation_force": variable("", curve.force, "N"),
+    }
+    for side in SIDES:
+        out[f"accelerance_{side}"] = accelerance_array(curve.accelerance[side])
+        for k, H in curve.more.items():
+            out[f"accelerance_{side}_harmonic_{k}"] = accelerance_array(H[side])
+        out |= peak_arrays(side, curve.peaks[side])
+    if isinstance(a, FrequencyResponse):
+        return out | _point_arrays(solution, curve)
+    if isinstance(a, InterfaceResponse):
+        return out | _faces_arrays(solution, curve)
+    return out | _swept_arrays(solution, curve)
 
 
 def _contact(state: Array, energy: Array, power: Array) -> Variables:
@@ -132,7 +220,7 @@ def loop_arrays(
     }
 
 
-def linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:
+def _linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:
     """Accelerance of both blades free and stuck, their peaks, the stuck modes, the damping."""
     excited = excitation_of(solution.plan.scene.excitation)
     told = {} if excited.usual else {"excitation": excited.words}
@@ -152,15 +240,11 @@ def linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:
     }
 
 
-def friction_arrays(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
-    """A path of points: accelerance of both blades, states, losses, motion of the damper, loops."""
+def _point_arrays(solution: ForcedSolution, curve: PointCurve) -> Variables:
+    """Along a path of points: states, losses, motion of the damper, loops."""
     answer, model, scene = curve.answer, solution.models[curve.stiffness], solution.plan.scene
     at = solution.marked_points(curve)
     out: Variables = {
-        "frequency": variable(
-            "frequency", answer.frequency, "Hz", status=answer.status, message=answer.message
-        ),
-        "excitation_force": variable("", curve.force, "N"),
         "stable": variable(
             "frequency",
             curve.rising.astype(np.int8),
@@ -168,7 +252,6 @@ def friction_arrays(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
             "0 between two folds, where the frequency falls",
         ),
         **_fold_arrays(curve),
-        **_accelerances(curve),
         **_contact(answer.state, answer.energy, measures.power(answer)),
         "truncation": variable("frequency", answer.truncation, "1"),
         "highest_harmonic": variable("frequency", answer.highest_harmonic, "1"),
@@ -186,11 +269,6 @@ def friction_arrays(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
             "mm, rad",
             coefficient="a0 a1 b1 ...",
         ),
-        **{
-            key: value
-            for side in SIDES
-            for key, value in peak_arrays(side, curve.peaks[side]).items()
-        },
         **marked_peaks(at),
     }
     if scene.wants("contact_state"):
@@ -208,7 +286,7 @@ def friction_arrays(solution: ForcedSolution, curve: ForcedCurve) -> Variables:
     return out | loop_arrays(loops, model.face, *measures.place(model))
 
 
-def _fold_arrays(curve: ForcedCurve) -> Variables:
+def _fold_arrays(curve: PointCurve) -> Variables:
     """Where slow sweeps jump, and the heights of the right blade before and after."""
     if not curve.folds:
         return {}
@@ -221,22 +299,13 @@ def _fold_arrays(curve: ForcedCurve) -> Variables:
     }
 
 
-def faces_friction(curve: FacesCurve, at: Sequence[tuple[int, str, int]]) -> Variables:
-    """A curve of whole faces: accelerance of both blades, states and losses of every node, jumps.
-
-    Parameters
-    ----------
-    at
-        Number, mode and point of its peaks.
-    """
+def _faces_arrays(solution: ForcedSolution, curve: FacesCurve) -> Variables:
+    """Along a curve of whole faces: states and losses of every node, jumps."""
     answer, on = curve.answer, "frequency"
     jumped = np.zeros(len(curve.frequency), np.int8)
     jumped[list(answer.jumps)] = 1
     loss = np.array([one.loss for one in answer.points])
     out: Variables = {
-        "frequency": variable(on, answer.frequency, "Hz", status=answer.status),
-        "excitation_force": variable("", curve.force, "N"),
-        **_accelerances(curve),
         **_contact(
             np.array([one.nodes for one in answer.points])[:, :, [1, 2, 0]],
             loss,
@@ -249,55 +318,20 @@ def faces_friction(curve: FacesCurve, at: Sequence[tuple[int, str, int]]) -> Var
             "motion of the faces by harmonics left out, relative",
         ),
         "jump": variable(on, jumped, "1", "whether the motion jumps to another after this point"),
-        **marked_peaks(at),
+        **marked_peaks(solution.marked_points(curve)),
     }
-    for side in SIDES:
-        out |= peak_arrays(side, curve.peaks[side])
+    if solution.plan.scene.wants("contact_state"):
+        places = faces_places(solution, curve.stiffness)
+        out["share"] = shares_by_face(out["state"][1], places)
     return out
 
 
-def performance_arrays(found: Performance) -> Variables:
-    """Peaks of both blades over F_C/F_E, nan where a mode has none; the highest, and the limits."""
-    points, at = found.known, "point"
-    ratio = np.array([one.ratio for one in points])
-    modes = {(p.blade, p.number): p.mode for one in points for p in one.peaks}
+def _swept_arrays(solution: ForcedSolution, one: SweptCurve) -> Variables:
+    """Along a sweep: states, losses and cost."""
+    found, at = one.answer, "frequency"
+    lowest = excitation_of(solution.plan.scene.excitation).lowest
+    scale = (2.0 * np.pi * lowest * found.frequency) ** 2 * 1e-3 / one.force
     out: Variables = {
-        "ratio": variable(at, ratio, "1", "F_C/F_E"),
-        "highest_accelerance": variable(
-            at,
-            [one.worst.height for one in points if one.worst is not None],
-            "(m/s2)/N",
-            "highest peak of both blades and all modes",
-        ),
-        "free_peak": variable("", found.free, "(m/s2)/N"),
-        "stuck_peak": variable("", found.stuck, "(m/s2)/N"),
-    }
-    for (blade, number), mode in sorted(modes.items()):
-        rows = np.full((2, len(points)), np.nan)
-        for k, one in enumerate(points):
-            for p in one.peaks:
-                if (p.blade, p.number) == (blade, number):
-                    rows[:, k] = p.frequency, p.height
-        about = {"mode": mode, "blade": blade}
-        out[f"peak_{number}_frequency_{blade}"] = variable(at, rows[0], "Hz", **about)
-        out[f"peak_{number}_accelerance_{blade}"] = variable(at, rows[1], "(m/s2)/N", **about)
-    best = found.best
-    if best is not None and best.worst is not None:
-        out |= {
-            "best_ratio": variable("", best.ratio, "1", "F_C/F_E"),
-            "best_accelerance": variable("", best.worst.height, "(m/s2)/N"),
-        }
-    return out
-
-
-def swept_arrays(one: SweptCurve, excited: Excitation) -> Variables:
-    """Accelerance of both blades along a sweep, its states, losses and cost."""
-    found, at = one.found, "frequency"
-    scale = (2.0 * np.pi * excited.lowest * found.frequency) ** 2 * 1e-3 / one.force
-    out: Variables = {
-        "frequency": variable(at, found.frequency, "Hz", status=found.status),
-        "excitation_force": variable("", one.force, "N"),
-        **_accelerances(one),
         "share": variable(
             "frequency state",
             found.share[:, [1, 2, 0]],
@@ -316,15 +350,7 @@ def swept_arrays(one: SweptCurve, excited: Excitation) -> Variables:
     for k, side in enumerate(SIDES):
         out[f"lowest_{side}"] = variable(at, scale * found.lowest[:, k], "(m/s2)/N")
         out[f"highest_{side}"] = variable(at, scale * found.highest[:, k], "(m/s2)/N")
-        out |= peak_arrays(side, one.peaks[side])
     return out
-
-
-def peaks_by_sweep(marched: Sequence[MarchedPeak]) -> list[tuple[SweptCurve, list[MarchedPeak]]]:
-    """Peaks of every sweep that has some."""
-    cases = dict.fromkeys(one.sweep.case for one in marched)
-    found = [[one for one in marched if one.sweep.case == case] for case in cases]
-    return [(some[0].sweep, some) for some in found]
 
 
 def marched_arrays(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Variables:
