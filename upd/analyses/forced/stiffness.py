@@ -22,7 +22,7 @@ from upd.cache.sources import source_digest
 from upd.contact.law import ContactLaw
 from upd.errors import InputError
 from upd.mesh import recipes
-from upd.mesh.damper import DamperSizes
+from upd.mesh.fields import DamperSizes
 from upd.progress import Stages
 from upd.results import ArrayGroup, read_netcdf, write_netcdf
 from upd.scene import Scene, load_scene
