@@ -295,3 +295,32 @@ def test_what_an_inp_file_cannot_say_is_refused(
     was: str, now: str, told: str, tmp_path: Path
 ) -> None:
     assert told in told_of(inp(tmp_path / "blocks.inp", blocks(), (was, now)))
+
+
+# -- places of the two faces -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gap", [-1e-3, -5e-4, 1e-3], ids=["overlap", "half of it", "apart"])
+def test_stiffness_counts_from_the_first_touch(gap: float, tmp_path: Path) -> None:
+    """The approach counts from the file's places; at -1 um the two cancel."""
+    meshes = blocks()
+    damper = meshes["damper"]
+    meshes["damper"] = damper.with_points(damper.points + [0.0, 0.0, gap])
+    result = solved(inp(tmp_path / "blocks.inp", meshes))
+    assert result.value("max_pressure") == pytest.approx(25.0, rel=1e-4)
+    assert result.value("approach") == pytest.approx(1.0 + 1e3 * gap, abs=1e-4)
+    assert result.value("K_N_secant_raw") == pytest.approx(4e5, rel=1e-4)
+    assert result.value("K_N_tangent_raw") == pytest.approx(4e5, rel=1e-4)
+    assert result.value("K_N_damper_alone") == pytest.approx(8e5, rel=1e-4)
+
+
+def test_an_overlap_of_curved_faces_makes_no_negative_stiffness(tmp_path: Path) -> None:
+    def secant(overlap: float) -> float:
+        meshes = blocks(cuts=6)
+        damper = meshes["damper"]
+        crown = damper.points.copy()
+        crown[:, 2] += ((crown[:, 0] - 2.0) ** 2 + (crown[:, 1] - 2.0) ** 2) / 2000.0 - overlap
+        meshes["damper"] = damper.with_points(crown)
+        return solved(inp(tmp_path / "blocks.inp", meshes), load="10 N").value("K_N_secant_raw")
+
+    assert secant(0.005) == pytest.approx(secant(0.0), rel=1e-3)

@@ -137,13 +137,13 @@ def _normal(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
 def _stiffness(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
     if not solution.plan.scene.wants("stiffness") or case.force <= 0.0:
         return []
-    at = case.case
+    at, touch = case.case, solution.model.first_touch
     out = [
-        q.K_N_SECANT_RAW.of(case.force / case.solution.approach, at),
+        q.K_N_SECANT_RAW.of(case.force / (case.solution.approach - touch), at),
         q.K_N_TANGENT_RAW.of(case.stiffness, at),
         q.K_N_BONDED.of(solution.bonded, at),
         *(
-            q.K_N_ALONE.of(case.force / one.approach, at, n=body)
+            q.K_N_ALONE.of(case.force / (one.approach - touch), at, n=body)
             for body, one in case.alone.items()
         ),
     ]
@@ -163,7 +163,9 @@ def _per_pad(solution: FlatSolution, case: FlatNormalCase) -> list[Result]:
     if n < 2:
         return []
     return [
-        q.K_N_PER_PAD.of(case.force / case.solution.approach / n, at),
+        q.K_N_PER_PAD.of(
+            case.force / (case.solution.approach - solution.model.first_touch) / n, at
+        ),
         *(
             q.K_T_PER_PAD.of(s.total / n, at, n=direction_name(s.direction))
             for s in solution.stuck

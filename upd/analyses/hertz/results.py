@@ -194,7 +194,9 @@ def _stiffness(solution: HertzSolution, case: HertzNormalCase) -> list[Result]:
     hertz, at = hertz_of(solution, case.load), case.case
     if not solution.plan.scene.wants("stiffness") or case.load <= 0.0:
         return []
-    body, secant = case.finite_body / case.load, case.load / case.approach
+    # a gap that is left at the apex is the lattice's, an overlap is the file's
+    touch = min(0.0, solution.model.first_touch)
+    body, secant = case.finite_body / case.load, case.load / (case.approach - touch)
     tangent_of, secant_of = _of(hertz, "tangent_stiffness"), _of(hertz, "secant_stiffness")
     K_N = without_body(case.stiffness, body)
     out = [
