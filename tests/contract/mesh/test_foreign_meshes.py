@@ -19,6 +19,7 @@ from upd.errors import InputError, UpdError
 from upd.fem import box_mesh
 from upd.mesh import Mesh, recipes
 from upd.mesh.export import write_mesh
+from upd.mesh.pairing import check_pairs
 from upd.mesh.quality import quality
 from upd.results import Result
 
@@ -305,7 +306,7 @@ def test_stiffness_counts_from_the_first_touch(gap: float, tmp_path: Path) -> No
     """The approach counts from the file's places; at -1 um the two cancel."""
     meshes = blocks()
     damper = meshes["damper"]
-    meshes["damper"] = damper.with_points(damper.points + [0.0, 0.0, gap])
+    meshes["damper"] = damper.with_points(damper.points + np.array([0.0, 0.0, gap]))
     result = solved(inp(tmp_path / "blocks.inp", meshes))
     assert result.value("max_pressure") == pytest.approx(25.0, rel=1e-4)
     assert result.value("approach") == pytest.approx(1.0 + 1e3 * gap, abs=1e-4)
@@ -324,3 +325,66 @@ def test_an_overlap_of_curved_faces_makes_no_negative_stiffness(tmp_path: Path) 
         return solved(inp(tmp_path / "blocks.inp", meshes), load="10 N").value("K_N_secant_raw")
 
     assert secant(0.005) == pytest.approx(secant(0.0), rel=1e-3)
+
+
+@pytest.mark.parametrize("far", [0.0, 800.0])
+@pytest.mark.parametrize("digits", [6, 7, 9])
+def test_rounded_coordinates_are_paired(digits: int, far: float, tmp_path: Path) -> None:
+    """Both faces round the same lattice, one of them after a shift that was taken back."""
+    meshes = blocks()
+    for name, mesh in meshes.items():
+        shift = np.array([far, 0.0, 0.0]) + (np.pi / 7.0 if name == "damper" else 0.0)
+        there = np.array([[float(f"{x:.{digits}g}") for x in row] for row in mesh.points + shift])
+        back = there + (np.array([far, 0.0, 0.0]) - shift)
+        back[:, 2] = mesh.points[:, 2]
+        meshes[name] = mesh.with_points(back)
+    file = inp(tmp_path / "blocks.inp", meshes)
+    number = re.compile(r"-?\d+\.\d+(e-\d+)?")
+    text = number.sub(lambda m: f"{float(m[0]):.{digits}g}", file.read_text(encoding="utf-8"))
+    file.write_text(text, encoding="utf-8")
+    read, _ = recipes.build_mesh(str(file), {})
+    (pairs,) = check_pairs(read)
+    assert pairs.count == 16
+    assert 0.0 < pairs.offset < 2.0 * max(far, 4.0) * 10.0 ** (1 - digits)
+
+
+def test_a_shifted_lattice_is_no_rounding(tmp_path: Path) -> None:
+    meshes = blocks()
+    damper = meshes["damper"]
+    meshes["damper"] = damper.with_points(damper.points + np.array([1e-4, 0.0, 0.0]))
+    assert "0.0001 mm out of line; order both sets alike" in told_of(
+        inp(tmp_path / "blocks.inp", meshes)
+    )
+
+
+def test_unmerged_halves_are_named(tmp_path: Path) -> None:
+    meshes = blocks()
+    damper = meshes["damper"]
+    upper = damper.points[damper.hexes].mean(axis=1)[:, 2] > 2.0
+    first, second = damper.hexes[~upper], damper.hexes[upper]
+    own = np.unique(second)
+    hexes = np.vstack([first, damper.n_node + np.searchsorted(own, second)])
+    nodes = {
+        "contact": damper.nodes["contact"],
+        "distant": damper.n_node + np.searchsorted(own, damper.nodes["distant"]),
+    }
+    points = np.vstack([damper.points, damper.points[own]])
+    meshes["damper"] = Mesh(points, hexes, nodes=nodes)
+    told = told_of(inp(tmp_path / "blocks.inp", meshes))
+    assert "damper: 16 pairs of nodes lie at one place each" in told
+    assert "merge coincident nodes" in told
+
+
+def test_surfaces_round_each_other_are_named(tmp_path: Path) -> None:
+    """Ring on ring with an interference of 2.5 um: there is one pairing direction only."""
+    meshes = {}
+    for name, radii, contact in (
+        ("damper", (10.0, 16.0, 20.0), "x1"),
+        ("platform", (19.9975, 24.0, 30.0), "x0"),
+    ):
+        box = box_mesh(radii, np.linspace(0.0, 0.5 * np.pi, 9), [0.0, 4.0, 8.0])
+        r, angle, z = box.points.T
+        nodes = {"contact": box.nodes[contact], "distant": box.nodes["z1"]}
+        places = np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1)
+        meshes[name] = Mesh(places, box.hexes, nodes=nodes)
+    assert "there is one pairing direction only" in told_of(inp(tmp_path / "r.inp", meshes))
