@@ -16,8 +16,17 @@ from geometry.blocks.gmsh_session import (
     session,
 )
 from geometry.blocks.hexahedron import REFERENCE, Grid, flipped, mirrored
-from upd.mesh.damper import DamperSizes, Size
-from upd.mesh.fields import choice, field_faults, in_degrees, in_mm, ratio, whole
+from geometry.blocks.mesh_file import read_msh
+from upd.mesh.fields import (
+    DamperSizes,
+    Size,
+    choice,
+    field_faults,
+    in_degrees,
+    in_mm,
+    ratio,
+    whole,
+)
 
 __all__ = [
     "DEBIAN_PACKAGES",
@@ -37,6 +46,7 @@ __all__ = [
     "mirrored",
     "ratio",
     "ratio_for",
+    "read_msh",
     "require",
     "session",
     "whole",

@@ -35,6 +35,7 @@ _OPTIONS = {
     "Mesh.SecondOrderLinear": 1,
     "Mesh.RecombineAll": 1,
     "Mesh.SecondOrderIncomplete": 0,
+    "Mesh.SwitchElementTags": 0,
 }
 
 

@@ -299,6 +299,11 @@ class ContactModel:
         (only,) = self.patches.values()
         return only
 
+    @property
+    def first_touch(self) -> float:
+        """Approach at which the unloaded bodies touch [mm]; negative where the meshes overlap."""
+        return float(self.gap.min())
+
     def compliance(self, row: int, column: int | None = None) -> Array:
         """Sum of both bodies' compliance at the multipliers, P' (C1 + C2) P.
 

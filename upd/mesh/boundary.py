@@ -8,28 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.errors import MeshError, OwnMeshError
-from upd.mesh.hexmesh import MIDDLES, SIDES, FloatArray, IntArray, Mesh
+from upd.mesh.hexmesh import FACE_SIZE, SIDE_NODES, SIDES, FloatArray, IntArray, Mesh
 
 
 def boundary_quads(mesh: Mesh) -> IntArray:
     """Corner nodes of the sides that belong to one hexahedron only, (n, 4), seen from outside
     counter-clockwise.
     """
-    quads = mesh.hexes[:, SIDES].reshape(-1, 4)
-    return np.asarray(quads[_alone(quads)], dtype=np.int64)
-
-
-# centres of the sides of a hexahedron (VTK's order)
-_CENTRES = dict(
-    zip(
-        map(
-            frozenset,
-            ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 1, 2, 3), (4, 5, 6, 7)),
-        ),
-        range(20, 26),
-        strict=True,
-    )
-)
+    return boundary_faces(mesh)[:, :4]
 
 
 def boundary_faces(mesh: Mesh) -> IntArray:
@@ -37,16 +23,8 @@ def boundary_faces(mesh: Mesh) -> IntArray:
 
     The ring first, seen from outside counter-clockwise, then mid-edges, then the centre.
     """
-    size = mesh.hexes.shape[1]
-    table = []
-    for ring in SIDES.tolist():
-        row = list(ring)
-        if size > 8:
-            row += [MIDDLES[frozenset((ring[k], ring[(k + 1) % 4]))] for k in range(4)]
-        if size > 20:
-            row.append(_CENTRES[frozenset(ring)])
-        table.append(row)
-    faces = mesh.hexes[:, np.array(table)].reshape(-1, len(table[0]))
+    size = FACE_SIZE[mesh.hexes.shape[1]]
+    faces = mesh.hexes[:, SIDE_NODES[:, :size]].reshape(-1, size)
     return np.asarray(faces[_alone(faces[:, :4])], dtype=np.int64)
 
 

@@ -6,9 +6,12 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from upd.errors import OwnMeshError
-from upd.mesh import FACE_SIZE, Mesh
+from upd.mesh.boundary import boundary_quads
+from upd.mesh.hexmesh import EDGES, FACE_SIZE, Mesh
+from upd.mesh.pairing import rounding
 
 #: set -> what it is for
 PURPOSE = {
@@ -35,6 +38,7 @@ def check_mesh(name: str, mesh: Mesh) -> None:
         problems += _number_problems(f"node set {key!r}", nodes, n, None)
     for key, weights in mesh.weights.items():
         problems += _weight_problems(key, weights, mesh.nodes.get(key))
+    problems = problems or _unmerged(mesh)
     if problems:
         raise OwnMeshError("\n".join(f"{name}: {problem}" for problem in problems))
 
@@ -51,6 +55,22 @@ def _point_problems(points: Any) -> list[str]:
         if len(bad)
         else []
     )
+
+
+def _unmerged(mesh: Mesh) -> list[str]:
+    """Whether parts of the body lie at the same places without being joined."""
+    points = mesh.points[np.unique(boundary_quads(mesh))]
+    edges = np.diff(mesh.points[mesh.hexes[:, EDGES]], axis=2)
+    apart = min(rounding(points), 1e-3 * float(np.linalg.norm(edges, axis=3).min()))
+    pairs = cKDTree(points).query_pairs(apart, output_type="ndarray")
+    if not len(pairs):
+        return []
+    x, y, z = points[pairs[0, 0]]
+    return [
+        f"{len(pairs)} pairs of nodes lie at one place each, the first at ({x:.6g}, {y:.6g}, "
+        f"{z:.6g}) mm, so that its parts are not joined; to fix it: merge coincident nodes where "
+        "the mesh is made"
+    ]
 
 
 def _number_problems(what: str, numbers: Any, n: int, widths: tuple[int, ...] | None) -> list[str]:

@@ -91,10 +91,6 @@ def _offsets(meshes: Mapping[str, Mesh]) -> IntArray:
     )
 
 
-def _body_of_nodes(meshes: Mapping[str, Mesh]) -> IntArray:
-    return np.repeat(np.arange(len(meshes)), [mesh.n_node for mesh in meshes.values()])
-
-
 def _write_vtu(
     meshes: Mapping[str, Mesh], path: Path, point_data: Mapping[str, NDArray[Any]] | None = None
 ) -> None:
@@ -105,7 +101,8 @@ def _write_vtu(
         for mesh, first in zip(meshes.values(), _offsets(meshes), strict=False)
     ]
     body = [np.full(mesh.n_hex, k) for k, mesh in enumerate(meshes.values())]
-    data = {"body": _body_of_nodes(meshes), **(point_data or {})}
+    nodes = np.repeat(np.arange(len(meshes)), [mesh.n_node for mesh in meshes.values()])
+    data = {"body": nodes, **(point_data or {})}
     points = np.vstack([mesh.points for mesh in meshes.values()])
     meshio.Mesh(points, cells, point_data=data, cell_data={"body": body}).write(
         path, file_format="vtu"

@@ -1,14 +1,15 @@
-"""Fields of a recipe's dataclass: unit, bounds and choices as data, checked by one function.
+"""What recipes share: fields of their dataclasses as data, and the sizes of a damper.
 
 A recipe writes ``radius: float = in_mm(5.0)`` and asks `field_faults` for what is out of bounds;
 bounds that depend on other parameters stay in the recipe's own checks. `table` gives all of them,
-the latter by asking the recipe itself.
+the latter by asking the recipe itself. Two recipes are of the same damper when their `DamperSizes`
+agree; what stands for the blade, and the mesh, may differ.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
@@ -20,6 +21,8 @@ UNITS_INSIDE = {"length": "mm", "angle": "deg"}
 _HALVINGS = 60
 #: numbers further from their value than this factor are called unbounded
 _FAR = 1e6
+#: rounding of lengths and angles that follow from others, relative to the largest of them
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -264,3 +267,60 @@ def _rounded(end: float | None, sign: int) -> float:
     # what is a round number but for the halving's last digit stays one
     nearest = round(end / unit)
     return (nearest if abs(end / unit - nearest) < 1e-6 else inwards(end / unit)) * unit
+
+
+@dataclass(frozen=True)
+class Size:
+    """One size of a damper.
+
+    Attributes
+    ----------
+    value
+        mm or degrees.
+    unit
+        "mm" or "deg".
+    parameter
+        Of the recipe that sets it; "" where none does.
+    """
+
+    value: float
+    unit: str = "mm"
+    parameter: str = ""
+
+    @property
+    def text(self) -> str:
+        """The value with its unit and parameter."""
+        place = f" ({self.parameter})" if self.parameter else ""
+        return f"{self.value:.6g} {self.unit}{place}"
+
+
+@dataclass(frozen=True)
+class DamperSizes:
+    """A damper and its contact faces.
+
+    Attributes
+    ----------
+    kind
+        "wedge" or "pads"; sizes of different kinds are not compared.
+    volume
+        Of the whole damper, mm3.
+    sizes
+        What is measured, in words -> its size.
+    """
+
+    kind: str
+    volume: float
+    sizes: Mapping[str, Size]
+
+    def differences(self, other: DamperSizes, mine: str, theirs: str) -> list[str]:
+        """What differs, one sentence a size; ``mine`` and ``theirs`` say whose damper is whose."""
+        if self.kind != other.kind:
+            return [f"kind of damper: {self.kind} {mine}, {other.kind} {theirs}"]
+        largest = max(size.value for size in (*self.sizes.values(), *other.sizes.values()))
+        return [
+            f"{what}: {size.text} {mine}, {other.sizes[what].text} {theirs}"
+            for what, size in self.sizes.items()
+            if not math.isclose(
+                size.value, other.sizes[what].value, rel_tol=0.0, abs_tol=_ROUNDING * largest
+            )
+        ]

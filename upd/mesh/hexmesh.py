@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,15 @@ EDGES = np.array(
 )
 #: corners of an edge -> its mid-edge node
 MIDDLES = {frozenset(map(int, edge)): 8 + k for k, edge in enumerate(EDGES)}
+#: centres of the sides
+CENTRES = (24, 25, 22, 21, 23, 20)
+#: corners of the sides, their mid-edge nodes and centres
+SIDE_NODES = np.array(
+    [
+        [*ring, *(MIDDLES[frozenset((ring[k - 1], ring[k]))] for k in (1, 2, 3, 0)), centre]
+        for ring, centre in zip(SIDES.tolist(), CENTRES, strict=True)
+    ]
+)
 
 
 @dataclass(frozen=True)
@@ -74,3 +84,24 @@ class Mesh:
     def with_points(self, points: FloatArray) -> Mesh:
         """The same mesh with other coordinates, (n_node, 3) in mm."""
         return replace(self, points=points)
+
+
+class NamedElements(NamedTuple):
+    """Elements of one kind under one name of a mesh file.
+
+    Attributes
+    ----------
+    name
+        "" for elements with a volume that have none.
+    dimension
+        3 for elements with a volume; of others the nodes are a set.
+    kind
+        "Hexahedron", or the file's word for another element.
+    nodes
+        Node numbers; of hexahedra (n_element, 8 | 20 | 27) in VTK order.
+    """
+
+    name: str
+    dimension: int
+    kind: str
+    nodes: IntArray

@@ -7,24 +7,25 @@ Boundary faces follow from the node sets; nodes that face each other are put in 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import TypeVar
 
 import numpy as np
 
 from upd.errors import InputError, OwnMeshError
 from upd.mesh.boundary import boundary_faces
-from upd.mesh.hexmesh import FloatArray, IntArray, Mesh
+from upd.mesh.hexmesh import FACE_SIZE, FloatArray, IntArray, Mesh, NamedElements
+from upd.mesh.inp import read_inp
 from upd.mesh.pairing import OUT_OF_LINE, in_pairs
 
 #: endings of the files
 ENDINGS = (".msh", ".inp")
 #: bodies of a rig without its damper, and the one of a rig with the damper glued in
 _BLADES, _GLUED = ("left", "right"), "rig"
-_HEXES = {"hexahedron": 8, "hexahedron20": 20, "hexahedron27": 27}
+#: what reads a file: points and named groups
+Reader = Callable[[Path], tuple[FloatArray, list[NamedElements]]]
 
 
 @dataclass(frozen=True)
@@ -67,17 +68,10 @@ class RigFile(MeshFile):
             raise InputError('symmetry: the file holds the whole rig; set mesh.symmetry = "full"')
 
 
-@dataclass
-class _Content:
-    """What a file holds: points, bodies as hexahedra, sets as node numbers."""
-
-    points: FloatArray
-    bodies: dict[str, IntArray] = field(default_factory=dict)
-    sets: dict[str, IntArray] = field(default_factory=dict)
-
-
-def recipe_of(path: Path) -> ModuleType:
+def recipe_of(path: Path, read_msh: Reader) -> ModuleType:
     """The file as a recipe: a module with ``build`` and the analysis its sets are for.
+
+    ``read_msh`` reads files of gmsh.
 
     Raises
     ------
@@ -86,7 +80,7 @@ def recipe_of(path: Path) -> ModuleType:
     OwnMeshError
         When it has no hexahedra or no named bodies.
     """
-    meshes = _meshes(path)
+    meshes = _meshes(path, read_inp if path.suffix.lower() == ".inp" else read_msh)
     module = ModuleType(f"upd_mesh_{path.stem}")
     module.__file__ = str(path.resolve())
     rig = set(_BLADES) <= set(meshes)
@@ -131,36 +125,96 @@ def _scaled(meshes: Mapping[str, Mesh], params: MeshFile) -> dict[str, Mesh]:
     return {name: mesh.with_points(params.scale * mesh.points) for name, mesh in meshes.items()}
 
 
-def _meshes(path: Path) -> dict[str, Mesh]:
+def _meshes(path: Path, read: Reader) -> dict[str, Mesh]:
+    place = f"recipe {str(path)!r}"
     try:
-        content = _inp(path) if path.suffix.lower() == ".inp" else _msh(path)
+        points, groups = read(path)
+        bodies, sets = _by_name(groups)
+        return in_pairs(
+            {name: _body(name, cells, points, sets, bodies) for name, cells in bodies.items()}
+        )
+    except OwnMeshError as problem:
+        raise OwnMeshError(f"{place}: {problem}") from None
     except OSError as problem:
         raise InputError(
-            f"recipe {str(path)!r}: cannot be read ({problem.strerror}); give the path of a mesh"
+            f"{place}: cannot be read ({problem.strerror}); give the path of a mesh"
         ) from None
     except (ValueError, KeyError, IndexError) as problem:
         raise InputError(
-            f"recipe {str(path)!r}: is damaged or of another kind ({problem}); to fix it: correct "
-            "it there or write the file again"
+            f"{place}: is damaged or of another kind ({problem}); to fix it: correct it there or "
+            "write the file again"
         ) from None
-    if not content.bodies:
-        raise OwnMeshError(
-            f"recipe {str(path)!r}: has no named body of hexahedra; to fix it: name the volumes "
-            "(physical volumes in gmsh, *ELEMENT ... ELSET=NAME in .inp)"
-        )
-    return in_pairs({name: _body(content, name) for name in content.bodies})
 
 
-def _body(content: _Content, name: str) -> Mesh:
+def _by_name(groups: Iterable[NamedElements]) -> tuple[dict[str, IntArray], dict[str, IntArray]]:
+    """Hexahedra of the bodies and nodes of the sets, each once in the order of the file."""
+    bodies: dict[str, list[IntArray]] = {}
+    sets: dict[str, list[int]] = {}
+    for name, dimension, kind, nodes in groups:
+        if dimension < 3:
+            sets.setdefault(name.lower(), []).extend(nodes.ravel().tolist())
+        elif kind == "Hexahedron" and nodes.shape[1] in FACE_SIZE:
+            bodies.setdefault(name.lower(), []).append(nodes)
+        else:
+            raise OwnMeshError(
+                f"has {kind} elements; to fix it: mesh all bodies with hexahedra of 8, 20 or 27 "
+                "nodes"
+            )
+    for name, parts in bodies.items():
+        if len(sizes := sorted({cells.shape[1] for cells in parts})) > 1:
+            raise OwnMeshError(
+                f"body {name!r} has hexahedra of {' and '.join(map(str, sizes))} nodes; mesh it "
+                "with one kind"
+            )
+        if twice := sum(map(len, parts)) - _different(parts):
+            raise OwnMeshError(f"body {name!r} has {twice} hexahedra twice; write each once")
+    stacked = {name: np.vstack(parts) for name, parts in bodies.items()}
+    return (
+        {name: stacked[name] for name in _chosen(stacked, sets)},
+        {name: np.array(list(dict.fromkeys(nodes)), np.int64) for name, nodes in sets.items()},
+    )
+
+
+def _chosen(bodies: Mapping[str, IntArray], sets: Iterable[str]) -> list[str]:
+    """The bodies: those that begin the name of a set, NAME_contact, when they hold all hexahedra;
+    else all that have a name.
+    """
+    named = [name for name in bodies if name]
+    begin = [name for name in named if any(key.startswith(f"{name}_") for key in sets)]
+    whole, missing = _different(bodies.values()), 0
+    for chosen in (begin, named):
+        missing = whole - _different(bodies[name] for name in chosen)
+        if chosen and not missing:
+            return chosen
+    raise OwnMeshError(
+        (f"{missing} of {whole} hexahedra are in" if named else "has")
+        + " no named body of hexahedra; to fix it: name the volumes (in gmsh a physical volume "
+        "each, written without SaveAll; ELSET= or *ELSET in .inp)"
+    )
+
+
+def _different(parts: Iterable[IntArray]) -> int:
+    """Number of different hexahedra."""
+    corners = [np.sort(cells[:, :8], axis=1) for cells in parts]
+    return len(np.unique(np.vstack(corners), axis=0)) if corners else 0
+
+
+def _body(
+    name: str,
+    cells: IntArray,
+    points: FloatArray,
+    sets: Mapping[str, IntArray],
+    bodies: Iterable[str],
+) -> Mesh:
     """One body with its own node numbers, its sets and the boundary faces on them."""
-    used, hexes = np.unique(content.bodies[name], return_inverse=True)
-    mesh = Mesh(content.points[used], hexes.reshape(content.bodies[name].shape).astype(np.int64))
+    used, hexes = np.unique(cells, return_inverse=True)
+    mesh = Mesh(points[used], hexes.reshape(cells.shape).astype(np.int64))
     nodes: dict[str, IntArray] = {}
     faces: dict[str, IntArray] = {}
     outside = boundary_faces(mesh)
-    for label, numbers in content.sets.items():
+    for label, numbers in sets.items():
         own = label.removeprefix(f"{name}_")
-        others = any(label.startswith(f"{b}_") for b in content.bodies if b != name)
+        others = any(label.startswith(f"{b}_") for b in bodies if b != name)
         mine = np.searchsorted(used, numbers)
         mine = np.minimum(mine, len(used) - 1)
         mine = mine[used[mine] == numbers]
@@ -173,207 +227,3 @@ def _body(content: _Content, name: str) -> Mesh:
         if len(whole):
             faces[own] = whole
     return Mesh(mesh.points, mesh.hexes, faces, nodes)
-
-
-def _msh(path: Path) -> _Content:
-    """A gmsh file, by meshio."""
-    import meshio
-
-    try:
-        read = meshio.read(path, file_format="gmsh")
-    except (meshio.ReadError, SystemExit) as problem:
-        raise ValueError(f"no gmsh file: {problem}") from None
-    names = {(int(tag), int(dim)): str(n).lower() for n, (tag, dim) in read.field_data.items()}
-    content = _Content(np.asarray(read.points, dtype=np.float64))
-    tags = read.cell_data.get("gmsh:physical", [np.zeros(len(b.data), int) for b in read.cells])
-    for block, mine in zip(read.cells, tags, strict=True):
-        for tag in np.unique(mine):
-            cells = np.asarray(block.data, dtype=np.int64)[mine == tag]
-            if block.type in _HEXES and (int(tag), 3) in names:
-                _add_body(content, names[int(tag), 3], cells)
-            elif block.dim == 3:
-                raise OwnMeshError(_OTHER_CELLS.format(path=path, kind=block.type))
-            elif (int(tag), block.dim) in names:
-                name = names[int(tag), block.dim]
-                known = content.sets.get(name, np.zeros(0, np.int64))
-                content.sets[name] = np.union1d(known, cells.ravel())
-    return content
-
-
-_OTHER_CELLS = (
-    "recipe '{path}': has {kind} elements outside a named body of hexahedra; to fix it: mesh all "
-    "bodies with hexahedra of 8, 20 or 27 nodes and name each (ELSET= in .inp, a physical volume "
-    "in gmsh)"
-)
-
-
-def _add_body(content: _Content, name: str, cells: IntArray) -> None:
-    known = content.bodies.get(name)
-    if known is not None and known.shape[1] != cells.shape[1]:
-        raise OwnMeshError(
-            f"body {name!r} has hexahedra of {known.shape[1]} and {cells.shape[1]} nodes; mesh it "
-            "with one kind"
-        )
-    content.bodies[name] = cells if known is None else np.vstack([known, cells])
-
-
-#: beginnings of the names of elements without a volume: plane and axisymmetric ones, shells,
-#: membranes, bars
-_THIN = (
-    *("CPS", "CPE", "CAX", "S3", "S4", "S6", "S8", "S9", "STRI"),
-    *("M3D", "SFM3D", "R3D", "T2D", "T3D", "B2", "B3"),
-)
-
-
-def _inp(path: Path) -> _Content:
-    """A flat Abaqus or CalculiX file: *NODE, *ELEMENT with ELSET, *NSET.
-
-    Elements without a volume, which gmsh writes of physical surfaces, are sets of nodes.
-    """
-    labels: list[int] = []
-    points: list[list[float]] = []
-    bodies: dict[str, list[list[int]]] = {}
-    sets: dict[str, list[str]] = {}
-    thin: set[str] = set()
-    for block in _blocks(_text(path)):
-        word, options, lines = block.word, block.options, block.lines
-        if word in ("INSTANCE", "INCLUDE"):
-            raise OwnMeshError(
-                f"recipe '{path}': has *{word}; to fix it: write a flat file, without parts and "
-                "instances, all in one"
-            )
-        if word == "NODE":
-            for line in lines:
-                labels.append(_number(int, line, 0))
-                points.append([_number(float, line, k) for k in (1, 2, 3)])
-        elif word == "ELEMENT" and lines:
-            kind, name = options.get("TYPE", "").upper(), options.get("ELSET", "").lower()
-            if kind.startswith(_THIN):
-                thin.add(kind)
-                if name:
-                    nodes = (x for line in lines for x in line.cells[1:] if x)
-                    sets.setdefault(name, []).extend(nodes)
-                continue
-            size = next((n for n in (20, 27, 8) if kind.startswith(f"C3D{n}")), 0)
-            if not size or not kind:
-                raise OwnMeshError(_OTHER_CELLS.format(path=path, kind=kind))
-            if not name:
-                raise OwnMeshError(
-                    f"recipe '{path}': line {block.line}: the {kind} elements have no name; to fix "
-                    f"it: *ELEMENT, TYPE={kind}, ELSET=NAME, the name of their body in the scene "
-                    "(*ELSET blocks are not read)"
-                )
-            numbers = _integers(lines)
-            if len(numbers) % (size + 1):
-                raise ValueError(
-                    f"line {block.line}: {kind} elements have {size} nodes each, these "
-                    f"{len(numbers)} numbers are not whole elements"
-                )
-            table = np.array(numbers).reshape(-1, size + 1)
-            bodies.setdefault(name, []).extend(table[:, 1:].tolist())
-        elif word == "NSET" and "NSET" in options:
-            name = options["NSET"].lower()
-            if "GENERATE" in options:
-                for line in lines:
-                    first, last, *step = _integers([line])
-                    every = range(first, last + 1, step[0] if step else 1)
-                    sets.setdefault(name, []).extend(map(str, every))
-            else:
-                sets.setdefault(name, []).extend(x for line in lines for x in line.cells if x)
-    if thin and not bodies:
-        raise OwnMeshError(
-            f"recipe '{path}': has {', '.join(sorted(thin))} elements only, which have no volume; "
-            "to fix it: write the mesh of the volumes, hexahedra C3D8, C3D20 or C3D27, each body "
-            "with its ELSET"
-        )
-    order = np.argsort(labels)
-    sorted_labels = np.asarray(labels, dtype=np.int64)[order]
-    content = _Content(np.array(points, dtype=np.float64).reshape(-1, 3)[order])
-    for name, cells in bodies.items():
-        _add_body(content, name, _numbered(np.array(cells, np.int64), sorted_labels, name))
-    for name, words in sets.items():
-        content.sets[name] = _numbered(_members(words, sets), sorted_labels, name)
-    return content
-
-
-def _text(path: Path) -> str:
-    """The text of a file: keywords and numbers are ASCII, comments may be in the Latin-1 of older
-    programs.
-    """
-    data = path.read_bytes()
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("latin-1")
-
-
-@dataclass(frozen=True)
-class _Line:
-    """A data line: its place in the file, from 1, and what stands between its commas."""
-
-    place: int
-    cells: list[str]
-
-
-_Kind = TypeVar("_Kind", int, float)
-
-
-def _number(kind: type[_Kind], line: _Line, column: int) -> _Kind:
-    """One number of a line. Raises ValueError, which names the line."""
-    try:
-        return kind(line.cells[column])
-    except (ValueError, IndexError):
-        found = ", ".join(line.cells)
-        raise ValueError(
-            f"line {line.place}: {found!r} has no number in column {column + 1}"
-        ) from None
-
-
-def _integers(lines: list[_Line]) -> list[int]:
-    return [_number(int, line, k) for line in lines for k, x in enumerate(line.cells) if x]
-
-
-def _members(words: list[str], sets: Mapping[str, list[str]]) -> IntArray:
-    """Node labels of a set, which may name other sets; each once, in the order of the file."""
-    found: list[int] = []
-    for word in words:
-        if word.lstrip("-").isdigit():
-            found.append(int(word))
-        else:
-            found.extend(int(w) for w in sets[word.lower()] if w.isdigit())
-    return np.array(list(dict.fromkeys(found)), dtype=np.int64)
-
-
-def _numbered(labels: IntArray, known: IntArray, name: str) -> IntArray:
-    """Places of node labels among the sorted ``known`` ones."""
-    places = np.minimum(np.searchsorted(known, labels), max(len(known) - 1, 0))
-    if not len(known) or (known[places] != labels).any():
-        raise ValueError(f"{name} names a node that is not there")
-    return places.astype(np.int64)
-
-
-@dataclass(frozen=True)
-class _Block:
-    """A keyword with its place in the file, from 1, its options and data lines."""
-
-    line: int
-    word: str
-    options: dict[str, str]
-    lines: list[_Line]
-
-
-def _blocks(text: str) -> Iterator[_Block]:
-    block = _Block(0, "", {}, [])
-    for place, raw in enumerate(text.splitlines(), 1):
-        line = raw.strip()
-        if not line or line.startswith("**"):
-            continue
-        if line.startswith("*"):
-            yield block
-            first, *rest = (part.strip() for part in line[1:].split(","))
-            pairs = (part.partition("=") for part in rest)
-            options = {key.strip().upper(): value.strip() for key, _, value in pairs}
-            block = _Block(place, first.upper(), options, [])
-        else:
-            block.lines.append(_Line(place, [cell.strip() for cell in line.split(",")]))
-    yield block

@@ -15,6 +15,10 @@ from upd.mesh import FloatArray, IntArray, Mesh
 #: largest offset of two paired nodes along the contact, relative to the contact's extent: rounding
 #: of coordinates, far below any element
 OUT_OF_LINE = 1e-9
+#: digits of coordinates that a file rounds; more are as good as all
+_DIGITS = range(6, 10)
+#: depth of a surface, relative to its extent, from which it is no face along one direction
+_WRAPS = 0.1
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,20 @@ class Pairs:
     count: int
     offset: float
     gap: float
+
+
+def rounding(points: FloatArray) -> float:
+    """How far two nodes at one place may lie apart: by the last digit of the coordinates.
+
+    Six digits at least; 0 where they have more than nine.
+    """
+    size = np.abs(points[points != 0.0])
+    power = np.floor(np.log10(size))
+    for digits in _DIGITS:
+        scaled = size / 10.0 ** (power - digits + 1)
+        if size.size and np.allclose(scaled, np.rint(scaled), rtol=1e-12, atol=0.0):
+            return float(np.sqrt(3.0) * 10.0 ** (power.max() - digits + 1))
+    return 0.0
 
 
 def check_pairs(meshes: Mapping[str, Mesh]) -> list[Pairs]:
@@ -111,12 +129,17 @@ def _checked(meshes: Mapping[str, Mesh], bodies: tuple[str, str], keys: tuple[st
     across = between @ normal
     offset = np.linalg.norm(between - np.outer(across, normal), axis=1)
     worst = int(offset.argmax())
-    if offset[worst] > OUT_OF_LINE * extent:
+    if offset[worst] > max(OUT_OF_LINE * extent, rounding(np.vstack(points))):
         x, y, z = points[0][worst]
+        remedy = "order both sets alike and copy the lattice of one surface to the other"
+        if min(float(np.ptp(p @ normal)) for p in points) > _WRAPS * extent:
+            remedy = (
+                "there is one pairing direction only, here ({:.2g}, {:.2g}, {:.2g}), so surfaces "
+                "that wrap round each other, as in a press fit, are not paired"
+            ).format(*normal + 0.0)
         raise MeshError(
             f"{place}: pair {worst} at ({x:.6g}, {y:.6g}, {z:.6g}) mm is "
-            f"{offset[worst]:.3g} mm out of line; "
-            "order both sets alike and copy the lattice of one surface to the other"
+            f"{offset[worst]:.3g} mm out of line; {remedy}"
         )
     return Pairs(bodies, keys, len(sets[0]), float(offset[worst]), float(np.abs(across).max()))
 

@@ -13,6 +13,10 @@ from upd.mesh.hexmesh import EDGES, MIDDLES
 _NEIGHBOURS = np.array(
     [[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]]
 )
+# middle node between each corner and its three neighbours
+_MIDDLES = np.array(
+    [[MIDDLES[frozenset((k, other))] for other in r] for k, r in enumerate(_NEIGHBOURS.tolist())]
+)
 # opposite faces, for the axes through the centre
 _FACES = (((1, 2, 6, 5), (0, 3, 7, 4)), ((2, 3, 7, 6), (1, 0, 4, 5)), ((4, 5, 6, 7), (0, 1, 2, 3)))
 
@@ -64,20 +68,12 @@ def scaled_jacobian(mesh: Mesh) -> FloatArray:
     edges = corner[:, _NEIGHBOURS] - corner[:, :, None, :]
     if mesh.order == 2:
         # tangent of the quadratic edge at the corner a: 4 x_middle - x_b - 3 x_a
-        edges = 4.0 * (mesh.points[mesh.hexes[:, _middles()]] - corner[:, :, None, :]) - edges
+        edges = 4.0 * (mesh.points[mesh.hexes[:, _MIDDLES]] - corner[:, :, None, :]) - edges
     centre = np.stack(
         [corner[:, high].sum(axis=1) - corner[:, low].sum(axis=1) for high, low in _FACES], axis=1
     )
     least: FloatArray = np.minimum(_determinant(edges).min(axis=1), _determinant(centre))
     return least
-
-
-def _middles() -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
-    """Local number of the middle node between each corner and its three neighbours, (8, 3)."""
-    rows = [
-        [MIDDLES[frozenset((k, other))] for other in r] for k, r in enumerate(_NEIGHBOURS.tolist())
-    ]
-    return np.array(rows, dtype=np.int64)
 
 
 def edge_ratio(mesh: Mesh) -> FloatArray:

@@ -84,7 +84,7 @@ def _content(path: Path, what: str) -> bytes:
 def _read_mesh(path: str, digest: str) -> ModuleType:
     """The user's mesh file as a recipe, read afresh whenever its content changed."""
     del digest
-    return recipe_of(Path(path))
+    return recipe_of(Path(path), geometry_module("blocks").read_msh)
 
 
 def _user_module(path: Path) -> ModuleType:

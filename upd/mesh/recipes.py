@@ -23,7 +23,7 @@ from upd.cache.sources import source_digest
 from upd.errors import InputError, MeshError, OwnMeshError, UpdError, did_you_mean
 from upd.mesh import FloatArray
 from upd.mesh.checks import check_mesh
-from upd.mesh.damper import DamperSizes
+from upd.mesh.fields import DamperSizes
 from upd.mesh.hexmesh import Mesh
 from upd.mesh.pairing import check_pairs
 from upd.mesh.quality import quality

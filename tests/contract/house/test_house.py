@@ -305,7 +305,7 @@ ROOM_LINES = {
     "fitting": 1870,
     "sizing": 1760,
     "batch": 1620,
-    "mesh": 1460,
+    "mesh": 1492,
     "vary": 1390,
     "reference": 1190,
     "cli": 980,

@@ -11,7 +11,7 @@ import meshio
 import numpy as np
 import pytest
 
-from geometry.blocks import import_gmsh
+from geometry.blocks import import_gmsh, read_msh
 from geometry.sphere_block import SphereBlock, build
 from upd.errors import InputError, MeshError
 from upd.fem import box_mesh
@@ -204,7 +204,7 @@ def test_weights_of_a_set_are_comments_in_inp(tmp_path: Path) -> None:
     rows = [line.removeprefix("** ").split(", ") for line in lines[first : first + 4]]
     assert [int(node) - 1 for node, _ in rows] == mesh.nodes["x1"].tolist()
     assert [float(weight) for _, weight in rows] == pytest.approx(own, rel=1e-12)
-    read = recipe_of(path).build(MeshFile())["box"]
+    read = recipe_of(path, read_msh).build(MeshFile())["box"]
     assert np.array_equal(read.nodes["distant"], mesh.nodes["x1"])
     assert not read.weights
 

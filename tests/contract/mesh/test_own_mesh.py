@@ -156,7 +156,7 @@ def test_a_changed_file_is_read_again(tmp_path: Path) -> None:
         ),
         (
             "*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=C3D8\n1, 1, 1, 1, 1, 1, 1, 1, 1\n",
-            r"line 3: the C3D8 elements have no name; to fix it: \*ELEMENT, TYPE=C3D8, ELSET=NAME",
+            r"has no named body of hexahedra; to fix it: name the volumes .*ELSET= or \*ELSET",
         ),
         ("*NODE\n1, 0, 0, 0\n2, 0, x, 0\n", "line 3: '2, 0, x, 0' has no number in column 3"),
         (

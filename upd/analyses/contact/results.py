@@ -276,7 +276,8 @@ def _approach_split(
 
 
 def _stiffness(solution: ContactSolution, case: NormalCase) -> list[Result]:
-    hertz, at, secant = hertz_of(solution, case.force), case.case, case.force / case.approach
+    hertz, at = hertz_of(solution, case.force), case.case
+    secant = case.force / (case.approach - _touch(solution))
     tangent_of, secant_of = _of(hertz, "tangent_stiffness"), _of(hertz, "secant_stiffness")
     out = [
         _beside(q.K_N_TANGENT_RAW, case.stiffness, at, tangent_of, _HERTZ),
@@ -307,6 +308,15 @@ def _stiffness(solution: ContactSolution, case: NormalCase) -> list[Result]:
     return out
 
 
+def _touch(solution: ContactSolution) -> float:
+    """Approach at which the faces touch first, which a secant counts from, mm.
+
+    A gap that is left at the apex of a curved body is the lattice's, an overlap is the file's.
+    """
+    touch = solution.model.first_touch
+    return min(0.0, touch) if solution.curved else touch
+
+
 def _stiffness_of_faces(solution: ContactSolution, case: NormalCase) -> list[Result]:
     """Nothing opened, each body alone, along each direction; and of one pad where several share
     the contact: the total over their number.
@@ -314,15 +324,16 @@ def _stiffness_of_faces(solution: ContactSolution, case: NormalCase) -> list[Res
     That is each pad's own when they carry equal forces; otherwise their mean.
     """
     at, n, C = case.case, len(lattices(solution)), solution.model.compliance(NORMAL)
+    touch = _touch(solution)
     bonded = solution.plan.copies * float(cho_solve(cho_factor(C), np.ones(len(C))).sum())
     out = [
         q.K_N_BONDED.of(bonded, at),
         *(
-            q.K_N_ALONE.of(case.force / one.solution.approach, at, n=body)
+            q.K_N_ALONE.of(case.force / (one.solution.approach - touch), at, n=body)
             for body, one in case.alone.items()
         ),
     ]
-    pads = [q.K_N_PER_PAD.of(case.force / case.approach / n, at)]
+    pads = [q.K_N_PER_PAD.of(case.force / (case.approach - touch) / n, at)]
     for stuck in solution.stuck_under(at):
         way = direction_name(stuck.direction)
         out.append(q.K_T_ALL_STUCK.of(stuck.total, at, n=way))

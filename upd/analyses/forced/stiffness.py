@@ -19,7 +19,7 @@ from upd.cache.sources import key_of, source_digest
 from upd.contact.law import ContactLaw
 from upd.errors import InputError
 from upd.mesh import recipes
-from upd.mesh.damper import DamperSizes
+from upd.mesh.fields import DamperSizes
 from upd.progress import Stages
 from upd.results import ArrayGroup, read_netcdf
 from upd.scene import Scene, load_scene
