@@ -12,10 +12,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args
 
-import h5netcdf
 import numpy as np
 
-from upd.errors import InputError
+from upd.errors import InputError, one_line
 from upd.measured.curve import (
     LEAST_POINTS,
     QUANTITIES,
@@ -26,6 +25,7 @@ from upd.measured.curve import (
 )
 from upd.measured.label import AskedCurve, CurveLabel, label_of, the_curve
 from upd.measured.text import TextCurve
+from upd.results import open_netcdf
 from upd.units import UNITS, unit_factor
 
 _AXIS = "frequency"
@@ -50,10 +50,10 @@ def read_variables(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, lis
         Faults with variable and place.
     """
     try:
-        with h5netcdf.File(path, "r") as file:
+        with open_netcdf(path) as file:
             return _read(file, *asked)
     except OSError as error:
-        reason = str(error).splitlines()[0]
+        reason = one_line(error)
         return None, [f"is no netCDF-4 file ({reason}); write it as netCDF-4, or as CSV"]
 
 
