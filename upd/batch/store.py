@@ -62,7 +62,10 @@ class PointStore:
     def check(self) -> None:
         """Raise InputError where the folder cannot be written, or has other things in it."""
         self._check_ours()
-        places = (self.folder.resolve(), *self.folder.resolve().parents)
+        try:
+            places = (self.folder.resolve(), *self.folder.resolve().parents)
+        except RuntimeError:
+            raise self._refused("its links lead in a circle") from None
         there = next(place for place in places if place.exists())
         if not there.is_dir() or not os.access(there, os.W_OK):
             raise self._refused(f"{there}: no folder, or no permission")
