@@ -29,10 +29,12 @@ from upd.report.figures import write_figures
 from upd.report.folder import check_replaceable, is_run_file
 from upd.report.notebook import RunResult, chart_arrays
 from upd.results import (
+    DIGEST,
     FAILED,
     Check,
     Estimates,
     Result,
+    file_digest,
     status_of,
     with_estimates,
     with_fault,
@@ -318,7 +320,10 @@ def _reached(one: Result) -> Result:
 
 
 def _write_summary(result: RunResult, folder: Path) -> None:
-    text = json.dumps(_json(result.summary()), indent=1, allow_nan=False)
+    data, arrays = result.summary(), folder / "result.nc"
+    if arrays.is_file():
+        data = {**data, DIGEST: file_digest(arrays)}
+    text = json.dumps(_json(data), indent=1, allow_nan=False)
     write_text(folder / "summary.json", text + "\n")
 
 

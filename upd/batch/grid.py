@@ -7,7 +7,6 @@ from __future__ import annotations
 import itertools
 import math
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from upd.errors import InputError
+from upd.scene.toml import value_of
 
 #: More points than this are refused: their files alone would fill a disk.
 MOST_POINTS = 200_000
@@ -114,7 +114,7 @@ def _axis(text: str, scene: Mapping[str, Any]) -> GridAxis:
     if len(ends) == 2:
         values = _range(path, parts, ends, own)
     else:
-        values = [_with_unit(_value(part), own) for part in _listed(given)]
+        values = [_with_unit(value_of(part), own) for part in _listed(given)]
     if len(set(map(str, values))) < len(values):
         raise InputError(f"--vary {path}: a value is duplicated")
     numbers, unit = _numbers(values)
@@ -158,13 +158,6 @@ def _range(
 def _with_unit(value: Any, unit: str) -> Any:
     plain = isinstance(value, (int, float)) and not isinstance(value, bool)
     return f"{value!r} {unit}" if plain and unit else value
-
-
-def _value(text: str) -> Any:
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
 
 
 def _entry(scene: Mapping[str, Any], path: str) -> Any:

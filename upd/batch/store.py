@@ -4,6 +4,7 @@ killed batch takes up where it stood.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,6 +20,8 @@ from upd.vary.outcome import Outcome, read_outcome
 
 #: the grid of a sweep or the draw of its sample, from its first moment on
 GRID = "grid.json"
+#: key of a point's file: SHA-256 of the rest
+_DIGEST = "sha256"
 #: files of which one stands in every folder of a sweep or study
 _OURS = {".lock", GRID, "sweep.json", "study.json"}
 
@@ -43,7 +46,7 @@ class PointStore:
     def finished(self, tasks: Sequence[Task]) -> dict[int, Outcome]:
         """Number of the task -> outcome kept by an earlier call.
 
-        A damaged file, or one whose point is to be tried again, counts as none.
+        A damaged or edited file, or one whose point is to be tried again, counts as none.
         """
         found = ((number, _read(self.path(task))) for number, task in enumerate(tasks))
         return {
@@ -54,12 +57,15 @@ class PointStore:
         """Keep a final outcome. Raises UpdError when the disk does not take it."""
         if outcome.final:
             with self.writing():
-                write_text(self.path(task), outcome.text() + "\n")
+                write_text(self.path(task), _sealed(outcome.text()) + "\n")
 
     def check(self) -> None:
         """Raise InputError where the folder cannot be written, or has other things in it."""
         self._check_ours()
-        places = (self.folder.resolve(), *self.folder.resolve().parents)
+        try:
+            places = (self.folder.resolve(), *self.folder.resolve().parents)
+        except RuntimeError:
+            raise self._refused("its links lead in a circle") from None
         there = next(place for place in places if place.exists())
         if not there.is_dir() or not os.access(there, os.W_OK):
             raise self._refused(f"{there}: no folder, or no permission")
@@ -157,8 +163,21 @@ def _shown(grid: Mapping[str, Any]) -> str:
     return f"{grid['scene']}, {' and '.join(axes)}"
 
 
+def _sealed(text: str) -> str:
+    """A JSON text with the SHA-256 of its content."""
+    data = json.loads(text)
+    return json.dumps({**data, _DIGEST: _digest(data)}, indent=1)
+
+
+def _digest(data: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(data).encode()).hexdigest()
+
+
 def _read(path: Path) -> Outcome | None:
+    """The outcome in a file; None of one that is not there, damaged or edited."""
     try:
-        return read_outcome(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, TypeError, KeyError):
+        data = json.loads(path.read_text(encoding="utf-8"))
+        known = data.pop(_DIGEST)
+        return read_outcome(json.dumps(data)) if known == _digest(data) else None
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return None

@@ -134,7 +134,10 @@ def own_folder(
     OSError
         As the file system does.
     """
-    real = place.resolve()
+    try:
+        real = place.resolve()
+    except RuntimeError:
+        raise OSError(errno.ELOOP, "its links lead in a circle") from None
     if real.exists() and not real.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, "it is a file")
     real.parent.mkdir(parents=True, exist_ok=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import sys
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -496,6 +497,8 @@ def doctor() -> int:
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point. Exit codes: 0 done, 1 failed, 2 bad input, 3 interrupted."""
+    # figures are files: the environment of a notebook may name a backend that is not here
+    os.environ["MPLBACKEND"] = "agg"
     logging.getLogger("upd").addHandler(logging.NullHandler())
     recipes = logging.getLogger("upd.mesh.recipe_modules")
     if not recipes.handlers:

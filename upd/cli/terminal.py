@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import logging
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -20,11 +22,40 @@ from upd.report.columns import text_width
 if TYPE_CHECKING:
     from upd.batch.engine import Progress
 
+
+def _open_streams() -> None:
+    """Give closed streams the null device, and "?" for what a stream's encoding lacks."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            # it takes the free descriptor, which else the first file of a run would
+            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115
+        elif name == "stdout" and isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+class Terminal(Console):
+    """A console that loses the lines nobody takes: what was computed lies in files."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print; a pipe without a reader and a full disk end nothing."""
+        try:
+            super().print(*objects, **options)
+        except OSError:
+            self.on_broken_pipe()
+
+    def on_broken_pipe(self) -> None:
+        """Let all further lines go nowhere."""
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, self.file.fileno())
+        os.close(null)
+
+
+_open_streams()
+_own_width = sys.stdout.isatty() and "COLUMNS" not in os.environ
 #: square brackets are no markup: titles, paths and messages may hold them
-console = Console(
-    highlight=False, markup=False, width=None if sys.stdout.isatty() else text_width()
-)
-errors = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+console = Terminal(highlight=False, markup=False, width=None if _own_width else text_width())
+errors = Terminal(stderr=True, highlight=False, markup=False, soft_wrap=True)
 
 #: least seconds between two lines of a batch's progress when the output is no terminal
 _PAUSE_S = 5.0

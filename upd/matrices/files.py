@@ -313,6 +313,12 @@ def checked(A: Any, name: str) -> csr_array:
     # stiffness or mass.
     if float(skew.max()) > 1e-7 * size:
         i, j = (int(k) for k in np.unravel_index(skew.argmax(), skew.shape))
+        rows, columns = matrix.nonzero()
+        if (rows >= columns).all() or (rows <= columns).all():
+            raise InputError(
+                f"{name}: the matrix has entries in one triangle only; give both, for example "
+                "A + A.T - diag(A), or write its file as symmetric."
+            )
         raise InputError(
             f"{name}: the matrix is not symmetric, A - A' is {float(skew.max()):.2e} in "
             f"({i}, {j}), max|A| is {size:.2e}."

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from upd.errors import InputError
 from upd.mesh import FloatArray
-from upd.units import unit_factor
+from upd.units import UNITS, unit_factor
 
 ComplexArray = NDArray[np.complex128]
 Blade = Literal["left", "right"]
@@ -108,6 +108,33 @@ def as_accelerance(
     omega = 2.0 * np.pi * frequency
     turn = (1j * omega) ** power if np.iscomplexobj(values) else omega**power
     return factor * to_m * turn * values, quantity
+
+
+def response_unit(own: str, given: str | None) -> str:
+    """The unit of a response: the file's own, or the one given beside a file that has none.
+
+    Parameters
+    ----------
+    own
+        As the file has it, "" where it has none.
+    given
+        By the caller or the scene.
+
+    Raises
+    ------
+    InputError
+        For decibels, for a unit of something else, and where both give different units.
+    """
+    if own.casefold().startswith("db"):
+        raise InputError("values in dB are not read; give linear ones, with their unit")
+    unit = given or own
+    mine = unit_factor(unit, QUANTITIES)
+    if given and own and (own not in UNITS[mine[0]] or unit_factor(own, QUANTITIES) != mine):
+        raise InputError(
+            f"the file gives its unit, {own!r}, but unit = {given!r}; remove unit, or correct "
+            "the file"
+        )
+    return unit
 
 
 def checked_curve(frequency: FloatArray) -> list[tuple[int, str]]:

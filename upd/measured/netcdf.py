@@ -12,13 +12,20 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args
 
-import h5netcdf
 import numpy as np
 
-from upd.errors import InputError
-from upd.measured.curve import LEAST_POINTS, QUANTITIES, State, checked_curve, the_one
+from upd.errors import InputError, one_line
+from upd.measured.curve import (
+    LEAST_POINTS,
+    QUANTITIES,
+    State,
+    checked_curve,
+    response_unit,
+    the_one,
+)
 from upd.measured.label import AskedCurve, CurveLabel, label_of, the_curve
 from upd.measured.text import TextCurve
+from upd.results import open_netcdf
 from upd.units import UNITS, unit_factor
 
 _AXIS = "frequency"
@@ -43,10 +50,10 @@ def read_variables(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, lis
         Faults with variable and place.
     """
     try:
-        with h5netcdf.File(path, "r") as file:
+        with open_netcdf(path) as file:
             return _read(file, *asked)
     except OSError as error:
-        reason = str(error).splitlines()[0]
+        reason = one_line(error)
         return None, [f"is no netCDF-4 file ({reason}); write it as netCDF-4, or as CSV"]
 
 
@@ -63,14 +70,15 @@ def _read(
         return None, [str(error)]
     group, variable = found[name]
     axis, faults = group.variables[_AXIS], []
-    units = {_AXIS: _units(axis), name: unit or _units(variable)}
-    scale = 1.0
-    for which, kinds in ((_AXIS, ["frequency"]), (name, list(QUANTITIES))):
-        try:
-            factor = unit_factor(units[which], kinds)[1]
-            scale = factor if which == _AXIS else scale
-        except InputError as error:
-            faults.append(f"variable {which}, attribute units: {error}")
+    scale, own_unit = 1.0, ""
+    try:
+        scale = unit_factor(_units(axis), ["frequency"])[1]
+    except InputError as error:
+        faults.append(f"variable {_AXIS}, attribute units: {error}")
+    try:
+        own_unit = response_unit(_units(variable), unit)
+    except InputError as error:
+        faults.append(f"variable {name}, attribute units: {error}")
     f, data = scale * np.asarray(axis[...], float), np.asarray(variable[...], float)
     for which, values in ((_AXIS, f), (name, data)):
         for k in np.argwhere(~np.isfinite(values)):
@@ -92,7 +100,7 @@ def _read(
     if faults:
         return None, faults
     way = slice(None) if f[-1] > f[0] else slice(None, None, -1)
-    return TextCurve(f[way], data[way], units[name], label), []
+    return TextCurve(f[way], data[way], own_unit, label), []
 
 
 def _said(group: Any, variable: Any) -> dict[str, Any]:

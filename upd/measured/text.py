@@ -5,9 +5,10 @@ in brackets, as the files that a run leaves in its folder ``curves`` do:
 
     frequency [Hz], accelerance real [(m/s2)/N], accelerance imaginary [(m/s2)/N]
 
-A response is one column of magnitudes, two of real and imaginary part, or two of magnitude and
-phase. Without names the columns are frequency in Hz and magnitudes, or frequency, real and
-imaginary part. Where semicolons or tabs part the cells, a decimal comma is understood.
+A response is one column of magnitudes or of complex numbers (``1.2-0.3j``), two of real and
+imaginary part, or two of magnitude and phase; a column in deg or rad is a phase. Without names the
+columns are frequency in Hz and magnitudes, or frequency, real and imaginary part. Where semicolons
+or tabs part the cells, a decimal comma is understood.
 
 Columns "blade" (left, right), "state" (free, stuck) and "F_C/F_E" say which curve a line is of, so
 that one file may hold several.
@@ -15,22 +16,29 @@ that one file may hold several.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from upd.errors import InputError
-from upd.measured.curve import LEAST_POINTS, QUANTITIES, ComplexArray, checked_curve, the_one
+from upd.measured.curve import (
+    LEAST_POINTS,
+    QUANTITIES,
+    ComplexArray,
+    checked_curve,
+    response_unit,
+    the_one,
+)
 from upd.measured.label import ANY, LABELS, AskedCurve, CurveLabel, read_label, the_curve
 from upd.mesh import FloatArray
-from upd.units import unit_factor
+from upd.units import UNITS, unit_factor
 
 _SEPARATORS = ";\t,"
 _UNIT = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>\S+)\))?\s*")
+_DECIBEL = re.compile(r"(?<![^\W_])db(?![^\W_])", re.IGNORECASE)
 _COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?")
 #: last words of a column's name -> what of the response it holds
 _PARTS = {
@@ -40,11 +48,22 @@ _PARTS = {
     "imag": "imaginary",
     "im": "imaginary",
     "phase": "phase",
+    "phi": "phase",
+    "arg": "phase",
+    "angle": "phase",
     "amplitude": "magnitude",
     "magnitude": "magnitude",
+    "mag": "magnitude",
     "modulus": "magnitude",
     "abs": "magnitude",
 }
+_WORDS = "|".join(_PARTS)
+#: "Phase angle of x", "Abs(x)"; "x_real", "x imaginary part"
+_PART = re.compile(
+    rf"(?P<first>{_WORDS})\b\.?(?:\s+(?:part|angle))?(?:\s+of)?\s*(?:\((?P<inner>.*)\)|(?P<after>.*))"
+    rf"|(?P<before>.*(?<![^\W_]))(?P<last>{_WORDS})\.?(?:\s+(?:part|angle))?",
+    re.IGNORECASE,
+)
 
 
 @dataclass(frozen=True)
@@ -102,6 +121,13 @@ def read_text(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, list[str
     """
     faults = Faults()
     lines = _lines(path, faults)
+    if [text.strip() for _, text in lines[:2]] == ["-1", "58"]:
+        faults.add(
+            "is a universal file (data set 58); export it as CSV with the columns frequency, real "
+            "and imaginary, each with its unit",
+            lines[0][0],
+        )
+        return None, faults.found
     if not lines:
         if not faults.found:
             faults.add("no values; give lines of frequency and response", 1)
@@ -119,7 +145,8 @@ def read_text(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, list[str
         return None, faults.found
     at = [n for n, _ in body]
     if len(at) < LEAST_POINTS:
-        faults.add(f"ends with {len(at)} points; a curve has {LEAST_POINTS} or more", at[-1])
+        last = at[-1] if at else head
+        faults.add(f"ends with {len(at)} points; a curve has {LEAST_POINTS} or more", last)
         return None, faults.found
     f = scale * rows["frequency"]
     place = parts["frequency"].place + 1
@@ -130,8 +157,8 @@ def read_text(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, list[str
         mine = next(c for kind, c in parts.items() if kind == "magnitude")
         for k in np.flatnonzero(values < 0.0).tolist():
             faults.add(
-                f"the magnitude {values[k]:g} is negative; give magnitudes, or name the columns "
-                "real and imaginary",
+                f"the magnitude {values[k]:g} is negative; give linear magnitudes, or name the "
+                "columns real and imaginary",
                 at[k],
                 mine.place + 1,
                 mine.name,
@@ -175,6 +202,14 @@ def _number(cell: str, separator: str) -> float | None:
         return None
 
 
+def _complex(cell: str) -> complex | None:
+    """``1.2-0.3j``, also in parentheses, with i, or with blanks."""
+    try:
+        return complex("".join(cell.split()).strip("()").replace("i", "j"))
+    except ValueError:
+        return None
+
+
 def _columns(
     split: Sequence[tuple[int, list[str]]], separator: str
 ) -> tuple[list[FileColumn], list[tuple[int, list[str]]], int]:
@@ -182,7 +217,8 @@ def _columns(
     line, first = split[0]
     named = all(_number(cell, separator) is None for cell in first)
     if named:
-        return [_column(k, cell) for k, cell in enumerate(first)], list(split[1:]), line
+        columns = _paired([_column(k, cell) for k, cell in enumerate(first)])
+        return columns, list(split[1:]), line
     usual = ("magnitude",) if len(first) <= 2 else ("real", "imaginary")
     columns = [FileColumn(0, "", "frequency", "Hz")]
     return (
@@ -198,13 +234,28 @@ def _column(place: int, head: str) -> FileColumn:
     name, unit = match["name"].strip(), (match["square"] or match["round"] or "").strip()
     if name.casefold() in ("frequency", "freq", "freq.", "f"):
         return FileColumn(place, "", "frequency", unit)
+    if _DECIBEL.search(head):
+        unit = "dB"
     if name.casefold() in LABELS:
         return FileColumn(place, "", LABELS[name.casefold()], unit)
-    *_, last = name.replace("_", " ").split() or [""]
-    part = _PARTS.get(last.casefold().rstrip("."))
-    if part is None:
-        return FileColumn(place, name, "magnitude", unit)
-    return FileColumn(place, name[: -len(last)].strip(" _") or "response", part, unit)
+    part, rest = "magnitude", name
+    if match := _PART.fullmatch(name):
+        part = _PARTS[(match["first"] or match["last"]).casefold()]
+        given = match["inner"] or match["after"] or match["before"] or ""
+        rest = given.strip(" _") or "response"
+    elif unit in UNITS["angle"]:
+        part = "phase"
+    return FileColumn(place, rest, part, unit)
+
+
+def _paired(columns: list[FileColumn]) -> list[FileColumn]:
+    """The only phase of a file belongs to its only magnitudes, however they are named."""
+    phases = [c for c in columns if c.part == "phase"]
+    others = [c for c in columns if c.name and c.part != "phase"]
+    names = {c.name for c in others if _is_response(c, None)} or {c.name for c in others}
+    if len(phases) != 1 or len(names) != 1:
+        return columns
+    return [replace(c, name=min(names)) if c in phases else c for c in columns]
 
 
 def _chosen(
@@ -238,11 +289,16 @@ def _chosen(
     units = {unit or c.unit for c in responses}
     for c in responses:
         try:
-            unit_factor(unit or c.unit, QUANTITIES)
+            response_unit(c.unit, unit)
         except InputError as error:
             faults.add(_without_unit(unit or c.unit, error), line, c.place + 1, c.name)
     if len(units) > 1:
         faults.add(f"the parts of {name} have different units, {' and '.join(units)}", line)
+    magnitudes = {c.name for c in columns if c.part == "magnitude"}
+    for c in columns:
+        if c.part == "phase" and c.name not in magnitudes and "phase" not in parts:
+            words = f'a phase of no response; name it "{name} phase", or remove it'
+            faults.add(words, line, c.place + 1, c.name)
     if "phase" in parts:
         try:
             unit_factor(parts["phase"].unit, ["angle"])
@@ -276,6 +332,8 @@ def _parts(
 ) -> dict[str, FileColumn]:
     """Real and imaginary part, or magnitude and phase, or magnitude alone."""
     found = {c.part: c for c in mine}
+    if len(found) < len(mine):
+        faults.add(f"several columns {name}; give each its own name", line)
     if {"real", "imaginary"} <= set(found):
         return {part: found[part] for part in ("real", "imaginary")}
     if "magnitude" in found:
@@ -328,7 +386,7 @@ def _numbers(
     width: int,
 ) -> dict[str, FloatArray]:
     """The cells of the columns that count, as numbers."""
-    out: dict[str, list[float]] = {kind: [] for kind in parts}
+    out: dict[str, list[complex]] = {kind: [] for kind in parts}
     for line, cells in body:
         if len(cells) > width and any(cells[width:]):
             faults.add(f"{len(cells)} cells where there are {width} columns", line)
@@ -339,8 +397,10 @@ def _numbers(
                     "nothing there; give a number, or remove the line", line, c.place + 1, name
                 )
                 continue
-            value = _number(cells[c.place], separator)
-            if value is None or not math.isfinite(value):
+            value: complex | None = _number(cells[c.place], separator)
+            if value is None and kind == "magnitude" and "phase" not in parts:
+                value = _complex(cells[c.place])
+            if value is None or not np.isfinite(value):
                 faults.add(
                     f"{cells[c.place]!r} is no finite number; correct it, or remove the line",
                     line,

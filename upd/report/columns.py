@@ -14,6 +14,7 @@ from upd.results.answer_table import AnswerTable
 GAP = 2
 #: width of text that goes to no terminal
 WIDTH = 120
+_LEAST_WIDTH = 40
 #: most lines of a column's head
 _HEAD_LINES = 3
 #: characters of a column of words that are read with ease
@@ -55,8 +56,10 @@ class TextColumn:
 
 
 def text_width() -> int:
-    """Columns of the terminal ($COLUMNS where it is set), 120 when there is none."""
-    return shutil.get_terminal_size((WIDTH, 24)).columns
+    """Columns of the terminal ($COLUMNS where it is set), 120 when there is none; no fewer than
+    a table needs.
+    """
+    return max(_LEAST_WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
 
 
 def fitted(

@@ -6,18 +6,19 @@ Nothing of it is trusted to be whole.
 from __future__ import annotations
 
 import fnmatch
-import json
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from upd.cache.folders import plain_name
 from upd.errors import InputError
 from upd.plot.chart import Arrays, Group, Variable
 from upd.report.figures import FIGURES
+from upd.report.schema import Summary, read_json
+from upd.results import open_netcdf
 
 _LOG_LINE = re.compile(r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$")
 _VERSIONS = "versions: "
@@ -37,12 +38,6 @@ RUN_FILES = (
     "curves/*.csv",
     *(f"{name}.png" for name in FIGURES),
 )
-Kind = Literal["run", "sweep"]
-#: kind of a folder -> what makes its files again
-_AGAIN: dict[Kind, str] = {
-    "run": "run the scene again",
-    "sweep": "start the same sweep again, finished points are kept",
-}
 #: names that the operating system or a viewer leaves
 _NOBODYS = (".DS_Store", "Thumbs.db", "desktop.ini")
 
@@ -154,10 +149,10 @@ def _is_run(folder: Path) -> bool:
         return False
 
 
-def read_run(folder: Path) -> RunFolder:
+def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
     """Read ``folder``; what is missing beside summary.json is named in ``missing``.
 
-    Raises InputError when there is no summary.
+    Raises InputError when there is no summary, and for a damaged result.nc where ``whole``.
     """
     summary = _summary(folder)
     missing: list[str] = []
@@ -166,7 +161,9 @@ def read_run(folder: Path) -> RunFolder:
     if (folder / "result.nc").exists():
         try:
             arrays = read_arrays(folder / "result.nc")
-        except (OSError, ValueError, KeyError) as problem:
+        except OSError as problem:
+            if whole:
+                raise InputError(f"{folder / 'result.nc'}: cannot be read ({problem})") from None
             missing.append(f"result.nc: cannot be read ({problem})")
     else:
         missing.append("result.nc: is not there, so there are no curves")
@@ -187,10 +184,8 @@ def read_run(folder: Path) -> RunFolder:
 def read_arrays(path: Path) -> dict[str, Group]:
     """Variables of a netCDF file with dimensions and units: group -> name -> Variable.
 
-    Raises OSError when it is none.
+    Raises OSError when it is none, or damaged.
     """
-    # h5netcdf is slow to import: only when there is something to read.
-    import h5netcdf
 
     def read(group: Any) -> Group:
         out = Group(
@@ -206,100 +201,13 @@ def read_arrays(path: Path) -> dict[str, Group]:
             )
         return out
 
-    with h5netcdf.File(path, "r") as file:
+    with open_netcdf(path) as file:
         root = {"": read(file)} if file.variables else {}
         return root | {name: read(group) for name, group in file.groups.items()}
 
 
-@dataclass
-class _EffectEntry:
-    name: str
-    on: bool
-    why: str
-    verdict: str
-
-
-@dataclass
-class _CheckEntry:
-    name: str
-    case: str
-    value: float | None
-    limit: float | None
-    says: str
-    verdict: str
-
-
-@dataclass
-class _NumberEntry:
-    name: str
-    case: str
-    case_fields: dict[str, Any]
-    value: float | None
-    unit: str
-    reference: float | None
-
-
-@dataclass
-class _Summary:
-    """What summary.json must have for a page."""
-
-    scene: str
-    title: str
-    status: str
-    effects: list[_EffectEntry]
-    checks: list[_CheckEntry]
-    size: dict[str, Any]
-    cost: dict[str, Any]
-    results: list[_NumberEntry]
-
-
 def _summary(folder: Path) -> dict[str, Any]:
-    return read_json(folder / "summary.json", _Summary, "run")
-
-
-def read_json(path: Path, schema: type, kind: Kind) -> dict[str, Any]:
-    """The content of a JSON file of a folder that `upd run` or `upd sweep` wrote.
-
-    Parameters
-    ----------
-    path
-        Of the file.
-    schema
-        Dataclass of what it must have; there may be more.
-    kind
-        Of the folder.
-
-    Raises
-    ------
-    InputError
-        When there is none, or something of it is missing or of another kind.
-    """
-    # pydantic is slow to import: only when a folder is read
-    from pydantic import TypeAdapter, ValidationError
-
-    try:
-        found = json.loads(path.read_text("utf-8"))
-        TypeAdapter(schema).validate_python(found)
-    except (FileNotFoundError, NotADirectoryError):
-        raise InputError(
-            f"{path.parent}: is no {kind} folder (it has no {path.name}); give the folder "
-            f"`upd {kind}` wrote"
-        ) from None
-    except OSError as problem:
-        raise InputError(
-            f"{path}: cannot be read ({problem.strerror}); check its permissions"
-        ) from None
-    except ValidationError as problem:
-        places = dict.fromkeys(str((*e["loc"], "the whole")[0]) for e in problem.errors())
-        raise damaged_file(path, places, kind) from None
-    except ValueError as problem:
-        raise InputError(f"{path}: is not JSON ({problem}); {_AGAIN[kind]}") from None
-    return dict(found)
-
-
-def damaged_file(path: Path, places: Iterable[str], kind: Kind) -> InputError:
-    """The error of a file that is damaged in these places."""
-    return InputError(f"{path}: is damaged in {', '.join(places)}; {_AGAIN[kind]}")
+    return read_json(folder / "summary.json", Summary, "run")
 
 
 def _text(path: Path, missing: list[str]) -> str:

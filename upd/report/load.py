@@ -33,9 +33,9 @@ def load(folder: str | Path) -> RunResult:
     Raises
     ------
     InputError
-        When it is no run folder or its summary is damaged.
+        When it is no run folder, or its summary or its arrays are damaged.
     """
-    run = read_run(Path(folder))
+    run = read_run(Path(folder), whole=True)
     summary = run.summary
     return RunResult(
         scene=summary["scene"],

@@ -16,7 +16,8 @@ import numpy as np
 from upd.labels import unit_label
 from upd.plot.chart import Array
 from upd.plot.sweep_charts import figure_names
-from upd.report.folder import damaged_file, is_png, read_json
+from upd.report.folder import is_png
+from upd.report.schema import damaged_file, read_json
 from upd.results.sampled import SampledNumber
 
 #: values of a parameter written one by one

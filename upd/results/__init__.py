@@ -15,7 +15,15 @@ from upd.results.check import (
     worst_check,
     worst_checks,
 )
-from upd.results.netcdf import ArrayGroup, read_netcdf, variable, write_netcdf
+from upd.results.netcdf import (
+    DIGEST,
+    ArrayGroup,
+    file_digest,
+    open_netcdf,
+    read_netcdf,
+    variable,
+    write_netcdf,
+)
 from upd.results.number import (
     ErrorPart,
     Estimates,
@@ -30,6 +38,7 @@ from upd.results.number import (
 )
 
 __all__ = [
+    "DIGEST",
     "FAILED",
     "NO_CASE",
     "OK",
@@ -42,7 +51,9 @@ __all__ = [
     "InputPart",
     "InputParts",
     "Result",
+    "file_digest",
     "left_out_check",
+    "open_netcdf",
     "outcome_of",
     "read_input_part",
     "read_netcdf",

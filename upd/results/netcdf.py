@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +13,11 @@ import h5netcdf
 import numpy as np
 
 from upd.cache.files import whole_bytes
+from upd.errors import UpdError, one_line
 from upd.results.case import NO_CASE, Case
+
+#: key of summary.json: SHA-256 of the result.nc beside it
+DIGEST = "result_nc_sha256"
 
 
 class ArrayGroup(dict[str, Any]):
@@ -88,14 +95,54 @@ def _write_variable(
         variable.attrs[key] = text
 
 
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@contextmanager
+def open_netcdf(path: Path) -> Iterator[h5netcdf.File]:
+    """A netCDF file to read in a block.
+
+    Raises
+    ------
+    OSError
+        For whatever is wrong with it, and for a result.nc that is another than the one whose
+        SHA-256 the summary.json beside it has.
+    """
+    try:
+        if path.name == "result.nc":
+            _check_digest(path)
+        with h5netcdf.File(path, "r") as file:
+            yield file
+    except (OSError, UpdError):
+        raise
+    except Exception as error:
+        # damaged files raise errors of any kind in HDF5
+        raise OSError(one_line(error)) from error
+
+
+def _check_digest(path: Path) -> None:
+    try:
+        known = json.loads(path.with_name("summary.json").read_text("utf-8")).get(DIGEST)
+    except (OSError, ValueError, AttributeError, RecursionError):
+        return
+    if known and known != file_digest(path):
+        raise OSError("it is not as the run wrote it, its SHA-256 is another; run the scene again")
+
+
 def read_netcdf(path: Path) -> dict[str, ArrayGroup]:
-    """Arrays of a result.nc: group -> variable -> array, with the groups' attributes."""
+    """Arrays of a result.nc: group -> variable -> array, with the groups' attributes.
+
+    Raises OSError as `open_netcdf` does.
+    """
 
     def read(group: Any) -> ArrayGroup:
         found = ArrayGroup({name: variable[...] for name, variable in group.variables.items()})
         found.attributes.update(group.attrs)
         return found
 
-    with h5netcdf.File(path, "r") as file:
+    with open_netcdf(path) as file:
         root = {"": read(file)} if file.variables else {}
         return root | {name: read(group) for name, group in file.groups.items()}

@@ -86,6 +86,19 @@ def load_scene(
 
     Raises InputError with every problem of the scene and its path in the file.
     """
+    try:
+        return _loaded(source, overrides)
+    except RecursionError:
+        name = "the scene" if isinstance(source, Mapping) else source
+        raise InputError(
+            f"{name}: it, or what is set in it, nests tables or lists too deeply; to fix it: "
+            "correct the file or the value"
+        ) from None
+
+
+def _loaded(
+    source: str | Path | Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any]
+) -> AnyScene:
     data, place, folder = _data(source)
     pairs, problems = read_overrides(overrides)
     nul = [path for path, value in _leaves("", data | dict(pairs)) if "\0" in str(value)]
@@ -126,7 +139,7 @@ def _data(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], str, 
     path = _find(source)
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(
             f"{path.name} is not valid TOML: {error}; to fix it: correct the file or copy a ready "
             "scene"

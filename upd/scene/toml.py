@@ -29,7 +29,7 @@ def value_of(text: str) -> Any:
     """A value as TOML reads it; what TOML does not read is text."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (tomllib.TOMLDecodeError, RecursionError):
         return text
 
 

@@ -234,11 +234,14 @@ def test_only_missing_points_run(tmp_path: Path) -> None:
     assert {path: path.stat().st_mtime_ns for path in stamps} == stamps
 
 
-def test_damaged_point_file_is_run_again(tmp_path: Path) -> None:
+@pytest.mark.parametrize("damage", ["cut", "edit"])
+def test_damaged_point_file_is_run_again(tmp_path: Path, damage: str) -> None:
     first = sweep("hertz", ["contact.friction=0.2,0.4"], overrides=TINY, out=tmp_path, workers=0)
     before = table(tmp_path)
     file = PointStore(tmp_path, "sweep").path(first.plan.tasks[1])
-    file.write_text(file.read_text(encoding="utf-8")[:200], encoding="utf-8")
+    data = json.loads(text := file.read_text(encoding="utf-8"))
+    data["results"][0]["value"] *= 1.1
+    file.write_text(text[:200] if damage == "cut" else json.dumps(data), encoding="utf-8")
     again = sweep("hertz", ["contact.friction=0.2,0.4"], overrides=TINY, out=tmp_path, workers=0)
     assert sorted(again.plan.kept) == [0]
     assert table(tmp_path) == before

@@ -117,7 +117,8 @@ SCENE_FILES: dict[str, tuple[bytes | None, str]] = {
     "no value": (b"name = \n", "not valid TOML"),
     "a recipe": (GOOD_RECIPE.encode(), "not valid TOML"),
     "NUL in a text": (b'name = "a"\n[geometry]\nrecipe = "\\u0000.py"\n', "NUL"),
-    "deep": (b"a = " + 3000 * b"[" + 3000 * b"]", "TOML"),
+    "deep": (b"a = " + 3000 * b"[" + 3000 * b"]", "too deeply"),
+    "deep keys": (3000 * b"a." + b"a = 1", "too deeply"),
 }
 
 
@@ -502,6 +503,16 @@ COMMANDS: dict[str, tuple[tuple[str, ...], str]] = {
         ".vtu",
     ),
     "value without path": (("plan", "hertz", "--set", "=3"), "path=value"),
+    "list too deep": (
+        ("plan", "hertz", "--set", "loads.normal=" + 3000 * "[" + 3000 * "]"),
+        "loads.normal",
+    ),
+    "tables too deep": (("plan", "hertz", "--set", 2000 * "a." + "a=1"), "nests tables"),
+    "axis too deep": (("sweep", "hertz", "--vary", 2000 * "a." + "a=1,2"), "nests tables"),
+    "axis of a list too deep": (
+        ("sweep", "hertz", "--vary", "contact.friction=" + 3000 * "[" + 3000 * "]"),
+        "contact.friction",
+    ),
     "value into a value": (("plan", "hertz", "--set", "name.first=3"), "is a value, not a table"),
 }
 

@@ -24,6 +24,7 @@ from upd.matrices import (
     write_matrices,
     write_matrix,
 )
+from upd.matrices.files import checked
 
 STEEL = Material(200e3, 0.3)
 
@@ -241,3 +242,9 @@ def test_matrix_market_files_that_would_be_another_matrix(
     with pytest.raises(InputError, match="cannot be read") as caught:
         read_matrix(path)
     assert says in str(caught.value)
+
+
+def test_one_triangle_of_a_matrix_is_named() -> None:
+    triangle = csr_array([[2.0, -1.0], [0.0, 2.0]])
+    with pytest.raises(InputError, match="K: the matrix has entries in one triangle only"):
+        checked(triangle, "K")

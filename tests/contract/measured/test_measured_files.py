@@ -38,8 +38,35 @@ def file(folder: Path, text: str, name: str = "curve.csv") -> Path:
             [2j, 1, -1],
         ),
         (HEAD + "3,4\n2,3\n1,2\n", [2.0, 3.0, 4.0]),
+        (
+            '"f [kHz]","Abs(x) [(m/s2)/N]","Phi(x) [rad]"\n'
+            + "".join(f"{f},1,{np.pi / 2}\n" for f in (1, 2, 3)),
+            [1j, 1j, 1j],
+        ),
+        (
+            "Frequency [Hz],Magnitude [(m/s2)/N],Phase angle [deg]\n1,2,90\n2,1,0\n3,1,180\n",
+            [2j, 1, -1],
+        ),
+        ("frequency [Hz],H [1/kg],lag [deg]\n1,2,90\n2,1,0\n3,1,180\n", [2j, 1, -1]),
+        (
+            "frequency [Hz],Re(H(f)) [1/kg],Im(H(f)) [1/kg]\n1,3,4\n2,0,1\n3,1,0\n",
+            [3 + 4j, 1j, 1],
+        ),
+        (HEAD + "1,(3+4j)\n2,1j\n3,1.0 - 0.5i\n", [3 + 4j, 1j, 1 - 0.5j]),
     ],
-    ids=["comma", "tab", "decimal comma", "complex", "phase", "falling"],
+    ids=[
+        "comma",
+        "tab",
+        "decimal comma",
+        "complex",
+        "phase",
+        "falling",
+        "Abs and Phi",
+        "phase angle",
+        "phase known by its unit",
+        "Re and Im",
+        "complex cells",
+    ],
 )
 def test_understood(tmp_path: Path, text: str, expected: object) -> None:
     curve = read_measured(file(tmp_path, text))
@@ -90,11 +117,43 @@ def test_every_fault_with_line_and_column(tmp_path: Path) -> None:
         ("time [s],H [m/N]\n1,2\n2,3\n", "line 1: no column of frequency"),
         ("frequency [Hz],H real [m/N]\n1,2\n2,3\n", "has a column real but none imaginary"),
         ("frequency [Hz],a [m/N],b [m/N]\n1,2,3\n", "line 1: 2 responses, a, b; name one"),
+        (HEAD, "line 1: ends with 0 points"),
+        ("frequency [Hz],Magnitude (dB)\n1,2\n2,3\n3,4\n", "column 2 .*: values in dB are not"),
+        ("frequency [Hz],H [1/kg],H [1/kg]\n1,2,3\n2,3,4\n", "several columns H; give each"),
+        ("    -1\n    58\nPoint\nNONE\n", "line 1: is a universal file .* export it as CSV"),
     ],
 )
 def test_faults_are_told_with_the_remedy(tmp_path: Path, text: str, told: str) -> None:
     with pytest.raises(InputError, match=told):
         read_measured(file(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("head", "told"),
+    [
+        ("Magnitude (dB)", "values in dB"),
+        ("H_dB", "values in dB"),
+        ("Magnitude [dB re 1 g/N]", "values in dB"),
+        ("accelerance [g/N]", r"the file gives its unit, 'g/N', but unit = '\(m/s2\)/N'; remove"),
+        ("accelerance [furlong]", "the file gives its unit, 'furlong', but unit"),
+    ],
+)
+def test_a_unit_beside_the_file_does_not_overrule_it(tmp_path: Path, head: str, told: str) -> None:
+    path = file(tmp_path, f"frequency [Hz],{head}\n1,2\n2,3\n3,4\n")
+    with pytest.raises(InputError, match=told):
+        read_measured(path, unit="(m/s2)/N")
+
+
+def test_a_unit_beside_the_file_may_repeat_it(tmp_path: Path) -> None:
+    curve = read_measured(file(tmp_path, HEAD + "1,2\n2,3\n3,4\n"), unit="m/s2/N")
+    assert curve.magnitude.tolist() == [2.0, 3.0, 4.0]
+
+
+def test_a_phase_that_belongs_to_no_response(tmp_path: Path) -> None:
+    head = "frequency [Hz],a [1/kg],turn [deg],b [1/kg],lag [deg]\n"
+    path = file(tmp_path, head + "1,2,3,4,5\n2,3,4,5,6\n3,4,5,6,7\n")
+    with pytest.raises(InputError, match=r'column 3 \(turn\): a phase .* name it "a phase"'):
+        read_measured(path, column="a")
 
 
 def test_what_is_no_text_or_not_there(tmp_path: Path) -> None:
@@ -132,6 +191,8 @@ def test_netcdf(tmp_path: Path) -> None:
     assert read_measured(path, column="lab/H").is_complex
     with pytest.raises(InputError, match="no response 'lab/x' among the variables"):
         read_measured(path, column="lab/x")
+    with pytest.raises(InputError, match="the file gives its unit"):
+        read_measured(path, unit="g/N")
     bad = netcdf(tmp_path / "b.nc", "(m/s2)/N", np.array([1.0, np.nan, -2.0]), f)
     with pytest.raises(InputError, match=r"variable lab/H, place \[1\]: no finite number"):
         read_measured(bad)
