@@ -13,7 +13,7 @@ from rigs import LINES
 
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import peaks
-from upd.analyses.forced.curves import Curve, TimeCheck, Top
+from upd.analyses.forced.curves import ForcedCurve, TimeCheck, Top
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.spring_march import make_springs
@@ -159,7 +159,9 @@ def confirm(
     answer: Any = SimpleNamespace(
         frequency=f, x=np.arange(len(size), dtype=float)[:, None], balance=None
     )
-    curve = Curve("own", 1.0, 1.0, dict.fromkeys(SIDES, size.astype(complex)), {}, {}, answer, 0.0)
+    curve = ForcedCurve(
+        "own", 1.0, 1.0, dict.fromkeys(SIDES, size.astype(complex)), {}, {}, answer, 0.0
+    )
     top = int(size.argmax())
 
     def motion(x: np.ndarray, _: float) -> np.ndarray | None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from upd.analyses.forced.curves import Curve, PointCurve, rising
+from upd.analyses.forced.curves import ForcedCurve, PointCurve, rising
 from upd.analyses.forced.peaks import _folds
 from upd.hbm import FrequencyResponse, contacts, frequency_response
 from upd.hbm.springs.time_integration import steady_state
@@ -16,7 +16,7 @@ from upd.hbm.springs.time_integration import steady_state
 
 def path(frequency: Any, height: Any) -> PointCurve:
     answer: Any = SimpleNamespace(frequency=np.asarray(frequency, float))
-    return Curve("own", 1.0, 1.0, {"right": np.asarray(height, complex)}, {}, {}, answer, 0.0)
+    return ForcedCurve("own", 1.0, 1.0, {"right": np.asarray(height, complex)}, {}, {}, answer, 0.0)
 
 
 def duffing(beta: float, n: int = 4001) -> tuple[np.ndarray, np.ndarray]:
@@ -123,7 +123,7 @@ def test_a_sweep_up_jumps_at_the_fold_of_a_contact_that_opens(
     the fold says.
     """
     size = softening.amplitude([1.0])
-    curve = Curve("own", 1.0, 0.15, {"right": size.astype(complex)}, {}, {}, softening, 0.0)
+    curve = ForcedCurve("own", 1.0, 0.15, {"right": size.astype(complex)}, {}, {}, softening, 0.0)
     up, down = _folds(curve)
     assert up.up and not down.up
     assert up.reached > 2.5 * up.before

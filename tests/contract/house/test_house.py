@@ -295,32 +295,32 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 15890,
+    "analyses": 14850,
     "hbm": 7760,
     "contact": 4450,
     "linalg": 3380,
-    "scene": 2340,
+    "scene": 2345,
     "plot": 2210,
-    "report": 2130,
+    "report": 2190,
     "fitting": 1870,
-    "sizing": 1760,
+    "sizing": 1755,
     "batch": 1620,
-    "mesh": 1492,
+    "mesh": 1525,
     "vary": 1390,
     "reference": 1190,
-    "cli": 980,
-    "measured": 880,
+    "cli": 1000,
+    "measured": 952,
     "reduction": 880,
-    "results": 880,
+    "results": 915,
     "fem": 860,
-    "matrices": 650,
-    "root": 600,
+    "matrices": 657,
+    "root": 605,
     "cache": 470,
     "dynamics": 360,
     "scenes": 220,
 }
 #: totals of upd/
-MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 54200, 425, 3980, 505
+MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 53400, 420, 3940, 498
 #: parameters of a function and fields of a class, outside the solver rooms
 MOST_PARAMETERS, MOST_FIELDS, SOLVER_ROOMS = 11, 20, ("hbm", "contact", "linalg")
 

@@ -41,8 +41,8 @@ def _on_one_thread(make: Callable[[ForcedSolution], Made]) -> Callable[[ForcedSo
 
 def _sizes(solution: ForcedSolution) -> dict[str, int]:
     """Contact points of the first stiffness, or nodes of whole faces."""
-    points = [m.contacts.n_point for m in solution.models.values()]
-    return {"n_pairs": next(iter(points + [f.of.n for f in solution.faces.values()]), 0)}
+    counts = [m.contacts.n_point for m in solution.models.values()]
+    return {"n_pairs": next(iter(counts + [f.of.n for f in solution.faces.values()]), 0)}
 
 
 ANALYSIS = Analysis(

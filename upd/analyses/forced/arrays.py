@@ -13,7 +13,7 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curve_results import measured_peaks
-from upd.analyses.forced.curves import Curve, FacesCurve, LinearCurves, PointCurve, SweptCurve
+from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, PointCurve, SweptCurve
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array, Model
@@ -107,7 +107,7 @@ def _places(position: Array, face: IntArray, along: Array, up: Array) -> Variabl
     }
 
 
-def _curve_arrays(solution: ForcedSolution, curve: Curve[Any]) -> Variables:
+def _curve_arrays(solution: ForcedSolution, curve: ForcedCurve[Any]) -> Variables:
     """A curve: accelerance of both blades in every harmonic that is excited, its peaks, and what
     its method knows of the contact.
     """

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import Curve, FacesCurve, PointCurve, SweptCurve, WholeFaces
+from upd.analyses.forced.curves import FacesCurve, ForcedCurve, PointCurve, SweptCurve, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.levels import HARMONICS, SAMPLES
 from upd.analyses.forced.model import Model
@@ -218,7 +218,7 @@ def _preloaded(case: Case, state: StaticState, mu: float, least: float) -> Check
     return _check("preloaded contact", case, float(bool(state.empty) or mobilised), what=what)
 
 
-def _curve_checks(solution: ForcedSolution, curve: Curve[Any]) -> Iterator[Check]:
+def _curve_checks(solution: ForcedSolution, curve: ForcedCurve[Any]) -> Iterator[Check]:
     e = solution.plan.scene.excitation
     if isinstance(curve.answer, SteppedSine):
         yield from _sweep_checks(curve)
@@ -233,7 +233,7 @@ def _curve_checks(solution: ForcedSolution, curve: Curve[Any]) -> Iterator[Check
         yield from _point_checks(curve, solution.models[curve.stiffness], levels)
 
 
-def _path(curve: Curve[Any]) -> Check:
+def _path(curve: ForcedCurve[Any]) -> Check:
     if curve.stopped:
         return _check("path stopped", curve.case, 1.0, message=curve.answer.message)
     astray = int((~curve.answer.periodic).sum()) if hasattr(curve.answer, "periodic") else 0

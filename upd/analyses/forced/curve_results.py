@@ -10,7 +10,7 @@ import numpy as np
 
 from upd.analyses import printed
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import Curve, PointCurve
+from upd.analyses.forced.curves import ForcedCurve, PointCurve
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
@@ -30,7 +30,7 @@ MEASURED_PEAK = q.FREE_PEAK_FREQUENCY.name
 _LOWER = 0.01
 
 
-def _more_harmonics(curve: Curve[Any]) -> Iterator[Result]:
+def _more_harmonics(curve: ForcedCurve[Any]) -> Iterator[Result]:
     """Highest points in the harmonics beside the one that is read, which has the numbered peaks."""
     for k, H in curve.more.items() if not curve.empty else ():
         for blade in SIDES[::-1]:
@@ -42,7 +42,7 @@ def _more_harmonics(curve: Curve[Any]) -> Iterator[Result]:
             yield q.HARMONIC_ACCELERANCE.on(blade).of(height, curve.case, n=k)
 
 
-def curve_results(solution: ForcedSolution, curve: Curve[Any]) -> list[Result]:
+def curve_results(solution: ForcedSolution, curve: ForcedCurve[Any]) -> list[Result]:
     """Peaks of both blades, those not reached, the reduction; the contact at the right ones."""
     case = curve.case
     results = [
@@ -66,7 +66,7 @@ def curve_results(solution: ForcedSolution, curve: Curve[Any]) -> list[Result]:
     return results
 
 
-def _at_peak(solution: ForcedSolution, curve: Curve[Any], peak: CurvePeak) -> list[Result]:
+def _at_peak(solution: ForcedSolution, curve: ForcedCurve[Any], peak: CurvePeak) -> list[Result]:
     """The contact at a peak: of points, of the last period of a sweep, or of the whole contact."""
     at, i = replace(curve.case, peak=peak.number, mode=peak.mode), peak.sample
     if isinstance(curve.answer, FrequencyResponse):
@@ -81,7 +81,7 @@ def _at_peak(solution: ForcedSolution, curve: Curve[Any], peak: CurvePeak) -> li
     ]
 
 
-def _folds(curve: Curve[Any]) -> Iterator[Result]:
+def _folds(curve: ForcedCurve[Any]) -> Iterator[Result]:
     """What a slow sweep up reaches where it jumps past the peak of a mode: by the largest of the
     jumps that are nearest to that peak.
     """
@@ -101,7 +101,7 @@ def _folds(curve: Curve[Any]) -> Iterator[Result]:
             yield q.SWEEP_UP_ACCELERANCE.of(fold.reached, case, n=peak.number)
 
 
-def _not_reached(solution: ForcedSolution, curve: Curve[Any]) -> list[Result]:
+def _not_reached(solution: ForcedSolution, curve: ForcedCurve[Any]) -> list[Result]:
     """Peaks of the stuck curve that the curve lacks, where it ended early or has none."""
     e, wanted = solution.plan.scene.excitation, solution.stuck_peaks(curve.stiffness)
     found = {peak.number for peak in curve.peaks.get("right", ())}
@@ -119,7 +119,7 @@ def _not_reached(solution: ForcedSolution, curve: Curve[Any]) -> list[Result]:
     ]
 
 
-def _reduction(solution: ForcedSolution, curve: Curve[Any], blade: Side) -> list[Result]:
+def _reduction(solution: ForcedSolution, curve: ForcedCurve[Any], blade: Side) -> list[Result]:
     """How far the highest point of a blade's curve is below its free peak."""
     linear = solution.linear.get(curve.stiffness)
     free = linear.free_peaks[blade] if linear else []

@@ -155,7 +155,7 @@ Way = Literal["", "up", "down"]
 
 
 @dataclass(frozen=True)
-class Curve(Generic[Answer]):
+class ForcedCurve(Generic[Answer]):
     """One curve with friction, whichever way it was found.
 
     Attributes
@@ -250,9 +250,9 @@ class Curve(Generic[Answer]):
 
 
 #: a curve of contact points, and of whole faces, by harmonic balance; a sweep
-PointCurve = Curve[FrequencyResponse]
-FacesCurve = Curve[InterfaceResponse]
-SweptCurve = Curve[SteppedSine]
+PointCurve = ForcedCurve[FrequencyResponse]
+FacesCurve = ForcedCurve[InterfaceResponse]
+SweptCurve = ForcedCurve[SteppedSine]
 
 
 def rising(frequency: Array) -> NDArray[np.bool_]:

@@ -21,8 +21,8 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import (
     AT_TOP,
-    Curve,
     Fold,
+    ForcedCurve,
     LinearCurves,
     PointCurve,
     TimeCheck,
@@ -84,7 +84,7 @@ def solve_curve(
         for k in model.excitation.harmonics
     }
     read = H.pop(model.excitation.lowest)
-    curve = Curve(name, ratio, force, read, H, {}, answer, time.perf_counter() - begin)
+    curve = ForcedCurve(name, ratio, force, read, H, {}, answer, time.perf_counter() - begin)
     if curve.empty:
         return curve
     curve = with_tops(plan, model, linear, curve)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import Curve, LinearCurves, PointCurve, TimeCheck, Top
+from upd.analyses.forced.curves import ForcedCurve, LinearCurves, PointCurve, TimeCheck, Top
 from upd.analyses.forced.linear_limits import limit_peaks, linear_of, stuck_frequency
 from upd.analyses.forced.measures import CurvePeak, StuckMode, stuck_modes
 from upd.analyses.forced.mode_peaks import CANDIDATES, numbered_peaks
@@ -348,7 +348,7 @@ def _confirmed_again(
 
     def stable(answer: FrequencyResponse) -> Iterator[CurvePeak]:
         blades = {s: measures.accelerance(answer, model.row(s), one.force) for s in SIDES}
-        path = Curve(one.case.stiffness, one.ratio, one.force, blades, {}, {}, answer, 0.0)
+        path = ForcedCurve(one.case.stiffness, one.ratio, one.force, blades, {}, {}, answer, 0.0)
         path = with_tops(plan, model, linear, path)
         # the other blade changes alike
         tops = {at: top for at, top in path.tops.items() if at == key}

@@ -11,7 +11,7 @@ import numpy as np
 from upd.analyses import measured
 from upd.analyses.forced import measures
 from upd.analyses.forced.curve_results import curve_results, peak_results
-from upd.analyses.forced.curves import Curve, LinearCurves, WholeFaces
+from upd.analyses.forced.curves import ForcedCurve, LinearCurves, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.inputs import InputEffect
 from upd.analyses.forced.linear_limits import linear_curves
@@ -207,7 +207,7 @@ def _linear_at(
     return lambda f: measures.linear_accelerance(problem, row, force, f, stuck)
 
 
-def _with_friction(c: Curve[Any], side: Side) -> Computed:
+def _with_friction(c: ForcedCurve[Any], side: Side) -> Computed:
     """A curve with friction, between its points by straight lines."""
     f, H = c.frequency, c.accelerance[side]
     way = slice(None) if f[-1] > f[0] else slice(None, None, -1)

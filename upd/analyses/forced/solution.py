@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.base import Resolved
-from upd.analyses.forced.curves import Curve, LinearCurves, SweptCurve, WholeFaces
+from upd.analyses.forced.curves import ForcedCurve, LinearCurves, SweptCurve, WholeFaces
 from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.inputs import InputEffect
 from upd.analyses.forced.linear_limits import stuck_peaks_of
@@ -103,7 +103,7 @@ class ForcedSolution:
     bodies: Bodies | None = None
     models: dict[str, Model] = field(default_factory=dict)
     linear: dict[str, LinearCurves] = field(default_factory=dict)
-    curves: list[Curve[Any]] = field(default_factory=list)
+    curves: list[ForcedCurve[Any]] = field(default_factory=list)
     faces: dict[str, WholeFaces] = field(default_factory=dict)
     marched: list[MarchedPeak] = field(default_factory=list)
     band: list[BandPoint] = field(default_factory=list)
@@ -130,7 +130,7 @@ class ForcedSolution:
             return stuck_peaks_of(march, peaks, CANDIDATES * stop, excitation)
         return tell_stuck_peaks(self.models[stiffness], linear.stuck_peaks[blade], stop)
 
-    def marked_points(self, curve: Curve[Any]) -> list[tuple[int, str, int]]:
+    def marked_points(self, curve: ForcedCurve[Any]) -> list[tuple[int, str, int]]:
         """Number, mode and point of the path of the right blade's peaks.
 
         Number 0 and the highest point of a curve without a peak.

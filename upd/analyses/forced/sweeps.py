@@ -18,7 +18,7 @@ from functools import partial
 
 import numpy as np
 
-from upd.analyses.forced.curves import Answer, Curve, FacesCurve, SweptCurve, Way, WholeFaces
+from upd.analyses.forced.curves import Answer, FacesCurve, ForcedCurve, SweptCurve, Way, WholeFaces
 from upd.analyses.forced.excitation import ComplexArray, excitation_of
 from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.linear_limits import stuck_modes_of
@@ -85,7 +85,9 @@ def both_ways(
             start = found.state
             moved = {k: found.harmonics[:, i] for i, k in enumerate(excitation.harmonics)}
             moved[excitation.lowest] = found.amplitude
-            curve = Curve(name, ratio, force, {}, {}, {}, found, float(found.seconds.sum()), way)
+            curve = ForcedCurve(
+                name, ratio, force, {}, {}, {}, found, float(found.seconds.sum()), way
+            )
             out.append(with_outputs(plan, march, curve, moved, sweep_maxima))
     return out
 
@@ -93,10 +95,10 @@ def both_ways(
 def with_outputs(
     plan: ForcedPlan,
     march: InterfaceModel,
-    curve: Curve[Answer],
+    curve: ForcedCurve[Answer],
     moved: Mapping[int, ComplexArray],
     maxima: Callable[[Array, Array], list[CurvePeak]],
-) -> Curve[Answer]:
+) -> ForcedCurve[Answer]:
     """The curve with the accelerances of both blades and their peaks.
 
     Parameters
@@ -162,7 +164,7 @@ def balance_curve(plan: ForcedPlan, name: str, faces: WholeFaces, ratio: float) 
         fallback=by_coulomb,
     )
     moved = {k: found.amplitude[:, k] for k in excitation.harmonics}
-    curve = Curve(name, ratio, force, {}, {}, {}, found, found.seconds)
+    curve = ForcedCurve(name, ratio, force, {}, {}, {}, found, found.seconds)
     return with_outputs(plan, faces.march, curve, moved, partial(_maxima, found.jumps))
 
 
