@@ -10,7 +10,7 @@ import hashlib
 import json
 import platform
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from functools import cache
 from importlib import metadata
@@ -83,7 +83,8 @@ def user_files(recipe: Path) -> list[Path]:
         if file in found:
             continue
         found.append(file)
-        for name in _imported(file) if file.suffix == ".py" and not _installed(file) else ():
+        own = file.suffix == ".py" and not _installed(file)
+        for name in _imported(file.read_bytes()) if own else ():
             for folder in (file.parent, *map(Path, sys.path)):
                 place = folder.joinpath(*name.split("."))
                 both = (place.with_suffix(".py"), place / "__init__.py")
@@ -92,14 +93,17 @@ def user_files(recipe: Path) -> list[Path]:
     return found
 
 
-def _imported(file: Path) -> Iterator[str]:
-    """Modules that a file imports, and what may be one."""
+@cache
+def _imported(source: bytes) -> list[str]:
+    """Modules that a file with this content imports, and what may be one."""
+    found: list[str] = []
     with suppress(SyntaxError, ValueError):
-        for node in ast.walk(ast.parse(file.read_bytes())):
+        for node in ast.walk(ast.parse(source)):
             if isinstance(node, ast.Import):
-                yield from (alias.name for alias in node.names)
+                found += [alias.name for alias in node.names]
             elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-                yield from (node.module, *(f"{node.module}.{a.name}" for a in node.names))
+                found += [node.module, *(f"{node.module}.{a.name}" for a in node.names)]
+    return list(dict.fromkeys(found))
 
 
 def _installed(file: Path) -> bool:

@@ -129,7 +129,7 @@ def _checked(meshes: Mapping[str, Mesh], bodies: tuple[str, str], keys: tuple[st
     across = between @ normal
     offset = np.linalg.norm(between - np.outer(across, normal), axis=1)
     worst = int(offset.argmax())
-    if offset[worst] > max(OUT_OF_LINE * extent, rounding(np.vstack(points))):
+    if offset[worst] > max(OUT_OF_LINE * extent, sum(map(rounding, points))):
         x, y, z = points[0][worst]
         remedy = "order both sets alike and copy the lattice of one surface to the other"
         if min(float(np.ptp(p @ normal)) for p in points) > _WRAPS * extent:

@@ -348,6 +348,15 @@ def test_rounded_coordinates_are_paired(digits: int, far: float, tmp_path: Path)
     assert 0.0 < pairs.offset < 2.0 * max(far, 4.0) * 10.0 ** (1 - digits)
 
 
+def test_rounded_coordinates_meet_exact_ones() -> None:
+    meshes = blocks()
+    for name, digits in (("damper", 6), ("platform", 12)):
+        rounded = [[float(f"{x:.{digits}g}") for x in row] for row in meshes[name].points]
+        meshes[name] = meshes[name].with_points(np.array(rounded))
+    (pairs,) = check_pairs(meshes)
+    assert 1e-6 < pairs.offset < 1e-5
+
+
 def test_a_shifted_lattice_is_no_rounding(tmp_path: Path) -> None:
     meshes = blocks()
     damper = meshes["damper"]
