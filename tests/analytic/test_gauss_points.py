@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 from upd.analyses import make_plan
 from upd.analyses.forced.measures import stuck_modes
 from upd.analyses.forced.model import Model, make_model, preloaded
-from upd.analyses.forced.peaks_again import moved
+from upd.analyses.forced.other_points import nearer
 from upd.analyses.forced.points import FacePoints, GaussRule, fewer_points, gauss_points
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import make_bodies
@@ -185,7 +185,7 @@ def test_half_a_rig_is_the_even_part_of_the_whole(arrangement: str) -> None:
 def test_points_on_half_of_each_face_are_the_model_of_a_smaller_patch() -> None:
     """The same stiffness and forces nearer to the middle: it stays, and what is uneven halves."""
     model, own = _model("symmetric", **{"left_out.solve": "no"})
-    same, half = moved(model, 1.0), moved(model, 0.5)
+    same, half = nearer(model, 1.0), nearer(model, 0.5)
     assert same is not None and half is not None and model.state is not None
     assert same.contacts.rows == pytest.approx(model.contacts.rows, abs=1e-12)
     assert half.contacts.law.k_t == pytest.approx(model.contacts.law.k_t)
@@ -211,7 +211,7 @@ def test_points_on_half_of_each_face_are_the_model_of_a_smaller_patch() -> None:
     lower = [m.frequency for m in stuck_modes(half, 1500.0)]
     assert all(a < b for a, b in zip(lower[:2], own[:2], strict=True))
     one_row, _ = _model("symmetric", **{"left_out.solve": "no", "contact.rows": 1})
-    assert moved(one_row, 0.5) is None
+    assert nearer(one_row, 0.5) is None
 
 
 @pytest.mark.parametrize(
@@ -219,7 +219,6 @@ def test_points_on_half_of_each_face_are_the_model_of_a_smaller_patch() -> None:
     [
         ({"contact.rows": "all"}, "needs numbers of points"),
         ({"contact.share": "equal"}, "Gauss points have their own shares"),
-        ({"stiffness.own.points": "law", "contact.stiffness": ["own"]}, "not those of a law"),
     ],
 )
 def test_what_gauss_points_are_not_is_refused(change: dict[str, Any], why: str) -> None:

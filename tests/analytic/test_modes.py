@@ -104,6 +104,20 @@ def test_all_below_a_frequency_and_no_more(solver):
     assert few.shapes.shape == (700, 0)
 
 
+def test_more_modes_than_a_mesh_describes_are_refused():
+    """As with a density in a wrong unit: the run ended never."""
+    K, M, exact = chain(3000)
+    with pytest.raises(InputError, match="3000 modes of 3000 dofs lie below.*units of density"):
+        modes(K, M, below_hz=2.0 * exact[-1], solver="superlu")
+
+
+@pytest.mark.parametrize("solver", ["superlu", "pardiso"])
+def test_many_modes_below_a_frequency_are_all_found(solver):
+    K, M, exact = chain(3000)
+    limit = 0.5 * (exact[119] + exact[120])
+    assert len(modes(K, M, below_hz=limit, solver=solver).frequency) == 120
+
+
 def rod(n=120):
     """A bar of n hexahedra whose lateral dofs are fixed, one end clamped, nu = 0.
 

@@ -300,7 +300,7 @@ def test_faults_are_told_together() -> None:
         ({"contact.stiffness": ["other"]}, "no table"),
         ({"stiffness.own.K_N": "1e6 N/mm"}, "come together"),
         ({"stiffness.own.scene": "symmetric", "stiffness.own.run": "runs/a"}, "both given"),
-        ({"stiffness.thesis.points": "law"}, '"law" needs'),
+        ({"stiffness.thesis.points": "law"}, "'law' is not known"),
         ({"excitation.start": "600 Hz"}, "not below"),
         ({"damper.centrifugal": "0 N"}, "loose"),
         ({"geometry.arrangement": "asymmetric"}, "left face needs"),

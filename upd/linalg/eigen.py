@@ -21,7 +21,7 @@ from scipy.linalg import eigh
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.common import EPS, Factor, FloatArray, Motion, checked_vectors, log
 from upd.linalg.eigen_checks import Modes, checked_mass, finished, ritz
-from upd.linalg.inertia import Count, count_modes
+from upd.linalg.inertia import Count, about_how_many, count_modes
 from upd.linalg.lanczos import BLOCK, MAX_BLOCKS, Operator, block_lanczos
 from upd.linalg.schur import factorise
 from upd.linalg.select import memory_left
@@ -35,6 +35,8 @@ DENSE_MANY = 4000
 RESIDUAL_LIMIT = 1e-6
 #: Modes asked for first when only a frequency limit is given.
 _FIRST_GUESS = 12
+#: Modes from which on those below the limit are counted before more are sought.
+_MANY = 4 * _FIRST_GUESS
 #: How often the guessed shift of a floating body may be bettered, and the blocks that show where it
 #: should be.
 _SHIFTS, _PROBE_BLOCKS = 5, 6
@@ -222,7 +224,8 @@ class Eigenproblem:
                 or found.frequency[:wanted].max(initial=0.0) > below_hz
             ):
                 break
-            wanted = min(most, 2 * wanted)
+            there = self._below(found, below_hz) if wanted == _MANY else 0
+            wanted = min(most, max(2 * wanted, there + 1))
         found = self._complete(found, wanted, below_hz)
         keep = _kept(found, wanted, below_hz)
         log.info(
@@ -264,6 +267,23 @@ class Eigenproblem:
         if self.solver == "dense" or (self.solver == "auto" and _is_dense(self.n, count)):
             return self._dense(count)
         return self._lanczos(count)
+
+    def _below(self, found: Modes, below_hz: float) -> int:
+        """About how many modes lie below the limit.
+
+        Raises InputError where they are more than a mesh describes: beyond a third of the dofs the
+        waves are as short as the elements.
+        """
+        if found.solver == "dense":
+            return 0
+        self._make_room()
+        there = about_how_many(self.K, self.M, (2.0 * np.pi * below_hz) ** 2, found.solver)
+        if 3 * there > self.n_massive:
+            raise InputError(
+                f"{there} modes of {self.n} dofs lie below {below_hz:g} Hz, more than the mesh "
+                "describes: check the units of density and E, or give a lower frequency limit."
+            )
+        return there
 
     def _refuse_size(self, count: int) -> None:
         """Raise InputError before memory runs out.
@@ -344,14 +364,16 @@ class Eigenproblem:
             found = self._more(self._factor(), found, _CHECK_BLOCK, step, _TOLERANCE)
         return found.with_proof(shown, abs(count.missed(found)))
 
-    def _counted(self, found: Modes, keep: int, limit: float) -> Count | None:
-        """The inertia above the first `keep` modes and above `limit`.
-
-        A second factor beside the first where both fit with as much to spare for another problem
-        solved at the same time, else in its place.
+    def _make_room(self) -> None:
+        """A second factor stands beside the first where both fit with as much to spare for another
+        problem solved at the same time, else in its place.
         """
         if self._inverse and (self.alone or 2 * self._inverse[0].factor.peak_bytes > memory_left()):
             self._inverse.clear()
+
+    def _counted(self, found: Modes, keep: int, limit: float) -> Count | None:
+        """The inertia above the first `keep` modes and above `limit`."""
+        self._make_room()
         return count_modes(self.K, self.M, found, keep, limit, found.solver)
 
     def _searched(self, inverse: _Inverse, found: Modes, count: int) -> Modes:

@@ -15,6 +15,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,14 +81,28 @@ def count_modes(
     """
     for sigma in _shifts(found, keep, limit):
         try:
-            signed = signed_pardiso if solver == "pardiso" else signed_superlu
-            factor = signed(combined(K, -sigma, M))
+            factor = _factor(K, M, sigma, solver)
         except ConvergenceError as error:
             log.info("no inertia at %.6g (rad/s)^2: %s", sigma, error)
             return None
         if factor is not None and _stands_clear(M, found, sigma, factor):
             return Count(sigma, factor.negative)
     return None
+
+
+def about_how_many(K: Matrix, M: Matrix, limit: float, solver: str) -> int:
+    """Modes below ``limit``, (rad/s)^2, unproven: one on it may count or not; 0 where no factor
+    tells.
+    """
+    with suppress(ConvergenceError):
+        factor = _factor(K, M, limit, solver)
+        return factor.negative if factor is not None else 0
+    return 0
+
+
+def _factor(K: Matrix, M: Matrix, sigma: float, solver: str) -> SignedFactor | None:
+    signed = signed_pardiso if solver == "pardiso" else signed_superlu
+    return signed(combined(K, -sigma, M))
 
 
 def _shifts(found: Modes, keep: int, limit: float) -> Iterator[float]:

@@ -381,8 +381,13 @@ MATRIX_FILES: dict[str, tuple[str, bytes | None, str]] = {
     "cut": ("K.mtx", (HEAD + "symmetric\n3 3 5\n1 1 2\n2 1 -1\n").encode(), "cannot be read"),
     "asymmetric": (
         "K.mtx",
-        (HEAD + "general\n2 2 3\n1 1 1\n2 2 1\n1 2 1\n").encode(),
+        (HEAD + "general\n2 2 4\n1 1 1\n2 2 1\n1 2 1\n2 1 3\n").encode(),
         "not symmetric",
+    ),
+    "one triangle": (
+        "K.mtx",
+        (HEAD + "general\n2 2 3\n1 1 1\n2 2 1\n1 2 1\n").encode(),
+        "one triangle only",
     ),
     "not square": ("K.mtx", (HEAD + "general\n2 3 1\n1 1 1\n").encode(), "are square"),
     "no dofs": ("K.mtx", (HEAD + "general\n0 0 0\n").encode(), "are square"),
