@@ -107,7 +107,7 @@ def test_all_below_a_frequency_and_no_more(solver):
 def test_more_modes_than_a_mesh_describes_are_refused():
     """As with a density in a wrong unit: the run ended never."""
     K, M, exact = chain(3000)
-    with pytest.raises(InputError, match="3000 modes of 3000 dofs lie below.*units of density"):
+    with pytest.raises(InputError, match=r"3000 modes of 3000 dofs lie below.*units of density"):
         modes(K, M, below_hz=2.0 * exact[-1], solver="superlu")
 
 
