@@ -298,7 +298,7 @@ ROOM_LINES = {
     "analyses": 14850,
     "hbm": 7760,
     "contact": 4450,
-    "linalg": 3380,
+    "linalg": 3395,
     "scene": 2345,
     "plot": 2210,
     "report": 2190,
@@ -315,7 +315,7 @@ ROOM_LINES = {
     "fem": 860,
     "matrices": 657,
     "root": 605,
-    "cache": 470,
+    "cache": 472,
     "dynamics": 360,
     "scenes": 220,
 }
