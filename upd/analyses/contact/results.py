@@ -67,11 +67,10 @@ CURVED_HEADLINE = (
     "approach",
     "mean_pressure",
 )
-#: and of a flat one
+#: and of a flat one, whose largest pressure, at its edges, has no limit
 FLAT_HEADLINE = (
     "F_N",
     "mean_pressure",
-    "max_pressure",
     "closed_share",
     "approach",
     "K_N_per_pad",
