@@ -307,7 +307,8 @@ def _rim_check(solution: ContactSolution, case: NormalCase) -> Check:
     # The gap gives the radius of curvature, h = r^2 / 2R at the rim; a flat patch (to rounding of
     # its coordinates) has none.
     gap = patch.whole(solution.model.gap)
-    corner = float(gap[0, len(patch.Y) // 2] - gap.min())
+    rim = gap[0, len(patch.Y) // 2] if patch.quads is None else gap[patch.rim()].min()
+    corner = float(rim - gap.min())
     if corner <= 1e-9 * half:
         return Check("patch rim", case.case, 0, 0, "the contact is flat: its rim belongs to it")
     radius = half**2 / (2.0 * corner)
@@ -350,7 +351,8 @@ def _resolution_check(solution: ContactSolution, case: NormalCase) -> Check:
 def _curved_checks(solution: ContactSolution) -> list[Check]:
     """Of a curved contact as a whole: symmetric, and small against its curvature."""
     plan, scene, checks = solution.plan, solution.plan.scene, []
-    if not plan.effect("mirror symmetry") and has_mirror_planes(scene):
+    lattice = solution.model.patch.quads is None
+    if lattice and not plan.effect("mirror symmetry") and has_mirror_planes(scene):
         text, remedy = "|f - mirrored f| / max f", "the mesh or the load is not symmetric"
         checks += [
             Check("symmetric pressure", c.case, _asymmetry(solution, c), 1e-6, text, remedy)
@@ -385,8 +387,7 @@ def _slope(solution: ContactSolution) -> float:
     a / R for a sphere.
     """
     patch = solution.model.patch
-    gap = patch.whole(solution.model.gap)
-    steepness = np.hypot(*np.gradient(gap, patch.X, patch.Y))
+    steepness = np.hypot(*patch.slopes(solution.model.gap))
     touching = [steepness[patch.whole(c.solution.force) > 0.0] for c in solution.normal]
     return max((float(s.max()) for s in touching if s.size), default=0.0)
 

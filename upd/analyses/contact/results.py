@@ -459,7 +459,7 @@ def _misfits(
     form and over that of mu p.
     """
     closed = closed_form_traction(solution, t)
-    if closed is None:
+    if closed is None or solution.model.patch.quads is not None:
         return []
     patch, mu = solution.model.patch, solution.plan.scene.contact.friction
     area, theirs = patch.area(), consistent_average(patch, closed)
