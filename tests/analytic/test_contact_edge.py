@@ -171,3 +171,29 @@ def test_one_node_keeps_within_its_cells() -> None:
     found = on_lattice(x, y, p, np.where(p > 0.0, 0.0, 1e-4), p > 0.0, MODULUS)
     assert 0.0 < found.area < 0.04
     assert found.resolution == pytest.approx(0.02)
+
+
+def o_grid(n: int, half: float) -> tuple[Array, NDArray[np.int64]]:
+    """A square of 2n x 2n cells whose lines are bent to rings: points and quadrilaterals."""
+    lines = np.linspace(-1.0, 1.0, 2 * n + 1)
+    x, y = (v.ravel() for v in np.meshgrid(lines, lines, indexing="ij"))
+    largest = np.maximum(np.abs(x), np.abs(y))
+    stretch = np.divide(largest, np.hypot(x, y), out=np.ones_like(x), where=largest > 0.0)
+    bend = 1.0 - largest + largest * stretch
+    cells = make_patch(np.column_stack([x, y]), np.ones(len(x)), (False, False)).cells()
+    return half * np.column_stack([x * bend, y * bend]), cells
+
+
+def test_disc_on_rings_converges_at_second_order() -> None:
+    """A disc off the middle of an O-grid, so that its edge cuts the quadrilaterals at all places."""
+    hertz = hertz_sphere(150.0, R, MODULUS)
+
+    def error(h: float, shift: float) -> float:
+        points, quads = o_grid(round(0.32 / h), 0.32)
+        p, gap = hertz_fields(np.hypot(points[:, 0] - 0.05 * shift, points[:, 1] - 0.02), 150.0)
+        found = located_area(points, quads, p, gap, p > 0.0, MODULUS)
+        assert abs(found.area - hertz.area) < found.resolution
+        return found.area / hertz.area - 1.0
+
+    assert abs(error(0.02, 0.3)) < 0.01
+    assert 1.7 < order(error, (0.04, 0.02, 0.01)) < 2.4

@@ -113,7 +113,7 @@ class _Lines:
         line = self.points[b] - self.points[a]
         cosine = 1.0 if self.cosine is None else self.cosine.get(_key(a, b), 1.0)
         length = cosine * float(np.hypot(*line))
-        return self.points[a] + line * _share(
+        return self.points[a] + line * _share(  # type: ignore[no-any-return]
             float(self.inside[a]), float(self.opening[b]), max(length, np.finfo(float).tiny)
         )
 
