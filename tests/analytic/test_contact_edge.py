@@ -185,7 +185,7 @@ def o_grid(n: int, half: float) -> tuple[Array, NDArray[np.int64]]:
 
 
 def test_disc_on_rings_converges_at_second_order() -> None:
-    """A disc off the middle of an O-grid, so that its edge cuts the quadrilaterals at all places."""
+    """A disc off the middle of an O-grid, its edge cuts quadrilaterals anywhere."""
     hertz = hertz_sphere(150.0, R, MODULUS)
 
     def error(h: float, shift: float) -> float:
