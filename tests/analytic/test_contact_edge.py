@@ -7,7 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from upd.contact import normal_contact
-from upd.contact.edge import located_area
+from upd.contact.edge import LocatedArea, located_area
+from upd.contact.patch import make_patch
 from upd.reference import contact_modulus, half_space_compliance, hertz_sphere, sphere_gap
 
 Array = NDArray[np.float64]
@@ -19,6 +20,14 @@ def lattice(h: float, half: float, shift: float = 0.0) -> tuple[Array, Array, Ar
     n = round(half / h)
     x, y = h * (np.arange(-n, n + 1) + shift), h * (np.arange(-n, n + 1) + 0.7 * shift)
     return (x, y, *np.meshgrid(x, y, indexing="ij"))
+
+
+def on_lattice(
+    x: Array, y: Array, p: Array, gap: Array, contact: NDArray[np.bool_], modulus: float
+) -> LocatedArea:
+    points = np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
+    cells = make_patch(points, np.ones(len(points)), (False, False)).cells()
+    return located_area(points, cells, p.ravel(), gap.ravel(), contact.ravel(), modulus)
 
 
 def hertz_fields(r: Array, load: float) -> tuple[Array, Array]:
@@ -57,7 +66,7 @@ def order(error: Callable[[float, float], float], spacings: tuple[float, ...]) -
 def test_square_face_has_its_own_area() -> None:
     x, y = np.linspace(-2.0, 2.0, 17), np.linspace(-2.0, 2.0, 9)
     p = np.full((17, 9), 25.0)
-    found = located_area(x, y, p, 0.0 * p, p > 0.0, MODULUS)
+    found = on_lattice(x, y, p, 0.0 * p, p > 0.0, MODULUS)
     assert found.area == pytest.approx(16.0, rel=1e-14)
     assert found.resolution == 0.0
 
@@ -70,7 +79,7 @@ def test_straight_edge_is_exact_in_any_direction() -> None:
         p, gap = edge_fields(offset - (n[0] * X + n[1] * Y))
         # By symmetry a line through the centre halves the square.
         exact = 2.0 + 2.0 * offset
-        assert located_area(x, y, p, gap, p > 0.0, MODULUS).area == pytest.approx(exact, rel=2e-3)
+        assert on_lattice(x, y, p, gap, p > 0.0, MODULUS).area == pytest.approx(exact, rel=2e-3)
 
 
 def test_circle_converges_at_second_order() -> None:
@@ -79,7 +88,7 @@ def test_circle_converges_at_second_order() -> None:
     def error(h: float, shift: float) -> float:
         x, y, X, Y = lattice(h, 0.3, shift)
         p, gap = hertz_fields(np.hypot(X, Y), 150.0)
-        found = located_area(x, y, p, gap, p > 0.0, MODULUS)
+        found = on_lattice(x, y, p, gap, p > 0.0, MODULUS)
         assert abs(found.area - exact) < found.resolution
         return found.area / exact - 1.0
 
@@ -106,7 +115,7 @@ def test_area_of_any_shape(shape: str) -> None:
         x, y, X, Y = lattice(h, 1.0, shift)
         distance, exact = distance_to(shape, X, Y)
         p, gap = edge_fields(distance)
-        found = located_area(x, y, p, gap, p > 0.0, MODULUS)
+        found = on_lattice(x, y, p, gap, p > 0.0, MODULUS)
         assert abs(found.area - exact) < found.resolution
         return found.area / exact - 1.0
 
@@ -125,7 +134,7 @@ def solved_area(h: float, gap: Callable[[Array, Array], Array], half: float, loa
     C = 2.0 * half_space_compliance(n, n, h, h, E, NU)
     answer = normal_contact(C, gap(X, Y).T.ravel(), load=load)
     p, g, on = (v.reshape(n, n).T for v in (answer.force / h**2, answer.gap, answer.contact))
-    return located_area(x, y, p, g, on, MODULUS).area
+    return on_lattice(x, y, p, g, on, MODULUS).area
 
 
 def test_solved_sphere_has_hertz_area() -> None:
@@ -152,13 +161,39 @@ def test_two_solved_spots_add_up() -> None:
 
 def test_nothing_in_contact_has_no_area() -> None:
     x, y, X, _ = lattice(0.1, 0.3)
-    found = located_area(x, y, 0.0 * X, 0.0 * X + 1.0, X > 9.0, MODULUS)
+    found = on_lattice(x, y, 0.0 * X, 0.0 * X + 1.0, X > 9.0, MODULUS)
     assert (found.area, found.resolution) == (0.0, 0.0)
 
 
 def test_one_node_keeps_within_its_cells() -> None:
     x, y, X, Y = lattice(0.1, 0.3)
     p = np.where((np.abs(X) < 1e-9) & (np.abs(Y) < 1e-9), 100.0, 0.0)
-    found = located_area(x, y, p, np.where(p > 0.0, 0.0, 1e-4), p > 0.0, MODULUS)
+    found = on_lattice(x, y, p, np.where(p > 0.0, 0.0, 1e-4), p > 0.0, MODULUS)
     assert 0.0 < found.area < 0.04
     assert found.resolution == pytest.approx(0.02)
+
+
+def o_grid(n: int, half: float) -> tuple[Array, NDArray[np.int64]]:
+    """A square of 2n x 2n cells whose lines are bent to rings: points and quadrilaterals."""
+    lines = np.linspace(-1.0, 1.0, 2 * n + 1)
+    x, y = (v.ravel() for v in np.meshgrid(lines, lines, indexing="ij"))
+    largest = np.maximum(np.abs(x), np.abs(y))
+    stretch = np.divide(largest, np.hypot(x, y), out=np.ones_like(x), where=largest > 0.0)
+    bend = 1.0 - largest + largest * stretch
+    cells = make_patch(np.column_stack([x, y]), np.ones(len(x)), (False, False)).cells()
+    return half * np.column_stack([x * bend, y * bend]), cells
+
+
+def test_disc_on_rings_converges_at_second_order() -> None:
+    """A disc off the middle of an O-grid, its edge cuts quadrilaterals anywhere."""
+    hertz = hertz_sphere(150.0, R, MODULUS)
+
+    def error(h: float, shift: float) -> float:
+        points, quads = o_grid(round(0.32 / h), 0.32)
+        p, gap = hertz_fields(np.hypot(points[:, 0] - 0.05 * shift, points[:, 1] - 0.02), 150.0)
+        found = located_area(points, quads, p, gap, p > 0.0, MODULUS)
+        assert abs(found.area - hertz.area) < found.resolution
+        return found.area / hertz.area - 1.0
+
+    assert abs(error(0.02, 0.3)) < 0.01
+    assert 1.7 < order(error, (0.04, 0.02, 0.01)) < 2.4

@@ -75,7 +75,7 @@ def finite_body_share(
     Timoshenko, J. N. Goodier, Theory of Elasticity (1970), section 93.
     """
     total = float(forces.sum())
-    centre = (forces.sum(axis=1) @ patch.X / total, forces.sum(axis=0) @ patch.Y / total, 0.0)
+    centre = (*(forces.ravel() @ patch.points() / total), 0.0)
     into = np.array([1.0, 1.0, body.side])
     x, v = body.mesh.points * into - centre, displacement * into
     size = _ROUNDING * float(np.ptp(x, axis=0).max())

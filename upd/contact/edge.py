@@ -1,4 +1,4 @@
-"""Area of a contact of any shape, its edge located between the nodes of a lattice.
+"""Area of a contact of any shape, its edge located between the nodes.
 
 At a smooth edge the pressure falls like the root of the distance s to it and the gap opens with
 its power 3/2, with one factor B along both (plane strain across the edge):
@@ -6,12 +6,12 @@ its power 3/2, with one factor B along both (plane strain across the edge):
     p = B sqrt(s)  inside,      g = (4 B / 3 E*) s^(3/2)  outside.
 
 Between a node in contact and an open neighbour, c h apart across the edge (c the cosine between the
-lattice line and the edge's normal), B follows from both distances together,
+line between them and the edge's normal), B follows from both distances together,
 
     p^2 / B^2 + (3 E* g / 4 B)^(2/3) = c h,
 
 and p^2 / B^2 / (c h) is the share of the line inside the contact. The edge is a chord in each
-quadrilateral it crosses, which gives its normal. Where the contact reaches the rim of the lattice
+quadrilateral it crosses, which gives its normal. Where the contact reaches the rim of the patch
 the face ends, and the area with it: a face wholly in contact has its own area exactly.
 """
 
@@ -25,8 +25,6 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: places of the corners of a quadrilateral of the lattice, around it
-_RING = ((0, 0), (1, 0), (1, 1), (0, 1))
 _NEWTON = 60
 
 
@@ -40,7 +38,7 @@ class LocatedArea:
         mm2.
     resolution : float
         Half the area of the quadrilaterals that the edge crosses [mm2]: the area lies this far from
-        the middle of what the lattice leaves possible, at most. Zero for a face wholly in contact.
+        the middle of what the nodes leave possible, at most. Zero for a face wholly in contact.
     """
 
     area: float
@@ -48,20 +46,27 @@ class LocatedArea:
 
 
 def located_area(
-    x: Array, y: Array, pressure: Array, gap: Array, contact: BoolArray, modulus: float
+    points: Array,
+    quads: NDArray[np.int64],
+    pressure: Array,
+    gap: Array,
+    contact: BoolArray,
+    modulus: float,
 ) -> LocatedArea:
-    """Area of the contact on a lattice of nodes.
+    """Area of the contact on quadrilaterals between nodes.
 
     Second order in the spacing for smooth edges; where a face ends or steps between two nodes, the
     resolution is all that is known.
 
     Parameters
     ----------
-    x, y : (nx,) and (ny,) ndarray
-        Lattice lines [mm].
-    pressure, gap : (nx, ny) ndarray
+    points : (n, 2) ndarray
+        Nodes [mm].
+    quads : (m, 4) ndarray of int
+        Corners of the quadrilaterals, around each.
+    pressure, gap : (n,) ndarray
         At the nodes, loaded [MPa, mm].
-    contact : (nx, ny) ndarray of bool
+    contact : (n,) ndarray of bool
         Nodes in contact.
     modulus : float
         Contact modulus E* [MPa].
@@ -75,51 +80,45 @@ def located_area(
     K. L. Johnson, Contact Mechanics (1985), section 4.2(c): the cylinder's pressure and gap, taken
     near the edge.
     """
-    closed = sum((contact[i : i + len(x) - 1, j : j + len(y) - 1] * 1 for i, j in _RING), 0)
-    cell = np.outer(np.diff(x), np.diff(y))
-    crossed = np.argwhere((closed > 0) & (closed < 4))
+    closed = contact[quads].sum(axis=1)
+    px, py = np.moveaxis(points[quads], 2, 0)
+    cell = 0.5 * np.abs((px * np.roll(py, -1, 1) - py * np.roll(px, -1, 1)).sum(axis=1))
+    cut = (closed > 0) & (closed < 4)
+    crossed = quads[cut]
     whole = float(cell[closed == 4].sum())
     if not len(crossed):
         return LocatedArea(whole, 0.0)
     inside, opening = pressure**2, np.cbrt(0.75 * modulus * np.maximum(gap, 0.0)) ** 2
-    lines = _Lines(x, y, inside, opening, contact)
-    # The first pass takes the lattice lines for normals, the second has the normals.
+    lines = _Lines(points, inside, opening, contact)
+    # The first pass takes the lines between nodes for normals, the second has the normals.
     normals = _cut(lines, crossed)[1]
-    areas, _ = _cut(_Lines(x, y, inside, opening, contact, normals), crossed)
-    return LocatedArea(whole + areas, 0.5 * float(cell[tuple(crossed.T)].sum()))
-
-
-Node = tuple[int, int]
+    areas, _ = _cut(_Lines(points, inside, opening, contact, normals), crossed)
+    return LocatedArea(whole + areas, 0.5 * float(cell[cut].sum()))
 
 
 @dataclass(frozen=True)
 class _Lines:
-    """Lattice lines between nodes in contact and open ones; the squared pressure and the opening to
+    """Lines between nodes in contact and open ones; the squared pressure and the opening to
     the power 2/3 at the nodes, both as a length but for B.
     """
 
-    x: Array
-    y: Array
+    points: Array
     inside: Array
     opening: Array
     contact: BoolArray
-    cosine: dict[tuple[Node, Node], float] | None = None
+    cosine: dict[tuple[int, int], float] | None = None
 
-    def at(self, node: Node) -> Array:
-        """(2,) place of a node, mm."""
-        return np.array([self.x[node[0]], self.y[node[1]]])
-
-    def crossing(self, a: Node, b: Node) -> Array:
+    def crossing(self, a: int, b: int) -> Array:
         """(2,) where the edge crosses the line from ``a``, in contact, to ``b``, open."""
-        line = self.at(b) - self.at(a)
+        line = self.points[b] - self.points[a]
         cosine = 1.0 if self.cosine is None else self.cosine.get(_key(a, b), 1.0)
-        length = cosine * float(np.abs(line).sum())
-        return self.at(a) + line * _share(
+        length = cosine * float(np.hypot(*line))
+        return self.points[a] + line * _share(  # type: ignore[no-any-return]
             float(self.inside[a]), float(self.opening[b]), max(length, np.finfo(float).tiny)
         )
 
 
-def _key(a: Node, b: Node) -> tuple[Node, Node]:
+def _key(a: int, b: int) -> tuple[int, int]:
     return (a, b) if a < b else (b, a)
 
 
@@ -139,29 +138,29 @@ def _share(inside: float, opening: float, length: float) -> float:
     return inside * u**3 / length
 
 
-def _cut(lines: _Lines, crossed: NDArray[np.int64]) -> tuple[float, dict[tuple[Node, Node], float]]:
+def _cut(lines: _Lines, crossed: NDArray[np.int64]) -> tuple[float, dict[tuple[int, int], float]]:
     """Area in contact of the quadrilaterals that the edge crosses, and line -> cosine between it
     and the normal of the chords that end on it.
     """
     area = 0.0
-    found: dict[tuple[Node, Node], list[float]] = {}
-    for i, j in crossed.tolist():
-        ring = [(i + di, j + dj) for di, dj in _RING]
+    found: dict[tuple[int, int], list[float]] = {}
+    for ring in crossed.tolist():
         corners, ends = [], []
         for k, node in enumerate(ring):
             after = ring[(k + 1) % 4]
             if lines.contact[node]:
-                corners.append(lines.at(node))
+                corners.append(lines.points[node])
             if lines.contact[node] != lines.contact[after]:
                 pair = (node, after) if lines.contact[node] else (after, node)
                 corners.append(lines.crossing(*pair))
-                ends.append((_key(node, after), k % 2, corners[-1]))
+                ends.append((_key(node, after), corners[-1]))
         px, py = np.array(corners).T
         area += 0.5 * abs(float(px @ np.roll(py, -1) - py @ np.roll(px, -1)))
         if len(ends) == 2:
-            chord = ends[1][2] - ends[0][2]
+            chord = ends[1][1] - ends[0][1]
             size = float(np.hypot(*chord))
-            for key, along, _ in ends if size > 0.0 else ():
-                # The normal's part along x is the chord's along y.
-                found.setdefault(key, []).append(abs(float(chord[1 - along])) / size)
+            for key, _ in ends if size > 0.0 else ():
+                line = lines.points[key[1]] - lines.points[key[0]]
+                across = abs(float(line[0] * chord[1] - line[1] * chord[0]))
+                found.setdefault(key, []).append(across / (size * float(np.hypot(*line))))
     return area, {key: float(np.mean(c)) for key, c in found.items()}

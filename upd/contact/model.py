@@ -383,7 +383,7 @@ def make_contact_model(upper: Body, lower: Body, mirrored: tuple[bool, bool]) ->
     Raises
     ------
     MeshError
-        When the contact sets differ, a contact face leaves its set, or a patch is no lattice.
+        When the contact sets differ, or a contact face leaves its set.
     """
     a, b = upper.mesh.points[upper.contact], lower.mesh.points[lower.contact]
     if a.shape != b.shape:
@@ -392,13 +392,26 @@ def make_contact_model(upper: Body, lower: Body, mirrored: tuple[bool, bool]) ->
         )
     multipliers = make_multipliers(lower.mesh)
     gap = np.asarray(multipliers.spread.T @ (a[:, 2] - b[:, 2]))
-    points = b[multipliers.nodes]
+    points, quads = b[multipliers.nodes], _quads(lower.mesh, multipliers)
     patches = {}
     for name, nodes in _patch_sets(lower.mesh).items():
         mine = np.flatnonzero(np.isin(lower.contact[multipliers.nodes], nodes))
         reaches = [m and bool((points[mine, k] == 0.0).any()) for k, m in enumerate(mirrored)]
-        patches[name] = make_patch(points, multipliers.weights, (reaches[0], reaches[1]), mine)
+        patches[name] = make_patch(
+            points, multipliers.weights, (reaches[0], reaches[1]), mine, quads
+        )
     return ContactModel(upper, lower, multipliers, patches, gap)
+
+
+def _quads(mesh: Mesh, multipliers: Multipliers) -> NDArray[np.int64]:
+    """Corners (m, 4), among the multipliers, of the contact faces; four to a face of 9 nodes."""
+    place = np.full(mesh.n_node, -1, np.int64)
+    place[mesh.nodes["contact"][multipliers.nodes]] = np.arange(len(multipliers.nodes))
+    faces = place[mesh.faces["contact"]]
+    if faces.shape[1] != 9:
+        return faces[:, :4]
+    quarters = [[k, 4 + k, 8, 4 + (k + 3) % 4] for k in range(4)]
+    return faces[:, quarters].reshape(-1, 4)
 
 
 def _patch_sets(mesh: Mesh) -> dict[str, NDArray[np.int64]]:

@@ -1,6 +1,7 @@
-"""The potential contact patch as a lattice of nodes, and what is measured on it.
+"""The potential contact patch, nodes and quadrilaterals, and what is measured on it.
 
-The lattice is mirrored to the whole patch; pressure, area and radius are measured there.
+A lattice where the nodes are one, any quadrilaterals elsewhere. The patch is mirrored to the whole;
+pressure, area and radius are measured there.
 """
 
 from __future__ import annotations
@@ -19,18 +20,21 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Patch:
-    """Lattice of contact nodes of the model, and of the whole patch beyond its mirror planes.
+    """Contact nodes of the model, and of the whole patch beyond its mirror planes.
 
     Attributes
     ----------
     x, y : (nx,) and (ny,) ndarray
-        Lattice lines of the model [mm].
-    order : (nx * ny,) ndarray of int
-        Node of the model's contact set at lattice place i * ny + j.
+        Lattice lines of the model [mm]; without a lattice the coordinates of its n nodes.
+    order : (nx * ny,) or (n,) ndarray of int
+        Node of the model's contact set at lattice place i * ny + j, or of each node.
     weights : (n,) ndarray
         Tributary areas of the model's nodes [mm2], in the order of the contact set.
     mirrored : tuple of two bool
-        Whether the lattice continues beyond the mirror planes x = 0, y = 0.
+        Whether the patch continues beyond the mirror planes x = 0, y = 0.
+    quads : (m, 4) ndarray of int, optional
+        Corners of the quadrilaterals of a patch that is no lattice, places in `order`. Its fields
+        on the whole patch are (n_whole,), its X and Y as long.
     """
 
     x: Array
@@ -38,6 +42,7 @@ class Patch:
     order: NDArray[np.int64]
     weights: Array
     mirrored: tuple[bool, bool]
+    quads: NDArray[np.int64] | None = None
 
     @property
     def copies(self) -> int:
@@ -47,16 +52,23 @@ class Patch:
     @property
     def X(self) -> Array:
         """Lattice lines of the whole patch in x [mm]."""
+        if self.quads is not None:
+            return self._images()[1][:, 0]
         return _mirror_lines(self.x) if self.mirrored[0] else self.x
 
     @property
     def Y(self) -> Array:
         """Lattice lines of the whole patch in y [mm]."""
+        if self.quads is not None:
+            return self._images()[1][:, 1]
         return _mirror_lines(self.y) if self.mirrored[1] else self.y
 
     @property
     def spacing(self) -> float:
-        """Largest node spacing [mm]."""
+        """Largest node spacing [mm]: of a patch without a lattice the longest side."""
+        if self.quads is not None:
+            corners = np.column_stack([self.x, self.y])[self.quads]
+            return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())
         return float(max(np.diff(self.x).max(), np.diff(self.y).max()))
 
     def whole(self, field: ArrayLike, *, extensive: bool = False) -> Array:
@@ -72,8 +84,12 @@ class Patch:
 
         Returns
         -------
-        (len(X), len(Y)) ndarray
+        (len(X), len(Y)) or, without a lattice, (n_whole,) ndarray
         """
+        if self.quads is not None:
+            place, _, share, _ = self._images()
+            own = np.asarray(field, float)[self.order][place]
+            return own * share if extensive else own
         out = np.asarray(field, float)[self.order].reshape(len(self.x), len(self.y))
         for axis, mirror in enumerate(self.mirrored):
             if not mirror:
@@ -98,6 +114,70 @@ class Patch:
         """
         return self.whole(self.weights, extensive=True)
 
+    def slopes(self, field: ArrayLike) -> list[Array]:
+        """Derivatives along x and y of a field of the model's nodes, on the whole patch.
+
+        Without a lattice the mean at a node of the planes through each quadrilateral around it.
+        """
+        whole = self.whole(field)
+        if self.quads is None:
+            return list(np.gradient(whole, self.X, self.Y))
+        points, cells = self.points(), self.cells()
+        # The plane with the mean slopes of a quadrilateral goes by its diagonals.
+        one, other = (points[cells[:, k + 2]] - points[cells[:, k]] for k in range(2))
+        rise = [whole[cells[:, k + 2]] - whole[cells[:, k]] for k in range(2)]
+        size = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+        count = np.bincount(cells.ravel(), minlength=len(points))
+        return [
+            np.bincount(cells.ravel(), np.repeat(slope / size, 4), len(points)) / count
+            for slope in (
+                rise[0] * other[:, 1] - rise[1] * one[:, 1],
+                rise[1] * one[:, 0] - rise[0] * other[:, 0],
+            )
+        ]
+
+    def points(self) -> Array:
+        """(n_whole, 2) nodes of the whole patch [mm], in the order of a raveled field."""
+        if self.quads is not None:
+            return self._images()[1]
+        lines = np.meshgrid(self.X, self.Y, indexing="ij")
+        return np.column_stack([v.ravel() for v in lines])
+
+    def cells(self) -> NDArray[np.int64]:
+        """(m, 4) corners, places in `points`, of the quadrilaterals of the whole patch."""
+        if self.quads is not None:
+            return self._images()[3]
+        n = len(self.Y)
+        first = (np.arange(len(self.X) - 1)[:, None] * n + np.arange(n - 1)).ravel()
+        return np.asarray(first[:, None] + np.array([0, n, n + 1, 1]))
+
+    def rim(self) -> NDArray[np.bool_]:
+        """(n_whole,) nodes on a side that only one quadrilateral has."""
+        cells = self.cells()
+        sides = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2))
+        found, count = np.unique(sides, axis=0, return_counts=True)
+        out = np.zeros(len(self.points()), bool)
+        out[found[count == 1]] = True
+        return out
+
+    def _images(self) -> tuple[NDArray[np.int64], Array, Array, NDArray[np.int64]]:
+        """Of a patch without a lattice: node of the model, point and share (2 on a mirror plane)
+        of every node of the whole, and its quadrilaterals.
+        """
+        assert self.quads is not None
+        place, quads = np.arange(len(self.x)), self.quads
+        xy, share = np.column_stack([self.x, self.y]), np.ones(len(self.x))
+        for axis in np.flatnonzero(self.mirrored):
+            off = np.flatnonzero(xy[:, axis] != 0.0)
+            share = np.where(xy[:, axis] == 0.0, 2.0 * share, share)
+            image = np.arange(len(xy))
+            image[off] = len(xy) + np.arange(len(off))
+            flip = np.where(np.arange(2) == axis, -1.0, 1.0)
+            quads = np.concatenate([quads, image[quads]])
+            xy = np.concatenate([xy, xy[off] * flip])
+            place, share = np.append(place, place[off]), np.append(share, share[off])
+        return place, xy, share, quads
+
 
 def _mirror_lines(lines: Array) -> Array:
     return np.concatenate([-lines[:0:-1], lines])
@@ -108,8 +188,9 @@ def make_patch(
     weights: Array,
     mirrored: tuple[bool, bool],
     members: NDArray[np.int64] | None = None,
+    quads: NDArray[np.int64] | None = None,
 ) -> Patch:
-    """The lattice behind contact nodes.
+    """The patch of contact nodes: the lattice behind them, or their quadrilaterals.
 
     Parameters
     ----------
@@ -121,6 +202,8 @@ def make_patch(
         Whether the patch continues beyond the mirror planes x = 0, y = 0.
     members : (k,) ndarray of int, optional
         The nodes of this patch among `points`; None takes all of them.
+    quads : (m, 4) ndarray of int, optional
+        Quadrilaterals of `points`, those of this patch among them, for nodes that are no lattice.
 
     Returns
     -------
@@ -129,12 +212,19 @@ def make_patch(
     Raises
     ------
     MeshError
-        When the nodes are no lattice.
+        When the nodes are no lattice and no quadrilaterals are given, or two are at one place.
     """
     members = np.arange(len(points)) if members is None else members
     mine = points[members]
     scale = float(np.ptp(mine[:, :2], axis=0).max())
     x, y = (_lattice_lines(mine[:, k], scale) for k in range(2))
+    if len(x) * len(y) != len(mine) and quads is not None:
+        place = np.full(len(points), -1, np.int64)
+        place[members] = np.arange(len(members))
+        own = place[quads]
+        return Patch(
+            mine[:, 0], mine[:, 1], members, weights, mirrored, own[(own >= 0).all(axis=1)]
+        )
     if len(x) * len(y) != len(mine):
         raise MeshError(
             f"contact nodes are no lattice: {len(mine)} nodes on {len(x)} x {len(y)} "
@@ -210,7 +300,7 @@ def measure(
     Parameters
     ----------
     patch : Patch
-    force : (len(X), len(Y)) ndarray
+    force : (len(X), len(Y)) or (n_whole,) ndarray
         Nodal forces on the whole patch [N].
     located : LocatedArea, optional
         Area with its edge located, for a contact of any shape; None takes Hertz's ellipse.
@@ -228,18 +318,16 @@ def measure(
     total = float(force.sum())
     if not total > 0.0:
         return ContactMeasures(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
-    share = force / total
-    x, y = share.sum(axis=1) @ patch.X, share.sum(axis=0) @ patch.Y
-    mxx = float(share.sum(axis=1) @ (patch.X - x) ** 2)
-    myy = float(share.sum(axis=0) @ (patch.Y - y) ** 2)
+    share, points = (force / total).ravel(), patch.points()
+    away = points - share @ points
+    mxx, myy = (float(m) for m in share @ away**2)
     area_nodes = float(weights[contact].sum())
     # One node alone has no second moment: its area is its own cell.
     area = located.area if located else 5.0 * np.pi * np.sqrt(mxx * myy) or area_nodes
-    r2 = (patch.X[:, None] - x) ** 2 + (patch.Y[None, :] - y) ** 2
     return ContactMeasures(
         radius_moment=float(np.sqrt(2.5 * (mxx + myy))),
         radius_area=float(np.sqrt(area_nodes / np.pi)),
-        radius_outermost=float(np.sqrt(r2[contact].max())),
+        radius_outermost=float(np.linalg.norm(away[contact.ravel()], axis=1).max()),
         area=float(area),
         area_nodes=area_nodes,
         max_pressure=float((force / weights if pressure is None else pressure).max()),

@@ -12,11 +12,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+import upd
 from upd.analyses import analysis_of, make_plan
 from upd.analyses.contact import effects as left_out
 from upd.analyses.contact.loading import Sheared
@@ -242,6 +244,14 @@ def moment(s: Any) -> None:
     moved(s, low, high, 0.1 * min(f[low], f[high]))
 
 
+def few_lines(s: Any) -> None:
+    patches: Any = {
+        name: SimpleNamespace(X=p.X, Y=p.Y[::2], mirrored=p.mirrored)
+        for name, p in s.model.patches.items()
+    }
+    s.model = replace(s.model, patches=patches)
+
+
 def shear_moves(s: Any) -> None:
     s.moved = dict.fromkeys(s.moved, 1.0)
 
@@ -287,6 +297,7 @@ SPOILERS: dict[tuple[str, str, str], Callable[[Any], None]] = {
     ("hertz", "products", "products"): careless,
     **{("flat", "damper", name): spoil for name, spoil in COMMON.items()},
     ("flat", "damper", "loop area"): loop,
+    ("flat", "damper", "resolution"): few_lines,
     ("flat", "damper", "pressure moved by shear"): shear_moves,
     ("flat", "damper", left_out.TILT): solved_again(left_out.TILT),
     ("flat", "tilting", "no penetration"): penetration,
@@ -321,3 +332,11 @@ def test_every_check_of_a_contact_has_a_spoiler() -> None:
                 if isinstance(first, ast.Constant):
                     names.add(str(first.value))
     assert {name for _, _, name in SPOILERS} == names | set(left_out.REMEDIES)
+
+
+def test_one_element_across_flat_faces_warns() -> None:
+    coarse = ["geometry.divisions=1", "geometry.divisions_long=2", "left_out.solve=no"]
+    result = upd.run("symmetric", overrides=[*coarse, "want=['normal','stiffness']"])
+    assert "resolution" in result.status
+    (check,) = (c for c in result.checks if c.name == "resolution")
+    assert "geometry.divisions to 4 or more" in check.remedy

@@ -10,7 +10,7 @@ import pytest
 
 import upd
 from upd.analyses import analysis_of, make_plan
-from upd.analyses.contact.varied import choices
+from upd.analyses.contact.varied import choices, levels
 from upd.errors import InputError
 from upd.plot.chart import Entry
 from upd.plot.matplotlib import draw
@@ -18,7 +18,7 @@ from upd.plot.plotly import figure as plotly_figure
 from upd.report.error_budget import budget_charts
 from upd.report.tables import budget_table, error_parts
 from upd.results import Case, ErrorPart, InputPart, Result, with_parts
-from upd.scene import load_scene
+from upd.scene import as_scene, load_scene
 
 pytestmark = pytest.mark.estimated
 
@@ -242,3 +242,8 @@ def test_an_answer_says_when_finer_levels_do_not_help(
     lines = " ".join(line.text for line in replace(sphere, results=numbers).answer(200))
     assert "input contact.friction 3 %" in lines
     assert ("finer levels do not help" in lines) == more
+
+
+def test_the_coarsest_mesh_says_which_divisions_give_an_estimate() -> None:
+    plan = make_plan(as_scene("symmetric", {"geometry.divisions": 1}))
+    assert "geometry.divisions to 6 or more" in levels(plan).reasons["mesh"]

@@ -58,7 +58,7 @@ def _analysis(
         charts=make_charts,
         headline=partial(results.pick, names=headline, last=last),
         estimate=partial(errors.estimate, PROBLEM),
-        verdict_names=() if last else ("max_pressure",),
+        verdict_names=() if last else ("K_N_per_pad", "K_N_secant_raw", "approach"),
         coarsened=coarsened,
     )
 

@@ -40,11 +40,15 @@ def by_case(arrays: Arrays, content: str) -> Faces:
 
 
 def loaded_cases(arrays: Arrays) -> Faces:
-    """The normal loads under which a node carries a force."""
+    """The normal loads under which a node carries a force.
+
+    Of contact faces without a lattice none: maps and sections are drawn on lattice lines.
+    """
     return {
         case: groups
         for case, groups in by_case(arrays, "normal").items()
         if any(closed_nodes(group).any() for group in groups)
+        and all(closed_nodes(group).ndim == 2 for group in groups)
     }
 
 

@@ -7,6 +7,7 @@ left corner of all patches together, x along the damper, y up the slope, as in t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,7 +38,7 @@ class FaceLattice:
     @property
     def X(self) -> Array:
         """Lattice lines along the damper."""
-        return -self.patch.X[::-1] if self.flipped else self.patch.X
+        return self._turned(-self.patch.X) if self.flipped else self.patch.X
 
     @property
     def Y(self) -> Array:
@@ -49,7 +50,39 @@ class FaceLattice:
         mirror plane.
         """
         out = self.patch.whole(values, extensive=extensive)
-        return out[::-1] if self.flipped else out
+        return self._turned(out) if self.flipped else out
+
+    def _turned(self, field: Array) -> Array:
+        """Lines from left to right; nodes without lines keep their order."""
+        return field[::-1] if self.lattice else field
+
+    def even(self, fields: Sequence[Array]) -> tuple[Array, Array, list[Array]]:
+        """Lattice lines and fields of the model's nodes on them; without lines on as many even
+        ones as there are nodes, linear between the nodes and zero off the patch.
+        """
+        whole = [self.field(one) for one in fields]
+        if self.lattice:
+            return self.X, self.Y, whole
+        # slow to import: only where it is called
+        from scipy.interpolate import LinearNDInterpolator
+
+        n = int(np.ceil(np.sqrt(self.X.size)))
+        x, y = (np.linspace(v.min(), v.max(), n) for v in self.nodes())
+        between = LinearNDInterpolator(np.column_stack(self.nodes()), np.column_stack(whole), 0.0)
+        found = between(*np.meshgrid(x, y, indexing="ij"))
+        return x, y, list(np.moveaxis(found, -1, 0))
+
+    @property
+    def lattice(self) -> bool:
+        """Whether the nodes lie on lines."""
+        return self.patch.quads is None
+
+    def nodes(self) -> tuple[Array, Array]:
+        """x and y of every node, mm, each of the shape of a field."""
+        if not self.lattice:
+            return self.X, self.Y
+        X, Y = np.meshgrid(self.X, self.Y, indexing="ij")
+        return X, Y
 
     def area(self) -> Array:
         """Tributary areas in mm2."""
@@ -65,7 +98,7 @@ def lattices(solution: ContactSolution) -> list[FaceLattice]:
             for k in found
             if not k.patch.mirrored[0]
         ]
-    return sorted(found, key=lambda k: float(k.X[0]))
+    return sorted(found, key=lambda k: float(k.X.min()))
 
 
 def measured(solution: ContactSolution, answer: NormalContact, load: float) -> ContactMeasures:
@@ -79,7 +112,14 @@ def measured(solution: ContactSolution, answer: NormalContact, load: float) -> C
     located = None
     if solution.plan.scene.sphere_radius is None:
         found = [
-            located_area(k.X, k.Y, f / k.area(), k.field(answer.gap), f > 0.0, solution.modulus)
+            located_area(
+                np.column_stack([v.ravel() for v in k.nodes()]),
+                k.patch.cells(),
+                (f / k.area()).ravel(),
+                k.field(answer.gap).ravel(),
+                (f > 0.0).ravel(),
+                solution.modulus,
+            )
             for k, f in zip(faces, forces, strict=True)
         ]
         located = LocatedArea(sum(a.area for a in found), sum(a.resolution for a in found))
@@ -116,6 +156,8 @@ def tractions(solution: ContactSolution, t: TangentialCase) -> list[Array]:
 def rim_nodes(solution: ContactSolution, case: NormalCase) -> int:
     """How many nodes of the rim of a curved contact's patch carry force."""
     force = solution.model.patch.whole(case.solution.force)
+    if solution.model.patch.quads is not None:
+        return int((force[solution.model.patch.rim()] > 0.0).sum())
     rim = np.concatenate([force[0], force[-1], force[:, 0], force[:, -1]])
     return int((rim > 0.0).sum())
 
@@ -125,4 +167,4 @@ def corner(solution: ContactSolution) -> Array:
     if solution.curved:
         return np.zeros(2)
     found = lattices(solution)
-    return np.array([min(k.X[0] for k in found), min(k.Y[0] for k in found)])
+    return np.array([min(k.X.min() for k in found), min(k.Y.min() for k in found)])

@@ -79,7 +79,7 @@ def _whole(
     them.
     """
     faces = lattices(solution)
-    points = [np.meshgrid(k.X, k.Y, indexing="ij") for k in faces]
+    points = [k.nodes() for k in faces]
     ends = np.cumsum([X.size for X, _ in points])
     whole = [np.concatenate([k.field(f, extensive=True).ravel() for k in faces]) for f in fields]
     return (

@@ -348,9 +348,8 @@ def displaced_gap(model: ContactModel, force: Array) -> Array:
         np.zeros(len(force)),
     )
     for patch in model.patches.values():
-        rises = np.gradient(patch.whole(height), patch.X, patch.Y)
-        for k, rise in enumerate(rises):
-            slope[patch.order, k] = rise.ravel()
+        for k, rise in enumerate(patch.slopes(height)):
+            slope[patch.order, k] = rise.ravel()[: len(patch.order)]
     moved = np.column_stack([model.compliance(c, NORMAL) @ force for c in (ALONG, ACROSS)])
     return np.asarray(model.gap - (slope * moved).sum(axis=1))
 

@@ -32,7 +32,6 @@ from upd.results import ArrayGroup, Case, variable
 
 Array = NDArray[np.float64]
 Variables = dict[str, Any]
-XY = "x y"
 # Points of a closed form: across a contact (its ends are steep), along a curve.
 _ACROSS, _ALONG = 801, 201
 # How far beyond the contact radius tractions are drawn.
@@ -43,7 +42,7 @@ def sizes(solution: ContactSolution) -> dict[str, int]:
     """Contact pairs of the model and of all patches, mirror images included."""
     return {
         "n_pairs": len(solution.model.gap),
-        "n_pairs_whole_patch": sum(len(k.X) * len(k.Y) for k in lattices(solution)),
+        "n_pairs_whole_patch": sum(k.area().size for k in lattices(solution)),
     }
 
 
@@ -53,7 +52,9 @@ def arrays(solution: ContactSolution) -> dict[str, ArrayGroup]:
     patches, (x, y) = lattices(solution), corner(solution)
     for k in patches:
         face: dict[str, str] = {"patch": k.name} if len(patches) > 1 else {}
-        lines = {"x": variable("x", k.X - x, "mm"), "y": variable("y", k.Y - y, "mm")}
+        # Without a lattice every node has its own x and y.
+        own = ("x", "y") if k.lattice else ("node", "node")
+        lines = {"x": variable(own[0], k.X - x, "mm"), "y": variable(own[1], k.Y - y, "mm")}
         cases = [("normal", c.case, _normal(solution, k, c)) for c in solution.normal]
         cases += [("tangential", t.case, _tangential(solution, k, t)) for t in solution.tangential]
         for content, case, fields in cases:
@@ -72,9 +73,13 @@ def arrays(solution: ContactSolution) -> dict[str, ArrayGroup]:
     return out | _laws(solution)
 
 
+def _dims(k: FaceLattice) -> str:
+    return "x y" if k.lattice else "node"
+
+
 def _normal(solution: ContactSolution, k: FaceLattice, case: NormalCase) -> Variables:
     """Fields under a normal load, (n_x, n_y) in MPa, N and mm."""
-    on, pressure = case.solution.contact, solution.model.multipliers.pressure
+    on, pressure, XY = case.solution.contact, solution.model.multipliers.pressure, _dims(k)
     out: Variables = {
         "pressure": variable(XY, k.field(pressure(case.solution.force)), "MPa"),
         "normal_force": variable(XY, k.field(case.solution.force, extensive=True), "N"),
@@ -105,6 +110,7 @@ def _sheared(
     k: FaceLattice, traction: Sequence[Array], slip: Sequence[Array], stick: NDArray[np.bool_]
 ) -> Variables:
     """Fields under a tangential load, (n_x, n_y, n_direction) in MPa and mm."""
+    XY = _dims(k)
     dims = f"{XY} direction"
     return {
         "traction": variable(dims, np.stack([k.field(c) for c in traction], -1), "MPa"),
@@ -114,7 +120,7 @@ def _sheared(
 
 
 def _tangential(solution: ContactSolution, k: FaceLattice, t: TangentialCase) -> Variables:
-    traction = tractions(solution, t)
+    traction, XY = tractions(solution, t), _dims(k)
     out = _sheared(k, traction, list(t.slip.T), t.stick)
     if solution.curved and len(traction) == 1:
         # One direction has no dimension of its own.

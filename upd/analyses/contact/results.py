@@ -67,11 +67,10 @@ CURVED_HEADLINE = (
     "approach",
     "mean_pressure",
 )
-#: and of a flat one
+#: and of a flat one, whose largest pressure, at its edges, has no limit
 FLAT_HEADLINE = (
     "F_N",
     "mean_pressure",
-    "max_pressure",
     "closed_share",
     "approach",
     "K_N_per_pad",
@@ -459,7 +458,7 @@ def _misfits(
     form and over that of mu p.
     """
     closed = closed_form_traction(solution, t)
-    if closed is None:
+    if closed is None or solution.model.patch.quads is not None:
         return []
     patch, mu = solution.model.patch, solution.plan.scene.contact.friction
     area, theirs = patch.area(), consistent_average(patch, closed)

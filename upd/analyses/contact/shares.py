@@ -86,6 +86,8 @@ def _mesh_error(
     F^(1/3), so that half of it reaches dU/dF.
     """
     model, patch = solution.model, solution.model.patch
+    if patch.quads is not None:
+        return None
     steps = [np.diff(lines) for lines in (patch.X, patch.Y)]
     if max(float(np.ptp(step) / step.mean()) for step in steps) > _EVEN:
         return None
@@ -114,13 +116,12 @@ def _share(
     axis = body.mesh.nodes["axis"]
     depth = np.abs(body.mesh.points[axis, 2])
     patch = solution.model.patch
-    X, Y = np.meshgrid(patch.X, patch.Y, indexing="ij")
     data = solution.plan.scene.materials[body.name]
     inside = depth > 0.5 * radius
     half_space = np.zeros(len(depth))
     half_space[inside] = axis_half_space(
         depth[inside],
-        np.column_stack([X.ravel(), Y.ravel()]),
+        patch.points(),
         force.ravel(),
         data.E,
         data.nu,

@@ -54,7 +54,8 @@ from upd.vary.wanted import LevelChoice, Wanted
 FEWEST = 4
 #: source of error
 MESH = "mesh"
-_COARSEST = "the mesh cannot be made coarser: its recipe has no divisions to lower"
+_NO_DIVISIONS = "the mesh cannot be made coarser: its recipe has no divisions to lower"
+_COARSEST = "the mesh is the coarsest there is: set geometry.divisions to {} or more"
 #: outputs that a level need not give: no number of them is estimated, and they cost
 _SPARED = ("fields", "curve")
 #: power of the divisions that the memory of a level grows with: the entries of a factor by nested
@@ -194,7 +195,9 @@ def levels(plan: ContactPlan) -> Levels:
         return Levels(())
     # Neighbouring loads show on half the divisions what the dearest level would.
     ratios = COARSER[1:] if has_neighbours(scene) else COARSER
-    return Levels([_coarser(plan, n) for n in coarser_divisions(plan, ratios)], {MESH: _COARSEST})
+    known = isinstance(plan.parameters.get("divisions"), int)
+    why = _COARSEST.format(FEWEST + 2) if known else _NO_DIVISIONS
+    return Levels([_coarser(plan, n) for n in coarser_divisions(plan, ratios)], {MESH: why})
 
 
 def _coarser(plan: ContactPlan, divisions: int) -> Variation:

@@ -72,13 +72,14 @@ def pressure_peaks(solution: ContactSolution, case: NormalCase) -> list[tuple[fl
     Middle at half height of each peak of the force per length, centre of force across it.
 
     The outermost columns are left out: the edge of a flat punch has a peak of its own on any mesh.
-    A peak stands out by a tenth of the largest value.
+    A peak stands out by a tenth of the largest value. Without lattice lines there is no force per
+    length, and no peak is sought.
     """
     # slow to import: only where it is called
     from scipy.signal import find_peaks, peak_widths
 
     found, origin = [], corner(solution)
-    for lattice in lattices(solution):
+    for lattice in (k for k in lattices(solution) if k.lattice):
         force = lattice.field(case.solution.force, extensive=True)[1:-1]
         X, p = lattice.X[1:-1], line_pressure(lattice, case.solution.force)[1:-1]
         tops, _ = find_peaks(p, prominence=0.1 * float(p.max(initial=0.0)), plateau_size=1)

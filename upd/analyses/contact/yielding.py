@@ -142,7 +142,7 @@ def yield_checks(solution: ContactSolution) -> list[Check]:
             checks += _hertz_checks(scene, model, case.case, hertz, radius, modulus)
             continue
         normal = pressure(case.solution.force)
-        fields = {k.name: (k.X, k.Y, [k.field(normal)]) for k in faces}
+        fields = {k.name: k.even([normal]) for k in faces}
         checks += _half_space_checks(scene, model, case.case, fields)
     for t in solution.tangential:
         hertz = hertz_of(solution, t.normal.force)
@@ -152,6 +152,6 @@ def yield_checks(solution: ContactSolution) -> list[Check]:
         normal = pressure(np.maximum(t.pressed, 0.0))
         shear = np.zeros((2, len(normal)))
         shear[list(t.nodes.components)] = tractions(solution, t)
-        fields = {k.name: (k.X, k.Y, [k.field(f) for f in (normal, *shear)]) for k in faces}
+        fields = {k.name: k.even([normal, *shear]) for k in faces}
         checks += _half_space_checks(scene, model, t.case, fields)
     return checks
