@@ -277,9 +277,9 @@ def _coupling_check(scene: Scene) -> Check:
         beta_of(scene),
         scene.contact.coupling_limit,
         "|beta|: how much pressure shears half-spaces of unlike materials",
-        "normal and tangential problems are coupled for these materials: raise "
-        "contact.coupling_limit to accept the error, "
-        "or set contact.friction = 0",
+        "pressure shears the contact of these materials, which the tangential numbers leave out: "
+        'set contact.coupling = "coupled", or raise contact.coupling_limit to accept it',
+        fatal=False,
     )
 
 

@@ -91,10 +91,16 @@ def coupling_effects(scene: Scene, loaded: bool) -> list[Effect]:
             Effect(COUPLING, True, "asked for", applies=loaded),
             Effect(MATERIALS, unlike, TOGETHER if unlike else why, applies=unlike and loaded),
         ]
+    frozen = "normal forces stay frozen under shear: exact for half-spaces of like materials alone"
+    if scene.contact.friction > 0.0 and beta > scene.contact.coupling_limit:
+        frozen += (
+            f"; |beta| = {beta:.3g} is above contact.coupling_limit = "
+            f"{scene.contact.coupling_limit:.3g}: set contact.coupling = coupled"
+        )
     return [
         omitted(
             COUPLING,
-            "normal forces stay frozen under shear: exact for half-spaces of like materials alone",
+            frozen,
             "contact.coupling=coupled",
             applies=loaded,
         ),
