@@ -246,7 +246,7 @@ def moment(s: Any) -> None:
 
 def few_lines(s: Any) -> None:
     patches: Any = {
-        name: SimpleNamespace(X=p.X, Y=p.Y[::2], mirrored=p.mirrored)
+        name: SimpleNamespace(quads=None, X=p.X, Y=p.Y[::2], mirrored=p.mirrored)
         for name, p in s.model.patches.items()
     }
     s.model = replace(s.model, patches=patches)

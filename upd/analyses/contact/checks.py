@@ -357,11 +357,13 @@ def _flat_resolution_check(solution: ContactSolution) -> Check:
     it, 12 % with 2, 8.7 % with 3, 4.8 % with 4 and 2.3 % with 8; with one and two hex20, whose
     nodes lie as near as those of two and four hex8i, it is 0.8 % too high and 0.9 % too low.
     """
-    edges = [
-        (len(line) - 1, name)
-        for k in lattices(solution)
-        for line, name in ((k.Y, "divisions"), (k.X, "divisions_long"))
-    ]
+    edges: list[tuple[int, str]] = []
+    for k in lattices(solution):
+        lines = (len(k.Y) - 1, len(k.X) - 1)
+        if not k.lattice:
+            # of a square of as many elements
+            lines = (round(len(k.patch.cells()) ** 0.5),) * 2
+        edges += zip(lines, ("divisions", "divisions_long"), strict=True)
     fewest, name = min(edges)
     scene = solution.plan.scene
     # the multipliers of hex20 sit at its corners

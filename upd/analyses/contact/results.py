@@ -384,9 +384,10 @@ def _working_slope(solution: ContactSolution) -> list[Result]:
 def _worn_zones(solution: ContactSolution, case: NormalCase) -> list[Result]:
     """Where the pressure peaks, beside the bands of the damper that the load comes from.
 
-    The worn areas themselves are printed nowhere; the bands are the scene's own.
+    The worn areas themselves are printed nowhere; the bands are the scene's own. Without lattice
+    lines no peak is sought, and none is counted.
     """
-    if case.force <= 0.0:
+    if case.force <= 0.0 or not all(k.lattice for k in lattices(solution)):
         return []
     peaks, bands = pressure_peaks(solution, case), band_middles(solution)
     out = [q.PRESSURE_PEAKS.of(len(peaks), case.case)]
