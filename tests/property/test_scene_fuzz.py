@@ -38,7 +38,7 @@ CONTACT = {
     "left_out.solve": "no",
 }
 FLAT = CONTACT | {
-    "geometry.divisions": 2,
+    "geometry.divisions": 4,
     "geometry.divisions_long": 4,
     "law.rows": 2,
     "law.columns": 2,

@@ -271,7 +271,8 @@ def test_two_patches_without_an_analysis_are_told(
     # the remedy is one
     two_patches(mine, 'ANALYSIS = "flat contact"\n' + TWO_PATCHES)
     result = upd.run(scene)
-    assert result.status in ("ok", "ok with warnings: tilt of the damper (F=400 N)")  # on its crown
+    # on its crown, and on few elements
+    assert {c.name for c in result.checks if not c.passed} <= {"tilt of the damper", "resolution"}
 
 
 def test_patches_that_leave_nodes_out_are_told(mine: Path) -> None:
