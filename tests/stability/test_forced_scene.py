@@ -249,6 +249,8 @@ def test_both_loads_together_scale_the_answer() -> None:
 def test_a_stopped_path_is_a_warning_with_its_partial_curve(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    # another process would not see the changes
+    monkeypatch.setattr("upd.linalg.processes.threads_used", lambda: 1)
     monkeypatch.setattr(paths, "LEAST_POINTS", 6)
     monkeypatch.setattr(paths, "MOST_POINTS", 0)
     result = run(want=["response"], excitation__centrifugal_to_force=[100.0], excitation__points=20)

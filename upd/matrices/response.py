@@ -55,6 +55,8 @@ MOST_DENSE = 600
 #: modes of the reduction reach this many times beyond the highest frequency of interest
 _BEYOND = 10.0
 _MOST_DYNAMIC = 3
+#: watched motions whose peaks are printed
+_MOST_NAMED = 7
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,15 @@ class OwnResponse:
     response: hbm.FrequencyResponse
     watched: Mapping[str, FloatArray]
     reduced: ReducedModel | None = None
+
+    def __repr__(self) -> str:
+        peaks = [
+            f"  {name}: {height:.5g} mm at {f:.5g} Hz"
+            for name, (f, height) in ((n, self.peak(n)) for n in list(self.watched)[:_MOST_NAMED])
+            if len(self.frequency)
+        ]
+        more = len(self.watched) - len(peaks)
+        return "\n".join([repr(self.response), *peaks, *([f"  and {more} more"] if more else [])])
 
     @property
     def frequency(self) -> FloatArray:
@@ -243,6 +254,7 @@ def forced_response(
     if problems:
         raise InputError("forced_response: " + "; ".join(problems))
     _refuse_penalties(model.K)
+    _refuse_multipliers(model)
     below = _BEYOND * _highest(orders) * float(f.max(initial=0.0))
     reduced = _reduced(model, rows.used, modes, below, whole=damping is not None)
     if reduced is None:
@@ -450,6 +462,18 @@ def _refuse_penalties(K: csr_array) -> None:
             f"forced_response: K has {diagonal[fixed[0]]:.3g} on the diagonal of "
             f"{len(fixed)} dofs, the first {int(fixed.min())}, a penalty beside which rounding "
             "loses the rest; leave these dofs out of K, M and C: they do not move"
+        )
+
+
+def _refuse_multipliers(model: Matrices) -> None:
+    """Refuse rows without mass and without stiffness of their own: Lagrange multipliers."""
+    mass, stiffness = (abs(A).sum(axis=1) for A in (_mass(model), model.K))
+    found = np.flatnonzero((mass == 0.0) & (model.K.diagonal() == 0.0) & (stiffness > 0.0))
+    if len(found):
+        raise InputError(
+            f"forced_response: {len(found)} rows, the first {found[0]}, have no mass and a zero on "
+            "the diagonal of K, as Lagrange multipliers have: leaving them out would drop their "
+            "constraints; export the matrices with the constraints eliminated"
         )
 
 

@@ -73,23 +73,28 @@ class RunResult:
         return replace(self, cost=cost)
 
     def value(self, name: str, case: str | Case | None = None) -> float:
-        """The number ``name`` of ``case``, its label or itself (the first when None).
+        """The number ``name`` of ``case``, its label or itself (the only one when None).
 
         The mode at the end of a peak's case may be left out.
 
         Raises
         ------
         InputError
-            When there is none.
+            When there is none, or several and no case.
         ConvergenceError
             When it was not reached, with the reason.
         """
-        for row in self.results:
-            if row.name == name and (case is None or row.case.matches(case)):
-                if row.withheld:
-                    label = f" of {row.case}" if row.case.label else ""
-                    raise ConvergenceError(f"{name}{label} was not reached: {row.withheld}")
-                return row.value
+        rows = [
+            r for r in self.results if r.name == name and (case is None or r.case.matches(case))
+        ]
+        if case is None and len(rows) > 1:
+            cases = ", ".join(f'"{r.case}"' for r in rows)
+            raise InputError(f'{name} has several cases: write value("{name}", case) with {cases}')
+        for row in rows:
+            if row.withheld:
+                label = f" of {row.case}" if row.case.label else ""
+                raise ConvergenceError(f"{name}{label} was not reached: {row.withheld}")
+            return row.value
         raise InputError(
             f"no result {name!r} for case {case!r}; there are "
             f"{sorted({r.name for r in self.results})}"

@@ -274,3 +274,33 @@ def test_fixed_dofs_on_the_diagonal_do_not_move(penalty: float) -> None:
 def test_penalties_beside_which_rounding_loses_the_rest_are_refused(penalty: float) -> None:
     with pytest.raises(InputError, match="on the diagonal of 1 dofs, the first 0, a penalty"):
         chain_with(penalty)
+
+
+def test_rows_of_lagrange_multipliers_are_named() -> None:
+    K = np.array(
+        [[2.0, -1.0, 0.0, 1.0], [-1.0, 2.0, 0.0, 0.0], [0, 0, 1.0, -1.0], [1.0, 0, -1.0, 0]]
+    )
+    with pytest.raises(InputError, match=r"1 rows, the first 3, have no mass .* constraints"):
+        forced_response(
+            K,
+            np.diag([1.0, 1.0, 1.0, 0.0]),
+            joints=[Joint(closing=1, sliding=[], k_n=1.0, k_t=1.0, mu=0.0)],
+            force={0: 1.0},
+            watch={"a": 0},
+            frequencies=[0.1],
+            zeta=0.01,
+        )
+
+
+def test_an_answer_prints_on_ten_lines() -> None:
+    model = two_blades()
+    many = {f"dof {k}": k for k in range(12)}
+    answer = forced_response(
+        model.K, model.M, zeta=0.005, dofs=model.dofs, **(ASKED | {"watch": many})
+    )
+    for text in (repr(answer), repr(answer.response)):
+        assert len(text.splitlines()) <= 10
+        assert f"{len(answer.frequency)} points" in text
+    frequency, height = answer.peak("dof 0")
+    assert f"dof 0: {height:.5g} mm at {frequency:.5g} Hz" in repr(answer)
+    assert "and 5 more" in repr(answer)

@@ -52,6 +52,15 @@ def test_text_says_how_it_ended_and_the_main_numbers(sphere: RunResult) -> None:
     assert str(sphere.folder) in lines[-1]
 
 
+def test_a_number_of_several_cases_asks_for_one(sphere: RunResult) -> None:
+    row = next(r for r in sphere.results if r.name == "max_pressure")
+    other = replace(row, case=replace(row.case, load=1.0), value=1.0)
+    two = replace(sphere, results=[*sphere.results, other])
+    with pytest.raises(InputError, match=r"max_pressure has several cases.*F=1 N"):
+        two.value("max_pressure")
+    assert two.value("max_pressure", "F=1 N") == 1.0
+
+
 def test_table_escapes_what_a_scene_can_hold(sphere: RunResult) -> None:
     bad = replace(
         sphere, title="<script>alert(1)</script>", status="failed: <b>x</b>", folder=Path("<i>")

@@ -96,6 +96,12 @@ class FrequencyResponse:
     periodic: NDArray[np.bool_]
     highest_harmonic: NDArray[np.int64]
 
+    def __repr__(self) -> str:
+        """Its end and its size, without the arrays."""
+        f = self.frequency
+        span = f", {f.min():.5g} to {f.max():.5g} Hz" if len(f) else ""
+        return f"Forced response: {self.status}, {len(f)} points{span}\n  {self.message}"
+
     @property
     def arrived(self) -> bool:
         """Whether the path reached the last frequency."""
