@@ -6,6 +6,7 @@ import pytest
 from upd.results import Case
 from upd.vary.curves import ConvergenceCurve, make_curves
 from upd.vary.outcome import Outcome, PointResult, SolvedPoint
+from upd.vary.tables import enough
 from upd.vary.variation import Variation
 
 CASE = Case(load=200.0)
@@ -97,3 +98,17 @@ def test_no_estimate_without_a_limit() -> None:
     found = only(ladder("fine", {"p": [h**-0.6 for h in H]}, 100), "p")
     assert "no limit" in found.verdict
     assert found.estimate is None
+
+
+def test_the_level_that_is_enough_is_the_cheapest_that_stays_within() -> None:
+    # the second level is within 1 % by chance, the third is not
+    curve = only(
+        ladder("fine", {"max_pressure": [3.3, 3.003, 3.06, 3.0015]}, 100, max_pressure=3.0),
+        "max_pressure",
+    )
+    (sentence,) = enough([curve])
+    words = "Maximum pressure F=200 N against reference: level 3 is enough for 0.1 %: 0.05 %"
+    assert sentence.startswith(words)
+    (sentence,) = enough([only(ladder("fine", {"p": [3.3, 3.2, 3.1, 3.06]}, 100, p=3.0), "p")])
+    assert "no level stays within 1 %, the finest has 2 %" in sentence
+    assert enough([]) == []

@@ -57,7 +57,7 @@ class Study:
     present: Callable[[Sequence[SolvedPoint]], StudyReport]
 
     def write(self, folder: Path, solved: Sequence[SolvedPoint], report: StudyReport) -> list[Path]:
-        """Write study.md, study.json (of a study with points) and the figures into ``folder``.
+        """Write study.md, study.json (of a study with points), figures and page into ``folder``.
 
         Returns the paths, the table first.
         """
@@ -76,7 +76,16 @@ class Study:
             "notes": list(report.notes),
         }
         write_text(data, json.dumps(content, indent=1) + "\n")
-        return [table, data, *write_sheets(report.charts(curves), folder)]
+        charts = report.charts(curves)
+        figures = write_sheets(charts, folder)
+        # slow to import: only where a page is made
+        from upd.report.study_page import write_study_report
+
+        failed = sum(bool(one.outcome.failure) for one in solved)
+        page = write_study_report(
+            folder, self.title, failed, report.notes, report.tables, charts, figures
+        )
+        return [table, data, *figures, page]
 
 
 @dataclass(frozen=True)

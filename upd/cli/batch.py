@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,15 @@ _WORDS = 16
 #: most different reasons of failures that are shown
 _REASONS = 5
 #: ending of a study's file -> what it is
-_KINDS = {".md": "Table", ".csv": "Rows", ".json": "Numbers", ".png": "Figure"}
+_KINDS = {
+    ".md": "Table",
+    ".csv": "Rows",
+    ".json": "Numbers",
+    ".png": "Figure",
+    ".html": "Page",
+}
+#: rows of a study's table on a terminal
+_ROWS = 12
 
 
 def print_sweep_plan(console: Console, plan: SweepPlan) -> None:
@@ -148,11 +157,14 @@ def print_study(console: Console, result: StudyResult) -> None:
     if result.kept:
         console.print(f"{counted(len(result.kept), 'point')} kept from an earlier call")
     for table in result.report.tables:
-        print_table(console, study_columns(table), title=table.title)
+        shown = replace(table, rows=table.rows[:_ROWS])
+        print_table(console, study_columns(shown), title=table.title)
+        if more := len(table.rows) - len(shown.rows):
+            console.print(f"{counted(more, 'more row')} in study.md")
     files = [f"{_KINDS.get(path.suffix, 'File')}: {path}" for path in result.files]
     fine = sum(not one.outcome.failure for one in result.solved)
     many = f"{fine} of {counted(len(result.solved), 'point')} ok, " if result.solved else ""
-    for line in (*result.report.notes, *files, f"{many}{duration(result.seconds)}"):
+    for line in (*files, f"{many}{duration(result.seconds)}", *result.report.notes):
         console.print(line)
 
 

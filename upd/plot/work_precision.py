@@ -109,7 +109,7 @@ def _change_chart(
     group: Sequence[Mapping[str, Any]], ways: Sequence[str], cost: str, axis: Axis
 ) -> Chart:
     traces, marks, lines = [], [], []
-    for c in group:
+    for c in (_by_cost(one, cost) for one in group):
         colour = ways.index(str(c["curve"]))
         size, spent = 100.0 * np.abs(np.array(c["error"], float)), np.array(c[cost], float)
         at = size > 0.0
@@ -151,8 +151,7 @@ def _error_chart(
 ) -> Chart:
     first, alone = group[0], len(group) == 1
     traces, marks = [], []
-    # In the order of the study, coarse to fine.
-    for k, c in enumerate(group):
+    for k, c in enumerate(_by_cost(one, cost) for one in group):
         spent, size = np.array(c[cost], float), 100.0 * np.abs(np.array(c["error"], float))
         label = _label(c) + f", against {c['against']}" * (alone and bool(c["against"]))
         traces.append(Trace(label, spent, size, "both", k))
@@ -179,6 +178,13 @@ def _error_chart(
         sheet=sheet,
         columns=columns,
     )
+
+
+def _by_cost(curve: Mapping[str, Any], cost: str) -> dict[str, Any]:
+    """The curve with its levels from the cheapest to the dearest."""
+    order = np.argsort(np.array(curve[cost], float), kind="stable")
+    levels = ("labels", "h", "error", "seconds", "memory_mb")
+    return dict(curve) | {k: [curve[k][i] for i in order] for k in levels if k in curve}
 
 
 def _reference(group: Sequence[Mapping[str, Any]]) -> str:

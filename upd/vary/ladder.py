@@ -19,7 +19,7 @@ from upd.vary.curves import (
     with_friction,
 )
 from upd.vary.outcome import SolvedPoint, matching
-from upd.vary.tables import TextTable, convergence_tables, level_table, points_table
+from upd.vary.tables import TextTable, convergence_tables, enough, level_table, points_table
 from upd.vary.variation import Key, Overrides, Variation
 
 #: divisions, refinements, numbers of modes ...: the levels a user asks for; None: the usual ones
@@ -76,7 +76,7 @@ def _convergence(
     solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve], *before: TextTable
 ) -> StudyReport:
     tables = (*before, *convergence_tables(solved, curves))
-    return StudyReport(tables, bool(curves), (), tuple(curves))
+    return StudyReport(tables, bool(curves), tuple(enough(curves)), tuple(curves))
 
 
 def accuracy_report(

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from upd.labels import percent
-from upd.results.quantities import number_label
+from upd.labels import percent, unit_label
+from upd.results.quantities import number_label, quantity_of
 from upd.vary.curves import ConvergenceCurve
 from upd.vary.outcome import SolvedPoint
 from upd.vary.variation import Key
@@ -66,6 +66,9 @@ def markdown_table(table: TextTable) -> list[str]:
     return [f"| {' | '.join(heads)} |", f"|{marks}", *lines]
 
 
+#: numbers beside the cost of a level, and errors for which one is sought
+_MAIN, _WANTED = 3, (0.01, 0.001)
+
 _POINTS: tuple[TableColumn, ...] = (
     ("curve", "l", lambda one: str(one.point.source)),
     ("level", "l", lambda one: str(one.point.label)),
@@ -73,17 +76,41 @@ _POINTS: tuple[TableColumn, ...] = (
 )
 
 
-def points_table(solved: Sequence[SolvedPoint]) -> TextTable:
-    """The points and what they cost."""
-    return make_table("Points", _POINTS, solved)
+def points_table(solved: Sequence[SolvedPoint], keys: Sequence[Key] = ()) -> TextTable:
+    """The points, what they have of the numbers `keys`, and what they cost."""
+
+    def text(key: Key, one: SolvedPoint) -> str:
+        return f"{one.values[key]:.5g}" if key in one.values else ""
+
+    numbers: list[TableColumn] = [
+        (_head(name, case.label), "r", partial(text, (name, case))) for name, case in keys
+    ]
+    # what a narrow terminal leaves out first stands last
+    curve, level, dofs, seconds, memory, note = _POINTS
+    columns = (curve, level, *numbers[:1], seconds, *numbers[1:], dofs, memory, note)
+    return make_table("Points", columns, solved)
+
+
+def _head(name: str, case: str) -> str:
+    """Label of a number, its case and unit, one below the other."""
+    unit = quantity_of(name)[0].unit
+    return "\n".join(
+        filter(None, (number_label(name), case, f"[{unit_label(unit)}]" if unit else ""))
+    )
 
 
 def convergence_tables(
     solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve]
 ) -> tuple[TextTable, TextTable]:
-    """The points and what they cost, then the curves: the error of every followed number on its
-    finest level, its rate, the error estimated there, and those of the other levels.
+    """The points with their main numbers and cost, then the curves: the error of every followed
+    number on its finest level, its rate, the error estimated there, and those of the other levels.
     """
+    main = dict.fromkeys(c.name for c in curves)
+    last = {c.name: c.case for c in curves}
+    keys = [
+        next(k for one in solved for k in one.values if k[0] == name and k[1].label == last[name])
+        for name in list(main)[:_MAIN]
+    ]
     errors = make_table(
         "Error",
         (
@@ -103,7 +130,33 @@ def convergence_tables(
         curves,
         spare=("against", "verdict", "error on each level"),
     )
-    return points_table(solved), errors
+    return points_table(solved, keys), errors
+
+
+def enough(curves: Sequence[ConvergenceCurve]) -> list[str]:
+    """The cheapest levels with which the first number stays within 1 % and 0.1 %, in a sentence.
+
+    A level within the limit by chance, before finer ones beyond it, is not enough.
+    """
+    if not curves:
+        return []
+    last = [c for c in curves if c.name == curves[0].name][-1]
+    size, at = np.abs(last.error), {}
+    for limit in _WANTED:
+        at[len(size) - int(np.argmin(np.append(size[::-1] <= limit, False)))] = limit
+    found = [
+        f"{last.labels[k]} is enough for {100 * limit:g} %: {100 * size[k]:.2g} % in "
+        f"{last.seconds[k]:.2g} s"
+        for k, limit in at.items()
+        if k < len(size)
+    ]
+    if not found:
+        found = [
+            f"no level stays within {100 * _WANTED[0]:g} %, the finest has {100 * size[-1]:.2g} %"
+        ]
+    what = f"{number_label(last.name)} {last.case}".strip()
+    what = what[:1].upper() + what[1:]
+    return [f"{what} against {last.against}: {'; '.join(found)}."]
 
 
 def level_table(
@@ -126,8 +179,8 @@ def level_table(
 
 
 def _rate_text(order: float) -> str:
-    """The fitted order, or that there is none."""
-    return f"{order:.1f}" if np.isfinite(order) else "no clear order"
+    """The fitted order, empty where there is none."""
+    return f"{order:.1f}" if np.isfinite(order) else ""
 
 
 def _levels_text(c: ConvergenceCurve) -> str:

@@ -62,7 +62,12 @@ def test_ladder_runs_resumes_and_reports(tmp_path: Path) -> None:
     approach = next(c for c in curves if c.name == "approach")
     # Without the bodies' share nothing but the ladder itself says where it leads.
     assert approach.against in ("its own extrapolation", "finest level, no clear order")
-    table, data, figure = again.files
+    table, data, figure, page = again.files
+    html = page.read_text(encoding="utf-8")
+    assert again.report.notes[-1].startswith("Maximum pressure F=200 N against reference: ")
+    assert again.report.notes[-1] in html
+    value = again.solved[0].values["max_pressure", "F=200 N"]
+    assert f"{value:.5g}" in html, "every level has its number"
     assert "maximum pressure" in table.read_text(encoding="utf-8")
     assert figure.name == "work_precision.png"
     assert figure.stat().st_size > 10_000

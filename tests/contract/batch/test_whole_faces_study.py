@@ -151,7 +151,7 @@ def test_a_peak_that_one_sweep_alone_has_is_no_single_number() -> None:
 
 
 def test_files_hold_every_digit_and_the_figure_every_change(tmp_path: Path) -> None:
-    table, data, figure = STUDY.write(tmp_path, LADDER, STUDY.present(LADDER))
+    table, data, figure, _ = STUDY.write(tmp_path, LADDER, STUDY.present(LADDER))
     written = json.loads(data.read_text(encoding="utf-8"))
     values = written["points"][2]["values"]
     case = "interface, F_C/F_E 194, in phase, sweep"
@@ -173,7 +173,7 @@ def test_without_whole_faces_nothing_is_compared(tmp_path: Path) -> None:
     assert not report.found
     assert list(change_curves(LADDER[:1])) == []
     written = STUDY.write(tmp_path, LADDER[:1], report)
-    assert [path.suffix for path in written] == [".md", ".json"]
+    assert [path.suffix for path in written] == [".md", ".json", ".html"]
 
 
 def test_a_toy_ladder_finds_the_stuck_peaks_of_both_models(tmp_path: Path) -> None:

@@ -942,6 +942,25 @@ def test_work_precision_is_one_description() -> None:
     assert seconds.case == "maximum pressure, F=50 N" and seconds.figure == "work_precision"
 
 
+def test_levels_are_drawn_from_the_cheapest_on() -> None:
+    curve = {
+        "curve": "c",
+        "name": "max_pressure",
+        "case": "F=1 N",
+        "against": "r",
+        "order": None,
+        "labels": ("8", "12", "16"),
+        "error": (0.1, 0.02, 0.01),
+        "seconds": (1.0, 3.0, 2.0),
+        "memory_mb": (1.0, 2.0, 3.0),
+    }
+    seconds, memory = work_precision_charts([curve])
+    assert seconds.traces[0].x.tolist() == [1.0, 2.0, 3.0]
+    np.testing.assert_allclose(seconds.traces[0].y, [10.0, 1.0, 2.0])
+    assert [mark.text for mark in seconds.marks] == ["8", "16", "12"]
+    assert memory.traces[0].x.tolist() == [1.0, 2.0, 3.0]
+
+
 def test_a_study_shows_its_first_numbers_with_first_and_last_case() -> None:
     curves = [
         {

@@ -10,12 +10,15 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
 
 from upd.analyses.measured import accelerance_array, measured_arrays
+from upd.analyses.modal.plan import parameters
 from upd.analyses.modal.results import REDUCED, mode_results, reduced_frequencies
-from upd.analyses.modal.shapes import whole
-from upd.analyses.modal.solve import Array, ModalSolution, ModeSet, RigResponse
+from upd.analyses.modal.solve import Array, ModalSolution, ModeSet, RigMode, RigResponse
+from upd.errors import MeshError
 from upd.matrices import DofMap, Matrices, write_dof_map, write_matrices
+from upd.mesh import IntArray, Mesh, recipes
 from upd.plot.modes import draw_mode
 from upd.plot.sheet import Drawing, write_sheet
 from upd.results import ArrayGroup, Case, variable
@@ -39,7 +42,7 @@ def write_pictures(solution: ModalSolution, folder: Path) -> list[Path]:
 
 def mode_drawings(solution: ModalSolution, found: ModeSet) -> list[Drawing]:
     """One drawing per mode, lowest first."""
-    meshes, shapes = whole(solution, found)
+    meshes, shapes = whole_shapes(solution, found)
     out: list[Drawing] = []
     for k, (mode, shape) in enumerate(shapes[:_DRAWN]):
         who = "" if mode.body.name == "rig" else f", {mode.body.name} blade"
@@ -147,9 +150,62 @@ def _write_shapes(solution: ModalSolution, folder: Path) -> None:
     from upd.mesh.export import write_fields
 
     for found in solution.sets:
-        meshes, shapes = whole(solution, found)
+        meshes, shapes = whole_shapes(solution, found)
         data: dict[str, dict[str, Array]] = {name: {} for name in meshes}
         for k, (mode, shape) in enumerate(shapes):
             for name, u in shape.items():
                 data[name][f"mode_{k + 1:02d}_{mode.frequency:.1f}Hz"] = u
         write_fields(folder / f"modes_{found.kind}_{found.arrangement}.vtu", meshes, data)
+
+
+# -- mode shapes on whole bodies: what half a rig saves is mirrored about y = 0 --------------------
+
+
+def whole_shapes(
+    solution: ModalSolution, found: ModeSet
+) -> tuple[dict[str, Mesh], list[tuple[RigMode, dict[str, Array]]]]:
+    """Whole bodies, and every mode's displacement on them.
+
+    Returns
+    -------
+    dict
+        Body -> mesh.
+    list
+        Of every mode, lowest first: the mode, and body -> (n_node, 3) displacement.
+
+    Raises
+    ------
+    MeshError
+        When the half model's nodes are not those of the whole one.
+    """
+    scene = solution.plan.scene
+    meshes, _ = recipes.build_mesh(
+        scene.recipe, parameters(scene, found.arrangement, found.kind, "full")
+    )
+    maps = {m.body.name: _onto(m.body.mesh, meshes[m.body.name]) for m in found.modes if m.family}
+    return meshes, [
+        (m, {m.body.name: _on_whole(m, meshes[m.body.name], maps)}) for m in found.modes
+    ]
+
+
+def _onto(half: Mesh, mesh: Mesh) -> IntArray:
+    """Node of the half model at each node of the whole one, or at its mirror image."""
+    mirrored = mesh.points.copy()
+    mirrored[:, 1] = np.abs(mirrored[:, 1])
+    distance, node = cKDTree(half.points).query(mirrored)
+    if float(np.max(distance)) > 1e-9 * float(np.ptp(mesh.points, axis=0).max()):
+        raise MeshError(
+            "the half model's nodes are not those of the whole one: make the recipe mirror its mesh"
+        )
+    return np.asarray(node, np.int64)
+
+
+def _on_whole(mode: RigMode, mesh: Mesh, maps: dict[str, IntArray]) -> Array:
+    if not mode.family:
+        return mode.shape
+    u = mode.shape[maps[mode.body.name]].copy()
+    # Even modes: x and z alike on both sides, y opposite; odd modes the other way round.
+    signs = np.array([1.0, -1.0, 1.0]) * (1.0 if mode.family == "x" else -1.0)
+    other = mesh.points[:, 1] < 0.0
+    u[other] *= signs
+    return np.asarray(u)
