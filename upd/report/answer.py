@@ -31,7 +31,7 @@ from upd.report.tables import (
 )
 from upd.results import FAILED, WARNED, outcome_of, worst_check
 from upd.results.answer_table import AnswerTable
-from upd.results.quantities import number_label
+from upd.results.quantities import number_label, quantity_of
 
 #: lines that fit on a screen
 LINES = 40
@@ -193,10 +193,9 @@ def _checked(summary: Mapping[str, Any]) -> str:
         return f"{text}. Left out: {', '.join(names)}"
     worst = worst_check(solved)
     value, limit = (check_number(worst, key) for key in ("value", "limit"))
-    return (
-        f"{text}. Left out, worth at most {value} of {number_label(worst['quantity'])} "
-        f"(limit {limit}): {', '.join(names)}"
-    )
+    of, whole = number_label(worst["quantity"]), quantity_of(worst["quantity"])[0].part_of
+    what = f"the {whole}, for {of}" if whole else of
+    return f"{text}. Left out, worth at most {value} of {what} (limit {limit}): {', '.join(names)}"
 
 
 def _cost(summary: Mapping[str, Any]) -> str:

@@ -22,7 +22,11 @@ CONTACT_AREA_RESOLUTION = Quantity(
     source="half the area of the cells that the edge crosses",
 )
 STICK_AREA = Quantity(
-    "stick_area", "mm2", "area in stick", source="tributary areas of the nodes that stick"
+    "stick_area",
+    "mm2",
+    "area in stick",
+    source="tributary areas of the nodes that stick",
+    part_of="contact area",
 )
 CLOSED_SHARE = Quantity("closed_share", "%", "share of the patch in contact", in_percent=True)
 APPROACH = Quantity("approach", "um", "approach, raw", full="approach_contact", same_bodies=True)

@@ -38,6 +38,8 @@ class Quantity:
         Where it comes from, of one that has no reference.
     in_percent
         Whether its values are given in %, not as parts of one.
+    part_of
+        What its changes are parts of, where it may vanish itself.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Quantity:
     is_error: bool = False
     source: str = ""
     in_percent: bool = False
+    part_of: str = ""
 
     @property
     def scale(self) -> float:

@@ -295,7 +295,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 14900,
+    "analyses": 14902,
     "hbm": 7760,
     "contact": 4530,
     "linalg": 3395,
@@ -311,7 +311,7 @@ ROOM_LINES = {
     "cli": 1012,
     "measured": 952,
     "reduction": 880,
-    "results": 915,
+    "results": 918,
     "fem": 860,
     "matrices": 676,
     "root": 605,
@@ -320,7 +320,7 @@ ROOM_LINES = {
     "scenes": 220,
 }
 #: totals of upd/
-MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 53660, 420, 3959, 498
+MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 53670, 420, 3959, 498
 #: parameters of a function and fields of a class, outside the solver rooms
 MOST_PARAMETERS, MOST_FIELDS, SOLVER_ROOMS = 11, 20, ("hbm", "contact", "linalg")
 

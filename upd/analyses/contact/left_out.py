@@ -63,6 +63,7 @@ from upd.contact.tilt import tilted_contact
 from upd.errors import InputError, UpdError
 from upd.progress import Stages
 from upd.results import Case, Result
+from upd.results import quantities as q
 from upd.scene import Scene
 from upd.scene.contact import Coupling
 from upd.vary.wanted import Wanted, solve_wanted
@@ -295,8 +296,8 @@ def _coupled_changes(
     areas = {r.case.load: r.value for r in mine if r.name == "contact_area"}
     for one in _changes(COUPLING, [r.name for r in mine], mine, again):
         area = areas.get(one.case.load, 0.0)
-        known = one.quantity == "stick_area" and area > 0.0
-        yield replace(one, over=(area, "contact area")) if known else one
+        known = one.quantity == q.STICK_AREA.name and area > 0.0
+        yield replace(one, over=(area, q.STICK_AREA.part_of)) if known else one
 
 
 def _quantity(scene: Scene) -> tuple[str, str]:
