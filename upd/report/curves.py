@@ -19,6 +19,8 @@ FOLDER = "curves"
 _PART = "part"
 #: dimensions whose tables stand among the numbers of summary.json
 _PEAKS = "peak"
+#: dimensions of a map on a face
+_PLACES = ("x", "y")
 #: dimension along which each entry of another dimension is a curve of its own
 _SAMPLE = "sample"
 
@@ -29,8 +31,8 @@ def write_curves(arrays: Arrays, folder: Path) -> list[Path]:
     """Write every curve of the arrays to ``folder``/curves, a file per group and dimension.
 
     Columns are the variables that run along one dimension, with their unit in the header:
-    ``frequency [Hz]``; a complex one has its real and imaginary part and its amplitude. Maps stay
-    in result.nc.
+    ``frequency [Hz]``; a complex one has its real and imaginary part and its amplitude. Maps over x
+    and y have a row for every place.
 
     Parameters
     ----------
@@ -82,6 +84,22 @@ def _tables(group: Group) -> Iterator[tuple[str, list[Column]]]:
         several = len(columns) > 1 and len(columns[0][1]) > 1
         if several and not dimension.startswith(_PEAKS):
             yield dimension, columns
+    maps = {name: v for name, v in group.items() if v.dims[:2] == _PLACES}
+    if maps and all(axis in group for axis in _PLACES):
+        lines = np.meshgrid(*(group[axis].data for axis in _PLACES), indexing="ij")
+        places = [
+            (f"{axis} [{group[axis].units}]", at.ravel())
+            for axis, at in zip(_PLACES, lines, strict=True)
+        ]
+        yield "map", places + [column for name, v in maps.items() for column in _on_map(name, v)]
+
+
+def _on_map(name: str, variable: Variable) -> Iterator[Column]:
+    """The columns of a map, one for each of its components."""
+    unit = f" [{variable.units}]" if variable.units else ""
+    parts = variable.data.reshape(variable.data.shape[0] * variable.data.shape[1], -1).T
+    for k, part in enumerate(parts):
+        yield f"{name}{f' {k + 1}' if len(parts) > 1 else ''}{unit}", part
 
 
 def _columns(name: str, variable: Variable, dimension: str) -> Iterator[Column]:

@@ -13,6 +13,7 @@ import pytest
 
 import upd
 from upd.errors import InputError
+from upd.labels import file_name
 from upd.report import notebook
 from upd.report.curves import write_curves
 from upd.report.folder import read_run
@@ -91,6 +92,15 @@ def test_curves_hold_every_digit_and_their_units(run: RunResult) -> None:
         group = notebook.chart_arrays(run)["force-approach"]
         np.testing.assert_array_equal(curve["approach [mm]"], group["approach"].data)
         np.testing.assert_array_equal(curve["normal_force [N]"], group["normal_force"].data)
+        # the computed fields, with their places, beside the closed forms
+        label = run.results[0].case.label
+        file, group = file_name(label), notebook.chart_arrays(run)[label]
+        places = _read(run.folder / "curves" / f"{file}-map.csv")
+        np.testing.assert_array_equal(places["pressure [MPa]"], group["pressure"].data.ravel())
+        top = np.argmax(places["pressure [MPa]"])
+        i, j = np.unravel_index(top, group["pressure"].data.shape)
+        assert places["x [mm]"][top] == group["x"].data[i]
+        assert places["y [mm]"][top] == group["y"].data[j]
     if run.scene.startswith("rig"):
         curve = _read(run.folder / "curves" / "response_free.csv")
         group = notebook.chart_arrays(run)["response free"]
