@@ -19,8 +19,9 @@ from upd.report.page import Section, page_text, write_page
 from upd.report.panels import make_panels
 from upd.report.run_page import verdict
 from upd.report.tables import filled, main_numbers
+from upd.results import Case, shared_label
 from upd.results.answer_table import AnswerTable
-from upd.results.quantities import number_label
+from upd.results.quantities import F_N, number_label
 
 
 def write_comparison(folders: Sequence[str | Path], path: str | Path) -> Path:
@@ -49,15 +50,29 @@ def run_names(runs: Sequence[RunFolder]) -> list[str]:
 
 def comparison_sections(runs: Sequence[RunFolder], names: Sequence[str]) -> list[Section]:
     """The page of several runs."""
-    charts = overlaid([analysis_charts(run.arrays, run.summary) for run in runs], names)
+    meant = [meanings(run.summary["results"]) for run in runs]
+    results = [
+        [{**row, "case": mine.get(row["case"], row["case"])} for row in run.summary["results"]]
+        for run, mine in zip(runs, meant, strict=True)
+    ]
+    charts = overlaid(
+        [
+            [
+                replace(c, case=mine.get(c.case, c.case))
+                for c in analysis_charts(run.arrays, run.summary)
+            ]
+            for run, mine in zip(runs, meant, strict=True)
+        ],
+        names,
+    )
     scenes = [run.summary["scene_file"] for run in runs]
     differ = differences(scenes)
     main = {
         (entry["name"], entry["case"])
-        for run in runs
-        for entry in main_numbers(run.summary["size"], run.summary["results"])
+        for run, rows in zip(runs, results, strict=True)
+        for entry in main_numbers(run.summary["size"], rows)
     }
-    first, others = numbers([run.summary["results"] for run in runs], names, main)
+    first, others = numbers(results, names, main)
     about = "Every run has one colour; points and lines are those of its own page."
     return [
         Section("Runs", [_runs_table(runs, names)]),
@@ -81,6 +96,23 @@ def comparison_sections(runs: Sequence[RunFolder], names: Sequence[str]) -> list
             for name, run in zip(names, runs, strict=True)
         ),
     ]
+
+
+def meanings(rows: Sequence[Entry]) -> dict[str, str]:
+    """Cases of a run -> what they mean in any run: a load that the damper's equilibrium gives is
+    named by the friction it mobilises, not by its force.
+    """
+    cases = {row["case"]: Case(**row.get("case_fields", {})) for row in rows}
+    states = {
+        row["value"]: cases[row["case"]].friction
+        for row in rows
+        if row["name"] == F_N.name and cases[row["case"]].friction
+    }
+    return {
+        label: f"{shared_label([case], ['load'])}, friction {states[case.load]}"
+        for label, case in cases.items()
+        if case.load in states
+    }
 
 
 def _runs_table(runs: Sequence[RunFolder], names: Sequence[str]) -> AnswerTable:
