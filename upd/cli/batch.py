@@ -18,6 +18,7 @@ from upd.batch.plan import SweepPlan
 from upd.batch.studies import Study, StudyResult
 from upd.cli.tables import print_table
 from upd.cli.terminal import counted, duration
+from upd.plot.sweep_charts import is_constant
 from upd.report.columns import TextColumn, whole_table
 from upd.report.tables import sample_table
 from upd.results.sampled import sample_sentence
@@ -38,7 +39,7 @@ _KINDS = {
     ".html": "Page",
 }
 #: rows of a study's table on a terminal
-_ROWS = 12
+_STUDY_ROWS = 12
 
 
 def print_sweep_plan(console: Console, plan: SweepPlan) -> None:
@@ -83,15 +84,17 @@ def print_sweep(console: Console, result: SweepResult) -> None:
         )
         for k, axis in enumerate(plan.axes)
     ]
-    for k, column in enumerate(result.columns):
+    # what varies first
+    for k, column in enumerate(sorted(result.columns, key=lambda one: is_constant(one.values))):
         values = (_shown(result, number, column.values, k) for number in range(len(places)))
         head = _head(column.name, column.case, column.unit)
         columns.append(TextColumn(head, tuple(values), right=True, rank=k))
     left_out = print_table(console, columns, note=False)
     points = max(len(plan.places) - _ROWS, 0)
     if points or left_out:
-        hidden = f"{counted(points, 'point')}, {counted(len(left_out), 'number')}"
-        console.print(f"Not shown: {hidden}; see the table's file")
+        hidden = {"point": points, "number": len(left_out)}
+        told = " and ".join(counted(count, what) for what, count in hidden.items() if count)
+        console.print(f"Not shown: {told}; see the table's file")
     _print_end(console, result)
 
 
@@ -157,7 +160,7 @@ def print_study(console: Console, result: StudyResult) -> None:
     if result.kept:
         console.print(f"{counted(len(result.kept), 'point')} kept from an earlier call")
     for table in result.report.tables:
-        shown = replace(table, rows=table.rows[:_ROWS])
+        shown = replace(table, rows=table.rows[:_STUDY_ROWS])
         print_table(console, study_columns(shown), title=table.title)
         if more := len(table.rows) - len(shown.rows):
             console.print(f"{counted(more, 'more row')} in study.md")

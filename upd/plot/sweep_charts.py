@@ -85,7 +85,8 @@ def sweep_charts(parameters: Sequence[Varied], numbers: Sequence[FollowedNumber]
     parameters
         All parameters of the grid.
     numbers
-        What is followed; numbers without any value are left out.
+        What is followed; those that nothing changes come last, those without any value are left
+        out.
 
     Returns
     -------
@@ -99,7 +100,7 @@ def sweep_charts(parameters: Sequence[Varied], numbers: Sequence[FollowedNumber]
     varied = [p for p in parameters if len(p.values) > 1]
     grids = [
         (n, np.asarray(n.values, float).reshape(shape).squeeze())
-        for n in numbers
+        for n in sorted(numbers, key=lambda one: is_constant(one.values))
         if np.isfinite(n.values).any()
     ]
     if not varied:
@@ -111,6 +112,12 @@ def sweep_charts(parameters: Sequence[Varied], numbers: Sequence[FollowedNumber]
             for chart in _multiples(varied, number, grid)
         ]
     return _plain_charts(varied, grids)
+
+
+def is_constant(values: Array) -> bool:
+    """Whether the points have one value, up to rounding."""
+    known = np.asarray(values, float)[np.isfinite(values)]
+    return not known.size or float(np.ptp(known)) <= _SAME * float(np.abs(known).max())
 
 
 def _plain_charts(

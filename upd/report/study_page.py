@@ -38,17 +38,12 @@ def write_study_report(
     InputError
         When it cannot be written.
     """
-    points, *others = [_table(one) for one in tables]
-    text = " ".join(
-        [*([f"{failed} of {len(points.rows)} points failed."] if failed else []), *notes]
-    )
+    text = " ".join([*([f"{failed} points failed."] if failed else []), *notes])
     verdict = Verdict(*("warning", "Done in part") if failed else ("passed", "Done"), text)
     panels = make_panels(charts, {path.stem: path for path in figures})
-    sections = [
-        Section(points.heading, [points], kind="grid"),
-        Section("Figures", panels=panels),
-        *(Section(one.heading, [one], kind="tall") for one in others),
-    ]
+    found = [_table(one) for one in tables]
+    sections = [Section(one.heading, [one], kind="tall") for one in found]
+    sections.insert(1, Section("Figures", panels=panels))
     return write_page(folder / "report.html", page_text(title, sections, verdict=verdict))
 
 

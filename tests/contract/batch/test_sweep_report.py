@@ -245,6 +245,10 @@ def test_one_value_everywhere_is_told(tmp_path: Path) -> None:
     made = read_sweep(_made(tmp_path / "same", {"a": [1, 2], "b": [1, 2]}))
     over = sweep_charts(made.parameters, [replace(followed(made)[0], values=np.full(4, 3.5))])[0]
     assert over.case == "3.5 µm everywhere"
+    varying = replace(followed(made)[0], values=np.arange(4.0))
+    flat = replace(varying, values=np.full(4, 3.5))
+    first, last = sweep_charts(made.parameters, [flat, varying])[:2]
+    assert "everywhere" not in first.case and "everywhere" in last.case
 
 
 def test_a_grid_of_one_point_still_has_a_page(tmp_path: Path) -> None:
