@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -79,6 +80,7 @@ def answer(
     if tables and not own and sum(map(len, (lines, *blocks[:2], end))) >= LINES:
         # no room for the first cases: the main numbers that are among them too
         whole = number_table(MAIN, reached_numbers(size, entries))
+        whole = replace(whole, note=tables[0].note)
         blocks = [_table(whole, width, cut=True), *blocks[tables[0].heading == MAIN :]]
     for k, block in enumerate(blocks):
         # the tables of an analysis are whole; of others those that fit on a screen

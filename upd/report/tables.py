@@ -5,6 +5,7 @@ notebook draw the same.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -80,7 +81,27 @@ def answer_tables(size: Mapping[str, Any], entries: Sequence[Entry]) -> list[Ans
         if entry["reference"] is not None or (entry["name"], entry["case"]) not in there
     ]
     tables = [number_table(MAIN, main)] if main else []
-    return tables + [_case_table(rows) for rows in cases]
+    tables += [_case_table(rows) for rows in cases]
+    told = _not_estimated([*main, *(entry for rows in cases for row in rows for entry in row)])
+    if not (tables and told):
+        return tables
+    first, *others = tables
+    return [replace(first, note=f"{first.note} {told}".lstrip()), *others]
+
+
+def _not_estimated(entries: Sequence[Entry]) -> str:
+    """Why numbers have no estimate of their error: in one sentence if none has one."""
+    reasons: dict[str, list[str]] = {}
+    for entry in entries:
+        lost = [p["basis"] for p in entry.get("error_parts", ()) if p["error"] is None]
+        if lost:
+            why = lost[0].removeprefix("not estimated: ").rstrip(".")
+            reasons.setdefault(why, []).append(number_label(entry["name"]))
+    if len(reasons) == 1 and not any(map(plus_minus, entries)):
+        return f"Errors are not estimated: {next(iter(reasons))}."
+    return " ".join(
+        f"{', '.join(dict.fromkeys(names))} without ±: {why}." for why, names in reasons.items()
+    )
 
 
 def reached_numbers(size: Mapping[str, Any], entries: Sequence[Entry]) -> list[Entry]:

@@ -19,6 +19,7 @@ from upd.report.notes import warnings
 from upd.report.tables import answer_tables
 from upd.results import NO_CASE, Case, Check, Result, status_of
 from upd.results.answer_table import AnswerTable
+from upd.results.quantities import number_label
 from upd.results.quantity import Quantity
 
 PEAKS = AnswerTable(
@@ -201,3 +202,17 @@ def test_the_levels_that_an_accuracy_chose_stand_beside_the_tables(told: RunResu
     lines = printed(replace(told, effects=(chosen,)), 80)
     assert "Accuracy reached, modes kept 20 of 10" in lines
     assert not any("Accuracy" in line for line in printed(told, 80))
+
+
+def test_why_a_number_has_no_error_is_told_below_the_table(told: RunResult) -> None:
+    unknown = {"source": "mesh", "error": None, "basis": "not estimated: one level only"}
+    entries = [{**row.as_dict(), "error_parts": [unknown]} for row in told.results[:2]]
+    size = {"analysis": "another"}
+    first = {**entries[0], "estimated_error": None}
+    second = {**entries[1], "estimated_error": None}
+    told_of = "Errors are not estimated: one level only."
+    assert answer_tables(size, [first, second])[0].note == told_of
+    known = {**second, "estimated_error": 0.01, "error_parts": []}
+    note = answer_tables(size, [first, known])[0].note
+    assert note == f"{number_label(first['name'])} without ±: one level only."
+    assert answer_tables(size, [{**first, "error_parts": []}])[0].note == ""
