@@ -87,7 +87,7 @@ def sampled_error(sizes: Sequence[float], samples: Sequence[FloatArray]) -> Erro
     away, spread, squares = (np.array(column) for column in zip(*fits, strict=True))
     spread = spread * np.sqrt(squares / freedom)
     least = float(squares.min())
-    weight = (squares / least) ** (-0.5 * len(q)) if least else (squares == 0.0).astype(float)
+    weight = (squares / least) ** (-0.5 * len(sizes)) if least else (squares == 0.0).astype(float)
     weight /= weight.sum()
     bound = _exceeded(away, spread, weight, freedom)
     k = int(weight.argmax())
