@@ -136,6 +136,8 @@ def test_quarter_patch_measures_as_the_whole() -> None:
     own = np.bincount(local.ravel(), minlength=len(kept)) * 1.0
     part = make_patch(points[kept], own, (True, True), quads=local.reshape(-1, 4))
     assert len(part.cells()) == len(quads) and len(part.points()) == len(points)
+    found, right = (sorted(map(tuple, one.points().round(9))) for one in (part, whole))
+    assert np.allclose(found, right, atol=2e-9)
     assert part.area().sum() == pytest.approx(whole.area().sum(), rel=1e-14)
     assert part.rim().sum() == whole.rim().sum() == 32
 

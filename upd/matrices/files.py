@@ -302,7 +302,10 @@ def checked(A: Any, name: str) -> csr_array:
     if len(np.shape(A)) != 2 or A.shape[0] != A.shape[1] or A.shape[0] == 0:
         raise InputError(f"{name}: the matrix is {np.shape(A)}; K and M are square.")
     if np.issubdtype(A.dtype, np.complexfloating):
-        raise InputError(f"{name}: the matrix is complex; give its real part.")
+        raise InputError(
+            f"{name}: the matrix is complex; give its real part, and its damping as zeta, half "
+            "the loss factor."
+        )
     matrix = csr_array(A, dtype=np.float64)
     matrix.sum_duplicates()
     matrix.sort_indices()

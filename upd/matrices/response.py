@@ -22,7 +22,7 @@ Units are those of the matrices: N/mm and t give mm, N and Hz.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, TypedDict, Unpack
 
@@ -275,6 +275,15 @@ def forced_response(
         harmonics=orders,
         **settings,
     )
+    if answer.status == "stopped":
+        held = _held_by_friction(Kd, joints, rows.matrix(closing) @ at)
+        names = [str(row) for row in rows.used[np.abs(at @ held).max(axis=1, initial=0.0) > 0.5]]
+        if names:
+            why = (
+                f"friction alone holds row {', '.join(names)}: where its joints slip nothing sets "
+                "its mean place and nothing balances a static force on it; give it a stiffness in K"
+            )
+            answer = replace(answer, message=f"{answer.message}; {why}")
     return OwnResponse(answer, dict(zip(watch, rows.matrix(watched) @ at, strict=True)), reduced)
 
 
@@ -446,6 +455,15 @@ def _blurred(K: FloatArray, M: FloatArray) -> int:
         ) from None
     rounding = len(values) * float(np.finfo(float).eps) * float(np.abs(values).max())
     return int((modal(M, np.zeros_like(K), K).rigid & (values > rounding)).sum())
+
+
+def _held_by_friction(K: FloatArray, joints: Sequence[Joint], closing: FloatArray) -> FloatArray:
+    """Motions (n, m) without stiffness of the bodies and of pressed joints, the largest entry 1."""
+    pressed = K + (closing.T * [j.k_n for j in joints]) @ closing
+    values, motions = eigh(pressed)
+    rounding = len(values) * float(np.finfo(float).eps) * float(np.abs(values).max())
+    free = motions[:, values <= rounding]
+    return np.asarray(free / np.abs(free).max(axis=0, initial=0.0))
 
 
 def _refuse_penalties(K: csr_array) -> None:

@@ -23,7 +23,7 @@ from upd.labels import (
 from upd.plot.chart import Entry
 from upd.results import read_part, worst_checks
 from upd.results.answer_table import AnswerTable
-from upd.results.quantities import number_label, number_title
+from upd.results.quantities import CLOSED_FORM_ERROR, number_label, number_title
 from upd.results.sampled import SampledNumber
 
 #: numbers of a run whose analysis is not known
@@ -83,10 +83,14 @@ def answer_tables(size: Mapping[str, Any], entries: Sequence[Entry]) -> list[Ans
     tables = [number_table(MAIN, main)] if main else []
     tables += [_case_table(rows) for rows in cases]
     told = _not_estimated([*main, *(entry for rows in cases for row in rows for entry in row)])
+    order = [entry["value"] for entry in entries if entry["name"] == CLOSED_FORM_ERROR.name]
+    if main and order:
+        exact = percent_of(max(order) / 100)
+        told = f"The closed forms are exact to the order (a/R)² = {exact}. {told}"
     if not (tables and told):
         return tables
     first, *others = tables
-    return [replace(first, note=f"{first.note} {told}".lstrip()), *others]
+    return [replace(first, note=f"{first.note} {told}".strip()), *others]
 
 
 def _not_estimated(entries: Sequence[Entry]) -> str:

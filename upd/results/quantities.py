@@ -62,6 +62,10 @@ K_N_TANGENT_3A = Quantity("K_N_tangent_3a", "N/mm", "K_N tangent, approach withi
 K_T_INITIAL_RAW = Quantity("K_T_initial_raw", "N/mm", "K_T initial, raw")
 K_T_INITIAL = Quantity("K_T_initial", "N/mm", "K_T initial, bulk compliance removed")
 K_T_OVER_K_N = Quantity("K_T_over_K_N", words="K_T / K_N")
+#: what a paraboloid on a half-space lacks of a sphere, to the order
+CLOSED_FORM_ERROR = Quantity(
+    "closed_form_error", "%", "order of Hertz's own error, (a/R)²", is_error=True
+)
 STICK_RADIUS = Quantity("stick_radius", "um", "stick radius")
 SHEAR_RAW = Quantity("tangential_displacement_raw", "um", "displacement, raw")
 SHEAR = Quantity("tangential_displacement", "um", "displacement, bulk compliance removed")

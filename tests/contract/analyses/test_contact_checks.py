@@ -216,6 +216,14 @@ def softer(s: Any) -> None:
     s.plan = replace(s.plan, scene=replace(scene, materials={**scene.materials, name: soft}))
 
 
+def incompressible(s: Any) -> None:
+    """Bodies of hex8 that hardly change their volumes."""
+    scene = s.plan.scene
+    held = {name: replace(one, nu=0.49) for name, one in scene.materials.items()}
+    mesh = replace(scene.mesh, element="hex8")
+    s.plan = replace(s.plan, scene=replace(scene, materials=held, mesh=mesh))
+
+
 def yielding(s: Any) -> None:
     """One body's material yields at hardly any stress."""
     scene = s.plan.scene
@@ -289,6 +297,7 @@ SPOILERS: dict[tuple[str, str, str], Callable[[Any], None]] = {
     ("hertz", "sphere", "patch rim"): rim,
     ("hertz", "sphere", "resolution"): lambda s: measures(s, radius_moment=1e-6),
     ("hertz", "sphere", "symmetric pressure"): uneven,
+    ("hertz", "sphere", "locking"): incompressible,
     ("hertz", "sphere", "contact radius against sphere"): lambda s: measures(
         s, radius_outermost=2.0
     ),

@@ -216,3 +216,10 @@ def test_why_a_number_has_no_error_is_told_below_the_table(told: RunResult) -> N
     note = answer_tables(size, [first, known])[0].note
     assert note == f"{number_label(first['name'])} without ±: one level only."
     assert answer_tables(size, [{**first, "error_parts": []}])[0].note == ""
+
+
+def test_the_own_error_of_closed_forms_is_told_below_the_main_numbers(told: RunResult) -> None:
+    entry = {**told.results[0].as_dict(), "reference": 1.0, "source": "Hertz"}
+    order = {**entry, "name": "closed_form_error", "value": 0.14, "reference": None}
+    (table,) = answer_tables({"analysis": "another"}, [entry, order])
+    assert table.note == "The closed forms are exact to the order (a/R)² = 0.14 %."

@@ -304,3 +304,27 @@ def test_an_answer_prints_on_ten_lines() -> None:
     frequency, height = answer.peak("dof 0")
     assert f"dof 0: {height:.5g} mm at {frequency:.5g} Hz" in repr(answer)
     assert "and 5 more" in repr(answer)
+
+
+def test_a_dof_that_friction_alone_holds_is_named_where_the_path_stops() -> None:
+    def stopped_with(stiffness: float) -> str:
+        return forced_response(
+            np.diag([1.0, stiffness]),
+            0.1 * np.eye(2),
+            C=0.02 * np.eye(2),
+            joints=[Joint(closing={}, sliding=[{0: 1.0, 1: -1.0}], k_t=3.0, mu=0.5, preload=1.0)],
+            force={0: 0.3},
+            static_force={1: 0.2},
+            watch={"x": 0},
+            frequencies=np.linspace(0.2, 0.8, 20),
+        ).response.message
+
+    assert "friction alone holds row 1: where its joints slip" in stopped_with(0.0)
+    assert "friction alone" not in stopped_with(0.3)
+
+
+def test_complex_stiffness_asks_for_a_damping_ratio() -> None:
+    with pytest.raises(InputError, match="complex; give its real part, and its damping as zeta"):
+        forced_response(
+            [[1.0 + 0.1j]], [[1.0]], joints=[], force={}, watch={}, frequencies=[1.0], zeta=0.01
+        )

@@ -215,6 +215,8 @@ def _normal(solution: ContactSolution, case: NormalCase) -> list[Result]:
         out.append(_area(solution, q.STICK_AREA).of(area_of(solution, case.stick), at))
     if solution.curved:
         out += _approach_split(solution, case, hertz)
+        if hertz is not None:
+            out.append(q.CLOSED_FORM_ERROR.of(hertz.approach**2 / hertz.radius**2, at))
         return [_with_estimate(result, case) for result in out]
     return out + _of_faces(solution, case)
 
