@@ -248,7 +248,7 @@ def test_geometry_without_a_radius_keeps_its_closed_form() -> None:
     result = upd.run(
         tables, overrides={"want": ["normal"], "loads.normal": ["200 N"], "geometry.divisions": 8}
     )
-    assert all(r.reference is not None for r in result.rows)
+    assert all(r.reference is not None for r in result.rows if r.name != "closed_form_error")
     with pytest.raises(InputError, match="loaded already"):
         upd.run(load_scene("hertz"), overrides=["contact.friction=0"])
 
