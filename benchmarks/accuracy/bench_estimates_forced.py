@@ -1,7 +1,7 @@
 """Estimated bounds against true errors of every reported peak of both ready responses.
 
 The truth is the finest level that two cores reach in minutes: half of the size of all elements,
-twelve rows of contact points for five, eleven harmonics for seven, twenty modes a blade for ten. A
+sixteen rows of contact points for seven, eleven harmonics for seven, twenty modes a blade for ten. A
 name or two (``asymmetric-response``) runs these alone.
 """
 
@@ -22,7 +22,7 @@ FINEST = (
     *ALONE,
     "accuracy=unknown",
     "geometry.refine=2",
-    "contact.rows=12",
+    "contact.rows=16",
     "balance.harmonics=11",
     "reduction.modes=20",
 )

@@ -192,8 +192,9 @@ def bound(source: str, found: Sequence[tuple[Variation, float]]) -> tuple[float,
     if source == MODES:
         return spread, f"change from {names}: what more modes change is less"
     if source == POINTS:
-        # of an error C h^p, p >= 1, levels to the size s show at least the part 1 - s
-        return spread / (1.0 - min(one.size for one, _ in found)), f"range with {names}, order 1"
+        # of an error C h^p, p >= 1, levels from the size s to S >= 1 show at least the part S - s
+        sizes = [1.0, *(one.size for one, _ in found)]
+        return spread / (max(sizes) - min(sizes)), f"range with {names}, order 1"
     return _SAFETY * spread, f"range with {names}, factor {_SAFETY:g}"
 
 

@@ -137,15 +137,15 @@ def _damping(peaks: FoundPeaks) -> Iterator[Changed]:
         yield f"x {factor:g}", made
 
 
-#: input that is assumed -> its ends
+#: input that is assumed -> its ends; those that take the longest first
 INPUTS: Mapping[str, Callable[[FoundPeaks], Iterator[Changed]]] = {
+    "fit of the faces": _fit,
+    "height of the contact patch": _patch,
     "K_T of the left face": partial(_stiffness, "left", "k_t"),
     "K_T of the right face": partial(_stiffness, "right", "k_t"),
     "K_N of both faces": partial(_stiffness, None, "k_n"),
-    "height of the contact patch": _patch,
     "friction": _friction,
     "static friction before vibration": _static,
-    "fit of the faces": _fit,
     "modal damping": _damping,
 }
 

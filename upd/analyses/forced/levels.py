@@ -72,8 +72,8 @@ HARMONICS, SAMPLES, TIME = "harmonics", "samples", "time integration"
 COARSER = (0.75, 0.5)
 #: spacing of the nodes of linear elements over that of quadratic ones on the same lattice
 _LINEAR = 2.0
-#: rows of Gauss points of the finer levels, over those of the run
-MORE_ROWS = (1.5, 2.0)
+#: rows of Gauss points of the levels, over those of the run
+OTHER_ROWS = (1.5, 0.7)
 #: the same of a run on lattice lines, and what stands for their number
 _GAUSS_ROWS, _LATTICE = (4, 8), 3
 #: harmonics that a finer level has more than the run
@@ -169,13 +169,15 @@ def with_gauss(contact: FrictionChoice, rows: int, columns: int) -> FrictionChoi
 
 
 def _contact_levels(contact: FrictionChoice) -> list[tuple[str, float, FrictionChoice]]:
-    """More Gauss points than the run has; Gauss points where it has lattice lines of whole faces.
+    """More and fewer Gauss points than the run has; Gauss points where it has lattice lines of whole
+    faces.
 
     Lines that the scene names are a choice of the patch: they have no finer level.
     """
     if contact.rule == GAUSS:
         row, column = int(contact.rows), int(contact.columns)
-        counts = [(math.ceil(more * row), column) for more in MORE_ROWS]
+        rows = dict.fromkeys(math.ceil(factor * row) for factor in OTHER_ROWS)
+        counts = [(one, column) for one in rows if one != row]
     else:
         if lines_named(contact):
             return []
