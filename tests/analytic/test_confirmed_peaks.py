@@ -60,7 +60,8 @@ def stays(
 ) -> np.ndarray | None:
     model, curve = solution.models["thesis"], solution.curves[0]
     springs = make_springs(solution.plan, model)
-    return peaks._stays(springs, model, curve, steps, x, f)
+    found = peaks._stays(springs, model, curve, steps, x, f)
+    return None if found is None else found.heights
 
 
 def test_the_motion_of_a_slipping_peak_stays(slipping: ForcedSolution) -> None:
@@ -152,9 +153,14 @@ def test_a_spoiled_top_is_replaced_by_a_motion_down_the_path(slipping: ForcedSol
 
 
 def confirm(
-    good: Callable[[int], bool], size: np.ndarray, like: TimeCheck | None = None
+    good: Callable[[int], bool],
+    size: np.ndarray,
+    like: TimeCheck | None = None,
+    followed: Callable[[int], bool] | None = None,
 ) -> tuple[TimeCheck, list[int]]:
-    """The check of a peak at the middle of a path whose motions stay or leave by their place."""
+    """The check of a peak at the middle of a path whose motions stay or leave by their place, and
+    those that time integration reaches from the one before.
+    """
     f, tried = 100.0 + np.arange(len(size)) / 10.0, list[int]()
     answer: Any = SimpleNamespace(
         frequency=f, x=np.arange(len(size), dtype=float)[:, None], balance=None
@@ -164,16 +170,24 @@ def confirm(
     )
     top = int(size.argmax())
 
-    def motion(x: np.ndarray, _: float) -> np.ndarray | None:
+    def motion(x: np.ndarray, _: float, before: Any = None) -> Any:
         (i,) = x
         tried.append(int(i))
         height = float(size[min(int(i), len(size) - 1)]) if i >= 0 else float(size[top])
-        return np.array([[height, height], [height, 0.99 * height]]) if good(int(i)) else None
+        stay = (followed or good) if before is not None else good
+        heights = np.array([[height, height], [height, 0.99 * height]])
+        return SimpleNamespace(heights=heights) if stay(int(i)) else None
 
     peak = CurvePeak(float(f[top]), float(size[top]), top, 1)
     very_top = Top(float(f[top]), float(size[top]), np.array([-1.0]), True)
-    found = peaks._confirmed(motion, curve, "right", peak, very_top, like, like is not None)
-    return found, tried
+    motions: dict[int, Any] = {}
+    found = peaks._confirmed(motion, curve, "right", peak, very_top, like, motions)
+    count = len(tried)
+    if not found.at_top:
+        left = peaks._confirmed(motion, curve, "left", peak, very_top, like, motions)
+        assert (left.sample, left.integrated) == (found.sample, found.balance) or not left.stays
+        assert len(tried) == count + (like is None), "no more than the other blade's own top"
+    return found, tried[:count]
 
 
 #: a peak of 2 with slopes of 0.02 a point
@@ -198,7 +212,38 @@ def test_bisection_ends_at_the_last_motion_that_leaves(last: int) -> None:
     assert found.balance == SLOPES[last + 1]
     assert found.step == pytest.approx(SLOPES[last] / SLOPES[last + 1] - 1.0)
     assert found.apart == pytest.approx(0.1 / (100.0 + (last + 1) / 10.0))
-    assert found.starts == len(tried) <= 2 * peaks._MOST_BISECTIONS
+    assert found.starts == len(tried) <= 20
+
+
+def test_from_the_border_time_integration_follows_its_own_motion_up() -> None:
+    """Further than harmonic balance tells, as long as the motion grows."""
+    found, _ = confirm(lambda i: i > 50, SLOPES, followed=lambda i: i > 44)
+    assert (found.sample, found.balance) == (45, SLOPES[45])
+    assert found.step == pytest.approx(SLOPES[44] / SLOPES[45] - 1.0)
+    found, _ = confirm(lambda i: i > 50, SLOPES, followed=lambda i: True)
+    assert (found.sample, found.step, found.apart) == (40, 0.0, 0.0)
+    dip = SLOPES - 0.1 * (np.arange(81) == 46)
+    found, _ = confirm(lambda i: i > 50, dip, followed=lambda i: True)
+    assert found.sample == 47
+
+
+def test_a_motion_is_followed_to_where_it_stays_too(slipping: ForcedSolution) -> None:
+    """From the next place of the path, at a height of its own."""
+    (curve,), model = slipping.curves, slipping.models["thesis"]
+    springs, size = make_springs(slipping.plan, model), np.abs(curve.accelerance["right"])
+    # before the first fold
+    i = int(np.flatnonzero(size > 0.6 * size.max())[8])
+    x, f = curve.answer.x, curve.frequency
+    given = springs, model, curve, peaks.STEPS
+    first = peaks._stays(*given, x[i], float(f[i]))
+    assert first is not None
+    # whatever the path has there
+    again = peaks._stays(*given, 3.0 * x[i + 1], float(f[i + 1]), first)
+    own = peaks._stays(*given, x[i + 1], float(f[i + 1]))
+    assert again is not None and own is not None
+    assert again.heights[1] == pytest.approx(own.heights[1], rel=5e-3)
+    far = first._replace(heights=first.heights * [[1.0], [1.3]])
+    assert peaks._stays(*given, x[i + 1], float(f[i + 1]), far) is None, "a jump is no growth"
 
 
 def test_the_higher_of_both_flanks_is_taken() -> None:
@@ -217,7 +262,7 @@ def test_on_another_model_the_border_is_looked_for_from_that_of_the_run(last: in
     alone, _ = confirm(lambda i: i > last, SLOPES)
     found, tried = confirm(lambda i: i > last, SLOPES, run)
     assert found == replace(alone, starts=found.starts)
-    assert found.starts == len(tried) <= 2 + 2 * np.log2(2 + abs(last - 46))
+    assert found.starts == len(tried) <= 3 + 2 * np.log2(2 + abs(last - 46))
     assert min(tried) > 40
     nothing, _ = confirm(lambda i: False, SLOPES, run)
     assert not nothing.stays

@@ -72,6 +72,8 @@ class Top(NamedTuple):
 
 #: in place of a sample: the top between the samples of a path
 AT_TOP = -1
+#: how far below a top, as a part of it, a motion is about as high
+ABOUT = 0.05
 
 
 @dataclass(frozen=True)
@@ -232,11 +234,20 @@ class ForcedCurve(Generic[Answer]):
         mine = (c for c in self.checked if (c.blade, c.number) == (side, number))
         return next((c for c in mine if c.stays and not c.at_top), None)
 
-    def compared(self, side: Side, number: int) -> tuple[float, float] | None:
-        """Hz and height that other levels of a peak are compared with: of the motion that stays,
-        else of its top; None without.
+    def below(self, side: Side, number: int) -> TimeCheck | None:
+        """The highest motion that stays, where it lies below the top of a peak; None where it stays
+        or is about as high: there tops of other levels tell what they change.
         """
         check, top = self.stayed(side, number), self.tops.get((side, number))
+        if check is None or top is None or check.integrated >= (1.0 - ABOUT) * top.height:
+            return None
+        return check
+
+    def compared(self, side: Side, number: int) -> tuple[float, float] | None:
+        """Hz and height that other levels of a peak are compared with: of the motion that stays
+        below its top, else of that; None without.
+        """
+        check, top = self.below(side, number), self.tops.get((side, number))
         if check is not None:
             return check.frequency, check.integrated
         return (top.frequency, top.height) if top is not None else None

@@ -169,8 +169,8 @@ def with_gauss(contact: FrictionChoice, rows: int, columns: int) -> FrictionChoi
 
 
 def _contact_levels(contact: FrictionChoice) -> list[tuple[str, float, FrictionChoice]]:
-    """More and fewer Gauss points than the run has; Gauss points where it has lattice lines of whole
-    faces.
+    """More and fewer Gauss points than the run has; Gauss points where it has lattice lines of
+    whole faces.
 
     Lines that the scene names are a choice of the patch: they have no finer level.
     """

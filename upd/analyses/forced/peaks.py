@@ -3,7 +3,9 @@
 A path by harmonic balance runs through motions that a rig never shows: between two folds they are
 unstable, and beside a fold the last few may leave for want of harmonics. Each reported peak is
 therefore confirmed by time integration that starts from its own motion. Where that leaves, the
-highest motion along the path that stays is the peak, found by bisection down from the top.
+highest motion along the path that stays is looked for by bisection down from the top. From there
+time integration follows its own motion up again, as a slow sweep does, where more harmonics than
+the path has count: how far it comes is the peak.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import takewhile
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,6 +45,7 @@ from upd.hbm import climb
 from upd.hbm.core.fourier import to_complex
 from upd.hbm.faces.march import InterfaceMarch
 from upd.hbm.faces.settle import settle
+from upd.hbm.faces.state import InterfaceState
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import STICK
 from upd.hbm.springs.peak import FIRST_REACH, is_near
@@ -61,8 +65,6 @@ LEAST = 0.5**0.5
 NEAR = 0.02
 #: steps in a period of the time integration at least
 STEPS = 256
-#: bisections of a stretch of a path
-_MOST_BISECTIONS = 8
 
 
 def solve_curve(
@@ -219,15 +221,13 @@ def confirmed(
         return curve
     springs = make_springs(plan, model)
     steps = max(STEPS, time_steps(plan.scene))
+    integrate = partial(_stays, springs, model, curve, steps)
     peaks = {side: list(curve.peaks[side]) for side in SIDES}
+    motions: dict[int, list[_Reached]] = {}
     checked: list[TimeCheck] = []
     for (side, number), top in loose:
         place = next(k for k, p in enumerate(peaks[side]) if p.number == number)
-        integrate = partial(_stays, springs, model, curve, steps)
-        # the other blade's border lies on the same motion
-        near = like or next((c for c in checked if c.number == number and not c.at_top), None)
-        leaves = like is not None
-        found = _confirmed(integrate, curve, side, peaks[side][place], top, near, leaves)
+        found = _confirmed(integrate, curve, side, peaks[side][place], top, like, motions)
         checked.append(found)
         if found.stays and not found.at_top:
             peaks[side][place] = peaks[side][place]._replace(
@@ -237,65 +237,75 @@ def confirmed(
     return replace(curve, peaks=stable, checked=tuple(checked))
 
 
+class _Steady(NamedTuple):
+    """A motion that stays: heights (2, 2) of the blades by harmonic balance and by time
+    integration, (m/s2)/N, and its state at the end of a period.
+    """
+
+    heights: Array
+    state: InterfaceState
+
+
+class _Reached(NamedTuple):
+    """The last motion that stays on a way up to a top.
+
+    Attributes
+    ----------
+    sample, beyond
+        Its place on the path, and the next one towards the top.
+    way
+        Direction along the path from the top to it, 1 or -1.
+    heights
+        As of `_Steady`.
+    """
+
+    sample: int
+    beyond: int
+    way: int
+    heights: Array
+
+
 def _confirmed(
-    integrate: Callable[[Array, float], Array | None],
+    integrate: Callable[..., _Steady | None],
     curve: PointCurve,
     side: Side,
     peak: CurvePeak,
     top: Top,
     like: TimeCheck | None,
-    leaves: bool,
+    motions: dict[int, list[_Reached]],
 ) -> TimeCheck:
     """The top where it stays, else the highest motion down the path that does.
 
     Parameters
     ----------
     like
-        As of `confirmed`, or of the other blade.
-    leaves
-        Whether the top is known to leave.
+        As of `confirmed`.
+    motions
+        Number of a peak -> those that stay beside its top, once they are looked for: one motion
+        has the heights of both blades.
     """
     starts, k = 0, SIDES.index(side)
     best = TimeCheck(side, peak.number, peak.mode, top.frequency, top.height, math.nan, peak.sample)
 
-    def stays(x: Array, f: float) -> Array | None:
+    def stays(x: Array, f: float, before: _Steady | None = None) -> _Steady | None:
         nonlocal starts
         starts += 1
-        return integrate(x, f)
+        return integrate(x, f, before)
 
-    if not leaves:
-        both = stays(top.x, top.frequency)
-        if both is not None:
-            balance, integrated = (float(one) for one in both[:, k])
-            return replace(
-                best, balance=balance, integrated=integrated, sample=AT_TOP, starts=starts
-            )
+    if like is None and (both := stays(top.x, top.frequency)) is not None:
+        balance, integrated = (float(one) for one in both.heights[:, k])
+        return replace(best, balance=balance, integrated=integrated, sample=AT_TOP, starts=starts)
     size, f = np.abs(curve.accelerance[side]), curve.frequency
-    ways = _downhill(curve, size, peak.sample)
-    if like is not None and like.stays:
-        ways = [way for way in ways if way[1] - way[0] == like.way] or ways
-    for way in ways:
-        # `low` leaves, `high` stays: steps that double from a known place, then bisection
-        low, high, kept = 0, len(way), None
-        at, step = high - 1, high
+    if peak.number not in motions:
+        ways = _downhill(curve, size, peak.sample)
         if like is not None and like.stays:
-            at, step = int(np.abs(size[way] - like.share * size[way[0]]).argmin()), 1
-        while high - low > 1 and (kept is None or starts < 2 * _MOST_BISECTIONS):
-            both = stays(curve.answer.x[way[at]], float(f[way[at]]))
-            if both is None:
-                low = at
-            else:
-                high, kept = at, both
-            if kept is None:
-                at = min(low + step, len(way) - 1)
-            else:
-                at = max((low + high) // 2, high - step)
-            step *= 2
-        if kept is None:
-            continue
-        balance, integrated = (float(one) for one in kept[:, k])
+            ways = [way for way in ways if way[1] - way[0] == like.way] or ways
+        found = (_highest(stays, curve, size, way, like) for way in ways)
+        motions[peak.number] = [one for one in found if one is not None]
+    for one in motions[peak.number]:
+        balance, integrated = (float(height) for height in one.heights[:, k])
         if not best.stays or integrated > best.integrated:
-            i, beyond = way[high], way[low]
+            i, beyond = one.sample, one.beyond
             best = replace(
                 best,
                 frequency=float(f[i]),
@@ -304,10 +314,44 @@ def _confirmed(
                 sample=i,
                 step=abs(float(size[beyond] / size[i]) - 1.0),
                 apart=abs(float(f[beyond] / f[i]) - 1.0),
-                way=way[1] - way[0],
-                share=float(size[i] / size[way[0]]),
+                way=one.way,
+                share=float(size[i] / size[peak.sample]),
             )
     return replace(best, starts=starts)
+
+
+def _highest(
+    stays: Callable[..., _Steady | None],
+    curve: PointCurve,
+    size: Array,
+    way: list[int],
+    like: TimeCheck | None,
+) -> _Reached | None:
+    """The last motion of a way up to a top that stays, None without one."""
+    x, f = curve.answer.x, curve.frequency
+    # `low` leaves, `high` stays: steps that double from a known place, then bisection
+    low, high = 0, len(way)
+    kept: _Steady | None = None
+    at, step = high - 1, high
+    if like is not None and like.stays:
+        at, step = int(np.abs(size[way] - like.share * size[way[0]]).argmin()), 1
+    while high - low > 1:
+        both = stays(x[way[at]], float(f[way[at]]))
+        if both is None:
+            low = at
+        else:
+            high, kept = at, both
+        at = min(low + step, len(way) - 1) if kept is None else max((low + high) // 2, high - step)
+        step *= 2
+    if kept is None:
+        return None
+    # up again from its own motion, as long as that grows
+    for k in range(high - 1, -1, -1):
+        further = stays(x[way[k]], float(f[way[k]]), kept)
+        if further is None or np.linalg.norm(further.heights[1]) < np.linalg.norm(kept.heights[1]):
+            break
+        high, kept = k, further
+    return _Reached(way[high], way[max(high - 1, 0)], way[1] - way[0], kept.heights)
 
 
 def _downhill(curve: PointCurve, size: Array, top: int) -> list[list[int]]:
@@ -325,26 +369,37 @@ def _downhill(curve: PointCurve, size: Array, top: int) -> list[list[int]]:
 
 
 def _stays(
-    springs: SpringMarch, model: Model, curve: PointCurve, steps: int, x: Array, f: float
-) -> Array | None:
-    """Heights (2, 2) of the blades by harmonic balance and by time integration that starts there,
-    (m/s2)/N; None where the integration leaves.
+    springs: SpringMarch,
+    model: Model,
+    curve: PointCurve,
+    steps: int,
+    x: Array,
+    f: float,
+    before: _Steady | None = None,
+) -> _Steady | None:
+    """The motion that time integration settles to from a place of the path, or from the one before
+    on the way up; None where it leaves.
     """
     b, force, k = curve.answer.balance, curve.force, model.excitation.lowest
     scale = 1e-3 * (2.0 * np.pi * k * f) ** 2 / force
     march = InterfaceMarch(springs.march, f, force * model.excitation.drive, steps, by_coulomb)
-    at = state_at(springs, model, b, x, f, force)
+    at = state_at(springs, model, b, x, f, force) if before is None else before.state.copy()
     try:
-        found = settle(march, at, TOLERANCE, PERIODS)
+        # beside the end of a branch a motion settles slowly
+        found = settle(march, at, TOLERANCE, PERIODS if before is None else 2 * PERIODS)
     except ConvergenceError as error:
         log.info("time integration at %.6g Hz: %s", f, one_line(error))
         return None
     integrated = scale * np.abs(found.first_harmonic[: len(SIDES)])
     balance = scale * np.array([_amplitude(model, b, x, f, side) for side in SIDES])
-    change = float(np.linalg.norm(integrated) / np.linalg.norm(balance)) - 1.0
-    if abs(change) > STAYS or not found.remaining <= STAYS:
+    size, near, room = np.linalg.norm(balance), balance, STAYS
+    if before is not None:
+        near = before.heights[1]
+        room += abs(float(size / np.linalg.norm(before.heights[0])) - 1.0)
+    change = float(np.linalg.norm(integrated) / np.linalg.norm(near)) - 1.0
+    if abs(change) > room or not found.remaining <= STAYS:
         return None
-    return np.array([balance, integrated])
+    return _Steady(np.array([balance, integrated]), at)
 
 
 def _amplitude(model: Model, b: Balance, x: Array, f: float, side: Side) -> float:

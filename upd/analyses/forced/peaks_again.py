@@ -80,7 +80,7 @@ class RunPeak(NamedTuple):
     top
         By harmonic balance.
     check
-        The highest motion that stays, where the top leaves; None where it stays.
+        The highest motion that stays, where the top leaves and it lies well below; None else.
     own, other
         What levels are compared with, of this blade and of the other one; None without.
     """
@@ -134,7 +134,7 @@ def run_peaks(curve: PointCurve) -> Iterator[RunPeak]:
             number,
             mode,
             curve.tops[side, number],
-            curve.stayed(side, number),
+            curve.below(side, number),
             NOT_FOUND if own is None else Found(*own),
             None if own is None or other is None else Found(*other),
         )
