@@ -1,8 +1,8 @@
 """Estimated bounds against true errors of every reported peak of both ready responses.
 
 The truth is the finest level that two cores reach in minutes: half of the size of all elements,
-sixteen rows of contact points for seven, eleven harmonics for seven, twenty modes a blade for ten. A
-name or two (``asymmetric-response``) runs these alone.
+sixteen rows of contact points for seven, eleven harmonics for seven, twenty modes a blade for ten.
+A name or two (``asymmetric-response``) runs these alone.
 """
 
 from __future__ import annotations
