@@ -25,8 +25,7 @@ from upd.cli import main
 from upd.errors import InputError
 from upd.plot.sweep_charts import sweep_charts
 from upd.report import sweep_page, write_comparison, write_report
-from upd.report.sweep_folder import read_sweep
-from upd.report.sweep_page import MOST_ROWS, followed, grouped, sweep_panels, verdict
+from upd.report.sweep_page import MOST_ROWS, followed, grouped, read_sweep, sweep_panels, verdict
 
 EVIL = '</script><script>alert("x")</script>'
 TINY = {"title": EVIL, "geometry.divisions": 8, "want": ["normal"], "geometry.core_depth": 0.2}
