@@ -93,8 +93,8 @@ def print_sweep(console: Console, result: SweepResult) -> None:
     points = max(len(plan.places) - _ROWS, 0)
     if points or left_out:
         hidden = {"point": points, "number": len(left_out)}
-        told = " and ".join(counted(count, what) for what, count in hidden.items() if count)
-        console.print(f"Not shown: {told}; see the table's file")
+        text = " and ".join(counted(count, what) for what, count in hidden.items() if count)
+        console.print(f"Not shown: {text}; see the table's file")
     _print_end(console, result)
 
 

@@ -1,15 +1,139 @@
-"""The one door to files of measured responses."""
+"""The one door to files of measured responses; of these netCDF-4 files are read here.
+
+A variable ``frequency`` in Hz and the response along its dimension, each with its attribute
+``units``: real numbers are magnitudes, a last dimension of two holds real and imaginary part. The
+result.nc of a run is such a file: its variables stand in groups,
+"linear own/accelerance_free_right".
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
+from typing import Any, get_args
 
-from upd.errors import InputError
-from upd.measured.curve import Blade, MeasuredCurve, State, as_accelerance
-from upd.measured.label import AskedCurve, CurveLabel
-from upd.measured.netcdf import read_variables
+import numpy as np
+
+from upd.errors import InputError, one_line
+from upd.measured.curve import (
+    LEAST_POINTS,
+    QUANTITIES,
+    Blade,
+    MeasuredCurve,
+    State,
+    as_accelerance,
+    checked_curve,
+    response_unit,
+    the_one,
+)
+from upd.measured.label import AskedCurve, CurveLabel, label_of, the_curve
 from upd.measured.text import TextCurve, read_text
+from upd.results import open_netcdf
+from upd.units import UNITS, unit_factor
+
+_AXIS = "frequency"
+_RESPONSE_UNITS = frozenset(unit for kind in QUANTITIES for unit in UNITS[kind])
+
+
+def read_variables(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, list[str]]:
+    """A response of a netCDF file, and all that is wrong with the file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    asked
+        Which response.
+
+    Returns
+    -------
+    TextCurve or None
+        None where something is wrong.
+    list of str
+        Faults with variable and place.
+    """
+    try:
+        with open_netcdf(path) as file:
+            return _read(file, *asked)
+    except OSError as error:
+        reason = one_line(error)
+        return None, [f"is no netCDF-4 file ({reason}); write it as netCDF-4, or as CSV"]
+
+
+def _read(
+    file: Any, column: str | None, unit: str | None, wanted: CurveLabel
+) -> tuple[TextCurve | None, list[str]]:
+    found = dict(_responses(file, "", unit))
+    try:
+        labels = {name: label_of(_said(*one)) for name, one in found.items()}
+        fitting = [name for name, label in labels.items() if label.agrees(wanted)]
+        name = the_one(fitting if column is None and fitting else list(found), column, "variables")
+        label = the_curve([labels[name]], wanted)
+    except InputError as error:
+        return None, [str(error)]
+    group, variable = found[name]
+    axis, faults = group.variables[_AXIS], []
+    scale, own_unit = 1.0, ""
+    try:
+        scale = unit_factor(_units(axis), ["frequency"])[1]
+    except InputError as error:
+        faults.append(f"variable {_AXIS}, attribute units: {error}")
+    try:
+        own_unit = response_unit(_units(variable), unit)
+    except InputError as error:
+        faults.append(f"variable {name}, attribute units: {error}")
+    f, data = scale * np.asarray(axis[...], float), np.asarray(variable[...], float)
+    for which, values in ((_AXIS, f), (name, data)):
+        for k in np.argwhere(~np.isfinite(values)):
+            at = ", ".join(map(str, k))
+            faults.append(f"variable {which}, place [{at}]: no finite number; leave it out")
+    if len(f) < LEAST_POINTS:
+        faults.append(f"variable {_AXIS}: {len(f)} points; a curve has {LEAST_POINTS} or more")
+    if faults:
+        return None, faults
+    faults += [f"variable {_AXIS}, place [{k}]: {words}" for k, words in checked_curve(f)]
+    if data.ndim == 2:
+        data = data[:, 0] + 1j * data[:, 1]
+    else:
+        faults += [
+            f"variable {name}, place [{k}]: the magnitude {data[k]:g} is negative; give "
+            "magnitudes, or a last dimension of real and imaginary part"
+            for k in np.flatnonzero(data < 0.0)
+        ]
+    if faults:
+        return None, faults
+    way = slice(None) if f[-1] > f[0] else slice(None, None, -1)
+    return TextCurve(f[way], data[way], own_unit, label), []
+
+
+def _said(group: Any, variable: Any) -> dict[str, Any]:
+    """What the attributes say of a curve, the variable's own before its group's."""
+    given = {str(key).casefold(): value for key, value in group.attrs.items()}
+    if given.get("kind") in get_args(State):
+        # as a run writes its own groups
+        given.setdefault("state", given["kind"])
+    return given | {str(key).casefold(): value for key, value in variable.attrs.items()}
+
+
+def _units(variable: Any) -> str:
+    """The attribute ``units``, "" without."""
+    return str(variable.attrs.get("units", ""))
+
+
+def _responses(group: Any, path: str, unit: str | None) -> Iterator[tuple[str, tuple[Any, Any]]]:
+    """Name -> group and variable of everything over frequency that may be a response."""
+    if _AXIS in group.variables:
+        (along,) = group.variables[_AXIS].dimensions[:1] or ("",)
+        for name, variable in group.variables.items():
+            dims, shape = variable.dimensions, variable.shape
+            over = dims == (along,) or (len(dims) == 2 and dims[0] == along and shape[1] == 2)
+            known = unit is not None or _units(variable) in _RESPONSE_UNITS
+            if name != _AXIS and over and known:
+                yield f"{path}{name}", (group, variable)
+    for name, inner in group.groups.items():
+        yield from _responses(inner, f"{path}{name}/", unit)
+
 
 _NETCDF = (".nc", ".nc4", ".cdf", ".h5")
 #: faults of one file that are reported
@@ -33,7 +157,7 @@ def read_measured(
     Parameters
     ----------
     path : str or Path
-        A text file, see `upd.measured.text`, or a netCDF-4 file (.nc), see `upd.measured.netcdf`.
+        A text file, see `upd.measured.text`, or a netCDF-4 file (.nc).
     blade : {"right", "left"}, optional
         Whose acceleration along x it is; where neither this nor the file gives it, the right one's.
     state : {"free", "stuck"}, optional

@@ -3,22 +3,228 @@
 Bodies are the physical volumes (gmsh) or the element sets (Abaqus, CalculiX); sets are the physical
 surfaces or the node sets, named ``contact`` or ``BODY_contact``, whatever the case of the letters.
 Boundary faces follow from the node sets; nodes that face each other are put in the same order.
+Of a flat Abaqus or CalculiX file *NODE, *ELEMENT, *ELSET and *NSET are read; elements without a
+volume, which gmsh writes of physical surfaces, are sets of nodes. Where a node or an element is
+given twice the last one counts, as in Abaqus.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from upd.errors import InputError, OwnMeshError
 from upd.mesh.boundary import boundary_faces
-from upd.mesh.hexmesh import FACE_SIZE, FloatArray, IntArray, Mesh, NamedElements
-from upd.mesh.inp import read_inp
+from upd.mesh.hexmesh import CENTRES, FACE_SIZE, FloatArray, IntArray, Mesh, NamedElements
 from upd.mesh.pairing import OUT_OF_LINE, in_pairs
+
+#: beginnings of the names of elements without a volume: plane and axisymmetric ones, shells,
+#: membranes, bars
+_THIN = (
+    *("CPS", "CPE", "CAX", "S3", "S4", "S6", "S8", "S9", "STRI"),
+    *("M3D", "SFM3D", "R3D", "T2D", "T3D", "B2", "B3"),
+)
+#: keywords and options that make nodes and elements elsewhere or move them
+_NOT_READ = frozenset(
+    {
+        *("INSTANCE", "INCLUDE", "INPUT", "SYSTEM", "NMAP"),
+        *("NGEN", "NFILL", "NCOPY", "ELGEN", "ELCOPY"),
+    }
+)
+#: VTK's order of the nodes of a C3D27, which has its centre before those of the sides S1 ... S6
+_C3D27 = np.argsort([*range(20), 26, *CENTRES])
+#: largest label
+_MOST = np.iinfo(np.int64).max
+
+
+def read_inp(path: Path) -> tuple[FloatArray, list[NamedElements]]:
+    """Points, in the order of the node labels, and the named groups of a file.
+
+    Elements that no ELSET= names are in the group "". Raises ValueError, which names the line, for
+    a damaged file and OwnMeshError for one that is not flat or has no volume.
+    """
+    deck = _Deck()
+    for block in _blocks(path.read_bytes()):
+        word, options = block.word, block.options
+        if word in _NOT_READ or not _NOT_READ.isdisjoint(options):
+            raise OwnMeshError(
+                f"line {block.line}: {', '.join((f'*{word}', *options))}: is not read; to fix it: "
+                "write a flat file, without parts and instances, all in one, in Cartesian "
+                "coordinates"
+            )
+        if word == "NODE":
+            deck.add_nodes(block)
+        elif word == "ELEMENT":
+            deck.add_elements(block)
+        elif word in ("NSET", "ELSET") and word in options:
+            deck.add_set(block)
+    kinds = {kind for kind, _ in deck.elements.values()}
+    if kinds and all(kind.startswith(_THIN) for kind in kinds):
+        raise OwnMeshError(
+            f"has {', '.join(sorted(kinds))} elements only, which have no volume; to fix it: write "
+            "the mesh of the volumes, hexahedra C3D8, C3D20 or C3D27, each body with its ELSET"
+        )
+    labels = np.array(sorted(deck.nodes), dtype=np.int64)
+    points = np.array([deck.nodes[n] for n in labels.tolist()], dtype=np.float64).reshape(-1, 3)
+    return points, list(deck.groups(labels, points))
+
+
+class _Line(NamedTuple):
+    """A data line: its place in the file, from 1, and what stands between its commas."""
+
+    place: int
+    cells: list[str]
+
+
+class _Block(NamedTuple):
+    """A keyword with its place in the file, from 1, its options in small letters, data lines."""
+
+    line: int
+    word: str
+    options: dict[str, str]
+    lines: list[_Line]
+
+
+@dataclass
+class _Deck:
+    """What a file holds, by label: nodes, elements, and the members of sets."""
+
+    nodes: dict[int, list[float]] = field(default_factory=dict)
+    elements: dict[int, tuple[str, list[int]]] = field(default_factory=dict)
+    nsets: dict[str, list[int]] = field(default_factory=dict)
+    elsets: dict[str, list[int]] = field(default_factory=dict)
+
+    def add_nodes(self, block: _Block) -> None:
+        found = [_number(int, line, 0) for line in block.lines]
+        for label, line in zip(found, block.lines, strict=True):
+            self.nodes[label] = [_number(float, line, k) for k in (1, 2, 3)]
+        if "NSET" in block.options:
+            self.nsets.setdefault(block.options["NSET"], []).extend(found)
+
+    def add_elements(self, block: _Block) -> None:
+        kind = block.options.get("TYPE", "").upper()
+        rows = [_integers(line) for line in block.lines]
+        if size := _size(kind):
+            numbers = [number for row in rows for number in row]
+            if len(numbers) % (size + 1):
+                raise ValueError(
+                    f"line {block.line}: {kind} elements have {size} nodes each, these "
+                    f"{len(numbers)} numbers are not whole elements"
+                )
+            rows = [numbers[k : k + size + 1] for k in range(0, len(numbers), size + 1)]
+        self.elements |= {row[0]: (kind, row[1:]) for row in rows if row}
+        self.elsets.setdefault(block.options.get("ELSET", ""), []).extend(
+            row[0] for row in rows if row
+        )
+
+    def add_set(self, block: _Block) -> None:
+        known = self.nsets if block.word == "NSET" else self.elsets
+        found = known.setdefault(block.options[block.word], [])
+        for line in block.lines:
+            if "GENERATE" in block.options:
+                first, last, *step = _integers(line)
+                found.extend(range(first, last + 1, step[0] if step else 1))
+                continue
+            for k, word in enumerate(line.cells):
+                if word.lower() in known:
+                    found.extend(known[word.lower()])
+                elif word:
+                    found.append(_number(int, line, k))
+
+    def groups(self, labels: IntArray, points: FloatArray) -> Iterator[NamedElements]:
+        """Sets with the places of their nodes among the sorted ``labels``."""
+        for name, nodes in self.nsets.items():
+            yield NamedElements(name, 0, "node", _numbered(nodes, labels, name))
+        for name, members in self.elsets.items():
+            rows: dict[str, list[list[int]]] = {}
+            for label in dict.fromkeys(members):
+                if label not in self.elements:
+                    raise ValueError(f"{name} names the element {label}, which is not there")
+                kind, nodes = self.elements[label]
+                rows.setdefault(kind, []).append(nodes)
+            for kind, table in rows.items():
+                places = _numbered([n for row in table for n in row], labels, name)
+                if size := _size(kind):
+                    hexes = _in_order(places.reshape(-1, size), points)
+                    yield NamedElements(name, 3, "Hexahedron", hexes)
+                else:
+                    yield NamedElements(
+                        name, 2 if kind.startswith(_THIN) else 3, kind, places[:, None]
+                    )
+
+
+def _size(kind: str) -> int:
+    """Nodes of a hexahedron, 0 for another element."""
+    return next((n for n in (20, 27, 8) if kind.startswith(f"C3D{n}")), 0)
+
+
+def _in_order(hexes: IntArray, points: FloatArray) -> IntArray:
+    """Hexahedra in VTK's order.
+
+    Those of 27 nodes may have Abaqus's, with the centre first after the 20.
+    """
+    if hexes.shape[1] < 27:
+        return hexes
+    centre = points[hexes[:, :8]].mean(axis=1)
+    first, last = (np.linalg.norm(points[hexes[:, k]] - centre, axis=1).sum() for k in (20, 26))
+    return hexes[:, _C3D27] if first < last else hexes
+
+
+_Kind = TypeVar("_Kind", int, float)
+
+
+def _number(kind: type[_Kind], line: _Line, column: int) -> _Kind:
+    """One number of a line. Raises ValueError, which names the line."""
+    try:
+        number = kind(line.cells[column])
+    except (ValueError, IndexError):
+        found = ", ".join(line.cells)
+        raise ValueError(
+            f"line {line.place}: {found!r} has no number in column {column + 1}"
+        ) from None
+    if kind is int and abs(number) > _MOST:
+        raise ValueError(f"line {line.place}: {number} is too large; labels go up to {_MOST}")
+    return number
+
+
+def _integers(line: _Line) -> list[int]:
+    return [_number(int, line, k) for k, x in enumerate(line.cells) if x]
+
+
+def _numbered(wanted: list[int], known: IntArray, name: str) -> IntArray:
+    """Places of node labels among the sorted ``known`` ones."""
+    labels = np.array(wanted, dtype=np.int64)
+    places = np.minimum(np.searchsorted(known, labels), max(len(known) - 1, 0))
+    if not len(known) or (known[places] != labels).any():
+        raise ValueError(f"{name} names a node that is not there")
+    return places.astype(np.int64)
+
+
+def _blocks(data: bytes) -> Iterator[_Block]:
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:  # comments may be in the Latin-1 of older programs
+        text = data.decode("latin-1")
+    block = _Block(0, "", {}, [])
+    for place, raw in enumerate(text.splitlines(), 1):
+        line = raw.strip()
+        if not line or line.startswith("**"):
+            continue
+        if line.startswith("*"):
+            yield block
+            first, *rest = (part.strip() for part in line[1:].split(","))
+            pairs = (part.partition("=") for part in rest)
+            options = {key.strip().upper(): value.strip().lower() for key, _, value in pairs}
+            block = _Block(place, first.upper(), options, [])
+        else:
+            block.lines.append(_Line(place, [cell.strip() for cell in line.split(",")]))
+    yield block
+
 
 #: endings of the files
 ENDINGS = (".msh", ".inp")

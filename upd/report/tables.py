@@ -82,15 +82,15 @@ def answer_tables(size: Mapping[str, Any], entries: Sequence[Entry]) -> list[Ans
     ]
     tables = [number_table(MAIN, main)] if main else []
     tables += [_case_table(rows) for rows in cases]
-    told = _not_estimated([*main, *(entry for rows in cases for row in rows for entry in row)])
+    note = _not_estimated([*main, *(entry for rows in cases for row in rows for entry in row)])
     order = [entry["value"] for entry in entries if entry["name"] == CLOSED_FORM_ERROR.name]
     if main and order:
         exact = percent_of(max(order) / 100)
-        told = f"The closed forms are exact to the order (a/R)² = {exact}. {told}"
-    if not (tables and told):
+        note = f"The closed forms are exact to the order (a/R)² = {exact}. {note}"
+    if not (tables and note):
         return tables
     first, *others = tables
-    return [replace(first, note=f"{first.note} {told}".strip()), *others]
+    return [replace(first, note=f"{first.note} {note}".strip()), *others]
 
 
 def _not_estimated(entries: Sequence[Entry]) -> str:

@@ -12,10 +12,9 @@ import pytest
 import upd
 from upd.analyses import make_plan
 from upd.analyses.seated import estimates, varied
-from upd.analyses.seated.estimates import NODES
 from upd.analyses.seated.plan import make_plan as bare_plan
 from upd.analyses.seated.plan import solve_seconds
-from upd.analyses.seated.varied import MESH, PROBLEM, STEPS, levels
+from upd.analyses.seated.varied import MESH, NODES, PROBLEM, STEPS, levels
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.progress import Stages

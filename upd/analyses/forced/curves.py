@@ -236,7 +236,7 @@ class ForcedCurve(Generic[Answer]):
 
     def below(self, side: Side, number: int) -> TimeCheck | None:
         """The highest motion that stays, where it lies below the top of a peak; None where it stays
-        or is about as high: there tops of other levels tell what they change.
+        or is about as high: there the tops of other levels show the change.
         """
         check, top = self.stayed(side, number), self.tops.get((side, number))
         if check is None or top is None or check.integrated >= (1.0 - ABOUT) * top.height:
