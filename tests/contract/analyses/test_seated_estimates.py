@@ -11,7 +11,7 @@ import pytest
 
 import upd
 from upd.analyses import make_plan
-from upd.analyses.seated import estimates, varied
+from upd.analyses.seated import varied
 from upd.analyses.seated.plan import make_plan as bare_plan
 from upd.analyses.seated.plan import solve_seconds
 from upd.analyses.seated.varied import MESH, NODES, PROBLEM, STEPS, levels
@@ -77,7 +77,7 @@ def test_terminal_and_page_tell_them(wedge: upd.RunResult) -> None:
     row = next(r for r in wedge.results if r.name == "face_N")
     assert "normal force of the face 154.68 N ±" in repr(wedge)
     parts = error_parts(row.as_dict())
-    assert {source for source, *_ in parts} == {NODES, MESH, STEPS, estimates.SOLVER}
+    assert {source for source, *_ in parts} == {NODES, MESH, STEPS, varied.SOLVER}
     assert all(half for source, _, _, half, _ in parts if source == NODES)
 
 
@@ -159,11 +159,11 @@ def test_bodies_that_would_have_too_many_nodes_are_not_refined(
 )
 def test_what_has_no_sign_has_no_relative_error(value: float, other: float, why: str) -> None:
     key = ("face_N", Case(name="raised"))
-    told = estimates.of_one_sign(value, key, [coarse(other)])
+    told = varied.of_one_sign(value, key, [coarse(other)])
     assert told is not None
     assert not told[0].known
     assert why in told[0].basis
-    assert estimates.of_one_sign(2.0, key, [coarse(1.0)]) is None
+    assert varied.of_one_sign(2.0, key, [coarse(1.0)]) is None
 
 
 def coarse(value: float) -> SolvedVariation:
@@ -178,7 +178,7 @@ def test_shares_of_a_face_are_known_to_a_row_of_nodes() -> None:
     counts = {"geometry.patch_along_y": 16, "geometry.patch_along_slope": 6}
     scene = load_scene("symmetric-seated", SMALL | counts)
     solution = PROBLEM.solve(bare_plan(scene), Stages())
-    edges, found = estimates.by_edges(solution), upd.run(scene)
+    edges, found = varied.by_edges(solution), upd.run(scene)
     rows = {(r.name, r.case): r for r in found.results}
     assert rows["closed_share", "raised, left"].value == pytest.approx(25.0)
     for key, (part,) in edges.items():
