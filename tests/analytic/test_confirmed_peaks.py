@@ -212,7 +212,7 @@ def test_bisection_ends_at_the_last_motion_that_leaves(last: int) -> None:
     assert found.balance == SLOPES[last + 1]
     assert found.step == pytest.approx(SLOPES[last] / SLOPES[last + 1] - 1.0)
     assert found.apart == pytest.approx(0.1 / (100.0 + (last + 1) / 10.0))
-    assert found.starts == len(tried) <= 20
+    assert found.starts == len(tried) <= 10
 
 
 def test_from_the_border_time_integration_follows_its_own_motion_up() -> None:

@@ -276,12 +276,12 @@ def forced_response(
         **settings,
     )
     if answer.status == "stopped":
-        held = _held_by_friction(Kd, joints, rows.matrix(closing) @ at)
-        names = [str(row) for row in rows.used[np.abs(at @ held).max(axis=1, initial=0.0) > 0.5]]
-        if names:
+        free = np.linalg.norm(at @ _held_by_friction(Kd, joints, rows.matrix(closing) @ at), axis=1)
+        if free.any():
+            row = int(rows.used[free.argmax()])
             why = (
-                f"friction alone holds row {', '.join(names)}: where its joints slip nothing sets "
-                "its mean place and nothing balances a static force on it; give it a stiffness in K"
+                f"friction alone holds row {row}: where its joints slip nothing sets its mean "
+                "place and nothing balances a static force on it; give it a stiffness in K"
             )
             answer = replace(answer, message=f"{answer.message}; {why}")
     return OwnResponse(answer, dict(zip(watch, rows.matrix(watched) @ at, strict=True)), reduced)
@@ -458,12 +458,11 @@ def _blurred(K: FloatArray, M: FloatArray) -> int:
 
 
 def _held_by_friction(K: FloatArray, joints: Sequence[Joint], closing: FloatArray) -> FloatArray:
-    """Motions (n, m) without stiffness of the bodies and of pressed joints, the largest entry 1."""
+    """Orthonormal motions (n, m) without stiffness of the bodies and of pressed joints."""
     pressed = K + (closing.T * [j.k_n for j in joints]) @ closing
     values, motions = eigh(pressed)
     rounding = len(values) * float(np.finfo(float).eps) * float(np.abs(values).max())
-    free = motions[:, values <= rounding]
-    return np.asarray(free / np.abs(free).max(axis=0, initial=0.0))
+    return np.asarray(motions[:, values <= rounding])
 
 
 def _refuse_penalties(K: csr_array) -> None:

@@ -38,7 +38,7 @@ def write_study_report(
     InputError
         When it cannot be written.
     """
-    text = " ".join([*([f"{failed} points failed."] if failed else []), *notes])
+    text = " ".join([*([f"{failed} point{'s' * (failed != 1)} failed."] if failed else []), *notes])
     verdict = Verdict(*("warning", "Done in part") if failed else ("passed", "Done"), text)
     panels = make_panels(charts, {path.stem: path for path in figures})
     found = [_table(one) for one in tables]

@@ -45,9 +45,11 @@ def sampled_error(sizes: Sequence[float], samples: Sequence[FloatArray]) -> Erro
     is fitted by least squares with deviations that go with x^(3/2), as the pressure falls to zero
     as the root of the distance from the edge. What a sum over the lattice leaves on average is of
     order 2, of a count of nodes of order 1; nothing shows which a number is, so both are fitted and
-    weighted by their likelihood (squares^(-n/2), the same number of coefficients). The bound is
-    exceeded by the distance of the finest level's plain value from log Q(F0), under the two
-    Student's t of this limit with their weights, with a probability of 5 %.
+    weighted by their likelihood, squares^(-n/2) with the same number of coefficients. n counts
+    levels, not loads: s changes little from a load to its neighbour, so that a level is one
+    observation of it; counted by loads, the weights go to the wrong order. The bound is exceeded by
+    the distance of the finest level's plain value from log Q(F0), under the two Student's t of this
+    limit with their weights, with a probability of 5 %.
 
     Numbers that change their sign are fitted themselves instead of their logarithms.
 

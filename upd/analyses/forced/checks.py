@@ -49,7 +49,7 @@ class _Rule(NamedTuple):
 _AT_REST = _Rule(BALANCE, "|static contact forces - F_C| / F_C, moments by their arms")
 _PERIOD = "|work - damping - friction| / their sum, of a period"
 _PATH = "curves that stopped early, or points that are not periodic"
-_CONFIRMED = "|time integration from the peak's own motion / harmonic balance - 1|"
+_CONFIRMED = "|time integration / harmonic balance - 1| at the peak"
 _RULES = {
     "static balance": _AT_REST,
     "preloaded contact": _Rule(
@@ -116,9 +116,9 @@ _RULES = {
     "confirmed": _Rule(
         0.05,
         _CONFIRMED,
-        "peak {number} of the {blade} blade at {frequency:.5g} Hz is not confirmed (it gives "
-        "{integrated:.4g}), so that a test may not show it: take more balance.harmonics, or sweep "
-        'as a test does: balance.method = "march"',
+        "peak {number} of the {blade} blade at {frequency:.5g} Hz has the height of time "
+        "integration, {integrated:.4g}; the curve and the slip there have too few harmonics: take "
+        'more balance.harmonics, or sweep as a test does: balance.method = "march"',
     ),
     "none stable": _Rule(
         0.05,

@@ -91,7 +91,7 @@ class TimeCheck:
         Its place on the path; `AT_TOP` where it is the top of the peak itself.
     step, apart
         Relative change of height and of frequency between it and the next motion towards the top,
-        which leaves; 0 at the top.
+        which leaves or is lower; 0 at the top.
     starts
         Time integrations.
     way, share
