@@ -69,7 +69,6 @@ def normal_contact(
     load: float | None = None,
     approach: float | None = None,
     start: ArrayLike | None = None,
-    max_iter: int | None = None,
 ) -> NormalContact:
     """Contact forces of two elastic bodies at a given load or a given approach.
 
@@ -88,8 +87,6 @@ def normal_contact(
         Approach d [mm].
     start : (n,) array_like of bool, optional
         A guess of the contact set (that of a neighbouring load).
-    max_iter : int, optional
-        Largest number of factorisations.
 
     Returns
     -------
@@ -135,9 +132,6 @@ def normal_contact(
                 mask.dtype != bool or mask.shape != (solver.n,),
                 f"start must be a bool mask of shape ({solver.n},), one per node.",
             )
-        problems.add(
-            max_iter is not None and max_iter < 1, f"max_iter is {max_iter}: it must be at least 1."
-        )
         target = (
             _scalar(problems, "load", load)
             if load is not None
@@ -146,8 +140,8 @@ def normal_contact(
         _check_load(problems, load if load is not None else 0.0)
         problems.raise_any()
         if load is not None:
-            return solver.at_load(target, mask, max_iter)
-        return solver.at_approach(target, mask, max_iter)
+            return solver.at_load(target, mask)
+        return solver.at_approach(target, mask)
 
 
 def normal_curve(
@@ -187,7 +181,7 @@ def normal_curve(
         curve: list[NormalContact] = []
         mask: BoolArray | None = None
         for value in values:
-            curve.append(solver.at_load(float(value), mask, None))
+            curve.append(solver.at_load(float(value), mask))
             mask = curve[-1].contact
         return curve
 
@@ -237,7 +231,7 @@ class _NormalSolver:
         self.h = self.gap - self.closest if self.n else self.gap
         self.lower, self.upper = np.zeros(self.n), np.full(self.n, np.inf)
 
-    def at_load(self, load: float, start: BoolArray | None, max_iter: int | None) -> NormalContact:
+    def at_load(self, load: float, start: BoolArray | None) -> NormalContact:
         """Contact at the load [N]."""
         if load == 0:
             message = (
@@ -246,11 +240,9 @@ class _NormalSolver:
             )
             return self._apart(self.closest, "no load", message)
         mask = start if start is not None and start.any() else self._winkler(load)
-        return self._solve(mask, max_iter, total=load)
+        return self._solve(mask, load=load)
 
-    def at_approach(
-        self, approach: float, start: BoolArray | None, max_iter: int | None
-    ) -> NormalContact:
+    def at_approach(self, approach: float, start: BoolArray | None) -> NormalContact:
         """Contact at the approach [mm]."""
         if approach <= self.closest:
             message = (
@@ -259,19 +251,18 @@ class _NormalSolver:
             )
             return self._apart(approach, "no contact", message)
         depth = approach - self.closest
-        return self._solve(start if start is not None else self.h < depth, max_iter, shift=depth)
+        return self._solve(start if start is not None else self.h < depth, motion=depth)
 
     def _solve(
         self,
         mask: BoolArray,
-        max_iter: int | None,
         *,
-        total: float | None = None,
-        shift: float | None = None,
+        load: float | None = None,
+        motion: float | None = None,
     ) -> NormalContact:
         state: State = np.where(mask, FREE, LOWER).astype(np.int8)
         answer = self.qp.solve(
-            self.h, self.lower, self.upper, total=total, shift=shift, state=state, max_iter=max_iter
+            self.h, self.lower, self.upper, load=load, motion=motion, state=state
         )
         contact = answer.state == FREE
         message = (
@@ -282,14 +273,14 @@ class _NormalSolver:
             force=answer.x,
             gap=np.maximum(answer.residual, 0.0),
             contact=contact,
-            approach=answer.shift + self.closest,
-            stiffness=answer.stiffness,
+            approach=float(answer.motion[0]) + self.closest,
+            stiffness=float(answer.stiffness[0, 0]),
             iterations=answer.iterations,
             method=answer.method,
             status="converged",
             message=message,
             unclipped=answer.unclipped,
-            rates=answer.rates,
+            rates=answer.rates[:, 0],
         )
 
     def _apart(self, approach: float, status: str, message: str) -> NormalContact:

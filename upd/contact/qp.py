@@ -1,13 +1,14 @@
 """Box-constrained contact QP: a primal-dual active set, and behind it a method that provably ends.
 
-    min 1/2 x'C x + h'x - d e'x,   lower <= x <= upper,
+    min 1/2 x'C x + h'x - s'B'x,   lower <= x <= upper,
 
-with the shift d given, or with the total e'x = T given and d its multiplier. The residual is
+with the rigid motion s given, or with the resultants B'x = p given and s their multipliers. The
+residual is
 
-    g = h + C x - d e:   g = 0 at free nodes, g >= 0 where x = lower, g <= 0 where x = upper.
+    g = h + C x - B s:   g = 0 at free nodes, g >= 0 where x = lower, g <= 0 where x = upper.
 
-C is symmetric positive definite, so there is one answer. Normal contact is lower = 0,
-upper = inf; friction in one direction is -mu f <= t <= mu f.
+C is symmetric positive definite, so there is one x. Normal contact is lower = 0, upper = inf,
+B = e; with free tilt B = [e T] with the arms T; friction in one direction is -mu f <= t <= mu f.
 """
 
 from __future__ import annotations
@@ -18,9 +19,10 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import blas, lapack
+from scipy.linalg import blas, eigh, lapack, null_space, qr, solve_triangular
 
 from upd.errors import ConvergenceError
+from upd.linalg.least_distance import least_distance_with_multipliers
 
 log = logging.getLogger(__name__)
 
@@ -30,69 +32,74 @@ Method = Literal["active set", "fallback"]
 
 FREE, LOWER, UPPER = 0, -1, 1
 EPS = float(np.finfo(float).eps)
+#: half of the digits: below this share of the largest resistance a motion counts as not resisted
+HALF_THE_DIGITS = float(np.sqrt(EPS))
 # A primal-dual active set that works takes 3 to 10 steps; longer chains are handed over to the
-# monotone method.
+# least distance.
 ACTIVE_SET_STEPS = 50
+# After the least distance rounding leaves at most a few nodes on the wrong side of a bound.
+_LAST_STEPS = 10
 
 
 @dataclass(frozen=True)
 class BoxSolution:
-    """Answer of one box QP.
+    """Answer of one box QP with r rigid motions.
 
     Attributes
     ----------
     x : (n,) ndarray
         Forces [N].
     residual : (n,) ndarray
-        g = h + C x - d e [mm].
-    shift : float
-        d [mm].
+        g = h + C x - B s [mm].
+    motion : (r,) ndarray
+        s [mm, rad].
     state : (n,) ndarray of int8
         0 free, -1 at the lower bound, +1 at the upper bound.
     iterations : int
         Factorisations.
     method : {"active set", "fallback"}
         Method that finished.
-    stiffness : float
-        Tangent e' C_AA^-1 e of the free set A [N/mm].
+    stiffness : (r, r) ndarray
+        Tangent B_A' C_AA^-1 B_A of the free set A [N/mm].
     unclipped : (n,) ndarray
         Forces before they were clipped to the bounds [N]: for checks.
-    rates : (n,) ndarray
-        Change of the forces with the shift [N/mm], C_AA^-1 e on A, whose sum is the stiffness.
+    rates : (n, r) ndarray
+        Change of the forces with the motion [N/mm], C_AA^-1 B_A on A, whose resultants are the
+        stiffness.
     """
 
     x: FloatArray
     residual: FloatArray
-    shift: float
+    motion: FloatArray
     state: State
     iterations: int
     method: Method
-    stiffness: float
+    stiffness: FloatArray
     unclipped: FloatArray
     rates: FloatArray
 
 
 @dataclass(frozen=True)
 class _Box:
-    """One problem: h, bounds and either the total or the shift (the other is None)."""
+    """One problem: h, bounds and either the resultants or the motion (the other is None)."""
 
     h: FloatArray
     lower: FloatArray
     upper: FloatArray
-    total: float | None
-    shift: float | None
+    load: FloatArray | None
+    motion: FloatArray | None
 
 
 @dataclass(frozen=True)
 class _Step:
-    """Minimiser over the free nodes of one set, its residual and its shift.
+    """Minimiser over the free nodes of one set, its residual and its motion.
 
     `tolerance` is the rounding level of the residual.
     """
 
     x: FloatArray
     residual: FloatArray
-    shift: float
+    motion: FloatArray
     tolerance: FloatArray
 
 
@@ -105,12 +112,15 @@ class BoxQP:
     ----------
     compliance : (n, n) ndarray
         Compliance [mm/N], symmetric positive definite: see `upd.contact.checks`.
+    rigid : (n, r) ndarray, optional
+        B, rigid motions of like size, the first one e; e alone by default.
     """
 
-    def __init__(self, compliance: FloatArray) -> None:
+    def __init__(self, compliance: FloatArray, rigid: FloatArray | None = None) -> None:
         # Fortran order: LAPACK and BLAS take it as it is.
         self.C = np.asfortranarray(compliance.T)
         self.n = len(self.C)
+        self.B = np.ones((self.n, 1)) if rigid is None else rigid
         # Rounding of a sum of n products, and of the handful of operations around it.
         self._rounding = (self.n + 10) * EPS
         diagonal = np.diagonal(self.C)
@@ -119,8 +129,8 @@ class BoxQP:
         self._key: bytes | None = None
         self._index = np.zeros(0, dtype=np.intp)
         self._factor = np.zeros((0, 0))
-        self._unit = np.zeros(0)
-        self._stiffness = 0.0
+        self._unit = np.zeros((0, self.B.shape[1]))
+        self._stiffness = np.zeros((self.B.shape[1],) * 2)
 
     def solve(
         self,
@@ -128,12 +138,11 @@ class BoxQP:
         lower: FloatArray,
         upper: FloatArray,
         *,
-        total: float | None = None,
-        shift: float | None = None,
+        load: FloatArray | float | None = None,
+        motion: FloatArray | float | None = None,
         state: State,
-        max_iter: int | None = None,
     ) -> BoxSolution:
-        """Solve one box QP; give either `total` or `shift`.
+        """Solve one box QP; give either `load` or `motion`.
 
         Parameters
         ----------
@@ -141,14 +150,12 @@ class BoxQP:
             Linear term [mm].
         lower, upper : (n,) ndarray
             Bounds [N].
-        total : float, optional
-            Sum of x [N], strictly between the sums of the bounds.
-        shift : float, optional
-            d [mm].
+        load : (r,) array_like, optional
+            Resultants B'x [N, N mm] that forces strictly between the bounds can have.
+        motion : (r,) array_like, optional
+            s [mm, rad].
         state : (n,) ndarray of int8
             Set to start from: 0 free, -1 at the lower bound, +1 at the upper bound.
-        max_iter : int, optional
-            Limit on the factorisations of both methods together.
 
         Returns
         -------
@@ -159,25 +166,28 @@ class BoxQP:
         ConvergenceError
             When neither method reaches the KKT tolerance.
         """
-        box = _Box(h, lower, upper, total, shift)
-        limit = ACTIVE_SET_STEPS + 20 * (self.n + 10) if max_iter is None else max_iter
-        step, state, used, reason = self._active_set(box, state, min(limit, ACTIVE_SET_STEPS))
+        box = _Box(
+            h,
+            lower,
+            upper,
+            None if load is None else np.atleast_1d(load),
+            None if motion is None else np.atleast_1d(motion),
+        )
+        first = np.zeros(self.B.shape[1])
+        step, state, used, reason = self._active_set(box, state, first, ACTIVE_SET_STEPS)
         method: Method = "active set"
         step = self._refined(box, step, state)
         if step is None or not self._solved(box, step, state):
-            log.info(
-                "primal-dual active set stopped (%s); the primal active set takes over", reason
-            )
+            log.info("primal-dual active set stopped (%s); the least distance takes over", reason)
             method = "fallback"
-            start = np.zeros(self.n) if step is None else step.x
-            step, state, more, reason = self._primal(box, start, limit - used)
+            state, near = self._least_distance(box)
+            step, state, more, reason = self._active_set(box, state, near, _LAST_STEPS)
             used += more
             step = self._refined(box, step, state)
         if step is None or not self._solved(box, step, state):
             raise ConvergenceError(
                 f"contact QP with {self.n} nodes: no answer after {used} factorisations "
-                f"({reason}). "
-                "Raise max_iter, or look for nearly dependent rows in the compliance matrix."
+                f"({reason}). Look for nearly dependent rows in the compliance matrix."
             )
         self._prepare(state == FREE)
         residual = np.where(state == FREE, 0.0, step.residual)
@@ -186,11 +196,10 @@ class BoxQP:
             np.maximum(residual, 0.0),
             np.where(state == UPPER, np.minimum(residual, 0.0), residual),
         )
-        x, rates = np.clip(step.x, lower, upper), np.zeros(self.n)
-        if self._index.size:
-            rates[self._index] = self._unit
+        x, rates = np.clip(step.x, lower, upper), np.zeros(self.B.shape)
+        rates[self._index] = self._unit
         return BoxSolution(
-            x, residual, step.shift, state, used, method, self._stiffness, step.x, rates
+            x, residual, step.motion, state, used, method, self._stiffness, step.x, rates
         )
 
     # -- linear algebra of one set -----------------------------------------------------------------
@@ -203,16 +212,19 @@ class BoxQP:
         """
         return np.asarray(blas.dgemv(1.0, self.C, x))
 
+    def _resultants(self, x: FloatArray) -> FloatArray:
+        return np.array([(column * x).sum() for column in self.B.T])
+
     def _prepare(self, free: NDArray[np.bool_]) -> None:
         """Factor C_AA of the free set A unless it is the set at hand.
 
-        With it come u = C_AA^-1 e and the tangent e'u.
+        With it come U = C_AA^-1 B_A and the tangent B_A'U.
         """
         key = free.tobytes()
         if key == self._key:
             return
         index = np.flatnonzero(free)
-        self._key, self._index, self._stiffness = None, index, 0.0
+        self._key, self._index, B = None, index, self.B[index]
         if index.size:
             # Symmetric: the rows of C' are its columns, and the transpose of the block is the
             # Fortran order LAPACK may overwrite.
@@ -226,14 +238,31 @@ class BoxQP:
                     "merge coincident contact nodes or use a compliance of better condition."
                 )
             self._factor = factor
-            self._unit = lapack.dpotrs(factor, np.ones(index.size), lower=1)[0]
-            self._stiffness = float(self._unit.sum())
+        self._unit = self._released(B) if index.size else B
+        self._stiffness = np.array([[(b * u).sum() for u in self._unit.T] for b in B.T])
         self._key = key
 
-    def _minimise(self, box: _Box, state: State) -> _Step | None:
+    def _released(self, right: FloatArray) -> FloatArray:
+        """C_AA^-1 times the right-hand sides (n_A,) or (n_A, r)."""
+        return np.asarray(lapack.dpotrs(self._factor, right, lower=1)[0])
+
+    def _motion(self, missing: FloatArray) -> FloatArray:
+        """The least motion by which the free set takes up these resultants.
+
+        Nothing moves along a motion that the set does not resist.
+        """
+        K = self._stiffness
+        if len(K) == 1:
+            return missing / K[0, 0]
+        size, V = eigh(K)
+        resisted = size > HALF_THE_DIGITS * size[-1]
+        return np.asarray(V[:, resisted] @ ((V.T @ missing)[resisted] / size[resisted]))
+
+    def _minimise(self, box: _Box, state: State, near: FloatArray) -> _Step | None:
         """Minimiser with the nodes of `state` held at their bounds.
 
-        None when a total is asked for and no node is free.
+        Motions that the set does not resist stay as in `near`. None when resultants are asked for
+        and no node is free.
         """
         free = state == FREE
         self._prepare(free)
@@ -243,26 +272,31 @@ class BoxQP:
             x[held] = bound[held]
         q = box.h + self.product(x) if x.any() else box.h
         index = self._index
-        if index.size:
-            y = lapack.dpotrs(self._factor, q[index], lower=1)[0]
-            d = (
-                box.shift
-                if box.total is None
-                else (box.total - x.sum() + y.sum()) / self._stiffness
-            )
-            assert d is not None
-            x[index] = d * self._unit - y
-        elif box.shift is not None:
-            d = box.shift
+        if box.motion is not None:
+            s = box.motion
+        elif index.size:
+            s = near
         else:
             return None
-        return _Step(x, box.h + self.product(x) - d, float(d), self._tolerance(box, x, float(d)))
+        if index.size:
+            y = self._released(q[index])
+            if box.load is not None:
+                held_load = self._resultants(x)
+                freed = np.array([(b * y).sum() for b in self.B[index].T])
+                s = s + self._motion(box.load - held_load + freed - self._stiffness @ s)
+            x[index] = self._unit @ s - y
+        return self._judged(box, x, s)
+
+    def _judged(self, box: _Box, x: FloatArray, s: FloatArray) -> _Step:
+        """The residual of these very forces and motion, with its rounding level."""
+        residual = box.h + self.product(x) - self.B @ s
+        return _Step(x, residual, s, self._tolerance(box, x, s))
 
     def _refined(self, box: _Box, step: _Step | None, state: State) -> _Step | None:
         """Iterative refinement of a step.
 
-        With a total given, x is a difference of large terms and loses digits that one more solve
-        brings back.
+        With resultants given, x is a difference of large terms and loses digits that one more
+        solve brings back.
         """
         if step is None or self._solved(box, step, state):
             return step
@@ -271,16 +305,19 @@ class BoxQP:
         if not index.size:
             return step
         x = step.x.copy()
-        y = lapack.dpotrs(self._factor, step.residual[index], lower=1)[0]
-        more = 0.0 if box.total is None else (box.total - x.sum() + y.sum()) / self._stiffness
-        x[index] += more * self._unit - y
-        d = step.shift + float(more)
-        return _Step(x, box.h + self.product(x) - d, d, self._tolerance(box, x, d))
+        y = self._released(step.residual[index])
+        more = np.zeros(self.B.shape[1])
+        if box.load is not None:
+            freed = np.array([(b * y).sum() for b in self.B[index].T])
+            more = self._motion(box.load - self._resultants(x) + freed)
+        x[index] += self._unit @ more - y
+        return self._judged(box, x, step.motion + more)
 
-    def _tolerance(self, box: _Box, x: FloatArray, d: float) -> FloatArray:
-        """Rounding level n eps (|h| + |d| + |C||x|) of the residual, node by node."""
+    def _tolerance(self, box: _Box, x: FloatArray, s: FloatArray) -> FloatArray:
+        """Rounding level n eps (|h| + |B||s| + |C||x|) of the residual, node by node."""
+        rigid = np.abs(self.B) @ np.abs(s)
         return np.asarray(
-            self._rounding * (np.abs(box.h) + abs(d) + self._row * float(np.abs(x).sum()))
+            self._rounding * (np.abs(box.h) + rigid + self._row * float(np.abs(x).sum()))
         )
 
     def _bound_tolerance(self, step: _Step) -> FloatArray:
@@ -299,17 +336,18 @@ class BoxQP:
         g = step.residual
         kkt = np.where(state == FREE, np.abs(g), np.where(state == LOWER, -g, g)) <= tolerance
         inside = (step.x >= box.lower - slack) & (step.x <= box.upper + slack)
-        if box.total is None:
+        if box.load is None:
             return bool(np.all(kkt & inside))
-        balance = abs(step.x.sum() - box.total) <= 4 * self._rounding * (
-            abs(box.total) + np.abs(step.x).sum()
+        arms = np.abs(self.B).max(axis=0)
+        balance = np.abs(self._resultants(step.x) - box.load) <= 4 * self._rounding * (
+            np.abs(box.load) + arms * np.abs(step.x).sum()
         )
-        return bool(np.all(kkt & inside) and balance)
+        return bool(np.all(kkt & inside) and np.all(balance))
 
     # -- primal-dual active set --------------------------------------------------------------------
 
     def _active_set(
-        self, box: _Box, state: State, limit: int
+        self, box: _Box, state: State, near: FloatArray, limit: int
     ) -> tuple[_Step | None, State, int, str]:
         """Primal-dual active set: fast, but may cycle, which the visited sets reveal.
 
@@ -321,11 +359,11 @@ class BoxQP:
         step: _Step | None = None
         for used in range(1, limit + 1):
             visited.add(state.tobytes())
-            now = self._minimise(box, state)
+            now = self._minimise(box, state, near)
             if now is None:
                 new = self._last_to_yield(box, state)
             else:
-                step, new = now, self._next_state(box, now, state)
+                step, near, new = now, now.motion, self._next_state(box, now, state)
                 if np.array_equal(new, state):
                     return step, state, used, "converged"
             if new.tobytes() in visited:
@@ -352,9 +390,9 @@ class BoxQP:
 
         As many as are needed to take up the difference.
         """
-        assert box.total is not None
+        assert box.load is not None
         x = np.where(state == LOWER, box.lower, box.upper)
-        missing = box.total - x.sum()
+        missing = float(box.load[0]) - x.sum()
         q = box.h + self.product(x)
         held, order = (state == UPPER, -q) if missing < 0 else (state == LOWER, q)
         nodes = np.flatnonzero(held)
@@ -365,105 +403,49 @@ class BoxQP:
         new[nodes[:count]] = FREE
         return new
 
-    # -- primal active set with ratio test ---------------------------------------------------------
+    # -- least distance ----------------------------------------------------------------------------
 
-    def _primal(
-        self, box: _Box, start: FloatArray, limit: int
-    ) -> tuple[_Step | None, State, int, str]:
-        """Primal active set with a ratio test; monotone.
+    def _least_distance(self, box: _Box) -> tuple[State, FloatArray]:
+        """Set and motion of the answer by a least distance, which ends after finitely many steps.
 
-        Free nodes stay strictly inside, so every step lowers the energy and no set comes back.
+        x = x0 + Z z with B'Z = 0 (all x where the motion is given): |L'x + L^-1 h| with C = L L' is
+        least under the bounds. Its multipliers are the residuals.
 
         References
         ----------
         C. L. Lawson and R. J. Hanson, Solving Least Squares Problems (1974), chapter 23.
         """
-        x = self._feasible(box, start)
-        state = np.where(x <= box.lower, LOWER, np.where(x >= box.upper, UPPER, FREE)).astype(
-            np.int8
-        )
-        entering = -1
-        skipped = np.zeros(self.n, dtype=bool)
-        for used in range(1, limit + 1):
-            target = self._minimise(box, state)
-            if target is None:
-                done = self._leave_vertex(box, x, state)
-                if done is not None:
-                    return done, state, used, "converged"
-                continue
-            outside = (state == FREE) & ((target.x < box.lower) | (target.x > box.upper))
-            if not outside.any():
-                x = target.x
-                entering = self._worst(target, state, skipped)
-                if entering < 0:
-                    return target, state, used, "converged"
-                state[entering] = FREE
-                continue
-            moved = self._ratio_step(box, x, target.x, outside, state)
-            if moved:
-                skipped[:] = False
-            elif entering >= 0 and state[entering] != FREE:
-                # Rounding: its residual is below what the solve resolves.
-                skipped[entering] = True
-        return None, state, limit, "step limit of the primal active set"
-
-    @staticmethod
-    def _ratio_step(
-        box: _Box, x: FloatArray, target: FloatArray, outside: NDArray[np.bool_], state: State
-    ) -> bool:
-        """Go towards `target` as far as the bounds allow (x and state change in place).
-
-        False when nothing could move.
-        """
-        nodes = np.flatnonzero(outside)
-        bound = np.where(target[nodes] < box.lower[nodes], box.lower[nodes], box.upper[nodes])
-        ratio = (bound - x[nodes]) / (target[nodes] - x[nodes])
-        alpha = float(np.clip(ratio.min(), 0.0, 1.0))
-        free = state == FREE
-        x[free] += alpha * (target[free] - x[free])
-        blocking = ratio <= alpha * (1 + EPS)
-        hit = nodes[blocking]
-        x[hit] = bound[blocking]
-        state[hit] = np.where(bound[blocking] == box.lower[hit], LOWER, UPPER)
-        return alpha > 0.0
-
-    @staticmethod
-    def _worst(step: _Step, state: State, skipped: NDArray[np.bool_]) -> int:
-        """Held node whose residual has the wrong sign by most, or -1."""
-        wrong = np.where(
-            state == LOWER, -step.residual, np.where(state == UPPER, step.residual, 0.0)
-        )
-        wrong[(wrong <= step.tolerance) | skipped] = 0.0
-        worst = int(np.argmax(wrong))
-        return worst if wrong[worst] > 0.0 else -1
-
-    def _leave_vertex(self, box: _Box, x: FloatArray, state: State) -> _Step | None:
-        """All nodes held, total given: the answer if a shift fits between both sides.
-
-        Otherwise the pair that lowers the energy most is freed.
-        """
-        q = box.h + self.product(x)
-        upper, lower = np.flatnonzero(state == UPPER), np.flatnonzero(state == LOWER)
-        i = int(upper[np.argmax(q[upper])]) if upper.size else -1
-        j = int(lower[np.argmin(q[lower])]) if lower.size else -1
-        d = float(q[[k for k in (i, j) if k >= 0]].mean())
-        tolerance = self._tolerance(box, x, d)
-        if i < 0 or j < 0 or q[i] <= q[j] + tolerance[i]:
-            return _Step(x, q - d, d, tolerance)
-        state[[i, j]] = FREE
-        return None
-
-    def _feasible(self, box: _Box, start: FloatArray) -> FloatArray:
-        """Nearest simple point inside the bounds, with the right total when one is asked for."""
-        x = np.clip(start, box.lower, box.upper)
-        if box.total is None:
-            return x
-        missing = box.total - float(x.sum())
-        room = box.upper - x
-        if missing > 0 and np.all(np.isfinite(room)):
-            return np.asarray(x + room * (missing / room.sum()))
-        above = x - box.lower
-        if above.sum() > 0:
-            return np.asarray(box.lower + above * ((box.total - box.lower.sum()) / above.sum()))
-        x[int(np.argmin(box.h))] += missing
-        return x
+        n, r = self.B.shape
+        h, x0, Z = box.h, np.zeros(n), np.eye(n)
+        if box.motion is not None:
+            h = h - self.B @ box.motion
+        else:
+            x0 = np.linalg.lstsq(self.B.T, box.load, rcond=HALF_THE_DIGITS)[0]
+            Z = null_space(self.B.T, rcond=HALF_THE_DIGITS)
+        if not Z.size:
+            return np.full(n, FREE, dtype=np.int8), np.zeros(r)
+        L = np.linalg.cholesky(self.C)
+        N, R = qr(L.T @ Z, mode="economic")
+        G = solve_triangular(R, Z.T, trans=1).T
+        x1 = x0 - G @ (N.T @ (L.T @ x0 + solve_triangular(L, h, lower=True)))
+        below, above = np.isfinite(box.lower), np.isfinite(box.upper)
+        rows = np.vstack([G[below], -G[above]])
+        right = np.concatenate([(box.lower - x1)[below], (x1 - box.upper)[above]])
+        size = float(np.linalg.norm(rows, axis=1).max())
+        found = least_distance_with_multipliers(rows / size, right)
+        if found is None:
+            raise ConvergenceError(
+                f"contact QP with {n} nodes: no forces inside the bounds have the load {box.load}."
+            )
+        y, u = found[0] / size, found[1] / size**2
+        state = np.full(n, FREE, dtype=np.int8)
+        count = int(below.sum())
+        state[np.flatnonzero(below)[u[:count] > 0]] = LOWER
+        state[np.flatnonzero(above)[u[count:] > 0]] = UPPER
+        if box.motion is not None:
+            return state, box.motion
+        g = np.zeros(n)
+        g[below] += u[:count]
+        g[above] -= u[count:]
+        x = x1 + G @ y
+        return state, np.linalg.lstsq(self.B, box.h + self.product(x) - g, rcond=None)[0]

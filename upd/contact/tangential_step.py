@@ -214,8 +214,8 @@ class TangentialSolver:
             before,
             -self.bound,
             self.bound,
-            total=value if by_load else None,
-            shift=None if by_load else value,
+            load=value if by_load else None,
+            motion=None if by_load else value,
             state=at.state[self.carried],
         )
         load = value if by_load else float(answer.x.sum())
@@ -224,14 +224,14 @@ class TangentialSolver:
             answer.x,
             before - answer.residual,
             answer.state,
-            answer.shift,
+            float(answer.motion[0]),
             load,
-            answer.stiffness,
+            float(answer.stiffness[0, 0]),
             answer.iterations,
             answer.method,
             by_load,
             answer.unclipped,
-            answer.rates[:, None],
+            answer.rates,
         )
 
     def _two(self, value: FloatArray, by_load: bool, at: TangentialHistory) -> TangentialContact:

@@ -1,21 +1,10 @@
 """Frictionless normal contact of a body that may also tilt.
 
-The approach and two small rotations follow from the load and its line:
+The approach d and two small rotations theta follow from the load and its line:
 
-    f >= 0,   g = h + C f - d e - T theta >= 0,   f.g = 0,   e'f = F,   T'f = M.
+    f >= 0,   g = h + C f - d e - T theta >= 0,   f.g = 0,   e'f = F,   T'f = M,
 
-For a fixed tilt this is `normal_contact` at the load F; its energy
-phi(theta) = min 1/2 f'C f + (h - T theta)'f over {f >= 0, e'f = F} is concave, so the tilt
-minimises the convex psi(theta) = -phi(theta) - M'theta, which is quadratic as long as the contact
-set A stays:
-
-    gradient r = T'f - M,   Hessian H = T'(B - B e e'B / e'B e) T,   B = C_AA^-1.
-
-Newton's method with these two, a line search on the monotone slope r.p, and an exact inner solve
-ends within a handful of steps: once A is that of the answer, one step is exact (J. Sun, Math.
-Program. 76 (1997) 451). A larger set is stiffer, so H of all nodes bounds every H: it sets the
-step along tilts that A does not resist. What Newton leaves is solved as a least distance problem,
-which is proven to end.
+with the arms T of the nodes: the box QP of `upd.contact.qp` with the rigid motions B = [e T].
 """
 
 from __future__ import annotations
@@ -29,9 +18,9 @@ from scipy.spatial import ConvexHull
 
 from upd.contact.checks import EPS, Problems, compliance_matrix, few_threads, numbers, unit_response
 from upd.contact.normal import NormalContact
-from upd.contact.qp import FREE, FloatArray
-from upd.contact.tilt_newton import HALF_THE_DIGITS, TiltMinimiser, least_distance_and_multipliers
+from upd.contact.qp import FREE, HALF_THE_DIGITS, LOWER, BoxQP, FloatArray
 from upd.errors import ConvergenceError
+from upd.linalg.least_distance import least_distance
 
 
 @dataclass(frozen=True)
@@ -47,8 +36,6 @@ class TiltedContact:
         theta [rad]; the approach at arms (x, y) is d + theta_0 x + theta_1 y.
     moment : (2,) ndarray
         T'f - M [N mm], what rounding left of the balance.
-    steps : int
-        Newton steps.
     status : {"converged", "no load", "tilt not unique"}
         "tilt not unique": fewer than three nodes off one line carry the load, and nothing resists a
         further tilt as long as no gap closes.
@@ -62,7 +49,6 @@ class TiltedContact:
     normal: NormalContact
     tilt: FloatArray
     moment: FloatArray
-    steps: int
     status: str
     message: str
     stiffness: FloatArray
@@ -127,8 +113,8 @@ def tilted_contact(
 
     References
     ----------
-    J. Sun, Math. Program. 76 (1997) 451; least distance problem: C. L. Lawson and R. J. Hanson,
-    Solving Least Squares Problems (1974), chapter 23.
+    M. Hintermueller, K. Ito and K. Kunisch, SIAM J. Optim. 13 (2002) 865; least distance problem:
+    C. L. Lawson and R. J. Hanson, Solving Least Squares Problems (1974), chapter 23.
 
     Examples
     --------
@@ -315,7 +301,7 @@ def _unloaded(h: FloatArray) -> TiltedContact:
         message,
         np.zeros(h.size),
     )
-    return TiltedContact(normal, np.zeros(2), np.zeros(2), 0, "no load", message, np.zeros((3, 3)))
+    return TiltedContact(normal, np.zeros(2), np.zeros(2), "no load", message, np.zeros((3, 3)))
 
 
 def _solve(
@@ -337,39 +323,41 @@ def _solve(
     # offset costs no digits.
     arms, gap = T - M / F, h - closest
     whole = len(S) == n
-    inner = TiltMinimiser(C if whole else C[np.ix_(S, S)], gap[S], arms[S] @ face.along, F)
-    at, steps, used, method = inner.minimise(mask[S])
+    along = arms[S] @ face.along
+    size = np.abs(along).max(axis=0)
+    qp = BoxQP(C if whole else C[np.ix_(S, S)], np.column_stack([np.ones(len(S)), along / size]))
+    load, none = np.zeros(1 + len(size)), np.zeros(len(S))
+    load[0] = F
+    start = np.where(mask[S] | (not mask[S].any()), FREE, LOWER).astype(np.int8)
+    answer = qp.solve(gap[S], none, none + np.inf, load=load, state=start)
+    approach = float(answer.motion[0])
     force, unclipped, contact = np.zeros(n), np.zeros(n), np.zeros(n, dtype=bool)
-    force[S], unclipped[S], contact[S] = (
-        at.answer.x,
-        at.answer.unclipped,
-        at.answer.state == FREE,
-    )
-    tilt = face.along @ at.theta
+    force[S], unclipped[S], contact[S] = answer.x, answer.unclipped, answer.state == FREE
+    tilt = face.along @ (answer.motion[1:] / size)
     residual = np.zeros(n)
     if not whole:
-        residual = gap + C @ force - at.answer.shift - arms @ tilt
+        residual = gap + C @ force - approach - arms @ tilt
         off = np.setdiff1d(np.arange(n), S)
         more = _least_opening(arms[off] @ face.across, residual[off])
         tilt, residual = tilt + face.across @ more, residual - arms @ face.across @ more
-    residual[S] = at.answer.residual
+    residual[S] = answer.residual
     K = _stiffness(C, contact, T)
     unique = bool(
         np.linalg.matrix_rank(T[contact] - T[contact].mean(axis=0), tol=HALF_THE_DIGITS * np.ptp(T))
         == n_free
     )
     message = (
-        f"{int(contact.sum())} of {n} nodes in contact after {steps} Newton steps ({used} "
-        f"factorisations, {method})."
+        f"{int(contact.sum())} of {n} nodes in contact after {answer.iterations} steps of the "
+        f"{answer.method}."
     )
     normal = NormalContact(
         force=force,
         gap=np.where(contact, 0.0, np.maximum(residual, 0.0)),
         contact=contact,
-        approach=at.answer.shift + closest - float(M @ tilt) / F,
+        approach=approach + closest - float(M @ tilt) / F,
         stiffness=float(K[0, 0]),
-        iterations=used,
-        method=method,
+        iterations=answer.iterations,
+        method=answer.method,
         status="converged",
         message=message,
         unclipped=unclipped,
@@ -380,7 +368,7 @@ def _solve(
             "long as no gap closes."
         )
     status = "converged" if unique else "tilt not unique"
-    return TiltedContact(normal, tilt, T.T @ force - M, steps, status, message, K)
+    return TiltedContact(normal, tilt, T.T @ force - M, status, message, K)
 
 
 def _stiffness(C: FloatArray, contact: NDArray[np.bool_], T: FloatArray) -> FloatArray:
@@ -403,6 +391,7 @@ def _least_opening(arms: FloatArray, gap: FloatArray) -> FloatArray:
     The least distance problem of Lawson and Hanson, chapter 23.
     """
     scale = float(np.abs(gap).max()) or 1.0
-    rows = np.vstack([-arms.T / np.abs(arms).max(), -gap / scale])
-    z = least_distance_and_multipliers(rows)[0]
-    return np.asarray(z * scale / np.abs(arms).max())
+    size = float(np.abs(arms).max())
+    z = least_distance(-arms / size, -gap / scale)
+    assert z is not None, "the nodes are off the face, so that some tilt opens them"
+    return np.asarray(z * scale / size)

@@ -45,16 +45,41 @@ def least_distance(G: FloatArray, h: FloatArray) -> FloatArray | None:
     >>> least_distance(np.array([[1.0, 1.0]]), np.array([2.0])).round(12).tolist()
     [1.0, 1.0]
     """
+    found = least_distance_with_multipliers(G, h)
+    return None if found is None else found[0]
+
+
+def least_distance_with_multipliers(
+    G: FloatArray, h: FloatArray
+) -> tuple[FloatArray, FloatArray] | None:
+    """The shortest v with G v >= h as in `least_distance`, and its multipliers.
+
+    Parameters
+    ----------
+    G : (m, k) ndarray
+    h : (m,) ndarray
+
+    Returns
+    -------
+    tuple of (k,) ndarray and (m,) ndarray, or None
+        v = G'u, u >= 0 and above zero only where G v = h.
+
+    Raises
+    ------
+    RuntimeError
+        As in `least_distance`.
+    """
     size = float(np.abs(h).max(initial=0.0))
     if not (h > 0.0).any():
-        return np.zeros(G.shape[1])
+        return np.zeros(G.shape[1]), np.zeros(len(h))
     E = np.vstack((G.T, h / size))
     e = np.zeros(len(E))
     e[-1] = 1.0
-    r = E @ nnls(E, e)[0] - e
+    u = nnls(E, e, maxiter=30 * (len(h) + 10))[0]
+    r = E @ u - e
     if np.linalg.norm(r) <= _DIGITS:
         return None
-    return np.asarray(-size * r[:-1] / r[-1])
+    return -size * r[:-1] / r[-1], -size * u / r[-1]
 
 
 def least_positive(A: FloatArray, b: FloatArray) -> FloatArray | None:
