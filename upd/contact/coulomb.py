@@ -31,8 +31,8 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, lstsq, lu_factor, lu_solve, null_space
-from scipy.optimize import linprog, nnls
+from scipy.linalg import cho_factor, cho_solve, lstsq, lu_factor, lu_solve
+from scipy.optimize import linprog
 
 from upd.contact.bordered import Bordered
 from upd.contact.checks import EPS
@@ -44,7 +44,8 @@ from upd.contact.coulomb_conditions import (
     Iterate,
 )
 from upd.contact.coupled_systems import ClosedSystem, NewtonRows, NewtonSystem, Target
-from upd.linalg.least_distance import least_distance
+from upd.contact.qp import BoxQP
+from upd.errors import ConvergenceError
 
 log = logging.getLogger(__name__)
 
@@ -395,68 +396,32 @@ class Coulomb(CoulombConditions):
         return replace(best, iterations=used)
 
     def _frictionless(self, step: AskedStep, start: Iterate | None, used: int) -> CoupledStep:
-        """Without friction the forces are the one answer of a convex problem, found in a finite
-        number of steps:
-
-            min 1/2 f'C f - b'f,   f >= 0,   B'f = p   (normal components).
-
-        With f = f_p + Z w, B'Z = 0, Z'C Z = R'R, G = Z R^-1, c = G'(b - C f_p) and v = R w - c it
-        is the shortest v with G v >= -(f_p + G c): a least distance.
-        """
+        """Without friction the forces are the one answer of a box QP, which is proven to end."""
         n, s = self.n, np.zeros(self.B.shape[1]) if start is None else start.s
-        C, B, b = self.C[:n, :n], self.B[:n], step.b[:n]
+        # forces and moments differ by a length; what moves no normal stays as it is
+        size = np.abs(self.B[:n]).max(axis=0)
+        moved = size > 0.0
+        none, state = np.zeros(n), np.zeros(n, dtype=np.int8)
         try:
-            if step.load is None:
-                assert step.motion is not None
-                s, L = step.motion, np.linalg.cholesky(C)
-                f = nnls(L.T, np.linalg.solve(L, b + B @ s))[0]
-            else:
-                # forces and moments differ by a length; what moves no normal carries nothing
-                size = np.abs(B).max(axis=0)
-                size[size == 0.0] = 1.0
-                f, Z = lstsq((B / size).T, step.load / size)[0], null_space((B / size).T)
-                R = np.linalg.cholesky(Z.T @ C @ Z).T
-                G = np.linalg.solve(R.T, Z.T).T
-                h = -(f + G @ (G.T @ (b - C @ f)))
-                v = least_distance(G, h)
-                if v is None:
-                    raise np.linalg.LinAlgError("no pressure balances the load")
-                f = np.maximum(f + G @ (G.T @ (b - C @ f) + v), 0.0)
-                f, s = self._on_closed(C, B, b, step.load, f, s)
-        except (np.linalg.LinAlgError, RuntimeError):
+            found = BoxQP(self.C[:n, :n], self.B[:n, moved] / size[moved]).solve(
+                -step.b[:n],
+                none,
+                none + np.inf,
+                load=None if step.load is None else (step.load / size)[moved],
+                motion=None if step.motion is None else (step.motion * size)[moved],
+                state=state,
+            )
+        except (ConvergenceError, RuntimeError):
             # nothing carries the load, or the least squares ran out of steps
             return self._judged(step, self._linear(step, self._stuck()), used)
-        forces = np.concatenate((f, np.zeros(len(self.C) - n)))
+        s = s.copy() if step.motion is None else step.motion
+        if step.motion is None:
+            s[moved] = found.motion / size[moved]
+        forces = np.concatenate((found.x, np.zeros(len(self.C) - n)))
         at = Iterate(forces, s, self.C @ forces - self.B @ s - step.b)
         answer = self._judged(step, at, used)
-        # Newton takes away what least squares leave of rounding, where a motion is not free.
+        # Newton takes away what is left of rounding, where a motion is not free.
         return answer if answer.converged else self._newton(step, at, NEWTON_STEPS)
-
-    def _on_closed(
-        self,
-        C: FloatArray,
-        B: FloatArray,
-        b: FloatArray,
-        load: FloatArray,
-        f: FloatArray,
-        s: FloatArray,
-    ) -> tuple[FloatArray, FloatArray]:
-        """Forces and motion with the nodes that carry closed, to rounding; the motions that move no
-        normal stay, for which Newton's system is singular.
-        """
-        closed = f > 0.0
-        q, size = int(closed.sum()), np.abs(self.B).max(axis=0)
-        unit = float(np.diagonal(C).max()) / size
-        M = np.zeros((q + len(size), q + len(size)))
-        M[:q, :q], M[:q, q:] = C[np.ix_(closed, closed)], -B[closed] * unit
-        M[q:, :q] = (B[closed] / size).T
-        f = np.where(closed, f, 0.0)
-        for _ in range(3):
-            off = np.concatenate(((b + B @ s - C @ f)[closed], (load - B.T @ f) / size))
-            more = lstsq(M, off)[0]
-            f[closed] += more[:q]
-            s = s + unit * more[q:]
-        return f, s
 
     def _fallback(self, step: AskedStep) -> CoupledStep:
         """Alternating directions for f in Coulomb's cone, u + mu |u_t| in its dual; Newton ends.

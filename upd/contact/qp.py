@@ -19,7 +19,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import blas, eigh, lapack, null_space, qr, solve_triangular
+from scipy.linalg import blas, eigh, lapack, lstsq, null_space, qr, solve_triangular
 
 from upd.errors import ConvergenceError
 from upd.linalg.least_distance import least_distance_with_multipliers
@@ -113,7 +113,7 @@ class BoxQP:
     compliance : (n, n) ndarray
         Compliance [mm/N], symmetric positive definite: see `upd.contact.checks`.
     rigid : (n, r) ndarray, optional
-        B, rigid motions of like size, the first one e; e alone by default.
+        B, rigid motions of like size; e alone by default.
     """
 
     def __init__(self, compliance: FloatArray, rigid: FloatArray | None = None) -> None:
@@ -253,7 +253,7 @@ class BoxQP:
         """
         K = self._stiffness
         if len(K) == 1:
-            return missing / K[0, 0]
+            return np.asarray(missing / K[0, 0])
         size, V = eigh(K)
         resisted = size > HALF_THE_DIGITS * size[-1]
         return np.asarray(V[:, resisted] @ ((V.T @ missing)[resisted] / size[resisted]))
@@ -360,6 +360,8 @@ class BoxQP:
         for used in range(1, limit + 1):
             visited.add(state.tobytes())
             now = self._minimise(box, state, near)
+            if now is None and self.B.shape[1] > 1:
+                return None, state, used, "no node is free"
             if now is None:
                 new = self._last_to_yield(box, state)
             else:
@@ -419,8 +421,8 @@ class BoxQP:
         h, x0, Z = box.h, np.zeros(n), np.eye(n)
         if box.motion is not None:
             h = h - self.B @ box.motion
-        else:
-            x0 = np.linalg.lstsq(self.B.T, box.load, rcond=HALF_THE_DIGITS)[0]
+        if box.load is not None:
+            x0 = np.asarray(lstsq(self.B.T, box.load, cond=HALF_THE_DIGITS)[0])
             Z = null_space(self.B.T, rcond=HALF_THE_DIGITS)
         if not Z.size:
             return np.full(n, FREE, dtype=np.int8), np.zeros(r)
@@ -448,4 +450,4 @@ class BoxQP:
         g[below] += u[:count]
         g[above] -= u[count:]
         x = x1 + G @ y
-        return state, np.linalg.lstsq(self.B, box.h + self.product(x) - g, rcond=None)[0]
+        return state, np.asarray(lstsq(self.B, box.h + self.product(x) - g)[0])
