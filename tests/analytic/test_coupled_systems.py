@@ -1,4 +1,4 @@
-"""Newton's linear system by each of its ways, against its equations."""
+"""Newton's linear systems against their equations."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from upd.contact.bordered import Bordered
 from upd.contact.coulomb import Coulomb
 from upd.contact.coulomb_conditions import Iterate
-from upd.contact.coupled_systems import ClosedSystem, NewtonSystem, Target, _Pivoted, _Stuck
+from upd.contact.coupled_systems import ClosedSystem, Stuck, Target
 
 
 def contact(seed: int, c: int) -> tuple[Coulomb, np.random.Generator]:
@@ -21,7 +21,7 @@ def contact(seed: int, c: int) -> tuple[Coulomb, np.random.Generator]:
 @pytest.mark.parametrize("by_load", [False, True])
 @pytest.mark.parametrize("c", [2, 3])
 @pytest.mark.parametrize("seed", range(6))
-def test_every_way_solves_the_rows(seed: int, c: int, by_load: bool) -> None:
+def test_the_closed_system_solves_the_rows(seed: int, c: int, by_load: bool) -> None:
     """P f + Q y = rhs with y = C f - B s - b and B'f = p, one column and many."""
     solver, rng = contact(seed, c)
     C, B, m = solver.C, solver.B, 8 * c
@@ -39,13 +39,9 @@ def test_every_way_solves_the_rows(seed: int, c: int, by_load: bool) -> None:
             None if by_load else np.add.outer(s, np.zeros(columns)),
         )
         rhs = np.add.outer(rows.rhs.T.ravel(), np.zeros(columns))
-        systems: list[NewtonSystem] = [ClosedSystem(solver.systems, rows, by_load)]
-        for base in (np.zeros(m, bool), np.tile(rows.is_open, c), np.arange(m) % 8 < 2):
-            systems.append(_Pivoted(solver.systems, rows, base, by_load))
-        answers = [
-            one.solve(rhs, target) if columns else one.refined(rhs, target) for one in systems
-        ]
-        for f, motion, y in answers:
+        system = ClosedSystem(solver.systems, rows, by_load)
+        solved = (system.solve,) if columns else (system.solve, system.refined)
+        for f, motion, y in (way(rhs, target) for way in solved):
             size = np.abs(f).max()
             there = C @ f - B @ motion - b
             np.testing.assert_allclose(y, there, atol=1e-9 * size * C.max())
@@ -58,7 +54,6 @@ def test_every_way_solves_the_rows(seed: int, c: int, by_load: bool) -> None:
             assert (off <= 1e-8 * row.T.ravel()).all()
             if target.load is not None:
                 np.testing.assert_allclose((B.T @ f).T, target.load.T, atol=1e-8 * size)
-            np.testing.assert_allclose(f, answers[0][0], atol=1e-7 * size)
 
 
 @pytest.mark.parametrize("by_load", [False, True])
@@ -119,7 +114,7 @@ def test_everything_stuck(by_load: bool) -> None:
     b, p = 1e-6 * rng.standard_normal(24), rng.standard_normal(4)
     target = Target(b, p if by_load else None, None if by_load else 1e-6 * p)
     system = solver.systems.system(solver._stuck(), by_load)
-    assert isinstance(system, _Stuck)
+    assert isinstance(system, Stuck)
     f, s, _ = system.refined(np.zeros(24), target)
     np.testing.assert_allclose(solver.C @ f, solver.B @ s + b, atol=1e-12 * solver.C.max())
     if by_load:

@@ -87,12 +87,11 @@ class Coulomb(CoulombConditions):
     def twin(self) -> Coulomb:
         """The same contact with what is kept between iterates of its own: for another thread."""
         out = copy(self)
-        out.systems, out._kept, out._bordered = self.systems.twin(), None, []
+        out._forget()
         return out
 
     def _forget(self) -> None:
         """Drop what is kept between iterates: it may be the very thing that failed."""
-        self.systems.forget()
         self._kept, self._bordered = None, []
 
     # -- answers -----------------------------------------------------------------------------------
@@ -430,7 +429,8 @@ class Coulomb(CoulombConditions):
         follows it.
         """
         n, c = self.n, self.c
-        sigma = float(np.sqrt(self._largest(self.C) / self._largest(self.systems.inverse)))
+        size = np.linalg.eigvalsh(self.C)
+        sigma = float(size[-1] * np.sqrt(max(size[0] / size[-1], EPS)))
         try:
             factor = cho_factor(self.C + sigma * np.eye(len(self.C)), lower=True)
         except np.linalg.LinAlgError:
@@ -477,14 +477,3 @@ class Coulomb(CoulombConditions):
         f[0, rim] = onto
         f[1:, rim] *= self.mu[rim] * onto / length[rim]
         return f.ravel()
-
-    @staticmethod
-    def _largest(A: FloatArray) -> float:
-        """Largest eigenvalue to a few per cent, by the power method."""
-        x = np.random.default_rng(0).standard_normal(len(A))
-        size = 1.0
-        for _ in range(20):
-            x /= np.linalg.norm(x)
-            x = A @ x
-            size = float(np.linalg.norm(x))
-        return size

@@ -1,14 +1,12 @@
-"""Newton's linear systems of coupled contact, each solved the cheapest way that its states allow.
+"""Newton's linear systems of coupled contact.
 
-Three ways lead to the same iterate. Everything stuck: the factor of C. Few nodes closed: the
-equations of the closed dofs alone, dense. Most closed and few of them slipping: a principal pivot
-of C^-1 that is kept from one iterate to the next, and a small system for what differs from it.
+Two ways lead to the same iterate. Everything stuck: the factor of C. Otherwise the equations of the
+closed dofs alone, dense.
 """
 
 from __future__ import annotations
 
-from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
@@ -23,10 +21,9 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 NOT_CARRIED = "nothing touches and carries the load"
-#: A kept base or factor serves about this many iterates, those of one load step, and a product of a
-#: matrix with a vector, which waits for memory, costs so much more; both only weigh costs.
-_SERVES, _PASS = 3, 10.0
-#: Refinements behind a kept base; each gains the digits that the condition of C leaves.
+#: A product of a matrix with a vector waits for memory and costs so much more, for weighing only.
+_PASS = 10.0
+#: Refinements behind the factor of C; each gains the digits that its condition leaves.
 _REFINED = 2
 
 
@@ -96,20 +93,9 @@ class CoupledSystems:
     B: FloatArray
     n: int
     proven: FloatArray | None = None
-    _bases: dict[bool, tuple[BoolArray, FloatArray]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         self.c = len(self.C) // self.n
-
-    def twin(self) -> CoupledSystems:
-        """The same matrices and their factors, with kept bases of its own."""
-        out = copy(self)
-        out._bases = {}
-        return out
-
-    def forget(self) -> None:
-        """Drop the kept bases: what a run that failed kept may be the very thing that failed."""
-        self._bases.clear()
 
     @cached_property
     def factor(self) -> FloatArray:
@@ -125,15 +111,6 @@ class CoupledSystems:
         return np.asarray(lapack.dpotrs(self.factor, b, lower=1)[0])
 
     @cached_property
-    def inverse(self) -> FloatArray:
-        """C^-1, (m, m)."""
-        inverse, info = lapack.dpotri(self.factor, lower=1)
-        if info != 0:
-            raise np.linalg.LinAlgError("compliance is not positive definite")
-        out: FloatArray = np.tril(inverse) + np.tril(inverse, -1).T
-        return out
-
-    @cached_property
     def carried(self) -> tuple[FloatArray, FloatArray]:
         """V (m, r) and A (r, r): everything stuck, under a load p,
 
@@ -143,13 +120,6 @@ class CoupledSystems:
         A = np.linalg.inv(self.B.T @ CB)
         A = 0.5 * (A + A.T)
         return CB @ A, A
-
-    def _stuck_pivot(self, by_load: bool) -> FloatArray:
-        """W, or C^-1 with the motion given: f = W y where everything is closed."""
-        if not by_load:
-            return self.inverse
-        V, _ = self.carried
-        return self.inverse - V @ self._solved(self.B).T
 
     def stuck_forces(self, target: Target) -> FloatArray:
         """Forces with y = 0; one column or many."""
@@ -161,64 +131,15 @@ class CoupledSystems:
         first = self._solved(target.b)
         return np.asarray(first + V @ (target.load - self.B.T @ first))
 
-    def base(self, by_load: bool) -> BoolArray:
-        """(m,) open dofs of the kept base."""
-        kept = self._bases.get(by_load)
-        return np.zeros(len(self.C), bool) if kept is None else kept[0]
-
-    def turned(self, is_open: BoolArray, by_load: bool) -> FloatArray:
-        """T (m, m) of z = z0 + T x: x the forces of open dofs and the y of closed ones, z the rest.
-
-        The principal pivot of f = f0 + W y on the open dofs. Kept, because few states change from
-        one iterate to the next.
-        """
-        if by_load not in self._bases or not np.array_equal(self._bases[by_load][0], is_open):
-            W = self._stuck_pivot(by_load)
-            if is_open.any():
-                o, c = np.flatnonzero(is_open), np.flatnonzero(~is_open)
-                inner, info = lapack.dpotrf(np.asfortranarray(W[np.ix_(o, o)]), lower=1, clean=1)
-                # Open nodes that carried the load leave a singular matrix, but for rounding.
-                lost = np.diagonal(inner) ** 2 <= len(o) * EPS * np.diagonal(self.inverse)[o]
-                if by_load and lost.any():
-                    raise np.linalg.LinAlgError(NOT_CARRIED)
-                if info == 0:
-                    inner, info = lapack.dpotri(inner, lower=1)
-                if info != 0:
-                    raise np.linalg.LinAlgError(NOT_CARRIED)
-                inner = inner + np.tril(inner, -1).T
-                across = inner @ W[np.ix_(o, c)]
-                T = np.empty_like(W)
-                T[np.ix_(o, o)], T[np.ix_(o, c)] = inner, -across
-                T[np.ix_(c, o)] = across.T
-                T[np.ix_(c, c)] = W[np.ix_(c, c)] - W[np.ix_(c, o)] @ across
-                W = T
-            self._bases[by_load] = is_open.copy(), W
-        return self._bases[by_load][1]
-
     def system(self, rows: NewtonRows, by_load: bool) -> NewtonSystem:
-        """The cheapest of the ways, by multiplications.
+        """The rows, factored.
 
         Raises LinAlgError where the states carry no load.
         """
-        is_open = np.tile(rows.is_open, self.c)
-        if not rows.relaxed.any():
-            return _Stuck(self, by_load)
-        m, kept = len(self.C), self.base(by_load)
-        o, q = int(is_open.sum()), int((~is_open).sum())
-        slips = int(rows.relaxed.sum()) - o
-        differ = slips + int((is_open != kept).sum())
-        inverse = 0.0 if "inverse" in self.__dict__ else m**3 / 3.0 / _SERVES
-        turn = inverse + (o**3 / 2.0 + o**2 * q + o * q**2) / _SERVES
-        closed = (q + self.B.shape[1]) ** 3 / 3.0 / _SERVES + 3.0 * _PASS * m**2
-        products = 3.0 * (1 + _REFINED) * _PASS * m**2
-        by_kept = inverse + differ**3 / 3.0 + products
-        by_turn = turn + slips**3 / 3.0 + products
-        if closed <= min(by_kept, by_turn):
-            return ClosedSystem(self, rows, by_load)
-        return _Pivoted(self, rows, kept if by_kept <= by_turn else is_open, by_load)
+        return ClosedSystem(self, rows, by_load) if rows.relaxed.any() else Stuck(self, by_load)
 
 
-class _Stuck:
+class Stuck:
     """Everything sticks: y = 0."""
 
     def __init__(self, of: CoupledSystems, by_load: bool) -> None:
@@ -234,7 +155,14 @@ class _Stuck:
         return f, A @ target.load - V.T @ target.b, np.zeros_like(f)
 
     def refined(self, rhs: FloatArray, target: Target) -> Solved:
-        return _refined(self, self.of, np.zeros(len(rhs), bool), rhs, target)
+        of, (f, s, y) = self.of, self.solve(rhs, target)
+        for _ in range(_REFINED):
+            there = of.C @ f - of.B @ s - target.b
+            missing = None if target.load is None else target.load - of.B.T @ f
+            still = np.zeros_like(s) if target.load is None else None
+            df, ds, _ = self.solve(rhs, Target(-there, missing, still))
+            f, s = f + df, s + ds
+        return f, s, y
 
 
 class ClosedSystem:
@@ -353,92 +281,6 @@ class ClosedSystem:
             assert target.motion is not None
             return f, target.motion
         return f, (found[q:].T * self.unit).T
-
-
-class _Pivoted:
-    """Only the rows R that differ from those of the base (open: f = 0, closed: y = 0) are solved
-    for: with z = z0 + T x and x = 0 off R, k^3 operations for k of them.
-    """
-
-    def __init__(
-        self, of: CoupledSystems, rows: NewtonRows, base: BoolArray, by_load: bool
-    ) -> None:
-        self.of, self.by_load, self.base = of, by_load, base
-        is_open = self.is_open = np.tile(rows.is_open, of.c)
-        relaxed = rows.relaxed.T.ravel()
-        self.T = of.turned(base, by_load)
-        self.R = np.flatnonzero((relaxed & ~is_open) | (is_open != base))
-        R = self.R
-        component, node = np.divmod(R, of.n)
-        place = np.full(len(base), -1)
-        place[R] = np.arange(len(R))
-        H = np.zeros((len(R), len(R)))
-        self._parts = []
-        for j in range(of.c):
-            p, q, dof = rows.P[node, component, j], rows.Q[node, component, j], j * of.n + node
-            # z holds y of the base's open dofs and f of the others, x the other of both.
-            by_z, by_x = np.where(base[dof], q, p), np.where(base[dof], p, q)
-            on = np.flatnonzero(by_z)
-            H[on] += by_z[on, None] * self.T[np.ix_(dof[on], R)]
-            self._parts.append((on, by_z[on], dof[on]))
-            with_x = np.flatnonzero((by_x != 0.0) & (place[dof] >= 0))
-            H[with_x, place[dof[with_x]]] += by_x[with_x]
-        # Rows of forces and of displacements are many powers of ten apart.
-        self._size = np.abs(H).max(axis=1, initial=0.0)
-        if not (self._size > 0.0).all():
-            raise np.linalg.LinAlgError(NOT_CARRIED)
-        self._factor = _lu(H / self._size[:, None]) if len(R) else None
-
-    def solve(self, rhs: FloatArray, target: Target) -> Solved:
-        of, R, base = self.of, self.R, self.base
-        f0 = of.stuck_forces(target)
-        known = np.zeros_like(f0)
-        known[base] = f0[base]
-        # f0 where closed, less what makes the open forces vanish.
-        z = np.where(_column(base, f0), 0.0, f0) - self.T @ known
-        x = np.zeros_like(f0)
-        if self._factor is not None:
-            right = rhs[R].copy()
-            for on, factor, dof in self._parts:
-                right[on] -= (factor * z[dof].T).T
-            x[R] = lu_solve(self._factor, (right.T / self._size).T)
-            z = z + self.T[:, R] @ x[R]
-        is_base = _column(base, f0)
-        f, y = np.where(is_base, x, z), np.where(is_base, z, x)
-        if target.load is None:
-            assert target.motion is not None
-            return f, target.motion, y
-        V, A = of.carried
-        return f, A @ target.load - V.T @ (target.b + y), y
-
-    def refined(self, rhs: FloatArray, target: Target) -> Solved:
-        return _refined(self, self.of, self.is_open, rhs, target)
-
-
-def _refined(
-    system: NewtonSystem, of: CoupledSystems, is_open: BoolArray, rhs: FloatArray, target: Target
-) -> Solved:
-    """Iterative refinement of an answer that rests on C^-1.
-
-    Everything closed takes forces that are many times those of a few nodes, and their rounding.
-    """
-    f, s, y = system.solve(rhs, target)
-    none = np.zeros_like(rhs)
-    for _ in range(_REFINED):
-        f[is_open] = 0.0
-        there = of.C @ f - of.B @ s - target.b
-        y[is_open] = there[is_open]
-        missing = None if target.load is None else target.load - of.B.T @ f
-        still = np.zeros_like(s) if target.load is None else None
-        df, ds, dy = system.solve(none, Target(y - there, missing, still))
-        f, y = f + df, y + dy
-        s = s if target.load is None else s + ds
-    f[is_open] = 0.0
-    return f, s, y
-
-
-def _column(mask: BoolArray, like: FloatArray) -> BoolArray:
-    return mask if like.ndim == 1 else mask[:, None]
 
 
 def _lu(A: FloatArray, *, overwrite: bool = False) -> tuple[FloatArray, IntArray]:
