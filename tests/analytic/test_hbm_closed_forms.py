@@ -16,7 +16,7 @@ from upd.hbm import (
     frequency_response,
     rigid_damper,
 )
-from upd.hbm.springs.pieces import loop_area
+from upd.hbm.springs.checks import loop_area
 from upd.hbm.springs.response import parabola
 from upd.reference.den_hartog import den_hartog_amplitude
 from upd.reference.friction import (

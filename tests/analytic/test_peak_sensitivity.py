@@ -17,9 +17,9 @@ from upd.hbm.core.fourier import harmonics
 from upd.hbm.peaks.parameter_change import ParameterChange
 from upd.hbm.peaks.sensitivity import _slopes, peak_derivatives
 from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.checks import loop_area
 from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
 from upd.hbm.springs.modal import modal
-from upd.hbm.springs.pieces import loop_area
 from upd.hbm.springs.starts import first_point, newton
 from upd.reference.friction import jenkins_peak, jenkins_peak_frequency
 

@@ -104,7 +104,7 @@ def test_a_curve_that_ends_early_is_taken_from_its_other_end(
             asked.append(sweep_down)
             answer = made(*args, sweep_down=sweep_down, **named)
             names = ("frequency", "x", "contact_displacement", "contact_force", "state")
-            names += ("energy", "linear", "truncation", "aliasing", "periodic", "highest_harmonic")
+            names += ("energy", "linear", "truncation", "aliasing", "periodic")
             n = int(share * len(answer.frequency))
             return replace(
                 answer, status="stopped", **{name: getattr(answer, name)[:n] for name in names}
@@ -224,9 +224,6 @@ def test_ratios_and_harmonics_are_the_scenes() -> None:
         plan.scene.excitation, forces=(replace(plan.scene.excitation.forces[0], harmonic=2),)
     )
     assert harmonics_of(scene(excitation=forces)) == 2, "what is excited is carried"
-    choice = replace(choice, harmonics=None)
-    adaptive = replace(plan.scene.balance, harmonics="adaptive")
-    assert harmonics_of(scene(balance=adaptive)) == 3
 
 
 def test_a_run_finds_the_best_ratio_and_tells_it() -> None:

@@ -38,7 +38,7 @@ _MATRICES: dict[str, Any] = {"M": [[1.0]], "C": [[0.02]], "K": [[1.0]]}
         ({"static_force": [50.0], "harmonics": (1, 3)}, r"static_force.*harmonics = \(0, 1, 3\)"),
         ({"harmonics": 5}, r"range\(6\)"),
         ({"harmonics": (0.5, 1)}, "whole numbers"),
-        ({"harmonics": "adaptiv"}, "adaptive"),
+        ({"harmonics": "many"}, "no set of whole numbers"),
         ({"harmonics": (0, 2)}, r"acts in 1, .*harmonics = \(0, 1, 2\)"),
         ({"start": "middle"}, "zero, static, mid, upper, lower"),
         ({"K": csr_array(np.eye(1))}, r"K\.toarray\(\)"),

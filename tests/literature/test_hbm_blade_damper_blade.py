@@ -139,13 +139,3 @@ def test_path_without_friction_arrives_through_every_fold() -> None:
     assert marched.status == "periodic"
     # harmonics above the fifth move the contacts by up to 2 % there
     assert marched.amplitude(Y2) == pytest.approx(answer.amplitude(Y2)[last], rel=2e-2)
-
-
-def test_adaptive_harmonics_come_close_to_fifteen(curve: FrequencyResponse) -> None:
-    answer = response(np.linspace(155, 170, 61), harmonics="adaptive")
-    assert 1 < answer.harmonics.highest < 15
-    assert answer.peak(Y2)[1] == pytest.approx(curve.peak(Y2)[1], rel=1e-3)
-    # where all sticks one harmonic is exact, and says so
-    assert answer.highest_harmonic.min() == 1
-    assert answer.truncation.max() <= 1e-3
-    assert answer.status == "complete"

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.linalg import blas, eigh, lapack, lstsq, null_space, qr, solve_triangular
 
 from upd.errors import ConvergenceError
-from upd.linalg.least_distance import least_distance_with_multipliers
+from upd.linalg.least_distance import least_distance
 
 log = logging.getLogger(__name__)
 
@@ -434,7 +434,7 @@ class BoxQP:
         rows = np.vstack([G[below], -G[above]])
         right = np.concatenate([(box.lower - x1)[below], (x1 - box.upper)[above]])
         size = float(np.linalg.norm(rows, axis=1).max())
-        found = least_distance_with_multipliers(rows / size, right)
+        found = least_distance(rows / size, right)
         if found is None:
             raise ConvergenceError(
                 f"contact QP with {n} nodes: no forces inside the bounds have the load {box.load}."

@@ -392,6 +392,6 @@ def _least_opening(arms: FloatArray, gap: FloatArray) -> FloatArray:
     """
     scale = float(np.abs(gap).max()) or 1.0
     size = float(np.abs(arms).max())
-    z = least_distance(-arms / size, -gap / scale)
-    assert z is not None, "the nodes are off the face, so that some tilt opens them"
-    return np.asarray(z * scale / size)
+    found = least_distance(-arms / size, -gap / scale)
+    assert found is not None, "the nodes are off the face, so that some tilt opens them"
+    return np.asarray(found[0] * scale / size)

@@ -16,8 +16,8 @@ FloatArray = NDArray[np.float64]
 _DIGITS = float(np.sqrt(np.finfo(float).eps))
 
 
-def least_distance(G: FloatArray, h: FloatArray) -> FloatArray | None:
-    """The shortest v with G v >= h.
+def least_distance(G: FloatArray, h: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """The shortest v with G v >= h, and its multipliers.
 
     With E = [G, h]' and r = E u - e_last of the u >= 0 that makes r least, v = -r / r_last.
 
@@ -28,8 +28,10 @@ def least_distance(G: FloatArray, h: FloatArray) -> FloatArray | None:
 
     Returns
     -------
-    (k,) ndarray or None
-        None when no v does: r vanishes, to half of the digits.
+    v : (k,) ndarray
+        None, with its multipliers, when no v does: r vanishes, to half of the digits.
+    multipliers : (m,) ndarray
+        v = G'u, u >= 0 and above zero only where G v = h.
 
     Raises
     ------
@@ -42,39 +44,15 @@ def least_distance(G: FloatArray, h: FloatArray) -> FloatArray | None:
 
     >>> import numpy as np
     >>> from upd.linalg.least_distance import least_distance
-    >>> least_distance(np.array([[1.0, 1.0]]), np.array([2.0])).round(12).tolist()
-    [1.0, 1.0]
-    """
-    found = least_distance_with_multipliers(G, h)
-    return None if found is None else found[0]
-
-
-def least_distance_with_multipliers(
-    G: FloatArray, h: FloatArray
-) -> tuple[FloatArray, FloatArray] | None:
-    """The shortest v with G v >= h as in `least_distance`, and its multipliers.
-
-    Parameters
-    ----------
-    G : (m, k) ndarray
-    h : (m,) ndarray
-
-    Returns
-    -------
-    tuple of (k,) ndarray and (m,) ndarray, or None
-        v = G'u, u >= 0 and above zero only where G v = h.
-
-    Raises
-    ------
-    RuntimeError
-        As in `least_distance`.
+    >>> v, u = least_distance(np.array([[1.0, 1.0]]), np.array([2.0]))
+    >>> v.round(12).tolist(), u.round(12).tolist()
+    ([1.0, 1.0], [1.0])
     """
     size = float(np.abs(h).max(initial=0.0))
     if not (h > 0.0).any():
         return np.zeros(G.shape[1]), np.zeros(len(h))
     E = np.vstack((G.T, h / size))
-    e = np.zeros(len(E))
-    e[-1] = 1.0
+    e = np.eye(len(E))[-1]
     u = nnls(E, e, maxiter=30 * (len(h) + 10))[0]
     r = E @ u - e
     if np.linalg.norm(r) <= _DIGITS:
@@ -99,6 +77,6 @@ def least_positive(A: FloatArray, b: FloatArray) -> FloatArray | None:
     """
     x0 = np.asarray(np.linalg.lstsq(A, b, rcond=_DIGITS)[0], np.float64)
     Z = null_space(A, rcond=_DIGITS)
-    z = least_distance(Z, -x0)
+    found = least_distance(Z, -x0)
     # what rounding leaves below zero
-    return None if z is None else np.asarray(np.maximum(x0 + Z @ z, 0.0))
+    return None if found is None else np.asarray(np.maximum(x0 + Z @ found[0], 0.0))

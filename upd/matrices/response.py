@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,7 +54,6 @@ Motion = Dof | Mapping[Any, float]
 MOST_DENSE = 600
 #: modes of the reduction reach this many times beyond the highest frequency of interest
 _BEYOND = 10.0
-_MOST_DYNAMIC = 3
 #: watched motions whose peaks are printed
 _MOST_NAMED = 7
 
@@ -166,7 +165,7 @@ class ResponseOptions(TypedDict, total=False):
     dofs: DofMap | Path | str | None
     static_force: Mapping[Any, float] | None
     modes: int | None
-    harmonics: Iterable[int] | Literal["adaptive"]
+    harmonics: Iterable[int]
     samples: int | None
     start: Any
     slider: ArrayLike | None
@@ -213,7 +212,7 @@ def forced_response(
         Bampton). None: the matrices are taken whole up to 600 dofs unless rounding blurs their low
         modes, and else reduced to the modes below ten times the highest harmonic of interest.
     harmonics
-        Harmonics of the balance, (0, 1) by default, or "adaptive".
+        Harmonics of the balance, (0, 1) by default.
     options
         C, zeta, dofs, static_force, modes and harmonics, as above; further arguments of
         `upd.hbm.frequency_response` (samples, start, sweep_down, ...).
@@ -235,7 +234,7 @@ def forced_response(
     harmonics = settings.pop("harmonics", (0, 1))
     model, damping = _read(K, M, C, zeta, dofs)
     n = model.K.shape[0]
-    orders: Any = harmonics if isinstance(harmonics, str) else hbm.harmonics(harmonics).numbers
+    orders = hbm.harmonics(harmonics).numbers
     f = np.atleast_1d(np.asarray(frequencies, dtype=float))
     rows = _Rows.collected(model.dofs, n, problems)
     closing = [rows.motion("joint", j.closing) for j in joints]
@@ -255,7 +254,7 @@ def forced_response(
         raise InputError("forced_response: " + "; ".join(problems))
     _refuse_penalties(model.K)
     _refuse_multipliers(model)
-    below = _BEYOND * _highest(orders) * float(f.max(initial=0.0))
+    below = _BEYOND * max(orders) * float(f.max(initial=0.0))
     reduced = _reduced(model, rows.used, modes, below, whole=damping is not None)
     if reduced is None:
         Kd, Md = model.K.toarray(), _mass(model).toarray()
@@ -285,14 +284,6 @@ def forced_response(
             )
             answer = replace(answer, message=f"{answer.message}; {why}")
     return OwnResponse(answer, dict(zip(watch, rows.matrix(watched) @ at, strict=True)), reduced)
-
-
-def _highest(harmonics: Sequence[int] | str) -> int:
-    """Highest harmonic whose modes a reduction must have.
-
-    An adaptive answer rarely needs more than the third.
-    """
-    return _MOST_DYNAMIC if isinstance(harmonics, str) else max((1, *harmonics))
 
 
 def _read(

@@ -59,9 +59,9 @@ HarmonicNumber = Annotated[
 Harmonics = Annotated[
     Any,
     q.must(
-        lambda v: v == "adaptive" or (q.is_whole(v) and 1 <= v <= MOST_HARMONICS),
-        'is no number of harmonics; give the highest, 1 to 31, or "adaptive"',
-        "1 to 31, or adaptive",
+        lambda v: q.is_whole(v) and 1 <= v <= MOST_HARMONICS,
+        "is no number of harmonics; give the highest, 1 to 31",
+        "1 to 31",
     ),
 ]
 Samples = Annotated[
@@ -167,8 +167,7 @@ class BalanceChoice:
         "march": sweeps up and down by time integration, as in an experiment. Cost: a sweep takes
         about a second for every three frequencies.
     harmonics
-        The highest, or "adaptive": as many as every point of a curve needs, 3 of the blades with
-        whole faces. Cost: unknowns grow with 2 harmonics + 1, seconds faster.
+        The highest. Cost: unknowns grow with 2 harmonics + 1, seconds faster.
     samples
         Of the contact force per period, and time steps of a sweep in a period; "auto" takes what
         the harmonics need, and 128 steps. Cost: seconds grow in proportion where points slip.
@@ -263,10 +262,9 @@ class ForcedScene(RigBase):
         return {name: self.stiffness[name] for name in self.contact.stiffness or self.stiffness}
 
     @property
-    def harmonic_numbers(self) -> range | Literal["adaptive"]:
+    def harmonic_numbers(self) -> range:
         """Harmonics of the balance, the static one included."""
-        highest = self.balance.harmonics
-        return "adaptive" if highest == "adaptive" else range(highest + 1)
+        return range(self.balance.harmonics + 1)
 
 
 def combined_forces(e: ExcitationChoice) -> dict[tuple[Side, int], complex]:

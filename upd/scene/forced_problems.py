@@ -60,7 +60,7 @@ def _force_problems(scene: ForcedScene) -> list[str]:
     if not integrated and q.is_whole(b.harmonics) and b.harmonics < highest:
         return [
             f"balance.harmonics: {b.harmonics} do not carry the force in harmonic {highest}; "
-            f'write {highest} or more, or "adaptive"'
+            f"write {highest} or more"
         ]
     return []
 

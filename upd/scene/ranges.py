@@ -196,11 +196,6 @@ def one_model(
             f'accuracy: {what} keeps one mesh; leave it out or set it to "{UNKNOWN}", and choose '
             "the levels in the scene"
         )
-    if friction and scene.harmonic_numbers == "adaptive":
-        problems.lines.append(
-            f"balance.harmonics: {what} keeps its harmonics; give a number, for example "
-            "balance.harmonics=3"
-        )
     problems.lines += more
     problems.check()
     return replace(

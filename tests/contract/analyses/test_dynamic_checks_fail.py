@@ -113,7 +113,7 @@ def _points(s: ForcedSolution, kept: Any) -> ForcedSolution:
     """Some of the points of the path alone."""
     a = s.curves[0].answer
     names = ("frequency", "x", "contact_displacement", "contact_force", "state", "energy", "linear")
-    names += ("truncation", "aliasing", "periodic", "highest_harmonic")
+    names += ("truncation", "aliasing", "periodic")
     return with_answer(s, **{name: getattr(a, name)[kept] for name in names})
 
 

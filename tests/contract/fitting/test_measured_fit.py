@@ -281,6 +281,3 @@ def test_targets_that_cannot_be_are_told_at_once(
         assert part in text, part
     with pytest.raises(InputError, match="no half-width, though others have one or are curves"):
         read_targets(f"stuck_in_phase=3 Hz,stuck={bare}")
-    with pytest.raises(InputError, match="keeps its harmonics"):
-        adaptive = load_scene("asymmetric-response", small | {"balance.harmonics": "adaptive"})
-        upd.fit(adaptive, "peak_1_frequency@194=390 Hz", RIGHT)

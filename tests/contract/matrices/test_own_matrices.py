@@ -190,7 +190,7 @@ def test_low_modes_that_rounding_blurs_are_reduced() -> None:
         ({"joints": [Joint({}, [RUBBING], mu=-1.0)]}, "mu must be >= 0"),
         ({"joints": [Joint({}, [RUBBING], mu=0.4, preload=1.0)]}, "joint 0: k_t is missing"),
         ({"harmonics": 5}, r"range\(6\)"),
-        ({"harmonics": "adaptiv"}, "adaptive"),
+        ({"harmonics": "many"}, "no set of whole numbers"),
         ({"start": "middle"}, "zero, static, mid"),
         ({"force": {(1, "UP"): 1.0}}, "no component 'UP'"),
         ({"force": {999: 1.0}}, "row 999 is not there"),

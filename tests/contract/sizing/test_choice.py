@@ -397,7 +397,6 @@ def test_speed_sets_the_force() -> None:
     ("setting", "told"),
     [
         ("balance.method=march", 'set "balance"'),
-        ("balance.harmonics=adaptive", "give a number"),
         ("contact.fit=unloaded", 'contact.fit="loaded"'),
         ("accuracy=2 %", "a choice keeps one mesh"),
     ],

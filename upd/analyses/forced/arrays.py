@@ -254,7 +254,6 @@ def _point_arrays(solution: ForcedSolution, curve: PointCurve) -> Variables:
         **_fold_arrays(curve),
         **_contact(answer.state, answer.energy, measures.power(answer)),
         "truncation": variable("frequency", answer.truncation, "1"),
-        "highest_harmonic": variable("frequency", answer.highest_harmonic, "1"),
         "periodic": variable(
             "frequency",
             answer.periodic.astype(np.int8),

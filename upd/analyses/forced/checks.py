@@ -25,7 +25,7 @@ from upd.analyses.forced.sweeps import TOLERANCE
 from upd.analyses.measured import fit_checks
 from upd.hbm.faces.balance import InterfaceResponse
 from upd.hbm.faces.sweep import SteppedSine
-from upd.hbm.springs.harmonics import TRUNCATION
+from upd.hbm.springs.response import TRUNCATION
 from upd.results import Case, Check
 from upd.scene.forced_contact import SIDES
 
@@ -86,7 +86,7 @@ _RULES = {
     "energy of nodes": _Rule(1e-2, _PERIOD, "take more samples: balance.samples"),
     "damper at rest": _Rule(_BALANCE, "|mean contact forces - F_C| / F_C"),
     "truncation": _Rule(
-        10.0 * TRUNCATION,
+        TRUNCATION,
         "motion of the faces by blades' harmonics above {highest}, relative",
         "take more: balance.harmonics = {more}",
     ),

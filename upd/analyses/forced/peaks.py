@@ -49,7 +49,6 @@ from upd.hbm.faces.state import InterfaceState
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import STICK
 from upd.hbm.springs.peak import FIRST_REACH, is_near
-from upd.hbm.springs.starts import newton
 from upd.scene.forced_contact import SIDES, Side
 
 log = logging.getLogger(__name__)
@@ -135,12 +134,7 @@ def _top(
     if a.linear[max(i - 1, 0) : i + 2].all():
         near = min(linear.stuck_peaks[side], key=lambda p: abs(p.frequency - peak.frequency))
         return Top(near.frequency, near.height, a.x[i], False)
-    x: Array | None = a.x[i]
-    if a.highest_harmonic[i] < a.harmonics.highest:
-        x = newton(a.balance, a.x[i], float(a.frequency[i]))
-    if x is None:
-        return None
-    return climbed(model, a.balance, x, float(a.frequency[i]), side, curve.force, peak)
+    return climbed(model, a.balance, a.x[i], float(a.frequency[i]), side, curve.force, peak)
 
 
 def climbed(

@@ -162,7 +162,7 @@ def harmonics_of(plan: ForcedPlan) -> int:
     highest = max(scene.excitation.highest_harmonic, 1)
     if given is not None:
         return max(given, highest)
-    return max(highest, 3) if run == "adaptive" else int(run)
+    return int(run)
 
 
 def beside_best(points: Sequence[RatioPoint]) -> list[float]:
@@ -200,7 +200,7 @@ def further_points(
     highest, run = harmonics_of(plan), plan.scene.balance.harmonics
     jobs: list[Job] = [(peaks_at, (plan, model, r, highest)) for r in beside_best(points)]
     best = _best(first)
-    if best is not None and run != "adaptive" and highest < int(run):
+    if best is not None and highest < int(run):
         jobs.append((peaks_at, (plan, model, best.ratio, int(run))))
     return jobs
 

@@ -193,11 +193,8 @@ def _curves_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -
 
 
 def blade_harmonics(scene: ForcedScene) -> int:
-    """The highest of the balance; of adaptive ones a usual one."""
-    asked = scene.balance.harmonics
-    if asked == "adaptive":
-        return max(HARMONICS, scene.excitation.highest_harmonic)
-    return int(asked)
+    """The highest of the balance."""
+    return int(scene.balance.harmonics)
 
 
 def time_steps(scene: ForcedScene) -> int:
@@ -269,7 +266,7 @@ def needs(plan: ForcedPlan, threads: int) -> Needs:
 def effects_of_points(scene: ForcedScene) -> list[Effect]:
     """Of contact by springs at points."""
     mu, b, c = scene.contact.friction, scene.balance, scene.contact
-    adaptive, swept = b.harmonics == "adaptive", b.method == "march"
+    swept = b.method == "march"
     samples = "power of two by rule" if b.samples == "auto" else f"{b.samples} a period"
     return [
         _friction(mu, f"Coulomb, mu = {mu:g}; a curve stuck everywhere is answered linearly"),
@@ -288,11 +285,7 @@ def effects_of_points(scene: ForcedScene) -> list[Effect]:
         Effect(
             "harmonics",
             True,
-            "all: time integration"
-            if swept
-            else "as many as matter, up to 31"
-            if adaptive
-            else f"0 to {b.harmonics}; {samples} samples",
+            "all: time integration" if swept else f"0 to {b.harmonics}; {samples} samples",
             "" if swept else "more harmonics",
         ),
         Effect(

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from upd.hbm.core.fourier import Harmonics, analysis, harmonics, synthesis, to_complex
 from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
 from upd.hbm.springs.friction import March
 from upd.hbm.springs.points import stuck_stiffness
 
@@ -239,3 +242,95 @@ def aliasing(b: Balance, x: FloatArray, force: FloatArray) -> FloatArray:
 def portions(n: int) -> list[slice]:
     """Portions of many answers that keep the arrays of their marches small."""
     return [slice(i, i + PORTION) for i in range(0, n, PORTION)]
+
+
+class Measures(NamedTuple):
+    """What is measured on n solved points.
+
+    Attributes
+    ----------
+    displacement, force : (n, n_point, 1 + d, size) ndarray
+        Coefficients of the relative displacements [mm] and of the contact forces [N].
+    state : (n, n_point, 3) ndarray
+        Shares of the cycle in stick, slip, lift-off.
+    energy : (n, n_point) ndarray
+        Energy lost per cycle [N mm].
+    periodic : (n,) ndarray of bool
+        Whether the contact forces of every point came back to their start.
+    truncation, aliasing : (n,) ndarray
+        What harmonics left out and twice the samples would change, relative.
+    """
+
+    displacement: FloatArray
+    force: FloatArray
+    state: FloatArray
+    energy: FloatArray
+    periodic: NDArray[np.bool_]
+    truncation: FloatArray
+    aliasing: FloatArray
+
+
+def measures(b: Balance, f: FloatArray, x: FloatArray) -> Measures:
+    """What is measured on solved points.
+
+    Parameters
+    ----------
+    b : Balance
+    f : (n,) ndarray
+        Frequencies [Hz].
+    x : (n, n_unknown) ndarray
+        Answers.
+
+    Returns
+    -------
+    Measures
+    """
+    n_point = b.contacts.n_point
+    W = b.coefficients(x)
+    F, state = np.empty_like(W), np.empty((len(f), n_point, 3))
+    periodic, left_out = np.empty(len(f), dtype=bool), np.empty(len(f))
+    for part in portions(len(x)):
+        found = b.marched(W[part], b.E)
+        F[part] = found.coefficients(b.Q)
+        periodic[part] = found.periodic.reshape(-1, n_point).all(axis=1)
+        left_out[part] = truncation(b, f[part], x[part], found)
+        for code in (STICK, SLIP, LIFT):
+            state[part, :, code] = (found.state == code).mean(axis=-1)
+    energy = loop_area(F, W, b.harmonics.offset, b.harmonics.dynamic, b.samples)
+    return Measures(W, F, state, energy, periodic, left_out, aliasing(b, x, F))
+
+
+def loop_area(
+    F: FloatArray, W: FloatArray, offset: int, k: NDArray[np.int64], samples: int
+) -> FloatArray:
+    """Area of the loops of force over displacement, harmonic by harmonic,
+    pi sum k (a_F b_W - b_F a_W); zero where it is rounding.
+
+    A loop without area is a difference of equal products. Each coefficient of the force is a sum
+    over the samples of a force no larger than sum |F|, so that the terms of the area add up to no
+    more than pi sum k |F| |W|; their rounding is that times eps times the number of samples.
+
+    Parameters
+    ----------
+    F, W : (n, n_point, 1 + d, size) ndarray
+        Coefficients of the forces [N] and of the relative displacements [mm].
+    offset : int
+        Coefficients before those of the first of the harmonics `k`.
+    k : (h,) ndarray
+        Numbers of the harmonics above 0.
+    samples : int
+        Of a period, from which F was summed.
+
+    Returns
+    -------
+    (n, n_point) ndarray
+        [N mm]
+
+    References
+    ----------
+    N. J. Higham, Accuracy and Stability of Numerical Algorithms (2002), ch. 3: errors of sums.
+    """
+    a, b = W[..., offset::2], W[..., offset + 1 :: 2]
+    area = np.einsum("k,npck->np", k, F[..., offset::2] * b - F[..., offset + 1 :: 2] * a)
+    terms = np.einsum("npc,k,npck->np", np.abs(F).sum(axis=-1), k, np.abs(a) + np.abs(b))
+    return np.pi * np.where(np.abs(area) > samples * EPS * terms, area, 0.0)

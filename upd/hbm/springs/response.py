@@ -19,13 +19,12 @@ from upd.hbm.core.fourier import Harmonics, harmonics, to_complex
 from upd.hbm.core.newton import Settings
 from upd.hbm.springs.assembled import assembled
 from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.checks import measures
 from upd.hbm.springs.damper import RigidDamper
 from upd.hbm.springs.friction import Start
-from upd.hbm.springs.harmonics import TRUNCATION, Whole, solve_adaptively, solve_curve
 from upd.hbm.springs.peak import climb
-from upd.hbm.springs.pieces import joined
 from upd.hbm.springs.points import Contacts
-from upd.hbm.springs.starts import newton
+from upd.hbm.springs.sweep import Curve, solve_curve
 from upd.linalg.parallel import threads_for
 
 log = logging.getLogger(__name__)
@@ -33,9 +32,11 @@ log = logging.getLogger(__name__)
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 EPS = float(np.finfo(float).eps)
+#: largest contact motion that omitted harmonics may cause before a warning, relative
+TRUNCATION = 1e-2
 #: largest change of the contact force with twice the samples before a warning
 ALIASING = 1e-2
-Status = Literal["complete", "not periodic", "harmonic limit", "stopped", "step limit"]
+Status = Literal["complete", "not periodic", "stopped", "step limit"]
 
 
 @dataclass(frozen=True)
@@ -43,13 +44,12 @@ class FrequencyResponse:
     """Steady forced response along the solution path.
 
     n points, in order of the path: frequencies repeat or turn back at folds. Coefficients are
-    [a0, a1, b1, a2, b2, ...] (no a0 without harmonic 0); those of harmonics a point was not solved
-    with are zero.
+    [a0, a1, b1, a2, b2, ...] (no a0 without harmonic 0).
 
     Attributes
     ----------
     balance : Balance
-        The condensed problem, with the most harmonics of the path.
+        The condensed problem.
     frequency : (n,) ndarray
         [Hz]
     x : (n, n_unknown) ndarray
@@ -68,17 +68,14 @@ class FrequencyResponse:
         Contact motion that missing harmonics would cause, relative.
     aliasing : (n,) ndarray
         Change of the contact force with twice the samples, relative.
-    status : {"complete", "not periodic", "harmonic limit", "stopped", "step limit"}
-        "complete": the path reached the last frequency, its contact forces are periodic, and
-        adaptive harmonics suffice. "not periodic": it reached it, but at some points the contact
-        forces do not come back to their start. "harmonic limit": it reached it, but adaptive
-        harmonics do not suffice everywhere. "stopped", "step limit": it did not reach it.
+    status : {"complete", "not periodic", "stopped", "step limit"}
+        "complete": the path reached the last frequency, and its contact forces are periodic. "not
+        periodic": it reached it, but at some points the contact forces do not come back to their
+        start. "stopped", "step limit": it did not reach it.
     message : str
-        Where and why the path ended, the harmonics of an adaptive answer, and warnings.
+        Where and why the path ended, and warnings.
     periodic : (n,) ndarray of bool
         Whether the contact forces came back to their start.
-    highest_harmonic : (n,) ndarray of int
-        Highest harmonic each point was solved with.
     """
 
     balance: Balance
@@ -94,7 +91,6 @@ class FrequencyResponse:
     status: Status
     message: str
     periodic: NDArray[np.bool_]
-    highest_harmonic: NDArray[np.int64]
 
     def __repr__(self) -> str:
         """Its end and its size, without the arrays."""
@@ -109,7 +105,7 @@ class FrequencyResponse:
 
     @property
     def harmonics(self) -> Harmonics:
-        """Harmonics of the answer, the most of its points."""
+        """Harmonics of the answer."""
         return self.balance.harmonics
 
     @cached_property
@@ -241,11 +237,8 @@ class FrequencyResponse:
         if not len(a):
             raise InputError(f"peak: the path has no point: {self.message}")
         i = int(np.argmax(a))
-        x = self.x[i] if 0 < i < len(a) - 1 else None
-        if x is not None and self.highest_harmonic[i] < self.harmonics.highest:
-            x = newton(self.balance, x, float(self.frequency[i]))
-        if x is not None:
-            top = climb(self.balance, row, x, float(self.frequency[i]), harmonic=harmonic)
+        if 0 < i < len(a) - 1:
+            top = climb(self.balance, row, self.x[i], float(self.frequency[i]), harmonic=harmonic)
             if top.found and top.amplitude >= a[i] * (1 - EPS**0.5):
                 return top.frequency, top.amplitude
         return parabola(self.frequency, a)
@@ -298,7 +291,7 @@ def frequency_response(
     harmonic_force: ArrayLike | Mapping[int, ArrayLike],
     frequencies: ArrayLike,
     static_force: ArrayLike | None = None,
-    harmonics: Iterable[int] | Literal["adaptive"] = (0, 1),
+    harmonics: Iterable[int] = (0, 1),
     samples: int | None = None,
     damper: RigidDamper | None = None,
     damper_rows: FloatArray | None = None,
@@ -324,9 +317,8 @@ def frequency_response(
         Frequencies [Hz], answered at these and between.
     static_force : (n,) array_like, optional
         [N]
-    harmonics : iterable of int, or "adaptive"
-        A set with or without 0; static loads need it. "adaptive" takes (0, 1) first, and more on
-        the stretches of the curve where those left out would move the contacts by more than 0.1 %.
+    harmonics : iterable of int
+        A set with or without 0; static loads need it.
     samples : int, optional
         Samples per period; by rule when None.
     damper : RigidDamper, optional
@@ -389,7 +381,7 @@ def frequency_response(
     static = np.zeros(n) if static_force is None else np.asarray(static_force, dtype=float)
     _require(f, static, force, contacts, n, (damper is None) == (damper_rows is None), start)
     placed = None if slider is None else _sliders(slider, contacts)
-    first = _harmonics(range(max(force) + 1) if harmonics == "adaptive" else harmonics, force)
+    first = _harmonics(harmonics, force)
     _require_static(first, static, damper)
     problem = assembled(
         A[0],
@@ -405,67 +397,51 @@ def frequency_response(
         fast_exits=fast_exits,
     )
     order = np.unique(f)[::-1] if sweep_down else np.unique(f)
-    adaptive = harmonics == "adaptive"
     with threads_for(problem(first).size):
-        found = (
-            solve_adaptively(problem, first, order, fast_exits, settings)
-            if adaptive
-            else solve_curve(problem(first), order, fast_exits, settings)
-        )
-        for part in found.pieces:
-            part.balance.forget_factors()
-        return _answer(found, adaptive)
+        b, curve = solve_curve(problem(first), order, fast_exits, settings)
+        b.forget_factors()
+        return _answer(b, curve)
 
 
-def _answer(found: Whole, adaptive: bool) -> FrequencyResponse:
+def _answer(b: Balance, curve: Curve) -> FrequencyResponse:
     """The answer with its status, and warnings about what the path leaves out."""
-    whole, highest = joined(found.pieces)
-    worst, astray = whole.truncation.max(initial=0.0), int((~whole.periodic).sum())
-    status = found.status
-    if status == "complete" and adaptive and worst > TRUNCATION:
-        status = "harmonic limit"
-    if found.status == "complete" and astray:
-        status = "not periodic"
+    found = measures(b, curve.p, curve.x)
+    worst, astray = found.truncation.max(initial=0.0), int((~found.periodic).sum())
+    status = "not periodic" if curve.status == "complete" and astray else curve.status
     notes = []
-    if worst > (TRUNCATION if adaptive else 10 * TRUNCATION):
-        at = int(np.argmax(whole.truncation))
+    if worst > TRUNCATION:
         notes.append(
-            f"the omitted harmonics ({_omitted(whole.balance.harmonics)}) would move the contacts "
-            f"by up to {worst:.1%}: take more"
-            if not adaptive
-            else f"at {int((whole.truncation > TRUNCATION).sum())} points up to {highest.max()} "
-            f"harmonics are not enough: those left out would move the contacts by up to "
-            f"{worst:.1%} at {whole.frequency[at]:.6g} Hz"
+            f"the omitted harmonics ({_omitted(b.harmonics)}) would move the contacts by up to "
+            f"{worst:.1%}: take more"
         )
     if astray:
-        at = int(np.argmin(whole.periodic))
+        at = int(np.argmin(found.periodic))
         notes.append(
-            f"at {astray} of {len(highest)} points, the first at {whole.frequency[at]:.6g} Hz, the "
+            f"at {astray} of {len(curve.p)} points, the first at {curve.p[at]:.6g} Hz, the "
             "contact forces do not come back to their start: their answers are no steady state; "
             'to fix it: start = "mid", or fewer tangents'
         )
-    if whole.aliasing.max(initial=0.0) > ALIASING:
+    if found.aliasing.max(initial=0.0) > ALIASING:
         notes.append(
             "twice the samples change the contact force by up to "
-            f"{whole.aliasing.max():.1%}: take more samples"
+            f"{found.aliasing.max():.1%}: take more samples"
         )
     for note in notes:
         log.warning(note)
     return FrequencyResponse(
-        whole.balance,
-        whole.frequency,
-        whole.x,
-        whole.displacement,
-        whole.force,
-        whole.state,
-        whole.energy,
-        whole.linear,
-        whole.truncation,
-        whole.aliasing,
-        cast(Status, status),
-        "; ".join([found.message, *notes]),
-        whole.periodic,
-        highest,
+        balance=b,
+        frequency=curve.p,
+        x=curve.x,
+        contact_displacement=found.displacement,
+        contact_force=found.force,
+        state=found.state,
+        energy=found.energy,
+        linear=curve.exact,
+        truncation=found.truncation,
+        aliasing=found.aliasing,
+        status=cast(Status, status),
+        message="; ".join([curve.message, *notes]),
+        periodic=found.periodic,
     )
 
 
@@ -563,9 +539,7 @@ def _require(
         raise InputError("frequency_response: " + "; ".join(problems))
 
 
-def _harmonics(numbers: Iterable[int] | str, force: dict[int, ComplexArray]) -> Harmonics:
-    if isinstance(numbers, str):
-        raise InputError(f'harmonics: "{numbers}" is unknown; give numbers or "adaptive"')
+def _harmonics(numbers: Iterable[int], force: dict[int, ComplexArray]) -> Harmonics:
     h = harmonics(numbers)
     missing = sorted(set(force) - set(h.numbers))
     if missing:

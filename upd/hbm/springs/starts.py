@@ -45,11 +45,11 @@ def place_sliders(b: Balance, frequency: float, settings: Settings | None = None
 
 
 def first_point(
-    b: Balance, frequency: float, guess: FloatArray | None = None, settings: Settings | None = None
+    b: Balance, frequency: float, settings: Settings | None = None
 ) -> FloatArray | None:
     """A solution at one frequency.
 
-    Newton from the guess, the stuck and the free answer; then preload taken away from where every
+    Newton from the stuck and the free answer; then preload taken away from where every
     point sticks; then the dynamic loads raised from zero.
 
     Parameters
@@ -57,8 +57,6 @@ def first_point(
     b : Balance
     frequency : float
         [Hz]
-    guess : (n_unknown,) ndarray, optional
-        Initial guess.
     settings : Settings, optional
 
     Returns
@@ -71,8 +69,8 @@ def first_point(
     if placed is None:
         return None
     b = placed
-    for x in (guess, b.stuck(omega), b.free(omega)):
-        found = None if x is None else newton(b, x, frequency, settings)
+    for x in (b.stuck(omega), b.free(omega)):
+        found = newton(b, x, frequency, settings)
         if found is not None:
             return found
     released = from_stuck(b, frequency, settings)

@@ -5,6 +5,7 @@ Exact stuck answers where proven, continuation over each stretch between.
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +14,11 @@ from numpy.typing import NDArray
 from upd.hbm.core.continuation import Path, follow
 from upd.hbm.core.newton import Settings
 from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.checks import separated, stuck_points
 from upd.hbm.springs.residuals import FREQUENCY_SHARE, over_frequency, scale_of, sizes_of
-from upd.hbm.springs.starts import first_point
+from upd.hbm.springs.starts import first_point, place_sliders
+
+log = logging.getLogger(__name__)
 
 FloatArray = NDArray[np.float64]
 #: share of the range by which a path may come back behind the first frequency before it is ended
@@ -34,7 +38,7 @@ class Curve:
     x : (n, n_unknown) ndarray
         Unknowns.
     exact : (n,) ndarray of bool
-        Where the linear stuck answer was taken.
+        Answered by an exact linear solution.
     status : {"complete", "stopped", "step limit"}
     message : str
         Where and why the curve ended.
@@ -47,11 +51,51 @@ class Curve:
     message: str
 
 
+def solve_curve(
+    b: Balance, f: FloatArray, fast: bool, settings: Settings | None
+) -> tuple[Balance, Curve]:
+    """The curve of a problem whose sliders are placed first, and that problem.
+
+    Parameters
+    ----------
+    b : Balance
+    f : (n,) ndarray
+        Frequencies [Hz], rising or falling.
+    fast : bool
+        Take the exact linear answers where they are proven.
+    settings : Settings or None
+        Step control of the continuation.
+
+    Returns
+    -------
+    tuple of Balance and Curve
+    """
+    omega = 2 * np.pi * f
+    linear = stuck_points(b, omega) if fast and b.start == "zero" else np.zeros(len(f), dtype=bool)
+    if linear.all():
+        x = np.array([b.stuck(float(w)) for w in omega])
+        message = "every point sticks over the whole cycle: the linear answer is exact"
+        return b, Curve(f, x, linear, "complete", message)
+    apart = separated(b, omega) if fast else None
+    if apart is not None:
+        message = "nothing presses the contacts: the free answer is exact"
+        return b, Curve(f, apart, np.ones(len(f), dtype=bool), "complete", message)
+    placed = place_sliders(b, float(f[0]), settings)
+    if placed is None:
+        message = (
+            'start "static": no solution under the static loads alone, so the sliders have no '
+            'place to start from; to fix it: start = "zero" or "mid", or static loads that press '
+            "the contacts"
+        )
+        log.warning(message)
+        return b, Curve(f[:0], np.zeros((0, b.size)), linear[:0], "stopped", message)
+    return placed, sweep(placed, f, linear, settings)
+
+
 def sweep(
     b: Balance,
     f: FloatArray,
     exact: NDArray[np.bool_],
-    guess: FloatArray | None = None,
     settings: Settings | None = None,
 ) -> Curve:
     """The curve over frequency: exact stuck answers where proven, continuation over the rest.
@@ -63,8 +107,6 @@ def sweep(
         Frequencies [Hz], rising or falling; answered in that order.
     exact : (n,) ndarray of bool
         Frequencies at which every point is proven to stick.
-    guess : (n_unknown,) ndarray, optional
-        Initial guess of the first point.
     settings : Settings, optional
         Step control of the continuation.
 
@@ -82,9 +124,7 @@ def sweep(
             i = stop
             continue
         stop = i + int(np.argmax(np.append(exact[i:], True)))
-        part, i = _to_the_next(
-            b, f, i, stop, parts[-1].x[-1] if parts else guess, bool(parts), settings
-        )
+        part, i = _to_the_next(b, f, i, stop, parts[-1].x[-1] if parts else None, settings)
         parts.append(part)
         if part.status != "complete":
             break
@@ -102,7 +142,6 @@ def _to_the_next(
     i: int,
     stop: int,
     x: FloatArray | None,
-    known: bool,
     settings: Settings | None,
 ) -> tuple[Curve, int]:
     """Continuation over f[i:stop] and onto the next exact answer.
@@ -110,13 +149,13 @@ def _to_the_next(
     Arriving on another branch, it follows that to the end.
     """
     last = stop < len(f)
-    part = _stretch(b, f, list(range(i, stop + last)), x, known, settings)
+    part = _stretch(b, f, list(range(i, stop + last)), x, settings)
     if not last or part.status != "complete":
         return part, stop
     there, here = b.stuck(2 * np.pi * f[stop]), part.x[-1]
     if float(np.abs((here - there) / sizes_of(b)(there)).max()) <= OTHER_BRANCH:
         return Curve(part.p[:-1], part.x[:-1], part.exact[:-1], part.status, part.message), stop
-    return _stretch(b, f, list(range(i, len(f))), x, known, settings), len(f)
+    return _stretch(b, f, list(range(i, len(f))), x, settings), len(f)
 
 
 def _stretch(
@@ -124,16 +163,16 @@ def _stretch(
     f: FloatArray,
     index: list[int],
     x: FloatArray | None,
-    known: bool,
     settings: Settings | None,
 ) -> Curve:
     """Continuation over the consecutive frequencies f[index].
 
-    From the solved point before them when `known`.
+    From x, the solved point before them, where there is one.
     """
+    known = x is not None
     begin = f[index[0] - 1] if known else f[index[0]]
-    if not known:
-        x = first_point(b, begin, x, settings)
+    if x is None:
+        x = first_point(b, begin, settings)
     if x is None:
         empty = np.zeros((0, b.size))
         message = (
