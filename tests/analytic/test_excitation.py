@@ -180,7 +180,7 @@ def test_the_march_settles_where_another_does_in_either_harmonic() -> None:
         drive = SLIPPING * model.excitation.drive
         march = InterfaceMarch(springs.march, f, drive, 128 * k, by_coulomb)
         at = state_of(springs, model, found, 0, SLIPPING)
-        point = settle(march, at, 1e-4, 400, accelerate=True)
+        point = settle(march, at, 1e-4, 400)
         assert point.settled and point.last.counts[2] > 0.0
         size = (2.0 * np.pi * k * f) ** 2 * 1e-3 / SLIPPING
         marched.append(size * np.abs(point.first_harmonic[: len(SIDES)]))

@@ -80,7 +80,6 @@ def both_ways(
                 tolerance=TOLERANCE,
                 most_periods=MOST_PERIODS,
                 fallback=by_coulomb,
-                accelerate=False,
             )
             start = found.state
             moved = {k: found.harmonics[:, i] for i, k in enumerate(excitation.harmonics)}

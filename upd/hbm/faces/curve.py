@@ -157,9 +157,7 @@ class InterfaceCurve:
         march = InterfaceMarch(self.modes, f, self.drive, e.samples, e.fallback)
         for tolerance in MARCHED:
             try:
-                settled = settle(
-                    march, self.moving, tolerance, MOST_PERIODS, accelerate=True
-                ).settled
+                settled = settle(march, self.moving, tolerance, MOST_PERIODS).settled
                 moving = self.moving.copy()
                 q = e.Q @ march.period(moving).output
             except ConvergenceError:

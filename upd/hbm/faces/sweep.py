@@ -52,8 +52,6 @@ class SteppedSine:
         Newton steps a time step, of the last period.
     fallbacks : (k,) ndarray of int
         Steps that the solver behind Newton's had to finish.
-    accepted, rejected : (k,) ndarray of int
-        Jumps ahead that were kept, and that were taken back.
     harmonics : (k, h, K) ndarray
         As `amplitude`, in all harmonics that are excited.
     model : InterfaceModel
@@ -89,8 +87,6 @@ class SteppedSine:
     state: InterfaceState
     status: str
     message: str
-    accepted: NDArray[np.int64]
-    rejected: NDArray[np.int64]
     harmonics: ComplexArray
     model: InterfaceModel
     drive: ComplexArray
@@ -108,7 +104,6 @@ def stepped_sine(
     tolerance: float = 1e-3,
     most_periods: int = 2000,
     fallback: Fallback | None = None,
-    accelerate: bool = True,
 ) -> SteppedSine:
     """Sweep over the frequencies in the order given, each from where the one before ended.
 
@@ -130,9 +125,6 @@ def stepped_sine(
         At each frequency.
     fallback : callable, optional
         As for `InterfaceMarch`.
-    accelerate : bool
-        Whether to jump ahead where the periods tell where they lead to; see
-        `upd.hbm.faces.settle`.
 
     Returns
     -------
@@ -156,7 +148,7 @@ def stepped_sine(
     for one in f:
         march = InterfaceMarch(model, float(one), drive, samples, fallback, march)
         try:
-            points.append(settle(march, at, tolerance, most_periods, accelerate=accelerate))
+            points.append(settle(march, at, tolerance, most_periods))
         except ConvergenceError as error:
             message = str(error)
             break
@@ -181,8 +173,6 @@ def stepped_sine(
         at,
         status,
         message or (unsettled if missed else "All frequencies settled."),
-        np.array([p.accepted for p in points], int),
-        np.array([p.rejected for p in points], int),
         np.array([p.harmonics for p in points]).reshape((k, -1, K) if k else (0, 1, K)),
         model,
         np.asarray(drive, complex),
