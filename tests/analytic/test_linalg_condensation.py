@@ -251,9 +251,9 @@ def test_choice(monkeypatch):
     monkeypatch.setattr(select_module, "has_pardiso", lambda: False)
     chosen = choose(10_000, 100, memory_limit_bytes=1e11)
     assert chosen.name == "superlu"
-    assert "pip install upd[mkl]" in chosen.why
-    assert "pip install upd[mkl]" in available()["solver pardiso"]
-    with pytest.raises(InputError, match=r"pip install upd\[mkl\]"):
+    assert "pip install updampers[mkl]" in chosen.why
+    assert "pip install updampers[mkl]" in available()["solver pardiso"]
+    with pytest.raises(InputError, match=r"pip install updampers\[mkl\]"):
         choose(10_000, 100, solver="pardiso")
     with pytest.raises(InputError, match="Unknown solver 'mumps'"):
         choose(10_000, 100, solver="mumps")

@@ -309,7 +309,7 @@ def test_bad_cluster_is_told(
 
 def test_missing_dask_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r"upd\[cluster\]"):
+    with pytest.raises(InputError, match=r"updampers\[cluster\]"):
         sweep("hertz", VARY, overrides=TINY, out=tmp_path, cluster="local:2")
 
 

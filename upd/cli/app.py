@@ -77,7 +77,7 @@ class SweepPoints:
         Threads of each process. The last digits of numbers depend on it.
     cluster
         Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs
-        upd[cluster].
+        updampers[cluster].
     """
 
     sample: int | None = None
@@ -100,7 +100,7 @@ class StudyWorkers:
         Threads of each point; by default all there are, divided by the workers.
     cluster
         Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs
-        upd[cluster].
+        updampers[cluster].
     """
 
     workers: int = 1

@@ -88,7 +88,7 @@ def load() -> Callable[..., None]:
         call: Any = PyPardisoSolver().libmkl.pardiso_64
     except (ImportError, AttributeError, OSError) as error:
         raise InputError(
-            f'Solver "pardiso" is not installed ({error}): pip install upd[mkl], or choose '
+            f'Solver "pardiso" is not installed ({error}): pip install updampers[mkl], or choose '
             '"superlu" or "amg".'
         ) from error
     call.restype = None

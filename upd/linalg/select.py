@@ -247,7 +247,7 @@ def choose(
         predict(n_dof, n_kept, solver)
         if solver == "pardiso" and not has_pardiso():
             raise InputError(
-                'Solver "pardiso" is not installed: pip install upd[mkl], or choose '
+                'Solver "pardiso" is not installed: pip install updampers[mkl], or choose '
                 '"superlu" or "amg".'
             )
         if solver == "amg" and direct:
@@ -278,7 +278,7 @@ def choose(
         f"{_size(limit)}"
     )
     if not has_pardiso():
-        why += "; pip install upd[mkl] for a faster one"
+        why += "; pip install updampers[mkl] for a faster one"
     return Choice(name, why)
 
 
@@ -320,7 +320,7 @@ def available() -> dict[str, str]:
 
 def _pardiso_version() -> str:
     if not has_pardiso():
-        return "not installed: pip install upd[mkl]"
+        return "not installed: pip install updampers[mkl]"
     try:
         mkl = metadata.version("mkl")
     except metadata.PackageNotFoundError:

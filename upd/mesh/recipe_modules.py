@@ -54,15 +54,26 @@ def module_of(recipe: str) -> ModuleType:
 def geometry_module(name: str) -> ModuleType:
     """Module `name` of our geometry package.
 
-    Raises InputError when another module of that name stands before it on the path.
+    The package lies beside ours, or inside it in a wheel. It is loaded from its place, so that
+    files of that name elsewhere do not matter. Raises InputError when another module of that name
+    has been imported before.
     """
-    root = Path(__file__).resolve().parents[2]
-    try:
-        found = importlib.util.find_spec("geometry")
-    except ValueError:  # already imported without a spec, so not by us
-        found = None
-    origin = Path(found.origin).resolve() if found is not None and found.origin else None
-    if origin != root / "geometry" / "__init__.py":
+    package = Path(__file__).resolve().parents[1]
+    file = next(
+        path
+        for path in (package / "geometry/__init__.py", package.parent / "geometry/__init__.py")
+        if path.is_file()
+    )
+    known = sys.modules.get("geometry")
+    if known is None:
+        spec = importlib.util.spec_from_file_location(
+            "geometry", file, submodule_search_locations=[str(file.parent)]
+        )
+        assert spec is not None and spec.loader is not None
+        known = sys.modules["geometry"] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(known)
+    origin = getattr(known, "__file__", None)
+    if origin is None or Path(origin).resolve() != file:
         raise InputError(
             f"recipes: upd's package 'geometry' is hidden by {origin or 'another module'}: "
             "rename that file or start elsewhere"

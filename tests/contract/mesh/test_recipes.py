@@ -295,11 +295,22 @@ def fresh_geometry() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("fresh_geometry")
-def test_shadowing_file_is_noticed_and_not_run(
+def test_a_file_of_that_name_elsewhere_is_not_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "geometry.py").write_text("raise RuntimeError('run')")
     monkeypatch.syspath_prepend(tmp_path)
+    assert recipes.parameters("sphere_block")
+    assert Path(sys.modules["geometry"].__file__ or "").parent.name == "geometry"
+
+
+@pytest.mark.usefixtures("fresh_geometry")
+def test_another_module_imported_before_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "geometry.py").write_text("")
+    monkeypatch.syspath_prepend(tmp_path)
+    importlib.import_module("geometry")
     with pytest.raises(InputError, match=r"hidden by .*geometry\.py: rename"):
         recipes.build_mesh("sphere_block", {}, cache_dir=tmp_path)
 

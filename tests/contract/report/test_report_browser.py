@@ -41,7 +41,8 @@ pytestmark = [
     pytest.mark.skipif(_BROWSER is None, reason=f"none of {', '.join(_NAMES)} is on the PATH"),
 ]
 tornado = pytest.importorskip(
-    "tornado.websocket", reason="tornado, which the extra upd[cluster] brings, drives the browser"
+    "tornado.websocket",
+    reason="tornado, which the extra updampers[cluster] brings, drives the browser",
 )
 
 _START_S, _LOAD_S = 30.0, 30.0
