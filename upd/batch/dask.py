@@ -22,8 +22,7 @@ PATIENCE_S = 60.0
 _LOOK_S = 1.0
 _LOCAL, _SCHEDULER = re.compile(r"local:([1-9]\d*)"), re.compile(r"(tcp|tls)://.+:\d+")
 _MISSING = (
-    '--cluster needs Dask: pip install "updampers[cluster]", or leave --cluster out to use this '
-    "machine"
+    '--cluster needs Dask: pip install "updampers[cluster]", or leave it out to use this machine'
 )
 _LOST = "the connection to the cluster's scheduler was lost"
 _AGAIN = ", then the same command; it takes up where it stood"

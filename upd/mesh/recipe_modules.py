@@ -59,24 +59,19 @@ def geometry_module(name: str) -> ModuleType:
     has been imported before.
     """
     package = Path(__file__).resolve().parents[1]
-    file = next(
-        path
-        for path in (package / "geometry/__init__.py", package.parent / "geometry/__init__.py")
-        if path.is_file()
-    )
+    inside, beside = (home / "geometry/__init__.py" for home in (package, package.parent))
+    file = inside if inside.is_file() else beside
     known = sys.modules.get("geometry")
     if known is None:
-        spec = importlib.util.spec_from_file_location(
-            "geometry", file, submodule_search_locations=[str(file.parent)]
-        )
+        spec = importlib.util.spec_from_file_location("geometry", file)
         assert spec is not None and spec.loader is not None
         known = sys.modules["geometry"] = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(known)
-    origin = getattr(known, "__file__", None)
-    if origin is None or Path(origin).resolve() != file:
+    origin = getattr(known, "__file__", None) or "another module"
+    if Path(origin).resolve() != file:
         raise InputError(
-            f"recipes: upd's package 'geometry' is hidden by {origin or 'another module'}: "
-            "rename that file or start elsewhere"
+            f"recipes: upd's package 'geometry' is hidden by {origin}: rename that file or start "
+            "elsewhere"
         )
     return importlib.import_module(f"geometry.{name}")
 
@@ -109,30 +104,26 @@ def _user_module(path: Path) -> ModuleType:
         return sys.modules[name]
     # what it imports may have changed since another recipe imported it
     changed = {str(file) for file in files[1:]}
-    for known, loaded in list(sys.modules.items()):
-        if getattr(loaded, "__file__", "") in changed:
-            del sys.modules[known]
+    for known in [k for k, m in sys.modules.items() if getattr(m, "__file__", "") in changed]:
+        del sys.modules[known]
     _warn_first(path, name)
-    module = ModuleType(name)
-    module.__file__ = str(path.resolve())
     # dataclasses and typing look the module up by name
-    sys.modules[name] = module
+    module = sys.modules[name] = ModuleType(name)
+    module.__file__ = str(path.resolve())
     try:
         exec(compile(source, str(path), "exec"), module.__dict__)
     except (Exception, SystemExit) as problem:
         del sys.modules[name]
-        message = f"{type(problem).__name__}: {problem}"
         raise InputError(
             f"recipe {str(path)!r}: fails when it is run{line_of(str(path), problem)}: "
-            f"{message}; to fix it: correct it there"
+            f"{type(problem).__name__}: {problem}; to fix it: correct it there"
         ) from problem
     return module
 
 
 def _warn_first(path: Path, name: str) -> None:
     """Say that a scene runs the code of a file, the first time it does so on this machine."""
-    mark = cache_folder() / "recipes" / name
-    if mark.exists():
+    if (mark := cache_folder() / "recipes" / name).exists():
         return
     log.warning(
         "the scene runs the Python code of %s, which may do whatever you may: read it when it is "
