@@ -406,8 +406,8 @@ class Coulomb(CoulombConditions):
                 -step.b[:n],
                 none,
                 none + np.inf,
-                load=None if step.load is None else (step.load / size)[moved],
-                motion=None if step.motion is None else (step.motion * size)[moved],
+                load=None if step.load is None else step.load[moved] / size[moved],
+                motion=None if step.motion is None else step.motion[moved] * size[moved],
                 state=state,
             )
         except (ConvergenceError, RuntimeError):
