@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# run.sh CMD...: make sure the environment is there, then run CMD in it. The first call sets up .venv; later calls start at once.
+# run.sh CMD...: make sure the environment is there, then run CMD in it (docs: build the manual). The first call sets up .venv; later calls start at once.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 venv="$root/.venv"
@@ -59,4 +59,5 @@ if [ ! -f "$venv/.ready" ] || [ "$(cat "$venv/.ready")" != "$stamp" ]; then
   exec 9>&-
 fi
 export PATH="$venv/bin:$PATH" VIRTUAL_ENV="$venv"
+[ "$1" != docs ] || set -- python "$root/upd/manual/build.py"
 exec "$@"

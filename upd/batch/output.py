@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,15 +21,18 @@ from upd.batch.table import Column, as_csv, csv_text, reasons
 from upd.cache.files import write_text
 from upd.cache.sources import versions
 from upd.errors import InputError
-from upd.plot.matplotlib import write_sheets
+from upd.plot.matplotlib import draw_all, write_sheets
 from upd.plot.sample_charts import sample_charts
 from upd.plot.sweep_charts import figure_names, sweep_charts
 from upd.results import write_netcdf
 from upd.results.sampled import SampledNumber
 from upd.vary.outcome import Outcome
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class SweepResult:
     """A finished sweep: its plan, the outcome of every point in the grid's order, the followed
     numbers, seconds of this call, files, what went wrong with its pictures, and of a sample what it
@@ -44,6 +47,23 @@ class SweepResult:
     files: tuple[Path, ...] = ()
     faults: tuple[str, ...] = ()
     sampled: tuple[SampledNumber, ...] = ()
+
+    def __repr__(self) -> str:
+        points = len(self.outcomes)
+        head = f"Sweep: {points - len(self.failed)} of {points} points solved; {self.folder}"
+        ranges = [
+            f"  {c.title}: {np.nanmin(c.values):.5g} to {np.nanmax(c.values):.5g} {c.unit}".rstrip()
+            for c in self.columns
+            if np.isfinite(c.values).any()
+        ]
+        more = [f"  and {len(ranges) - 7} more numbers"] * (len(ranges) > 8)
+        return "\n".join([head, *ranges[: 7 if more else 8], *more])
+
+    def plot(self) -> list[Axes]:
+        """Draw the followed numbers with matplotlib, and return the axes."""
+        if self.sampled:
+            return draw_all(sample_charts(self.sampled, [c.values for c in self.columns]))
+        return draw_all(sweep_charts(self.plan.axes, self.columns)[:6])
 
     @property
     def failed(self) -> list[int]:

@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from upd.analyses import analysis_of, ladders_of
 from upd.batch.dask import check_address
@@ -21,7 +21,7 @@ from upd.cache.files import write_text
 from upd.cache.sources import source_digest
 from upd.errors import InputError
 from upd.linalg import select
-from upd.plot.matplotlib import write_sheets
+from upd.plot.matplotlib import draw_all, write_sheets
 from upd.scene import AnyScene, load_scene
 from upd.scene.quantities import UNKNOWN
 from upd.units import parse_quantity
@@ -29,6 +29,9 @@ from upd.vary.ladder import Asked, StudyReport
 from upd.vary.outcome import SolvedPoint
 from upd.vary.tables import markdown_table
 from upd.vary.variation import Variation
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 #: numbers the loads alone decide: no level changes them
 _OF_LOADS = ("F_N", "F_T")
@@ -88,7 +91,7 @@ class Study:
         return [table, data, *figures, page]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StudyResult:
     """A finished study.
 
@@ -108,6 +111,20 @@ class StudyResult:
     files: tuple[Path, ...]
     kept: tuple[int, ...]
     seconds: float
+
+    def __repr__(self) -> str:
+        solved = sum(not one.outcome.failure for one in self.solved)
+        counts = f"{solved} of {len(self.solved)} levels solved in {self.seconds:.1f} s"
+        return "\n".join([f"{self.study.title}: {counts}", *self.report.notes[:6]])
+
+    def table(self) -> str:
+        """Its first table in Markdown: the levels with their cost and main numbers."""
+        return "\n".join(markdown_table(self.report.tables[0]))
+
+    def plot(self) -> list[Axes]:
+        """Draw error against seconds with matplotlib, and return the axes."""
+        charts = self.report.charts([asdict(one) for one in self.report.curves])
+        return draw_all([one for one in charts if one.x.name == charts[0].x.name][:6])
 
 
 def study(

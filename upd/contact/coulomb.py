@@ -419,7 +419,7 @@ class Coulomb(CoulombConditions):
         forces = np.concatenate((found.x, np.zeros(len(self.C) - n)))
         at = Iterate(forces, s, self.C @ forces - self.B @ s - step.b)
         answer = self._judged(step, at, used)
-        # Newton takes away what is left of rounding, where a motion is not free.
+        # Newton removes the rest of rounding, where a motion is not free.
         return answer if answer.converged else self._newton(step, at, NEWTON_STEPS)
 
     def _fallback(self, step: AskedStep) -> CoupledStep:

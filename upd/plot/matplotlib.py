@@ -87,6 +87,16 @@ def draw(chart: Chart, ax: Axes | None = None) -> Axes:
     return ax
 
 
+def draw_all(charts: Sequence[Chart]) -> list[Axes]:
+    """Charts side by side in a figure of pyplot, two a row; returns their axes."""
+    import matplotlib.pyplot as plt
+
+    columns = min(2, len(charts))
+    rows = -(-len(charts) // columns)
+    sheet = plt.figure(figsize=(6.4 * columns, 4.2 * rows), layout="constrained")
+    return [draw(chart, sheet.add_subplot(rows, columns, k + 1)) for k, chart in enumerate(charts)]
+
+
 def chart_png(charts: Sequence[Chart]) -> bytes:
     """A sheet of ``charts`` as PNG for a page, at most `MOST_PANELS`."""
     out = io.BytesIO()

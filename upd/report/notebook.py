@@ -135,6 +135,10 @@ class RunResult:
         """
         return plot(self, title, case, ax)
 
+    def table(self) -> str:
+        """All its numbers as text, a line each: name, case, value, unit, bound of the error."""
+        return "\n".join(line.text for line in self.answer(text_width(), full=True))
+
     def to_xarray(self) -> dict[str, Any]:
         """Case -> xarray.Dataset, with dimensions, coordinates and units.
 
@@ -203,7 +207,7 @@ def charts(result: RunResult) -> list[Chart]:
 
 def plot(result: RunResult, title: str | None, case: str | None, ax: Axes | None) -> list[Axes]:
     """Draw charts with matplotlib; see `RunResult.plot`."""
-    from upd.plot.matplotlib import draw
+    from upd.plot.matplotlib import draw, draw_all
 
     chosen = _chosen(charts(result), title, case)
     if ax is not None:
@@ -213,12 +217,7 @@ def plot(result: RunResult, title: str | None, case: str | None, ax: Axes | None
                 f"plot: ax takes one chart, {len(chosen)} are meant ({meant}); give title and case"
             )
         return [draw(chosen[0], ax)]
-    import matplotlib.pyplot as plt
-
-    columns = min(2, len(chosen))
-    rows = -(-len(chosen) // columns)
-    sheet = plt.figure(figsize=(6.4 * columns, 4.2 * rows), layout="constrained")
-    return [draw(chart, sheet.add_subplot(rows, columns, k + 1)) for k, chart in enumerate(chosen)]
+    return draw_all(chosen)
 
 
 def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Chart]:

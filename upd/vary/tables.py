@@ -59,11 +59,13 @@ def cost_columns(digits: int = 2) -> tuple[TableColumn, ...]:
 
 
 def markdown_table(table: TextTable) -> list[str]:
-    """Lines of a table in Markdown."""
-    heads = (head.replace("\n", " ") for head in table.columns)
-    marks = "".join("---:|" if letter == "r" else "---|" for letter in table.align)
-    lines = (f"| {' | '.join(row)} |" for row in table.rows)
-    return [f"| {' | '.join(heads)} |", f"|{marks}", *lines]
+    """Lines of a table in Markdown, its columns as wide as their widest cell."""
+    rows = [tuple(head.replace("\n", " ") for head in table.columns), *table.rows]
+    widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
+    signs = [">" if letter == "r" else "<" for letter in table.align]
+    marks = ("-" * (n + 1) + "-:"[sign == ">"] for n, sign in zip(widths, signs, strict=True))
+    lines = [f"| {' | '.join(map('{:{}{}}'.format, row, signs, widths))} |" for row in rows]
+    return [lines[0], f"|{'|'.join(marks)}|", *lines[1:]]
 
 
 #: numbers beside the cost of a level, and errors for which one is sought

@@ -8,7 +8,6 @@ import csv
 import io
 import json
 import re
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -95,7 +94,7 @@ def sphere(
 
 def test_readme_is_short() -> None:
     lines = README.splitlines()
-    assert len(lines) <= 160
+    assert len(lines) <= 120
     assert [line for line in lines if len(line) > 120 and not line.startswith(("|", "!["))] == []
 
 
@@ -139,13 +138,6 @@ def test_example_prints_its_numbers(
 
 def test_the_readme_has_an_example() -> None:
     assert "README.md" in [name for name, _ in EXAMPLES]
-
-
-def test_scene_in_the_readme_is_the_example_file() -> None:
-    (shown,) = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
-    file = (ROOT / "upd" / "scenes" / "examples" / "own_damper.toml").read_text(encoding="utf-8")
-    assert tomllib.loads(shown) == tomllib.loads(file)
-    assert shown.strip() == file.strip()
 
 
 def test_headlines_are_printed(sphere: tuple[str, dict[tuple[str, str], dict[str, Any]]]) -> None:

@@ -1,0 +1,11 @@
+"""
+Does the damper jam, lift off or tilt?
+======================================
+
+Before any dynamics: the damper as a rigid body between two faces, in closed form.
+"""
+
+import upd
+
+design = upd.design("symmetric-response")
+print(design)
