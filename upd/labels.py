@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 
@@ -80,3 +82,30 @@ _UNITS = {
 def unit_label(unit: str) -> str:
     """A unit as it is printed."""
     return _UNITS.get(unit, unit)
+
+
+class Shown:
+    """Base of results with arrays: they print as shapes and ranges, on ten lines at most."""
+
+    def __repr__(self) -> str:
+        known: Any = self
+        parts = [f"{one.name} {_shown_field(getattr(self, one.name))}" for one in fields(known)]
+        lines = textwrap.wrap(f"{type(self).__name__}: {', '.join(parts)}", 100)
+        return "\n  ".join(lines if len(lines) <= 10 else [*lines[:9], "..."])
+
+
+def _shown_field(value: Any) -> str:
+    """A value in few characters: an array by its shape and range."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, (str, int)) or value is None:
+        return str(value)
+    shape = getattr(value, "shape", None)
+    if shape is None:
+        return type(value).__name__
+    if not shape or 0 in shape or not hasattr(value, "ravel"):
+        return f"{shape}" if shape else f"{value:.6g}"
+    flat = abs(value.ravel()) if value.dtype.kind == "c" else value.ravel()
+    return (
+        f"{shape} {flat.min():.4g} to {flat.max():.4g}" if flat.dtype.kind in "fiu" else f"{shape}"
+    )

@@ -13,13 +13,14 @@ from upd.contact.coulomb_conditions import CoupledStep, Iterate
 from upd.contact.load_steps import CoupledHistory, LoadSteps, SolvedStep, offset_of
 from upd.contact.locking import carries
 from upd.errors import ConvergenceError, InputError
+from upd.labels import Shown
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
-@dataclass(frozen=True)
-class CoupledContact:
+@dataclass(frozen=True, repr=False)
+class CoupledContact(Shown):
     """Answers of a load history of k steps at n nodes with c = 2 or 3 components.
 
     Attributes

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.contact.checks import EPS, Problems, numbers
 from upd.errors import InputError
+from upd.labels import Shown
 
 FloatArray = NDArray[np.float64]
 Weight = Literal["stiffness", "area"]
@@ -29,8 +30,8 @@ _FORMAT: dict[str, tuple[tuple[str, ...], str]] = {
 _PREFIX = "law_"
 
 
-@dataclass(frozen=True)
-class ContactLaw:
+@dataclass(frozen=True, repr=False)
+class ContactLaw(Shown):
     """Contact points of a dynamic model, m of them.
 
     Attributes

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from upd.contact.coulomb import Coulomb
 from upd.contact.coulomb_conditions import CoupledStep, Iterate
 from upd.contact.locking import carries
+from upd.labels import Shown
 
 FloatArray = NDArray[np.float64]
 
@@ -18,8 +19,8 @@ FloatArray = NDArray[np.float64]
 _PARTS = 8
 
 
-@dataclass(frozen=True)
-class CoupledHistory:
+@dataclass(frozen=True, repr=False)
+class CoupledHistory(Shown):
     """What the next load step must know about the one before.
 
     Attributes

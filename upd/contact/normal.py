@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.contact.checks import Problems, compliance_matrix, few_threads, numbers, unit_response
 from upd.contact.qp import FREE, LOWER, BoxQP, FloatArray, Method, State
+from upd.labels import Shown
 
 BoolArray = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class NormalContact:
+@dataclass(frozen=True, repr=False)
+class NormalContact(Shown):
     """Answer of one normal contact problem with n nodes.
 
     Attributes

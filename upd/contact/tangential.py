@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 from upd.contact.checks import Problems, few_threads
 from upd.contact.qp import FloatArray, State
 from upd.contact.tangential_step import TangentialContact, TangentialHistory, TangentialSolver
+from upd.labels import Shown
 
 BoolArray = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class TangentialPath:
+@dataclass(frozen=True, repr=False)
+class TangentialPath(Shown):
     """Answers of a load history of k steps.
 
     Attributes

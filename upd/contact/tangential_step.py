@@ -11,12 +11,13 @@ from scipy.linalg import blas
 from upd.contact.checks import EPS, Problems, compliance_matrix, numbers, unit_response
 from upd.contact.disk import DiskQP
 from upd.contact.qp import FREE, BoxQP, FloatArray, State
+from upd.labels import Shown
 
 BoolArray = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class TangentialHistory:
+@dataclass(frozen=True, repr=False)
+class TangentialHistory(Shown):
     """What the next load step must know about the one before.
 
     Attributes
@@ -34,8 +35,8 @@ class TangentialHistory:
     state: State
 
 
-@dataclass(frozen=True)
-class TangentialContact:
+@dataclass(frozen=True, repr=False)
+class TangentialContact(Shown):
     """Answer of one tangential load step at n nodes.
 
     Vectors are (n,), or (2 n,) = [x_0 .. x_{n-1}, y_0 .. y_{n-1}] in two directions.

@@ -20,11 +20,12 @@ from upd.contact.checks import EPS, Problems, compliance_matrix, few_threads, nu
 from upd.contact.normal import NormalContact
 from upd.contact.qp import FREE, HALF_THE_DIGITS, LOWER, BoxQP, FloatArray
 from upd.errors import ConvergenceError
+from upd.labels import Shown
 from upd.linalg.least_distance import least_distance
 
 
-@dataclass(frozen=True)
-class TiltedContact:
+@dataclass(frozen=True, repr=False)
+class TiltedContact(Shown):
     """Answer of one contact problem with free tilt.
 
     Attributes

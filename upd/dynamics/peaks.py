@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.errors import InputError
+from upd.labels import Shown
 from upd.mesh import FloatArray, IntArray
 
 
-@dataclass(frozen=True)
-class Peaks:
+@dataclass(frozen=True, repr=False)
+class Peaks(Shown):
     """Resonance peaks, lowest frequency first.
 
     Attributes

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from upd.dynamics.systems import ComplexArray
 from upd.errors import InputError
+from upd.labels import Shown
 from upd.linalg.common import checked_vectors
 from upd.mesh import FloatArray
 
@@ -58,8 +59,8 @@ class System(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class LinearResponse:
+@dataclass(frozen=True, repr=False)
+class LinearResponse(Shown):
     """Response per newton.
 
     Attributes

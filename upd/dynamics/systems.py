@@ -17,6 +17,7 @@ from scipy.sparse.linalg import splu
 
 from upd.errors import ConvergenceError, InputError
 from upd.fem.damping import checked_ratio
+from upd.labels import Shown
 from upd.linalg.eigen_checks import Modes
 from upd.mesh import FloatArray
 
@@ -106,8 +107,8 @@ def _sparse_solve(Z: Any, force: FloatArray) -> ComplexArray:
     )
 
 
-@dataclass(frozen=True)
-class ModalSystem:
+@dataclass(frozen=True, repr=False)
+class ModalSystem(Shown):
     """Superposition of modes with modal damping.
 
     Attributes

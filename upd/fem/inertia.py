@@ -11,6 +11,7 @@ from upd.errors import MeshError
 from upd.fem.assembly import _blocks, _per_hex
 from upd.fem.elements import BasisMaker, gauss, hex_element
 from upd.fem.material import Material
+from upd.labels import Shown
 from upd.mesh import FloatArray, IntArray, Mesh
 
 # Gauss points per direction that integrate rho x_i x_j |J| exactly: |J| has degree 2 (8 nodes) or 5
@@ -18,8 +19,8 @@ from upd.mesh import FloatArray, IntArray, Mesh
 _POINTS = {1: 3, 2: 5}
 
 
-@dataclass(frozen=True)
-class MassProperties:
+@dataclass(frozen=True, repr=False)
+class MassProperties(Shown):
     """Mass properties of a body.
 
     Attributes

@@ -10,13 +10,14 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from upd.errors import InputError
+from upd.labels import Shown
 from upd.mesh import FloatArray, IntArray
 
 _AXES = "xyz"
 
 
-@dataclass(frozen=True)
-class RigidSet:
+@dataclass(frozen=True, repr=False)
+class RigidSet(Shown):
     """Nodes that move as one.
 
     Parameters
@@ -48,8 +49,8 @@ class RigidSet:
         ).ravel()
 
 
-@dataclass(frozen=True)
-class Reduction:
+@dataclass(frozen=True, repr=False)
+class Reduction(Shown):
     """Change of unknowns u = T q.
 
     Attributes
@@ -68,8 +69,8 @@ class Reduction:
     rigid: Mapping[str, IntArray]
 
 
-@dataclass(frozen=True)
-class Supports:
+@dataclass(frozen=True, repr=False)
+class Supports(Shown):
     """Fixed dofs and rigid sets of one body.
 
     Parameters

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.errors import InputError
+from upd.labels import Shown
 from upd.linalg.blocks import WIDTH
 from upd.linalg.common import FloatArray, checked_dofs, checked_vectors, log
 from upd.linalg.multigrid import MAX_ITERATIONS, MultigridSolver
@@ -19,8 +20,8 @@ from upd.linalg.symmetric import checked
 RTOL = 1e-10
 
 
-@dataclass(frozen=True)
-class AmgSolution:
+@dataclass(frozen=True, repr=False)
+class AmgSolution(Shown):
     """One answer of conjugate gradients.
 
     Attributes

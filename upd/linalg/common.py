@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
+from upd.labels import Shown
 
 log = logging.getLogger("upd.linalg")
 
@@ -29,8 +30,8 @@ _STRIPS = 16
 _CHECKED = "_upd_checked"
 
 
-@dataclass(frozen=True)
-class Condensation:
+@dataclass(frozen=True, repr=False)
+class Condensation(Shown):
     """Schur complement of a stiffness on the kept dofs.
 
     Attributes

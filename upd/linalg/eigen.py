@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import eigh
 
 from upd.errors import ConvergenceError, InputError
+from upd.labels import Shown
 from upd.linalg.common import EPS, Factor, FloatArray, Motion, checked_vectors, log
 from upd.linalg.eigen_checks import Modes, checked_mass, finished, ritz
 from upd.linalg.inertia import Count, about_how_many, count_modes
@@ -133,8 +134,8 @@ class _Inverse:
     placed: bool = False
 
 
-@dataclass
-class Eigenproblem:
+@dataclass(repr=False)
+class Eigenproblem(Shown):
     """K x = lambda M x with its factor kept from one question to the next.
 
     Parameters

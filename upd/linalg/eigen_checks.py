@@ -10,12 +10,13 @@ from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
+from upd.labels import Shown
 from upd.linalg.common import EPS, FloatArray, largest_skew
 from upd.linalg.symmetric import Matrix, Symmetric
 
 
-@dataclass(frozen=True)
-class Modes:
+@dataclass(frozen=True, repr=False)
+class Modes(Shown):
     """Natural frequencies and mode shapes, lowest first.
 
     Attributes

@@ -19,6 +19,7 @@ from scipy.io import mminfo, mmread, mmwrite
 from scipy.sparse import csr_array, load_npz, save_npz
 
 from upd.errors import InputError
+from upd.labels import Shown
 from upd.matrices.harwell_boeing import read_harwell_boeing, write_harwell_boeing
 from upd.mesh import IntArray
 
@@ -30,8 +31,8 @@ _OTHER_NUMBER = re.compile(rb"[0-9.][dD][-+0-9]|,")
 _HEADER = "! Matrix Eqn      Node      DOF"
 
 
-@dataclass(frozen=True)
-class DofMap:
+@dataclass(frozen=True, repr=False)
+class DofMap(Shown):
     """What each row of the matrices is.
 
     Attributes
@@ -76,8 +77,8 @@ class DofMap:
         return int(rows[0])
 
 
-@dataclass(frozen=True)
-class Matrices:
+@dataclass(frozen=True, repr=False)
+class Matrices(Shown):
     """Stiffness and mass of a model.
 
     Attributes

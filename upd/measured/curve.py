@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.errors import InputError
+from upd.labels import Shown
 from upd.mesh import FloatArray
 from upd.units import UNITS, unit_factor
 
@@ -25,8 +26,8 @@ QUANTITIES = tuple(TO_ACCELERANCE)
 LEAST_POINTS = 3
 
 
-@dataclass(frozen=True)
-class MeasuredCurve:
+@dataclass(frozen=True, repr=False)
+class MeasuredCurve(Shown):
     """A measured frequency response, whichever way its file gave it.
 
     Attributes

@@ -39,6 +39,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from upd.errors import InputError
+from upd.labels import Shown
 from upd.measured.curve import ComplexArray, MeasuredCurve
 from upd.measured.noise import NoiseLevel, noise_mix
 from upd.measured.peaks import noisy_peaks
@@ -54,8 +55,8 @@ _FEW, _MOST = 30, 500
 _MOST_SIGNS = 5
 
 
-@dataclass(frozen=True)
-class DampingFit:
+@dataclass(frozen=True, repr=False)
+class DampingFit(Shown):
     """Modes fitted to a measured curve, by rising frequency.
 
     Attributes

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.errors import InputError
+from upd.labels import Shown
 from upd.linalg.common import EPS, FloatArray, checked_vectors
 from upd.linalg.eigen import Eigenproblem
 from upd.linalg.symmetric import checked
 
 
-@dataclass(frozen=True)
-class AttachedModel:
+@dataclass(frozen=True, repr=False)
+class AttachedModel(Shown):
     """A body on modal coordinates, then those of its static shapes.
 
     Attributes

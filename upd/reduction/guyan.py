@@ -13,6 +13,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from upd.errors import ConvergenceError, InputError
+from upd.labels import Shown
 from upd.linalg.amg import compliance_amg
 from upd.linalg.common import EPS, checked_dofs, checked_vectors, log
 from upd.linalg.schur import schur_complement
@@ -32,8 +33,8 @@ RIGID_NAMES = (
 _REMEDY = "To fix it: hold the distant set."
 
 
-@dataclass(frozen=True)
-class Condensed:
+@dataclass(frozen=True, repr=False)
+class Condensed(Shown):
     """A body condensed on k kept dofs.
 
     Attributes

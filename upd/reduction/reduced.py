@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.cache.files import whole_bytes, whole_file
 from upd.errors import InputError
+from upd.labels import Shown
 from upd.linalg.common import FloatArray, IntArray, checked_vectors
 from upd.linalg.eigen import modes
 from upd.linalg.eigen_checks import Modes
@@ -33,8 +34,8 @@ _UNITS = {"K": "N/mm", "M": "t", "stiffness_size": "N/mm", "fixed_frequency": "H
 _FORMAT = "upd reduced model 1"
 
 
-@dataclass(frozen=True)
-class ReducedModel:
+@dataclass(frozen=True, repr=False)
+class ReducedModel(Shown):
     """Model on r = k + m coordinates q: displacements of k boundary dofs, then modal coordinates.
 
     Attributes

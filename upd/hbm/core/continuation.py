@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from upd.hbm.core.newton import EPS, ROUNDING, FloatArray, Function, Scale, Settings
 from upd.hbm.core.path_step import State, advance, begin
+from upd.labels import Shown
 
 log = logging.getLogger(__name__)
 
@@ -27,8 +28,8 @@ Status = Literal["complete", "stopped", "step limit"]
 UNBOUNDED = 10.0
 
 
-@dataclass(frozen=True)
-class Path:
+@dataclass(frozen=True, repr=False)
+class Path(Shown):
     """Points of a path.
 
     Attributes

@@ -13,13 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
 from upd.hbm.springs.points import Contacts
+from upd.labels import Shown
 
 FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
 
 
-@dataclass(frozen=True)
-class RigidDamper:
+@dataclass(frozen=True, repr=False)
+class RigidDamper(Shown):
     """Rigid body between the blades.
 
     Dofs (ux, uy, uz, rx, ry, rz): a point at r moves by u + theta x (r - centre).

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from upd.hbm.springs.coulomb import LIFT
 from upd.hbm.springs.period import GIVEN, LOWER, MID, UPPER, march_points
+from upd.labels import Shown
 
 FloatArray = NDArray[np.float64]
 Start = Literal["zero", "static", "mid", "upper", "lower"]
@@ -33,8 +34,8 @@ START_CODE = {"zero": GIVEN, "static": GIVEN, "mid": MID, "upper": UPPER, "lower
 MOST_PERIODS = 40
 
 
-@dataclass(frozen=True)
-class Law:
+@dataclass(frozen=True, repr=False)
+class Law(Shown):
     """Parameters of the contact points.
 
     The law itself is in `upd.hbm.springs.coulomb`, shared by harmonic balance and time

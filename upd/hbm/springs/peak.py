@@ -21,6 +21,7 @@ from upd.hbm.core.newton import Function, Settings, Solution, cross_section
 from upd.hbm.core.path_step import State, begin, direction_reversed, walk
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.residuals import FREQUENCY_SHARE, over_frequency, scale_of
+from upd.labels import Shown
 
 log = logging.getLogger(__name__)
 
@@ -35,8 +36,8 @@ POSITION = 1e-5
 JUMP_FREQUENCY, JUMP_HEIGHT = 0.03, 2.0
 
 
-@dataclass(frozen=True)
-class Peak:
+@dataclass(frozen=True, repr=False)
+class Peak(Shown):
     """A local maximum of the amplitude on the path.
 
     Attributes

@@ -9,12 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
 from upd.hbm.springs.friction import Law
+from upd.labels import Shown
 
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Contacts:
+@dataclass(frozen=True, repr=False)
+class Contacts(Shown):
     """Contact points on the dofs of a system.
 
     Attributes

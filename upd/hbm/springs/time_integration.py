@@ -20,6 +20,7 @@ from upd.hbm.core.fourier import analysis, to_complex
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import normal, step
 from upd.hbm.springs.friction import Law
+from upd.labels import Shown
 from upd.linalg.compiled import compiled
 
 FloatArray = NDArray[np.float64]
@@ -29,8 +30,8 @@ MOST_NEWTON = 30
 EPS = float(np.finfo(float).eps)
 
 
-@dataclass(frozen=True)
-class SteadyState:
+@dataclass(frozen=True, repr=False)
+class SteadyState(Shown):
     """Last period of a time march, n steps.
 
     Attributes
