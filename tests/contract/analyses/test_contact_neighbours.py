@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from upd.analyses.contact.neighbours import sample
 from upd.analyses.contact.results import make_results
 from upd.analyses.contact.scene_plan import make_plan
 from upd.analyses.contact.solve import solve_plan
-from upd.analyses.contact.varied import levels, neighbours_seconds
+from upd.analyses.contact.varied import levels, neighbours_seconds, sample
 from upd.progress import Stages
 from upd.scene import load_scene
 

@@ -14,9 +14,8 @@ import pytest
 from upd import load_scene, make_plan, run
 from upd.analyses import ladders_of
 from upd.analyses.base import Plan
-from upd.analyses.contact import PROBLEM, WANTED
-from upd.analyses.contact.ladders import parameter_points, parameter_rows
-from upd.analyses.contact.varied import level_of
+from upd.analyses.contact.ladders import parameter_points
+from upd.analyses.contact.varied import PROBLEM, WANTED, level_of
 from upd.batch.engine import Progress, Workers
 from upd.batch.store import PointStore
 from upd.batch.studies import plan_study, point_task, run_study, study, study_workers
@@ -371,9 +370,6 @@ def test_parameters_are_changed_one_at_a_time(tmp_path: Path) -> None:
         "geometry.patch_width": "17.0 mm",
         "geometry.band": "4.0 mm",
     }
-    assert dict(points["patch 42.5 x 6 mm"].overrides) == {"geometry.patch_length": "6.0 mm"}
-    scaled = dict(points["patch 17 x 6 mm, damper 0.4 times as large"].overrides)
-    assert (scaled["geometry.length"], scaled["geometry.base"]) == ("17.0 mm", "12.0 mm")
     for point in points.values():
         load_scene("symmetric", dict(point.overrides))
     chosen = replace(
@@ -389,16 +385,14 @@ def test_parameters_are_changed_one_at_a_time(tmp_path: Path) -> None:
         ),
     )
     found = run_study(scene, chosen, tmp_path, workers=HERE)
-    rows = parameter_rows(scene, found.solved)
-    given, margin, patch, wires, thesis = (values["K_N_secant_raw"] for _, values, _ in rows)
+    key = "K_N_secant_raw", Case(load=100.0)
+    given, margin, patch, wires = (one.values[key] for one in found.solved)
     assert margin < given
     assert patch < margin
     assert wires < given
-    assert thesis == 1.56e6
-    assert rows[-1][0] == "thesis, Table XI (one K_T)"
     (table,) = found.report.tables
-    assert [row[0] for row in table.rows] == [label for label, _, _ in rows]
-    assert f"| as given | {1e-6 * given:.4g} |" in found.files[0].read_text(encoding="utf-8")
+    assert [row[1] for row in table.rows] == [point.label for point in chosen.points]
+    assert f"| as given | {given:.5g} |" in found.files[0].read_text(encoding="utf-8")
 
 
 def test_two_pads_are_compared_one_by_one(tmp_path: Path) -> None:
@@ -409,12 +403,10 @@ def test_two_pads_are_compared_one_by_one(tmp_path: Path) -> None:
     assert float(gap.removesuffix(" mm")) == pytest.approx(42.5 - 2.0 * 7.2)
     chosen = replace(plan_study(scene, "parameters"), points=(points["as given"],))
     found = run_study(scene, chosen, tmp_path, workers=HERE)
-    (given, values, _), (source, thesis, _) = parameter_rows(scene, found.solved)
-    assert (given, source) == ("as given", "thesis, Table XII (one K_T)")
+    values = {name: value for (name, _), value in found.solved[0].values.items()}
     assert values["K_N_per_pad"] == pytest.approx(values["K_N_secant_raw"] / 2.0, rel=1e-12)
-    assert thesis == {"K_N_per_pad": 4.71e5, "K_Tx_per_pad": 1.5e5, "K_Ty_per_pad": 1.5e5}
     (table,) = found.report.tables
-    assert table.columns[1] == "K_N of one pad"
+    assert table.columns[2].startswith("K_N of one pad")
     assert not any("secant" in head for head in table.columns)
 
 

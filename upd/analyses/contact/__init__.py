@@ -12,23 +12,17 @@ from typing import Any
 from upd.analyses.base import Analysis
 from upd.analyses.contact import charts, checks, curved_charts, left_out, output, results
 from upd.analyses.contact.bodies import needs
-from upd.analyses.contact.neighbours import sample
-from upd.analyses.contact.solve import solve_plan
 from upd.analyses.contact.varied import (
-    CURVED_GOVERNING,
-    FLAT_GOVERNING,
+    FLAT_WANTED,
+    PROBLEM,
+    WANTED,
     coarsened,
-    make_wanted,
-    mesh_problem,
     plan_with_estimates,
 )
 from upd.plot.chart import Arrays, Chart
 from upd.vary import errors
 from upd.vary.wanted import Wanted, plan_wanted
 
-PROBLEM = mesh_problem(solve_plan, results.make_results, sample)
-WANTED = make_wanted(PROBLEM, CURVED_GOVERNING)
-FLAT_WANTED = make_wanted(PROBLEM, FLAT_GOVERNING)
 #: arrays, summary -> charts
 Charts = Callable[[Arrays, Mapping[str, Any]], list[Chart]]
 _INPUT_CHECKS = (
@@ -47,7 +41,7 @@ def _analysis(
         name=name,
         headline_names=headline,
         input_checks=_INPUT_CHECKS,
-        make_plan=partial(plan_wanted, wanted, partial(plan_with_estimates, PROBLEM)),
+        make_plan=partial(plan_wanted, wanted, plan_with_estimates),
         needs=needs,
         solve=partial(left_out.solve, wanted),
         make_results=results.make_results,

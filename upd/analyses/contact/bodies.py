@@ -161,21 +161,22 @@ def _held(mesh: Mesh, name: str, plan: ContactPlan) -> Mesh:
     chosen = plan.scene.contact.distant.get(name)
     if chosen is None:
         return mesh
-    # Fewer than three nodes cannot hold a body.
-    known = [
-        key.removeprefix("distant_")
-        for key, nodes in mesh.nodes.items()
-        if key.startswith("distant_") and len(nodes) > 2
-    ]
     if f"distant_{chosen}" not in mesh.nodes:
-        raise InputError(
-            f"contact.distant.{name}: the mesh has no set {chosen!r}; known: {', '.join(known)}"
-        )
+        known = ", ".join(held_sets(mesh))
+        raise InputError(f"contact.distant.{name}: the mesh has no set {chosen!r}; known: {known}")
     weights = {key: own for key, own in mesh.weights.items() if key != "distant"}
     if f"distant_{chosen}" in weights:
         weights["distant"] = weights[f"distant_{chosen}"]
     nodes = {**mesh.nodes, "distant": mesh.nodes[f"distant_{chosen}"]}
     return replace(mesh, nodes=nodes, weights=weights)
+
+
+def held_sets(mesh: Mesh) -> list[str]:
+    """Names of the distant sets that can hold a body: fewer than three nodes leave it free to
+    turn.
+    """
+    sets = [key for key, nodes in mesh.nodes.items() if len(nodes) > 2]
+    return [key.removeprefix("distant_") for key in sets if key.startswith("distant_")]
 
 
 def _body(plan: ContactPlan, mesh: Mesh, name: str, side: int) -> Body:

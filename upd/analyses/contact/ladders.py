@@ -5,18 +5,17 @@ scene at a time, each beside the scene as given.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import partial
 from typing import Any
 
 from upd.analyses import analysis_of
 from upd.analyses.base import Plan
-from upd.analyses.contact.plan import is_curved, refined_growth
-from upd.analyses.contact.results import printed_of
-from upd.analyses.contact.varied import governing
+from upd.analyses.contact.bodies import held_sets
+from upd.analyses.contact.plan import is_curved
+from upd.analyses.contact.varied import edge_of, governing, level_geometry, overridden
 from upd.linalg import select
 from upd.mesh import recipes
-from upd.results.quantities import number_label
 from upd.scene import Scene
 from upd.vary.ladder import (
     Asked,
@@ -30,9 +29,9 @@ from upd.vary.ladder import (
     no_levels,
     whole_levels,
 )
-from upd.vary.outcome import SolvedPoint, without_failed
-from upd.vary.tables import make_table
-from upd.vary.variation import Overrides, Variation
+from upd.vary.outcome import SolvedPoint, matching, without_failed
+from upd.vary.tables import points_table
+from upd.vary.variation import Key, Overrides, Variation
 
 #: numbers a ladder follows beside those the analysis names first
 _NUMBERS = (
@@ -47,49 +46,27 @@ _NUMBERS = (
     "law_k_n",
     "cycle_energy",
 )
-_ELEMENTS = ("hex8", "hex8i", "hex20", "hex27")
 #: element -> finest divisions: quadratic elements cost several times as much for the same patch
-_FINEST = {"hex20": 28, "hex27": 20}
+_FINEST = {"hex8": math.inf, "hex8i": math.inf, "hex20": 28, "hex27": 20}
 #: solver -> how many of the levels it can afford
 _AFFORDABLE: Mapping[str, int | None] = {"pardiso": None, "superlu": 4, "amg": 3}
-#: names a recipe gives to the edge that is divided
-_EDGES = ("patch", "patch_length", "pad_length")
 _ACCURACY_NOTES = (
     "estimated: by the run itself, a bound; true: against the closed form, where a number has one",
     "the accuracy is asked of these numbers alone; where one mesh reaches two accuracies, both "
     "levels are that mesh",
 )
-
 #: usual divisions across the patch of a curved contact; shares of a flat scene's own: spacing from
 #: twice to half of it
 _DIVISIONS, _SHARES = (12, 16, 20, 28, 40, 56), (0.5, 0.67, 1.0, 1.34, 1.67)
 #: usual accuracies in per cent, of a curved contact (3 % takes 7 GB on the ready sphere, 2 % 24 GB)
 #: and of a flat one
 _ACCURACIES, _FLAT_ACCURACIES = (40.0, 10.0, 3.0), (20.0, 10.0, 5.0)
-#: numbers of the table, in its order
-STIFFNESSES = (
-    "K_N_secant_raw",
-    "K_N_damper_alone",
-    "K_N_platform_alone",
-    "K_Tx_initial_raw",
-    "K_Ty_initial_raw",
-)
-
-#: the same of one pad, shown instead where the contact is two pads
-PER_PAD = {
-    "K_N_secant_raw": "K_N_per_pad",
-    "K_Tx_initial_raw": "K_Tx_per_pad",
-    "K_Ty_initial_raw": "K_Ty_per_pad",
-}
-_NAMES = (*STIFFNESSES, *PER_PAD.values())
+#: numbers of the table of what moves the stiffness, of one pad where the contact is two
+_STIFFNESSES = ("K_N_secant_raw", "K_N_*_alone", "K_Tx_initial_raw", "K_Ty_initial_raw")
+_PER_PAD = ("K_N_per_pad", "K_N_*_alone", "K_Tx_per_pad", "K_Ty_per_pad")
 #: patches smaller than the scene's: where it is made of squares, their edge goes with it
 _SMALLER = (0.8, 0.6, 0.4)
-#: lengths of the wedge's patch with the bands over it, and of its damper
-_WEDGE_PATCH = ("patch_length", "patch_width", "band")
-_WEDGE = ("base", "height", "length", "patch_offset", "wire_position", "wire_width")
 
-#: what a row is of, number -> value, why it failed
-Row = tuple[str, dict[str, float], str]
 #: plan, divisions across the patch -> variations
 Maker = Callable[[Plan[Any], Sequence[int]], Iterable[Variation]]
 
@@ -118,34 +95,27 @@ def _meshes(plan: Plan[Any], levels: Sequence[int]) -> list[Variation]:
 
 
 def _elements(plan: Plan[Any], levels: Sequence[int]) -> list[Variation]:
-    chosen = [(e, max(4, 2 * (n // 4)) if e == "hex27" else n) for e in _ELEMENTS for n in levels]
-    return [_on_mesh(e, e, n, plan) for e, n in chosen if n <= _FINEST.get(e, n)]
+    chosen = ((e, max(4, 2 * (n // 4)) if e == "hex27" else n) for e in _FINEST for n in levels)
+    return [_on_mesh(e, e, n, plan) for e, n in chosen if n <= _FINEST[e]]
 
 
 def _solvers(plan: Plan[Any], levels: Sequence[int]) -> list[Variation]:
-    known = [s for s in _AFFORDABLE if s != "pardiso" or select.has_pardiso()]
     return [
-        _on_mesh(s, plan.scene.mesh.element, n, plan, ("solver.name", s))
-        for s in known
-        for n in levels[: _AFFORDABLE[s]]
+        _on_mesh(solver, plan.scene.mesh.element, n, plan, ("solver.name", solver))
+        for solver, most in _AFFORDABLE.items()
+        if solver != "pardiso" or select.has_pardiso()
+        for n in levels[:most]
     ]
 
 
 def _on_mesh(
     source: str, element: str, divisions: int, plan: Plan[Any], *extra: tuple[str, Any]
 ) -> Variation:
-    given = plan.parameters
-    patch, usual = float(next(given[e] for e in _EDGES if e in given)), int(given["divisions"])
-    nodes = 2 * divisions if element in ("hex20", "hex27") else divisions
-    overrides: Overrides = (("geometry.divisions", divisions), ("mesh.element", element), *extra)
-    long = divisions
-    if "divisions_long" in given:
-        long = 2 * max(1, round(divisions * int(given["divisions_long"]) / (2 * usual)))
-        overrides += (("geometry.divisions_long", long),)
-    if "growth" in given:
-        growth = refined_growth(float(given["growth"]), usual / nodes)
-        overrides += (("geometry.growth", round(growth, 4)),)
-    return Variation(source, f"{long} x {divisions}", overrides, patch / divisions)
+    per_edge = 2 if element in ("hex20", "hex27") else 1
+    own = level_geometry(plan.parameters, divisions, per_edge=per_edge)
+    label = f"{own.get('divisions_long', divisions)} x {divisions}"
+    overrides = (*overridden(own), ("mesh.element", element), *extra)
+    return Variation(source, label, overrides, edge_of(plan.parameters) / divisions)
 
 
 def _patches(plan: Plan[Any], levels: Sequence[int]) -> Iterator[Variation]:
@@ -155,17 +125,16 @@ def _patches(plan: Plan[Any], levels: Sequence[int]) -> Iterator[Variation]:
     for factor in (0.6, 0.8, 1.0, 1.3, 1.6):
         n = even(factor * divisions)
         edge = patch * n / divisions
-        overrides = (("geometry.patch", f"{edge!r} mm"), ("geometry.divisions", n))
+        overrides = (*_lengths({"patch": edge}), ("geometry.divisions", n))
         yield Variation("patch", f"{edge:.3g} mm", overrides, patch / divisions)
 
 
 def _accuracies(scene: Scene, asked: Asked) -> list[Variation]:
     """The scene at one accuracy after the other."""
-    usual = _ACCURACIES if is_curved(scene) else _FLAT_ACCURACIES
-    words = "errors in per cent, between 0 and 100, for example --levels 5 2 1"
-    wanted = (
-        usual if asked is None else chosen_levels(asked, lambda p: 0.0 < p < 100.0, words)[::-1]
-    )
+    wanted: Sequence[float] = _ACCURACIES if is_curved(scene) else _FLAT_ACCURACIES
+    if asked is not None:
+        words = "errors in per cent, between 0 and 100, for example --levels 5 2 1"
+        wanted = chosen_levels(asked, lambda p: 0.0 < p < 100.0, words)[::-1]
     return [
         Variation("accuracy", f"{p:g} %", (("accuracy", p / 100.0),), p / 100.0) for p in wanted
     ]
@@ -178,9 +147,9 @@ def parameter_points(scene: Scene, asked: Asked = None) -> list[Variation]:
     scene leaves the mesh to an accuracy.
     """
     no_levels(asked, "a parameter study changes one parameter at a time")
+    plan = analysis_of(scene).make_plan(scene)
     return [
-        Variation("parameters", label, overrides, 1.0)
-        for label, overrides in _setups(scene, analysis_of(scene).make_plan(scene))
+        Variation("parameters", label, overrides, 1.0) for label, overrides in _setups(scene, plan)
     ]
 
 
@@ -190,9 +159,9 @@ def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Overrides]]:
     for name in ("margin", "thickness"):
         for factor in (0.25, 0.5, 1.5) if name in p else ():
             yield f"block {name} {factor * p[name]:g} mm", _lengths({name: factor * p[name]})
-    yield from _smaller_patches(scene.recipe, p)
-    for body, names in _distant_sets(scene, plan).items():
-        for name in names:
+    yield from _smaller_patches(recipes.made(scene.recipe, p))
+    for body, mesh in recipes.build_mesh(scene.recipe, p)[0].items():
+        for name in held_sets(mesh):
             if scene.contact.distant.get(body) != name:
                 yield f"{body} held at {name}", ((f"contact.distant.{body}", name),)
     other = "free" if scene.contact.tilt == "held" else "held"
@@ -208,101 +177,31 @@ def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Overrides]]:
         yield f"bands {0.2 * p['band']:g} mm wide", _lengths({"band": 0.2 * p["band"]})
 
 
-def _smaller_patches(recipe: str, parameters: Mapping[str, Any]) -> Iterable[tuple[str, Overrides]]:
-    """Smaller patches on the same damper, a lower one, and the damper smaller with its patch."""
-    p = recipes.made(recipe, parameters)
-    if hasattr(p, "patch_width") and hasattr(p, "band"):
-        length = p.patch_length
-        sizes = {"patch_length": length, "patch_width": p.width, "band": p.band}
-        for k in _SMALLER:
-            smaller = {name: k * sizes[name] for name in _WEDGE_PATCH}
-            yield _patch_label(k * p.width, k * length), _lengths(smaller)
-        k = _SMALLER[-1]
-        yield _patch_label(p.width, k * length), _lengths({"patch_length": k * length})
-        whole = sizes | {name: getattr(p, name) for name in _WEDGE}
-        yield (
-            f"{_patch_label(k * p.width, k * length)}, damper {k:g} times as large",
-            _lengths({name: k * value for name, value in whole.items()}),
-        )
-    elif hasattr(p, "pad_gap") and hasattr(p, "pad_length"):
-        for k in _SMALLER:
+def _smaller_patches(p: Any) -> Iterable[tuple[str, Overrides]]:
+    """Smaller patches on the same damper, of a wedge and of two pads."""
+    for k in _SMALLER:
+        if hasattr(p, "patch_width") and hasattr(p, "band"):
+            width, length = k * p.width, k * p.patch_length
+            smaller = {"patch_length": length, "patch_width": width, "band": k * p.band}
+            yield f"patch {width:g} x {length:g} mm", _lengths(smaller)
+        elif hasattr(p, "pad_gap") and hasattr(p, "pad_length"):
             # the damper keeps its length
             gap = p.pad_gap + 2.0 * (1.0 - k) * p.pad_width
             smaller = {"pad_length": k * p.pad_length, "pad_width": k * p.pad_width, "pad_gap": gap}
             yield f"pads {k * p.pad_width:g} x {k * p.pad_length:g} mm", _lengths(smaller)
 
 
-def _patch_label(width: float, length: float) -> str:
-    return f"patch {width:g} x {length:g} mm"
-
-
 def _lengths(values: Mapping[str, float]) -> Overrides:
-    return tuple((f"geometry.{name}", f"{value!r} mm") for name, value in values.items())
+    return overridden({name: f"{value!r} mm" for name, value in values.items()})
 
 
-def _distant_sets(scene: Scene, plan: Plan[Any]) -> dict[str, list[str]]:
-    """Names of the sets that may be held, body by body.
-
-    Sets of a single node leave the body free to turn and are left out.
-    """
-    meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
-    return {
-        body: [
-            name.removeprefix("distant_")
-            for name, nodes in mesh.nodes.items()
-            if name.startswith("distant_") and len(nodes) > 2
-        ]
-        for body, mesh in meshes.items()
-    }
-
-
-def parameter_rows(scene: Scene, solved: Iterable[SolvedPoint]) -> list[Row]:
-    """Stiffnesses at the first normal load of every point, then the printed ones where the geometry
-    has been published.
-    """
-    out = []
-    for one in solved:
-        first: dict[str, float] = {}
-        for (name, _), value in one.values.items():
-            first.setdefault(name, value)
-        found = {name: first[name] for name in _NAMES if name in first}
-        out.append((one.point.label, found, one.outcome.failure.split(";")[0][:60]))
-    return [*out, *_printed_rows(scene)]
-
-
-def _printed_rows(scene: Scene) -> list[Row]:
-    look_up = printed_of(scene)
-    printed = {name: found[0] for name in _NAMES if len(found := look_up(name, {})) == 1}
-    sources = dict.fromkeys(one.source for one in printed.values())
-    out = []
-    for source in sources:
-        values = {name: one.value for name, one in printed.items() if one.source == source}
-        along, across = (
-            values.get(f"K_T{axis}_initial_raw", values.get(f"K_T{axis}_per_pad")) for axis in "xy"
-        )
-        out.append(
-            (f"{source} (one K_T)" if along is not None and along == across else source, values, "")
-        )
-    return out
-
-
-def _report(scene: Scene, solved: Sequence[SolvedPoint], names: Sequence[str]) -> StudyReport:
-    """Stiffnesses of every point, a row each."""
-    del names
-    rows = parameter_rows(scene, solved)
-    there = {name for _, values, _ in rows for name in values}
-    wanted = [PER_PAD[n] if PER_PAD.get(n) in there else n for n in STIFFNESSES]
-    shown = [name for name in wanted if name in there]
-
-    def cell(name: str, row: Row) -> str:
-        _, values, failure = row
-        if failure:
-            return failure if name == shown[0] else ""
-        return f"{1e-6 * values[name]:.4g}" if name in values else ""
-
-    columns = ((number_label(name), "r", partial(cell, name)) for name in shown)
-    setup = ("setup", "l", lambda row: str(row[0]))
-    table = make_table("What moves the stiffness, 1e6 N/mm", (setup, *columns), rows)
+def _stiffnesses(scene: object, solved: Sequence[SolvedPoint], names: Sequence[str]) -> StudyReport:
+    """Stiffnesses of every point at its first normal load."""
+    del scene, names
+    first: dict[str, Key] = {}
+    for key in matching(solved, _PER_PAD if matching(solved, _PER_PAD[:1]) else _STIFFNESSES):
+        first.setdefault(key[0], key)
+    table = points_table(solved, list(first.values()))
     return StudyReport((table,), bool(without_failed(solved)))
 
 
@@ -329,7 +228,7 @@ LADDERS: Mapping[str, Ladder] = {
     "patch": _on_meshes(_patches, is_curved),
     "parameters": Ladder(
         parameter_points,
-        report=_report,
+        report=_stiffnesses,
         title=lambda scene, vary: "what moves the stiffness",
         applies=lambda scene: not is_curved(scene),
     ),

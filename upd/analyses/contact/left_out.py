@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Literal
 
 import numpy as np
@@ -52,7 +52,7 @@ from upd.analyses.contact.plan import (
 )
 from upd.analyses.contact.results import make_results
 from upd.analyses.contact.solution import ContactSolution, NormalCase
-from upd.analyses.contact.solve import solve_companion
+from upd.analyses.contact.solve import solve_plan
 from upd.analyses.contact.tangential import note_moved
 from upd.contact.checks import few_threads
 from upd.contact.model import ContactModel
@@ -179,12 +179,13 @@ def _on_companion(solution: ContactSolution, model: ContactModel) -> Iterator[Re
 
 def _sheared(solution: ContactSolution, model: ContactModel) -> Iterator[Resolved]:
     plan, scene = solution.plan, solution.plan.scene
-    mine = solve_companion(variant(plan, scene.contact.directions), model)
+    companion = partial(solve_plan, stages=Stages(), model=model, companion=True)
+    mine = companion(variant(plan, scene.contact.directions))
     numbers = make_results(mine)
     note_moved(solution, mine)
 
     def again(directions: Literal[1, 2], coupling: Coupling = "uncoupled") -> list[Result]:
-        return make_results(solve_companion(variant(plan, directions, coupling=coupling), model))
+        return make_results(companion(variant(plan, directions, coupling=coupling)))
 
     yield from _coupled_changes(plan, numbers, lambda: again(2, "coupled"))
     directions = scene.loads.directions

@@ -19,7 +19,7 @@ order beside what the contact leaves.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, Final
@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import chosen_by_accuracy, refuse_oversize, require_memory
+from upd.analyses.contact.faces import rim_nodes
 from upd.analyses.contact.plan import (
     ContactPlan,
     add_loads,
@@ -35,13 +36,17 @@ from upd.analyses.contact.plan import (
     is_curved,
     refined_growth,
 )
+from upd.analyses.contact.results import make_results
 from upd.analyses.contact.scene_plan import auto_patch, make_plan
+from upd.analyses.contact.solution import ContactSolution, NormalCase
+from upd.analyses.contact.solve import solve_normal, solve_plan
+from upd.analyses.contact.tangential import solve_tangential
 from upd.analyses.cost import CostModel
-from upd.errors import InputError
+from upd.errors import InputError, UpdError
 from upd.mesh import recipes
 from upd.progress import Stages
 from upd.reference import contact_modulus, hertz_sphere
-from upd.results import Result
+from upd.results import Case
 from upd.scene import Scene
 from upd.scene.contact import Loads
 from upd.vary.errors import estimate_in_round
@@ -103,7 +108,7 @@ _SPARED_NEARBY = ("internal displacement", "load curve")
 
 
 def level_geometry(
-    parameters: Mapping[str, Any], divisions: int, *, step: int = 2
+    parameters: Mapping[str, Any], divisions: int, *, step: int = 2, per_edge: int = 1
 ) -> dict[str, Any]:
     """Parameters of the recipe that change with the divisions of its contact.
 
@@ -115,6 +120,8 @@ def level_geometry(
         Of the level, even.
     step
         Of the numbers of elements along the contact: 2 for recipes that take even ones only.
+    per_edge
+        Spacings of nodes along the edge of an element, over those of the plan.
 
     Returns
     -------
@@ -128,7 +135,8 @@ def level_geometry(
         long = divisions * int(parameters["divisions_long"]) / (step * usual)
         out["divisions_long"] = step * max(1, round(long))
     if "growth" in parameters:
-        out["growth"] = round(refined_growth(float(parameters["growth"]), usual / divisions), 4)
+        ratio = usual / (per_edge * divisions)
+        out["growth"] = round(refined_growth(float(parameters["growth"]), ratio), 4)
     return out
 
 
@@ -178,10 +186,11 @@ def coarsened(plan: ContactPlan) -> Overrides:
     geometry = level_geometry(plan.parameters, half[0]) if half else {}
     names = SIZED_BY_LOAD if plan.scene.sphere_radius is not None else ()
     sized = {name: "auto" for name in names if name in plan.scene.geometry}
-    return (*bare(plan.scene), *_geometry(sized | geometry))
+    return (*bare(plan.scene), *overridden(sized | geometry))
 
 
-def _geometry(parameters: Mapping[str, Any]) -> Overrides:
+def overridden(parameters: Mapping[str, Any]) -> Overrides:
+    """What sets these parameters of the recipe."""
     return tuple((f"geometry.{name}", value) for name, value in parameters.items())
 
 
@@ -206,25 +215,14 @@ def _coarser(plan: ContactPlan, divisions: int) -> Variation:
     label = " x ".join(
         str(geometry[key]) for key in ("divisions_long", "divisions") if key in geometry
     )
-    return Variation(MESH, f"{label} divisions", _geometry(geometry), size)
+    return Variation(MESH, f"{label} divisions", overridden(geometry), size)
 
 
-def mesh_problem(
-    solve: Callable[[ContactPlan, Stages], Any],
-    make_results: Callable[[Any], Sequence[Result]],
-    sample: Callable[[Any], Samples] | None = None,
-) -> Problem:
-    """A contact whose mesh varies; of plans, what is solved on them, its numbers, and these at
-    neighbouring loads.
-    """
-    return Problem(make_plan, solve, make_results, bare, (MESH,), levels, half_cost, sample)
-
-
-def plan_with_estimates(problem: Problem, scene: Scene) -> ContactPlan:
+def plan_with_estimates(scene: Scene) -> ContactPlan:
     """The plan of a scene with what its levels cost."""
-    plan: ContactPlan = problem.make_plan(scene)
+    plan = make_plan(scene)
     made = levels(plan).variations
-    again = sum(_seconds(problem, plan, one) for one in made)
+    again = sum(_seconds(plan, one) for one in made)
     again += neighbours_seconds(plan) if made else 0.0
     return replace(
         plan,
@@ -234,35 +232,18 @@ def plan_with_estimates(problem: Problem, scene: Scene) -> ContactPlan:
     )
 
 
-def _seconds(problem: Problem, plan: ContactPlan, one: Variation) -> float:
+def _seconds(plan: ContactPlan, one: Variation) -> float:
     """Predicted for a level and its neighbouring loads."""
     if recipes.counted_by_mesh(plan.scene.recipe):
         # A plan runs a user's recipe once: the run makes these meshes.
         return plan.solve_seconds * float(one.size**-POWER) + neighbours_seconds(plan)
-    level: ContactPlan = varied_plan(problem, plan.scene, one)
+    level: ContactPlan = varied_plan(PROBLEM, plan.scene, one)
     return level.solve_seconds + neighbours_seconds(level)
 
 
 def governing(scene: Scene) -> tuple[str, ...]:
     """Names of the numbers (shell patterns) that one accuracy for all is asked of."""
     return CURVED_GOVERNING if is_curved(scene) else FLAT_GOVERNING
-
-
-def make_wanted(problem: Problem, governing: Sequence[str]) -> Wanted:
-    """A contact whose mesh is chosen by an accuracy; ``governing``: names of the numbers (shell
-    patterns) that one accuracy for all is asked of.
-    """
-    return Wanted(
-        choices,
-        {name: name for name in governing},
-        problem.make_plan,
-        problem.solve,
-        problem.make_results,
-        partial(estimate_in_round, problem, level_of),
-        refuse_oversize,
-        chosen_by_accuracy,
-        predicted=_predicted,
-    )
 
 
 def choices(scene: Scene) -> list[LevelChoice]:
@@ -336,8 +317,11 @@ def _flat_levels(scene: Scene) -> dict[int, Scene]:
     plain = replace(scene, mesh=mesh, accuracy=None, geometry=geometry)
     usual, fewest = geometry["divisions"], 2 if wires else FEWEST
     shares = _SHARES_OF_WIRES if wires else _SHARES
-    counts = dict.fromkeys(max(fewest, 2 * round(0.5 * share * usual)) for share in shares)
-    return {n: _flat_level(plain, n, 1 if wires else 2) for n in counts}
+    found = {}
+    for n in (max(fewest, 2 * round(0.5 * share * usual)) for share in shares):
+        own = level_geometry(geometry, n, step=1 if wires else 2)
+        found[n] = replace(plain, geometry={**geometry, **own})
+    return found
 
 
 def _for_wires(geometry: Mapping[str, Any]) -> dict[str, Any]:
@@ -351,17 +335,16 @@ def _for_wires(geometry: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _flat_level(scene: Scene, divisions: int, step: int) -> Scene:
-    """The scene with so many divisions, those along the contact in proportion in such steps."""
-    own = level_geometry(scene.geometry, divisions, step=step)
-    return replace(scene, geometry={**scene.geometry, **own})
+def edge_of(parameters: Mapping[str, Any]) -> float:
+    """Edge of the contact that is divided, mm; 1 of a recipe that names none."""
+    edges = ("patch", "patch_length", "pad_length")
+    return next((float(parameters[n]) for n in edges if n in parameters), 1.0)
 
 
 def level_of(plan: ContactPlan) -> Variation:
     known = plan.parameters
     counts = (str(known[n]) for n in ("divisions_long", "divisions") if n in known)
-    edge = next((n for n in ("patch", "patch_length", "pad_length") if n in known), None)
-    size = spacing(known) * (1.0 if edge is None else float(known[edge]))
+    size = spacing(known) * edge_of(known)
     return Variation(MESH, " x ".join(counts) + " divisions", size=size)
 
 
@@ -438,3 +421,75 @@ def neighbours_seconds(plan: ContactPlan) -> float:
     cost = CostModel(near.scene)
     add_loads(cost, near.scene, near.size, near.effects, 0.0)
     return cost.seconds
+
+
+def sample(solution: ContactSolution) -> Samples:
+    """The numbers of every loaded case at neighbouring loads.
+
+    They move the contact's edge by up to one spacing of the lattice each way, on the same condensed
+    bodies. What the finite bodies add to a displacement is taken in proportion to the load: it
+    knows the total force only. A load whose contact reaches the rim of the patch is omitted.
+
+    Returns
+    -------
+    Samples
+        Empty where a neighbour is not cheap.
+    """
+    if not has_neighbours(solution.plan.scene):
+        return {}
+    found: dict[tuple[str, Case], list[tuple[float, float]]] = {
+        (r.name, r.case): [(0.0, r.value)]
+        for r in make_results(solution, misfits=False)
+        if not r.withheld and r.case.load
+    }
+    for case in solution.normal:
+        touching = int(np.count_nonzero(solution.model.patch.whole(case.solution.force) > 0.0))
+        for t in neighbours(touching) if case.force > 0.0 else ():
+            for name, of, value in _values(solution, case, case.force * float(np.exp(t))):
+                key = name, replace(of, load=case.force)
+                if key in found:
+                    found[key].append((t, value))
+    return {key: np.array(rows) for key, rows in found.items()}
+
+
+def _values(
+    solution: ContactSolution, case: NormalCase, load: float
+) -> list[tuple[str, Case, float]]:
+    """The numbers at a load near the case's; none where it is too large for the patch."""
+    near = ContactSolution(plan_at(solution.plan, (load,)), solution.model)
+    try:
+        solve_normal(near, Stages())
+        (one,) = near.normal
+        if rim_nodes(near, one):
+            return []
+        one.shares = {body: s.over(case.force / load) for body, s in case.shares.items()}
+        one.shear_shares = case.shear_shares
+        if near.plan.effect("friction"):
+            solve_tangential(near, Stages())
+        return [
+            (r.name, r.case, r.value) for r in make_results(near, misfits=False) if not r.withheld
+        ]
+    except UpdError:
+        # The load itself was solved: a neighbour that is not is a sample less.
+        return []
+
+
+PROBLEM = Problem(make_plan, solve_plan, make_results, bare, (MESH,), levels, half_cost, sample)
+
+
+def _wanted(governing: Sequence[str]) -> Wanted:
+    return Wanted(
+        choices,
+        {name: name for name in governing},
+        make_plan,
+        solve_plan,
+        make_results,
+        partial(estimate_in_round, PROBLEM, level_of),
+        refuse_oversize,
+        chosen_by_accuracy,
+        predicted=_predicted,
+    )
+
+
+#: a contact, curved or flat, whose mesh is chosen by an accuracy
+WANTED, FLAT_WANTED = _wanted(CURVED_GOVERNING), _wanted(FLAT_GOVERNING)
