@@ -18,7 +18,7 @@ from upd.cache.shared import active
 from upd.cache.sources import key_of, source_digest
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
 from upd.contact.products import ROUGH, centre, half_space_start
-from upd.errors import InputError, UpdError
+from upd.errors import InputError
 from upd.fem import Material, rigid_body_modes, stiffness
 from upd.linalg.multigrid import MultigridSolver
 from upd.linalg.parallel import in_parallel
@@ -115,19 +115,6 @@ def _shape(plan: ContactPlan, body: str) -> dict[str, Any]:
     }
 
 
-def prepare_companion(companion: ContactPlan) -> ContactModel:
-    """As `prepare`, of the whole model at the run's own spacing where a user's recipe cannot be
-    made coarser.
-    """
-    try:
-        return prepare(companion, Stages(), "companion")
-    except UpdError:
-        if companion.otherwise is None or dict(companion.otherwise) == dict(companion.parameters):
-            raise
-        finer = replace(companion, parameters=companion.otherwise, otherwise=None)
-        return prepare(finer, Stages(), "companion")
-
-
 def _prepared(plan: ContactPlan, stages: Stages, workers: int) -> ContactModel:
     scene = plan.scene
     with stages("mesh", scene.recipe):
@@ -154,16 +141,10 @@ def _prepared(plan: ContactPlan, stages: Stages, workers: int) -> ContactModel:
 
 
 def _held(mesh: Mesh, name: str, plan: ContactPlan) -> Mesh:
-    """The mesh with the distant set the scene chose.
-
-    Raises InputError naming the sets there are.
-    """
+    """The mesh with the distant set the scene chose."""
     chosen = plan.scene.contact.distant.get(name)
     if chosen is None:
         return mesh
-    if f"distant_{chosen}" not in mesh.nodes:
-        known = ", ".join(held_sets(mesh))
-        raise InputError(f"contact.distant.{name}: the mesh has no set {chosen!r}; known: {known}")
     weights = {key: own for key, own in mesh.weights.items() if key != "distant"}
     if f"distant_{chosen}" in weights:
         weights["distant"] = weights[f"distant_{chosen}"]

@@ -21,9 +21,8 @@ from upd.analyses.contact.loading import (
     tangential_compliance,
     tilt_arms,
 )
-from upd.analyses.contact.plan import NORMAL, ContactPlan
+from upd.analyses.contact.plan import NORMAL, ContactPlan, wider_patch
 from upd.analyses.contact.products import product_checks
-from upd.analyses.contact.scene_plan import has_mirror_planes, wider_patch
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
 from upd.analyses.contact.yielding import yield_checks
 from upd.contact.model import ContactModel
@@ -410,7 +409,8 @@ def _curved_checks(solution: ContactSolution) -> list[Check]:
     """Of a curved contact as a whole: symmetric, and small against its curvature."""
     plan, scene, checks = solution.plan, solution.plan.scene, []
     lattice = solution.model.patch.quads is None
-    if lattice and not plan.effect("mirror symmetry") and has_mirror_planes(scene):
+    mirrored = recipes.has_parameter(scene.recipe, "symmetry")
+    if lattice and mirrored and not plan.effect("mirror symmetry"):
         text, remedy = "|f - mirrored f| / max f", "the mesh or the load is not symmetric"
         checks += [
             Check("symmetric pressure", c.case, _asymmetry(solution, c), 1e-6, text, remedy)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import Resolved
-from upd.analyses.contact.bodies import prepare_companion
+from upd.analyses.contact.bodies import prepare
 from upd.analyses.contact.coupled import raised, slope, slope_loads
 from upd.analyses.contact.effects import (
     COUPLED_NUMBERS,
@@ -36,7 +36,6 @@ from upd.analyses.contact.loading import (
     LOAD_STEP,
     closed_loop,
     load_history,
-    slip_components,
     tangential_compliance,
     tilt_arms,
 )
@@ -48,6 +47,7 @@ from upd.analyses.contact.plan import (
     ContactPlan,
     Family,
     direction_name,
+    slip_components,
     unit_vector,
 )
 from upd.analyses.contact.results import make_results
@@ -107,7 +107,7 @@ def solve(wanted: Wanted, plan: ContactPlan, stages: Stages) -> ContactSolution:
                 solution.left_out += [_tilted(solution, case) for case in cases]
             if companion is not None:
                 try:
-                    model = prepare_companion(companion)
+                    model = prepare(companion, Stages(), "companion")
                     with few_threads(model.gap):
                         solution.left_out += list(_on_companion(solution, model))
                 except UpdError:

@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.contact.plan import ACROSS, ALONG, ContactPlan, axis_of
+from upd.analyses.contact.plan import ContactPlan
 from upd.contact.model import Body, ContactModel
 from upd.contact.tangential import TangentialPath, tangential_path
 from upd.contact.tangential_step import TangentialHistory
 from upd.results import Case
-from upd.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -57,11 +56,6 @@ def tilt_arms(plan: ContactPlan, model: ContactModel, *, held: bool | None = Non
     if plan.scene.contact.tilt != "free" if held is None else held:
         return np.zeros((len(model.gap), 0))
     return contact_points_of(model)[:, :2] - load_point(plan, model)
-
-
-def slip_components(scene: Scene, direction: float) -> tuple[int, ...]:
-    """Components of a tangential load in a direction (degrees from x)."""
-    return (ALONG, ACROSS) if scene.slip_directions == 2 else (axis_of(direction),)
 
 
 @dataclass(frozen=True)

@@ -1,22 +1,28 @@
-"""Plan of a contact of two bodies: load families, what the recipe is given, sizes, cost."""
+"""What a plan of a contact of two bodies holds: normal loads, mirror planes and load families, what
+the recipe is given, and what its meshes must name.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.base import Effect, Plan
-from upd.analyses.cost import NODES, START_BYTES, CostModel, dense_s
-from upd.errors import InputError, OwnMeshError, UpdError
-from upd.linalg.routes import EACH, FIRST
+from upd.analyses.base import Plan
+from upd.analyses.cost import NODES
+from upd.contact.equilibrium import FaceForces, equilibrium
+from upd.errors import InputError, OwnMeshError
 from upd.mesh import Mesh, recipes
 from upd.mesh.checks import require_sets
 from upd.mesh.recipe_modules import is_mesh
-from upd.scene import Scene
+from upd.reference import contact_modulus, hertz_sphere, sphere_gap
+from upd.results import Case
+from upd.scene import Scene, friction_on
+
+Array = NDArray[np.float64]
 
 NORMAL, ALONG, ACROSS = 2, 0, 1
 #: all three, in the order of a coupled contact
@@ -61,17 +67,10 @@ class ContactPlan(Plan[Scene]):
     companion
         A coarser whole model with all directions at once, on which numbers are solved again with
         effects left out.
-    solve_seconds
-        Of ``seconds``, those without figures and files.
-    otherwise
-        Of a companion whose mesh is made by the run only: parameters it takes when the recipe
-        cannot be made coarser.
     """
 
     families: tuple[Family, ...] = ()
     companion: ContactPlan | None = None
-    solve_seconds: float = 0.0
-    otherwise: Mapping[str, Any] | None = None
 
     @property
     def mirrors(self) -> tuple[int, ...]:
@@ -82,305 +81,218 @@ class ContactPlan(Plan[Scene]):
             sorted({"xyz".index(name[-1]) for family in self.families for name in family.mirror})
         )
 
+    @property
+    def solve_seconds(self) -> float:
+        """Predicted seconds without figures and files."""
+        return self.seconds - self.files_seconds
+
 
 def is_curved(scene: Scene) -> bool:
     """Whether the faces are curved: their contact set depends on the load."""
     return scene.analysis == "curved contact"
 
 
-def contact_plan(
-    scene: Scene,
-    symmetry: str,
-    families: tuple[Family, ...],
-    effects: Sequence[Effect],
-    parameters: Mapping[str, Any],
-    about: Mapping[str, Mapping[str, int]] | None = None,
-) -> ContactPlan:
-    """The plan of a contact of two bodies, with its size and cost.
+# -- directions of a tangential load, degrees from x -----------------------------------------------
 
-    ``about``: a size that was estimated, for a mesh that is made by the run only.
 
-    Raises InputError when a body lacks its material.
+def component(direction: float) -> int | None:
+    """The component a tangential load runs along, or None for one between the axes."""
+    return {0.0: ALONG, 90.0: ACROSS}.get(direction % 180.0)
+
+
+def slip_components(scene: Scene, direction: float) -> tuple[int, ...]:
+    """Components of a tangential load in a direction."""
+    own = component(direction)
+    return (ALONG, ACROSS) if scene.slip_directions == 2 or own is None else (own,)
+
+
+def direction_name(direction: float) -> str:
+    """x, y or the angle."""
+    return {0.0: "x", 90.0: "y"}.get(direction % 360.0, f"{direction:g}deg")
+
+
+def unit_vector(direction: float, components: Sequence[int]) -> Array:
+    """(n_component,) of the unit vector along ``direction``."""
+    radians = np.radians(direction)
+    return np.asarray(np.array([np.cos(radians), np.sin(radians)])[list(components)])
+
+
+@dataclass(frozen=True)
+class DamperLoad:
+    """A normal force in N, and the damper's equilibrium it comes from, if any."""
+
+    force: float
+    state: str = ""
+    faces: FaceForces | None = None
+
+    @property
+    def case(self) -> Case:
+        """The force, with as many digits as distinguish the scene's loads."""
+        return Case(load=self.force)
+
+
+def normal_loads(scene: Scene) -> tuple[DamperLoad, ...]:
+    """The scene's normal loads in N. Raises InputError, with all problems, for an equilibrium that
+    jams or lifts.
     """
-    two_bodies(scene)
-    counted = recipes.count(scene.recipe, parameters) if about is None else about
-    size = {body: dict(count) for body, count in counted.items()}
-    if about is None and recipes.counted_by_mesh(scene.recipe):
-        # The mesh is there: what it lacks is reported before anything is written.
-        require_contact_sets(scene, recipes.build_mesh(scene.recipe, parameters)[0], families)
-    missing = sorted(set(size) - set(scene.materials))
-    spare = sorted(set(scene.materials) - set(size))
-    if missing or spare:
-        raise InputError(
-            f"materials: the recipe makes the bodies {', '.join(size)}"
-            + (f"; {', '.join(missing)} has no material" if missing else "")
-            + (f"; {', '.join(spare)} is not one of them" if spare else "")
-        )
-    if about is None:
-        _require_held(scene, parameters, size)
-    cost = CostModel(scene)
-    solve = 0.0
-    in_the_mean = _in_the_mean(scene, parameters, about)
-    for count in size.values():
-        cost.contact_body(count["hexes"], count["nodes"])
-    # what every task keeps is held at once: an equal share of the memory each
-    room = (cost.limit() - cost.kept_bytes) / (len(size) * len(families))
-    for body, count in size.items():
-        found = []
-        for family in families:
-            task = (
-                f"{body}, {family.label}",
-                count["hexes"],
-                count["nodes"],
-                len(family.components) * count["contact"],
-            )
-            found.append(
-                cost.contact(*task, _products(scene, effects, family), room)
-                if _may_learn(scene) and body not in in_the_mean
-                else cost.condensed(*task)
-            )
-        if body in in_the_mean:
-            for family in families:
-                cost.held_in_mean(f"{body}, {family.label}", count["hexes"], count["nodes"])
-        # recovery of the inner dofs: backward only
-        solve += 0.5 * max(one.substitution() for one in found)
-    add_loads(cost, scene, size, effects, solve)
-    # The internal displacement takes the factors of all bodies again.
-    inner = any(effect.name == "internal displacement" and effect.on for effect in effects)
-    memory, workers = cost.in_a_row(keep=inner)
-    seconds, files = cost.total(workers), _files_seconds(scene, size)
-    return ContactPlan(
-        scene,
-        parameters,
-        symmetry,
-        tuple(effects),
-        size,
-        cost.solver,
-        seconds + files,
-        memory,
-        workers,
-        families,
-        solve_seconds=seconds,
-        files_seconds=files,
-        ways=cost.ways,
-    )
-
-
-def _may_learn(scene: Scene) -> bool:
-    """Whether products may serve instead of a condensation."""
-    return is_curved(scene) and not scene.coupled
-
-
-def _products(scene: Scene, effects: Sequence[Effect], family: Family) -> int:
-    """Products that a family of loads takes about."""
-    on, loads = {e.name for e in effects if e.on}, len(scene.loads.normal)
-    cases = 0
-    if NORMAL in family.components:
-        cases += loads * (3 if scene.wants("stiffness") else 1)
-        cases += scene.loads.curve_points if "load curve" in on else 0
-    if ALONG in family.components:
-        sheared = len(scene.loads.tangential) if scene.wants("tangential") else 0
-        cases += loads * (2 + sheared + _CYCLE_CASES * scene.wants("cycle"))
-    return FIRST + EACH * max(cases - 1, 0)
-
-
-# A cycle takes the products of so many loads.
-_CYCLE_CASES = 4
-
-
-def _in_the_mean(
-    scene: Scene, parameters: Mapping[str, Any], about: Mapping[str, Any] | None
-) -> set[str]:
-    """Bodies that a set with weights holds. Of a mesh that only the run makes nothing is known."""
-    if about is not None:
-        return set()
-    chosen = {body: f"distant_{name}" for body, name in scene.contact.distant.items()}
-    found = recipes.weighted_sets(scene.recipe, parameters)
-    return {body for body, names in found.items() if chosen.get(body, "distant") in names}
-
-
-def _require_held(scene: Scene, parameters: Mapping[str, Any], bodies: Iterable[str]) -> None:
-    """Raise InputError for a body or a node set of contact.distant that is not there."""
-    chosen = scene.contact.distant
-    if not chosen:
-        return
-    known = recipes.distant_sets(scene.recipe, parameters)
-    problems = []
-    for body, name in chosen.items():
-        if body not in set(bodies):
-            problems.append(
-                f"contact.distant.{body}: no such body; the recipe makes {', '.join(bodies)}"
-            )
-        elif name not in known.get(body, ()):
-            there = ", ".join(known.get(body, ()))
-            problems.append(
-                f"contact.distant.{body}: the mesh has no set {name!r}; "
-                + (f"known: {there}" if there else "it has one distant set: leave the line out")
-            )
+    loads, problems = [], []
+    for value in dict.fromkeys(scene.loads.normal):
+        if not isinstance(value, str):
+            loads.append(DamperLoad(float(value)))
+            continue
+        try:
+            parameters = mesh_parameters(scene, "full")
+            left, right = recipes.inclination(scene.recipe, parameters)
+            assert scene.loads.centrifugal is not None
+            found = equilibrium(left, right, scene.loads.centrifugal, scene.contact.friction, value)
+            loads.append(DamperLoad(found.normal_right, value, found))
+        except InputError as error:
+            problems.append(f"loads.normal: {value!r}: {error}")
     if problems:
         raise InputError("\n".join(problems))
+    # Without friction all equilibria are one.
+    different: dict[str, DamperLoad] = {}
+    for load in loads:
+        different.setdefault(load.case.label, load)
+    return tuple(different.values())
 
 
-# Counted and timed on the ready scenes, one thread: a contact set under one load; a tangential
-# load; a step of the march along one direction and, with its disks, along two.
-_LOAD_S, _TANGENTIAL_S, _STEP_S, _STEP_2_S = 1e-3, 5e-3, 1.5e-4, 1.5e-3
-# Figures and page, figures of a flat contact's tangential loads, files of fields per node.
-_FILES_S, _FLAT_S, _NODE_S = 2.6, 1.4, 3.5e-5
-# Dense factorisations with three directions of a load, of effects left out.
-_AGAIN = 20
-
-
-def add_loads(
-    cost: CostModel,
-    scene: Scene,
-    size: Mapping[str, Mapping[str, int]],
-    effects: Sequence[Effect],
-    solve: float,
-) -> None:
-    """Seconds and bytes of all loads.
-
-    Parameters
-    ----------
-    solve
-        Seconds of one displacement inside both bodies.
-    """
-    on = {e.name for e in effects if e.on}
-    nodes, k = sum(c["nodes"] for c in size.values()), max(c["contact"] for c in size.values())
-    n_load, ratios = len(scene.loads.normal), len(scene.loads.tangential)
-    n_curve = scene.loads.curve_points if "load curve" in on else 0
-    # A stiffness is a slope between two more loads.
-    forces = n_load * (3 if scene.wants("stiffness") else 1) + n_curve
-    cost.seconds += forces * (_LOAD_S + dense_s(k**3 / 6.0))
-    if "friction" in on:
-        curved = is_curved(scene)
-        lines = 1 if curved else len(scene.loads.directions)
-        tangential = ratios if scene.wants("tangential") else 0
-        cost.seconds += n_load * lines * tangential * (_TANGENTIAL_S + dense_s(3.0 * k**3))
-        step = _STEP_2_S if scene.slip_directions == 2 else _STEP_S
-        steps = scene.loads.cycle_steps if scene.wants("cycle") else 0
-        cost.seconds += n_load * lines * steps * step
-        # Four numbers a step and node: traction, also before it is clipped, slip, state. A curved
-        # contact's patch reaches to twice its radius at least.
-        loaded = np.pi / 16.0 * k if curved else k
-        cost.kept_bytes += 32.0 * n_load * steps * scene.slip_directions * loaded
-        cost.kept_bytes += 64.0 * n_load * lines * tangential * k
-    cost.kept_bytes += 64.0 * forces * k
+def choose_symmetry(scene: Scene) -> tuple[str, str]:
+    """Part of the model that is solved, and why. Raises InputError for one that does not serve."""
+    asked, reasons = scene.mesh.symmetry, []
+    if not recipes.has_parameter(scene.recipe, "symmetry"):
+        reasons.append("the geometry has no mirror plane")
     if scene.coupled:
-        _add_coupled(cost, scene, k, forces, curved=is_curved(scene))
-    if "internal displacement" in on:
-        inside = n_load * (2 if "friction" in on else 1) + n_curve
-        cost.seconds += inside * solve
-        cost.kept_bytes += 48.0 * n_load * nodes
+        reasons.append("normal and tangential contact at once are solved on the full model")
+    elif friction_on(scene) and scene.slip_directions == 2:
+        reasons.append("slip in two directions is solved on the full model")
+    if scene.contact.tilt == "free":
+        reasons.append("the damper may tilt about both axes")
+    if scene.geometry.get("pad_offset", 0.0) != 0.0:
+        reasons.append("the pads have unequal heights")
+    if asked not in ("auto", "full") and reasons:
+        raise InputError(f'mesh.symmetry: {"; ".join(reasons)}; use "full" or "auto"')
+    if asked != "auto":
+        return asked, "asked for in the scene"
+    if reasons:
+        return "full", "; ".join(reasons)
+    if is_curved(scene):
+        return "quarter", "geometry, load and effects share both mirror planes"
+    return "half", "geometry and loads share the mirror plane x = 0"
 
 
-# Flops of a load step of coupled contact over the cube of its closed dofs, and over those times
-# all; dense matrices of all dofs kept (compliance, factor, inverse, what solves them); steps of
-# the curve to gross slip.
-_STEP_CUBES, _STEP_SQUARES, _KEPT, _CURVE_STEPS = 1.5, 20.0, 5.0, 26
+def make_families(scene: Scene, symmetry: str) -> tuple[Family, ...]:
+    """Load cases of the scene, by the supports they share."""
+    curved, shear = is_curved(scene), set[int]()
+    if scene.coupled or friction_on(scene):
+        shear = {c for d in scene.loads.directions for c in slip_components(scene, d)}
+    if symmetry == "full" or (curved and symmetry == "half"):
+        mirror = {"plane_y": (1,)} if symmetry == "half" else {}
+        return (Family((NORMAL, *sorted(shear)), mirror),)
+    # Loads along y and z are even about x = 0 (the plane holds u_x), a load along x is odd (it
+    # keeps u_x alone).
+    beside = {"plane_y": (1,)} if symmetry == "quarter" else {}
+    even = (NORMAL, ACROSS) if ACROSS in shear else (NORMAL,)
+    families = [Family(even, {"plane_x": (0,), **beside})]
+    if ALONG in shear:
+        families.append(Family((ALONG,), {"plane_x": (1, 2), **beside}))
+    return tuple(families)
 
 
-def _add_coupled(cost: CostModel, scene: Scene, k: int, forces: int, *, curved: bool) -> None:
-    """Seconds and bytes of normal and tangential contact at once, for k contact pairs."""
-    m = 3.0 * k
-    closed = np.pi / 16.0 * m if curved else m
-    loads, lines = len(scene.loads.normal), 1 if curved else len(scene.loads.directions)
-    # Faces that touch without a load scale: their normal loads are one step.
-    steps = 8.0 + 3.0 * forces if curved else 1.0
-    steps += loads * lines * _CURVE_STEPS * scene.wants("tangential")
-    steps += loads * lines * (1.8 * scene.loads.cycle_steps) * scene.wants("cycle")
-    one = _STEP_CUBES * closed**3 + _STEP_SQUARES * m * closed
-    cost.seconds += steps * (5e-3 + dense_s(one)) + dense_s(m**3 / 3.0)
-    cost.kept_bytes += _KEPT * 8.0 * m**2
+# -- what the recipe is given ----------------------------------------------------------------------
 
 
-def _files_seconds(scene: Scene, size: Mapping[str, Mapping[str, int]]) -> float:
-    """Seconds of figures, files and page."""
-    flat = 0.0 if is_curved(scene) else _FLAT_S
-    nodes = sum(c["nodes"] for c in size.values()) if scene.wants("fields") else 0
-    # A table row, a group of arrays and a curve per load.
-    loads = len(scene.loads.normal) * (1 + len(scene.loads.tangential))
-    return _FILES_S + flat + 5e-3 * loads + _NODE_S * nodes
+def mesh_parameters(scene: Scene, symmetry: str) -> dict[str, Any]:
+    """Parameters for the recipe: those of the scene, the symmetry and the nodes per element."""
+    parameters = {k: v for k, v in scene.geometry.items() if k != "recipe"}
+    own = {"symmetry": symmetry, "element_nodes": NODES[scene.mesh.element]}
+    return parameters | {k: v for k, v in own.items() if recipes.has_parameter(scene.recipe, k)}
 
 
-# Fewest elements along an edge of the contact that a companion is made coarser to, of linear and of
-# quadratic elements.
-_FEWEST = {8: 8, 20: 4, 27: 4}
-#: parameters of a recipe that are numbers of elements
-_DIVISIONS = ("divisions", "divisions_long")
+def recipe_parameters(scene: Scene, symmetry: str) -> dict[str, Any]:
+    """Parameters for the recipe, with patch and core sized from the load when "auto"."""
+    parameters = mesh_parameters(scene, symmetry)
+    if parameters.get("patch") == "auto":
+        parameters["patch"] = auto_patch(scene)
+    if parameters.get("core_depth") == "auto":
+        parameters["core_depth"] = auto_core_depth(scene, float(parameters["patch"]))
+    return parameters
 
 
-def with_companion(plan: ContactPlan, parameters: Mapping[str, Any]) -> ContactPlan:
-    """The plan with a companion where an effect left out needs one, and its cost.
+def hertz_radius(scene: Scene, load: float) -> float:
+    """Hertz's radius in mm of a sphere under the load in N."""
+    if scene.sphere_radius is None:
+        raise InputError(
+            'geometry: "auto" sizes are known for a sphere on a plane only; recipe '
+            f"{scene.recipe!r} needs lengths"
+        )
+    m1, m2 = list(scene.materials.values())[:2]
+    E = contact_modulus(m1.E, m1.nu, m2.E, m2.nu)
+    return float(hertz_sphere(load, scene.sphere_radius, E).radius)
 
-    Parameters
-    ----------
-    parameters
-        Of the recipe for the whole model; the companion has half the elements along each edge of
-        its contact, where the recipe can be made coarser.
+
+def auto_core_depth(scene: Scene, patch: float) -> float:
+    """Depth of the fine core relative to the patch: one contact radius, and deep enough for the
+    sphere's curvature.
     """
-    needed = (e.check and e.word == "no" and e.name not in OWN_LEVEL for e in plan.effects)
-    if not plan.scene.left_out.solves or not any(needed):
-        return plan
-    fewest = _FEWEST[NODES[plan.scene.mesh.element]]
-    coarse = dict(parameters)
-    for name in _DIVISIONS:
-        n = parameters.get(name)
-        if isinstance(n, int) and n > fewest:
-            coarse[name] = max(fewest, 2 * (n // 4))
-    off = ("load curve", "internal displacement")
-    effects = [replace(e, on=e.on and e.name not in off) for e in plan.effects]
-    family = (Family((NORMAL, ALONG, ACROSS)),)
-    # It goes through a cycle only where nothing else is sheared.
-    sheared = plan.scene.wants("stiffness") or plan.scene.wants("tangential")
-    want = tuple(w for w in plan.scene.want if w != "cycle" or not sheared)
-    # What couples the directions is looked up in the whole compliance.
-    route = "condensed" if plan.scene.solver.route == "products" else plan.scene.solver.route
-    solver = replace(plan.scene.solver, route=route)
-    scene = replace(plan.scene, want=want, solver=solver)
-    if recipes.counted_by_mesh(scene.recipe):
-        # A plan runs a user's recipe once: the run makes the second mesh.
-        about = _size_about(plan, coarse)
-        companion = contact_plan(scene, "full", family, effects, coarse, about)
-        companion = replace(companion, otherwise=parameters)
-    else:
-        try:
-            companion = contact_plan(scene, "full", family, effects, coarse)
-        except UpdError:
-            # A recipe of the user's own that cannot be coarser.
-            companion = contact_plan(scene, "full", family, effects, parameters)
-    again = companion.solve_seconds
-    k = 3.0 * max(count["contact"] for count in companion.size.values())
-    again += len(plan.scene.loads.normal) * _AGAIN * dense_s(k**3)
-    return replace(
-        plan,
-        companion=companion,
-        seconds=plan.seconds + again,
-        solve_seconds=plan.solve_seconds + again,
-        # Both models are there at the same time, the libraries once.
-        memory_bytes=plan.memory_bytes + companion.memory_bytes - START_BYTES,
+    radius = hertz_radius(scene, max(scene.loads.forces))
+    assert scene.sphere_radius is not None
+    curvature = 2.0 * float(sphere_gap(patch / np.sqrt(2.0), scene.sphere_radius)) / patch
+    return float(max(0.15, curvature, min(0.5, radius / patch)))
+
+
+def auto_patch(scene: Scene) -> float:
+    """Edge of the square patch in mm.
+
+    2.6 times the Hertz radius of the largest load, so that the rim stays clear of the contact.
+    """
+    load = max(scene.loads.forces)
+    if not load > 0.0:
+        raise InputError(
+            'geometry.patch: "auto" needs a positive normal load to size the patch; give '
+            "the patch a length"
+        )
+    return 2.6 * hertz_radius(scene, load)
+
+
+def wider_patch(scene: Scene, needed: float) -> str:
+    """What to do where a contact needs a patch of so many mm."""
+    if recipes.has_parameter(scene.recipe, "patch"):
+        return f'set geometry.patch to "{needed:.3g} mm" or more, or to "auto"'
+    return (
+        f"mesh a contact surface of {needed:.3g} mm or more, with all its nodes in the sets "
+        "'contact', or lower the load"
     )
 
 
-def _size_about(plan: ContactPlan, coarse: Mapping[str, Any]) -> dict[str, dict[str, int]]:
-    """Numbers of the whole model with other divisions, from those of the plan's own mesh.
+def refined_growth(growth: float, ratio: float) -> float:
+    """Growth of a mesh whose spacing is ``ratio`` times that of a mesh with ``growth``, so that the
+    far mesh is refined with the patch.
 
-    Element edges along the contact by the geometric mean of its divisions' ratios, into the bodies
-    likewise.
+    Sizes grow by the same factor over 1 / ratio as many elements; within what the recipes accept.
     """
-    ratios = [
-        coarse[name] / plan.parameters[name]
-        for name in _DIVISIONS
-        if isinstance(plan.parameters.get(name), int) and name in coarse
-    ]
-    edge = float(np.prod(ratios)) ** (1.0 / len(ratios)) if ratios else 1.0
-    powers = {"nodes": 3, "hexes": 3, "contact": 2}
-    return {
-        body: {
-            what: max(1, round(plan.copies * number * edge ** powers.get(what, 3)))
-            for what, number in count.items()
-        }
-        for body, count in plan.size.items()
-    }
+    return float(min(1.9, max(1.06, growth**ratio)))
+
+
+# -- what the meshes must name ---------------------------------------------------------------------
+
+
+def require_held(scene: Scene, parameters: Mapping[str, Any], bodies: Iterable[str]) -> None:
+    """Raise InputError for a body or a node set of contact.distant that is not there."""
+    chosen, problems = scene.contact.distant, []
+    known = recipes.distant_sets(scene.recipe, parameters) if chosen else {}
+    for body, name in chosen.items():
+        if body not in set(bodies):
+            problem = f"no such body; the recipe makes {', '.join(bodies)}"
+        elif name not in known.get(body, ()):
+            there = ", ".join(known.get(body, ()))
+            advice = f"known: {there}" if there else "it has one distant set: leave the line out"
+            problem = f"the mesh has no set {name!r}; {advice}"
+        else:
+            continue
+        problems.append(f"contact.distant.{body}: {problem}")
+    if problems:
+        raise InputError("\n".join(problems))
 
 
 def require_contact_sets(
@@ -390,19 +302,14 @@ def require_contact_sets(
     of the loads, and have as many patches as their analysis knows.
     """
     planes = sorted({plane for family in families for plane in family.mirror})
-    held = {
-        name
-        for name in scene.contact.distant
-        if f"distant_{scene.contact.distant[name]}" in getattr(meshes.get(name), "nodes", ())
-    }
+    chosen = scene.contact.distant
     require_sets(scene.recipe, meshes, ("contact", *planes), ("contact",))
-    require_sets(
-        scene.recipe,
-        {name: mesh for name, mesh in meshes.items() if name not in held},
-        ("distant",),
-    )
+    usual = {name: mesh for name, mesh in meshes.items() if name not in chosen}
+    require_sets(scene.recipe, usual, ("distant",))
     problems: dict[str, list[str]] = {}
     for name, mesh in meshes.items():
+        if name in chosen:
+            require_sets(scene.recipe, {name: mesh}, (f"distant_{chosen[name]}",))
         if problem := _patch_problem(scene, mesh):
             problems.setdefault(problem, []).append(name)
     if problems:
@@ -435,58 +342,3 @@ def _patch_problem(scene: Scene, mesh: Mesh) -> str:
             "contact node to one patch"
         )
     return ""
-
-
-def two_bodies(scene: Scene) -> None:
-    """Raise InputError unless the scene has two materials, one per body."""
-    if len(scene.materials) != 2:
-        raise InputError(
-            f"materials: a contact has two bodies, {len(scene.materials)} given "
-            f"({', '.join(scene.materials)})"
-        )
-
-
-def mesh_parameters(scene: Scene, symmetry: str) -> dict[str, Any]:
-    """Parameters for the recipe: those of the scene, the symmetry and the nodes per element."""
-    parameters = {k: v for k, v in scene.geometry.items() if k != "recipe"}
-    known = recipes.parameters(scene.recipe).__dataclass_fields__
-    if "symmetry" in known:
-        parameters["symmetry"] = symmetry
-    if "element_nodes" in known:
-        parameters["element_nodes"] = NODES[scene.mesh.element]
-    return parameters
-
-
-def refined_growth(growth: float, ratio: float) -> float:
-    """Growth of a mesh whose spacing is ``ratio`` times that of a mesh with ``growth``, so that the
-    far mesh is refined with the patch.
-
-    Sizes grow by the same factor over 1 / ratio as many elements; within what the recipes accept.
-    """
-    return float(min(1.9, max(1.06, growth**ratio)))
-
-
-Array = NDArray[np.float64]
-
-
-def component(direction: float) -> int | None:
-    """The component a tangential load runs along, or None for one between the axes."""
-    return {0.0: ALONG, 90.0: ACROSS}.get(direction % 180.0)
-
-
-def axis_of(direction: float) -> int:
-    """The component of a direction that runs along an axis."""
-    found = component(direction)
-    assert found is not None
-    return found
-
-
-def direction_name(direction: float) -> str:
-    """x, y or the angle."""
-    return {0.0: "x", 90.0: "y"}.get(direction % 360.0, f"{direction:g}deg")
-
-
-def unit_vector(direction: float, components: Sequence[int]) -> Array:
-    """(n_component,) of the unit vector along ``direction`` in degrees."""
-    radians = np.radians(direction)
-    return np.asarray(np.array([np.cos(radians), np.sin(radians)])[list(components)])

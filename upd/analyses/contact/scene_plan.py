@@ -1,11 +1,11 @@
-"""Plan of a contact, curved or flat.
-
-Normal loads, mirror planes, load families, effects omitted, sizes from Hertz's contact.
+"""Plan of a contact, curved or flat: effects simulated and omitted, cost, and the coarser whole
+model of what is solved again.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,62 +22,27 @@ from upd.analyses.contact.effects import (
 from upd.analyses.contact.plan import (
     ACROSS,
     ALONG,
+    COMPONENTS,
     NORMAL,
+    OWN_LEVEL,
     ContactPlan,
     Family,
+    auto_core_depth,
+    auto_patch,
+    choose_symmetry,
     component,
-    contact_plan,
     is_curved,
-    mesh_parameters,
-    two_bodies,
-    with_companion,
+    make_families,
+    normal_loads,
+    recipe_parameters,
+    require_contact_sets,
+    require_held,
 )
-from upd.contact.equilibrium import FaceForces, equilibrium
-from upd.errors import InputError
+from upd.analyses.cost import NODES, START_BYTES, CostModel, dense_s
+from upd.errors import InputError, UpdError
+from upd.linalg.routes import EACH, FIRST
 from upd.mesh import recipes
-from upd.reference import contact_modulus, hertz_sphere, sphere_gap
-from upd.results import Case
 from upd.scene import FRICTION_WANTS, Scene, friction_on
-
-
-@dataclass(frozen=True)
-class DamperLoad:
-    """A normal force in N, and the damper's equilibrium it comes from, if any."""
-
-    force: float
-    state: str = ""
-    faces: FaceForces | None = None
-
-    @property
-    def case(self) -> Case:
-        """The force, with as many digits as distinguish the scene's loads."""
-        return Case(load=self.force)
-
-
-def normal_loads(scene: Scene) -> tuple[DamperLoad, ...]:
-    """The scene's normal loads in N. Raises InputError, with all problems, for an equilibrium that
-    jams or lifts.
-    """
-    loads, problems = [], []
-    for value in dict.fromkeys(scene.loads.normal):
-        if not isinstance(value, str):
-            loads.append(DamperLoad(float(value)))
-            continue
-        try:
-            parameters = mesh_parameters(scene, "full")
-            left, right = recipes.inclination(scene.recipe, parameters)
-            assert scene.loads.centrifugal is not None
-            found = equilibrium(left, right, scene.loads.centrifugal, scene.contact.friction, value)
-            loads.append(DamperLoad(found.normal_right, value, found))
-        except InputError as error:
-            problems.append(f"loads.normal: {value!r}: {error}")
-    if problems:
-        raise InputError("\n".join(problems))
-    # Without friction all equilibria are one.
-    different: dict[str, DamperLoad] = {}
-    for load in loads:
-        different.setdefault(load.case.label, load)
-    return tuple(different.values())
 
 
 def make_plan(scene: Scene) -> ContactPlan:
@@ -85,19 +50,18 @@ def make_plan(scene: Scene) -> ContactPlan:
 
     Raises InputError when its parts do not fit together.
     """
-    two_bodies(scene)
+    if len(scene.materials) != 2:
+        raise InputError(
+            f"materials: a contact has two bodies, {len(scene.materials)} given "
+            f"({', '.join(scene.materials)})"
+        )
     loaded = any(load.force > 0.0 for load in normal_loads(scene))
     if not is_curved(scene):
         _require_fitting(scene)
-    symmetry, why = _symmetry(scene)
-    plan = contact_plan(
-        scene,
-        symmetry,
-        _families(scene, symmetry),
-        _effects(scene, symmetry, why, loaded),
-        recipe_parameters(scene, symmetry),
-    )
-    return with_companion(plan, _companion_parameters(scene))
+    symmetry, why = choose_symmetry(scene)
+    families, effects = make_families(scene, symmetry), _effects(scene, symmetry, why, loaded)
+    parameters = recipe_parameters(scene, symmetry)
+    return _with_companion(contact_plan(scene, symmetry, families, effects, parameters))
 
 
 def _require_fitting(scene: Scene) -> None:
@@ -122,67 +86,308 @@ def _require_fitting(scene: Scene) -> None:
         raise InputError("\n".join(problems))
 
 
-def has_mirror_planes(scene: Scene) -> bool:
-    """Whether the recipe makes bodies that are their own mirror images: about x = 0, and of a
-    curved contact about y = 0 too.
-    """
-    return "symmetry" in recipes.parameters(scene.recipe).__dataclass_fields__
+# -- effects ---------------------------------------------------------------------------------------
 
 
-def _symmetry(scene: Scene) -> tuple[str, str]:
-    asked, reasons = scene.mesh.symmetry, []
-    if not has_mirror_planes(scene):
-        reasons.append("the geometry has no mirror plane")
-    if scene.coupled:
-        reasons.append("normal and tangential contact at once are solved on the full model")
-    elif friction_on(scene) and scene.slip_directions == 2:
-        reasons.append("slip in two directions is solved on the full model")
-    if scene.contact.tilt == "free":
-        reasons.append("the damper may tilt about both axes")
-    if scene.geometry.get("pad_offset", 0.0) != 0.0:
-        reasons.append("the pads have unequal heights")
-    if asked not in ("auto", "full") and reasons:
-        raise InputError(f'mesh.symmetry: {"; ".join(reasons)}; use "full" or "auto"')
-    if asked != "auto":
-        return asked, "asked for in the scene"
-    if reasons:
-        return "full", "; ".join(reasons)
+def _simulated(name: str, on: bool, why: str) -> Effect:
+    """An effect that the scene's question has where it is simulated, and else not."""
+    return Effect(name, on, why, applies=on)
+
+
+def _effects(scene: Scene, symmetry: str, why_symmetry: str, loaded: bool) -> list[Effect]:
+    edge = "edges may lift off; one linear solve when none does"
+    small, tilt = "the approach is small against the patch", [_tilt_effect(scene, loaded)]
     if is_curved(scene):
-        return "quarter", "geometry, load and effects share both mirror planes"
-    return "half", "geometry and loads share the mirror plane x = 0"
+        edge = "the gap is curved: the contact set depends on the load"
+        small, tilt = "the contact is small against the body", []
+    curve, inside = scene.wants("curve"), ", ".join(_inside(scene))
+    points = f"{scene.loads.curve_points} points asked for" if curve else "single loads only"
+    fields = (
+        f"a back-substitution per load for {inside}"
+        if inside
+        else "no output asks for it: contact nodes only"
+    )
+    return [
+        Effect("unilateral contact", True, edge),
+        *tilt,
+        *_friction_effects(scene, loaded),
+        _simulated("mirror symmetry", symmetry != "full", why_symmetry),
+        _simulated("load curve", curve, points),
+        _simulated("internal displacement", bool(inside), fields),
+        _simulated("inertia", False, "every output is static: M is not assembled"),
+        omitted(LARGE, small, applies=loaded),
+    ]
 
 
-def _families(scene: Scene, symmetry: str) -> tuple[Family, ...]:
-    curved, shear = is_curved(scene), set[int]()
-    if scene.coupled or (friction_on(scene) and scene.slip_directions == 2):
-        shear = {ALONG, ACROSS}
-    elif friction_on(scene):
-        directions = (0.0,) if curved else scene.loads.directions
-        shear = {c for d in directions if (c := component(d)) is not None}
-    if symmetry == "full" or (curved and symmetry == "half"):
-        mirror = {"plane_y": (1,)} if symmetry == "half" else {}
-        return (Family((NORMAL, *sorted(shear)), mirror),)
-    # Loads along y and z are even about x = 0 (the plane holds u_x), a load along x is odd (it
-    # keeps u_x alone).
-    beside = {"plane_y": (1,)} if symmetry == "quarter" else {}
-    even = (NORMAL, ACROSS) if ACROSS in shear else (NORMAL,)
-    families = [Family(even, {"plane_x": (0,), **beside})]
-    if ALONG in shear:
-        families.append(Family((ALONG,), {"plane_x": (1, 2), **beside}))
-    return tuple(families)
+def _tilt_effect(scene: Scene, loaded: bool) -> Effect:
+    if scene.contact.tilt == "free":
+        return Effect(TILT, True, "no moment about the load line")
+    return omitted(TILT, "its distant set only translates", "contact.tilt=free", applies=loaded)
 
 
-def recipe_parameters(scene: Scene, symmetry: str) -> dict[str, Any]:
-    """Parameters for the recipe, with patch and core sized from the load when "auto"."""
-    parameters = mesh_parameters(scene, symmetry)
-    if parameters.get("patch") == "auto":
-        parameters["patch"] = auto_patch(scene)
-    if parameters.get("core_depth") == "auto":
-        parameters["core_depth"] = auto_core_depth(scene, float(parameters["patch"]))
-    return parameters
+def _friction_effects(scene: Scene, loaded: bool) -> list[Effect]:
+    curved, mu = is_curved(scene), scene.contact.friction
+    if not friction_on(scene):
+        asked = scene.wants(*FRICTION_WANTS)
+        why = "mu = 0: no tangential force can be carried" if asked else "no output asks for it"
+        coupling = coupling_effects(scene, loaded)[:1] if mu > 0.0 else ()
+        return [_simulated("friction", False, why), *coupling]
+    outputs = ", ".join(w for w in scene.want if w in FRICTION_WANTS)
+    stepped, steps = True, "first loading, in small steps"
+    if scene.wants("cycle"):
+        steps = "a full cycle is asked for"
+    elif curved and not scene.coupled:
+        stepped, steps = False, "first loading only"
+    directions = Effect(DIRECTIONS, True, TOGETHER if scene.coupled else "asked for")
+    if scene.slip_directions == 1:
+        why = "the load has one direction" if curved else "loads run along the axes"
+        shows = loaded and (not curved or _slip_shows(scene))
+        directions = omitted(DIRECTIONS, why, "contact.directions=2", applies=shows)
+    return [
+        _simulated("friction", True, f"mu = {mu:g} and the outputs {outputs}"),
+        directions,
+        *coupling_effects(scene, loaded),
+        _simulated("load history", stepped, steps),
+    ]
 
 
-def _companion_parameters(scene: Scene) -> dict[str, Any]:
+def _slip_shows(scene: Scene) -> bool:
+    """Whether a number of the run depends on the directions of slip."""
+    shear = scene.wants("stiffness") and scene.sphere_radius is not None
+    loads = scene.wants("tangential") and len(scene.loads.tangential) > 0
+    return shear or loads or scene.wants("cycle")
+
+
+def _inside(scene: Scene) -> list[str]:
+    """Outputs that ask for displacements inside the bodies."""
+    if not is_curved(scene):
+        return [w for w in scene.want if w == "fields"]
+    wanted = ("fields", "body_compression", "stiffness")
+    return [w for w in scene.want if w in wanted or (w == "tangential" and friction_on(scene))]
+
+
+# -- size and cost ---------------------------------------------------------------------------------
+
+
+def contact_plan(
+    scene: Scene,
+    symmetry: str,
+    families: tuple[Family, ...],
+    effects: Sequence[Effect],
+    parameters: Mapping[str, Any],
+) -> ContactPlan:
+    """The plan of a contact of two bodies, with its size and cost.
+
+    Raises InputError when a body lacks its material.
+    """
+    size = {body: dict(n) for body, n in recipes.count(scene.recipe, parameters).items()}
+    missing = sorted(set(size) - set(scene.materials))
+    spare = sorted(set(scene.materials) - set(size))
+    if missing or spare:
+        raise InputError(
+            f"materials: the recipe makes the bodies {', '.join(size)}"
+            + (f"; {', '.join(missing)} has no material" if missing else "")
+            + (f"; {', '.join(spare)} is not one of them" if spare else "")
+        )
+    require_held(scene, parameters, size)
+    if recipes.counted_by_mesh(scene.recipe):
+        # The mesh is there: what it lacks is reported before anything is written.
+        require_contact_sets(scene, recipes.build_mesh(scene.recipe, parameters)[0], families)
+    cost = CostModel(scene)
+    weighted = recipes.weighted_sets(scene.recipe, parameters)
+    add_loads(cost, scene, size, effects, _add_bodies(cost, size, families, effects, weighted))
+    # The internal displacement takes the factors of all bodies again.
+    memory, workers = cost.in_a_row(keep=_is_on(effects, "internal displacement"))
+    files = _files_seconds(scene, size)
+    return ContactPlan(
+        scene,
+        parameters,
+        symmetry,
+        tuple(effects),
+        size,
+        cost.solver,
+        cost.total(workers) + files,
+        memory,
+        workers,
+        families,
+        files_seconds=files,
+        ways=cost.ways,
+    )
+
+
+def _is_on(effects: Sequence[Effect], name: str) -> bool:
+    return any(effect.name == name and effect.on for effect in effects)
+
+
+def _add_bodies(
+    cost: CostModel,
+    size: Mapping[str, Mapping[str, int]],
+    families: tuple[Family, ...],
+    effects: Sequence[Effect],
+    weighted: Mapping[str, Sequence[str]],
+) -> float:
+    """Bodies meshed and condensed; the seconds of one displacement inside them.
+
+    ``weighted``: body -> its sets with weights, which hold it in the mean.
+    """
+    scene, inside = cost.scene, 0.0
+    assert isinstance(scene, Scene)
+    for count in size.values():
+        cost.contact_body(count["hexes"], count["nodes"])
+    # what every task keeps is held at once: an equal share of the memory each
+    room = (cost.limit() - cost.kept_bytes) / (len(size) * len(families))
+    for body, count in size.items():
+        chosen = scene.contact.distant.get(body)
+        in_mean = ("distant" if chosen is None else f"distant_{chosen}") in weighted.get(body, ())
+        # products may serve instead of a condensation
+        learns = is_curved(scene) and not scene.coupled and not in_mean
+        found = []
+        for family in families:
+            name, n_kept = f"{body}, {family.label}", len(family.components) * count["contact"]
+            task = (name, count["hexes"], count["nodes"])
+            if learns:
+                found.append(cost.contact(*task, n_kept, _products(scene, effects, family), room))
+            else:
+                found.append(cost.condensed(*task, n_kept))
+        for family in families if in_mean else ():
+            cost.held_in_mean(f"{body}, {family.label}", count["hexes"], count["nodes"])
+        # recovery of the inner dofs: backward only
+        inside += 0.5 * max(one.substitution() for one in found)
+    return inside
+
+
+# A cycle takes the products of so many loads.
+_CYCLE_CASES = 4
+
+
+def _products(scene: Scene, effects: Sequence[Effect], family: Family) -> int:
+    """Products that a family of loads takes about."""
+    loads, cases = len(scene.loads.normal), 0
+    if NORMAL in family.components:
+        cases += loads * (3 if scene.wants("stiffness") else 1)
+        cases += scene.loads.curve_points * _is_on(effects, "load curve")
+    if ALONG in family.components:
+        sheared = len(scene.loads.tangential) if scene.wants("tangential") else 0
+        cases += loads * (2 + sheared + _CYCLE_CASES * scene.wants("cycle"))
+    return FIRST + EACH * max(cases - 1, 0)
+
+
+# Counted and timed on the ready scenes, one thread: a contact set under one load; a tangential
+# load; a step of the march along one direction and, with its disks, along two; coupled, a step.
+_LOAD_S, _TANGENTIAL_S, _STEP_S, _COUPLED_S = 1e-3, 5e-3, {1: 1.5e-4, 2: 1.5e-3}, 5e-3
+# Figures and page, figures of a flat contact's tangential loads, files of fields per node.
+_FILES_S, _FLAT_S, _NODE_S = 2.6, 1.4, 3.5e-5
+# Dense factorisations with three directions of a load, of effects left out.
+_AGAIN = 20
+# Of coupled contact: flops of a load step over the cube of its closed dofs, and over those times
+# all; dense matrices of all dofs kept (compliance, factor, inverse, what solves them); steps of the
+# curve to gross slip.
+_STEP_CUBES, _STEP_SQUARES, _KEPT, _CURVE_STEPS = 1.5, 20.0, 5.0, 26
+
+
+def add_loads(
+    cost: CostModel,
+    scene: Scene,
+    size: Mapping[str, Mapping[str, int]],
+    effects: Sequence[Effect],
+    inside: float,
+) -> None:
+    """Seconds and bytes of all loads; ``inside``: seconds of a displacement inside both bodies."""
+    nodes, k = sum(c["nodes"] for c in size.values()), max(c["contact"] for c in size.values())
+    friction, curved = _is_on(effects, "friction"), is_curved(scene)
+    n_load = len(scene.loads.normal)
+    n_curve = scene.loads.curve_points * _is_on(effects, "load curve")
+    # A stiffness is a slope between two more loads.
+    forces = n_load * (3 if scene.wants("stiffness") else 1) + n_curve
+    lines = n_load * len(scene.loads.directions) * friction
+    ratios = lines * len(scene.loads.tangential) * scene.wants("tangential")
+    steps = lines * scene.loads.cycle_steps * scene.wants("cycle")
+    # A curved contact's patch reaches to twice its radius at least.
+    share = np.pi / 16.0 if curved else 1.0
+    cost.seconds += forces * (_LOAD_S + dense_s(k**3 / 6.0))
+    cost.seconds += ratios * (_TANGENTIAL_S + dense_s(3.0 * k**3))
+    cost.seconds += steps * _STEP_S[scene.slip_directions]
+    # Four numbers a step and node: traction, also before it is clipped, slip, state.
+    cost.kept_bytes += (
+        32.0 * steps * scene.slip_directions * share * k + 64.0 * (forces + ratios) * k
+    )
+    if scene.coupled:
+        m, closed = 3.0 * k, 3.0 * share * k
+        # Faces that touch without a load scale: their normal loads are one step.
+        coupled = 8.0 + 3.0 * forces if curved else 1.0
+        coupled += lines * _CURVE_STEPS * scene.wants("tangential") + 1.8 * steps
+        one = _STEP_CUBES * closed**3 + _STEP_SQUARES * m * closed
+        cost.seconds += coupled * (_COUPLED_S + dense_s(one)) + dense_s(m**3 / 3.0)
+        cost.kept_bytes += _KEPT * 8.0 * m**2
+    if _is_on(effects, "internal displacement"):
+        cost.seconds += (n_load * (1 + friction) + n_curve) * inside
+        cost.kept_bytes += 48.0 * n_load * nodes
+
+
+def _files_seconds(scene: Scene, size: Mapping[str, Mapping[str, int]]) -> float:
+    """Seconds of figures, files and page."""
+    flat = 0.0 if is_curved(scene) else _FLAT_S
+    nodes = sum(c["nodes"] for c in size.values()) if scene.wants("fields") else 0
+    # A table row, a group of arrays and a curve per load.
+    loads = len(scene.loads.normal) * (1 + len(scene.loads.tangential))
+    return _FILES_S + flat + 5e-3 * loads + _NODE_S * nodes
+
+
+# -- the coarser whole model -----------------------------------------------------------------------
+
+# Fewest elements along an edge of the contact that a companion is made coarser to, of linear and of
+# quadratic elements.
+_FEWEST = {8: 8, 20: 4, 27: 4}
+#: parameters of a recipe that are numbers of elements
+_DIVISIONS = ("divisions", "divisions_long")
+
+
+def _with_companion(plan: ContactPlan) -> ContactPlan:
+    """The plan with a companion where an effect left out needs one, and its cost.
+
+    The companion has half the elements along each edge of its contact, where the recipe can be made
+    coarser.
+    """
+    scene = plan.scene
+    needed = (e.check and e.word == "no" and e.name not in OWN_LEVEL for e in plan.effects)
+    if not scene.left_out.solves or not any(needed):
+        return plan
+    off = ("load curve", "internal displacement")
+    effects = [replace(e, on=e.on and e.name not in off) for e in plan.effects]
+    # It goes through a cycle only where nothing else is sheared.
+    sheared = scene.wants("stiffness") or scene.wants("tangential")
+    want = tuple(w for w in scene.want if w != "cycle" or not sheared)
+    # What couples the directions is looked up in the whole compliance.
+    route = "condensed" if scene.solver.route == "products" else scene.solver.route
+    smaller = replace(scene, want=want, solver=replace(scene.solver, route=route))
+    whole, family = _whole_parameters(scene), (Family(COMPONENTS),)
+    try:
+        companion = contact_plan(smaller, "full", family, effects, _coarse(scene, whole))
+    except UpdError:
+        # A recipe of the user's own that cannot be coarser.
+        companion = contact_plan(smaller, "full", family, effects, whole)
+    k = 3.0 * max(count["contact"] for count in companion.size.values())
+    again = companion.solve_seconds + len(scene.loads.normal) * _AGAIN * dense_s(k**3)
+    return replace(
+        plan,
+        companion=companion,
+        seconds=plan.seconds + again,
+        # Both models are there at the same time, the libraries once.
+        memory_bytes=plan.memory_bytes + companion.memory_bytes - START_BYTES,
+    )
+
+
+def _coarse(scene: Scene, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Half the elements along each edge of the contact, not fewer than it takes."""
+    fewest, coarse = _FEWEST[NODES[scene.mesh.element]], dict(parameters)
+    for name in _DIVISIONS:
+        n = parameters.get(name)
+        if isinstance(n, int) and n > fewest:
+            coarse[name] = max(fewest, 2 * (n // 4))
+    return coarse
+
+
+def _whole_parameters(scene: Scene) -> dict[str, Any]:
     """Of the whole model at the run's spacing.
 
     The patch is no larger than the largest load needs it.
@@ -197,157 +402,3 @@ def _companion_parameters(scene: Scene) -> dict[str, Any]:
             if scene.geometry.get("core_depth", "auto") == "auto":
                 parameters["core_depth"] = auto_core_depth(scene, needed)
     return parameters
-
-
-def _largest_contact(scene: Scene, load: float | None = None) -> float:
-    """Hertz's radius in mm of the largest load (or of ``load``)."""
-    (m1, m2) = list(scene.materials.values())[:2]
-    load = max(scene.loads.forces) if load is None else load
-    return float(
-        hertz_sphere(load, _sphere(scene), contact_modulus(m1.E, m1.nu, m2.E, m2.nu)).radius
-    )
-
-
-def _sphere(scene: Scene) -> float:
-    if scene.sphere_radius is None:
-        raise InputError(
-            'geometry: "auto" sizes are known for a sphere on a plane only; recipe '
-            f"{scene.recipe!r} needs lengths"
-        )
-    return scene.sphere_radius
-
-
-def auto_core_depth(scene: Scene, patch: float) -> float:
-    """Depth of the fine core relative to the patch: one contact radius, and deep enough for the
-    sphere's curvature.
-    """
-    curvature = 2.0 * float(sphere_gap(patch / np.sqrt(2.0), _sphere(scene))) / patch
-    return float(max(0.15, curvature, min(0.5, _largest_contact(scene) / patch)))
-
-
-def auto_patch(scene: Scene, load: float | None = None) -> float:
-    """Edge of the square patch in mm.
-
-    2.6 times the Hertz radius of the largest load, so that the rim stays clear of the contact.
-    """
-    load = max(scene.loads.forces) if load is None else load
-    if not load > 0.0:
-        raise InputError(
-            'geometry.patch: "auto" needs a positive normal load to size the patch; give '
-            "the patch a length"
-        )
-    return 2.6 * _largest_contact(scene, load)
-
-
-def wider_patch(scene: Scene, needed: float) -> str:
-    """What to do where a contact needs a patch of so many mm."""
-    if recipes.has_parameter(scene.recipe, "patch"):
-        return f'set geometry.patch to "{needed:.3g} mm" or more, or to "auto"'
-    return (
-        f"mesh a contact surface of {needed:.3g} mm or more, with all its nodes in the sets "
-        "'contact', or lower the load"
-    )
-
-
-def _effects(scene: Scene, symmetry: str, why_symmetry: str, loaded: bool) -> list[Effect]:
-    curved = is_curved(scene)
-    out = [
-        Effect(
-            "unilateral contact",
-            True,
-            "the gap is curved: the contact set depends on the load"
-            if curved
-            else "edges may lift off; one linear solve when none does",
-        )
-    ]
-    if not curved:
-        out.append(
-            Effect(TILT, True, "no moment about the load line")
-            if scene.contact.tilt == "free"
-            else omitted(
-                TILT, "its distant set only translates", "contact.tilt=free", applies=loaded
-            )
-        )
-    out += _friction_effects(scene, loaded)
-    curve, users = scene.wants("curve"), _inside(scene)
-    small = (
-        "the contact is small against the body"
-        if curved
-        else "the approach is small against the patch"
-    )
-    return [
-        *out,
-        Effect("mirror symmetry", symmetry != "full", why_symmetry, applies=symmetry != "full"),
-        Effect(
-            "load curve",
-            curve,
-            f"{scene.loads.curve_points} points asked for" if curve else "single loads only",
-            applies=curve,
-        ),
-        Effect(
-            "internal displacement",
-            bool(users),
-            "a back-substitution per load for " + ", ".join(users)
-            if users
-            else "no output asks for it: contact nodes only",
-            applies=bool(users),
-        ),
-        Effect("inertia", False, "every output is static: M is not assembled", applies=False),
-        omitted(LARGE, small, applies=loaded),
-    ]
-
-
-def _friction_effects(scene: Scene, loaded: bool) -> list[Effect]:
-    curved, friction, mu = is_curved(scene), friction_on(scene), scene.contact.friction
-    if friction:
-        outputs = ", ".join(w for w in scene.want if w in FRICTION_WANTS)
-        why = f"mu = {mu:g} and the outputs {outputs}"
-    elif scene.wants(*FRICTION_WANTS):
-        why = "mu = 0: no tangential force can be carried"
-    else:
-        why = "no output asks for it"
-    out = [Effect("friction", friction, why, applies=friction)]
-    if not friction:
-        return [*out, *(coupling_effects(scene, loaded)[:1] if mu > 0.0 else ())]
-    cycle = scene.wants("cycle")
-    stepped = cycle or scene.coupled or not curved
-    return [
-        *out,
-        Effect(DIRECTIONS, True, TOGETHER if scene.coupled else "asked for")
-        if scene.slip_directions == 2
-        else omitted(
-            DIRECTIONS,
-            "the load has one direction" if curved else "loads run along the axes",
-            "contact.directions=2",
-            applies=loaded and (not curved or _slip_shows(scene)),
-        ),
-        *coupling_effects(scene, loaded),
-        Effect(
-            "load history",
-            stepped,
-            "a full cycle is asked for"
-            if cycle
-            else "first loading, in small steps"
-            if stepped
-            else "first loading only",
-            applies=stepped,
-        ),
-    ]
-
-
-def _slip_shows(scene: Scene) -> bool:
-    """Whether a number of the run depends on the directions of slip."""
-    shear = scene.wants("stiffness") and scene.sphere_radius is not None
-    return (
-        shear
-        or scene.wants("cycle")
-        or (scene.wants("tangential") and len(scene.loads.tangential) > 0)
-    )
-
-
-def _inside(scene: Scene) -> list[str]:
-    """Outputs that ask for displacements inside the bodies."""
-    if not is_curved(scene):
-        return [w for w in scene.want if w == "fields"]
-    wanted = ("fields", "body_compression", "stiffness")
-    return [w for w in scene.want if w in wanted or (w == "tangential" and friction_on(scene))]

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from upd.analyses.base import Resolved
 from upd.analyses.contact.coupled import CoupledState
 from upd.analyses.contact.loading import LoadPath, Sheared
-from upd.analyses.contact.plan import ContactPlan, direction_name, is_curved
-from upd.analyses.contact.scene_plan import DamperLoad
+from upd.analyses.contact.plan import ContactPlan, DamperLoad, direction_name, is_curved
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
 from upd.contact.patch import ContactMeasures

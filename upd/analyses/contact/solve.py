@@ -22,9 +22,8 @@ from upd.analyses.contact.coupled import (
 )
 from upd.analyses.contact.faces import measured
 from upd.analyses.contact.loading import LOAD_STEP, tilt_arms
-from upd.analyses.contact.plan import NORMAL, ContactPlan
+from upd.analyses.contact.plan import NORMAL, ContactPlan, DamperLoad, normal_loads
 from upd.analyses.contact.products import show_normal
-from upd.analyses.contact.scene_plan import DamperLoad, normal_loads
 from upd.analyses.contact.shares import solve_inside
 from upd.analyses.contact.solution import ContactSolution, NormalCase, PressedContact
 from upd.analyses.contact.tangential import solve_tangential

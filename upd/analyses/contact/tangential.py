@@ -21,10 +21,16 @@ from upd.analyses.contact.loading import (
     along,
     closed_loop,
     load_history,
-    slip_components,
     tangential_compliance,
 )
-from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan, unit_vector
+from upd.analyses.contact.plan import (
+    ACROSS,
+    ALONG,
+    NORMAL,
+    ContactPlan,
+    slip_components,
+    unit_vector,
+)
 from upd.analyses.contact.products import show_tangential
 from upd.analyses.contact.solution import (
     ContactSolution,

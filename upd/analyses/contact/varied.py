@@ -31,13 +31,13 @@ from upd.analyses.base import chosen_by_accuracy, refuse_oversize, require_memor
 from upd.analyses.contact.faces import rim_nodes
 from upd.analyses.contact.plan import (
     ContactPlan,
-    add_loads,
-    contact_plan,
+    auto_patch,
+    hertz_radius,
     is_curved,
     refined_growth,
 )
 from upd.analyses.contact.results import make_results
-from upd.analyses.contact.scene_plan import auto_patch, make_plan
+from upd.analyses.contact.scene_plan import add_loads, contact_plan, make_plan
 from upd.analyses.contact.solution import ContactSolution, NormalCase
 from upd.analyses.contact.solve import solve_normal, solve_plan
 from upd.analyses.contact.tangential import solve_tangential
@@ -45,7 +45,6 @@ from upd.analyses.cost import CostModel
 from upd.errors import InputError, UpdError
 from upd.mesh import recipes
 from upd.progress import Stages
-from upd.reference import contact_modulus, hertz_sphere
 from upd.results import Case
 from upd.scene import Scene
 from upd.scene.contact import Loads
@@ -227,7 +226,6 @@ def plan_with_estimates(scene: Scene) -> ContactPlan:
     return replace(
         plan,
         seconds=plan.seconds + again,
-        solve_seconds=plan.solve_seconds + again,
         estimate_seconds=again,
     )
 
@@ -283,10 +281,7 @@ def _curved_level(scene: Scene, level: int) -> Scene:
     loads = [F for F in scene.loads.forces if F > 0.0]
     if not loads:
         raise InputError("accuracy: needs a positive normal load to size the mesh")
-    m1, m2 = list(scene.materials.values())[:2]
-    E = contact_modulus(m1.E, m1.nu, m2.E, m2.nu)
-    radius = hertz_sphere(min(loads), scene.sphere_radius, E).radius
-    patch = auto_patch(scene, max(loads))
+    radius, patch = hertz_radius(scene, min(loads)), auto_patch(scene)
     if scene.geometry.get("patch", "auto") != "auto":
         patch = min(patch, float(scene.geometry["patch"]))
     divisions = 2 * math.ceil(0.5 * patch / radius * _NODES[level])
