@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from upd.analyses import analysis_of, make_plan
-from upd.analyses.contact.coupled import shear_nodes
+from upd.analyses.contact.loading import shear_nodes
 from upd.analyses.contact.plan import COMPONENTS, ContactPlan
 from upd.contact import coupled_contact
 from upd.errors import InputError

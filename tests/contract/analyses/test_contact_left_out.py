@@ -20,8 +20,8 @@ from scipy.sparse.linalg import splu
 import upd
 from upd.analyses import make_plan
 from upd.analyses.contact.bodies import prepare
-from upd.analyses.contact.coupled import raised
 from upd.analyses.contact.left_out import displaced_gap, pressure_slip
+from upd.analyses.contact.loading import raised
 from upd.analyses.contact.plan import NORMAL, ContactPlan
 from upd.contact import normal_contact, tangential_contact
 from upd.contact.model import ContactModel

@@ -11,13 +11,15 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.contact.coupled import as_normal, opened_by_shear, shear_nodes
 from upd.analyses.contact.effects import beta_of, checks_of
 from upd.analyses.contact.faces import lattices, rim_nodes
 from upd.analyses.contact.loading import (
     LoadPath,
     Sheared,
+    as_normal,
     contact_points_of,
+    opened_by_shear,
+    shear_nodes,
     tangential_compliance,
     tilt_arms,
 )

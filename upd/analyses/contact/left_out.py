@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from upd.analyses.base import Resolved
 from upd.analyses.contact.bodies import prepare
-from upd.analyses.contact.coupled import raised, slope, slope_loads
 from upd.analyses.contact.effects import (
     COUPLED_NUMBERS,
     COUPLING,
@@ -36,6 +35,9 @@ from upd.analyses.contact.loading import (
     LOAD_STEP,
     closed_loop,
     load_history,
+    raised,
+    slope,
+    slope_loads,
     tangential_compliance,
     tilt_arms,
 )

@@ -1,21 +1,27 @@
-"""Tangential loads after a normal load.
+"""Loads after loads of two condensed bodies: what carries them, the states of normal and tangential
+contact at once, closed loops.
 
-Compliance of the loaded nodes, force over displacement, the closed loop of a cycle.
+The normal load rises without a tangential one; the tangential loads follow it. Friction remembers
+its way: every state of coupled contact starts from the one before.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.contact.plan import ContactPlan
+from upd.analyses.contact.plan import ACROSS, ALONG, COMPONENTS, NORMAL, ContactPlan
+from upd.contact.coulomb_conditions import STICK
+from upd.contact.coupled import CoupledContact, coupled_contact
 from upd.contact.model import Body, ContactModel
+from upd.contact.normal import NormalContact
 from upd.contact.tangential import TangentialPath, tangential_path
 from upd.contact.tangential_step import TangentialHistory
+from upd.errors import ConvergenceError
 from upd.results import Case
 
 Array = NDArray[np.float64]
@@ -23,6 +29,8 @@ Array = NDArray[np.float64]
 #: Relative step of load on both sides of a load over which a slope of the force-approach curve is
 #: taken; the curvature of Hertz's F ~ d^(3/2) makes it 0.074 LOAD_STEP^2 too soft.
 LOAD_STEP = 0.1
+#: Steps in which a normal load rises from nothing, at least.
+NORMAL_STEPS = 8
 
 
 def contact_points_of(model: ContactModel) -> Array:
@@ -56,6 +64,26 @@ def tilt_arms(plan: ContactPlan, model: ContactModel, *, held: bool | None = Non
     if plan.scene.contact.tilt != "free" if held is None else held:
         return np.zeros((len(model.gap), 0))
     return contact_points_of(model)[:, :2] - load_point(plan, model)
+
+
+def tangential_compliance(
+    model: ContactModel,
+    components: Sequence[int],
+    loaded: NDArray[np.int64],
+    body: Body | None = None,
+) -> Array:
+    """Compliance of the loaded nodes, (n, n) or (2n, 2n) mm/N with x dofs first, of both bodies or
+    of one.
+    """
+    pick = np.ix_(loaded, loaded)
+
+    def one(i: int, j: int) -> Array:
+        return (model.compliance(i, j) if body is None else model.body_compliance(body, i, j))[pick]
+
+    return np.block([[one(i, j) for j in components] for i in components])
+
+
+# -- tangential force over displacement ------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -120,23 +148,6 @@ class Sheared:
     terms: Array | float = 0.0
 
 
-def tangential_compliance(
-    model: ContactModel,
-    components: Sequence[int],
-    loaded: NDArray[np.int64],
-    body: Body | None = None,
-) -> Array:
-    """Compliance of the loaded nodes, (n, n) or (2n, 2n) mm/N with x dofs first, of both bodies or
-    of one.
-    """
-    pick = np.ix_(loaded, loaded)
-
-    def one(i: int, j: int) -> Array:
-        return (model.compliance(i, j) if body is None else model.body_compliance(body, i, j))[pick]
-
-    return np.block([[one(i, j) for j in components] for i in components])
-
-
 def load_history(values: Array, unit: Array) -> Array:
     """(n_step,) loads along one component, or (n_step, 2) along ``unit`` (2,)."""
     return np.outer(values, unit) if len(unit) == 2 else values
@@ -150,7 +161,7 @@ def along(path: TangentialPath, unit: Array, copies: int) -> tuple[Array, Array]
         np.asarray(v).reshape(len(path.load), len(unit)) @ unit
         for v in (path.load, path.displacement)
     )
-    return np.concatenate([[0.0], copies * load]), np.concatenate([[0.0], moved])
+    return np.insert(copies * load, 0, 0.0), np.insert(moved, 0, 0.0)
 
 
 def cycle_shares(steps: int) -> tuple[Array, int]:
@@ -199,7 +210,224 @@ def closed_loop(
         compliance, limit, loads=load_history(peak * shares, unit), history=history
     )
     T, d = along(path, unit, copies)
-    area = abs(float(np.trapezoid(T[quarter:], d[quarter:])))
-    return LoadPath(
-        case, normal, T, d, True, copies * float(np.sum(path.slip_work[quarter:])), area
+    return _loop(case, normal, T, d, copies * float(np.sum(path.slip_work[quarter:])), quarter)
+
+
+def _loop(case: Case, normal: Case, T: Array, d: Array, work: float, begin: int) -> LoadPath:
+    area = abs(float(np.trapezoid(T[begin:], d[begin:])))
+    return LoadPath(case, normal, T, d, True, work, area)
+
+
+# -- normal and tangential contact at once ---------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class CoupledState:
+    """A load step of coupled contact.
+
+    Attributes
+    ----------
+    found
+        Answers up to it; its own is the last.
+    before
+        (n, 2) slip before the step, mm.
+    """
+
+    found: CoupledContact
+    before: Array
+
+    @property
+    def force(self) -> Array:
+        """(n, 3) normal force, force along x and y, N."""
+        return np.asarray(self.found.force[-1])
+
+    @property
+    def motion(self) -> Array:
+        """(r,) approach, shifts along x and y in mm, free tilts in rad."""
+        return np.asarray(self.found.displacement[-1])
+
+    @property
+    def stick(self) -> NDArray[np.bool_]:
+        """(n,) nodes that stick."""
+        return np.asarray(self.found.state[-1] == STICK)
+
+    @property
+    def shear_stiffness(self) -> Array:
+        """(2, 2) dT/dd in N/mm with the normal load and the states kept; 0 where nothing holds."""
+        try:
+            return np.asarray(np.linalg.inv(np.linalg.inv(self.found.stiffness())[1:3, 1:3]))
+        except (ConvergenceError, np.linalg.LinAlgError):
+            return np.zeros((2, 2))
+
+
+def raised(
+    model: ContactModel,
+    friction: float,
+    loads: Iterable[float],
+    arms: Array,
+    *,
+    body: Body | None = None,
+    gap: Array | None = None,
+) -> dict[float, CoupledState]:
+    """States of the positive normal loads in N, each on the way to the next, without a tangential
+    load.
+
+    Parameters
+    ----------
+    arms
+        (n, k) mm of the k free tilts.
+    body
+        Against a rigid counterpart; None: both.
+    gap
+        (n,) mm, in place of the model's.
+    """
+    n, out = len(model.gap), {}
+    found: CoupledContact | None = None
+    at = 0.0
+    for F in sorted({load for load in loads if load > 0.0}):
+        steps = int(np.ceil(NORMAL_STEPS * (1.0 - at / F)))
+        way = np.zeros((steps, 3 + arms.shape[1]))
+        way[:, 0] = np.linspace(at, F, steps + 1)[1:]
+        before = np.zeros((n, 2)) if found is None else found.slip[-1]
+        if found is None:
+            # approach, shifts along x and y, tilts
+            columns = np.zeros((3 * n, 3 + arms.shape[1]))
+            columns[:, :3], columns[:n, 3:] = np.kron(np.eye(3), np.ones((n, 1))), arms
+            found = coupled_contact(
+                tangential_compliance(model, COMPONENTS, np.arange(n), body),
+                model.gap if gap is None else gap,
+                friction,
+                load=way,
+                columns=columns,
+            )
+        else:
+            found = found.go_on(load=way)
+        out[F] = CoupledState(found, found.slip[-2] if steps > 1 else before)
+        at = F
+    return out
+
+
+def slope_loads(loads: Iterable[float]) -> list[float]:
+    """The loads with one a little below and above each, for `slope`."""
+    return [F * (1.0 + s) for F in loads for s in (-LOAD_STEP, 0.0, LOAD_STEP)]
+
+
+def slope(states: dict[float, CoupledState], load: float) -> float:
+    """dF/d approach in N/mm while the normal load rises, tilts and shifts following."""
+    low, high = (states[load * (1.0 + s)] for s in (-LOAD_STEP, LOAD_STEP))
+    return 2.0 * LOAD_STEP * load / float(high.motion[0] - low.motion[0])
+
+
+def as_normal(state: CoupledState, stiffness: float) -> NormalContact:
+    """The normal part of a state."""
+    found, f = state.found, state.force[:, 0]
+    return NormalContact(
+        np.maximum(f, 0.0),
+        np.maximum(found.gap[-1], 0.0),
+        np.asarray(found.state[-1] > 0),
+        float(state.motion[0]),
+        stiffness,
+        int(found.iterations[-1]),
+        "fallback" if found.fallbacks else "active set",
+        found.status,
+        found.message,
+        f,
     )
+
+
+def pressed_by(model: ContactModel, body: Body, force: Array) -> float:
+    """Mean approach in mm that a body takes under the forces (n, 3) in N, weighted by the
+    pressure.
+    """
+    f = force[:, 0]
+    moved = sum(
+        (model.body_compliance(body, NORMAL, c) @ force[:, k] for k, c in enumerate(COMPONENTS)),
+        np.zeros(len(f)),
+    )
+    return float(f @ moved) / float(f.sum())
+
+
+def opened_by_shear(model: ContactModel, state: CoupledState) -> Array:
+    """(n,) mm that the tangential forces open, C_nt t."""
+    f = state.force
+    return np.asarray(
+        sum(
+            (model.compliance(NORMAL, c) @ f[:, 1 + k] for k, c in enumerate((ALONG, ACROSS))),
+            np.zeros(len(f)),
+        )
+    )
+
+
+def shear_nodes(model: ContactModel, friction: float, state: CoupledState) -> Sheared:
+    """What a step left at the closed nodes: beside the slip before it stands the way that the
+    pressure alone moves them, C_tn f.
+    """
+    on = np.flatnonzero(state.found.state[-1] > 0)
+    f, axes = state.force, (ALONG, ACROSS)
+    size = float(np.sqrt(np.diagonal(model.compliance(NORMAL))) @ np.abs(f[:, 0]))
+    before = [model.compliance(c, NORMAL) @ f[:, 0] + state.before[:, c] for c in axes]
+    return Sheared(
+        axes,
+        on,
+        friction * f[on, 0],
+        np.concatenate([f[on, 1], f[on, 2]]),
+        np.concatenate([one[on] for one in before]),
+        state.motion[1:3],
+        state.found.load[-1, 1:3],
+        state.stick[on],
+        np.concatenate([np.sqrt(np.diagonal(model.compliance(c)))[on] * size for c in axes]),
+    )
+
+
+def _loads(base: CoupledState, values: Array, unit: Array) -> Array:
+    """The normal load of a state with tangential ones (k,) in N along ``unit`` (2,)."""
+    out = np.zeros((len(values), len(base.motion)))
+    out[:, 0] = base.found.load[-1, 0]
+    out[:, 1:3] = np.outer(values, unit)
+    return out
+
+
+def sheared(
+    base: CoupledState, values: Array, unit: Array, needed: float
+) -> tuple[list[CoupledState], Array]:
+    """Tangential loads (k,) in N along ``unit`` (2,), rising, from the state of a normal load.
+
+    Those above ``needed`` are there for a curve, which ends where the contact slides.
+
+    Returns
+    -------
+    states, displacement
+        After each load, and (k,) mm along the direction since the normal load.
+    """
+    now, states = base, []
+    for T in values:
+        try:
+            found = now.found.go_on(load=_loads(base, np.array([T]), unit))
+        except ConvergenceError:
+            if needed >= T:
+                raise
+            break
+        now = CoupledState(found, now.found.slip[-1])
+        states.append(now)
+    start = base.motion[1:3]
+    return states, np.array([(one.motion[1:3] - start) @ unit for one in states])
+
+
+def coupled_loop(
+    case: Case, normal: Case, base: CoupledState, *, peak: float, steps: int, unit: Array
+) -> LoadPath:
+    """First loading to ``peak`` in N, then +peak -> -peak -> +peak twice, the normal load kept.
+
+    The first of both loops does not close: shear settles what the pressure left, and the approach
+    with it. Friction's work of the second, by the mean tractions of each step.
+    """
+    shares, quarter = cycle_shares(steps)
+    shares, quarter = np.concatenate([shares, shares[quarter:]]), len(shares)
+    found = base.found.go_on(load=_loads(base, peak * shares, unit))
+    d = np.insert((found.displacement[:, 1:3] - base.motion[1:3]) @ unit, 0, 0.0)
+    shear = np.concatenate([base.force[None, :, 1:], found.force[..., 1:]])
+    slip = np.concatenate([base.found.slip[-1:], found.slip])
+    mean = 0.5 * (shear[1:] + shear[:-1])
+    work = (mean * np.diff(slip, axis=0)).sum(axis=(1, 2))
+    T = np.insert(peak * shares, 0, 0.0)
+    return _loop(case, normal, T, d, float(work[quarter:].sum()), quarter)

@@ -20,9 +20,9 @@ from upd.analyses.contact.closed_forms import (
     shear_compliance,
     stick_radius,
 )
-from upd.analyses.contact.coupled import pressed_by
 from upd.analyses.contact.faces import area_of, lattices, tractions
 from upd.analyses.contact.law import contact_law, tilt_stiffness
+from upd.analyses.contact.loading import pressed_by
 from upd.analyses.contact.plan import NORMAL, direction_name, normal_loads
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
 from upd.analyses.contact.worn_zones import band_middles, pressure_peaks

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import Resolved
-from upd.analyses.contact.coupled import CoupledState
-from upd.analyses.contact.loading import LoadPath, Sheared
+from upd.analyses.contact.loading import CoupledState, LoadPath, Sheared
 from upd.analyses.contact.plan import ContactPlan, DamperLoad, direction_name, is_curved
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
@@ -159,10 +158,16 @@ class TangentialCase:
     stiffness: float
     force: Array
     slip: Array
-    stick: NDArray[np.bool_]
     pressed: Array
     nodes: Sheared
     state: CoupledState | None = None
+
+    @property
+    def stick(self) -> NDArray[np.bool_]:
+        """(n,) nodes that stick."""
+        out = np.zeros(len(self.pressed), bool)
+        out[self.nodes.loaded] = self.nodes.stick
+        return out
 
 
 @dataclass

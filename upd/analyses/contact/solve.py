@@ -7,28 +7,29 @@ Arrays in, arrays out.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.contact.bodies import prepare
-from upd.analyses.contact.coupled import (
+from upd.analyses.contact.faces import measured
+from upd.analyses.contact.loading import (
+    LOAD_STEP,
+    CoupledState,
     as_normal,
-    held_stiffness,
     raised,
     slope,
     slope_loads,
-    unloaded,
+    tilt_arms,
 )
-from upd.analyses.contact.faces import measured
-from upd.analyses.contact.loading import LOAD_STEP, tilt_arms
 from upd.analyses.contact.plan import NORMAL, ContactPlan, DamperLoad, normal_loads
 from upd.analyses.contact.products import show_normal
 from upd.analyses.contact.shares import solve_inside
 from upd.analyses.contact.solution import ContactSolution, NormalCase, PressedContact
 from upd.analyses.contact.tangential import solve_tangential
 from upd.contact.model import Body, ContactModel
-from upd.contact.normal import normal_curve
+from upd.contact.normal import normal_contact, normal_curve
 from upd.contact.tilt import tilted_contact
 from upd.progress import Stages
 
@@ -151,13 +152,20 @@ def _sheared_too(
     model, mu = solution.model, solution.plan.scene.contact.friction
     arms = tilt_arms(solution.plan, model)
     states = raised(model, mu, forces, arms, body=body)
-    out = {F: PressedContact(unloaded(model), 0.0) for F in forces if not F > 0.0}
+    # no load: friction has nothing to hold
+    none = partial(normal_contact, model.compliance(NORMAL), model.gap, load=0.0)
+    out = {F: PressedContact(none(), 0.0) for F in forces if not F > 0.0}
     for F, state in states.items():
         sloped = all(F * (1.0 + s) in states for s in (-LOAD_STEP, LOAD_STEP))
         free = slope(states, F) if sloped else float("nan")
-        held = held_stiffness(state) if arms.size and sloped and body is None else free
+        held = _held_stiffness(state) if arms.size and sloped and body is None else free
         out[F] = PressedContact(as_normal(state, held), free, state)
     return out
+
+
+def _held_stiffness(state: CoupledState) -> float:
+    """dF/d approach in N/mm with the tilts held and the states kept, shifts following."""
+    return float(1.0 / np.linalg.inv(state.found.stiffness()[:3, :3])[0, 0])
 
 
 def _bodies_alone(solution: ContactSolution) -> tuple[Body, ...]:

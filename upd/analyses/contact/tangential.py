@@ -1,36 +1,33 @@
-"""Stiffness, tangential loads and cycles of a contact after every normal load."""
+"""Stiffness, tangential loads and cycles of a contact after every normal load.
+
+With the normal forces frozen, or with normal and tangential contact at once, where the pressure
+follows the shear.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from upd.analyses.contact.coupled import (
-    CoupledState,
-    coupled_loop,
-    initial_stiffness,
-    shear_nodes,
-    shear_tangent,
-    sheared,
-)
 from upd.analyses.contact.effects import largest_ratio
 from upd.analyses.contact.loading import (
+    CoupledState,
     LoadPath,
     Sheared,
     along,
     closed_loop,
+    coupled_loop,
     load_history,
+    shear_nodes,
+    sheared,
     tangential_compliance,
 )
-from upd.analyses.contact.plan import (
-    ACROSS,
-    ALONG,
-    NORMAL,
-    ContactPlan,
-    slip_components,
-    unit_vector,
-)
+from upd.analyses.contact.plan import NORMAL, ContactPlan, slip_components, unit_vector
 from upd.analyses.contact.products import show_tangential
 from upd.analyses.contact.solution import (
     ContactSolution,
@@ -50,6 +47,8 @@ PATH_SHARES = np.concatenate(
 )
 # On the way to the tangential loads of a curved contact where the pressure follows the shear.
 _SHARES = np.arange(1, 20) / 20.0
+#: tangential load of an initial stiffness of coupled contact, as a part of mu N
+SMALL_SHEAR = 1e-3
 
 
 def march_shares(plan: ContactPlan, curved: bool, *, companion: bool = False) -> Array:
@@ -78,214 +77,190 @@ def solve_tangential(solution: ContactSolution, stages: Stages, *, companion: bo
             frozen = [case.solution.force for case in solution.normal]
             show_tangential(plan, solution.model, frozen, slip_components(scene, 0.0))
         for case in solution.normal:
-            loaded = np.flatnonzero(case.solution.force > 0.0)
-            for direction in scene.loads.directions if loaded.size else ():
-                if case.state is not None:
-                    _sheared_together(solution, case, case.state, direction, shares)
-                else:
-                    _sheared(solution, case, direction, loaded, shares)
+            for direction in scene.loads.directions if case.solution.force.any() else ():
+                _sheared(solution, case, direction, shares)
 
 
-def _sheared(
-    solution: ContactSolution,
-    case: NormalCase,
-    direction: float,
-    loaded: NDArray[np.int64],
-    shares: Array,
-) -> None:
+class March(NamedTuple):
+    """Loads in N of the whole contact and displacements in mm along them, from zero on; and what
+    the k-th load leaves, for a case with its ratio.
+    """
+
+    load: Array
+    displacement: Array
+    at: Callable[[int, float], TangentialCase]
+
+
+def _sheared(solution: ContactSolution, case: NormalCase, direction: float, shares: Array) -> None:
     """Stiffness, single loads, curve and cycle of one direction after one normal load."""
-    scene, copies = solution.plan.scene, solution.plan.copies
-    components = slip_components(scene, direction)
-    unit = unit_vector(direction, components)
-    C = tangential_compliance(solution.model, components, loaded)
-    limit = scene.contact.friction * case.solution.force[loaded]
-    total = float(limit.sum())
-    if solution.curved:
-        total = scene.contact.friction * case.force / copies
-    if _wants_stiffness(solution):
-        solution.stuck.append(_stuck(solution, case, direction, C, loaded))
-    for ratios in _marches(solution, shares):
-        path = tangential_path(C, limit, loads=load_history(ratios * total, unit))
+    scene, own = solution.plan.scene, solution.sheared_case(case, direction)
+    way: _Frozen | _Coupled = (
+        _Frozen(solution, case, direction)
+        if case.state is None
+        else _Coupled(solution, case, direction, case.state)
+    )
+    # Flat faces share their law by the stuck contact.
+    if not solution.curved or scene.wants("stiffness"):
+        solution.stuck.append(StuckContact(case.case, own, direction, *way.stuck()))
+    loads = scene.loads.tangential if scene.wants("tangential") else ()
+    # Each load of a curved contact with frozen forces alone, all others on one way.
+    marches = [np.array([ratio]) for ratio in loads]
+    if scene.wants("tangential") and not (solution.curved and case.state is None):
+        marches = [np.unique(np.concatenate([shares, loads]))]
+    for ratios in marches:
+        march = way.march(ratios)
         if not solution.curved:
-            own = solution.sheared_case(case, direction)
-            solution.paths.append(LoadPath(own, case.case, *along(path, unit, copies)))
-        for ratio in (r for r in scene.loads.tangential if r in ratios):
-            k = int(np.searchsorted(ratios, ratio))
-            before = path.slip[k - 1] if k else np.zeros(len(C))
-            d, load = np.atleast_1d(path.displacement[k]), ratio * total * unit
-            force, stick = path.unclipped[k], path.state[k] == 0
-            nodes = Sheared(components, loaded, limit, force, before, d, load, stick)
-            solution.tangential.append(
-                _single_load(solution, case, direction, ratio, nodes, path, k)
-            )
+            solution.paths.append(LoadPath(own, case.case, march.load, march.displacement))
+        for ratio in (r for r in loads if r in ratios):
+            solution.tangential.append(march.at(int(np.searchsorted(ratios, ratio)), ratio))
     if scene.wants("cycle"):
-        loop = closed_loop(
-            _cycle_case(solution, case, direction),
-            case.case,
-            C,
-            limit,
-            peak=scene.loads.cycle_amplitude * total,
-            steps=scene.loads.cycle_steps,
-            unit=unit,
-            copies=copies,
+        amplitude = scene.loads.cycle_amplitude if solution.curved else None
+        solution.paths.append(way.cycle(solution.sheared_case(case, direction, amplitude)))
+
+
+class _Frozen:
+    """Tangential loads along a direction that leave the normal forces as they are."""
+
+    def __init__(self, solution: ContactSolution, case: NormalCase, direction: float) -> None:
+        scene, force = solution.plan.scene, case.solution.force
+        self.solution, self.case, self.direction = solution, case, direction
+        self.components = slip_components(scene, direction)
+        self.unit = unit_vector(direction, self.components)
+        self.loaded = np.flatnonzero(force > 0.0)
+        self.compliance = tangential_compliance(solution.model, self.components, self.loaded)
+        self.limit = scene.contact.friction * force[self.loaded]
+        self.copies = solution.plan.copies
+        #: mu N on the model
+        self.total = float(self.limit.sum())
+        if solution.curved:
+            self.total = scene.contact.friction * case.force / self.copies
+
+    def stuck(self) -> tuple[float, dict[str, float], Array]:
+        """The contact set stuck and moved by one along the direction: T = e' C^-1 e, for both
+        bodies and for each on a rigid counterpart.
+        """
+        model = self.solution.model
+
+        def moved(compliance: Array) -> tuple[Array, float]:
+            e = np.repeat(self.unit, len(compliance) // len(self.unit))
+            t = cho_solve(cho_factor(compliance), e)
+            return t, self.copies * float(e @ t)
+
+        t, total = moved(self.compliance)
+        of = {}
+        for body in (model.upper, model.lower):
+            if body.name in self.case.alone:
+                on = np.flatnonzero(self.case.alone[body.name].solution.force > 0.0)
+                of[body.name] = moved(tangential_compliance(model, self.components, on, body))[1]
+        return total, of, self._spread(t) @ self.unit
+
+    def march(self, ratios: Array) -> March:
+        """Shares of mu N one after the other."""
+        loads = load_history(ratios * self.total, self.unit)
+        path = tangential_path(self.compliance, self.limit, loads=loads)
+        return March(*along(path, self.unit, self.copies), partial(self._at, path))
+
+    def _at(self, path: TangentialPath, k: int, ratio: float) -> TangentialCase:
+        before = path.slip[k - 1] if k else np.zeros(len(self.compliance))
+        d, stick = np.atleast_1d(path.displacement[k]), path.state[k] == 0
+        load, force = ratio * self.total * self.unit, path.unclipped[k]
+        nodes = Sheared(self.components, self.loaded, self.limit, force, before, d, load, stick)
+        K = np.atleast_2d(path.stiffness[k])
+        # with the motion across the load held, or free to follow
+        tangent = float(K[0, 0]) if self.solution.curved else _free_stiffness(K, self.unit)
+        return TangentialCase(
+            self.case,
+            self.solution.sheared_case(self.case, self.direction, ratio),
+            ratio * self.solution.plan.scene.contact.friction * self.case.force,
+            float(d @ self.unit),
+            self.copies * tangent,
+            self._spread(path.force[k]),
+            self._spread(path.slip[k]),
+            self.case.solution.force,
+            nodes,
         )
-        solution.paths.append(loop)
 
+    def cycle(self, case: Case) -> LoadPath:
+        """The full cycle."""
+        loads = self.solution.plan.scene.loads
+        return closed_loop(
+            case,
+            self.case.case,
+            self.compliance,
+            self.limit,
+            peak=loads.cycle_amplitude * self.total,
+            steps=loads.cycle_steps,
+            unit=self.unit,
+            copies=self.copies,
+        )
 
-def _wants_stiffness(solution: ContactSolution) -> bool:
-    """Whether the stuck contact is asked for: flat faces share their law by it."""
-    return not solution.curved or solution.plan.scene.wants("stiffness")
-
-
-def _cycle_case(solution: ContactSolution, case: NormalCase, direction: float) -> Case:
-    ratio = solution.plan.scene.loads.cycle_amplitude if solution.curved else None
-    return solution.sheared_case(case, direction, ratio)
-
-
-def _marches(solution: ContactSolution, shares: Array) -> list[Array]:
-    """Shares of mu N, march by march: each load of a curved contact alone, all loads of flat faces
-    on one way to gross slip.
-    """
-    scene = solution.plan.scene
-    if not scene.wants("tangential"):
-        return []
-    if solution.curved:
-        return [np.array([ratio]) for ratio in scene.loads.tangential]
-    return [np.unique(np.concatenate([shares, scene.loads.tangential]))]
-
-
-def _stuck(
-    solution: ContactSolution,
-    case: NormalCase,
-    direction: float,
-    C: Array,
-    loaded: NDArray[np.int64],
-) -> StuckContact:
-    """The contact set stuck and moved by one along the direction: T = e' C^-1 e, for both bodies
-    and for each on a rigid counterpart.
-    """
-    model, copies = solution.model, solution.plan.copies
-    components = slip_components(solution.plan.scene, direction)
-    unit = unit_vector(direction, components)
-
-    def moved(compliance: Array) -> tuple[Array, float]:
-        e = np.repeat(unit, len(compliance) // len(unit))
-        t = cho_solve(cho_factor(compliance), e)
-        return t, copies * float(e @ t)
-
-    t, total = moved(C)
-    of = {}
-    for body in (model.upper, model.lower):
-        if body.name in case.alone:
-            on = np.flatnonzero(case.alone[body.name].solution.force > 0.0)
-            of[body.name] = moved(tangential_compliance(model, components, on, body))[1]
-    nodal = np.zeros(len(model.gap))
-    nodal[loaded] = t.reshape(len(components), len(loaded)).T @ unit
-    own = solution.sheared_case(case, direction)
-    return StuckContact(case.case, own, direction, total, of, nodal)
-
-
-def _single_load(
-    solution: ContactSolution,
-    case: NormalCase,
-    direction: float,
-    ratio: float,
-    nodes: Sheared,
-    path: TangentialPath,
-    k: int,
-) -> TangentialCase:
-    """After step k of a march."""
-    unit, n = unit_vector(direction, nodes.components), len(solution.model.gap)
-
-    def spread(values: Array) -> Array:
-        out = np.zeros((n, len(unit)))
-        out[nodes.loaded] = values.reshape(len(unit), len(nodes.loaded)).T
+    def _spread(self, values: Array) -> Array:
+        """(n, 1 or 2) of values at the loaded nodes."""
+        out = np.zeros((len(self.solution.model.gap), len(self.unit)))
+        out[self.loaded] = values.reshape(len(self.unit), len(self.loaded)).T
         return out
 
-    stick = np.zeros(n, bool)
-    stick[nodes.loaded] = nodes.stick
-    return TangentialCase(
-        case,
-        solution.sheared_case(case, direction, ratio),
-        ratio * solution.plan.scene.contact.friction * case.force,
-        float(nodes.displacement @ unit),
-        solution.plan.copies * _tangent(np.atleast_2d(path.stiffness[k]), unit, solution.curved),
-        spread(path.force[k]),
-        spread(path.slip[k]),
-        stick,
-        case.solution.force,
-        nodes,
-    )
 
+class _Coupled:
+    """Tangential loads along a direction with normal and tangential contact at once."""
 
-def _tangent(K: Array, unit: Array, held: bool) -> float:
-    """Stiffness along the load: with the motion across it ``held``, or free to follow."""
-    if held:
-        return float(K[0, 0])
-    return 1.0 / float(unit @ np.linalg.pinv(K, hermitian=True) @ unit) if K.any() else 0.0
+    def __init__(
+        self, solution: ContactSolution, case: NormalCase, direction: float, state: CoupledState
+    ) -> None:
+        scene = solution.plan.scene
+        self.solution, self.case, self.direction, self.state = solution, case, direction, state
+        self.unit = unit_vector(direction, slip_components(scene, direction))
+        self.friction = scene.contact.friction
+        self.total = self.friction * case.force
 
+    def stuck(self) -> tuple[float, dict[str, float], Array]:
+        """Secant of a small tangential load, of both bodies and of each on a rigid counterpart."""
 
-def _sheared_together(
-    solution: ContactSolution,
-    case: NormalCase,
-    state: CoupledState,
-    direction: float,
-    shares: Array,
-) -> None:
-    """The same with normal and tangential contact at once: the pressure follows the shear."""
-    scene, n = solution.plan.scene, len(solution.model.gap)
-    mu, unit = scene.contact.friction, unit_vector(direction, (ALONG, ACROSS))
-    total, own = mu * case.force, solution.sheared_case(case, direction)
-    if _wants_stiffness(solution):
-        states = {name: one.state for name, one in case.alone.items()}
-        of = {name: initial_stiffness(s, mu, unit) for name, s in states.items() if s is not None}
-        first = initial_stiffness(state, mu, unit)
-        solution.stuck.append(StuckContact(case.case, own, direction, first, of, np.zeros(n)))
-    if scene.wants("tangential"):
-        ratios = np.unique(np.concatenate([shares, scene.loads.tangential]))
-        needed = max(scene.loads.tangential, default=0.0) * total
-        path = sheared(state, ratios * total, unit, needed)
-        if not solution.curved:
-            T, d = (np.concatenate([[0.0], values]) for values in (path.loads, path.moved))
-            solution.paths.append(LoadPath(own, case.case, T, d))
-        for ratio in scene.loads.tangential:
-            k = int(np.searchsorted(ratios, ratio))
-            now, moved = path.states[k], path.moved[k]
-            solution.tangential.append(_together_case(solution, case, direction, ratio, now, moved))
-    if scene.wants("cycle"):
-        peak, steps = scene.loads.cycle_amplitude * total, scene.loads.cycle_steps
-        cycle = _cycle_case(solution, case, direction)
-        solution.paths.append(
-            coupled_loop(cycle, case.case, state, peak=peak, steps=steps, unit=unit)
+        def secant(state: CoupledState) -> float:
+            size = SMALL_SHEAR * self.friction * float(state.found.load[-1, 0])
+            return size / float(sheared(state, np.array([size]), self.unit, size)[1][0])
+
+        alone = {name: one.state for name, one in self.case.alone.items()}
+        of = {name: secant(state) for name, state in alone.items() if state is not None}
+        return secant(self.state), of, np.zeros(len(self.state.force))
+
+    def march(self, ratios: Array) -> March:
+        """Shares of mu N one after the other."""
+        needed = max(self.solution.plan.scene.loads.tangential, default=0.0) * self.total
+        states, moved = sheared(self.state, ratios * self.total, self.unit, needed)
+        load = np.insert(ratios[: len(states)] * self.total, 0, 0.0)
+        return March(load, np.insert(moved, 0, 0.0), partial(self._at, states, moved))
+
+    def _at(self, states: list[CoupledState], moved: Array, k: int, ratio: float) -> TangentialCase:
+        state, solution = states[k], self.solution
+        nodes, K = shear_nodes(solution.model, self.friction, state), state.shear_stiffness
+        slip = np.zeros((len(state.force), 2))
+        slip[nodes.loaded] = state.found.slip[-1][nodes.loaded]
+        return TangentialCase(
+            self.case,
+            solution.sheared_case(self.case, self.direction, ratio),
+            ratio * self.friction * self.case.force,
+            float(moved[k]),
+            float(K[0, 0]) if solution.curved else _free_stiffness(K, self.unit),
+            state.force[:, 1:],
+            slip,
+            state.force[:, 0],
+            nodes,
+            state,
+        )
+
+    def cycle(self, case: Case) -> LoadPath:
+        """The full cycle."""
+        loads = self.solution.plan.scene.loads
+        peak, steps = loads.cycle_amplitude * self.total, loads.cycle_steps
+        return coupled_loop(
+            case, self.case.case, self.state, peak=peak, steps=steps, unit=self.unit
         )
 
 
-def _together_case(
-    solution: ContactSolution,
-    case: NormalCase,
-    direction: float,
-    ratio: float,
-    state: CoupledState,
-    moved: float,
-) -> TangentialCase:
-    mu, unit = solution.plan.scene.contact.friction, unit_vector(direction, (ALONG, ACROSS))
-    nodes, K = shear_nodes(solution.model, mu, state), shear_tangent(state)
-    slip = np.zeros((len(solution.model.gap), 2))
-    slip[nodes.loaded] = state.found.slip[-1][nodes.loaded]
-    free = 1.0 / float(unit @ np.linalg.inv(K) @ unit) if K.any() else 0.0
-    return TangentialCase(
-        case,
-        solution.sheared_case(case, direction, ratio),
-        ratio * mu * case.force,
-        float(moved),
-        float(K[0, 0]) if solution.curved else free,
-        state.force[:, 1:],
-        slip,
-        state.stick,
-        state.force[:, 0],
-        nodes,
-        state,
-    )
+def _free_stiffness(K: Array, unit: Array) -> float:
+    """Stiffness along the load with the motion across it free to follow; 0 where nothing holds."""
+    return 1.0 / float(unit @ np.linalg.pinv(K, hermitian=True) @ unit) if K.any() else 0.0
 
 
 def note_moved(run: ContactSolution, companion: ContactSolution) -> None:
@@ -303,10 +278,10 @@ def moved_by_shear(solution: ContactSolution, case: NormalCase, stuck: StuckCont
     The tangential forces t open or close the contact by C_nt t; kept closed at the same load, the
     normal forces change by df = -C_nn^-1 (C_nt t - d e), e'df = 0.
     """
-    scene, model = solution.plan.scene, solution.model
+    scene, model, force = solution.plan.scene, solution.model, case.solution.force
     components = slip_components(scene, stuck.direction)
     unit = unit_vector(stuck.direction, components)
-    total = scene.contact.friction * float(case.solution.force.sum())
+    total = scene.contact.friction * float(force.sum())
     on = np.flatnonzero(case.solution.contact)
     t = stuck.nodal * (total / float(stuck.nodal.sum()))
     opened = sum(
@@ -317,4 +292,4 @@ def moved_by_shear(solution: ContactSolution, case: NormalCase, stuck: StuckCont
     e = cho_solve(factor, np.ones(len(on)))
     df = -cho_solve(factor, opened)
     df -= e * (df.sum() / e.sum())
-    return float(np.abs(df).sum() / (2.0 * case.solution.force.sum()))
+    return float(np.abs(df).sum() / (2.0 * force.sum()))
