@@ -5,6 +5,7 @@ Both bodies meshed, assembled and condensed on their contact nodes; displacement
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -17,7 +18,14 @@ from upd.analyses.contact.plan import COMPONENTS, NORMAL, ContactPlan, Family, r
 from upd.cache.shared import active
 from upd.cache.sources import key_of, source_digest
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
-from upd.contact.products import ROUGH, centre, half_space_start
+from upd.contact.products import (
+    ROUGH,
+    centre,
+    energy_error,
+    half_space_start,
+    learning,
+    normal_contact_by_products,
+)
 from upd.errors import InputError
 from upd.fem import Material, rigid_body_modes, stiffness
 from upd.linalg.multigrid import MultigridSolver
@@ -32,6 +40,7 @@ from upd.reduction.guyan import Condensed, condense, require_held
 from upd.reduction.learned import LearnedCompliance
 from upd.reduction.mean_held import condense_held_in_mean, motions_left
 from upd.reduction.stored import stored_condensation
+from upd.results import Case, Check
 
 
 def prepare(plan: ContactPlan, stages: Stages, kind: str = "contact") -> ContactModel:
@@ -276,3 +285,49 @@ def pressed(
         displacement[body.name] = u
         reaction[body.name] = -body.side * copies * body.reaction(u, NORMAL)
     return displacement, reaction
+
+
+# -- bodies by products ----------------------------------------------------------------------------
+
+
+def learns(model: ContactModel) -> bool:
+    """Whether a body's compliance is learned."""
+    bodies = (model.upper, model.lower)
+    return any(learning(b, family) is not None for b in bodies for family in b.condensed)
+
+
+def product_checks(
+    model: ContactModel, case: Case, components: Sequence[int], force: Array
+) -> list[Check]:
+    """The bound of the error that products leave in the forces (n_component n,) of a case."""
+    found = [
+        one for b in (model.upper, model.lower) if (one := learning(b, components)) is not None
+    ]
+    if not found or not force.any():
+        return []
+    products = ", ".join(
+        f"{one.products} products of {min(one.iterations)} to {max(one.iterations)} iterations, "
+        f"{np.mean(one.iterations):.3g} in the mean ({one.solver})"
+        for one in found
+        if one.iterations
+    )
+    return [
+        Check(
+            "products",
+            case,
+            energy_error(model, components, force),
+            1e-8,
+            f"bound of |f - exact| / |f| in energy, by the products with K; {products}",
+            'set solver.route = "condensed", or report the mesh',
+        )
+    ]
+
+
+def show_normal(model: ContactModel, loads: Sequence[float]) -> None:
+    """Show bodies that learn the forces of the normal loads in N on the model, one after the other.
+
+    Raises ConvergenceError where a product does not converge.
+    """
+    mask = None
+    for load in sorted(loads, reverse=True) if learns(model) else ():
+        mask = normal_contact_by_products(model, load=load, start=mask).contact

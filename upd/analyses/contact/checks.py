@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.analyses.contact.bodies import product_checks
 from upd.analyses.contact.effects import beta_of, checks_of
 from upd.analyses.contact.faces import lattices, rim_nodes
 from upd.analyses.contact.loading import (
@@ -24,7 +25,6 @@ from upd.analyses.contact.loading import (
     tilt_arms,
 )
 from upd.analyses.contact.plan import NORMAL, ContactPlan, wider_patch
-from upd.analyses.contact.products import product_checks
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
 from upd.analyses.contact.yielding import yield_checks
 from upd.contact.model import ContactModel

@@ -33,12 +33,10 @@ from upd.analyses.contact.effects import (
 )
 from upd.analyses.contact.loading import (
     LOAD_STEP,
-    closed_loop,
     load_history,
     raised,
     slope,
     slope_loads,
-    tangential_compliance,
     tilt_arms,
 )
 from upd.analyses.contact.plan import (
@@ -49,13 +47,11 @@ from upd.analyses.contact.plan import (
     ContactPlan,
     Family,
     direction_name,
-    slip_components,
-    unit_vector,
 )
 from upd.analyses.contact.results import make_results
 from upd.analyses.contact.solution import ContactSolution, NormalCase
 from upd.analyses.contact.solve import solve_plan
-from upd.analyses.contact.tangential import note_moved
+from upd.analyses.contact.tangential import Frozen, note_moved
 from upd.contact.checks import few_threads
 from upd.contact.model import ContactModel
 from upd.contact.normal import normal_contact
@@ -210,29 +206,16 @@ def _unlike(
 ) -> Iterator[Resolved]:
     """The tangential loads along a direction with the slip of the pressure alone already there."""
     scene, model = mine.plan.scene, mine.model
-    components = slip_components(scene, direction)
-    unit, mu = unit_vector(direction, components), scene.contact.friction
-    force, load = case.solution.force, case.force
-    loaded = np.flatnonzero(force > 0.0)
-    C, limit = tangential_compliance(model, components, loaded), mu * force[loaded]
-    before = pressure_slip(model, components, force, loaded)
+    way = Frozen(mine, case, direction)
+    before = pressure_slip(model, way.components, case.solution.force, way.loaded)
     for one in (r for r in numbers if r.name == "K_T_secant_raw"):
         assert one.case.ratio is not None
-        K = _slipped_stiffness(C, limit, before, one.case.ratio * mu * load * unit)
+        load = one.case.ratio * scene.contact.friction * case.force * way.unit
+        K = _slipped_stiffness(way.compliance, way.limit, before, load)
         yield Resolved(MATERIALS, one.name, one.case, one.value, K, one.unit)
     for one in (r for r in numbers if r.name == "cycle_energy"):
-        loop = closed_loop(
-            one.case,
-            case.case,
-            C,
-            limit,
-            peak=scene.loads.cycle_amplitude * mu * load,
-            steps=scene.loads.cycle_steps,
-            unit=unit,
-            copies=1,
-            history=before,
-        )
-        yield Resolved(MATERIALS, one.name, one.case, one.value, loop.slip_work, one.unit)
+        work = way.cycle(one.case, before).slip_work
+        yield Resolved(MATERIALS, one.name, one.case, one.value, work, one.unit)
 
 
 def _changes(

@@ -19,8 +19,7 @@ from upd.contact.coulomb_conditions import STICK
 from upd.contact.coupled import CoupledContact, coupled_contact
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact
-from upd.contact.tangential import TangentialPath, tangential_path
-from upd.contact.tangential_step import TangentialHistory
+from upd.contact.tangential import TangentialPath
 from upd.errors import ConvergenceError
 from upd.results import Case
 
@@ -176,44 +175,8 @@ def cycle_shares(steps: int) -> tuple[Array, int]:
     return np.concatenate([leg[1:] for leg in legs]), quarter
 
 
-def closed_loop(
-    case: Case,
-    normal: Case,
-    compliance: Array,
-    limit: Array,
-    *,
-    peak: float,
-    steps: int,
-    unit: Array,
-    copies: int,
-    history: TangentialHistory | None = None,
-) -> LoadPath:
-    """First loading to ``peak``, then the closed loop +peak -> -peak -> +peak.
-
-    Parameters
-    ----------
-    compliance, limit
-        Of the loaded nodes: (n, n) or (2n, 2n) mm/N, and (n,) mu times the normal force in N.
-    peak
-        N on the model.
-    steps
-        Load steps in all, about a fifth of them on the first loading.
-    unit
-        (1 or 2,) direction of the load.
-    copies
-        Of the model in the whole contact.
-    history
-        Before the first step; None starts from no slip.
-    """
-    shares, quarter = cycle_shares(steps)
-    path = tangential_path(
-        compliance, limit, loads=load_history(peak * shares, unit), history=history
-    )
-    T, d = along(path, unit, copies)
-    return _loop(case, normal, T, d, copies * float(np.sum(path.slip_work[quarter:])), quarter)
-
-
-def _loop(case: Case, normal: Case, T: Array, d: Array, work: float, begin: int) -> LoadPath:
+def closed_loop(case: Case, normal: Case, T: Array, d: Array, work: float, begin: int) -> LoadPath:
+    """The path of a cycle whose closed loop begins at a step; ``work`` of slip over it, N mm."""
     area = abs(float(np.trapezoid(T[begin:], d[begin:])))
     return LoadPath(case, normal, T, d, True, work, area)
 
@@ -430,4 +393,4 @@ def coupled_loop(
     mean = 0.5 * (shear[1:] + shear[:-1])
     work = (mean * np.diff(slip, axis=0)).sum(axis=(1, 2))
     T = np.insert(peak * shares, 0, 0.0)
-    return _loop(case, normal, T, d, float(work[quarter:].sum()), quarter)
+    return closed_loop(case, normal, T, d, float(work[quarter:].sum()), quarter)

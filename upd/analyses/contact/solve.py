@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.contact.bodies import prepare
+from upd.analyses.contact.bodies import prepare, show_normal
 from upd.analyses.contact.faces import measured
 from upd.analyses.contact.loading import (
     LOAD_STEP,
@@ -24,12 +24,12 @@ from upd.analyses.contact.loading import (
     tilt_arms,
 )
 from upd.analyses.contact.plan import NORMAL, ContactPlan, DamperLoad, normal_loads
-from upd.analyses.contact.products import show_normal
 from upd.analyses.contact.shares import solve_inside
 from upd.analyses.contact.solution import ContactSolution, NormalCase, PressedContact
 from upd.analyses.contact.tangential import solve_tangential
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import normal_contact, normal_curve
+from upd.contact.products import KNOWN, settled
 from upd.contact.tilt import tilted_contact
 from upd.progress import Stages
 
@@ -127,12 +127,21 @@ def _pressed(
     loads, arms = [F / plan.copies for F in distinct], tilt_arms(plan, model)
     if solution.curved:
         show_normal(model, loads)
-    C = model.compliance(NORMAL) if body is None else model.body_compliance(body, NORMAL)
+
+    def compliance() -> Array:
+        return model.compliance(NORMAL) if body is None else model.body_compliance(body, NORMAL)
+
+    C = compliance()
     if arms.size:
         tilted = [tilted_contact(C, model.gap, arms, load=F) for F in loads]
         found = [PressedContact(t.normal, plan.copies * t.free_stiffness, tilted=t) for t in tilted]
     else:
-        answers = normal_curve(C, model.gap, loads)
+        answers = settled(
+            model,
+            (NORMAL,),
+            lambda: normal_curve(compliance(), model.gap, loads),
+            lambda found: [(np.column_stack([one.force for one in found]), KNOWN)],
+        )
         found = [PressedContact(one, plan.copies * one.stiffness) for one in answers]
     out = dict(zip(distinct, found, strict=True))
     for F in distinct if _by_slope(solution) else ():

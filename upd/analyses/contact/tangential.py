@@ -6,7 +6,7 @@ follows the shear.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import NamedTuple
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from upd.analyses.contact.bodies import learns
 from upd.analyses.contact.effects import largest_ratio
 from upd.analyses.contact.loading import (
     CoupledState,
@@ -22,20 +23,22 @@ from upd.analyses.contact.loading import (
     along,
     closed_loop,
     coupled_loop,
+    cycle_shares,
     load_history,
     shear_nodes,
     sheared,
     tangential_compliance,
 )
 from upd.analyses.contact.plan import NORMAL, ContactPlan, slip_components, unit_vector
-from upd.analyses.contact.products import show_tangential
 from upd.analyses.contact.solution import (
     ContactSolution,
     NormalCase,
     StuckContact,
     TangentialCase,
 )
-from upd.contact.tangential import TangentialPath, tangential_path
+from upd.contact.products import KNOWN, KNOWN_STIFFNESS, settled
+from upd.contact.tangential import TangentialPath, tangential_contact, tangential_path
+from upd.contact.tangential_step import TangentialContact, TangentialHistory
 from upd.progress import Stages
 from upd.results import Case
 
@@ -73,11 +76,13 @@ def solve_tangential(solution: ContactSolution, stages: Stages, *, companion: bo
     plan, scene = solution.plan, solution.plan.scene
     shares = march_shares(plan, solution.curved, companion=companion)
     with stages("tangential contact", f"{len(solution.normal)} normal loads"):
-        if solution.curved:
-            frozen = [case.solution.force for case in solution.normal]
-            show_tangential(plan, solution.model, frozen, slip_components(scene, 0.0))
-        for case in solution.normal:
-            for direction in scene.loads.directions if case.solution.force.any() else ():
+        loaded = [case for case in solution.normal if case.solution.force.any()]
+        # Twice: what one load teaches changes the answers of the others within the tolerance.
+        # Nothing is learned afterwards, so that every result and check sees one compliance.
+        for case in 2 * loaded if learns(solution.model) else ():
+            Frozen(solution, case, 0.0).learn()
+        for case in loaded:
+            for direction in scene.loads.directions:
                 _sheared(solution, case, direction, shares)
 
 
@@ -94,8 +99,8 @@ class March(NamedTuple):
 def _sheared(solution: ContactSolution, case: NormalCase, direction: float, shares: Array) -> None:
     """Stiffness, single loads, curve and cycle of one direction after one normal load."""
     scene, own = solution.plan.scene, solution.sheared_case(case, direction)
-    way: _Frozen | _Coupled = (
-        _Frozen(solution, case, direction)
+    way: Frozen | _Coupled = (
+        Frozen(solution, case, direction)
         if case.state is None
         else _Coupled(solution, case, direction, case.state)
     )
@@ -118,7 +123,7 @@ def _sheared(solution: ContactSolution, case: NormalCase, direction: float, shar
         solution.paths.append(way.cycle(solution.sheared_case(case, direction, amplitude)))
 
 
-class _Frozen:
+class Frozen:
     """Tangential loads along a direction that leave the normal forces as they are."""
 
     def __init__(self, solution: ContactSolution, case: NormalCase, direction: float) -> None:
@@ -127,7 +132,6 @@ class _Frozen:
         self.components = slip_components(scene, direction)
         self.unit = unit_vector(direction, self.components)
         self.loaded = np.flatnonzero(force > 0.0)
-        self.compliance = tangential_compliance(solution.model, self.components, self.loaded)
         self.limit = scene.contact.friction * force[self.loaded]
         self.copies = solution.plan.copies
         #: mu N on the model
@@ -135,23 +139,28 @@ class _Frozen:
         if solution.curved:
             self.total = scene.contact.friction * case.force / self.copies
 
+    @property
+    def compliance(self) -> Array:
+        """Of the loaded nodes; it changes while bodies learn."""
+        return tangential_compliance(self.solution.model, self.components, self.loaded)
+
+    def _moved(self, compliance: Array) -> tuple[Array, float]:
+        """Tractions of stuck nodes that move by one along the direction, T = e' C^-1 e."""
+        e = np.repeat(self.unit, len(compliance) // len(self.unit))
+        t = cho_solve(cho_factor(compliance), e)
+        return t, self.copies * float(e @ t)
+
     def stuck(self) -> tuple[float, dict[str, float], Array]:
-        """The contact set stuck and moved by one along the direction: T = e' C^-1 e, for both
-        bodies and for each on a rigid counterpart.
+        """Stiffness of the stuck contact set, of both bodies and of each on a rigid counterpart,
+        and its tractions.
         """
-        model = self.solution.model
-
-        def moved(compliance: Array) -> tuple[Array, float]:
-            e = np.repeat(self.unit, len(compliance) // len(self.unit))
-            t = cho_solve(cho_factor(compliance), e)
-            return t, self.copies * float(e @ t)
-
-        t, total = moved(self.compliance)
-        of = {}
+        model, of = self.solution.model, {}
+        t, total = self._moved(self.compliance)
         for body in (model.upper, model.lower):
             if body.name in self.case.alone:
                 on = np.flatnonzero(self.case.alone[body.name].solution.force > 0.0)
-                of[body.name] = moved(tangential_compliance(model, self.components, on, body))[1]
+                C = tangential_compliance(model, self.components, on, body)
+                of[body.name] = self._moved(C)[1]
         return total, of, self._spread(t) @ self.unit
 
     def march(self, ratios: Array) -> March:
@@ -180,19 +189,58 @@ class _Frozen:
             nodes,
         )
 
-    def cycle(self, case: Case) -> LoadPath:
-        """The full cycle."""
+    def cycle(self, case: Case, history: TangentialHistory | None = None) -> LoadPath:
+        """The full cycle, first loading and the closed loop.
+
+        ``history``: before the first step; None starts from no slip.
+        """
+        path, quarter = self._cycle_path(history)
+        T, d = along(path, self.unit, self.copies)
+        work = self.copies * float(np.sum(path.slip_work[quarter:]))
+        return closed_loop(case, self.case.case, T, d, work, quarter)
+
+    def _cycle_path(self, history: TangentialHistory | None = None) -> tuple[TangentialPath, int]:
         loads = self.solution.plan.scene.loads
-        return closed_loop(
-            case,
-            self.case.case,
-            self.compliance,
-            self.limit,
-            peak=loads.cycle_amplitude * self.total,
-            steps=loads.cycle_steps,
-            unit=self.unit,
-            copies=self.copies,
-        )
+        shares, quarter = cycle_shares(loads.cycle_steps)
+        values = load_history(loads.cycle_amplitude * self.total * shares, self.unit)
+        path = tangential_path(self.compliance, self.limit, loads=values, history=history)
+        return path, quarter
+
+    def learn(self) -> None:
+        """Show bodies that learn the tractions of every tangential load and of the cycle.
+
+        Raises ConvergenceError where a product does not converge.
+        """
+        scene, model = self.solution.plan.scene, self.solution.model
+        n = len(model.gap)
+        at = np.concatenate([self.loaded + k * n for k in range(len(self.components))])
+
+        def whole(tractions: Array) -> Array:
+            """Tractions at the loaded nodes, on all nodes; column by column."""
+            out = np.zeros((n * len(self.components), *tractions.shape[1:]))
+            out[at] = tractions
+            return out.reshape(len(out), -1)
+
+        def shown(solve: Callable[[], Array], limit: float = KNOWN) -> None:
+            settled(model, self.components, solve, lambda found: [(whole(found), limit)])
+
+        def single(load: Array) -> TangentialContact:
+            target = load if len(load) == 2 else float(load[0])
+            return tangential_contact(self.compliance, self.limit, load=target)
+
+        def both(found: TangentialContact) -> Iterable[tuple[Array, float]]:
+            yield whole(found.force), KNOWN
+            if found.rates is not None:
+                yield whole(found.rates), KNOWN_STIFFNESS
+
+        shown(lambda: self._moved(self.compliance)[0], KNOWN_STIFFNESS)
+        gross = np.zeros(len(self.components) * len(self.limit))
+        gross[: len(self.limit)] = self.limit
+        shown(lambda: gross)
+        for ratio in scene.loads.tangential if scene.wants("tangential") else ():
+            settled(model, self.components, partial(single, ratio * self.total * self.unit), both)
+        if scene.wants("cycle"):
+            shown(lambda: self._cycle_path()[0].force.T)
 
     def _spread(self, values: Array) -> Array:
         """(n, 1 or 2) of values at the loaded nodes."""
