@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +25,6 @@ from upd.contact.products import (
     learning,
     normal_contact_by_products,
 )
-from upd.errors import InputError
 from upd.fem import Material, rigid_body_modes, stiffness
 from upd.linalg.multigrid import MultigridSolver
 from upd.linalg.parallel import in_parallel
@@ -63,24 +61,32 @@ def condensation_key(plan: ContactPlan, body: str, family: Family, threads: int)
     """Hash of all that one body's condensation for one family of loads depends on, rounding
     included.
     """
-    supports = {
-        "family": [family.components, family.mirror],
-        "solver": _solver(plan, body, family),
-        "threads": threads,
-    }
-    return key_of(_shape(plan, body) | supports)
+    scene, material = plan.scene, plan.scene.materials[body]
+    return key_of(
+        {
+            "mesh": mesh_key(plan),
+            "body": body,
+            "held": scene.contact.distant.get(body),
+            "E": material.E,
+            "nu": material.nu,
+            "element": scene.mesh.element,
+            "family": [family.components, family.mirror],
+            "solver": _solver(plan, body, family),
+            "threads": threads,
+        }
+    )
+
+
+def _condensation_keys(plan: ContactPlan, threads: int) -> list[str]:
+    pairs = ((body, family) for body in plan.size for family in plan.families)
+    return [condensation_key(plan, body, family, threads) for body, family in pairs]
 
 
 def model_key(plan: ContactPlan, threads: int) -> str:
     """Hash of all that the contact model depends on."""
-    parts = sorted(
-        condensation_key(plan, body, family, threads)
-        for body in plan.size
-        for family in plan.families
-    )
     return key_of(
         {
-            "parts": parts,
+            "parts": sorted(_condensation_keys(plan, threads)),
             "memory": plan.scene.solver.memory,
             "factors": plan.effect("internal displacement"),
         }
@@ -89,16 +95,10 @@ def model_key(plan: ContactPlan, threads: int) -> str:
 
 def needs(plan: ContactPlan, threads: int) -> Needs:
     """What a point of a sweep with this plan needs, and may share with others."""
-    parts = frozenset(
-        condensation_key(one, body, family, threads)
-        for one in (plan, plan.companion)
-        if one is not None
-        for body in one.size
-        for family in one.families
-    )
-    return Needs(
-        model_key(plan, threads), mesh_key(plan), parts, plan.effect("internal displacement")
-    )
+    plans = (plan,) if plan.companion is None else (plan, plan.companion)
+    parts = frozenset(key for one in plans for key in _condensation_keys(one, threads))
+    inside = plan.effect("internal displacement")
+    return Needs(model_key(plan, threads), mesh_key(plan), parts, inside)
 
 
 def mesh_key(plan: ContactPlan) -> str:
@@ -111,42 +111,23 @@ def _solver(plan: ContactPlan, body: str, family: Family) -> str:
     return plan.solver[f"{body}, {family.label}"].partition(":")[0]
 
 
-def _shape(plan: ContactPlan, body: str) -> dict[str, Any]:
-    scene, material = plan.scene, plan.scene.materials[body]
-    held = scene.contact.distant.get(body)
-    return {
-        "mesh": mesh_key(plan),
-        "body": body,
-        "held": held,
-        "E": material.E,
-        "nu": material.nu,
-        "element": scene.mesh.element,
-    }
-
-
 def _prepared(plan: ContactPlan, stages: Stages, workers: int) -> ContactModel:
     scene = plan.scene
     with stages("mesh", scene.recipe):
         meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
     require_contact_sets(scene, meshes, plan.families)
     meshes = {name: _held(mesh, name, plan) for name, mesh in meshes.items()}
-    upper_name, lower_name = upper_and_lower(meshes)
-    sides = {upper_name: 1, lower_name: -1}
+    sides = dict(zip(upper_and_lower(meshes), (1, -1), strict=True))
     with stages("assembly", ", ".join(f"{name}: {meshes[name].n_hex} hexahedra" for name in sides)):
-        found = in_parallel(
-            [partial(_body, plan, meshes[name], name, side) for name, side in sides.items()],
-            workers,
-        )
-        bodies = {body.name: body for body in found}
-    jobs = [(body, family) for family in plan.families for body in bodies.values()]
+        made = [partial(_body, plan, meshes[name], name, side) for name, side in sides.items()]
+        upper, lower = in_parallel(made, workers)
+    jobs = [(body, family) for family in plan.families for body in (upper, lower)]
     sizes = ", ".join(f"{name} {3 * meshes[name].n_node} dofs" for name in sides)
     with stages("condensation", f"{sizes}; {' and '.join(f.label for f in plan.families)}"):
         condensed = in_parallel([partial(_condensation, plan, *job) for job in jobs], workers)
         for (body, family), one in zip(jobs, condensed, strict=True):
             body.condensed[family.components] = one
-    return make_contact_model(
-        bodies[upper_name], bodies[lower_name], (0 in plan.mirrors, 1 in plan.mirrors)
-    )
+    return make_contact_model(upper, lower, (0 in plan.mirrors, 1 in plan.mirrors))
 
 
 def _held(mesh: Mesh, name: str, plan: ContactPlan) -> Mesh:
@@ -154,11 +135,11 @@ def _held(mesh: Mesh, name: str, plan: ContactPlan) -> Mesh:
     chosen = plan.scene.contact.distant.get(name)
     if chosen is None:
         return mesh
-    weights = {key: own for key, own in mesh.weights.items() if key != "distant"}
-    if f"distant_{chosen}" in weights:
-        weights["distant"] = weights[f"distant_{chosen}"]
-    nodes = {**mesh.nodes, "distant": mesh.nodes[f"distant_{chosen}"]}
-    return replace(mesh, nodes=nodes, weights=weights)
+    own = f"distant_{chosen}"
+    weights = {key: w for key, w in mesh.weights.items() if key != "distant"}
+    if own in weights:
+        weights["distant"] = weights[own]
+    return replace(mesh, nodes={**mesh.nodes, "distant": mesh.nodes[own]}, weights=weights)
 
 
 def held_sets(mesh: Mesh) -> list[str]:
@@ -171,14 +152,9 @@ def held_sets(mesh: Mesh) -> list[str]:
 
 def _body(plan: ContactPlan, mesh: Mesh, name: str, side: int) -> Body:
     data = plan.scene.materials[name]
-    return Body(
-        name,
-        mesh,
-        Symmetric.of(
-            stiffness(mesh, Material(data.E, data.nu, data.density), plan.scene.mesh.element)
-        ),
-        side,
-    )
+    material = Material(data.E, data.nu, data.density)
+    K = Symmetric.of(stiffness(mesh, material, plan.scene.mesh.element))
+    return Body(name, mesh, K, side)
 
 
 def _condensation(
@@ -232,11 +208,6 @@ def _by_products(
 ) -> LearnedCompliance:
     """One body whose compliance is learned from products with the solver ``name``."""
     mesh, data = body.mesh, plan.scene.materials[body.name]
-    if "distant" in mesh.weights:
-        raise InputError(
-            f"{body.name} is held in the mean of a weighted set, which products do not serve: set "
-            'solver.route = "condensed", or hold another set'
-        )
     K, modes = submatrix_of(body.K, free), rigid_body_modes(mesh.points)[free]
     require_held(K, modes)
     held = {"xyz".index(plane[-1]): odd for plane, odd in family.mirror.items()}
@@ -249,9 +220,8 @@ def _by_products(
     node = centre(points, held)
     measured: dict[int, tuple[int, Array]] = {}
     if node is not None:
-        for component, own in zip(
-            family.components, np.split(kept, len(family.components)), strict=True
-        ):
+        places = np.split(kept, len(family.components))
+        for component, own in zip(family.components, places, strict=True):
             load = np.zeros(len(free))
             load[own[node]] = 1.0
             measured[component] = (node, solver(load, ROUGH).x[own])

@@ -4,7 +4,7 @@ model of what is solved again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -193,12 +193,16 @@ def contact_plan(
     if recipes.counted_by_mesh(scene.recipe):
         # The mesh is there: what it lacks is reported before anything is written.
         require_contact_sets(scene, recipes.build_mesh(scene.recipe, parameters)[0], families)
-    cost = CostModel(scene)
-    weighted = recipes.weighted_sets(scene.recipe, parameters)
-    add_loads(cost, scene, size, effects, _add_bodies(cost, size, families, effects, weighted))
+    cost, on = CostModel(scene), {effect.name for effect in effects if effect.on}
+    products = [(family, _products(scene, on, family)) for family in families]
+    _add_bodies(cost, scene, size, products, recipes.weighted_sets(scene.recipe, parameters))
+    _add_loads(cost, scene, size, on)
     # The internal displacement takes the factors of all bodies again.
-    memory, workers = cost.in_a_row(keep=_is_on(effects, "internal displacement"))
-    files = _files_seconds(scene, size)
+    memory, workers = cost.in_a_row(keep="internal displacement" in on)
+    # A table row, a group of arrays and a curve per load.
+    loads = len(scene.loads.normal) * (1 + len(scene.loads.tangential))
+    nodes = sum(count["nodes"] for count in size.values()) if scene.wants("fields") else 0
+    files = _FILES_S + 5e-3 * loads + _NODE_S * nodes
     return ContactPlan(
         scene,
         parameters,
@@ -215,57 +219,51 @@ def contact_plan(
     )
 
 
-def _is_on(effects: Sequence[Effect], name: str) -> bool:
-    return any(effect.name == name and effect.on for effect in effects)
-
-
 def _add_bodies(
     cost: CostModel,
+    scene: Scene,
     size: Mapping[str, Mapping[str, int]],
-    families: tuple[Family, ...],
-    effects: Sequence[Effect],
+    products: Sequence[tuple[Family, int]],
     weighted: Mapping[str, Sequence[str]],
-) -> float:
-    """Bodies meshed and condensed; the seconds of one displacement inside them.
+) -> None:
+    """Bodies meshed and condensed.
 
-    ``weighted``: body -> its sets with weights, which hold it in the mean.
+    Parameters
+    ----------
+    products
+        A family of loads, and about how many it takes where they may serve instead of a
+        condensation.
+    weighted
+        Body -> its sets with weights, which hold it in the mean.
     """
-    scene, inside = cost.scene, 0.0
-    assert isinstance(scene, Scene)
     for count in size.values():
         cost.contact_body(count["hexes"], count["nodes"])
     # what every task keeps is held at once: an equal share of the memory each
-    room = (cost.limit() - cost.kept_bytes) / (len(size) * len(families))
+    room = (cost.limit() - cost.kept_bytes) / (len(size) * len(products))
     for body, count in size.items():
         chosen = scene.contact.distant.get(body)
         in_mean = ("distant" if chosen is None else f"distant_{chosen}") in weighted.get(body, ())
-        # products may serve instead of a condensation
-        learns = is_curved(scene) and not scene.coupled and not in_mean
-        found = []
-        for family in families:
-            name, n_kept = f"{body}, {family.label}", len(family.components) * count["contact"]
-            task = (name, count["hexes"], count["nodes"])
-            if learns:
-                found.append(cost.contact(*task, n_kept, _products(scene, effects, family), room))
+        for family, number in products:
+            task = f"{body}, {family.label}", count["hexes"], count["nodes"]
+            n_kept = len(family.components) * count["contact"]
+            if is_curved(scene) and not scene.coupled and not in_mean:
+                cost.contact(*task, n_kept, number, room)
             else:
-                found.append(cost.condensed(*task, n_kept))
-        for family in families if in_mean else ():
+                cost.condensed(*task, n_kept)
+        for family, _ in products if in_mean else ():
             cost.held_in_mean(f"{body}, {family.label}", count["hexes"], count["nodes"])
-        # recovery of the inner dofs: backward only
-        inside += 0.5 * max(one.substitution() for one in found)
-    return inside
 
 
 # A cycle takes the products of so many loads.
 _CYCLE_CASES = 4
 
 
-def _products(scene: Scene, effects: Sequence[Effect], family: Family) -> int:
-    """Products that a family of loads takes about."""
+def _products(scene: Scene, on: Collection[str], family: Family) -> int:
+    """Products that a family of loads takes about, with the effects ``on``."""
     loads, cases = len(scene.loads.normal), 0
     if NORMAL in family.components:
         cases += loads * (3 if scene.wants("stiffness") else 1)
-        cases += scene.loads.curve_points * _is_on(effects, "load curve")
+        cases += scene.loads.curve_points * ("load curve" in on)
     if ALONG in family.components:
         sheared = len(scene.loads.tangential) if scene.wants("tangential") else 0
         cases += loads * (2 + sheared + _CYCLE_CASES * scene.wants("cycle"))
@@ -273,10 +271,12 @@ def _products(scene: Scene, effects: Sequence[Effect], family: Family) -> int:
 
 
 # Counted and timed on the ready scenes, one thread: a contact set under one load; a tangential
-# load; a step of the march along one direction and, with its disks, along two; coupled, a step.
+# load; a step of the march along one direction and, with its disks, along two; coupled, a step; a
+# displacement inside both bodies, per node.
 _LOAD_S, _TANGENTIAL_S, _STEP_S, _COUPLED_S = 1e-3, 5e-3, {1: 1.5e-4, 2: 1.5e-3}, 5e-3
-# Figures and page, figures of a flat contact's tangential loads, files of fields per node.
-_FILES_S, _FLAT_S, _NODE_S = 2.6, 1.4, 3.5e-5
+_INSIDE_S = 1.4e-6
+# Figures and page, files of fields per node.
+_FILES_S, _NODE_S = 3.0, 3.5e-5
 # Dense factorisations with three directions of a load, of effects left out.
 _AGAIN = 20
 # Of coupled contact: flops of a load step over the cube of its closed dofs, and over those times
@@ -285,32 +285,26 @@ _AGAIN = 20
 _STEP_CUBES, _STEP_SQUARES, _KEPT, _CURVE_STEPS = 1.5, 20.0, 5.0, 26
 
 
-def add_loads(
-    cost: CostModel,
-    scene: Scene,
-    size: Mapping[str, Mapping[str, int]],
-    effects: Sequence[Effect],
-    inside: float,
+def _add_loads(
+    cost: CostModel, scene: Scene, size: Mapping[str, Mapping[str, int]], on: Collection[str]
 ) -> None:
-    """Seconds and bytes of all loads; ``inside``: seconds of a displacement inside both bodies."""
+    """Seconds and bytes of all loads, with the effects ``on``."""
     nodes, k = sum(c["nodes"] for c in size.values()), max(c["contact"] for c in size.values())
-    friction, curved = _is_on(effects, "friction"), is_curved(scene)
-    n_load = len(scene.loads.normal)
-    n_curve = scene.loads.curve_points * _is_on(effects, "load curve")
+    curved, n_load = is_curved(scene), len(scene.loads.normal)
+    n_curve = scene.loads.curve_points * ("load curve" in on)
     # A stiffness is a slope between two more loads.
     forces = n_load * (3 if scene.wants("stiffness") else 1) + n_curve
-    lines = n_load * len(scene.loads.directions) * friction
+    lines = n_load * len(scene.loads.directions) * ("friction" in on)
     ratios = lines * len(scene.loads.tangential) * scene.wants("tangential")
     steps = lines * scene.loads.cycle_steps * scene.wants("cycle")
     # A curved contact's patch reaches to twice its radius at least.
     share = np.pi / 16.0 if curved else 1.0
     cost.seconds += forces * (_LOAD_S + dense_s(k**3 / 6.0))
-    cost.seconds += ratios * (_TANGENTIAL_S + dense_s(3.0 * k**3))
     cost.seconds += steps * _STEP_S[scene.slip_directions]
+    cost.seconds += ratios * (_TANGENTIAL_S + dense_s(3.0 * k**3))
     # Four numbers a step and node: traction, also before it is clipped, slip, state.
-    cost.kept_bytes += (
-        32.0 * steps * scene.slip_directions * share * k + 64.0 * (forces + ratios) * k
-    )
+    cost.kept_bytes += 32.0 * steps * scene.slip_directions * share * k
+    cost.kept_bytes += 64.0 * (forces + ratios) * k
     if scene.coupled:
         m, closed = 3.0 * k, 3.0 * share * k
         # Faces that touch without a load scale: their normal loads are one step.
@@ -319,18 +313,9 @@ def add_loads(
         one = _STEP_CUBES * closed**3 + _STEP_SQUARES * m * closed
         cost.seconds += coupled * (_COUPLED_S + dense_s(one)) + dense_s(m**3 / 3.0)
         cost.kept_bytes += _KEPT * 8.0 * m**2
-    if _is_on(effects, "internal displacement"):
-        cost.seconds += (n_load * (1 + friction) + n_curve) * inside
+    if "internal displacement" in on:
+        cost.seconds += (n_load * (1 + ("friction" in on)) + n_curve) * nodes * _INSIDE_S
         cost.kept_bytes += 48.0 * n_load * nodes
-
-
-def _files_seconds(scene: Scene, size: Mapping[str, Mapping[str, int]]) -> float:
-    """Seconds of figures, files and page."""
-    flat = 0.0 if is_curved(scene) else _FLAT_S
-    nodes = sum(c["nodes"] for c in size.values()) if scene.wants("fields") else 0
-    # A table row, a group of arrays and a curve per load.
-    loads = len(scene.loads.normal) * (1 + len(scene.loads.tangential))
-    return _FILES_S + flat + 5e-3 * loads + _NODE_S * nodes
 
 
 # -- the coarser whole model -----------------------------------------------------------------------

@@ -19,7 +19,6 @@ from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
 from upd.contact.patch import ContactMeasures
 from upd.contact.stiffness import BodyShare
-from upd.contact.tilt import TiltedContact
 from upd.reference import contact_modulus
 from upd.results import Case, Estimates
 
@@ -36,14 +35,14 @@ class PressedContact:
         Tangent normal stiffness of the whole contact, N/mm.
     state
         With normal and tangential contact at once, the state it comes from.
-    tilted
-        With a free tilt, the answer it is a part of.
+    tilt
+        (2,) free tilts in rad; None where they are held.
     """
 
     solution: NormalContact
     stiffness: float
     state: CoupledState | None = None
-    tilted: TiltedContact | None = None
+    tilt: Array | None = None
 
     @property
     def stick(self) -> NDArray[np.bool_]:
@@ -51,14 +50,6 @@ class PressedContact:
         shear.
         """
         return self.solution.contact if self.state is None else self.state.stick
-
-    @property
-    def tilt(self) -> Array | None:
-        """(2,) free tilts in rad; None where they are held."""
-        if self.tilted is not None:
-            return self.tilted.tilt
-        motion = np.zeros(0) if self.state is None else self.state.motion[3:]
-        return motion if motion.size else None
 
 
 @dataclass(kw_only=True)

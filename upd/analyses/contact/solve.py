@@ -134,7 +134,11 @@ def _pressed(
     C = compliance()
     if arms.size:
         tilted = [tilted_contact(C, model.gap, arms, load=F) for F in loads]
-        found = [PressedContact(t.normal, plan.copies * t.free_stiffness, tilted=t) for t in tilted]
+        free = [plan.copies * one.free_stiffness for one in tilted]
+        found = [
+            PressedContact(one.normal, K, tilt=one.tilt)
+            for one, K in zip(tilted, free, strict=True)
+        ]
     else:
         answers = settled(
             model,
@@ -168,7 +172,8 @@ def _sheared_too(
         sloped = all(F * (1.0 + s) in states for s in (-LOAD_STEP, LOAD_STEP))
         free = slope(states, F) if sloped else float("nan")
         held = _held_stiffness(state) if arms.size and sloped and body is None else free
-        out[F] = PressedContact(as_normal(state, held), free, state)
+        tilt = state.motion[3:] if arms.size else None
+        out[F] = PressedContact(as_normal(state, held), free, state, tilt)
     return out
 
 

@@ -37,11 +37,10 @@ from upd.analyses.contact.plan import (
     refined_growth,
 )
 from upd.analyses.contact.results import make_results
-from upd.analyses.contact.scene_plan import add_loads, contact_plan, make_plan
+from upd.analyses.contact.scene_plan import contact_plan, make_plan
 from upd.analyses.contact.solution import ContactSolution, NormalCase
 from upd.analyses.contact.solve import solve_normal, solve_plan
 from upd.analyses.contact.tangential import solve_tangential
-from upd.analyses.cost import CostModel
 from upd.errors import InputError, UpdError
 from upd.mesh import recipes
 from upd.progress import Stages
@@ -220,23 +219,17 @@ def _coarser(plan: ContactPlan, divisions: int) -> Variation:
 def plan_with_estimates(scene: Scene) -> ContactPlan:
     """The plan of a scene with what its levels cost."""
     plan = make_plan(scene)
-    made = levels(plan).variations
-    again = sum(_seconds(plan, one) for one in made)
-    again += neighbours_seconds(plan) if made else 0.0
-    return replace(
-        plan,
-        seconds=plan.seconds + again,
-        estimate_seconds=again,
-    )
+    again = sum(_seconds(plan, one) for one in levels(plan).variations)
+    return replace(plan, seconds=plan.seconds + again, estimate_seconds=again)
 
 
 def _seconds(plan: ContactPlan, one: Variation) -> float:
-    """Predicted for a level and its neighbouring loads."""
+    """Predicted for a level."""
     if recipes.counted_by_mesh(plan.scene.recipe):
         # A plan runs a user's recipe once: the run makes these meshes.
-        return plan.solve_seconds * float(one.size**-POWER) + neighbours_seconds(plan)
+        return plan.solve_seconds * float(one.size**-POWER)
     level: ContactPlan = varied_plan(PROBLEM, plan.scene, one)
-    return level.solve_seconds + neighbours_seconds(level)
+    return level.solve_seconds
 
 
 def governing(scene: Scene) -> tuple[str, ...]:
@@ -288,14 +281,10 @@ def _curved_level(scene: Scene, level: int) -> Scene:
     if scene.mesh.element in ("hex20", "hex27"):
         divisions = 2 * math.ceil(divisions / 4)
     geometry = {**scene.geometry, "patch": patch, "divisions": max(4, divisions)}
-    if "growth" in recipes.parameters(scene.recipe).__dataclass_fields__:
+    if recipes.has_parameter(scene.recipe, "growth"):
         # The far mesh is refined with the patch.
-        geometry["growth"] = round(
-            refined_growth(
-                float(scene.geometry.get("growth", _GROWTH)), _GROWTH_AT / _NODES[level]
-            ),
-            4,
-        )
+        usual, ratio = float(geometry.get("growth", _GROWTH)), _GROWTH_AT / _NODES[level]
+        geometry["growth"] = round(refined_growth(usual, ratio), 4)
     return replace(scene, geometry=geometry, accuracy=None)
 
 
@@ -399,25 +388,6 @@ def neighbours(touching: int) -> list[float]:
     return [float(t) for t in steps if np.exp(RADIUS * t) >= spacing]
 
 
-def plan_at(plan: ContactPlan, loads: Sequence[float]) -> ContactPlan:
-    """The plan with other loads in N, without what they go without, cycles in fewer steps."""
-    own = plan.scene.loads
-    near = replace(own, normal=tuple(loads), cycle_steps=min(own.cycle_steps, _FEWEST_STEPS))
-    scene = replace(plan.scene, loads=near)
-    effects = tuple(replace(e, on=False) if e.name in _SPARED_NEARBY else e for e in plan.effects)
-    return replace(plan, scene=scene, effects=effects)
-
-
-def neighbours_seconds(plan: ContactPlan) -> float:
-    """Predicted for the neighbours of all loads."""
-    if not has_neighbours(plan.scene):
-        return 0.0
-    near = plan_at(plan, [F for F in plan.scene.loads.forces if F > 0.0] * len(PLACES))
-    cost = CostModel(near.scene)
-    add_loads(cost, near.scene, near.size, near.effects, 0.0)
-    return cost.seconds
-
-
 def sample(solution: ContactSolution) -> Samples:
     """The numbers of every loaded case at neighbouring loads.
 
@@ -451,7 +421,11 @@ def _values(
     solution: ContactSolution, case: NormalCase, load: float
 ) -> list[tuple[str, Case, float]]:
     """The numbers at a load near the case's; none where it is too large for the patch."""
-    near = ContactSolution(plan_at(solution.plan, (load,)), solution.model)
+    plan, loads = solution.plan, solution.plan.scene.loads
+    loads = replace(loads, normal=(load,), cycle_steps=min(loads.cycle_steps, _FEWEST_STEPS))
+    effects = tuple(replace(e, on=e.on and e.name not in _SPARED_NEARBY) for e in plan.effects)
+    plan = replace(plan, scene=replace(plan.scene, loads=loads), effects=effects)
+    near = ContactSolution(plan, solution.model)
     try:
         solve_normal(near, Stages())
         (one,) = near.normal
