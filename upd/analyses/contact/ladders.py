@@ -64,8 +64,12 @@ _ACCURACIES, _FLAT_ACCURACIES = (40.0, 10.0, 3.0), (20.0, 10.0, 5.0)
 #: numbers of the table of what moves the stiffness, of one pad where the contact is two
 _STIFFNESSES = ("K_N_secant_raw", "K_N_*_alone", "K_Tx_initial_raw", "K_Ty_initial_raw")
 _PER_PAD = ("K_N_per_pad", "K_N_*_alone", "K_Tx_per_pad", "K_Ty_per_pad")
-#: patches smaller than the scene's: where it is made of squares, their edge goes with it
-_SMALLER = (0.8, 0.6, 0.4)
+#: lengths of a recipe, and times of them that are tried
+_FACTORS = {
+    **dict.fromkeys(("margin", "thickness"), (0.25, 0.5, 1.5)),
+    **dict.fromkeys(("patch_length", "patch_width", "pad_length"), (0.8, 0.6, 0.4)),
+    "band": (0.2,),
+}
 
 #: plan, divisions across the patch -> variations
 Maker = Callable[[Plan[Any], Sequence[int]], Iterable[Variation]]
@@ -143,8 +147,8 @@ def _accuracies(scene: Scene, asked: Asked) -> list[Variation]:
 def parameter_points(scene: Scene, asked: Asked = None) -> list[Variation]:
     """The scene as given, then with one parameter changed at a time.
 
-    Block, patch, distant sets, tilt, friction, element. Raises InputError for levels, and when the
-    scene leaves the mesh to an accuracy.
+    Lengths of block and patch, distant sets, tilt, friction. Raises InputError for levels, and when
+    the scene leaves the mesh to an accuracy.
     """
     no_levels(asked, "a parameter study changes one parameter at a time")
     plan = analysis_of(scene).make_plan(scene)
@@ -154,13 +158,12 @@ def parameter_points(scene: Scene, asked: Asked = None) -> list[Variation]:
 
 
 def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Overrides]]:
-    p = plan.parameters
     yield "as given", ()
-    for name in ("margin", "thickness"):
-        for factor in (0.25, 0.5, 1.5) if name in p else ():
-            yield f"block {name} {factor * p[name]:g} mm", _lengths({name: factor * p[name]})
-    yield from _smaller_patches(recipes.made(scene.recipe, p))
-    for body, mesh in recipes.build_mesh(scene.recipe, p)[0].items():
+    for name, factors in _FACTORS.items():
+        length = plan.parameters.get(name)
+        for value in (factor * length for factor in factors if isinstance(length, float)):
+            yield f"{name} {value:g} mm", _lengths({name: value})
+    for body, mesh in recipes.build_mesh(scene.recipe, plan.parameters)[0].items():
         for name in held_sets(mesh):
             if scene.contact.distant.get(body) != name:
                 yield f"{body} held at {name}", ((f"contact.distant.{body}", name),)
@@ -169,26 +172,6 @@ def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Overrides]]:
     # The normal force goes with the friction when it comes from an equilibrium.
     for mu in (m for m in (0.3, 1.0) if m != scene.contact.friction):
         yield f"mu = {mu:g}", (("contact.friction", mu),)
-    # hex27 on the same lattice has eight times the nodes.
-    for element in ("hex8", "hex8i"):
-        if scene.mesh.element != element:
-            yield f"element {element}", (("mesh.element", element),)
-    if "band" in p:
-        yield f"bands {0.2 * p['band']:g} mm wide", _lengths({"band": 0.2 * p["band"]})
-
-
-def _smaller_patches(p: Any) -> Iterable[tuple[str, Overrides]]:
-    """Smaller patches on the same damper, of a wedge and of two pads."""
-    for k in _SMALLER:
-        if hasattr(p, "patch_width") and hasattr(p, "band"):
-            width, length = k * p.width, k * p.patch_length
-            smaller = {"patch_length": length, "patch_width": width, "band": k * p.band}
-            yield f"patch {width:g} x {length:g} mm", _lengths(smaller)
-        elif hasattr(p, "pad_gap") and hasattr(p, "pad_length"):
-            # the damper keeps its length
-            gap = p.pad_gap + 2.0 * (1.0 - k) * p.pad_width
-            smaller = {"pad_length": k * p.pad_length, "pad_width": k * p.pad_width, "pad_gap": gap}
-            yield f"pads {k * p.pad_width:g} x {k * p.pad_length:g} mm", _lengths(smaller)
 
 
 def _lengths(values: Mapping[str, float]) -> Overrides:

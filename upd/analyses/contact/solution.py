@@ -121,8 +121,6 @@ class StuckContact:
         Tangential stiffness in N/mm.
     of
         That of each body stuck to a rigid counterpart, by its own contact set.
-    nodal
-        (n,) field of it.
     """
 
     normal: Case
@@ -130,7 +128,6 @@ class StuckContact:
     direction: float
     total: float
     of: dict[str, float]
-    nodal: Array
 
 
 @dataclass
@@ -149,9 +146,13 @@ class TangentialCase:
     stiffness: float
     force: Array
     slip: Array
-    pressed: Array
     nodes: Sheared
     state: CoupledState | None = None
+
+    @property
+    def pressed(self) -> Array:
+        """(n,) normal forces under it, N."""
+        return self.normal.solution.force if self.state is None else self.state.force[:, 0]
 
     @property
     def stick(self) -> NDArray[np.bool_]:

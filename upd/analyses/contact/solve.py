@@ -131,14 +131,11 @@ def _pressed(
     def compliance() -> Array:
         return model.compliance(NORMAL) if body is None else model.body_compliance(body, NORMAL)
 
-    C = compliance()
     if arms.size:
-        tilted = [tilted_contact(C, model.gap, arms, load=F) for F in loads]
-        free = [plan.copies * one.free_stiffness for one in tilted]
-        found = [
-            PressedContact(one.normal, K, tilt=one.tilt)
-            for one, K in zip(tilted, free, strict=True)
-        ]
+        found = []
+        for F in loads:
+            t = tilted_contact(compliance(), model.gap, arms, load=F)
+            found.append(PressedContact(t.normal, plan.copies * t.free_stiffness, tilt=t.tilt))
     else:
         answers = settled(
             model,

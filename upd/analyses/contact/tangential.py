@@ -99,11 +99,7 @@ class March(NamedTuple):
 def _sheared(solution: ContactSolution, case: NormalCase, direction: float, shares: Array) -> None:
     """Stiffness, single loads, curve and cycle of one direction after one normal load."""
     scene, own = solution.plan.scene, solution.sheared_case(case, direction)
-    way: Frozen | _Coupled = (
-        Frozen(solution, case, direction)
-        if case.state is None
-        else _Coupled(solution, case, direction, case.state)
-    )
+    way = (Frozen if case.state is None else _Coupled)(solution, case, direction)
     # Flat faces share their law by the stuck contact.
     if not solution.curved or scene.wants("stiffness"):
         solution.stuck.append(StuckContact(case.case, own, direction, *way.stuck()))
@@ -123,21 +119,51 @@ def _sheared(solution: ContactSolution, case: NormalCase, direction: float, shar
         solution.paths.append(way.cycle(solution.sheared_case(case, direction, amplitude)))
 
 
-class Frozen:
-    """Tangential loads along a direction that leave the normal forces as they are."""
+class _Shear:
+    """Tangential loads along a direction after a normal one."""
 
     def __init__(self, solution: ContactSolution, case: NormalCase, direction: float) -> None:
-        scene, force = solution.plan.scene, case.solution.force
+        scene = solution.plan.scene
         self.solution, self.case, self.direction = solution, case, direction
         self.components = slip_components(scene, direction)
         self.unit = unit_vector(direction, self.components)
-        self.loaded = np.flatnonzero(force > 0.0)
-        self.limit = scene.contact.friction * force[self.loaded]
+        self.friction, self.loads = scene.contact.friction, scene.loads
         self.copies = solution.plan.copies
+
+    def _found(
+        self,
+        ratio: float,
+        displacement: float,
+        K: Array,
+        fields: tuple[Array, Array],
+        nodes: Sheared,
+        state: CoupledState | None = None,
+    ) -> TangentialCase:
+        """The load, with the tangent K (1, 1) or (2, 2) of the model, forces and slip."""
+        # with the motion across the load held, or free to follow; 0 where nothing holds
+        tangent = float(K[0, 0])
+        if not self.solution.curved:
+            free = np.linalg.pinv(K, hermitian=True)
+            tangent = 1.0 / float(self.unit @ free @ self.unit) if K.any() else 0.0
+        case = self.solution.sheared_case(self.case, self.direction, ratio)
+        load = ratio * self.friction * self.case.force
+        return TangentialCase(
+            self.case, case, load, displacement, self.copies * tangent, *fields, nodes, state
+        )
+
+
+class Frozen(_Shear):
+    """Tangential loads along a direction that leave the normal forces as they are."""
+
+    def __init__(self, solution: ContactSolution, case: NormalCase, direction: float) -> None:
+        super().__init__(solution, case, direction)
+        force = case.solution.force
+        self.loaded = np.flatnonzero(force > 0.0)
+        self.limit = self.friction * force[self.loaded]
         #: mu N on the model
         self.total = float(self.limit.sum())
         if solution.curved:
-            self.total = scene.contact.friction * case.force / self.copies
+            self.total = self.friction * case.force / self.copies
 
     @property
     def compliance(self) -> Array:
@@ -150,18 +176,15 @@ class Frozen:
         t = cho_solve(cho_factor(compliance), e)
         return t, self.copies * float(e @ t)
 
-    def stuck(self) -> tuple[float, dict[str, float], Array]:
-        """Stiffness of the stuck contact set, of both bodies and of each on a rigid counterpart,
-        and its tractions.
-        """
+    def stuck(self) -> tuple[float, dict[str, float]]:
+        """Stiffness of the stuck contact set, of both bodies and of each on a rigid counterpart."""
         model, of = self.solution.model, {}
-        t, total = self._moved(self.compliance)
         for body in (model.upper, model.lower):
             if body.name in self.case.alone:
                 on = np.flatnonzero(self.case.alone[body.name].solution.force > 0.0)
                 C = tangential_compliance(model, self.components, on, body)
                 of[body.name] = self._moved(C)[1]
-        return total, of, self._spread(t) @ self.unit
+        return self._moved(self.compliance)[1], of
 
     def march(self, ratios: Array) -> March:
         """Shares of mu N one after the other."""
@@ -174,20 +197,9 @@ class Frozen:
         d, stick = np.atleast_1d(path.displacement[k]), path.state[k] == 0
         load, force = ratio * self.total * self.unit, path.unclipped[k]
         nodes = Sheared(self.components, self.loaded, self.limit, force, before, d, load, stick)
+        fields = self._spread(path.force[k]), self._spread(path.slip[k])
         K = np.atleast_2d(path.stiffness[k])
-        # with the motion across the load held, or free to follow
-        tangent = float(K[0, 0]) if self.solution.curved else _free_stiffness(K, self.unit)
-        return TangentialCase(
-            self.case,
-            self.solution.sheared_case(self.case, self.direction, ratio),
-            ratio * self.solution.plan.scene.contact.friction * self.case.force,
-            float(d @ self.unit),
-            self.copies * tangent,
-            self._spread(path.force[k]),
-            self._spread(path.slip[k]),
-            self.case.solution.force,
-            nodes,
-        )
+        return self._found(ratio, float(d @ self.unit), K, fields, nodes)
 
     def cycle(self, case: Case, history: TangentialHistory | None = None) -> LoadPath:
         """The full cycle, first loading and the closed loop.
@@ -200,9 +212,8 @@ class Frozen:
         return closed_loop(case, self.case.case, T, d, work, quarter)
 
     def _cycle_path(self, history: TangentialHistory | None = None) -> tuple[TangentialPath, int]:
-        loads = self.solution.plan.scene.loads
-        shares, quarter = cycle_shares(loads.cycle_steps)
-        values = load_history(loads.cycle_amplitude * self.total * shares, self.unit)
+        shares, quarter = cycle_shares(self.loads.cycle_steps)
+        values = load_history(self.loads.cycle_amplitude * self.total * shares, self.unit)
         path = tangential_path(self.compliance, self.limit, loads=values, history=history)
         return path, quarter
 
@@ -242,6 +253,28 @@ class Frozen:
         if scene.wants("cycle"):
             shown(lambda: self._cycle_path()[0].force.T)
 
+    def moved_pressure(self) -> float:
+        """How far shear with T = mu N would change the normal forces that are frozen.
+
+        Sum |df| / 2 N over the nodes kept in contact.
+
+        The tangential forces t open or close the contact by C_nt t; kept closed at the same load,
+        the normal forces change by df = -C_nn^-1 (C_nt t - d e), e'df = 0.
+        """
+        model, answer = self.solution.model, self.case.solution
+        on, total = np.flatnonzero(answer.contact), float(answer.force.sum())
+        t = self._spread(self._moved(self.compliance)[0]) @ self.unit
+        t = t * (self.friction * total / float(t.sum()))
+        opened = sum(
+            u * (model.compliance(NORMAL, c) @ t)
+            for c, u in zip(self.components, self.unit, strict=True)
+        )
+        factor = cho_factor(model.compliance(NORMAL)[np.ix_(on, on)])
+        e = cho_solve(factor, np.ones(len(on)))
+        df = -cho_solve(factor, opened[on])
+        df -= e * (df.sum() / e.sum())
+        return float(np.abs(df).sum() / (2.0 * answer.force.sum()))
+
     def _spread(self, values: Array) -> Array:
         """(n, 1 or 2) of values at the loaded nodes."""
         out = np.zeros((len(self.solution.model.gap), len(self.unit)))
@@ -249,19 +282,15 @@ class Frozen:
         return out
 
 
-class _Coupled:
+class _Coupled(_Shear):
     """Tangential loads along a direction with normal and tangential contact at once."""
 
-    def __init__(
-        self, solution: ContactSolution, case: NormalCase, direction: float, state: CoupledState
-    ) -> None:
-        scene = solution.plan.scene
-        self.solution, self.case, self.direction, self.state = solution, case, direction, state
-        self.unit = unit_vector(direction, slip_components(scene, direction))
-        self.friction = scene.contact.friction
-        self.total = self.friction * case.force
+    def __init__(self, solution: ContactSolution, case: NormalCase, direction: float) -> None:
+        super().__init__(solution, case, direction)
+        assert case.state is not None
+        self.state, self.total = case.state, self.friction * case.force
 
-    def stuck(self) -> tuple[float, dict[str, float], Array]:
+    def stuck(self) -> tuple[float, dict[str, float]]:
         """Secant of a small tangential load, of both bodies and of each on a rigid counterpart."""
 
         def secant(state: CoupledState) -> float:
@@ -270,74 +299,34 @@ class _Coupled:
 
         alone = {name: one.state for name, one in self.case.alone.items()}
         of = {name: secant(state) for name, state in alone.items() if state is not None}
-        return secant(self.state), of, np.zeros(len(self.state.force))
+        return secant(self.state), of
 
     def march(self, ratios: Array) -> March:
         """Shares of mu N one after the other."""
-        needed = max(self.solution.plan.scene.loads.tangential, default=0.0) * self.total
+        needed = max(self.loads.tangential, default=0.0) * self.total
         states, moved = sheared(self.state, ratios * self.total, self.unit, needed)
         load = np.insert(ratios[: len(states)] * self.total, 0, 0.0)
         return March(load, np.insert(moved, 0, 0.0), partial(self._at, states, moved))
 
     def _at(self, states: list[CoupledState], moved: Array, k: int, ratio: float) -> TangentialCase:
-        state, solution = states[k], self.solution
-        nodes, K = shear_nodes(solution.model, self.friction, state), state.shear_stiffness
+        state = states[k]
+        nodes = shear_nodes(self.solution.model, self.friction, state)
         slip = np.zeros((len(state.force), 2))
         slip[nodes.loaded] = state.found.slip[-1][nodes.loaded]
-        return TangentialCase(
-            self.case,
-            solution.sheared_case(self.case, self.direction, ratio),
-            ratio * self.friction * self.case.force,
-            float(moved[k]),
-            float(K[0, 0]) if solution.curved else _free_stiffness(K, self.unit),
-            state.force[:, 1:],
-            slip,
-            state.force[:, 0],
-            nodes,
-            state,
-        )
+        fields = state.force[:, 1:], slip
+        return self._found(ratio, float(moved[k]), state.shear_stiffness, fields, nodes, state)
 
     def cycle(self, case: Case) -> LoadPath:
         """The full cycle."""
-        loads = self.solution.plan.scene.loads
-        peak, steps = loads.cycle_amplitude * self.total, loads.cycle_steps
+        peak, steps = self.loads.cycle_amplitude * self.total, self.loads.cycle_steps
         return coupled_loop(
             case, self.case.case, self.state, peak=peak, steps=steps, unit=self.unit
         )
 
 
-def _free_stiffness(K: Array, unit: Array) -> float:
-    """Stiffness along the load with the motion across it free to follow; 0 where nothing holds."""
-    return 1.0 / float(unit @ np.linalg.pinv(K, hermitian=True) @ unit) if K.any() else 0.0
-
-
 def note_moved(run: ContactSolution, companion: ContactSolution) -> None:
     """Note in the run what shear would move of the companion's pressure, of flat faces."""
-    for stuck in () if run.curved else companion.stuck:
-        case = next(c for c in companion.normal if c.case == stuck.normal)
-        run.moved[stuck.case] = moved_by_shear(companion, case, stuck)
-
-
-def moved_by_shear(solution: ContactSolution, case: NormalCase, stuck: StuckContact) -> float:
-    """How far shear with T = mu N would change the normal forces that are frozen.
-
-    Sum |df| / 2 N over the nodes kept in contact.
-
-    The tangential forces t open or close the contact by C_nt t; kept closed at the same load, the
-    normal forces change by df = -C_nn^-1 (C_nt t - d e), e'df = 0.
-    """
-    scene, model, force = solution.plan.scene, solution.model, case.solution.force
-    components = slip_components(scene, stuck.direction)
-    unit = unit_vector(stuck.direction, components)
-    total = scene.contact.friction * float(force.sum())
-    on = np.flatnonzero(case.solution.contact)
-    t = stuck.nodal * (total / float(stuck.nodal.sum()))
-    opened = sum(
-        (u * (model.compliance(NORMAL, c) @ t) for c, u in zip(components, unit, strict=True)),
-        np.zeros(len(t)),
-    )[on]
-    factor = cho_factor(model.compliance(NORMAL)[np.ix_(on, on)])
-    e = cho_solve(factor, np.ones(len(on)))
-    df = -cho_solve(factor, opened)
-    df -= e * (df.sum() / e.sum())
-    return float(np.abs(df).sum() / (2.0 * force.sum()))
+    for case in () if run.curved else companion.normal:
+        for direction in companion.plan.scene.loads.directions:
+            way = Frozen(companion, case, direction)
+            run.moved[companion.sheared_case(case, direction)] = way.moved_pressure()
