@@ -295,10 +295,10 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 14942,
-    "hbm": 7323,
-    "contact": 4190,
-    "linalg": 3383,
+    "analyses": 14501,
+    "hbm": 7329,
+    "contact": 4197,
+    "linalg": 3387,
     "scene": 2337,
     "plot": 2220,
     "report": 2274,
@@ -309,19 +309,19 @@ ROOM_LINES = {
     "vary": 1429,
     "reference": 1181,
     "cli": 1013,
-    "measured": 947,
-    "reduction": 876,
+    "measured": 949,
+    "reduction": 879,
     "results": 921,
-    "fem": 854,
-    "matrices": 689,
-    "root": 603,
+    "fem": 856,
+    "matrices": 690,
+    "root": 625,
     "cache": 472,
-    "dynamics": 360,
+    "dynamics": 363,
     "scenes": 212,
     "manual": 175,
 }
 #: totals of upd/; pages of the manual's gallery are no modules
-MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 53177, 412, 3926, 494
+MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 52786, 408, 3912, 498
 #: parameters of a function and fields of a class, outside the solver rooms
 MOST_PARAMETERS, MOST_FIELDS, SOLVER_ROOMS = 11, 20, ("hbm", "contact", "linalg")
 
