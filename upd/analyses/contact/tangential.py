@@ -86,7 +86,7 @@ def solve_tangential(solution: ContactSolution, stages: Stages, *, companion: bo
                 _sheared(solution, case, direction, shares)
 
 
-class March(NamedTuple):
+class LoadedPath(NamedTuple):
     """Loads in N of the whole contact and displacements in mm along them, from zero on; and what
     the k-th load leaves, for a case with its ratio.
     """
@@ -186,11 +186,11 @@ class Frozen(_Shear):
                 of[body.name] = self._moved(C)[1]
         return self._moved(self.compliance)[1], of
 
-    def march(self, ratios: Array) -> March:
+    def march(self, ratios: Array) -> LoadedPath:
         """Shares of mu N one after the other."""
         loads = load_history(ratios * self.total, self.unit)
         path = tangential_path(self.compliance, self.limit, loads=loads)
-        return March(*along(path, self.unit, self.copies), partial(self._at, path))
+        return LoadedPath(*along(path, self.unit, self.copies), partial(self._at, path))
 
     def _at(self, path: TangentialPath, k: int, ratio: float) -> TangentialCase:
         before = path.slip[k - 1] if k else np.zeros(len(self.compliance))
@@ -301,12 +301,12 @@ class _Coupled(_Shear):
         of = {name: secant(state) for name, state in alone.items() if state is not None}
         return secant(self.state), of
 
-    def march(self, ratios: Array) -> March:
+    def march(self, ratios: Array) -> LoadedPath:
         """Shares of mu N one after the other."""
         needed = max(self.loads.tangential, default=0.0) * self.total
         states, moved = sheared(self.state, ratios * self.total, self.unit, needed)
         load = np.insert(ratios[: len(states)] * self.total, 0, 0.0)
-        return March(load, np.insert(moved, 0, 0.0), partial(self._at, states, moved))
+        return LoadedPath(load, np.insert(moved, 0, 0.0), partial(self._at, states, moved))
 
     def _at(self, states: list[CoupledState], moved: Array, k: int, ratio: float) -> TangentialCase:
         state = states[k]
