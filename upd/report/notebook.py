@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from upd.errors import ConvergenceError, InputError
+from upd.errors import ConvergenceError, InputError, did_you_mean
 from upd.report.answer import AnswerLine, Written, answer
 from upd.report.columns import text_width
 from upd.report.error_budget import run_charts
@@ -95,10 +95,13 @@ class RunResult:
                 label = f" of {row.case}" if row.case.label else ""
                 raise ConvergenceError(f"{name}{label} was not reached: {row.withheld}")
             return row.value
-        raise InputError(
-            f"no result {name!r} for case {case!r}; there are "
-            f"{sorted({r.name for r in self.results})}"
-        )
+        names = sorted({r.name for r in self.results})
+        if name in names:
+            cases = [str(r.case) for r in self.results if r.name == name]
+            near = did_you_mean(case, cases, f"there are {', '.join(map(repr, cases))}")
+            raise InputError(f"no result {name!r} for case {str(case)!r}{near}")
+        near = did_you_mean(name, names, f"there are {', '.join(names)}")
+        raise InputError(f"no result {name!r}{near}")
 
     def summary(self) -> dict[str, Any]:
         """The content of summary.json."""

@@ -141,6 +141,14 @@ def test_charts_are_those_of_the_run_folder(
     assert scene in repr(result)
 
 
+def test_a_name_or_case_that_is_nearly_right_is_named(sphere: RunResult) -> None:
+    with pytest.raises(InputError, match="no result 'max_presure', did you mean 'max_pressure'"):
+        sphere.value("max_presure")
+    with pytest.raises(InputError, match="for case 'F=201 N', did you mean 'F=200 N'"):
+        sphere.value("max_pressure", "F=201 N")
+    assert "maximum pressure" in sphere.table()
+
+
 def test_missing_xarray_is_told(sphere: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(InputError, match="pip install xarray"):
