@@ -21,6 +21,7 @@ from upd.hbm.core.newton import Settings
 from upd.hbm.core.path_step import State
 from upd.hbm.springs.damper import RigidDamper, contact_rows, rigid_damper
 from upd.hbm.springs.friction import Law
+from upd.hbm.springs.nonlinear_mode import NonlinearMode, nonlinear_mode
 from upd.hbm.springs.peak import Peak, climb
 from upd.hbm.springs.points import Contacts, contacts
 from upd.hbm.springs.response import FrequencyResponse, frequency_response
@@ -31,6 +32,7 @@ __all__ = [
     "FrequencyResponse",
     "Harmonics",
     "Law",
+    "NonlinearMode",
     "Path",
     "Peak",
     "RigidDamper",
@@ -43,6 +45,7 @@ __all__ = [
     "follow",
     "frequency_response",
     "harmonics",
+    "nonlinear_mode",
     "rigid_damper",
     "steady_state",
 ]

@@ -97,8 +97,8 @@ class RunResult:
             return row.value
         names = sorted({r.name for r in self.results})
         if name in names:
-            cases = [str(r.case) for r in self.results if r.name == name]
-            near = did_you_mean(case, cases, f"there are {', '.join(map(repr, cases))}")
+            known = [str(r.case) for r in self.results if r.name == name]
+            near = did_you_mean(case, known, f"there are {', '.join(map(repr, known))}")
             raise InputError(f"no result {name!r} for case {str(case)!r}{near}")
         near = did_you_mean(name, names, f"there are {', '.join(names)}")
         raise InputError(f"no result {name!r}{near}")

@@ -221,11 +221,12 @@ def test_a_disk_full_at_the_figures_leaves_the_numbers(
 
 
 @pytest.mark.parametrize("command", [["--help"], None])
-def test_help_and_readme_say_what_a_full_disk_is(
+def test_help_and_manual_say_what_a_full_disk_is(
     command: list[str] | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     if command is None:
-        text = (Path(upd.__file__).parents[1] / "README.md").read_text("utf-8")
+        manual = Path(upd.__file__).parent / "manual"
+        text = (manual / "reference" / "commands.md").read_text("utf-8")
     else:
         call(*command)
         text = re.sub("[^ -~]", " ", capsys.readouterr().out)

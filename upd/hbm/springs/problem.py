@@ -212,6 +212,11 @@ class CondensedProblem:
         return self._linear(omega, self._stiffness.ravel(), *self._stuck_rest)
 
     @property
+    def stuck_stiffness(self) -> FloatArray:
+        """Stiffness (c,) of the rows of closed points that stick [N/mm]."""
+        return self._stiffness.ravel()
+
+    @property
     def stuck_constant(self) -> FloatArray:
         """Force (n_point, 1 + d) of closed points that stick to given sliders, unmoved [N]."""
         given = self.slider if self.start in ("zero", "static") else None
@@ -355,6 +360,22 @@ class CondensedProblem:
             dynamic=dynamic * self.dynamic,
             loads=dynamic * self.loads,
         )
+
+    def shifted(self, xi: float) -> Self:
+        """The same problem with xi off its modal damping, C - xi M.
+
+        Parameters
+        ----------
+        xi : float
+            [1/s]
+
+        Returns
+        -------
+        CondensedProblem
+            Of the same kind.
+        """
+        off = xi if self.modal.proportional else xi * np.eye(len(self.modal.eigenvalues))
+        return self._changed(modal=replace(self.modal, damping=self.modal.damping - off))
 
     def with_sliders(self, start: Start, slider: FloatArray | None = None) -> Self:
         """The same problem with another start of the sliders.

@@ -1,0 +1,222 @@
+"""Damped nonlinear modes: the Jenkins element in closed form and by shooting, a public benchmark by
+shooting, forced peaks against harmonic balance, the Jacobian by differences.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from upd.errors import InputError
+from upd.hbm import NonlinearMode, contacts, frequency_response, nonlinear_mode
+from upd.hbm.core.fourier import harmonics
+from upd.hbm.springs.assembled import assembled
+from upd.hbm.springs.nonlinear_mode import ExtendedBalance, stuck_modes
+
+FloatArray = NDArray[np.float64]
+JENKINS: dict[str, Any] = {"k_n": 0.0, "k_t": 0.25, "mu": 1.0, "preload": 1.0}
+X_C = 4.0
+#: a/x_c -> omega, zeta by shooting of m = k = 1 (9 harmonics agree with it to 3e-7)
+EXACT = {
+    2.0: (1.0607723, 0.0353544),
+    5.0: (1.0175799, 0.0246503),
+    10.0: (1.0064451, 0.0141610),
+    20.0: (1.0023186, 0.0075299),
+    50.0: (1.0005931, 0.0031164),
+}
+
+
+def jenkins(amplitudes: Any, **options: Any) -> NonlinearMode:
+    points = contacts([[0.0]], [[1.0]], **JENKINS)
+    return nonlinear_mode(
+        [[1.0]], [[0.0]], [[1.0]], points, mode=1, amplitudes=amplitudes, **options
+    )
+
+
+def at(mode: NonlinearMode, amplitude: float) -> tuple[float, float]:
+    """omega and zeta at an amplitude that was asked for."""
+    k = int(np.argmin(np.abs(mode.amplitude / amplitude - 1.0)))
+    assert mode.amplitude[k] == pytest.approx(amplitude, rel=1e-9)
+    return float(2 * np.pi * mode.frequency[k]), float(mode.damping[k])
+
+
+def test_one_harmonic_is_the_closed_form() -> None:
+    """a1 = (k_t A/pi)(th - sin(2 th)/2), b1 = (4 mu N/pi)(1 - x_c/A), th = acos(1 - 2 x_c/A)."""
+    ratios = np.array([1.2, 2.0, 5.0, 20.0])
+    mode = jenkins(ratios * X_C, harmonics=(1,), samples=2**14)
+    assert mode.status == "complete"
+    for A in ratios * X_C:
+        th = np.arccos(1 - 2 * X_C / A)
+        stiffness = 1 + 0.25 / np.pi * (th - np.sin(2 * th) / 2)
+        omega = np.sqrt(stiffness)
+        zeta = 4 / np.pi * (1 - X_C / A) / A / (2 * omega**2)
+        found = at(mode, A)
+        assert found == pytest.approx((omega, zeta), rel=2e-7)
+
+
+def test_nine_harmonics_are_what_shooting_finds() -> None:
+    mode = jenkins(np.array([*EXACT]) * X_C, samples=2048)
+    for ratio, exact in EXACT.items():
+        omega, zeta = at(mode, ratio * X_C)
+        assert omega == pytest.approx(exact[0], rel=1e-6)
+        assert zeta == pytest.approx(exact[1], abs=1e-6)
+
+
+def test_the_largest_damping() -> None:
+    mode = jenkins(X_C * np.geomspace(2.0, 2.4, 9), samples=2048)
+    zeta, amplitude, _ = mode.largest_damping
+    assert zeta == pytest.approx(0.0355589, rel=1e-5)
+    assert amplitude / X_C == pytest.approx(2.1636, rel=5e-3)
+
+
+def test_below_first_slip_it_is_the_stuck_mode() -> None:
+    mode = jenkins([0.1, 1.0, 3.9])
+    np.testing.assert_allclose(2 * np.pi * mode.frequency, np.sqrt(1.25), rtol=1e-12)
+    assert np.abs(mode.damping).max() < 1e-12
+    assert (mode.state[:, 0, 0] == 1.0).all()
+
+
+def test_viscous_damping_adds() -> None:
+    points = contacts([[0.0]], [[1.0]], **JENKINS)
+    mode = nonlinear_mode(
+        [[1.0]], [[0.02]], [[1.0]], points, mode=1, amplitudes=[0.5, 1.0], harmonics=(1, 3)
+    )
+    np.testing.assert_allclose(mode.damping * 2 * (2 * np.pi * mode.frequency), 0.02, rtol=1e-9)
+
+
+# -- the public blade-damper-blade benchmark -------------------------------------------------------
+
+M = np.diag([1.0, 1, 1, 1, 0.1, 0.1])
+C = np.diag([20.0] * 4 + [0, 0])
+STATIC = [0, 0, 0, 0, 0, 120.0]
+FORCE = -1j * np.array([0, -20, 5, 0, 0, 0])
+Y2 = np.eye(6)[3]
+#: mode, start of the sliders -> log10 a -> Hz, damping in per cent, by shooting
+BENCHMARK = {
+    (3, "zero"): {-4.0: (222.9916, 2.1716), -3.8: (212.9318, 4.6632), -3.6: (207.1169, 4.1153)},
+    (3, "upper"): {-4.0: (224.9565, 0.9067), -3.8: (216.4494, 4.2933), -3.6: (208.6737, 4.4326)},
+    (2, "zero"): {-3.5: (161.9810, 0.9681), -3.3: (160.6857, 1.9013), -3.2: (157.9843, 2.0170)},
+}
+
+
+def benchmark(mode: int, amplitudes: Any, **options: Any) -> NonlinearMode:
+    """After N. N. Balaji, repository nonuniq: see tests/literature/test_hbm_blade_damper_blade."""
+    K = np.diag([3e5] * 4 + [0, 0])
+    for i, j, k in ((0, 1, 3e5), (2, 3, 3e5), (0, 2, 7e5), (1, 3, 7e5), (4, 5, 3e5)):
+        K[np.ix_([i, j], [i, j])] += k * np.array([[1, -1], [-1, 1]])
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    normal = [[s, -c, 0, 0, -s, c], [0, 0, -s, -c, s, c]]
+    tangent = [[[-c, -s, 0, 0, c, s], [0, 0, -c, s, c, -s]]]
+    points = contacts(normal, tangent, k_n=3e5, k_t=3e5, mu=0.5)
+    given = {"static_force": STATIC, "harmonics": range(10)} | options
+    return nonlinear_mode(M, C, K, points, mode=mode, amplitudes=amplitudes, **given)
+
+
+@pytest.mark.parametrize(("mode", "start"), [*BENCHMARK])
+def test_benchmark_is_what_shooting_finds(mode: int, start: str) -> None:
+    known = BENCHMARK[mode, start]
+    found = benchmark(mode, 10.0 ** np.array([*known]), start=start)
+    for log_a, (hertz, per_cent) in known.items():
+        omega, zeta = at(found, 10.0**log_a)
+        assert omega / (2 * np.pi) == pytest.approx(hertz, abs=0.01)
+        assert 100 * zeta == pytest.approx(per_cent, abs=2e-3)
+
+
+def test_forced_peaks_from_the_mode_and_the_linear_rest() -> None:
+    """Heights of harmonic balance at a quarter, half and all of the load: .06, .25, .71 % off."""
+    mode = benchmark(3, [1e-6, 1e-5, 10**-3.4])
+    assert mode.largest_damping[0] == pytest.approx(0.046802, rel=1e-3)
+    known = ((0.25, 4.3205e-5, 224.009), (0.5, 4.9856e-5, 222.024), (1.0, 6.0821e-5, 217.855))
+    for load, height, hertz in known:
+        f, found = mode.peak(load * FORCE, Y2)
+        assert found == pytest.approx(height, rel=0.0075)
+        assert f == pytest.approx(hertz, rel=1e-3)
+    with pytest.raises(InputError, match="beyond its amplitudes"):
+        benchmark(3, [1e-6, 1e-5]).peak(FORCE, Y2)
+
+
+def test_amplitude_turns_back_under_lift_off() -> None:
+    """Past 10^-3.203 the contacts open and the amplitude falls: arc length passes the turn."""
+    mode = benchmark(3, [1e-4, 10**-3.2])
+    assert mode.status == "complete"
+    assert (np.diff(mode.amplitude) < 0.0).any()
+    assert mode.state[-1, :, 2].min() > 0.5
+
+
+@pytest.mark.parametrize("amplitude", [0.5, 3.0, 12.0])
+@pytest.mark.parametrize("proportional", [True, False])
+def test_jacobian_by_differences(amplitude: float, proportional: bool) -> None:
+    """In stick, slip and with lift-off."""
+    one = np.diag([1.0, 2.0])
+    K = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    damping = 0.01 * K if proportional else np.diag([0.01, 0.05])
+    points = contacts(
+        [[0.0, 0.0], [0.5, 0.2]],
+        [[[1.0, 0.0], [0.3, -0.4]]],
+        k_n=[0.0, 0.2],
+        k_t=0.25,
+        mu=1.0,
+        preload=[1.0, 0.3],
+    )
+    static = np.array([0.1, 0.05])
+    b = assembled(one, damping, K, points, {}, static, samples=256, fast_exits=False)(
+        harmonics((0, 1, 2, 3))
+    )
+    stuck, number, omega = stuck_modes(b, 1)
+    extended = ExtendedBalance(b, stuck[:, number], omega)
+    p, rng, h = np.log(amplitude), np.random.default_rng(0), 1e-6
+    X = extended.guess(p)
+    X[:-2] += 0.1 * amplitude * rng.standard_normal(len(X) - 2)
+    X[-1] = 0.03
+    _, J, by_p = extended.function(X, p, True)
+    assert J is not None
+
+    def difference(step: FloatArray, dp: float = 0.0) -> FloatArray:
+        up, down = (extended.function(X + s * step, p + s * dp, False)[0] for s in (h, -h))
+        return (up - down) / (2 * h)
+
+    found = np.array([difference(e) for e in np.eye(len(X))]).T
+    np.testing.assert_allclose(J, found, atol=1e-7 * np.abs(J).max())
+    np.testing.assert_allclose(by_p, difference(np.zeros(len(X)), 1.0), atol=1e-8)
+
+
+def test_energy_of_the_friction_is_that_of_the_damping() -> None:
+    """What friction takes in a period is 2 pi zeta omega^2 a^2 where nothing else damps."""
+    mode = jenkins(X_C * np.array([1.5, 3.0]), samples=2048)
+    omega = 2 * np.pi * mode.frequency
+    # all of it in the fundamental: the others carry no extra damping but their own xi k omega
+    lost = 2 * np.pi * mode.damping * omega**2 * mode.amplitude**2
+    assert mode.energy[:, 0] == pytest.approx(lost, rel=2e-3, abs=1e-6)
+
+
+def test_peak_of_one_degree_of_freedom_is_that_of_harmonic_balance() -> None:
+    force = 0.8
+    mode = jenkins(X_C * np.geomspace(1.01, 30.0, 20), harmonics=(1,), samples=2048)
+    points = contacts([[0.0]], [[1.0]], **JENKINS)
+    omega = np.linspace(0.953, 1.151, 100)
+    answer = frequency_response(
+        [[1.0]], [[0.0]], [[1.0]], points, harmonic_force=[force], frequencies=omega / (2 * np.pi),
+        harmonics=(1,), samples=2048,
+    )  # fmt: skip
+    # the mode's damping force grows with the frequency, that of friction does not
+    assert mode.peak([force], [1.0])[1] == pytest.approx(answer.peak([1.0])[1], rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"amplitudes": [0.0, 1.0]}, "amplitudes must be"),
+        ({"amplitudes": [2.0, 1.0]}, "rising"),
+        ({"harmonics": (0, 2)}, "lack 1"),
+        ({"harmonics": (1, 3), "static_force": [1.0]}, "lack 0"),
+        ({"mode": 2}, "mode 2 is none; there are 1 to 1"),
+    ],
+)
+def test_faults(change: dict[str, Any], words: str) -> None:
+    points = contacts([[0.0]], [[1.0]], **JENKINS)
+    given = {"mode": 1, "amplitudes": [1.0, 2.0]} | change
+    with pytest.raises(InputError, match=words):
+        nonlinear_mode([[1.0]], [[0.0]], [[1.0]], points, **given)

@@ -1,0 +1,416 @@
+"""Damped nonlinear modes: frequency and damping of a mode over its amplitude.
+
+The motion of a mode is made periodic by taking its damping away (extended periodic motion concept):
+
+    M q'' + (C - xi M) q' + K q + B'f(w) = f_0,   xi = 2 zeta omega,
+
+with the amplitude |q_1|_M = a of the fundamental harmonic given. In mass-normalised modes the term
+is xi off the modal damping, so that the condensed balance serves as it is; omega and xi join its
+unknowns, amplitude and phase its equations. The path goes over log a by arc length.
+
+References
+----------
+M. Krack, Nonlinear modal analysis of nonconservative systems: extension of the periodic motion
+concept, Computers and Structures 154 (2015) 59.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+from scipy.linalg import eigh
+
+from upd.errors import InputError
+from upd.hbm.core.continuation import follow
+from upd.hbm.core.fourier import harmonics as harmonics_of
+from upd.hbm.core.newton import Settings, solve
+from upd.hbm.springs.assembled import assembled
+from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.checks import measures
+from upd.hbm.springs.damper import RigidDamper
+from upd.hbm.springs.friction import Start
+from upd.hbm.springs.points import Contacts
+from upd.hbm.springs.residuals import FREQUENCY_SHARE, scale_of
+from upd.hbm.springs.response import parabola
+from upd.labels import Shown
+from upd.linalg.parallel import threads_for
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+#: halvings of the first amplitude in search of one at which the mode is found
+HALVINGS = 40
+#: points of a forced response for each of the path
+FINE = 50
+
+
+@dataclass(frozen=True, repr=False)
+class NonlinearMode(Shown):
+    """Frequency and damping of a mode over its amplitude: n points along the path.
+
+    Attributes
+    ----------
+    amplitude : (n,) ndarray
+        a, the mass norm of the fundamental harmonic [t^(1/2) mm].
+    frequency : (n,) ndarray
+        [Hz]
+    damping : (n,) ndarray
+        Damping ratio zeta = xi / (2 omega), that of C included.
+    status : {"complete", "stopped", "step limit"}
+    message : str
+        Where and why the path ended.
+    state : (n, n_point, 3) ndarray
+        Shares of the cycle in stick, slip, lift-off.
+    energy : (n, n_point) ndarray
+        Energy lost per cycle [N mm].
+    fundamental : (n, m) ndarray of complex
+        Modal amplitudes of the fundamental harmonic.
+    x : (n, n_unknown) ndarray
+        Unknowns of the balance.
+    balance : Balance
+        The condensed problem, without dynamic loads.
+    stuck : (m, m) ndarray
+        Modes with all points closed and sticking, on the modes of the balance; rigid ones first.
+    number : int
+        Column of this mode in `stuck`.
+    """
+
+    amplitude: FloatArray
+    frequency: FloatArray
+    damping: FloatArray
+    status: str
+    message: str
+    state: FloatArray
+    energy: FloatArray
+    fundamental: ComplexArray
+    x: FloatArray
+    balance: Balance
+    stuck: FloatArray
+    number: int
+
+    def motion(self, row: ArrayLike) -> FloatArray:
+        """Amplitude (n,) [mm] of row @ q in the fundamental harmonic."""
+        return np.abs(self.fundamental @ self.balance.modal_row(row))
+
+    @property
+    def largest_damping(self) -> tuple[float, float, float]:
+        """Damping ratio, amplitude and frequency [Hz] where the damping is largest: the vertex of
+        the parabola through the highest point and its neighbours, over log a.
+        """
+        k, log_a = int(np.argmax(self.damping)), np.log(self.amplitude)
+        near = slice(max(k - 1, 0), k + 2)
+        at, zeta = parabola(log_a[near], self.damping[near])
+        order = np.argsort(log_a[near])
+        found = np.interp(at, log_a[near][order], self.frequency[near][order])
+        return zeta, float(np.exp(at)), float(found)
+
+    def response(self, force: ArrayLike, row: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Forced response near the resonance, from the mode and the other stuck modes.
+
+        With u = q_1 / a of the mode, (w0^2 - W^2 + 2 i zeta w0 W) A = u'f and |A| = a give both
+        frequencies W at which the mode has the amplitude a; the other modes are added as linear.
+
+        Parameters
+        ----------
+        force : (n_dof,) array_like of complex
+            Amplitude of the first harmonic [N].
+        row : (n_dof,) array_like
+            Weighs the displacements: row @ q.
+
+        Returns
+        -------
+        frequency : (k,) ndarray
+            [Hz], up one side of the resonance and down the other, half way to the next stuck
+            frequencies at most.
+        motion : (k,) ndarray
+            Amplitude of row @ q [mm].
+        """
+        f = np.asarray(np.asarray(force, complex) @ self.balance.modal.Phi, complex)
+        weights = self.balance.modal_row(row)
+        log_a = np.log(self.amplitude)
+        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff([log_a, 100 * self.damping])))])
+        fine = np.linspace(0.0, way[-1], FINE * len(way))
+        data = np.column_stack([log_a, 2.0 * np.pi * self.frequency, self.damping])
+        log_a, w0, zeta = CubicSpline(way, data)(fine).T if len(way) > 1 else data.T
+        shape = self.fundamental / self.amplitude[:, None]
+        u = CubicSpline(way, shape)(fine) if len(way) > 1 else shape
+        pushed, a = u.conj() @ f, np.exp(log_a)
+        middle = w0**2 * (1.0 - 2.0 * zeta**2)
+        inside = middle**2 - w0**4 + np.abs(pushed / a) ** 2
+        known = inside >= 0.0
+        squares = [middle - s * np.sqrt(np.where(known, inside, 0.0)) for s in (1.0, -1.0)]
+        found = []
+        low, high = self._band()
+        for square, order in zip(squares, (slice(None), slice(None, None, -1)), strict=True):
+            W = np.sqrt(np.maximum(square, 0.0))
+            A = pushed / (w0**2 - W**2 + 2j * zeta * w0 * W)
+            motion = np.abs((u @ weights) * A + self._rest(W, f, weights))
+            good = (known & (low < W) & (high > W))[order]
+            found.append((W[order][good] / (2.0 * np.pi), motion[order][good]))
+        (f1, m1), (f2, m2) = found
+        return np.concatenate([f1, f2]), np.concatenate([m1, m2])
+
+    def peak(self, force: ArrayLike, row: ArrayLike) -> tuple[float, float]:
+        """Frequency [Hz] and height [mm] of the forced peak; see `response`.
+
+        Raises InputError where the amplitudes of the mode do not reach the peak.
+        """
+        f, motion = self.response(force, row)
+        pushed = np.abs(self.fundamental.conj() @ (np.asarray(force) @ self.balance.modal.Phi))
+        w0 = 2.0 * np.pi * self.frequency
+        least = 2.0 * self.damping * w0**2 * self.amplitude**2
+        if not len(motion) or (pushed > least).all():
+            raise InputError(
+                "nonlinear mode: the forced peak lies beyond its amplitudes, "
+                f"{self.amplitude[0]:.3g} to {self.amplitude[-1]:.3g}; give others"
+            )
+        k = int(np.argmax(motion))
+        return float(f[k]), float(motion[k])
+
+    def _stuck_omega(self) -> FloatArray:
+        """Angular frequencies (m,) of the stuck modes [rad/s]."""
+        b = self.balance
+        K = np.diag(b.modal.eigenvalues) + (b.Psi.T * b.stuck_stiffness) @ b.Psi
+        squares = np.einsum("ij,ij->j", self.stuck, K @ self.stuck)
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+
+    def _band(self) -> tuple[float, float]:
+        """Angular frequencies half way to the neighbouring stuck modes."""
+        w, n = self._stuck_omega(), self.number
+        high = 0.5 * (w[n] + w[n + 1]) if n + 1 < len(w) else np.inf
+        return (0.5 * float(w[n] + w[n - 1]) if n else 0.0), float(high)
+
+    def _rest(self, W: FloatArray, f: ComplexArray, weights: FloatArray) -> ComplexArray:
+        """The other stuck modes under the force, linear, at W rad/s."""
+        b, others = self.balance, np.arange(len(self.stuck)) != self.number
+        shapes, values = self.stuck[:, others], self._stuck_omega()[others] ** 2
+        c = b.modal.damping
+        lost = np.einsum("ij,ij->j", shapes, c[:, None] * shapes if c.ndim == 1 else c @ shapes)
+        gain = (weights @ shapes) * (f @ shapes)
+        return np.asarray((gain / (values - W[:, None] ** 2 + 1j * W[:, None] * lost)).sum(axis=1))
+
+
+def nonlinear_mode(
+    M: ArrayLike,
+    C: ArrayLike,
+    K: ArrayLike,
+    contacts: Contacts,
+    *,
+    mode: int,
+    amplitudes: ArrayLike,
+    harmonics: Iterable[int] = range(10),
+    static_force: ArrayLike | None = None,
+    damper: RigidDamper | None = None,
+    damper_rows: FloatArray | None = None,
+    samples: int | None = None,
+    start: Start = "zero",
+    slider: FloatArray | None = None,
+    settings: Settings | None = None,
+) -> NonlinearMode:
+    """A mode of M q'' + C q' + K q = f_0 - B'f_c over its amplitude.
+
+    Parameters
+    ----------
+    M, C, K : (n, n) array_like
+        As in `upd.hbm.frequency_response`.
+    contacts : Contacts
+    mode : int
+        Number of the mode with all points closed and sticking, 1 the lowest with a frequency.
+    amplitudes : (k,) array_like
+        Rising, above 0 [t^(1/2) mm]: answered at these and between.
+    harmonics : iterable of int
+        With 1, and with 0 where static loads act. One harmonic does not do under lift-off.
+    static_force : (n,) array_like, optional
+        [N]
+    damper, damper_rows, samples, start, slider, settings
+        As in `upd.hbm.frequency_response`.
+
+    Returns
+    -------
+    NonlinearMode
+        A path that stops early is returned with its status.
+
+    Raises
+    ------
+    InputError
+        For bad input, and for a mode that is not found at a small amplitude.
+
+    Examples
+    --------
+    A mass on a spring with a Jenkins element, x_c = mu N / k_t = 4: the damping is largest near
+    twice that amplitude.
+
+    >>> import numpy as np
+    >>> from upd.hbm import contacts, nonlinear_mode
+    >>> jenkins = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=0.25, mu=1.0, preload=1.0)
+    >>> mode = nonlinear_mode(
+    ...     [[1.0]], [[0.0]], [[1.0]], jenkins, mode=1, amplitudes=[2.0, 8.0], harmonics=(1,)
+    ... )
+    >>> round(float(2 * np.pi * mode.frequency[-1]), 4), round(float(mode.damping[-1]), 4)
+    (1.0607, 0.0354)
+    """
+    K = np.asarray(K, dtype=float)
+    a, h = np.asarray(amplitudes, dtype=float).ravel(), harmonics_of(harmonics)
+    static = np.zeros(len(K)) if static_force is None else np.asarray(static_force, dtype=float)
+    problems = []
+    if not (len(a) and np.isfinite(a).all() and (a > 0.0).all() and (np.diff(a) > 0.0).all()):
+        problems.append("amplitudes must be finite, above 0 and rising")
+    if 1 not in h.numbers:
+        problems.append(f"harmonics {h.numbers} lack 1, the mode's own")
+    if static.any() and not h.static:
+        problems.append(f"static_force would have no effect: harmonics {h.numbers} lack 0")
+    if (contacts.law.preload < 0.0).any():
+        problems.append("a preload is negative")
+    if problems:
+        raise InputError(f"nonlinear_mode: {'; '.join(problems)}")
+    b = assembled(
+        np.asarray(M, dtype=float),
+        np.asarray(C, dtype=float),
+        K,
+        contacts,
+        {},
+        static,
+        joined_to=None if damper is None or damper_rows is None else (damper, damper_rows),
+        samples=samples,
+        start=start,
+        slider=slider,
+        fast_exits=False,
+    )(h)
+    with threads_for(b.size):
+        return _along(b, mode, np.log(a), settings or Settings())
+
+
+def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearMode:
+    stuck, number, omega = stuck_modes(b, mode)
+    shape = stuck[:, number]
+    of = ExtendedBalance(b, shape, omega)
+    begin = wanted[0]
+    for _ in range(HALVINGS):
+        first = solve(of.function, of.guess(begin), begin, of.scale, s)
+        if first.tangent is not None:
+            break
+        begin -= np.log(2.0)
+    else:
+        raise InputError(
+            f"nonlinear_mode: mode {mode} near {omega / (2.0 * np.pi):.6g} Hz is not found at any "
+            f"amplitude below {np.exp(wanted[0]):.3g}: do the contacts carry a load at rest?"
+        )
+    end = float(wanted[-1])
+    if begin == end:
+        xs, ps, status, message = first.x[None], np.array([begin]), "complete", "one amplitude"
+    else:
+        path = follow(
+            of.function,
+            (first.x, float(begin)),
+            end,
+            scale=of.scale,
+            p_scale=1.0,
+            wanted=wanted,
+            settings=s,
+        )
+        xs, ps, status, message = path.x, path.p, path.status, path.message
+    kept = ps >= wanted[0]
+    xs, ps = xs[kept], ps[kept]
+    x, omegas, xi = xs[:, :-2], xs[:, -2], xs[:, -1]
+    found = measures(b, omegas / (2.0 * np.pi), x)
+    eta = np.array([of.fundamental(one) for one in xs]).reshape(len(xs), len(shape))
+    return NonlinearMode(
+        amplitude=np.exp(ps),
+        frequency=omegas / (2.0 * np.pi),
+        damping=xi / (2.0 * omegas),
+        status=status,
+        message=message,
+        state=found.state,
+        energy=found.energy,
+        fundamental=eta,
+        x=x,
+        balance=b,
+        stuck=stuck,
+        number=number,
+    )
+
+
+def stuck_modes(b: Balance, mode: int) -> tuple[FloatArray, int, float]:
+    """Modes with all points sticking, on those of the balance; the wanted one and its omega."""
+    K = np.diag(b.modal.eigenvalues) + (b.Psi.T * b.stuck_stiffness) @ b.Psi
+    values, shapes = eigh(K)
+    elastic = np.flatnonzero(values > len(values) * np.finfo(float).eps * values[-1])
+    if not 1 <= mode <= len(elastic):
+        raise InputError(f"nonlinear_mode: mode {mode} is none; there are 1 to {len(elastic)}")
+    number = int(elastic[mode - 1])
+    return shapes, number, float(np.sqrt(values[number]))
+
+
+class ExtendedBalance:
+    """The balance with omega and xi as unknowns, amplitude and phase as equations, over log a."""
+
+    def __init__(self, b: Balance, shape: FloatArray, omega: float) -> None:
+        self.b, self.shape, self.omega = b, shape, omega
+        self._sizes = scale_of(b)
+        c = b.modal.damping
+        self.xi = float(shape @ (c * shape if b.modal.proportional else c @ shape))
+
+    def guess(self, p: float) -> FloatArray:
+        """The stuck mode at log a = p, beside the mean motion of points that stick."""
+        x, o, c = self.b.stuck(self.omega), self.b.harmonics.offset, len(self.b.Psi)
+        W = x[: c * self.b.harmonics.size].reshape(c, -1)
+        W[:, o:] = 0.0
+        W[:, o] = np.exp(p) * (self.b.Psi @ self.shape)
+        return np.concatenate([x, [self.omega, self.xi]])
+
+    def scale(self, X: FloatArray) -> FloatArray:
+        """Sizes of the unknowns."""
+        unit = FREQUENCY_SHARE * self.omega
+        return np.concatenate([self._sizes(X[:-2]), [unit, unit]])
+
+    def fundamental(self, X: FloatArray) -> ComplexArray:
+        """Modal amplitudes (m,) of the first harmonic."""
+        b, o = self.b.shifted(float(X[-1])), self.b.harmonics.offset
+        F = b.force(X[:-2]).force.reshape(len(b.Psi), -1)
+        pushed = np.asarray(-(F[:, o] - 1j * F[:, o + 1])[None] @ b.Psi, dtype=complex)
+        return np.asarray(b.modal.solve(X[-2:-1], pushed)[0])
+
+    def function(
+        self, X: FloatArray, p: float, jacobian: bool
+    ) -> tuple[FloatArray, FloatArray | None, FloatArray]:
+        """Residual, Jacobian and derivative by log a, as the continuation takes them."""
+        omega, b, a = float(X[-2]), self.b.shifted(float(X[-1])), float(np.exp(p))
+        found = b.evaluate(X[:-2], omega, jacobian)
+        c, o = len(b.Psi), b.harmonics.offset
+        w = np.asarray(b.harmonics.dynamic * omega, dtype=float)
+        F = found.contact.force.reshape(c, -1)
+        pushed = np.asarray(-(F[:, o::2] - 1j * F[:, o + 1 :: 2]).T @ b.Psi, dtype=complex)
+        all_eta = b.modal.solve(w, pushed)
+        eta, one = all_eta[0], w[:1]
+        energy, phase = float((eta.conj() @ eta).real), float((self.shape @ eta).imag) / a
+        amplitude = 0.5 * np.log(energy) - p if energy > 0.0 else -np.inf
+        residual = np.concatenate([found.residual, [amplitude, phase]])
+        by_p = np.zeros(len(residual))
+        by_p[-2:] = -1.0, -phase
+        if not jacobian:
+            return residual, None, by_p
+        n, DF = len(found.residual), found.contact.jacobian
+        assert DF is not None and found.jacobian is not None
+        J = np.zeros((n + 2, n + 2))
+        J[:n, :n], J[:n, n] = found.jacobian, found.by_frequency
+        # xi acts on each harmonic as i k omega eta_k, a force
+        moved = b.modal.solve(w, -1j * w[:, None] * all_eta) @ b.Psi.T
+        by_xi = np.zeros((c, b.harmonics.size))
+        by_xi[:, o::2], by_xi[:, o + 1 :: 2] = moved.real.T, -moved.imag.T
+        J[: by_xi.size, n + 1] = by_xi.ravel()
+        damping = b.modal.damping
+        lost = damping * eta if b.modal.proportional else damping @ eta
+        slopes = b.modal.solve(one, np.array([2.0 * omega * eta - 1j * lost]))[0]
+        by_shift = b.modal.solve(one, np.array([1j * omega * eta]))[0]
+        for row, weights, part in ((n, eta.conj() / energy, 1.0), (n + 1, self.shape / a, -1j)):
+            y = part * (b.modal.solve(one, weights[None].astype(complex))[0] @ b.Psi.T)
+            V = np.zeros((c, b.harmonics.size))
+            V[:, o], V[:, o + 1] = -y.real, -y.imag
+            by_w = np.einsum("pcs,pcsdt->pdt", V.reshape(DF.shape[:3]), DF)
+            J[row, : V.size] = by_w.ravel()
+            J[row, n] = (part * (weights @ slopes)).real
+            J[row, n + 1] = (part * (weights @ by_shift)).real
+        return residual, J, by_p
