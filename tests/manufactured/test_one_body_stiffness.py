@@ -115,7 +115,7 @@ def in_the_mean(mesh: Mesh, mirror: dict[str, tuple[int, ...]]) -> np.ndarray:
 def test_body_alone_by_its_own_finite_elements(scene: str) -> None:
     solution = solved(scene)
     (case,), copies = solution.normal, solution.plan.copies
-    results = {s.direction: s.of for s in solution.stuck}
+    results = {way: of for case in solution.normal for way, (_, of) in case.stuck.items()}
     for body in (solution.model.upper, solution.model.lower):
         alone = case.alone[body.name].solution
         family = {c: dict(f.mirror) for f in solution.plan.families for c in f.components}

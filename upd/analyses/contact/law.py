@@ -26,8 +26,8 @@ def contact_law(solution: ContactSolution, case: NormalCase) -> ContactLaw | Non
 
     def sheared(direction: float) -> float:
         """Of the model, N/mm."""
-        ways = [s for s in solution.stuck_under(case.case) if s.direction % 180.0 == direction]
-        totals = [s.total if both else s.of[upper] for s in ways]
+        ways = [stuck for d, stuck in case.stuck.items() if d % 180.0 == direction]
+        totals = [total if both else of[upper] for total, of in ways]
         return totals[0] / solution.plan.copies if totals else 0.0
 
     # Shared out like the pressure, which pushes everywhere; stiffness fields may pull at single

@@ -293,13 +293,13 @@ def _stiffness(solution: ContactSolution, case: NormalCase) -> list[Result]:
             _beside(q.K_N_TANGENT, K_N, at, tangent_of, _HERTZ),
             _beside(q.K_N_SECANT, K_N_secant, at, secant_of, _HERTZ),
         ]
-    stuck = next(iter(solution.stuck_under(at)), None)
+    stuck = next((total for total, _ in case.stuck.values()), None)
     if stuck is None or hertz is None:
         return out
     closed = mindlin.initial_tangential_stiffness(hertz.radius, shear_compliance(solution))
-    out.append(q.K_T_INITIAL_RAW.of(stuck.total, at, closed, _MINDLIN))
+    out.append(q.K_T_INITIAL_RAW.of(stuck, at, closed, _MINDLIN))
     if case.shear_shares:
-        K_T = without_body(stuck.total, case.finite_body_shear)
+        K_T = without_body(stuck, case.finite_body_shear)
         ratio = closed / hertz.tangent_stiffness
         out += [
             q.K_T_INITIAL.of(K_T, at, closed, _MINDLIN),
@@ -334,11 +334,11 @@ def _stiffness_of_faces(solution: ContactSolution, case: NormalCase) -> list[Res
         ),
     ]
     pads = [q.K_N_PER_PAD.of(case.force / (case.approach - touch) / n, at)]
-    for stuck in solution.stuck_under(at):
-        way = direction_name(stuck.direction)
-        out.append(q.K_T_ALL_STUCK.of(stuck.total, at, n=way))
-        out += [q.K_T_ALONE.of(value, at, n=f"{way}_{body}") for body, value in stuck.of.items()]
-        pads.append(q.K_T_PER_PAD.of(stuck.total / n, at, n=way))
+    for direction, (total, of) in case.stuck.items():
+        way = direction_name(direction)
+        out.append(q.K_T_ALL_STUCK.of(total, at, n=way))
+        out += [q.K_T_ALONE.of(value, at, n=f"{way}_{body}") for body, value in of.items()]
+        pads.append(q.K_T_PER_PAD.of(total / n, at, n=way))
     return out + pads if n > 1 else out
 
 

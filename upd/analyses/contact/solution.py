@@ -6,7 +6,6 @@ the whole, which loads and stiffnesses are those of. `faces` has the fields on t
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -61,6 +60,10 @@ class NormalCase(PressedContact):
     alone
         By body: its answer at the same load, pressed by a rigid counterpart, where a stiffness
         calls for it.
+    stuck
+        By direction in degrees: tangential stiffness in N/mm of the contact set stuck, and that of
+        each body stuck to a rigid counterpart, by its own contact set; with normal and tangential
+        contact at once of a small load in that direction.
     displacement, reaction
         By body: (n_node, 3) mm, N on its distant set.
     compression
@@ -75,6 +78,7 @@ class NormalCase(PressedContact):
     load: DamperLoad
     measures: ContactMeasures
     alone: dict[str, PressedContact] = field(default_factory=dict)
+    stuck: dict[float, tuple[float, dict[str, float]]] = field(default_factory=dict)
     displacement: dict[str, Array] = field(default_factory=dict)
     reaction: dict[str, float] = field(default_factory=dict)
     compression: dict[str, float] = field(default_factory=dict)
@@ -106,28 +110,6 @@ class NormalCase(PressedContact):
     def finite_body_shear(self) -> float:
         """What the finite bodies add to the tangential displacement, mm per N."""
         return sum(s.finite_body for s in self.shear_shares.values())
-
-
-@dataclass(frozen=True)
-class StuckContact:
-    """Every node of the contact set stuck under one normal load, moved along ``direction`` in
-    degrees; with normal and tangential contact at once a small load in that direction.
-
-    Attributes
-    ----------
-    case
-        Normal load and, of flat faces, direction.
-    total
-        Tangential stiffness in N/mm.
-    of
-        That of each body stuck to a rigid counterpart, by its own contact set.
-    """
-
-    normal: Case
-    case: Case
-    direction: float
-    total: float
-    of: dict[str, float]
 
 
 @dataclass
@@ -170,8 +152,6 @@ class ContactSolution:
     ----------
     curve
         Loaded points of the force-approach curve.
-    stuck
-        By normal load and direction.
     paths
         Tangential force over displacement, cycles among them.
     moved
@@ -188,7 +168,6 @@ class ContactSolution:
     model: ContactModel
     normal: list[NormalCase] = field(default_factory=list)
     curve: list[NormalCase] = field(default_factory=list)
-    stuck: list[StuckContact] = field(default_factory=list)
     tangential: list[TangentialCase] = field(default_factory=list)
     paths: list[LoadPath] = field(default_factory=list)
     moved: dict[Case, float] = field(default_factory=dict)
@@ -213,7 +192,3 @@ class ContactSolution:
         """A normal load with a tangential one; a curved contact has one direction."""
         name = "" if self.curved else direction_name(direction)
         return replace(normal.case, direction=name, ratio=ratio)
-
-    def stuck_under(self, case: Case) -> Iterable[StuckContact]:
-        """Of a normal load, direction by direction."""
-        return (s for s in self.stuck if s.normal == case)

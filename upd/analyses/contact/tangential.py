@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +32,6 @@ from upd.analyses.contact.plan import NORMAL, ContactPlan, slip_components, unit
 from upd.analyses.contact.solution import (
     ContactSolution,
     NormalCase,
-    StuckContact,
     TangentialCase,
 )
 from upd.contact.products import KNOWN, KNOWN_STIFFNESS, settled
@@ -43,6 +41,9 @@ from upd.progress import Stages
 from upd.results import Case
 
 Array = NDArray[np.float64]
+#: loads in N of the whole contact and displacements in mm along them, from zero on; what the k-th
+#: load leaves, for a case with its ratio
+Marched = tuple[Array, Array, Callable[[int, float], TangentialCase]]
 
 #: Shares of mu N of the force-displacement curve: even steps, then closer to gross slip.
 PATH_SHARES = np.concatenate(
@@ -86,49 +87,45 @@ def solve_tangential(solution: ContactSolution, stages: Stages, *, companion: bo
                 _sheared(solution, case, direction, shares)
 
 
-class LoadedPath(NamedTuple):
-    """Loads in N of the whole contact and displacements in mm along them, from zero on; and what
-    the k-th load leaves, for a case with its ratio.
-    """
-
-    load: Array
-    displacement: Array
-    at: Callable[[int, float], TangentialCase]
-
-
 def _sheared(solution: ContactSolution, case: NormalCase, direction: float, shares: Array) -> None:
     """Stiffness, single loads, curve and cycle of one direction after one normal load."""
     scene, own = solution.plan.scene, solution.sheared_case(case, direction)
     way = (Frozen if case.state is None else _Coupled)(solution, case, direction)
     # Flat faces share their law by the stuck contact.
     if not solution.curved or scene.wants("stiffness"):
-        solution.stuck.append(StuckContact(case.case, own, direction, *way.stuck()))
+        case.stuck[direction] = way.stuck()
     loads = scene.loads.tangential if scene.wants("tangential") else ()
     # Each load of a curved contact with frozen forces alone, all others on one way.
     marches = [np.array([ratio]) for ratio in loads]
     if scene.wants("tangential") and not (solution.curved and case.state is None):
         marches = [np.unique(np.concatenate([shares, loads]))]
     for ratios in marches:
-        march = way.march(ratios)
+        load, moved, at = way.march(ratios)
         if not solution.curved:
-            solution.paths.append(LoadPath(own, case.case, march.load, march.displacement))
+            solution.paths.append(LoadPath(own, case.case, load, moved))
         for ratio in (r for r in loads if r in ratios):
-            solution.tangential.append(march.at(int(np.searchsorted(ratios, ratio)), ratio))
+            solution.tangential.append(at(int(np.searchsorted(ratios, ratio)), ratio))
     if scene.wants("cycle"):
         amplitude = scene.loads.cycle_amplitude if solution.curved else None
         solution.paths.append(way.cycle(solution.sheared_case(case, direction, amplitude)))
 
 
-class _Shear:
-    """Tangential loads along a direction after a normal one."""
+class Frozen:
+    """Tangential loads along a direction that leave the normal forces as they are."""
 
     def __init__(self, solution: ContactSolution, case: NormalCase, direction: float) -> None:
-        scene = solution.plan.scene
+        scene, force = solution.plan.scene, case.solution.force
         self.solution, self.case, self.direction = solution, case, direction
         self.components = slip_components(scene, direction)
         self.unit = unit_vector(direction, self.components)
         self.friction, self.loads = scene.contact.friction, scene.loads
         self.copies = solution.plan.copies
+        self.loaded = np.flatnonzero(force > 0.0)
+        self.limit = self.friction * force[self.loaded]
+        #: mu N on the model
+        self.total = float(self.limit.sum())
+        if solution.curved:
+            self.total = self.friction * case.force / self.copies
 
     def _found(
         self,
@@ -151,20 +148,6 @@ class _Shear:
             self.case, case, load, displacement, self.copies * tangent, *fields, nodes, state
         )
 
-
-class Frozen(_Shear):
-    """Tangential loads along a direction that leave the normal forces as they are."""
-
-    def __init__(self, solution: ContactSolution, case: NormalCase, direction: float) -> None:
-        super().__init__(solution, case, direction)
-        force = case.solution.force
-        self.loaded = np.flatnonzero(force > 0.0)
-        self.limit = self.friction * force[self.loaded]
-        #: mu N on the model
-        self.total = float(self.limit.sum())
-        if solution.curved:
-            self.total = self.friction * case.force / self.copies
-
     @property
     def compliance(self) -> Array:
         """Of the loaded nodes; it changes while bodies learn."""
@@ -186,11 +169,11 @@ class Frozen(_Shear):
                 of[body.name] = self._moved(C)[1]
         return self._moved(self.compliance)[1], of
 
-    def march(self, ratios: Array) -> LoadedPath:
+    def march(self, ratios: Array) -> Marched:
         """Shares of mu N one after the other."""
         loads = load_history(ratios * self.total, self.unit)
         path = tangential_path(self.compliance, self.limit, loads=loads)
-        return LoadedPath(*along(path, self.unit, self.copies), partial(self._at, path))
+        return *along(path, self.unit, self.copies), partial(self._at, path)
 
     def _at(self, path: TangentialPath, k: int, ratio: float) -> TangentialCase:
         before = path.slip[k - 1] if k else np.zeros(len(self.compliance))
@@ -282,8 +265,8 @@ class Frozen(_Shear):
         return out
 
 
-class _Coupled(_Shear):
-    """Tangential loads along a direction with normal and tangential contact at once."""
+class _Coupled(Frozen):
+    """The same with normal and tangential contact at once: the pressure follows the shear."""
 
     def __init__(self, solution: ContactSolution, case: NormalCase, direction: float) -> None:
         super().__init__(solution, case, direction)
@@ -301,14 +284,14 @@ class _Coupled(_Shear):
         of = {name: secant(state) for name, state in alone.items() if state is not None}
         return secant(self.state), of
 
-    def march(self, ratios: Array) -> LoadedPath:
+    def march(self, ratios: Array) -> Marched:
         """Shares of mu N one after the other."""
         needed = max(self.loads.tangential, default=0.0) * self.total
         states, moved = sheared(self.state, ratios * self.total, self.unit, needed)
         load = np.insert(ratios[: len(states)] * self.total, 0, 0.0)
-        return LoadedPath(load, np.insert(moved, 0, 0.0), partial(self._at, states, moved))
+        return load, np.insert(moved, 0, 0.0), partial(self._to, states, moved)
 
-    def _at(self, states: list[CoupledState], moved: Array, k: int, ratio: float) -> TangentialCase:
+    def _to(self, states: list[CoupledState], moved: Array, k: int, ratio: float) -> TangentialCase:
         state = states[k]
         nodes = shear_nodes(self.solution.model, self.friction, state)
         slip = np.zeros((len(state.force), 2))
@@ -316,8 +299,9 @@ class _Coupled(_Shear):
         fields = state.force[:, 1:], slip
         return self._found(ratio, float(moved[k]), state.shear_stiffness, fields, nodes, state)
 
-    def cycle(self, case: Case) -> LoadPath:
-        """The full cycle."""
+    def cycle(self, case: Case, history: TangentialHistory | None = None) -> LoadPath:
+        """The full cycle; friction remembers the normal load."""
+        del history
         peak, steps = self.loads.cycle_amplitude * self.total, self.loads.cycle_steps
         return coupled_loop(
             case, self.case.case, self.state, peak=peak, steps=steps, unit=self.unit
