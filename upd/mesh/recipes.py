@@ -96,7 +96,7 @@ LEAST_JACOBIAN = 0.1
 
 
 # Meshes of users' recipes that no folder keeps, so that a plan does not run these once more for
-# each question; a run also has that of the coarser companion.
+# each question: that of the plan and that of its coarser companion.
 _not_kept: dict[str, dict[str, Mesh]] = {}
 _MOST_NOT_KEPT = 2
 

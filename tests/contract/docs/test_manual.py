@@ -12,7 +12,7 @@ MANUAL = Path(__file__).resolve().parents[3] / "upd" / "manual"
 GALLERY = sorted((MANUAL / "gallery").glob("plot_*.py"))
 
 
-@pytest.mark.parametrize("name", ["plot_01_hertz", "plot_05_statics", "plot_10_sweep"])
+@pytest.mark.parametrize("name", ["plot_05_statics", "plot_09_own_matrices", "plot_10_sweep"])
 def test_a_page_of_the_gallery_runs_as_a_notebook(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
