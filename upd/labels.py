@@ -104,7 +104,7 @@ def _shown_field(value: Any) -> str:
     if shape is None:
         return type(value).__name__
     if not shape or 0 in shape or not hasattr(value, "ravel"):
-        return f"{shape}" if shape else f"{value:.6g}"
+        return str(shape or value)
     flat = abs(value.ravel()) if value.dtype.kind == "c" else value.ravel()
     return (
         f"{shape} {flat.min():.4g} to {flat.max():.4g}" if flat.dtype.kind in "fiu" else f"{shape}"

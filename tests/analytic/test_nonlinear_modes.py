@@ -165,8 +165,8 @@ def test_jacobian_by_differences(amplitude: float, proportional: bool) -> None:
     b = assembled(one, damping, K, points, {}, static, samples=256, fast_exits=False)(
         harmonics((0, 1, 2, 3))
     )
-    stuck, number, omega = stuck_modes(b, 1)
-    extended = ExtendedBalance(b, stuck[:, number], omega)
+    stuck, omegas, number = stuck_modes(b, 1)
+    extended = ExtendedBalance(b, stuck[:, number], float(omegas[number]))
     p, rng, h = np.log(amplitude), np.random.default_rng(0), 1e-6
     X = extended.guess(p)
     X[:-2] += 0.1 * amplitude * rng.standard_normal(len(X) - 2)
@@ -211,7 +211,10 @@ def test_peak_of_one_degree_of_freedom_is_that_of_harmonic_balance() -> None:
         ({"amplitudes": [0.0, 1.0]}, "amplitudes must be"),
         ({"amplitudes": [2.0, 1.0]}, "rising"),
         ({"harmonics": (0, 2)}, "lack 1"),
-        ({"harmonics": (1, 3), "static_force": [1.0]}, "lack 0"),
+        ({"harmonics": (1, 3), "static_force": [1.0]}, "would have no effect"),
+        ({"slider": [0.1, 0.2]}, "every point along every tangent"),
+        ({"static_force": [1.0, 2.0]}, "static_force has shape"),
+        ({"damper_rows": np.zeros((1, 2, 6))}, "come together"),
         ({"mode": 2}, "mode 2 is none; there are 1 to 1"),
     ],
 )

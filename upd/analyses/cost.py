@@ -2,7 +2,8 @@
 
 Every piece is work that can be counted before it is done (entries and operations of a factor, right
 sides, dense algebra, Newton steps times points) over the rates of a usual machine
-(`upd.linalg.rates`). The work of a piece was counted or timed on the ready scenes with one thread.
+(`upd.linalg.select.Rates`). The work of a piece was counted or timed on the ready scenes with one
+thread.
 """
 
 from __future__ import annotations
@@ -11,9 +12,8 @@ from dataclasses import dataclass, field
 
 from upd.errors import InputError
 from upd.linalg import select
-from upd.linalg.rates import USUAL
 from upd.linalg.routes import Route, choose_route, contact_routes
-from upd.linalg.select import Prediction, Solid
+from upd.linalg.select import USUAL, Prediction, Solid
 from upd.scene import AnyScene
 
 #: element -> nodes per hexahedron

@@ -410,7 +410,7 @@ class Coulomb(CoulombConditions):
                 motion=None if step.motion is None else step.motion[moved] * size[moved],
                 state=state,
             )
-        except (ConvergenceError, RuntimeError):
+        except ConvergenceError:
             # nothing carries the load, or the least squares ran out of steps
             return self._judged(step, self._linear(step, self._stuck()), used)
         s = s.copy() if step.motion is None else step.motion

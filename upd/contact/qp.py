@@ -426,7 +426,8 @@ class BoxQP:
             Z = null_space(self.B.T, rcond=HALF_THE_DIGITS)
         if not Z.size:
             return np.full(n, FREE, dtype=np.int8), np.zeros(r)
-        L = np.linalg.cholesky(self.C)
+        self._prepare(np.ones(n, dtype=bool))
+        L = np.tril(self._factor)
         N, R = qr(L.T @ Z, mode="economic")
         G = solve_triangular(R, Z.T, trans=1).T
         x1 = x0 - G @ (N.T @ (L.T @ x0 + solve_triangular(L, h, lower=True)))
@@ -440,14 +441,12 @@ class BoxQP:
                 f"contact QP with {n} nodes: no forces inside the bounds have the load {box.load}."
             )
         y, u = found[0] / size, found[1] / size**2
-        state = np.full(n, FREE, dtype=np.int8)
-        count = int(below.sum())
-        state[np.flatnonzero(below)[u[:count] > 0]] = LOWER
-        state[np.flatnonzero(above)[u[count:] > 0]] = UPPER
-        if box.motion is not None:
-            return state, box.motion
-        g = np.zeros(n)
+        g, count = np.zeros(n), int(below.sum())
         g[below] += u[:count]
         g[above] -= u[count:]
+        # residuals press against the bounds: LOWER where above zero, UPPER where below
+        state = -np.sign(g).astype(np.int8)
+        if box.motion is not None:
+            return state, box.motion
         x = x1 + G @ y
         return state, np.asarray(lstsq(self.B, box.h + self.product(x) - g)[0])

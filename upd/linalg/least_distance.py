@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.optimize import nnls
 
+from upd.errors import ConvergenceError
+
 FloatArray = NDArray[np.float64]
 _DIGITS = float(np.sqrt(np.finfo(float).eps))
 
@@ -35,8 +37,8 @@ def least_distance(G: FloatArray, h: FloatArray) -> tuple[FloatArray, FloatArray
 
     Raises
     ------
-    RuntimeError
-        When the least squares do not end in the steps scipy allows.
+    ConvergenceError
+        When the least squares do not end in the steps they are allowed.
 
     Examples
     --------
@@ -53,7 +55,10 @@ def least_distance(G: FloatArray, h: FloatArray) -> tuple[FloatArray, FloatArray
         return np.zeros(G.shape[1]), np.zeros(len(h))
     E = np.vstack((G.T, h / size))
     e = np.eye(len(E))[-1]
-    u = nnls(E, e, maxiter=30 * (len(h) + 10))[0]
+    try:
+        u = nnls(E, e, maxiter=30 * (len(h) + 10))[0]
+    except RuntimeError as problem:
+        raise ConvergenceError(f"the least distance problem found no answer ({problem})") from None
     r = E @ u - e
     if np.linalg.norm(r) <= _DIGITS:
         return None
@@ -75,8 +80,7 @@ def least_positive(A: FloatArray, b: FloatArray) -> FloatArray | None:
     -------
     (n,) ndarray or None
     """
-    x0 = np.asarray(np.linalg.lstsq(A, b, rcond=_DIGITS)[0], np.float64)
-    Z = null_space(A, rcond=_DIGITS)
-    found = least_distance(Z, -x0)
+    x0, Z = np.linalg.lstsq(A, b, rcond=_DIGITS)[0], null_space(A, rcond=_DIGITS)
+    found = least_distance(Z, np.asarray(-x0, np.float64))
     # what rounding leaves below zero
     return None if found is None else np.asarray(np.maximum(x0 + Z @ found[0], 0.0))

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from upd.errors import InputError
-from upd.linalg.rates import USUAL
 from upd.linalg.select import (
     PRODUCTS,
+    USUAL,
     Choice,
     Prediction,
     Solid,

@@ -15,7 +15,6 @@ import scipy
 
 from upd.errors import InputError
 from upd.linalg.common import EPS
-from upd.linalg.rates import USUAL
 
 SOLVERS = ("pardiso", "superlu", "amg")
 #: before the name of a solver that serves a contact by products
@@ -42,6 +41,38 @@ _MMD_FACTOR, _MMD_SOLVE = 1.2e-10, 2.8e-10  # s per nnz^2 / n, s per entry
 # Multigrid: about 27 iterations per column, 0.26 us per dof each, where there are no slivers;
 # counted on the ready scene at 50 000 to 800 000 dofs, bytes while it is set up.
 _AMG_SETUP, _AMG_COLUMN, _AMG_BYTES_DOF = 1.8e-5, 7e-6, 2500.0
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Speeds of one thread, and what all threads together gain.
+
+    Attributes
+    ----------
+    factor_flops
+        Operations per s of a sparse Cholesky factorisation.
+    analysis_entries
+        Entries of a matrix ordered and analysed per s.
+    solve_bytes
+        Bytes of a factor read per s by a triangular solve.
+    dense_flops
+        Operations per s of dense Cholesky, LU and products.
+    elements
+        Hexahedra with eight nodes per s whose stiffness is assembled: numpy on large arrays.
+    speedup
+        All threads over one thread, of a sparse factorisation.
+    """
+
+    factor_flops: float = 3.0e10
+    analysis_entries: float = 9.0e6
+    solve_bytes: float = 1.0e10
+    dense_flops: float = 2.6e10
+    elements: float = 6.0e4
+    speedup: float = 1.5
+
+
+#: one core of a server of 2.1 GHz, where the seconds in plans were measured
+USUAL = Rates()
 
 
 @dataclass(frozen=True)

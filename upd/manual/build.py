@@ -1,7 +1,7 @@
 """Build the manual: `./run.sh docs` writes plain files to build/manual. Warnings are errors.
 
-The sources are copied first, and what is taken from the program (keys of scenes, commands, outputs)
-is written beside the copy, so that nothing generated lies in the repository.
+The sources are copied first, and what is taken from the program (keys of scenes and recipes) is
+written beside the copy, so that nothing generated lies in the repository.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator
 from itertools import groupby
 from pathlib import Path
 
+from upd.mesh.recipe_modules import READY
 from upd.scene import load_scene
 from upd.scene.keys import SceneKey, absent_keys, recipe_keys, scene_keys
 
@@ -23,7 +24,6 @@ SCENES = {
     "seated": "symmetric-seated",
     "forced": "asymmetric-response",
 }
-RECIPES = ("sphere_block", "wedge_platform", "pads_platform", "blade_rig")
 
 
 def main() -> int:
@@ -37,7 +37,7 @@ def main() -> int:
         scene = load_scene(what)
         keys = [k for k in (*scene_keys(scene), *absent_keys(scene)) if k.steps[0] != "geometry"]
         write(source / f"reference/scene_{kind}.md", f"Keys of a {scene.analysis} (`{what}`)", keys)
-    for recipe in RECIPES:
+    for recipe in READY:
         write(source / f"reference/{recipe}.md", f"Recipe `{recipe}`", recipe_keys(recipe))
     command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html"]
     return subprocess.call([*command, str(source), str(target / "manual")])

@@ -12,8 +12,7 @@ from upd.batch.engine import time_left
 from upd.cli.app import main
 from upd.errors import InputError
 from upd.linalg import predict
-from upd.linalg.rates import USUAL
-from upd.linalg.select import Solid, threads_used
+from upd.linalg.select import USUAL, Solid, threads_used
 from upd.mesh import recipes
 from upd.scene import load_scene
 from upd.vary.solve import changed

@@ -295,9 +295,9 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 14483,
-    "hbm": 7601,
-    "contact": 4197,
+    "analyses": 14482,
+    "hbm": 7590,
+    "contact": 4195,
     "linalg": 3387,
     "scene": 2337,
     "plot": 2220,
@@ -321,7 +321,7 @@ ROOM_LINES = {
     "manual": 175,
 }
 #: totals of upd/; pages of the manual's gallery are no modules
-MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 53043, 409, 3927, 497
+MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 53029, 407, 3925, 497
 #: parameters of a function and fields of a class, outside the solver rooms
 MOST_PARAMETERS, MOST_FIELDS, SOLVER_ROOMS = 11, 20, ("hbm", "contact", "linalg")
 

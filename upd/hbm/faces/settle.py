@@ -13,20 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from upd.hbm.faces.march import PAYS, InterfaceMarch, InterfacePeriod
-from upd.hbm.faces.memory import (
+from upd.hbm.faces.periods import (
     COUNTERS,
     KNOWN,
+    NEW_BASE,
     PERIODS,
     SAMPLE,
     SEEN,
+    UNSOLVED,
     WINDOW,
     Settling,
-    memory,
-)
-from upd.hbm.faces.periods import (
-    NEW_BASE,
-    UNSOLVED,
     march_periods,
+    memory,
 )
 from upd.hbm.faces.state import EPS, ComplexArray, FloatArray, InterfaceState
 

@@ -202,9 +202,7 @@ def _mean_motion(b: Balance, force: FloatArray) -> FloatArray:
     From (Lambda + Psi'k Psi) eta = Psi'f. Motions without any stiffness take the least stiffness
     that rounding leaves.
     """
-    stiffness = np.diag(np.where(b.modal.rigid, 0.0, b.modal.eigenvalues))
-    stiffness += b.Psi.T @ (stuck_stiffness(b.contacts).ravel()[:, None] * b.Psi)
-    values, vectors = np.linalg.eigh(stiffness)
+    values, vectors = np.linalg.eigh(b.stuck_modal_stiffness)
     values = np.maximum(values, len(values) * EPS * values[-1])
     return np.asarray(np.abs((force @ b.Psi @ vectors / values) @ (b.Psi @ vectors).T))
 

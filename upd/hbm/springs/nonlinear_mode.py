@@ -28,6 +28,7 @@ from upd.errors import InputError
 from upd.hbm.core.continuation import follow
 from upd.hbm.core.fourier import harmonics as harmonics_of
 from upd.hbm.core.newton import Settings, solve
+from upd.hbm.springs import response
 from upd.hbm.springs.assembled import assembled
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.checks import measures
@@ -35,7 +36,6 @@ from upd.hbm.springs.damper import RigidDamper
 from upd.hbm.springs.friction import Start
 from upd.hbm.springs.points import Contacts
 from upd.hbm.springs.residuals import FREQUENCY_SHARE, scale_of
-from upd.hbm.springs.response import parabola
 from upd.labels import Shown
 from upd.linalg.parallel import threads_for
 
@@ -74,6 +74,8 @@ class NonlinearMode(Shown):
         The condensed problem, without dynamic loads.
     stuck : (m, m) ndarray
         Modes with all points closed and sticking, on the modes of the balance; rigid ones first.
+    stuck_omega : (m,) ndarray
+        Their angular frequencies [rad/s].
     number : int
         Column of this mode in `stuck`.
     """
@@ -89,6 +91,7 @@ class NonlinearMode(Shown):
     x: FloatArray
     balance: Balance
     stuck: FloatArray
+    stuck_omega: FloatArray
     number: int
 
     def motion(self, row: ArrayLike) -> FloatArray:
@@ -102,7 +105,7 @@ class NonlinearMode(Shown):
         """
         k, log_a = int(np.argmax(self.damping)), np.log(self.amplitude)
         near = slice(max(k - 1, 0), k + 2)
-        at, zeta = parabola(log_a[near], self.damping[near])
+        at, zeta = response.parabola(log_a[near], self.damping[near])
         order = np.argsort(log_a[near])
         found = np.interp(at, log_a[near][order], self.frequency[near][order])
         return zeta, float(np.exp(at)), float(found)
@@ -131,7 +134,9 @@ class NonlinearMode(Shown):
         f = np.asarray(np.asarray(force, complex) @ self.balance.modal.Phi, complex)
         weights = self.balance.modal_row(row)
         log_a = np.log(self.amplitude)
-        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff([log_a, 100 * self.damping])))])
+        # length of the path, with the damping over its largest
+        relative = self.damping / (float(np.abs(self.damping).max()) or 1.0)
+        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff([log_a, relative])))])
         fine = np.linspace(0.0, way[-1], FINE * len(way))
         data = np.column_stack([log_a, 2.0 * np.pi * self.frequency, self.damping])
         log_a, w0, zeta = CubicSpline(way, data)(fine).T if len(way) > 1 else data.T
@@ -143,7 +148,9 @@ class NonlinearMode(Shown):
         known = inside >= 0.0
         squares = [middle - s * np.sqrt(np.where(known, inside, 0.0)) for s in (1.0, -1.0)]
         found = []
-        low, high = self._band()
+        # half way to the neighbours
+        beside, k = [0.0, *self.stuck_omega, np.inf], self.number
+        low, high = 0.5 * (beside[k] + beside[k + 1]), 0.5 * (beside[k + 1] + beside[k + 2])
         for square, order in zip(squares, (slice(None), slice(None, None, -1)), strict=True):
             W = np.sqrt(np.maximum(square, 0.0))
             A = pushed / (w0**2 - W**2 + 2j * zeta * w0 * W)
@@ -170,23 +177,10 @@ class NonlinearMode(Shown):
         k = int(np.argmax(motion))
         return float(f[k]), float(motion[k])
 
-    def _stuck_omega(self) -> FloatArray:
-        """Angular frequencies (m,) of the stuck modes [rad/s]."""
-        b = self.balance
-        K = np.diag(b.modal.eigenvalues) + (b.Psi.T * b.stuck_stiffness) @ b.Psi
-        squares = np.einsum("ij,ij->j", self.stuck, K @ self.stuck)
-        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
-
-    def _band(self) -> tuple[float, float]:
-        """Angular frequencies half way to the neighbouring stuck modes."""
-        w, n = self._stuck_omega(), self.number
-        high = 0.5 * (w[n] + w[n + 1]) if n + 1 < len(w) else np.inf
-        return (0.5 * float(w[n] + w[n - 1]) if n else 0.0), float(high)
-
     def _rest(self, W: FloatArray, f: ComplexArray, weights: FloatArray) -> ComplexArray:
         """The other stuck modes under the force, linear, at W rad/s."""
         b, others = self.balance, np.arange(len(self.stuck)) != self.number
-        shapes, values = self.stuck[:, others], self._stuck_omega()[others] ** 2
+        shapes, values = self.stuck[:, others], self.stuck_omega[others] ** 2
         c = b.modal.damping
         lost = np.einsum("ij,ij->j", shapes, c[:, None] * shapes if c.ndim == 1 else c @ shapes)
         gain = (weights @ shapes) * (f @ shapes)
@@ -207,7 +201,7 @@ def nonlinear_mode(
     damper_rows: FloatArray | None = None,
     samples: int | None = None,
     start: Start = "zero",
-    slider: FloatArray | None = None,
+    slider: ArrayLike | None = None,
     settings: Settings | None = None,
 ) -> NonlinearMode:
     """A mode of M q'' + C q' + K q = f_0 - B'f_c over its amplitude.
@@ -252,26 +246,29 @@ def nonlinear_mode(
     >>> round(float(2 * np.pi * mode.frequency[-1]), 4), round(float(mode.damping[-1]), 4)
     (1.0607, 0.0354)
     """
-    K = np.asarray(K, dtype=float)
     a, h = np.asarray(amplitudes, dtype=float).ravel(), harmonics_of(harmonics)
-    static = np.zeros(len(K)) if static_force is None else np.asarray(static_force, dtype=float)
     problems = []
     if not (len(a) and np.isfinite(a).all() and (a > 0.0).all() and (np.diff(a) > 0.0).all()):
         problems.append("amplitudes must be finite, above 0 and rising")
     if 1 not in h.numbers:
         problems.append(f"harmonics {h.numbers} lack 1, the mode's own")
-    if static.any() and not h.static:
-        problems.append(f"static_force would have no effect: harmonics {h.numbers} lack 0")
     if (contacts.law.preload < 0.0).any():
         problems.append("a preload is negative")
     if problems:
         raise InputError(f"nonlinear_mode: {'; '.join(problems)}")
+    A = response.dense("nonlinear_mode", M, C, K)
+    n = len(A[0])
+    static = np.zeros(n) if static_force is None else np.asarray(static_force, dtype=float)
+    paired = (damper is None) == (damper_rows is None)
+    none = {1: np.zeros(n, dtype=complex)}
+    response.require("nonlinear_mode", np.ones(1), static, none, contacts, n, paired, start)
+    response.require_static("nonlinear_mode", h, static, damper)
+    if slider is not None:
+        slider = response.sliders_of("nonlinear_mode", slider, contacts)
     b = assembled(
-        np.asarray(M, dtype=float),
-        np.asarray(C, dtype=float),
-        K,
+        *A,
         contacts,
-        {},
+        none,
         static,
         joined_to=None if damper is None or damper_rows is None else (damper, damper_rows),
         samples=samples,
@@ -284,8 +281,8 @@ def nonlinear_mode(
 
 
 def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearMode:
-    stuck, number, omega = stuck_modes(b, mode)
-    shape = stuck[:, number]
+    stuck, omegas_stuck, number = stuck_modes(b, mode)
+    shape, omega = stuck[:, number], float(omegas_stuck[number])
     of = ExtendedBalance(b, shape, omega)
     begin = wanted[0]
     for _ in range(HALVINGS):
@@ -312,8 +309,10 @@ def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearM
             settings=s,
         )
         xs, ps, status, message = path.x, path.p, path.status, path.message
-    kept = ps >= wanted[0]
-    xs, ps = xs[kept], ps[kept]
+    # an amplitude below those asked for was only where the path began
+    reached = np.flatnonzero(ps >= wanted[0])
+    first_kept = int(reached[0]) if len(reached) else len(ps)
+    xs, ps = xs[first_kept:], ps[first_kept:]
     x, omegas, xi = xs[:, :-2], xs[:, -2], xs[:, -1]
     found = measures(b, omegas / (2.0 * np.pi), x)
     eta = np.array([of.fundamental(one) for one in xs]).reshape(len(xs), len(shape))
@@ -329,19 +328,18 @@ def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearM
         x=x,
         balance=b,
         stuck=stuck,
+        stuck_omega=omegas_stuck,
         number=number,
     )
 
 
-def stuck_modes(b: Balance, mode: int) -> tuple[FloatArray, int, float]:
-    """Modes with all points sticking, on those of the balance; the wanted one and its omega."""
-    K = np.diag(b.modal.eigenvalues) + (b.Psi.T * b.stuck_stiffness) @ b.Psi
-    values, shapes = eigh(K)
+def stuck_modes(b: Balance, mode: int) -> tuple[FloatArray, FloatArray, int]:
+    """Modes with all points sticking, on those of the balance, their omega; which is wanted."""
+    values, shapes = eigh(b.stuck_modal_stiffness)
     elastic = np.flatnonzero(values > len(values) * np.finfo(float).eps * values[-1])
     if not 1 <= mode <= len(elastic):
         raise InputError(f"nonlinear_mode: mode {mode} is none; there are 1 to {len(elastic)}")
-    number = int(elastic[mode - 1])
-    return shapes, number, float(np.sqrt(values[number]))
+    return shapes, np.sqrt(np.maximum(values, 0.0)), int(elastic[mode - 1])
 
 
 class ExtendedBalance:

@@ -212,9 +212,10 @@ class CondensedProblem:
         return self._linear(omega, self._stiffness.ravel(), *self._stuck_rest)
 
     @property
-    def stuck_stiffness(self) -> FloatArray:
-        """Stiffness (c,) of the rows of closed points that stick [N/mm]."""
-        return self._stiffness.ravel()
+    def stuck_modal_stiffness(self) -> FloatArray:
+        """Stiffness (m, m) of the modes with closed points that stick [1/s2]."""
+        own = np.diag(np.where(self.modal.rigid, 0.0, self.modal.eigenvalues))
+        return np.asarray(own + (self.Psi.T * self._stiffness.ravel()) @ self.Psi)
 
     @property
     def stuck_constant(self) -> FloatArray:

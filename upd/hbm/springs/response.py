@@ -375,18 +375,25 @@ def frequency_response(
     True
     """
     f = np.asarray(frequencies, dtype=float).ravel()
-    A = [_dense(name, a) for name, a in (("M", M), ("C", C), ("K", K))]
+    A = dense("frequency_response", M, C, K)
     force = _force(harmonic_force)
     n = len(A[0])
     static = np.zeros(n) if static_force is None else np.asarray(static_force, dtype=float)
-    _require(f, static, force, contacts, n, (damper is None) == (damper_rows is None), start)
-    placed = None if slider is None else _sliders(slider, contacts)
+    require(
+        "frequency_response",
+        f,
+        static,
+        force,
+        contacts,
+        n,
+        (damper is None) == (damper_rows is None),
+        start,
+    )
+    placed = None if slider is None else sliders_of("frequency_response", slider, contacts)
     first = _harmonics(harmonics, force)
-    _require_static(first, static, damper)
+    require_static("frequency_response", first, static, damper)
     problem = assembled(
-        A[0],
-        A[1],
-        A[2],
+        *A,
         contacts,
         force,
         static,
@@ -450,34 +457,72 @@ def _omitted(h: Harmonics) -> str:
     return ", ".join([*map(str, between), f"above {h.highest}"])
 
 
-def _dense(name: str, A: ArrayLike) -> FloatArray:
-    if hasattr(A, "toarray"):
-        raise InputError(
-            f"frequency_response: {name} is sparse; to fix it: give {name}.toarray(), or large "
-            "matrices to upd.matrices.response.forced_response, which reduces them"
-        )
-    return np.asarray(A, dtype=float)
+def dense(
+    what: str, M: ArrayLike, C: ArrayLike, K: ArrayLike
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The matrices as arrays. Raises InputError for sparse ones.
+
+    Parameters
+    ----------
+    what : str
+        Public function that was called, for the message.
+    M, C, K : (n, n) array_like
+
+    Returns
+    -------
+    tuple of three (n, n) ndarray
+    """
+    for name, A in (("M", M), ("C", C), ("K", K)):
+        if hasattr(A, "toarray"):
+            raise InputError(
+                f"{what}: {name} is sparse; to fix it: give {name}.toarray(), or large "
+                "matrices to upd.matrices.response.forced_response, which reduces them"
+            )
+    return np.asarray(M, dtype=float), np.asarray(C, dtype=float), np.asarray(K, dtype=float)
 
 
-def _require_static(h: Harmonics, static: FloatArray, damper: RigidDamper | None) -> None:
-    """Refuse static loads that no harmonic of the balance carries."""
+def require_static(what: str, h: Harmonics, static: FloatArray, damper: RigidDamper | None) -> None:
+    """Refuse static loads that no harmonic of the balance carries.
+
+    Parameters
+    ----------
+    what : str
+        Public function that was called, for the message.
+    h : Harmonics
+    static : (n,) ndarray
+        [N]
+    damper : RigidDamper or None
+    """
     loads = ["static_force"] if np.any(static) else []
     loads += (
         ["the damper's centrifugal force"] if damper is not None and np.any(damper.force) else []
     )
     if loads and not h.static:
         raise InputError(
-            f"frequency_response: {' and '.join(loads)} would have no effect: harmonic 0 is not "
+            f"{what}: {' and '.join(loads)} would have no effect: harmonic 0 is not "
             f"among {h.numbers}; to fix it: harmonics = {(0, *h.numbers)}"
         )
 
 
-def _sliders(given: ArrayLike, points: Contacts) -> FloatArray:
-    """Places of the sliders along both tangents (n_point, 2)."""
+def sliders_of(what: str, given: ArrayLike, points: Contacts) -> FloatArray:
+    """Places of the sliders along both tangents.
+
+    Parameters
+    ----------
+    what : str
+        Public function that was called, for the message.
+    given : (n_point, d) array_like
+        [mm]
+    points : Contacts
+
+    Returns
+    -------
+    (n_point, 2) ndarray
+    """
     place = np.asarray(given, dtype=float)
     if place.shape != (points.n_point, points.tangents) or not np.all(np.isfinite(place)):
         raise InputError(
-            f"frequency_response: slider has shape {place.shape}; to fix it: give a finite place "
+            f"{what}: slider has shape {place.shape}; to fix it: give a finite place "
             f"of every point along every tangent, ({points.n_point}, {points.tangents})"
         )
     out = np.zeros((points.n_point, 2))
@@ -491,7 +536,8 @@ def _force(given: ArrayLike | Mapping[int, ArrayLike]) -> dict[int, ComplexArray
     return {1: np.asarray(given, dtype=complex)}
 
 
-def _require(
+def require(
+    what: str,
     f: FloatArray,
     static: FloatArray,
     force: dict[int, ComplexArray],
@@ -500,6 +546,26 @@ def _require(
     paired: bool,
     start: str,
 ) -> None:
+    """Refuse loads, rows and starts that do not fit the system; all problems are named.
+
+    Parameters
+    ----------
+    what : str
+        Public function that was called, for the message.
+    f : (k,) ndarray
+        Frequencies [Hz].
+    static : (n,) ndarray
+        [N]
+    force : dict
+        Harmonic number -> (n,) complex amplitude [N].
+    points : Contacts
+    n : int
+        Dofs of the system.
+    paired : bool
+        Whether a damper and its rows are both given, or neither.
+    start : str
+        Of the sliders.
+    """
     problems = (
         []
         if len(f) and np.all(np.isfinite(f)) and np.all(f > 0)
@@ -536,7 +602,7 @@ def _require(
     )
     problems += [] if force else ["harmonic_force is empty; give the amplitude of a harmonic"]
     if problems:
-        raise InputError("frequency_response: " + "; ".join(problems))
+        raise InputError(f"{what}: " + "; ".join(problems))
 
 
 def _harmonics(numbers: Iterable[int], force: dict[int, ComplexArray]) -> Harmonics:
