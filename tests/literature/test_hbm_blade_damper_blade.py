@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from upd.hbm import Contacts, FrequencyResponse, contacts, frequency_response
+from upd.hbm import Contacts, FrequencyResponse, contacts, frequency_response, stability
 from upd.hbm.springs.modal import modal
 from upd.hbm.springs.time_integration import steady_state
 
@@ -139,3 +139,37 @@ def test_path_without_friction_arrives_through_every_fold() -> None:
     assert marched.status == "periodic"
     # harmonics above the fifth move the contacts by up to 2 % there
     assert marched.amplitude(Y2) == pytest.approx(answer.amplitude(Y2)[last], rel=2e-2)
+
+
+def test_the_printed_curve_has_a_stretch_that_oscillates_and_its_peak_is_stable(
+    curve: FrequencyResponse,
+) -> None:
+    peak = int(np.argmax(curve.amplitude(Y2)))
+    beside = np.flatnonzero(np.abs(curve.frequency - 224.5) < 4.0)
+    assert stability(curve, [peak]).label == ("stable",)
+    assert set(stability(curve, beside).label) == {"oscillating"}
+    # one slider lies at its limit there: a small deviation grows by 1.0203 in a period of an
+    # independent time integration, or dies where the slider stays
+    point = stability(response([159.77], harmonics=range(16), samples=256))
+    assert point.label[0] in ("oscillating", "undecided")
+
+
+def test_five_times_the_load_folds() -> None:
+    path = frequency_response(
+        M,
+        C,
+        stiffness(),
+        wedge(),
+        static_force=[0, 0, 0, 0, 0, 120.0],
+        harmonic_force=-5j * np.array([0, -20, 5, 0, 0, 0]),
+        frequencies=np.linspace(140.0, 156.0, 81),
+        harmonics=range(10),
+    )
+    y2, f = path.amplitude(Y2), path.frequency
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(f)))) + 1
+    fold = turns[np.argmin(np.abs(f[turns] - 151.795))]
+    assert f[fold] == pytest.approx(151.795, abs=0.01)
+    # the nearest solved point: the curve is vertical there
+    assert y2[fold] == pytest.approx(2.397e-4, rel=2e-2)
+    labels = stability(path, [fold - 4, fold + 4]).label
+    assert set(labels) == {"stable", "fold"}

@@ -25,6 +25,7 @@ from upd.hbm.springs.nonlinear_mode import NonlinearMode, nonlinear_mode
 from upd.hbm.springs.peak import Peak, climb
 from upd.hbm.springs.points import Contacts, contacts
 from upd.hbm.springs.response import FrequencyResponse, frequency_response
+from upd.hbm.springs.stability import Stability, stability
 from upd.hbm.springs.time_integration import SteadyState, steady_state
 
 __all__ = [
@@ -37,6 +38,7 @@ __all__ = [
     "Peak",
     "RigidDamper",
     "Settings",
+    "Stability",
     "State",
     "SteadyState",
     "climb",
@@ -47,5 +49,6 @@ __all__ = [
     "harmonics",
     "nonlinear_mode",
     "rigid_damper",
+    "stability",
     "steady_state",
 ]

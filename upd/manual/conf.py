@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+from pathlib import Path
 from typing import Any
 
 import upd
@@ -19,7 +21,7 @@ extensions = [
     "sphinx_gallery.gen_gallery",
 ]
 exclude_patterns = ["gallery/*", "_examples/*"]
-myst_enable_extensions = ["dollarmath", "colon_fence"]
+myst_enable_extensions = ["dollarmath", "colon_fence", "substitution"]
 myst_heading_anchors = 3
 html_theme = "furo"
 html_show_sourcelink = False
@@ -43,6 +45,27 @@ sphinx_gallery_conf: dict[str, Any] = {
     "image_scrapers": ("matplotlib",),
     "min_reported_time": 3600,
 }
+
+
+def _measured() -> dict[str, dict[str, dict[str, str]]]:
+    """What the benchmarks kept: benchmark -> name -> case -> number with its unit; over all cases
+    of a name the "worst", their "count", and how many "hold".
+    """
+    found: dict[str, dict[str, dict[str, str]]] = {}
+    for path in (Path(upd.__file__).parents[1] / "benchmarks" / "results").glob("*.csv"):
+        mine = found.setdefault(path.stem, {})
+        with path.open(encoding="utf-8", newline="") as table:
+            rows = [row for row in csv.DictReader(table) if row["value"]]
+        for row in sorted(rows, key=lambda row: abs(float(row["value"]))):
+            cases = mine.setdefault(row["name"], {"count": "0", "holds": "0"})
+            value = row["value"].replace("-", "−")
+            cases[row["case"]] = cases["worst"] = f"{value} {row['unit']}".strip()
+            cases["count"] = str(int(cases["count"]) + 1)
+            cases["holds"] = str(int(cases["holds"]) + row["note"].count(": holds"))
+    return found
+
+
+myst_substitutions = {"measured": _measured()}
 
 
 def _bars(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
