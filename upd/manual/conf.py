@@ -6,6 +6,9 @@ import csv
 from pathlib import Path
 from typing import Any
 
+from docutils import nodes
+from latex2mathml.converter import convert
+
 import upd
 
 project = "upd"
@@ -17,13 +20,13 @@ extensions = [
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",
-    "sphinx.ext.mathjax",
     "sphinx_gallery.gen_gallery",
 ]
 exclude_patterns = ["gallery/*", "_examples/*"]
 myst_enable_extensions = ["dollarmath", "colon_fence", "substitution"]
 myst_heading_anchors = 3
 html_theme = "furo"
+html_math_renderer = "mathml"
 html_show_sourcelink = False
 suppress_warnings = ["config.cache"]
 
@@ -73,6 +76,20 @@ def _bars(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[st
     lines[:] = [one if ">>>" in one else one.replace("|", r"\|") for one in lines]
 
 
+def _formula(translator: Any, node: Any) -> None:
+    """An equation as the browser's own MathML: it needs no script and no network."""
+    translator.body.append(convert(node.astext()))
+    raise nodes.SkipNode
+
+
+def _equation(translator: Any, node: Any) -> None:
+    """One on a line of its own, which scrolls where the page is narrow."""
+    shown = convert(rf"\displaystyle {node.astext()}", display="block")
+    translator.body.append(f'<div style="overflow-x: auto; padding: 0.5em 0">{shown}</div>')
+    raise nodes.SkipNode
+
+
 def setup(app: Any) -> None:
-    """After numpydoc has made its lines."""
+    """Equations, and docstrings after numpydoc has made their lines."""
+    app.add_html_math_renderer("mathml", (_formula, None), (_equation, None))
     app.connect("autodoc-process-docstring", _bars, priority=900)
