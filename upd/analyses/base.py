@@ -118,6 +118,13 @@ class Resolved:
         )
 
 
+def conditions(case: Case, remedy: str, *rows: tuple[str, float, float, str]) -> list[Check]:
+    """Self-checks of a case with one remedy: name, value, limit and what is compared."""
+    return [
+        Check(name, case, float(value), limit, says, remedy) for name, value, limit, says in rows
+    ]
+
+
 S = TypeVar("S", bound=AnyScene)
 
 

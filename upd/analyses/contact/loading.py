@@ -55,12 +55,9 @@ def load_point(plan: ContactPlan, model: ContactModel) -> Array:
     return np.asarray(middle if 0 not in plan.mirrors else middle * np.array([0.0, 1.0]))
 
 
-def tilt_arms(plan: ContactPlan, model: ContactModel, *, held: bool | None = None) -> Array:
-    """(n, k) mm from the load line to the nodes, for the k free tilts.
-
-    ``held``: in place of the scene's choice.
-    """
-    if plan.scene.contact.tilt != "free" if held is None else held:
+def tilt_arms(plan: ContactPlan, model: ContactModel) -> Array:
+    """(n, k) mm from the load line to the nodes, for the k free tilts."""
+    if plan.scene.contact.tilt != "free":
         return np.zeros((len(model.gap), 0))
     return contact_points_of(model)[:, :2] - load_point(plan, model)
 

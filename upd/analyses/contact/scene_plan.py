@@ -1,5 +1,5 @@
-"""Plan of a contact, curved or flat: effects simulated and omitted, cost, and the coarser whole
-model of what is solved again.
+"""Plan of a contact, curved or flat, with its cost and the coarser whole model of what is solved
+again.
 """
 
 from __future__ import annotations
@@ -11,20 +11,12 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.base import Effect
-from upd.analyses.contact.effects import (
-    DIRECTIONS,
-    LARGE,
-    TILT,
-    TOGETHER,
-    coupling_effects,
-    omitted,
-)
 from upd.analyses.contact.plan import (
     ACROSS,
     ALONG,
     COMPONENTS,
     NORMAL,
-    OWN_LEVEL,
+    TILT,
     ContactPlan,
     Family,
     auto_core_depth,
@@ -32,6 +24,7 @@ from upd.analyses.contact.plan import (
     choose_symmetry,
     component,
     is_curved,
+    make_effects,
     make_families,
     normal_loads,
     recipe_parameters,
@@ -42,7 +35,7 @@ from upd.analyses.cost import NODES, START_BYTES, CostModel, dense_s
 from upd.errors import InputError, UpdError
 from upd.linalg.routes import EACH, FIRST
 from upd.mesh import recipes
-from upd.scene import FRICTION_WANTS, Scene, friction_on
+from upd.scene import Scene, friction_on
 
 
 def make_plan(scene: Scene) -> ContactPlan:
@@ -59,7 +52,7 @@ def make_plan(scene: Scene) -> ContactPlan:
     if not is_curved(scene):
         _require_fitting(scene)
     symmetry, why = choose_symmetry(scene)
-    families, effects = make_families(scene, symmetry), _effects(scene, symmetry, why, loaded)
+    families, effects = make_families(scene, symmetry), make_effects(scene, symmetry, why, loaded)
     parameters = recipe_parameters(scene, symmetry)
     return _with_companion(contact_plan(scene, symmetry, families, effects, parameters))
 
@@ -84,86 +77,6 @@ def _require_fitting(scene: Scene) -> None:
         )
     if problems:
         raise InputError("\n".join(problems))
-
-
-# -- effects ---------------------------------------------------------------------------------------
-
-
-def _simulated(name: str, on: bool, why: str) -> Effect:
-    """An effect that the scene's question has where it is simulated, and else not."""
-    return Effect(name, on, why, applies=on)
-
-
-def _effects(scene: Scene, symmetry: str, why_symmetry: str, loaded: bool) -> list[Effect]:
-    edge = "edges may lift off; one linear solve when none does"
-    small, tilt = "the approach is small against the patch", [_tilt_effect(scene, loaded)]
-    if is_curved(scene):
-        edge = "the gap is curved: the contact set depends on the load"
-        small, tilt = "the contact is small against the body", []
-    curve, inside = scene.wants("curve"), ", ".join(_inside(scene))
-    points = f"{scene.loads.curve_points} points asked for" if curve else "single loads only"
-    fields = (
-        f"a back-substitution per load for {inside}"
-        if inside
-        else "no output asks for it: contact nodes only"
-    )
-    return [
-        Effect("unilateral contact", True, edge),
-        *tilt,
-        *_friction_effects(scene, loaded),
-        _simulated("mirror symmetry", symmetry != "full", why_symmetry),
-        _simulated("load curve", curve, points),
-        _simulated("internal displacement", bool(inside), fields),
-        _simulated("inertia", False, "every output is static: M is not assembled"),
-        omitted(LARGE, small, applies=loaded),
-    ]
-
-
-def _tilt_effect(scene: Scene, loaded: bool) -> Effect:
-    if scene.contact.tilt == "free":
-        return Effect(TILT, True, "no moment about the load line")
-    return omitted(TILT, "its distant set only translates", "contact.tilt=free", applies=loaded)
-
-
-def _friction_effects(scene: Scene, loaded: bool) -> list[Effect]:
-    curved, mu = is_curved(scene), scene.contact.friction
-    if not friction_on(scene):
-        asked = scene.wants(*FRICTION_WANTS)
-        why = "mu = 0: no tangential force can be carried" if asked else "no output asks for it"
-        coupling = coupling_effects(scene, loaded)[:1] if mu > 0.0 else ()
-        return [_simulated("friction", False, why), *coupling]
-    outputs = ", ".join(w for w in scene.want if w in FRICTION_WANTS)
-    stepped, steps = True, "first loading, in small steps"
-    if scene.wants("cycle"):
-        steps = "a full cycle is asked for"
-    elif curved and not scene.coupled:
-        stepped, steps = False, "first loading only"
-    directions = Effect(DIRECTIONS, True, TOGETHER if scene.coupled else "asked for")
-    if scene.slip_directions == 1:
-        why = "the load has one direction" if curved else "loads run along the axes"
-        shows = loaded and (not curved or _slip_shows(scene))
-        directions = omitted(DIRECTIONS, why, "contact.directions=2", applies=shows)
-    return [
-        _simulated("friction", True, f"mu = {mu:g} and the outputs {outputs}"),
-        directions,
-        *coupling_effects(scene, loaded),
-        _simulated("load history", stepped, steps),
-    ]
-
-
-def _slip_shows(scene: Scene) -> bool:
-    """Whether a number of the run depends on the directions of slip."""
-    shear = scene.wants("stiffness") and scene.sphere_radius is not None
-    loads = scene.wants("tangential") and len(scene.loads.tangential) > 0
-    return shear or loads or scene.wants("cycle")
-
-
-def _inside(scene: Scene) -> list[str]:
-    """Outputs that ask for displacements inside the bodies."""
-    if not is_curved(scene):
-        return [w for w in scene.want if w == "fields"]
-    wanted = ("fields", "body_compression", "stiffness")
-    return [w for w in scene.want if w in wanted or (w == "tangential" and friction_on(scene))]
 
 
 # -- size and cost ---------------------------------------------------------------------------------
@@ -334,8 +247,7 @@ def _with_companion(plan: ContactPlan) -> ContactPlan:
     coarser.
     """
     scene = plan.scene
-    needed = (e.check and e.word == "no" and e.name not in OWN_LEVEL for e in plan.effects)
-    if not scene.left_out.solves or not any(needed):
+    if not {*plan.shown} - {TILT}:
         return plan
     off = ("load curve", "internal displacement")
     effects = [replace(e, on=e.on and e.name not in off) for e in plan.effects]

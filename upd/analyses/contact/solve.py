@@ -76,11 +76,11 @@ def solve_normal(solution: ContactSolution, stages: Stages) -> None:
     curve = _curve_loads(plan, max(wanted), solution.curved)
     around = slope_loads(wanted) if _by_slope(solution) else []
     with stages("normal contact", f"{len({*wanted, *curve, *around})} loads"):
-        found = _pressed(solution, [*wanted, *curve, *around])
+        found = press(solution, [*wanted, *curve, *around])
         solution.normal = [_case(solution, load, found) for load in loads]
         solution.curve = [_case(solution, DamperLoad(F), found) for F in curve]
         for body in _bodies_alone(solution):
-            alone = _pressed(solution, [*wanted, *around], body)
+            alone = press(solution, [*wanted, *around], body)
             for case in solution.normal:
                 case.alone[body.name] = alone[case.force]
 
@@ -107,7 +107,7 @@ def _curve_loads(plan: ContactPlan, largest: float, curved: bool) -> list[float]
     return [top * k / n for k in range(1, n + 1)]
 
 
-def _pressed(
+def press(
     solution: ContactSolution, forces: Iterable[float], body: Body | None = None
 ) -> dict[float, PressedContact]:
     """Answers of the forces in N on the whole contact, by force.
@@ -132,9 +132,9 @@ def _pressed(
         return model.compliance(NORMAL) if body is None else model.body_compliance(body, NORMAL)
 
     if arms.size:
-        found = []
+        found, free = [], (0 not in plan.mirrors, 1 not in plan.mirrors)
         for F in loads:
-            t = tilted_contact(compliance(), model.gap, arms, load=F)
+            t = tilted_contact(compliance(), model.gap, arms, load=F, free=free)
             found.append(PressedContact(t.normal, plan.copies * t.free_stiffness, tilt=t.tilt))
     else:
         answers = settled(

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from upd.analyses.contact.bodies import learns
-from upd.analyses.contact.effects import largest_ratio
 from upd.analyses.contact.loading import (
     CoupledState,
     LoadPath,
@@ -28,7 +27,13 @@ from upd.analyses.contact.loading import (
     sheared,
     tangential_compliance,
 )
-from upd.analyses.contact.plan import NORMAL, ContactPlan, slip_components, unit_vector
+from upd.analyses.contact.plan import (
+    NORMAL,
+    ContactPlan,
+    largest_ratio,
+    slip_components,
+    unit_vector,
+)
 from upd.analyses.contact.solution import (
     ContactSolution,
     NormalCase,
@@ -169,10 +174,13 @@ class Frozen:
                 of[body.name] = self._moved(C)[1]
         return self._moved(self.compliance)[1], of
 
-    def march(self, ratios: Array) -> Marched:
-        """Shares of mu N one after the other."""
+    def march(self, ratios: Array, history: TangentialHistory | None = None) -> Marched:
+        """Shares of mu N one after the other.
+
+        ``history``: before the first; None starts from no slip.
+        """
         loads = load_history(ratios * self.total, self.unit)
-        path = tangential_path(self.compliance, self.limit, loads=loads)
+        path = tangential_path(self.compliance, self.limit, loads=loads, history=history)
         return *along(path, self.unit, self.copies), partial(self._at, path)
 
     def _at(self, path: TangentialPath, k: int, ratio: float) -> TangentialCase:
@@ -284,8 +292,9 @@ class _Coupled(Frozen):
         of = {name: secant(state) for name, state in alone.items() if state is not None}
         return secant(self.state), of
 
-    def march(self, ratios: Array) -> Marched:
-        """Shares of mu N one after the other."""
+    def march(self, ratios: Array, history: TangentialHistory | None = None) -> Marched:
+        """Shares of mu N one after the other; friction remembers the normal load."""
+        del history
         needed = max(self.loads.tangential, default=0.0) * self.total
         states, moved = sheared(self.state, ratios * self.total, self.unit, needed)
         load = np.insert(ratios[: len(states)] * self.total, 0, 0.0)
