@@ -15,10 +15,15 @@ from numpy.typing import NDArray
 from upd.analyses.base import conditions
 from upd.analyses.contact import loading
 from upd.analyses.contact.bodies import product_checks
-from upd.analyses.contact.closed_forms import closed_form_traction, hertz_of
 from upd.analyses.contact.faces import lattices, rim_nodes, tractions
 from upd.analyses.contact.plan import NORMAL, REMEDIES, beta_of, wider_patch
-from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
+from upd.analyses.contact.solution import (
+    ContactSolution,
+    NormalCase,
+    TangentialCase,
+    closed_form_traction,
+    hertz_of,
+)
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
 from upd.contact.subsurface import most_stressed, partial_slip_ratio

@@ -11,19 +11,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.contact.closed_forms import (
+from upd.analyses.contact import faces
+from upd.analyses.contact.faces import FaceLattice, corner, lattices
+from upd.analyses.contact.loading import LoadPath
+from upd.analyses.contact.results import printed_of
+from upd.analyses.contact.solution import (
+    ContactSolution,
+    NormalCase,
+    TangentialCase,
     beyond_3a,
     closed_form_traction,
     hertz_of,
     shear_compliance,
     stick_radius,
 )
-from upd.analyses.contact.faces import FaceLattice, corner, lattices, tractions
-from upd.analyses.contact.law import contact_law
-from upd.analyses.contact.loading import LoadPath
-from upd.analyses.contact.results import printed_of
-from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
-from upd.analyses.contact.worn_zones import band_middles
 from upd.contact.law import ContactLaw
 from upd.labels import file_name
 from upd.mesh import recipes
@@ -93,7 +94,7 @@ def _normal(solution: ContactSolution, k: FaceLattice, case: NormalCase) -> Vari
         return out | _approach_split(case) | _hertz(solution, case)
     out["worn_zone_middle"] = variable(
         "worn_zone",
-        band_middles(solution),
+        faces.band_middles(solution),
         "mm",
         "middle of the bands of the damper that the load comes from",
     )
@@ -120,7 +121,7 @@ def _sheared(
 
 
 def _tangential(solution: ContactSolution, k: FaceLattice, t: TangentialCase) -> Variables:
-    traction, XY = tractions(solution, t), _dims(k)
+    traction, XY = faces.tractions(solution, t), _dims(k)
     out = _sheared(k, traction, list(t.slip.T), t.stick)
     if solution.curved and len(traction) == 1:
         # One direction has no dimension of its own.
@@ -296,7 +297,7 @@ def _laws(solution: ContactSolution) -> dict[str, ArrayGroup]:
     scene = solution.plan.scene
     out: dict[str, ArrayGroup] = {}
     for case in solution.normal if scene.wants("contact_law") else ():
-        law = contact_law(solution, case)
+        law = faces.contact_law(solution, case)
         if law is not None:
             placed = law.placed(*recipes.placement(scene.recipe, solution.plan.parameters))
             groups = {
