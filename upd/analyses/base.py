@@ -176,6 +176,11 @@ class Plan(Generic[S]):
         """Copies of the model that make the whole."""
         return COPIES[self.symmetry]
 
+    @property
+    def solve_seconds(self) -> float:
+        """Predicted seconds without figures, files and page."""
+        return self.seconds - self.files_seconds
+
     def effect(self, name: str) -> bool:
         """True when the effect is simulated."""
         return next(e.on for e in self.effects if e.name == name)

@@ -15,13 +15,12 @@ import upd
 from upd.analyses import make_plan, seated
 from upd.analyses.seated.interface import make_interface
 from upd.analyses.seated.solve import AGAIN, LOWERED, OVER, RAISED, SHAKEN, SMOOTH, SeatedSolution
-from upd.analyses.seated.state import read_state
 from upd.contact.damper_section import admissible_forces, moment_share
 from upd.contact.equilibrium import equilibrium
 from upd.contact.rigid_damper import SLIDINGS
 from upd.errors import InputError
 from upd.progress import Stages, silent
-from upd.results import Check, write_netcdf
+from upd.results import Check
 from upd.scene import load_scene
 from upd.sizing.statics import motion_state, scene_damper
 
@@ -195,7 +194,7 @@ def test_stuck_stiffness_against_small_motion(wedge: SeatedSolution) -> None:
     for k, axis in enumerate(of.directions):
         step = moved.copy()
         step[0, axis] = tiny
-        found = of.seat(0.6, [F_C], gap=wedge.gap, moved=step, history=phase.found.history)
+        found = of.seat_on(phase.found, [F_C], moved=step)
         if (found.state[-1] == 2).any():
             continue
         force = (of.face_forces(found)[-1, 1] - wedge.forces(SHAKEN)[1]) @ -of.frame[1]
@@ -235,22 +234,12 @@ def test_blade_moved_in_cycles_closes_its_loop(wedge: SeatedSolution) -> None:
     assert loss > 0.0
 
 
-def test_state_is_read_back_and_gone_on_from(wedge: SeatedSolution, tmp_path: Path) -> None:
-    """F_C kept: nothing moves. Another contact is refused."""
-    write_netcdf(tmp_path / "result.nc", seated.ANALYSIS.arrays(wedge))
-    state = read_state(tmp_path, OVER)
-    of = wedge.interface
-    found = of.seat(state.friction, [state.centrifugal], gap=state.gap, history=state.of(of))
-    np.testing.assert_allclose(found.force[0], wedge.phases[OVER].found.force[-1], atol=1e-9 * F_C)
-    np.testing.assert_allclose(found.displacement[0], state.history.motion, atol=1e-12)
-    assert state.centrifugal == pytest.approx(F_C)
-    with pytest.raises(InputError, match="it has raised, lowered"):
-        read_state(tmp_path, "worn out")
-    with pytest.raises(InputError, match="no seated state"):
-        read_state(tmp_path / "nowhere")
-    other = replace(state, position=state.position + 1.0)
-    with pytest.raises(InputError, match="geometry, mesh and symmetry of this scene"):
-        other.of(of)
+def test_state_is_left_in_the_folder(wedge: SeatedSolution) -> None:
+    """Of the nodes of both faces, after each way of loading."""
+    groups = seated.ANALYSIS.arrays(wedge)
+    state, found = groups[f"state {OVER}"], wedge.phases[OVER].found
+    np.testing.assert_array_equal(state["force"][1], found.force[-1])
+    assert len(groups["faces"]["position"][1]) == wedge.interface.n
 
 
 def test_worn_faces_press_evenly() -> None:
@@ -359,7 +348,6 @@ def test_run_folder_of_a_seating(tmp_path: Path) -> None:
     assert undeclared(result.results) == []
     again = upd.load(tmp_path / "run")
     assert [r.value for r in again.results] == [r.value for r in result.results]
-    assert read_state(tmp_path / "run").history.force.shape[1] == 3
 
 
 @pytest.mark.parametrize(

@@ -104,11 +104,6 @@ class ContactPlan(Plan[Scene]):
         """Effects left out whose change of a number the run shows."""
         return tuple(e.check for e in self.effects if e.check and self.scene.left_out.solves)
 
-    @property
-    def solve_seconds(self) -> float:
-        """Predicted seconds without figures and files."""
-        return self.seconds - self.files_seconds
-
 
 def is_curved(scene: Scene) -> bool:
     """Whether the faces are curved: their contact set depends on the load."""

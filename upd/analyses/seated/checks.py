@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from upd.analyses.base import conditions
 from upd.analyses.seated.interface import Array, Interface
 from upd.analyses.seated.solve import RAISED, Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, SLIP
@@ -15,7 +16,6 @@ from upd.results import Check
 ROUNDING = 1e-9
 #: the same of works
 WORK_ROUNDING = 1e-8
-_REPORT = "report this scene"
 
 
 def check_solution(solution: SeatedSolution) -> list[Check]:
@@ -26,54 +26,51 @@ def check_solution(solution: SeatedSolution) -> list[Check]:
     return checks + [one.check(limits) for one in solution.omissions]
 
 
-def _phase(solution: SeatedSolution, phase: Phase) -> Iterator[Check]:
-    of, found, mu, case = solution.interface, phase.found, phase.friction, phase.case
-    yield Check(
-        "equilibrium",
-        case,
-        _off_balance(solution, phase),
-        ROUNDING,
-        "force and moment left on the damper / (F_C, F_C times its size)",
-        _REPORT,
-    )
+def _phase(solution: SeatedSolution, phase: Phase) -> list[Check]:
+    of, found, mu = solution.interface, phase.found, phase.friction
     normal = found.force[..., 0]
     size = normal.max(axis=1, initial=np.finfo(float).tiny)
     shear = np.linalg.norm(found.force[..., 1:], axis=-1)
     beyond = np.maximum(shear - mu * normal, -normal).max(axis=1)
-    yield Check(
-        "Coulomb's cone",
-        case,
-        float((beyond / size).max()),
-        ROUNDING,
-        "largest |t| - mu n or tension / largest n",
-        _REPORT,
-    )
     gap, step = _kinematics(solution, phase)
     moves = np.abs(found.displacement).max() + np.abs(phase.moved).max()
     reach = float(np.abs(of.columns[: of.n]).max()) * moves
-    yield Check(
-        "no penetration",
-        case,
-        float(np.maximum(-gap, np.where(normal > 0.0, np.abs(gap), 0.0)).max() / reach),
-        ROUNDING,
-        "overlap, or gap under pressure / motion of the damper",
-        _REPORT,
-    )
-    yield Check(
-        "sticking nodes",
-        case,
-        _stick_misfit(found.state, found.force[..., 1:], step) / reach if mu else 0.0,
-        ROUNDING,
-        "slip of sticking nodes, or slip against its friction / motion of the damper",
-        _REPORT,
-    )
-    yield Check(
-        "energy balance",
-        case,
-        _energy_misfit(solution, phase, gap, step),
-        WORK_ROUNDING,
-        "work in less elastic energy and friction / work of all forces",
-        _REPORT,
+    overlap = np.maximum(-gap, np.where(normal > 0.0, np.abs(gap), 0.0)).max() / reach
+    slip = _stick_misfit(found.state, found.force[..., 1:], step) / reach if mu else 0.0
+    work = _energy_misfit(solution, phase, gap, step)
+    return conditions(
+        phase.case,
+        "report this scene",
+        (
+            "equilibrium",
+            _off_balance(solution, phase),
+            ROUNDING,
+            "force and moment left on the damper / (F_C, F_C times its size)",
+        ),
+        (
+            "Coulomb's cone",
+            (beyond / size).max(),
+            ROUNDING,
+            "largest |t| - mu n or tension / largest n",
+        ),
+        (
+            "no penetration",
+            overlap,
+            ROUNDING,
+            "overlap, or gap under pressure / motion of the damper",
+        ),
+        (
+            "sticking nodes",
+            slip,
+            ROUNDING,
+            "slip of sticking nodes, or slip against its friction / motion of the damper",
+        ),
+        (
+            "energy balance",
+            work,
+            WORK_ROUNDING,
+            "work in less elastic energy and friction / work of all forces",
+        ),
     )
 
 

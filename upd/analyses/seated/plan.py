@@ -100,11 +100,6 @@ def _cost(
     return cost, memory, workers
 
 
-def solve_seconds(plan: SeatedPlan) -> float:
-    """Predicted seconds of the plan without its files."""
-    return plan.seconds - _FILES_S
-
-
 def needs(plan: SeatedPlan, threads: int) -> Needs:
     """What a point of a sweep with this plan needs, and may share with others."""
     del threads

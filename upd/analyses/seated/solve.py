@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -30,34 +29,44 @@ WAYS = (RAISED, AGAIN, OVER, SHAKEN)
 
 
 @dataclass(frozen=True)
-class Phase:
-    """One way of loading, k steps.
+class Way:
+    """A way of loading, k steps.
 
     Attributes
     ----------
     name
-        What was done.
+        What is done.
     centrifugal : (k,) ndarray
         F_C after each step, N.
     moved : (k, 3) ndarray
         Shift of what holds the right blade after each step, mm.
+    after
+        The way whose state it starts from; "": nothing pressed.
+    """
+
+    name: str
+    centrifugal: Array
+    moved: Array
+    after: str = RAISED
+
+
+@dataclass(frozen=True, kw_only=True)
+class Phase(Way):
+    """A way of loading, solved.
+
+    Attributes
+    ----------
     friction
         Coefficient.
     found
         Its answers.
     before
         State it started from; None: nothing pressed.
-    seconds
-        By the clock.
     """
 
-    name: str
-    centrifugal: Array
-    moved: Array
     friction: float
     found: CoupledContact
     before: CoupledHistory | None
-    seconds: float
 
     @property
     def case(self) -> Case:
@@ -137,7 +146,8 @@ def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
             solution.bodies = make_bodies(plan)
         with stages("condensation", "both blades and the damper on the nodes of both faces"):
             solution.of = make_interface(plan, solution.bodies, scene.blades.held)
-        solution.gap = _gap(solution, scene.contact.worn)
+        worn, F = scene.contact.worn, scene.damper.centrifugal
+        solution.gap = worn * solution.of.worn_gap(F) if worn else np.zeros(solution.of.n)
         with stages("seating", f"{RAISED}, {scene.seating.steps} load steps"):
             _phase(solution, _raised(solution))
         _go_on(solution, stages)
@@ -156,30 +166,14 @@ def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
     return solution
 
 
-def _gap(solution: SeatedSolution, fit: float) -> Array:
-    of, F = solution.interface, solution.plan.scene.damper.centrifugal
-    return fit * of.worn_gap(F) if fit else np.zeros(of.n)
-
-
-@dataclass(frozen=True)
-class _Way:
-    """A way of loading, from the state after another; moved blades keep F_C."""
-
-    name: str
-    centrifugal: Array
-    moved: Array
-    after: str = RAISED
-    friction: float | None = None
-
-
-def _raised(solution: SeatedSolution) -> _Way:
+def _raised(solution: SeatedSolution) -> Way:
     """F_C raised from nothing."""
     F, s = solution.plan.scene.damper.centrifugal, solution.plan.scene.seating
     return _still(RAISED, F * np.arange(1, s.steps + 1) / s.steps, "")
 
 
-def _still(name: str, centrifugal: Array, after: str = RAISED) -> _Way:
-    return _Way(name, centrifugal, np.zeros((len(centrifugal), 3)), after)
+def _still(name: str, centrifugal: Array, after: str = RAISED) -> Way:
+    return Way(name, centrifugal, np.zeros((len(centrifugal), 3)), after)
 
 
 def _go_on(solution: SeatedSolution, stages: Stages) -> None:
@@ -196,15 +190,15 @@ def _go_on(solution: SeatedSolution, stages: Stages) -> None:
         down = np.linspace(s.over, 1.0, s.steps + 1)[1:]
         rows.append([_still(OVER, F * np.concatenate((over, down)))])
         rows.append([_shaken(plan)])
-        rows.append([_Way(SMOOTH, np.array([F]), np.zeros((1, 3)), "", 0.0)])
+        rows.append([_still(SMOOTH, np.array([F]), "")])
     if scene.wants("moved"):
         for axis in scene.moved.directions:
             moved = _cycles(plan, "xyz".index(axis))
-            rows.append([_Way(f"moved along {axis}", np.full(len(moved), F), moved)])
+            rows.append([Way(f"moved along {axis}", np.full(len(moved), F), moved)])
     names = [way.name for row in rows for way in row]
     steps = sum(len(way.centrifugal) for row in rows for way in row)
 
-    def done(row: Sequence[_Way]) -> None:
+    def done(row: Sequence[Way]) -> None:
         for way in row:
             _phase(solution, way)
 
@@ -224,14 +218,14 @@ def _worn(solution: SeatedSolution) -> None:
     solution.worn = of.seat(scene.contact.friction, raised.centrifugal, gap=gap)
 
 
-def _shaken(plan: SeatedPlan) -> _Way:
+def _shaken(plan: SeatedPlan) -> Way:
     """The right blade vibrates along x under F_C; its amplitude dies away evenly to nothing."""
     s = plan.scene.seating
     t = np.arange(1, s.cycle_steps * s.cycles + 1) / s.cycle_steps
     moved = np.zeros((len(t), 3))
     moved[:, _X] = s.shake * (1.0 - t / s.cycles) * np.sin(2.0 * np.pi * t)
     moved[-1] = 0.0
-    return _Way(SHAKEN, np.full(len(t), plan.scene.damper.centrifugal), moved)
+    return Way(SHAKEN, np.full(len(t), plan.scene.damper.centrifugal), moved)
 
 
 def _cycles(plan: SeatedPlan, axis: int) -> Array:
@@ -247,20 +241,18 @@ def _cycles(plan: SeatedPlan, axis: int) -> Array:
     return out
 
 
-def _phase(solution: SeatedSolution, way: _Way) -> None:
+def _phase(solution: SeatedSolution, way: Way) -> None:
     """Solve one way of loading."""
-    of, mu = solution.interface, solution.plan.scene.contact.friction
-    begin = time.perf_counter()
+    of, friction = solution.interface, solution.plan.scene.contact.friction
     if way.after:
         last = solution.phases[way.after].found
         before: CoupledHistory | None = last.history
         moved = way.moved if way.moved.any() else None
         found = of.seat_on(last, way.centrifugal, moved=moved)
     else:
-        mu, before = mu if way.friction is None else way.friction, None
-        found = of.seat(mu, way.centrifugal, gap=solution.gap)
-    took = time.perf_counter() - begin
-    solution.phases[way.name] = Phase(way.name, way.centrifugal, way.moved, mu, found, before, took)
+        friction, before = 0.0 if way.name == SMOOTH else friction, None
+        found = of.seat(friction, way.centrifugal, gap=solution.gap)
+    solution.phases[way.name] = Phase(**vars(way), friction=friction, found=found, before=before)
 
 
 def _solve_again(solution: SeatedSolution, stages: Stages) -> Iterator[Resolved]:

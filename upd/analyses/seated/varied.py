@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from upd.analyses.base import require_memory
 from upd.analyses.seated.checks import ROUNDING, WORK_ROUNDING
-from upd.analyses.seated.plan import SeatedPlan, make_plan, solve_seconds
+from upd.analyses.seated.plan import SeatedPlan, make_plan
 from upd.analyses.seated.results import make_results
 from upd.analyses.seated.solve import RAISED, SeatedSolution, solve
 from upd.contact.coulomb_conditions import OPEN, SLIP
@@ -178,7 +178,7 @@ def plan_with_estimates(scene: SeatedScene) -> SeatedPlan:
     for one in levels(plan).variations:
         # what the recipe does not take is the reason that the run gives
         with suppress(InputError):
-            again += solve_seconds(varied_plan(PROBLEM, scene, one))
+            again += varied_plan(PROBLEM, scene, one).solve_seconds
     return replace(plan, seconds=plan.seconds + again, estimate_seconds=again)
 
 
@@ -337,8 +337,8 @@ def _half_cost(plan: SeatedPlan, source: str, seconds: float, order: float) -> f
         overrides = _half_steps(scene)
     more = varied_plan(PROBLEM, scene, Variation(source, "half the error", overrides))
     require_memory(more.scene, more.memory_bytes)
-    own = solve_seconds(plan) - plan.estimate_seconds
-    return max(0.0, seconds * (solve_seconds(more) / own - 1.0))
+    own: float = plan.solve_seconds - plan.estimate_seconds
+    return max(0.0, seconds * (float(more.solve_seconds) / own - 1.0))
 
 
 PROBLEM = Problem(
