@@ -26,8 +26,7 @@ from upd.analyses.contact.loading import LOAD_STEP, slope_loads
 from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan
 from upd.analyses.contact.results import make_results
 from upd.analyses.contact.solution import ContactSolution, NormalCase, PressedContact
-from upd.analyses.contact.solve import press, solve_plan
-from upd.analyses.contact.tangential import Frozen, note_moved
+from upd.analyses.contact.solve import Frozen, press, solve_plan
 from upd.contact.checks import few_threads
 from upd.contact.model import ContactModel
 from upd.contact.tangential_step import TangentialHistory
@@ -169,7 +168,10 @@ def _sheared(solution: ContactSolution, model: ContactModel) -> Iterator[Resolve
     companion = partial(solve_plan, stages=Stages(), model=model, companion=True)
     mine = companion(variant(plan, scene.contact.directions))
     numbers = make_results(mine)
-    note_moved(solution, mine)
+    for case in () if solution.curved else mine.normal:
+        for direction in scene.loads.directions:
+            way = Frozen(mine, case, direction)
+            solution.moved[mine.sheared_case(case, direction)] = way.moved_pressure()
     if planned.COUPLING in plan.shown:
         coupled = variant(plan, 2, coupling="coupled")
         yield from _coupled_changes(scene, numbers, lambda: make_results(companion(coupled)))

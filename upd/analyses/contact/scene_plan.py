@@ -11,26 +11,8 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.base import Effect
-from upd.analyses.contact.plan import (
-    ACROSS,
-    ALONG,
-    COMPONENTS,
-    NORMAL,
-    TILT,
-    ContactPlan,
-    Family,
-    auto_core_depth,
-    auto_patch,
-    choose_symmetry,
-    component,
-    is_curved,
-    make_effects,
-    make_families,
-    normal_loads,
-    recipe_parameters,
-    require_contact_sets,
-    require_held,
-)
+from upd.analyses.contact import plan as planned
+from upd.analyses.contact.plan import ALONG, NORMAL, ContactPlan, Family, is_curved
 from upd.analyses.cost import NODES, START_BYTES, CostModel, dense_s
 from upd.errors import InputError, UpdError
 from upd.linalg.routes import EACH, FIRST
@@ -48,12 +30,13 @@ def make_plan(scene: Scene) -> ContactPlan:
             f"materials: a contact has two bodies, {len(scene.materials)} given "
             f"({', '.join(scene.materials)})"
         )
-    loaded = any(load.force > 0.0 for load in normal_loads(scene))
+    loaded = any(load.force > 0.0 for load in planned.normal_loads(scene))
     if not is_curved(scene):
         _require_fitting(scene)
-    symmetry, why = choose_symmetry(scene)
-    families, effects = make_families(scene, symmetry), make_effects(scene, symmetry, why, loaded)
-    parameters = recipe_parameters(scene, symmetry)
+    symmetry, why = planned.choose_symmetry(scene)
+    families = planned.make_families(scene, symmetry)
+    effects = planned.make_effects(scene, symmetry, why, loaded)
+    parameters = planned.recipe_parameters(scene, symmetry)
     return _with_companion(contact_plan(scene, symmetry, families, effects, parameters))
 
 
@@ -64,12 +47,12 @@ def _require_fitting(scene: Scene) -> None:
         problems.append(
             'mesh.symmetry: a damper\'s face has one mirror plane; use "half", "full" or "auto"'
         )
-    axes = {component(d) for d in scene.loads.directions}
-    if scene.wants("contact_law") and friction_on(scene) and not {ALONG, ACROSS} <= axes:
+    axes = {planned.component(d) for d in scene.loads.directions}
+    if scene.wants("contact_law") and friction_on(scene) and not {ALONG, planned.ACROSS} <= axes:
         problems.append(
             'loads.directions: contact_law needs the stiffness along both axes; give ["x", "y"]'
         )
-    oblique = [d for d in scene.loads.directions if component(d) is None]
+    oblique = [d for d in scene.loads.directions if planned.component(d) is None]
     if oblique and friction_on(scene) and scene.slip_directions == 1:
         problems.append(
             f"loads.directions: {oblique[0]:g} deg lies between the axes and slips in two "
@@ -102,10 +85,12 @@ def contact_plan(
             + (f"; {', '.join(missing)} has no material" if missing else "")
             + (f"; {', '.join(spare)} is not one of them" if spare else "")
         )
-    require_held(scene, parameters, size)
+    planned.require_held(scene, parameters, size)
     if recipes.counted_by_mesh(scene.recipe):
         # The mesh is there: what it lacks is reported before anything is written.
-        require_contact_sets(scene, recipes.build_mesh(scene.recipe, parameters)[0], families)
+        planned.require_contact_sets(
+            scene, recipes.build_mesh(scene.recipe, parameters)[0], families
+        )
     cost, on = CostModel(scene), {effect.name for effect in effects if effect.on}
     products = [(family, _products(scene, on, family)) for family in families]
     _add_bodies(cost, scene, size, products, recipes.weighted_sets(scene.recipe, parameters))
@@ -247,7 +232,7 @@ def _with_companion(plan: ContactPlan) -> ContactPlan:
     coarser.
     """
     scene = plan.scene
-    if not {*plan.shown} - {TILT}:
+    if not {*plan.shown} - {planned.TILT}:
         return plan
     off = ("load curve", "internal displacement")
     effects = [replace(e, on=e.on and e.name not in off) for e in plan.effects]
@@ -257,7 +242,7 @@ def _with_companion(plan: ContactPlan) -> ContactPlan:
     # What couples the directions is looked up in the whole compliance.
     route = "condensed" if scene.solver.route == "products" else scene.solver.route
     smaller = replace(scene, want=want, solver=replace(scene.solver, route=route))
-    whole, family = _whole_parameters(scene), (Family(COMPONENTS),)
+    whole, family = _whole_parameters(scene), (Family(planned.COMPONENTS),)
     try:
         companion = contact_plan(smaller, "full", family, effects, _coarse(scene, whole))
     except UpdError:
@@ -289,13 +274,13 @@ def _whole_parameters(scene: Scene) -> dict[str, Any]:
 
     The patch is no larger than the largest load needs it.
     """
-    parameters = recipe_parameters(scene, "full")
+    parameters = planned.recipe_parameters(scene, "full")
     if scene.sphere_radius is not None and max(scene.loads.forces) > 0.0:
-        needed = auto_patch(scene)
+        needed = planned.auto_patch(scene)
         if needed < float(parameters["patch"]):
             share = needed / float(parameters["patch"])
             parameters["patch"] = needed
             parameters["divisions"] = 2 * round(0.5 * share * int(parameters["divisions"])) or 2
             if scene.geometry.get("core_depth", "auto") == "auto":
-                parameters["core_depth"] = auto_core_depth(scene, needed)
+                parameters["core_depth"] = planned.auto_core_depth(scene, needed)
     return parameters
