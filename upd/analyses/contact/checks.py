@@ -17,13 +17,7 @@ from upd.analyses.contact import loading
 from upd.analyses.contact.bodies import product_checks
 from upd.analyses.contact.faces import lattices, rim_nodes, tractions
 from upd.analyses.contact.plan import NORMAL, REMEDIES, beta_of, wider_patch
-from upd.analyses.contact.solution import (
-    ContactSolution,
-    NormalCase,
-    TangentialCase,
-    closed_form_traction,
-    hertz_of,
-)
+from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
 from upd.contact.subsurface import most_stressed, partial_slip_ratio
@@ -383,11 +377,11 @@ def yield_checks(solution: ContactSolution) -> Iterator[Check]:
     for t in solution.tangential:
         shear = np.zeros((2, len(t.pressed)))
         shear[list(t.nodes.components)] = tractions(solution, t)
-        closed = closed_form_traction(solution, t) is not None
+        closed = solution.closed_form_traction(t) is not None
         fields = [pressure(np.maximum(t.pressed, 0.0)), *shear]
         loads.append((t, t.normal.force, closed, fields))
     for one, force, closed, fields in loads if limited else ():
-        by_hertz = closed and hertz_of(solution, force) is not None
+        by_hertz = closed and solution.hertz_of(force) is not None
         faces = [] if by_hertz else [k.even(fields) for k in lattices(solution)]
         for body in limited:
             limit = scene.materials[body.name].yield_stress
@@ -407,7 +401,7 @@ def _hertz_stress(
     solution: ContactSolution, case: Case, force: float, body: str
 ) -> tuple[float, str]:
     """MPa in a body of a sphere's contact, and what it is."""
-    scene, hertz = solution.plan.scene, hertz_of(solution, force)
+    scene, hertz = solution.plan.scene, solution.hertz_of(force)
     material, radius = scene.materials[body], scene.sphere_radius
     assert hertz is not None and radius is not None and material.yield_stress is not None
     worst = hertz_yield_point(material.nu)

@@ -15,16 +15,7 @@ from upd.analyses.contact import faces
 from upd.analyses.contact.faces import FaceLattice, corner, lattices
 from upd.analyses.contact.loading import LoadPath
 from upd.analyses.contact.results import printed_of
-from upd.analyses.contact.solution import (
-    ContactSolution,
-    NormalCase,
-    TangentialCase,
-    beyond_3a,
-    closed_form_traction,
-    hertz_of,
-    shear_compliance,
-    stick_radius,
-)
+from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
 from upd.contact.law import ContactLaw
 from upd.labels import file_name
 from upd.mesh import recipes
@@ -152,7 +143,7 @@ def _approach_split(case: NormalCase) -> Variables:
 
 
 def _hertz(solution: ContactSolution, case: NormalCase) -> Variables:
-    hertz = hertz_of(solution, case.force)
+    hertz = solution.hertz_of(case.force)
     if hertz is None:
         return {}
     x = np.linspace(-hertz.radius, hertz.radius, _ACROSS)
@@ -167,14 +158,14 @@ def _hertz(solution: ContactSolution, case: NormalCase) -> Variables:
 
 
 def _cattaneo(solution: ContactSolution, t: TangentialCase) -> Variables:
-    hertz, c = hertz_of(solution, t.normal.force), stick_radius(solution, t)
+    hertz, c = solution.hertz_of(t.normal.force), solution.stick_radius(t)
     if hertz is None or c is None:
         return {}
     out: Variables = {
         "hertz_radius": variable("", hertz.radius, "mm"),
         "mindlin_stick_radius": variable("", c, "mm"),
     }
-    closed = closed_form_traction(solution, t)
+    closed = solution.closed_form_traction(t)
     if closed is not None:
         x = np.linspace(-_BEYOND * hertz.radius, _BEYOND * hertz.radius, _ACROSS)
         out["mindlin_x"] = variable("mindlin_x", x, "mm")
@@ -190,10 +181,10 @@ def _deresiewicz(solution: ContactSolution, cycle: LoadPath) -> Variables:
         out["finite_body_compliance"] = variable(
             "", normal.finite_body_shear, "mm/N", "shear of the finite, held bodies"
         )
-    hertz, ratio = hertz_of(solution, normal.force), cycle.case.ratio
+    hertz, ratio = solution.hertz_of(normal.force), cycle.case.ratio
     if hertz is None or ratio is None:
         return out
-    mu, C = solution.plan.scene.contact.friction, shear_compliance(solution)
+    mu, C = solution.plan.scene.contact.friction, solution.shear_compliance()
     peak = ratio * mu * normal.force
     T = np.linspace(peak, -peak, _ALONG)
     d = mindlin.unloading(T, peak, mu, normal.force, hertz.radius, C)
@@ -233,7 +224,7 @@ def _approach_over_load(solution: ContactSolution, d: Array, F: Array) -> Variab
         bodies = split[-1].finite_body / split[-1].force * F
         out["approach_contact"] = variable("point", d - bodies, "mm")
     force = np.linspace(0.0, float(F[-1]), _ALONG)
-    hertz = [h for load in force[1:] if (h := hertz_of(solution, float(load))) is not None]
+    hertz = [h for load in force[1:] if (h := solution.hertz_of(float(load))) is not None]
     if hertz:
         out["hertz_normal_force"] = variable("hertz_point", force, "N")
         for name, unit in (("area", "mm2"), ("max_pressure", "MPa"), ("approach", "mm")):
@@ -251,7 +242,7 @@ def _along(solution: ContactSolution) -> Variables:
         "max_pressure": variable(dims, [p.measures.max_pressure for p in points], "MPa"),
         "loaded_approach": variable(dims, [p.approach for p in points], "mm"),
     }
-    closed = [beyond_3a(solution, p.force) for p in points]
+    closed = [solution.beyond_3a(p.force) for p in points]
     for body in points[0].compression:
         name = f"compression_{file_name(body)}"
         beyond = [p.compression[body] for p in points]

@@ -16,16 +16,7 @@ from upd.analyses.contact import faces
 from upd.analyses.contact.faces import lattices
 from upd.analyses.contact.loading import pressed_by
 from upd.analyses.contact.plan import NORMAL, direction_name, normal_loads
-from upd.analyses.contact.solution import (
-    ContactSolution,
-    NormalCase,
-    References,
-    TangentialCase,
-    closed_form_traction,
-    hertz_of,
-    normal_references,
-    shear_references,
-)
+from upd.analyses.contact.solution import ContactSolution, NormalCase, References, TangentialCase
 from upd.contact.patch import consistent_average
 from upd.contact.stiffness import without_body
 from upd.mesh import recipes
@@ -118,7 +109,7 @@ def make_results(solution: ContactSolution, *, misfits: bool = True) -> list[Res
     scene = solution.plan.scene
     out = _equilibrium(solution)
     for case in solution.normal:
-        known = normal_references(solution, case)
+        known = solution.normal_references(case)
         out += _normal(solution, case, known)
         if scene.wants("stiffness") and case.force > 0.0:
             out += _stiffness(solution, case, known)
@@ -200,7 +191,7 @@ def _normal(solution: ContactSolution, case: NormalCase, known: References) -> l
     if not solution.curved:
         return out + _of_faces(solution, case)
     out += _approach_split(case, known)
-    hertz = hertz_of(solution, case.force)
+    hertz = solution.hertz_of(case.force)
     if hertz is not None:
         out.append(q.CLOSED_FORM_ERROR.of(hertz.approach**2 / hertz.radius**2, at))
     return [_with_estimate(result, case) for result in out]
@@ -392,7 +383,7 @@ def _law(solution: ContactSolution, case: NormalCase) -> list[Result]:
 def _tangential(solution: ContactSolution, t: TangentialCase, *, misfits: bool) -> Iterable[Result]:
     area = faces.area_of(solution, t.stick)
     if solution.curved:
-        known = shear_references(solution, t)
+        known = solution.shear_references(t)
         rows = [(q.STICK_RADIUS, float(np.sqrt(area / np.pi))), (q.SHEAR_RAW, t.displacement)]
         if t.normal.shear_shares:
             bodies = t.load * t.normal.finite_body_shear
@@ -413,7 +404,7 @@ def _misfits(solution: ContactSolution, t: TangentialCase) -> list[Result]:
     """Root mean square difference of the traction from Cattaneo and Mindlin's, where they have a
     closed form, over that of the closed form and over that of mu p.
     """
-    hertz, closed = hertz_of(solution, t.normal.force), closed_form_traction(solution, t)
+    hertz, closed = solution.hertz_of(t.normal.force), solution.closed_form_traction(t)
     if hertz is None or closed is None or solution.model.patch.quads is not None:
         return []
     patch, mu = solution.model.patch, solution.plan.scene.contact.friction
