@@ -6,17 +6,15 @@ middle, y up the slope from the patch's lower edge.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from upd.analyses.seated.interface import Array
-from upd.analyses.seated.lattice import lattice, lines
+from upd.analyses.contact.faces import FaceLattice
 from upd.analyses.seated.results import platform_force
 from upd.analyses.seated.solve import (
     AGAIN,
@@ -27,6 +25,7 @@ from upd.analyses.seated.solve import (
     SeatedSolution,
 )
 from upd.contact.coulomb_conditions import OPEN, STICK
+from upd.contact.patch import make_patch
 from upd.mesh import IntArray, Mesh
 from upd.results import ArrayGroup, variable
 from upd.scene.forced_contact import SIDES, Side
@@ -71,15 +70,15 @@ def arrays(solution: SeatedSolution) -> dict[str, ArrayGroup]:
         out[f"{content} {phase.name}"] = ArrayGroup(
             _history(solution, phase), content=content, case=phase.case
         )
-    patches = face_patches(solution)
+    faces = _faces(solution)
     for phase in solution.phases.values():
-        for patch in patches:
-            name = f"face {patch.side} {patch.name} {phase.name}".replace("  ", " ")
+        for side, face in faces:
+            name = f"face {side} {face.name} {phase.name}".replace("  ", " ")
             out[name] = ArrayGroup(
-                _face(solution, patch, phase),
+                _face(solution, face, phase),
                 content=FACE,
-                case=replace(phase.case, side=patch.side),
-                **({"patch": patch.name} if patch.name else {}),
+                case=replace(phase.case, side=side),
+                **({"patch": face.name} if face.name else {}),
             )
     out["faces"] = _nodes(solution)
     for phase in solution.phases.values():
@@ -149,120 +148,63 @@ def _history(solution: SeatedSolution, phase: Phase) -> Variables:
     return out
 
 
-def _face(solution: SeatedSolution, patch: FacePatch, phase: Phase) -> Variables:
+def _face(solution: SeatedSolution, k: FaceLattice, phase: Phase) -> Variables:
     """Pressure, traction, slip and state on a face's lattice after a phase."""
     of, found, place = solution.interface, phase.found, "x y"
     force, slip = found.force[-1], found.slip[-1]
-    area = patch.field(of.area, extensive=True)
-    normal = patch.field(force[:, 0], extensive=True)
+    area, normal = (k.field(one, extensive=True) for one in (of.area, force[:, 0]))
     out: Variables = {
-        "x": variable("x", patch.x, "mm", "along the damper, from its middle"),
-        "y": variable("y", patch.y, "mm", "up the slope, from the lower edge"),
+        "x": variable("x", k.X, "mm", "along the damper, from its middle"),
+        "y": variable("y", k.Y, "mm", "up the slope, from the lower edge"),
         "normal_force": variable(place, normal, "N"),
         "pressure": variable(place, normal / area, "MPa"),
-        "gap": variable(place, patch.field(found.gap[-1]), "mm"),
-        "state": variable(place, patch.field(found.state[-1]), flag_meanings=_STATES),
+        "gap": variable(place, k.field(found.gap[-1]), "mm"),
+        "state": variable(place, k.field(found.state[-1]), flag_meanings=_STATES),
     }
-    for j, name in ((0, "along"), (1, "up")):
-        odd = j == 0
-        shear = patch.field(force[:, 1 + j], extensive=True, odd=odd)
+    # the mirror image has the opposite along the damper
+    image = np.where((k.X < 0.0) & (of.copies > 1), -1.0, 1.0)[:, None]
+    for j, name, sign in ((0, "along", image), (1, "up", np.ones_like(image))):
+        shear = sign * k.field(force[:, 1 + j], extensive=True)
         out[f"traction_{name}"] = variable(place, shear / area, "MPa")
-        out[f"slip_{name}"] = variable(place, patch.field(slip[:, j], odd=odd), "mm")
+        out[f"slip_{name}"] = variable(place, sign * k.field(slip[:, j]), "mm")
     return out
 
 
-@dataclass(frozen=True)
-class FacePatch:
-    """One connected part of a face: a pad, or the whole of it.
-
-    Attributes
-    ----------
-    name
-        "pad 1" and so on; "" where the face is one.
-    x, y
-        Lattice lines, mm.
-    at : (len(x), len(y)) array of int
-        Node of the interface at each place.
-    doubled : (len(x),) array of bool
-        Lines on the mirror plane of a half, whose nodes carry half of the force.
-    flipped : (len(x),) array of bool
-        Lines of the mirror image.
+def _faces(solution: SeatedSolution) -> list[tuple[Side, FaceLattice]]:
+    """The parts of both faces, left first, along the damper; "pad 1" and so on where they are
+    several.
     """
-
-    side: Side
-    name: str
-    x: Array
-    y: Array
-    at: IntArray
-    doubled: NDArray[np.bool_]
-    flipped: NDArray[np.bool_]
-
-    def field(self, values: Array, *, extensive: bool = False, odd: bool = False) -> Array:
-        """(len(x), len(y)) of a field of the interface's nodes (n,).
-
-        ``extensive``: forces and areas; ``odd``: the mirror image has the opposite.
-        """
-        out = np.asarray(values, float)[self.at]
-        if extensive:
-            out = np.where(self.doubled[:, None], 2.0 * out, out)
-        return np.asarray(np.where(self.flipped[:, None], -out, out) if odd else out)
-
-
-def face_patches(solution: SeatedSolution) -> list[FacePatch]:
-    """The parts of both faces, left first, along the damper."""
+    of, out = solution.interface, []
     assert solution.bodies is not None
-    out: list[FacePatch] = []
-    first = 0
-    for side in SIDES:
-        mesh = solution.bodies.blades[side].mesh
-        patch = lattice(mesh)
-        local = mesh.points[patch.nodes] @ patch.frame.T
-        up = local[:, 2] - local[:, 2].min()
+    half = of.copies > 1
+    _, along, up = np.einsum("nc,nfc->fn", of.position, of.frame[of.face])
+    for k, side in enumerate(SIDES):
+        mine = np.flatnonzero(of.face == k)
+        points = np.column_stack([along, up - up[mine].min()])
         found = []
-        for nodes in _parts(mesh, patch.nodes):
-            found += _whole(side, nodes + first, local[nodes, 1], up[nodes], solution)
-        found.sort(key=lambda one: float(one.x[0]))
-        if len(found) > 1:
-            found = [
-                FacePatch(side, f"pad {k + 1}", p.x, p.y, p.at, p.doubled, p.flipped)
-                for k, p in enumerate(found)
-            ]
-        out += found
-        first += len(patch.nodes)
+        for part in _parts(solution.bodies.blades[side].mesh):
+            # the line on the plane once
+            on_plane = half and bool((along[mine[part]] == 0.0).any())
+            patch = make_patch(points, of.area, (on_plane, False), mine[part])
+            images = (False, True) if half and not on_plane else (False,)
+            found += [FaceLattice("", patch, flipped) for flipped in images]
+        found.sort(key=lambda one: float(one.X[0]))
+        several = len(found) > 1
+        out += [
+            (side, replace(one, name=f"pad {i + 1}" if several else ""))
+            for i, one in enumerate(found)
+        ]
     return out
 
 
-def _parts(mesh: Mesh, nodes: IntArray) -> list[IntArray]:
-    """Places in `nodes` of each connected part of the patch."""
-    faces = np.searchsorted(nodes, mesh.faces["patch"][:, :4])
+def _parts(mesh: Mesh) -> list[IntArray]:
+    """Places in the nodes of the patch of each connected part."""
+    nodes, faces = np.unique(mesh.faces["patch"][:, :4], return_inverse=True)
+    faces, n = faces.reshape(-1, 4), len(nodes)
     ends = np.concatenate([faces[:, [k, (k + 1) % 4]] for k in range(4)])
-    n = len(nodes)
     graph = coo_array((np.ones(len(ends)), ends.T), shape=(n, n))
     count, part = connected_components(graph, directed=False)
     return [np.flatnonzero(part == k) for k in range(count)]
-
-
-def _whole(
-    side: Side, nodes: IntArray, along: Array, up: Array, solution: SeatedSolution
-) -> list[FacePatch]:
-    """A part with its mirror image: one where it lies on the plane, two else."""
-    i, j = lines(along), lines(up)
-    at = np.empty((int(i.max()) + 1, int(j.max()) + 1), np.int64)
-    at[i, j] = nodes
-    x, y = np.empty(len(at)), np.empty(at.shape[1])
-    x[i], y[j] = along, up
-    no = np.zeros(len(x), bool)
-    if solution.interface.copies == 1:
-        return [FacePatch(side, "", x, y, at, no, no)]
-    if x[0] == 0.0:
-        # the line on the plane once
-        mirrored = np.concatenate((at[:0:-1], at))
-        place = np.concatenate((-x[:0:-1], x))
-        return [FacePatch(side, "", place, y, mirrored, place == 0.0, place < 0.0)]
-    return [
-        FacePatch(side, "", -x[::-1], y, at[::-1], no, ~no),
-        FacePatch(side, "", x, y, at, no, no),
-    ]
 
 
 def write_files(solution: SeatedSolution, folder: Path) -> None:
