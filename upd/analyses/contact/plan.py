@@ -177,23 +177,21 @@ def normal_loads(scene: Scene) -> tuple[DamperLoad, ...]:
 
 def choose_symmetry(scene: Scene) -> tuple[str, str]:
     """Part of the model that is solved, and why. Raises InputError for one that does not serve."""
-    asked, reasons = scene.mesh.symmetry, []
-    if not recipes.has_parameter(scene.recipe, "symmetry"):
-        reasons.append("the geometry has no mirror plane")
-    if scene.coupled:
-        reasons.append("normal and tangential contact at once are solved on the full model")
-    elif friction_on(scene) and scene.slip_directions == 2:
-        reasons.append("slip in two directions is solved on the full model")
-    if scene.contact.tilt == "free":
-        reasons.append("the damper may tilt about both axes")
-    if scene.geometry.get("pad_offset", 0.0) != 0.0:
-        reasons.append("the pads have unequal heights")
+    asked, two = scene.mesh.symmetry, friction_on(scene) and scene.slip_directions == 2
+    hindered = {
+        "the geometry has no mirror plane": not recipes.has_parameter(scene.recipe, "symmetry"),
+        "normal and tangential contact at once are solved on the full model": scene.coupled,
+        "slip in two directions is solved on the full model": two and not scene.coupled,
+        "the damper may tilt about both axes": scene.contact.tilt == "free",
+        "the pads have unequal heights": scene.geometry.get("pad_offset", 0.0) != 0.0,
+    }
+    reasons = "; ".join(why for why, applies in hindered.items() if applies)
     if asked not in ("auto", "full") and reasons:
-        raise InputError(f'mesh.symmetry: {"; ".join(reasons)}; use "full" or "auto"')
+        raise InputError(f'mesh.symmetry: {reasons}; use "full" or "auto"')
     if asked != "auto":
         return asked, "asked for in the scene"
     if reasons:
-        return "full", "; ".join(reasons)
+        return "full", reasons
     if is_curved(scene):
         return "quarter", "geometry, load and effects share both mirror planes"
     return "half", "geometry and loads share the mirror plane x = 0"

@@ -16,10 +16,9 @@ from scipy.linalg import cho_factor, cho_solve
 
 from upd.analyses.contact import loading
 from upd.analyses.contact import plan as planned
-from upd.analyses.contact.bodies import learns, prepare, show_normal
+from upd.analyses.contact.bodies import learns, prepare, show_normal, solve_inside
 from upd.analyses.contact.faces import measured
 from upd.analyses.contact.plan import NORMAL, ContactPlan, DamperLoad
-from upd.analyses.contact.shares import solve_inside
 from upd.analyses.contact.solution import (
     ContactSolution,
     NormalCase,
