@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,8 @@ from upd.scene import Scene
 Array = NDArray[np.float64]
 #: fewest node spacings across flat faces
 _ACROSS = 4
+#: a check that does not end the run
+_warning = partial(Check, fatal=False)
 _EPS, _TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
 _YIELDS = (
     "the body yields before this load, and the contact is then larger and its pressure lower than "
@@ -125,27 +128,18 @@ def tangential_checks(case: Case, model: ContactModel, t: loading.Sheared) -> li
     along = np.maximum(0.0, (slip * force).sum(axis=0)) / np.maximum(length**2, _TINY)
     beside = np.abs(slip - along * force) / size
     largest, slips = float(t.limit.max()), ~t.stick
-    force_allowed = allowed * float((size / diagonal.reshape(k, n)).max()) / largest
+    bound = allowed * float((size / diagonal.reshape(k, n)).max()) / largest
     left = np.abs(force.sum(axis=1) - t.load).max() / t.limit.sum()
-    beyond, short = length - t.limit, np.abs(length - t.limit)[slips].max(initial=0.0)
+    beyond = (length - t.limit) / largest
+    over, short = max(0.0, beyond.max()), np.abs(beyond)[slips].max(initial=0.0)
     stuck = (np.abs(slip) / size)[:, t.stick].max(initial=0.0)
     astray = beside[:, slips].max(initial=0.0)
     return conditions(
         case,
         "report this case",
         ("tangential balance", left, allowed, "|sum of tractions - T| / mu N"),
-        (
-            "Coulomb limit",
-            max(0.0, float(beyond.max()) / largest),
-            force_allowed,
-            "largest (|t| - mu f) / max(mu f), before projection",
-        ),
-        (
-            "slip at the limit",
-            short / largest,
-            force_allowed,
-            "largest ||t| - mu f| / max(mu f) where nodes slip",
-        ),
+        ("Coulomb limit", over, bound, "largest (|t| - mu f) / max(mu f), before projection"),
+        ("slip at the limit", short, bound, "largest ||t| - mu f| / max(mu f) where nodes slip"),
         ("stick", stuck, allowed, "largest slip d - C t / its terms where nodes stick"),
         ("slip direction", astray, allowed, "slip beside or against the traction / its terms"),
     )
@@ -166,12 +160,10 @@ def _left_out_checks(solution: ContactSolution) -> list[Check]:
         checks.append(_coupling_check(scene))
     if scene.mesh.element == "hex8":
         checks.append(_locking_check(solution))
-    text, remedy = (
-        "sum |df| / 2 F at T = mu N",
-        "gross slip would move much of the pressure: trust the first loading only",
-    )
+    says = "sum |df| / 2 F at T = mu N"
+    remedy = "gross slip would move much of the pressure: trust the first loading only"
     return checks + [
-        Check("pressure moved by shear", case, value, 0.5, text, remedy, fatal=False)
+        _warning("pressure moved by shear", case, value, 0.5, says, remedy)
         for case, value in solution.moved.items()
     ]
 
@@ -182,15 +174,13 @@ def _coupling_check(scene: Scene) -> Check:
     Bodies of finite shape couple the two problems whatever their materials: nearly not at all
     where the contact is small against both, much where it is as large as they are.
     """
-    return Check(
-        "Dundurs beta",
-        NO_CASE,
-        beta_of(scene),
-        scene.contact.coupling_limit,
-        "|beta|: how much pressure shears half-spaces of unlike materials",
+    says = "|beta|: how much pressure shears half-spaces of unlike materials"
+    remedy = (
         "pressure shears the contact of these materials, which the tangential numbers leave out: "
-        'set contact.coupling = "coupled", or raise contact.coupling_limit to accept it',
-        fatal=False,
+        'set contact.coupling = "coupled", or raise contact.coupling_limit to accept it'
+    )
+    return _warning(
+        "Dundurs beta", NO_CASE, beta_of(scene), scene.contact.coupling_limit, says, remedy
     )
 
 
@@ -201,17 +191,12 @@ def _locking_check(solution: ContactSolution) -> Check:
     10, 56, 233 % off Hertz with nu = 0.3, 0.4, 0.45, 0.48, 0.49, 0.499, 0.4999; hex8i's -0.4 to
     -2.1 %. (T. J. R. Hughes, The Finite Element Method, 2000, section 4.3: volumetric locking.)
     """
-    scene = solution.plan.scene
-    return Check(
-        "locking",
-        NO_CASE,
-        max(one.nu for one in scene.materials.values()),
-        0.48,
-        "Poisson's ratio of bodies of hex8",
+    remedy = (
         "hex8 locks where a body is nearly incompressible: pressures are more than about 5 % too "
-        'high, and at 0.4999 more than three times the right ones: set mesh.element = "hex8i"',
-        fatal=False,
+        'high, and at 0.4999 more than three times the right ones: set mesh.element = "hex8i"'
     )
+    largest = max(one.nu for one in solution.plan.scene.materials.values())
+    return _warning("locking", NO_CASE, largest, 0.48, "Poisson's ratio of bodies of hex8", remedy)
 
 
 def _missing(shown: Iterable[str], made: set[str]) -> Iterable[Check]:
@@ -239,15 +224,10 @@ def _rim_check(solution: ContactSolution, case: NormalCase) -> Check:
         return Check("patch rim", case.case, 0, 0, "the contact is flat: its rim belongs to it")
     radius = half**2 / (2.0 * corner)
     needed = 2.6 * float(np.cbrt(0.75 * case.force * radius / solution.modulus))
-    return Check(
-        "patch rim",
-        case.case,
-        rim_nodes(solution, case),
-        0,
-        "rim nodes in contact",
-        f"the contact reaches the rim of the {2 * half:.4g} mm patch: "
-        + wider_patch(solution.plan.scene, needed),
-    )
+    remedy = f"the contact reaches the rim of the {2 * half:.4g} mm patch: "
+    remedy += wider_patch(solution.plan.scene, needed)
+    nodes = rim_nodes(solution, case)
+    return Check("patch rim", case.case, nodes, 0, "rim nodes in contact", remedy)
 
 
 def _resolution_check(solution: ContactSolution, case: NormalCase) -> Check:
@@ -262,16 +242,9 @@ def _resolution_check(solution: ContactSolution, case: NormalCase) -> Check:
         if ways
         else f"mesh the contact surface with elements of {radius / 3.0:.3g} mm or less"
     )
-    return Check(
-        "resolution",
-        case.case,
-        3.0 * spacing / max(radius, 1e-300),
-        1.0,
-        "3 h / a (a contact radius, h node spacing)",
-        "fewer than 3 nodes along the contact radius, so the numbers of this load are "
-        f"rough: {finer}",
-        fatal=False,
-    )
+    rough = "fewer than 3 nodes along the contact radius, so the numbers of this load are rough: "
+    value, says = 3.0 * spacing / max(radius, 1e-300), "3 h / a (a contact radius, h node spacing)"
+    return _warning("resolution", case.case, value, 1.0, says, rough + finer)
 
 
 def _flat_resolution_check(solution: ContactSolution) -> Check:
@@ -297,15 +270,9 @@ def _flat_resolution_check(solution: ContactSolution) -> Check:
         if recipes.has_parameter(scene.recipe, name)
         else f"mesh the contact with {enough} elements or more along each edge"
     )
-    return Check(
-        "resolution",
-        NO_CASE,
-        enough / fewest,
-        1.0,
-        f"{enough} / lines of elements across the contact",
-        f"the stiffnesses are wrong by more than about 5 %: {way}",
-        fatal=False,
-    )
+    says = f"{enough} / lines of elements across the contact"
+    remedy = f"the stiffnesses are wrong by more than about 5 %: {way}"
+    return _warning("resolution", NO_CASE, enough / fewest, 1.0, says, remedy)
 
 
 def _curved_checks(solution: ContactSolution) -> list[Check]:
@@ -323,7 +290,7 @@ def _curved_checks(solution: ContactSolution) -> list[Check]:
     checks.append(_steepness_check(solution))
     if solution.no_shares:
         text, remedy = solution.no_shares, "use a larger or finer body"
-        checks.append(Check("body compression", NO_CASE, 1, 0, text, remedy, fatal=False))
+        checks.append(_warning("body compression", NO_CASE, 1, 0, text, remedy))
     return checks
 
 
@@ -394,7 +361,7 @@ def yield_checks(solution: ContactSolution) -> Iterator[Check]:
                 stress, says = _half_space_stress(faces, sign, scene.materials[body.name].nu)
             says = f"largest von Mises stress / yield stress of {body.name}, {says}"
             case = replace(one.case, body=body.name)
-            yield Check("onset of yield", case, stress / limit, 1.0, says, _YIELDS, fatal=False)
+            yield _warning("onset of yield", case, stress / limit, 1.0, says, _YIELDS)
 
 
 def _hertz_stress(

@@ -227,7 +227,6 @@ def raised(
     arms: Array,
     *,
     body: Body | None = None,
-    gap: Array | None = None,
 ) -> dict[float, CoupledState]:
     """States of the positive normal loads in N, each on the way to the next, without a tangential
     load.
@@ -238,8 +237,6 @@ def raised(
         (n, k) mm of the k free tilts.
     body
         Against a rigid counterpart; None: both.
-    gap
-        (n,) mm, in place of the model's.
     """
     n, out = len(model.gap), {}
     found: CoupledContact | None = None
@@ -255,7 +252,7 @@ def raised(
             columns[:, :3], columns[:n, 3:] = np.kron(np.eye(3), np.ones((n, 1))), arms
             found = coupled_contact(
                 tangential_compliance(model, COMPONENTS, np.arange(n), body),
-                model.gap if gap is None else gap,
+                model.gap,
                 friction,
                 load=way,
                 columns=columns,

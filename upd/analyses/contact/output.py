@@ -236,17 +236,16 @@ def _approach_over_load(solution: ContactSolution, d: Array, F: Array) -> Variab
 def _along(solution: ContactSolution) -> Variables:
     """Contact area, largest pressure and each body's compression at the loaded points."""
     points, dims = solution.curve, "loaded_point"
+    area, pressure = zip(*((p.measures.area, p.measures.max_pressure) for p in points), strict=True)
     out: Variables = {
         "load": variable(dims, [p.force for p in points], "N"),
-        "contact_area": variable(dims, [p.measures.area for p in points], "mm2"),
-        "max_pressure": variable(dims, [p.measures.max_pressure for p in points], "MPa"),
+        "contact_area": variable(dims, area, "mm2"),
+        "max_pressure": variable(dims, pressure, "MPa"),
         "loaded_approach": variable(dims, [p.approach for p in points], "mm"),
     }
-    closed = [solution.beyond_3a(p.force) for p in points]
+    closed, words = [solution.beyond_3a(p.force) for p in points], "approach beyond depth 3a"
     for body in points[0].compression:
-        name = f"compression_{file_name(body)}"
-        beyond = [p.compression[body] for p in points]
-        words = "approach beyond depth 3a"
+        name, beyond = f"compression_{file_name(body)}", [p.compression[body] for p in points]
         out[name] = variable(dims, beyond, "mm", words, body=body)
         if all(closed):
             out[f"hertz_{name}"] = variable(dims, [c[body] for c in closed], "mm")

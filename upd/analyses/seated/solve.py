@@ -129,9 +129,9 @@ class SeatedSolution:
         assert self.of is not None
         return self.of
 
-    def forces(self, name: str, step: int = -1) -> Array:
+    def forces(self, name: str) -> Array:
         """(2, 3) N on the faces after a phase: normal, along the damper, up the slope."""
-        return np.asarray(self.interface.face_forces(self.phases[name].found)[step])
+        return np.asarray(self.interface.face_forces(self.phases[name].found)[-1])
 
 
 def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:

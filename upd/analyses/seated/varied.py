@@ -129,12 +129,9 @@ def by_edges(solution: SeatedSolution) -> Estimates:
     of, state = solution.interface, solution.phases[RAISED].found.state[-1]
     assert solution.bodies is not None
     out: dict[Key, tuple[ErrorPart, ...]] = {}
-    first = 0
-    for side in SIDES:
+    for k, side in enumerate(SIDES):
         quads = solution.bodies.blades[side].mesh.faces["patch"][:, :4]
-        nodes, quads = np.unique(quads, return_inverse=True)
-        here = slice(first, first + len(nodes))
-        first = here.stop
+        quads, here = np.unique(quads, return_inverse=True)[1], of.face == k
         area, closed, slips = of.area[here], state[here] != OPEN, state[here] == SLIP
         if not closed.any():
             continue
