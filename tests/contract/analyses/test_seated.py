@@ -14,7 +14,8 @@ from rigs import undeclared
 import upd
 from upd.analyses import make_plan, seated
 from upd.analyses.seated.interface import make_interface
-from upd.analyses.seated.solve import AGAIN, LOWERED, OVER, RAISED, SHAKEN, SMOOTH, SeatedSolution
+from upd.analyses.seated.plan import AGAIN, LOWERED, OVER, RAISED, SHAKEN, SMOOTH
+from upd.analyses.seated.solve import SeatedSolution
 from upd.contact.damper_section import admissible_forces, moment_share
 from upd.contact.equilibrium import equilibrium
 from upd.contact.rigid_damper import SLIDINGS

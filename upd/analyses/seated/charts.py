@@ -9,7 +9,7 @@ import numpy as np
 
 from upd.analyses.contact.charts import TOP_PERCENTILE, face_chart, values
 from upd.analyses.seated.output import FACE, HISTORY, MOVED, SEATING
-from upd.analyses.seated.solve import RAISED, SMOOTH, WAYS
+from upd.analyses.seated.plan import RAISED, SMOOTH, WAYS
 from upd.plot.chart import STATES, Arrays, Axis, Chart, Group, Map, Style, Trace
 from upd.plot.common import UM, case_of, lattice, pressure_map, with_content
 from upd.scene.forced_contact import SIDES

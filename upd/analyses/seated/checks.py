@@ -8,7 +8,8 @@ import numpy as np
 
 from upd.analyses.base import conditions
 from upd.analyses.seated.interface import Array, Interface
-from upd.analyses.seated.solve import RAISED, Phase, SeatedSolution
+from upd.analyses.seated.plan import RAISED
+from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, SLIP
 from upd.results import Check
 

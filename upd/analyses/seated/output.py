@@ -15,15 +15,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from upd.analyses.contact.faces import FaceLattice
+from upd.analyses.seated.plan import AGAIN, LOWERED, RAISED, WAYS
 from upd.analyses.seated.results import platform_force
-from upd.analyses.seated.solve import (
-    AGAIN,
-    LOWERED,
-    RAISED,
-    WAYS,
-    Phase,
-    SeatedSolution,
-)
+from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, STICK
 from upd.contact.patch import make_patch
 from upd.mesh import IntArray, Mesh

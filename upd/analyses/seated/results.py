@@ -8,16 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from upd.analyses.seated.lattice import rigid_balance
-from upd.analyses.seated.solve import (
-    AGAIN,
-    LOWERED,
-    RAISED,
-    SHAKEN,
-    SMOOTH,
-    WAYS,
-    Phase,
-    SeatedSolution,
-)
+from upd.analyses.seated.plan import AGAIN, LOWERED, RAISED, SHAKEN, SMOOTH, WAYS
+from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, SLIP
 from upd.plot.chart import Entry
 from upd.results import Case, Result

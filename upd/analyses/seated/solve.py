@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,17 @@ from numpy.typing import NDArray
 from upd.analyses.base import Resolved
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.analyses.seated.interface import Interface, make_interface
-from upd.analyses.seated.plan import OTHER_WAYS, WORN, SeatedPlan
+from upd.analyses.seated.plan import (
+    OTHER_WAYS,
+    RAISED,
+    SHAKEN,
+    SMOOTH,
+    WORN,
+    SeatedPlan,
+    Way,
+    shaken,
+    ways,
+)
 from upd.contact import CoupledContact, CoupledHistory
 from upd.linalg.parallel import in_parallel
 from upd.progress import Stages
@@ -21,33 +30,6 @@ from upd.results import Case
 from upd.scene.forced_contact import SIDES
 
 Array = NDArray[np.float64]
-_X = 0
-RAISED, LOWERED, AGAIN = "raised", "lowered", "raised again"
-OVER, SHAKEN, SMOOTH = "over-pressed", "vibrated in", "frictionless"
-#: ways to F_C that differ by friction
-WAYS = (RAISED, AGAIN, OVER, SHAKEN)
-
-
-@dataclass(frozen=True)
-class Way:
-    """A way of loading, k steps.
-
-    Attributes
-    ----------
-    name
-        What is done.
-    centrifugal : (k,) ndarray
-        F_C after each step, N.
-    moved : (k, 3) ndarray
-        Shift of what holds the right blade after each step, mm.
-    after
-        The way whose state it starts from; "": nothing pressed.
-    """
-
-    name: str
-    centrifugal: Array
-    moved: Array
-    after: str = RAISED
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,8 +131,9 @@ def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
         worn, F = scene.contact.worn, scene.damper.centrifugal
         solution.gap = worn * solution.of.worn_gap(F) if worn else np.zeros(solution.of.n)
         with stages("seating", f"{RAISED}, {scene.seating.steps} load steps"):
-            _phase(solution, _raised(solution))
-        _go_on(solution, stages)
+            (raised,), *others = ways(scene)
+            _phase(solution, raised)
+        _go_on(solution, others, stages)
         if scene.wants("stiffness"):
             with stages("stiffness", "platforms held"):
                 solution.platforms = (
@@ -166,35 +149,11 @@ def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
     return solution
 
 
-def _raised(solution: SeatedSolution) -> Way:
-    """F_C raised from nothing."""
-    F, s = solution.plan.scene.damper.centrifugal, solution.plan.scene.seating
-    return _still(RAISED, F * np.arange(1, s.steps + 1) / s.steps, "")
-
-
-def _still(name: str, centrifugal: Array, after: str = RAISED) -> Way:
-    return Way(name, centrifugal, np.zeros((len(centrifugal), 3)), after)
-
-
-def _go_on(solution: SeatedSolution, stages: Stages) -> None:
+def _go_on(solution: SeatedSolution, rows: Sequence[Sequence[Way]], stages: Stages) -> None:
     """F_C lowered and raised again, and every other way that is asked for: each from the raised
     state, and so side by side.
     """
-    scene, plan = solution.plan.scene, solution.plan
-    F, s = scene.damper.centrifugal, scene.seating
-    way = np.linspace(1.0, s.lowest, s.steps + 1)[1:] * F
-    back = np.linspace(s.lowest, 1.0, s.steps + 1)[1:] * F
-    rows = [[_still(LOWERED, way), _still(AGAIN, back, LOWERED)]]
-    if scene.wants("band"):
-        over = np.linspace(1.0, s.over, s.steps + 1)[1:]
-        down = np.linspace(s.over, 1.0, s.steps + 1)[1:]
-        rows.append([_still(OVER, F * np.concatenate((over, down)))])
-        rows.append([_shaken(plan)])
-        rows.append([_still(SMOOTH, np.array([F]), "")])
-    if scene.wants("moved"):
-        for axis in scene.moved.directions:
-            moved = _cycles(plan, "xyz".index(axis))
-            rows.append([Way(f"moved along {axis}", np.full(len(moved), F), moved)])
+    scene = solution.plan.scene
     names = [way.name for row in rows for way in row]
     steps = sum(len(way.centrifugal) for row in rows for way in row)
 
@@ -213,32 +172,9 @@ def _go_on(solution: SeatedSolution, stages: Stages) -> None:
 
 def _worn(solution: SeatedSolution) -> None:
     """F_C raised on faces worn in, an effect left out."""
-    of, scene, raised = solution.interface, solution.plan.scene, _raised(solution)
-    gap = of.worn_gap(scene.damper.centrifugal)
-    solution.worn = of.seat(scene.contact.friction, raised.centrifugal, gap=gap)
-
-
-def _shaken(plan: SeatedPlan) -> Way:
-    """The right blade vibrates along x under F_C; its amplitude dies away evenly to nothing."""
-    s = plan.scene.seating
-    t = np.arange(1, s.cycle_steps * s.cycles + 1) / s.cycle_steps
-    moved = np.zeros((len(t), 3))
-    moved[:, _X] = s.shake * (1.0 - t / s.cycles) * np.sin(2.0 * np.pi * t)
-    moved[-1] = 0.0
-    return Way(SHAKEN, np.full(len(t), plan.scene.damper.centrifugal), moved)
-
-
-def _cycles(plan: SeatedPlan, axis: int) -> Array:
-    """(k, 3) mm: out to the amplitude, then whole cycles, in even steps."""
-    m = plan.scene.moved
-    corners = [0.0, 1.0, *[-1.0, 1.0] * m.cycles]
-    way = [
-        np.linspace(a, b, m.steps * (1 if k == 0 else 2) + 1)[1:]
-        for k, (a, b) in enumerate(pairwise(corners))
-    ]
-    out = np.zeros((sum(map(len, way)), 3))
-    out[:, axis] = m.amplitude * np.concatenate(way)
-    return out
+    of, scene = solution.interface, solution.plan.scene
+    gap, raised = of.worn_gap(scene.damper.centrifugal), solution.phases[RAISED].centrifugal
+    solution.worn = of.seat(scene.contact.friction, raised, gap=gap)
 
 
 def _phase(solution: SeatedSolution, way: Way) -> None:
@@ -272,7 +208,7 @@ def _solve_again(solution: SeatedSolution, stages: Stages) -> Iterator[Resolved]
     if not scene.wants("band"):
         if SHAKEN not in solution.phases:
             with stages("seating", SHAKEN):
-                _phase(solution, _shaken(solution.plan))
+                _phase(solution, shaken(scene))
         included = float(solution.forces(SHAKEN)[side, 0])
         del solution.phases[SHAKEN]
         yield resolved(OTHER_WAYS, included, 'friction leaves the state open: add "band" to want')

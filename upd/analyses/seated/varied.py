@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from upd.analyses.base import require_memory
 from upd.analyses.seated.checks import ROUNDING, WORK_ROUNDING
-from upd.analyses.seated.plan import SeatedPlan, make_plan
+from upd.analyses.seated.plan import RAISED, SeatedPlan, make_plan
 from upd.analyses.seated.results import make_results
-from upd.analyses.seated.solve import RAISED, SeatedSolution, solve
+from upd.analyses.seated.solve import SeatedSolution, solve
 from upd.contact.coulomb_conditions import OPEN, SLIP
 from upd.errors import InputError, one_line
 from upd.mesh import IntArray, recipes
