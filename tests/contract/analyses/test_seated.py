@@ -19,7 +19,7 @@ from upd.analyses.seated.solve import SeatedSolution
 from upd.contact.damper_section import admissible_forces, moment_share
 from upd.contact.equilibrium import equilibrium
 from upd.contact.rigid_damper import SLIDINGS
-from upd.errors import InputError
+from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages, silent
 from upd.results import Check
 from upd.scene import load_scene
@@ -243,6 +243,18 @@ def test_state_is_left_in_the_folder(wedge: SeatedSolution) -> None:
     assert len(groups["faces"]["position"][1]) == wedge.interface.n
 
 
+def test_a_way_that_fails_leaves_the_raised_state(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: Any, **__: Any) -> Any:
+        raise ConvergenceError("did not converge")
+
+    monkeypatch.setattr("upd.analyses.seated.interface.Interface.seat_on", refuse)
+    with pytest.raises(ConvergenceError) as failed:
+        solved("symmetric-seated", {**WEDGE, "want": ["seating"]})
+    found = seated.ANALYSIS.make_results(failed.value.partial)  # type: ignore[attr-defined]
+    assert {one.name for one in found} >= {"face_N", "contact_area"}
+    assert "seating_loss" not in {one.name for one in found}
+
+
 def test_worn_faces_press_evenly() -> None:
     """Without friction, and worn in under F_C: the pressure of the wedge is even."""
     scene = {**WEDGE, "contact.friction": 0.0, "contact.fit": "worn", "want": ["seating"]}
@@ -260,10 +272,9 @@ def test_platforms_held_in_the_scene() -> None:
     one = solved(
         "symmetric-seated", {**WEDGE, "blades.held": "platforms", "want": ["seating", "stiffness"]}
     )
-    assert one.platforms is one.of
+    assert one.platforms is one.interface
     # friction of held platforms is not fully mobilised everywhere
     assert 154.67 < one.forces(RAISED)[0, 0] < 247.49
-    assert one.bodies is not None
     soft = make_interface(one.plan, one.bodies, "bases")
     m = 3 * one.interface.n
     assert np.linalg.eigvalsh(soft.compliance - one.interface.compliance)[0] > -1e-9

@@ -77,9 +77,7 @@ def _phase(solution: SeatedSolution, phase: Phase) -> list[Check]:
 
 def _off_balance(solution: SeatedSolution, phase: Phase) -> float:
     """Forces and moments on the damper, from the nodes' places and the faces' frames."""
-    of = solution.interface
-    assert solution.bodies is not None
-    body = solution.bodies.damper
+    of, body = solution.interface, solution.bodies.damper
     F = np.zeros((len(phase.centrifugal), 3))
     F[:, 2] = phase.centrifugal / of.copies
     # into the blades: the damper feels the opposite
@@ -100,17 +98,11 @@ def _off_balance(solution: SeatedSolution, phase: Phase) -> float:
 
 def _kinematics(solution: SeatedSolution, phase: Phase) -> tuple[Array, Array]:
     """Gap (k, n) and slip of each step (k, n, 2) in mm, from forces and motions."""
-    of, found = solution.interface, phase.found
-    assert solution.gap is not None
+    of, found, before = solution.interface, phase.found, phase.before
     w = _motion(of, found.force, found.displacement, phase.moved)
     n = of.n
     gap = solution.gap - w[:, :n]
-    before = phase.before
-    at = (
-        np.zeros((1, 3 * n))
-        if before is None
-        else _motion(of, before.force[None], before.motion[None], np.zeros((1, 3)))
-    )
+    at = _motion(of, before.force[None], before.motion[None], np.zeros((1, 3)))
     ways = np.vstack((at, w))[:, n:].reshape(-1, 2, n).transpose(0, 2, 1)
     return gap, np.diff(ways, axis=0)
 
@@ -139,20 +131,17 @@ def _energy_misfit(solution: SeatedSolution, phase: Phase, gap: Array, step: Arr
 
     By the trapezoidal rule, under which the balance is exact: f' dw = p' ds - f' du - d(f'C f)/2.
     """
-    of, found = solution.interface, phase.found
-    before = phase.before
-    assert solution.gap is not None
-    none = np.zeros_like(found.force[0])
-    force = np.concatenate(((none if before is None else before.force)[None], found.force))
-    gaps = np.vstack((solution.gap if before is None else before.gap, gap))
+    of, found, before = solution.interface, phase.found, phase.before
+    force = np.concatenate((before.force[None], found.force))
+    gaps = np.vstack((before.gap, gap))
     mean = 0.5 * (force[1:] + force[:-1])
     friction = (mean[..., 1:] * step).sum(axis=(1, 2))
     closing = -(mean[..., 0] * np.diff(gaps, axis=0)).sum(axis=1)
     f = force.transpose(0, 2, 1).reshape(len(force), -1)
     elastic = 0.5 * np.diff(((f @ of.compliance) * f).sum(axis=1))
     # What the forces do in motions that cancel is the measure: a damper carried along does no work.
-    start = np.zeros(found.displacement.shape[1]) if before is None else before.motion
-    moves = np.abs(np.diff(np.vstack((start, found.displacement)), axis=0)) @ np.abs(of.columns.T)
+    motion = np.vstack((before.motion, found.displacement))
+    moves = np.abs(np.diff(motion, axis=0)) @ np.abs(of.columns.T)
     size = float((np.abs(f[1:]) * moves).sum())
     return float(np.abs(found.work - elastic - friction - closing).max() / size)
 

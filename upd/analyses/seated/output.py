@@ -43,7 +43,7 @@ _STATE: dict[str, tuple[str, str]] = {
 
 def sizes(solution: SeatedSolution) -> dict[str, int]:
     """Nodes of both faces in the model."""
-    return {"n_pairs": 0 if solution.of is None else solution.of.n}
+    return {"n_pairs": solution.interface.n}
 
 
 def arrays(solution: SeatedSolution) -> dict[str, ArrayGroup]:
@@ -56,8 +56,6 @@ def arrays(solution: SeatedSolution) -> dict[str, ArrayGroup]:
         F_C), "moved" (over the blade's shift), "face" (fields on a face's lattice after each way of
         loading), "seated faces" and "seated state" (of the nodes of both faces, left ones first).
     """
-    if solution.of is None or solution.gap is None:
-        return {}
     out: dict[str, ArrayGroup] = {}
     for phase in solution.phases.values():
         content = MOVED if phase.moved.any() else HISTORY
@@ -169,7 +167,6 @@ def _faces(solution: SeatedSolution) -> list[tuple[Side, FaceLattice]]:
     several.
     """
     of, out = solution.interface, []
-    assert solution.bodies is not None
     half = of.copies > 1
     _, along, up = np.einsum("nc,nfc->fn", of.position, of.frame[of.face])
     for k, side in enumerate(SIDES):
@@ -203,8 +200,6 @@ def _parts(mesh: Mesh) -> list[IntArray]:
 
 def write_files(solution: SeatedSolution, folder: Path) -> None:
     """Meshes of both blades and the damper."""
-    if solution.bodies is None:
-        return
     # meshio is slow to import: only when files are wanted.
     from upd.mesh.export import write_mesh
 

@@ -43,12 +43,12 @@ class Phase(Way):
     found
         Its answers.
     before
-        State it started from; None: nothing pressed.
+        State it started from.
     """
 
     friction: float
     found: CoupledContact
-    before: CoupledHistory | None
+    before: CoupledHistory
 
     @property
     def case(self) -> Case:
@@ -62,16 +62,9 @@ class Phase(Way):
         The mean over a step is what the work of all forces balances with; the traction after the
         step alone is off by the step's share.
         """
-        shear, slip = self.found.force[..., 1:], self.found.slip
-        none = np.zeros_like(shear[:1])
-        before = (
-            (none, none)
-            if self.before is None
-            else (self.before.force[None, :, 1:], self.before.slip[None])
-        )
-        tractions, slips = (
-            np.concatenate((one, many)) for one, many in zip(before, (shear, slip), strict=True)
-        )
+        before, found = self.before, self.found
+        tractions = np.concatenate((before.force[None, :, 1:], found.force[..., 1:]))
+        slips = np.concatenate((before.slip[None], found.slip))
         mean = 0.5 * (tractions[1:] + tractions[:-1])
         return np.asarray((mean * np.diff(slips, axis=0)).sum(axis=(1, 2)))
 
@@ -82,7 +75,7 @@ class SeatedSolution:
 
     Attributes
     ----------
-    bodies, of
+    bodies, interface
         Meshes and matrices; both faces as one contact.
     gap : (n,) ndarray
         mm, before any load.
@@ -97,19 +90,13 @@ class SeatedSolution:
     """
 
     plan: SeatedPlan
-    bodies: Bodies | None = None
-    of: Interface | None = None
-    gap: Array | None = None
+    bodies: Bodies
+    interface: Interface
+    gap: Array
     phases: dict[str, Phase] = field(default_factory=dict)
     worn: CoupledContact | None = None
     platforms: Interface | None = None
     omissions: list[Resolved] = field(default_factory=list)
-
-    @property
-    def interface(self) -> Interface:
-        """The contact of both faces, once it is made."""
-        assert self.of is not None
-        return self.of
 
     def forces(self, name: str) -> Array:
         """(2, 3) N on the faces after a phase: normal, along the damper, up the slope."""
@@ -119,27 +106,27 @@ class SeatedSolution:
 def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
     """Run everything the plan calls for.
 
-    An error raised on the way carries what converged so far as ``partial``.
+    An error after F_C was raised carries what converged so far as ``partial``.
     """
-    solution = SeatedSolution(plan)
+    scene = plan.scene
+    with stages("mesh and assembly", f"both blades and the {scene.arrangement} damper"):
+        bodies = make_bodies(plan)
+    with stages("condensation", "both blades and the damper on the nodes of both faces"):
+        of = make_interface(plan, bodies, scene.blades.held)
+    worn, F = scene.contact.worn, scene.damper.centrifugal
+    gap = worn * of.worn_gap(F) if worn else np.zeros(of.n)
+    solution = SeatedSolution(plan, bodies, of, gap)
+    (raised,), *others = ways(scene)
+    with stages("seating", f"{RAISED}, {scene.seating.steps} load steps"):
+        _phase(solution, raised)
     try:
-        scene = plan.scene
-        with stages("mesh and assembly", f"both blades and the {scene.arrangement} damper"):
-            solution.bodies = make_bodies(plan)
-        with stages("condensation", "both blades and the damper on the nodes of both faces"):
-            solution.of = make_interface(plan, solution.bodies, scene.blades.held)
-        worn, F = scene.contact.worn, scene.damper.centrifugal
-        solution.gap = worn * solution.of.worn_gap(F) if worn else np.zeros(solution.of.n)
-        with stages("seating", f"{RAISED}, {scene.seating.steps} load steps"):
-            (raised,), *others = ways(scene)
-            _phase(solution, raised)
         _go_on(solution, others, stages)
         if scene.wants("stiffness"):
             with stages("stiffness", "platforms held"):
                 solution.platforms = (
-                    solution.of
+                    of
                     if scene.blades.held == "platforms"
-                    else make_interface(plan, solution.bodies, "platforms", like=solution.of)
+                    else make_interface(plan, bodies, "platforms", like=of)
                 )
         if scene.left_out.solves:
             solution.omissions = list(_solve_again(solution, stages))
@@ -182,12 +169,13 @@ def _phase(solution: SeatedSolution, way: Way) -> None:
     of, friction = solution.interface, solution.plan.scene.contact.friction
     if way.after:
         last = solution.phases[way.after].found
-        before: CoupledHistory | None = last.history
-        moved = way.moved if way.moved.any() else None
+        before, moved = last.history, way.moved if way.moved.any() else None
         found = of.seat_on(last, way.centrifugal, moved=moved)
     else:
-        friction, before = 0.0 if way.name == SMOOTH else friction, None
+        friction = 0.0 if way.name == SMOOTH else friction
         found = of.seat(friction, way.centrifugal, gap=solution.gap)
+        none, still = np.zeros((of.n, 3)), np.zeros(len(of.kept))
+        before = CoupledHistory(none, none[:, 1:], solution.gap, still, none[:, 1:], still)
     solution.phases[way.name] = Phase(**vars(way), friction=friction, found=found, before=before)
 
 

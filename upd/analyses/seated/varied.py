@@ -127,7 +127,6 @@ def by_edges(solution: SeatedSolution) -> Estimates:
     A share counts whole nodes, and levels may agree by chance.
     """
     of, state = solution.interface, solution.phases[RAISED].found.state[-1]
-    assert solution.bodies is not None
     out: dict[Key, tuple[ErrorPart, ...]] = {}
     for k, side in enumerate(SIDES):
         quads = solution.bodies.blades[side].mesh.faces["patch"][:, :4]
