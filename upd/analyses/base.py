@@ -121,7 +121,7 @@ class Resolved:
 def conditions(case: Case, remedy: str, *rows: tuple[str, float, float, str]) -> list[Check]:
     """Self-checks of a case with one remedy: name, value, limit and what is compared."""
     return [
-        Check(name, case, float(value), limit, says, remedy) for name, value, limit, says in rows
+        Check(name, case, float(value), limit, what, remedy) for name, value, limit, what in rows
     ]
 
 

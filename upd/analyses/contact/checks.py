@@ -95,10 +95,10 @@ def normal_checks(
         ),
         ("no force across a gap", across, limit, "sum f |h + C f - d| / F, over its terms"),
     )
-    says = "|reaction of the distant set, or sum of the contact forces - F| / F"
+    what = "|reaction of the distant set, or sum of the contact forces - F| / F"
     remedy = 'the linear solve lost accuracy: try solver.name = "superlu" and report the mesh'
     return [
-        *conditions(case, remedy, ("reaction", balance, 1e-8, says)),
+        *conditions(case, remedy, ("reaction", balance, 1e-8, what)),
         *conditions(case, "report this", *rows),
     ]
 
@@ -160,10 +160,10 @@ def _left_out_checks(solution: ContactSolution) -> list[Check]:
         checks.append(_coupling_check(scene))
     if scene.mesh.element == "hex8":
         checks.append(_locking_check(solution))
-    says = "sum |df| / 2 F at T = mu N"
+    what = "sum |df| / 2 F at T = mu N"
     remedy = "gross slip would move much of the pressure: trust the first loading only"
     return checks + [
-        _warning("pressure moved by shear", case, value, 0.5, says, remedy)
+        _warning("pressure moved by shear", case, value, 0.5, what, remedy)
         for case, value in solution.moved.items()
     ]
 
@@ -174,13 +174,13 @@ def _coupling_check(scene: Scene) -> Check:
     Bodies of finite shape couple the two problems whatever their materials: nearly not at all
     where the contact is small against both, much where it is as large as they are.
     """
-    says = "|beta|: how much pressure shears half-spaces of unlike materials"
+    what = "|beta|: how much pressure shears half-spaces of unlike materials"
     remedy = (
         "pressure shears the contact of these materials, which the tangential numbers leave out: "
         'set contact.coupling = "coupled", or raise contact.coupling_limit to accept it'
     )
     return _warning(
-        "Dundurs beta", NO_CASE, beta_of(scene), scene.contact.coupling_limit, says, remedy
+        "Dundurs beta", NO_CASE, beta_of(scene), scene.contact.coupling_limit, what, remedy
     )
 
 
@@ -202,8 +202,8 @@ def _locking_check(solution: ContactSolution) -> Check:
 def _missing(shown: Iterable[str], made: set[str]) -> Iterable[Check]:
     """A failed check for every effect left out whose check was not made."""
     for name in (one for one in shown if one not in made):
-        says, remedy = f"the check of {name} was not made", "report this scene"
-        yield Check(name, NO_CASE, 1, 0, says, remedy)
+        what, remedy = f"the check of {name} was not made", "report this scene"
+        yield Check(name, NO_CASE, 1, 0, what, remedy)
 
 
 # -- size and place of the contact -----------------------------------------------------------------
@@ -243,8 +243,8 @@ def _resolution_check(solution: ContactSolution, case: NormalCase) -> Check:
         else f"mesh the contact surface with elements of {radius / 3.0:.3g} mm or less"
     )
     rough = "fewer than 3 nodes along the contact radius, so the numbers of this load are rough: "
-    value, says = 3.0 * spacing / max(radius, 1e-300), "3 h / a (a contact radius, h node spacing)"
-    return _warning("resolution", case.case, value, 1.0, says, rough + finer)
+    value, what = 3.0 * spacing / max(radius, 1e-300), "3 h / a (a contact radius, h node spacing)"
+    return _warning("resolution", case.case, value, 1.0, what, rough + finer)
 
 
 def _flat_resolution_check(solution: ContactSolution) -> Check:
@@ -270,9 +270,9 @@ def _flat_resolution_check(solution: ContactSolution) -> Check:
         if recipes.has_parameter(scene.recipe, name)
         else f"mesh the contact with {enough} elements or more along each edge"
     )
-    says = f"{enough} / lines of elements across the contact"
+    what = f"{enough} / lines of elements across the contact"
     remedy = f"the stiffnesses are wrong by more than about 5 %: {way}"
-    return _warning("resolution", NO_CASE, enough / fewest, 1.0, says, remedy)
+    return _warning("resolution", NO_CASE, enough / fewest, 1.0, what, remedy)
 
 
 def _curved_checks(solution: ContactSolution) -> list[Check]:
@@ -354,14 +354,14 @@ def yield_checks(solution: ContactSolution) -> Iterator[Check]:
             limit = scene.materials[body.name].yield_stress
             assert limit is not None
             if by_hertz:
-                stress, says = _hertz_stress(solution, one.case, force, body.name)
+                stress, what = _hertz_stress(solution, one.case, force, body.name)
             else:
                 # the upper body feels the tractions the other way round
                 sign = -1.0 if body is model.upper else 1.0
-                stress, says = _half_space_stress(faces, sign, scene.materials[body.name].nu)
-            says = f"largest von Mises stress / yield stress of {body.name}, {says}"
+                stress, what = _half_space_stress(faces, sign, scene.materials[body.name].nu)
+            what = f"largest von Mises stress / yield stress of {body.name}, {what}"
             case = replace(one.case, body=body.name)
-            yield _warning("onset of yield", case, stress / limit, 1.0, says, _YIELDS)
+            yield _warning("onset of yield", case, stress / limit, 1.0, what, _YIELDS)
 
 
 def _hertz_stress(
@@ -446,8 +446,8 @@ def _normal(solution: ContactSolution, one: NormalCase) -> list[Check]:
         return checks
     length = float(np.ptp(loading.contact_points_of(model)[:, :2], axis=0).max())
     moment = float(np.abs(arms.T @ force).max()) / (float(force.sum()) * length)
-    says = "moment about the load line / (F patch length)"
-    return [*checks, *conditions(case, "report this", ("moment balance", moment, 1e-8, says))]
+    what = "moment about the load line / (F patch length)"
+    return [*checks, *conditions(case, "report this", ("moment balance", moment, 1e-8, what))]
 
 
 def _tangential(solution: ContactSolution, t: TangentialCase) -> list[Check]:
