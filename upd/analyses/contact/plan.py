@@ -227,7 +227,7 @@ def _effect(name: str, on: bool, why: str, *switch: str, shows: bool = False) ->
 
 
 def make_effects(scene: Scene, symmetry: str, why: str, loaded: bool) -> tuple[Effect, ...]:
-    """What is simulated and what is left out.
+    """Effects simulated and omitted.
 
     Parameters
     ----------
