@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from upd.analyses.contact.bodies import pressed
+from upd.analyses.contact.faces import band_centres
 from upd.analyses.contact.loading import load_point, tilt_arms
 from upd.analyses.contact.plan import refined_growth
 from upd.analyses.contact.scene_plan import make_plan
 from upd.analyses.contact.solution import ContactSolution
 from upd.analyses.contact.solve import solve_plan
-from upd.analyses.contact.worn_zones import band_centres
 from upd.progress import Stages
 from upd.scene import load_scene
 from upd.vary.orders import estimate_error

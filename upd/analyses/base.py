@@ -118,6 +118,13 @@ class Resolved:
         )
 
 
+def conditions(case: Case, remedy: str, *rows: tuple[str, float, float, str]) -> list[Check]:
+    """Self-checks of a case with one remedy: name, value, limit and what is compared."""
+    return [
+        Check(name, case, float(value), limit, what, remedy) for name, value, limit, what in rows
+    ]
+
+
 S = TypeVar("S", bound=AnyScene)
 
 
@@ -168,6 +175,11 @@ class Plan(Generic[S]):
     def copies(self) -> int:
         """Copies of the model that make the whole."""
         return COPIES[self.symmetry]
+
+    @property
+    def solve_seconds(self) -> float:
+        """Predicted seconds without figures, files and page."""
+        return self.seconds - self.files_seconds
 
     def effect(self, name: str) -> bool:
         """True when the effect is simulated."""

@@ -14,14 +14,14 @@ from rigs import undeclared
 import upd
 from upd.analyses import make_plan, seated
 from upd.analyses.seated.interface import make_interface
-from upd.analyses.seated.solve import AGAIN, LOWERED, OVER, RAISED, SHAKEN, SMOOTH, SeatedSolution
-from upd.analyses.seated.state import read_state
+from upd.analyses.seated.plan import AGAIN, LOWERED, OVER, RAISED, SHAKEN, SMOOTH
+from upd.analyses.seated.solve import SeatedSolution
 from upd.contact.damper_section import admissible_forces, moment_share
 from upd.contact.equilibrium import equilibrium
 from upd.contact.rigid_damper import SLIDINGS
-from upd.errors import InputError
+from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages, silent
-from upd.results import Check, write_netcdf
+from upd.results import Check
 from upd.scene import load_scene
 from upd.sizing.statics import motion_state, scene_damper
 
@@ -195,7 +195,7 @@ def test_stuck_stiffness_against_small_motion(wedge: SeatedSolution) -> None:
     for k, axis in enumerate(of.directions):
         step = moved.copy()
         step[0, axis] = tiny
-        found = of.seat(0.6, [F_C], gap=wedge.gap, moved=step, history=phase.found.history)
+        found = of.seat_on(phase.found, [F_C], moved=step)
         if (found.state[-1] == 2).any():
             continue
         force = (of.face_forces(found)[-1, 1] - wedge.forces(SHAKEN)[1]) @ -of.frame[1]
@@ -235,22 +235,24 @@ def test_blade_moved_in_cycles_closes_its_loop(wedge: SeatedSolution) -> None:
     assert loss > 0.0
 
 
-def test_state_is_read_back_and_gone_on_from(wedge: SeatedSolution, tmp_path: Path) -> None:
-    """F_C kept: nothing moves. Another contact is refused."""
-    write_netcdf(tmp_path / "result.nc", seated.ANALYSIS.arrays(wedge))
-    state = read_state(tmp_path, OVER)
-    of = wedge.interface
-    found = of.seat(state.friction, [state.centrifugal], gap=state.gap, history=state.of(of))
-    np.testing.assert_allclose(found.force[0], wedge.phases[OVER].found.force[-1], atol=1e-9 * F_C)
-    np.testing.assert_allclose(found.displacement[0], state.history.motion, atol=1e-12)
-    assert state.centrifugal == pytest.approx(F_C)
-    with pytest.raises(InputError, match="it has raised, lowered"):
-        read_state(tmp_path, "worn out")
-    with pytest.raises(InputError, match="no seated state"):
-        read_state(tmp_path / "nowhere")
-    other = replace(state, position=state.position + 1.0)
-    with pytest.raises(InputError, match="geometry, mesh and symmetry of this scene"):
-        other.of(of)
+def test_state_is_left_in_the_folder(wedge: SeatedSolution) -> None:
+    """Of the nodes of both faces, after each way of loading."""
+    groups = seated.ANALYSIS.arrays(wedge)
+    state, found = groups[f"state {OVER}"], wedge.phases[OVER].found
+    np.testing.assert_array_equal(state["force"][1], found.force[-1])
+    assert len(groups["faces"]["position"][1]) == wedge.interface.n
+
+
+def test_a_way_that_fails_leaves_the_raised_state(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: Any, **__: Any) -> Any:
+        raise ConvergenceError("did not converge")
+
+    monkeypatch.setattr("upd.analyses.seated.interface.Interface.seat_on", refuse)
+    with pytest.raises(ConvergenceError) as failed:
+        solved("symmetric-seated", {**WEDGE, "want": ["seating"]})
+    found = seated.ANALYSIS.make_results(failed.value.partial)  # type: ignore[attr-defined]
+    assert {one.name for one in found} >= {"face_N", "contact_area"}
+    assert "seating_loss" not in {one.name for one in found}
 
 
 def test_worn_faces_press_evenly() -> None:
@@ -270,10 +272,9 @@ def test_platforms_held_in_the_scene() -> None:
     one = solved(
         "symmetric-seated", {**WEDGE, "blades.held": "platforms", "want": ["seating", "stiffness"]}
     )
-    assert one.platforms is one.of
+    assert one.platforms is one.interface
     # friction of held platforms is not fully mobilised everywhere
     assert 154.67 < one.forces(RAISED)[0, 0] < 247.49
-    assert one.bodies is not None
     soft = make_interface(one.plan, one.bodies, "bases")
     m = 3 * one.interface.n
     assert np.linalg.eigvalsh(soft.compliance - one.interface.compliance)[0] > -1e-9
@@ -359,7 +360,6 @@ def test_run_folder_of_a_seating(tmp_path: Path) -> None:
     assert undeclared(result.results) == []
     again = upd.load(tmp_path / "run")
     assert [r.value for r in again.results] == [r.value for r in result.results]
-    assert read_state(tmp_path / "run").history.force.shape[1] == 3
 
 
 @pytest.mark.parametrize(

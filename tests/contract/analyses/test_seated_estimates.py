@@ -13,7 +13,6 @@ import upd
 from upd.analyses import make_plan
 from upd.analyses.seated import varied
 from upd.analyses.seated.plan import make_plan as bare_plan
-from upd.analyses.seated.plan import solve_seconds
 from upd.analyses.seated.varied import MESH, NODES, PROBLEM, STEPS, levels
 from upd.errors import InputError
 from upd.mesh import recipes
@@ -106,7 +105,7 @@ def test_the_plan_counts_what_errors_take(scene: str) -> None:
     assert plan.seconds == pytest.approx(without.seconds + plan.estimate_seconds)
     assert not levels(without).variations
     found = levels(bare_plan(load_scene(scene))).variations
-    each = [solve_seconds(varied_plan(PROBLEM, load_scene(scene), one)) for one in found]
+    each = [varied_plan(PROBLEM, load_scene(scene), one).solve_seconds for one in found]
     assert plan.estimate_seconds == pytest.approx(sum(each))
     # no level costs as much as the run itself
     assert 0.0 < min(each) <= max(each) < without.seconds

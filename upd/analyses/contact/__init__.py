@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from upd.analyses.base import Analysis
-from upd.analyses.contact import charts, checks, curved_charts, left_out, output, results
+from upd.analyses.contact import charts, checks, left_out, output, results
 from upd.analyses.contact.bodies import needs
 from upd.analyses.contact.varied import (
     FLAT_WANTED,
@@ -61,7 +61,7 @@ def _analysis(
 ANALYSES = {
     one.name: one
     for one in (
-        _analysis("hertz", WANTED, results.CURVED_HEADLINE, curved_charts.curved_charts, last=True),
+        _analysis("hertz", WANTED, results.CURVED_HEADLINE, charts.curved_charts, last=True),
         _analysis("flat", FLAT_WANTED, results.FLAT_HEADLINE, charts.flat_charts, last=False),
     )
 }

@@ -6,32 +6,107 @@ A curved contact is drawn about its middle, in um; flat faces whole, in report a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.plot.chart import Array, Arrays, Axis, Band, Chart, Group, Map, Scatter, Style, Trace
+from upd.plot.chart import Array, Arrays, Axis, Band, Bars, Chart, Group, Map, Scatter, Style, Trace
 from upd.plot.common import UM, case_of, circle, cut, pressure_map, scalar, state_map, with_content
 from upd.results import Case
 
-FACE_X, FACE_Y = Axis("x, along the damper", "mm"), Axis("y, up the slope", "mm")
-#: size of a face
-FACE_SIZE = (7.2, 4.2)
+#: axes and size of flat faces
+FACE: dict[str, Any] = {
+    "x": Axis("x, along the damper", "mm"),
+    "y": Axis("y, up the slope", "mm"),
+    "size": (7.2, 4.2),
+}
 #: percentile of the pressure where the colours end: beyond it the pressure is the edge's
 TOP_PERCENTILE = 99.0
-X_UM, Y_UM = Axis("x", "µm"), Axis("y", "µm")
-_APPROACH, _FORCE = Axis("approach δ", "µm", low=0.0), Axis("normal force F", "N", low=0.0)
-# Normal loads whose pressure is on the sheet; of flat faces' other maps, those of the first load.
+_X_UM, _Y_UM = Axis("x", "µm"), Axis("y", "µm")
+_PRESSURE, _FORCE = Axis("pressure", "MPa", low=0.0), Axis("normal force F", "N", low=0.0)
+# Normal loads whose pressure is on the sheet: of a curved contact the largest, of flat faces the
+# first, whose other maps are there for the first load alone.
 _SHOWN = 2
+# Points of a closed form across a contact, whose ends are steep.
+_ACROSS = 401
+# Lattice lines of the sections, in half radii from the middle.
+_SECTIONS: tuple[tuple[float, int, Style], ...] = (
+    (0.0, 0, "points"),
+    (1.0, 1, "open points"),
+    (-1.0, 1, "crosses"),
+)
 
 #: case -> its groups, one per contact face
 Faces = dict[Case, list[Group]]
 
 
-def by_case(arrays: Arrays, content: str) -> Faces:
+def curved_charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
+    """Pressure, stick and slip, traction, force over approach, hysteresis of a curved contact."""
+    del summary
+    normal, sheared = _loaded(arrays), _by_case(arrays, "tangential")
+    loaded = [group for (group,) in reversed(normal.values())]
+    curves = [group for group in with_content(arrays, "force-approach") if "load" in group]
+    return [
+        *(
+            _about_middle("Contact pressure", g, g, pressure_map(g, UM), sheet=k < _SHOWN)
+            for k, g in enumerate(loaded)
+        ),
+        *([_section(loaded[::-1])] if loaded else []),
+        *(_three_sections(group) for group in loaded),
+        *(
+            _states_about_middle(group, normal[Case(load=case.load)][0], _ratios(sheared))
+            for case, (group,) in reversed(sheared.items())
+            if Case(load=case.load) in normal
+        ),
+        *(_tractions(group, mine) for group in loaded if (mine := _of_load(sheared, group))),
+        *_approaches(arrays),
+        *_split(loaded[::-1]),
+        *(_over_load(group, *quantity) for group in curves for quantity in _OVER_LOAD),
+        *(_compressions(group) for group in curves if _beyond_3a(group)),
+        *(_loop(group) for group in reversed(with_content(arrays, "cycle"))),
+    ]
+
+
+def flat_charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
+    """Pressure, opening, deformed surface, stick and slip, force over approach and over
+    displacement, contact points of flat faces.
+    """
+    del summary
+    normal, sheared = _loaded(arrays), _by_case(arrays, "tangential")
+    first = next(iter(normal), None)
+    return [
+        *(_pressure(c, g, sheet=k < _SHOWN) for k, (c, g) in enumerate(normal.items())),
+        *([_per_length(normal)] if normal else []),
+        *(_opening(case, groups, sheet=case == first) for case, groups in normal.items()),
+        *(
+            _surface(case, groups, sheet=case == first)
+            for case, groups in normal.items()
+            if all("surface_displacement" in group for group in groups)
+        ),
+        *(
+            _states(case, groups, normal[load], sheet=load == first, columns=_ratios(sheared))
+            for case, groups in reversed(sheared.items())
+            if (load := Case(load=case.load)) in normal
+        ),
+        *_approaches(arrays),
+        *_pressures_over_force(arrays),
+        *_paths(arrays, "path"),
+        *_paths(arrays, "cycle"),
+        *(
+            _law(group, normal.get(case_of(group), []), sheet=case_of(group) == first)
+            for group in with_content(arrays, "contact law")
+            if "report_x" in group
+        ),
+    ]
+
+
+# -- of every contact ------------------------------------------------------------------------------
+
+
+def _by_case(arrays: Arrays, content: str) -> Faces:
     """Case -> its groups, one per contact face."""
     out: Faces = {}
     for group in with_content(arrays, content):
@@ -39,20 +114,25 @@ def by_case(arrays: Arrays, content: str) -> Faces:
     return out
 
 
-def loaded_cases(arrays: Arrays) -> Faces:
+def _ratios(sheared: Faces) -> int:
+    """How many loads there are in each direction."""
+    return len({case.ratio for case in sheared})
+
+
+def _loaded(arrays: Arrays) -> Faces:
     """The normal loads under which a node carries a force.
 
     Of contact faces without a lattice none: maps and sections are drawn on lattice lines.
     """
     return {
         case: groups
-        for case, groups in by_case(arrays, "normal").items()
-        if any(closed_nodes(group).any() for group in groups)
-        and all(closed_nodes(group).ndim == 2 for group in groups)
+        for case, groups in _by_case(arrays, "normal").items()
+        if any(_closed(group).any() for group in groups)
+        and all(_closed(group).ndim == 2 for group in groups)
     }
 
 
-def closed_nodes(group: Group) -> NDArray[np.bool_]:
+def _closed(group: Group) -> NDArray[np.bool_]:
     """(n_x, n_y) nodes that carry a normal force."""
     return np.asarray(group["normal_force"].data > 0.0)
 
@@ -62,74 +142,7 @@ def values(group: Group, name: str, scale: float = 1.0) -> Array:
     return np.asarray(group[name].data, float) * scale
 
 
-def window(normal: Group) -> float:
-    """Half width in um of the window around a curved contact."""
-    x, y = values(normal, "x", UM), values(normal, "y", UM)
-    reach = np.hypot(*np.meshgrid(x, y, indexing="ij"))[closed_nodes(normal)].max(initial=0.0)
-    return max(1.3 * float(reach), 3.0 * float(max(np.diff(x).max(), np.diff(y).max())))
-
-
-def _frames(groups: Iterable[Group]) -> tuple[Trace, ...]:
-    """Edges of the faces."""
-    out = []
-    for group in groups:
-        (left, right), (low, high) = (values(group, axis)[[0, -1]] for axis in "xy")
-        x, y = np.array([left, right, right, left, left]), np.array([low, low, high, high, low])
-        out.append(Trace("", x, y, outline=True))
-    return tuple(out)
-
-
-def face_chart(title: str, groups: list[Group], case: str, figure: str, **more: Any) -> Chart:
-    """A chart of faces with their edges, lengths in mm alike; ``more`` are fields of it."""
-    more = {"traces": _frames(groups), "size": FACE_SIZE, **more}
-    return Chart(title, FACE_X, FACE_Y, case=case, figure=figure, equal=True, **more)
-
-
-# -- of every contact ------------------------------------------------------------------------------
-
-
-def state_charts(arrays: Arrays, normal: Faces, *, curved: bool) -> list[Chart]:
-    """Stick and slip under every tangential load, the last one first."""
-    tangential = by_case(arrays, "tangential")
-    columns, first = len({case.ratio for case in tangential}), next(iter(normal), None)
-    out = []
-    for case, groups in reversed(tangential.items()):
-        load = Case(load=case.load)
-        pairs = list(zip(groups, normal[load], strict=True)) if load in normal else []
-        if curved and pairs:
-            out.append(_states_about_middle(case, *pairs[0], columns))
-        elif pairs:
-            maps = tuple(state_map(group, closed_nodes(under), 1.0) for group, under in pairs)
-            more: dict[str, Any] = {"sheet": load == first, "columns": max(1, columns)}
-            more |= {"maps": maps, "size": (5.4, 4.0), "note": "Blue sticks, orange slips."}
-            out.append(face_chart("Stick and slip", groups, case.label, "stick_slip", **more))
-    return out
-
-
-def _states_about_middle(case: Case, group: Group, normal: Group, columns: int) -> Chart:
-    whole, half = state_map(group, closed_nodes(normal), UM), window(normal)
-    a, c = scalar(group, "hertz_radius"), scalar(group, "mindlin_stick_radius")
-    rims = [circle(a * UM, f"a, Hertz: {a * UM:.1f} µm")] if a else []
-    rims += [circle(c * UM, f"c, Mindlin: {c * UM:.1f} µm", dashed=True)] if c else []
-    note = "Blue sticks, orange slips"
-    if rims:
-        note += "; the lines are Hertz's contact radius and Cattaneo and Mindlin's stick radius"
-    return Chart(
-        "Stick and slip",
-        X_UM,
-        Y_UM,
-        tuple(rims),
-        (cut(whole, half, half),),
-        case.label,
-        "stick_slip",
-        equal=True,
-        note=f"{note}.",
-        columns=columns,
-        size=(4.6, 4.0),
-    )
-
-
-def approach_charts(arrays: Arrays) -> list[Chart]:
+def _approaches(arrays: Arrays) -> list[Chart]:
     """Force over approach, beside the closed form or the printed stiffness."""
     return [_approach(group) for group in with_content(arrays, "force-approach")]
 
@@ -149,8 +162,8 @@ def _approach(group: Group) -> Chart:
     if "approach_contact" in group:
         d = values(group, "approach_contact", UM)
         traces.append(Trace("computed, bulk compliance removed", d, F, "crosses", 1))
-    title = "Force over approach"
-    return Chart(title, _APPROACH, _FORCE, tuple(traces), figure="force_approach")
+    axes = Axis("approach δ", "µm", low=0.0), _FORCE
+    return Chart("Force over approach", *axes, tuple(traces), figure="force_approach")
 
 
 def _printed_slope(group: Group, top: float) -> list[Trace]:
@@ -163,7 +176,7 @@ def _printed_slope(group: Group, top: float) -> list[Trace]:
     return [Trace(label, d, F, "dashed", closed=True)]
 
 
-def path_trace(
+def _path(
     label: str, group: Group, colour: int, style: Style = "line", compliance: float = 0.0
 ) -> Trace:
     """Tangential force in N over displacement in um, less ``compliance`` (mm/N) times it."""
@@ -172,32 +185,204 @@ def path_trace(
     return Trace(label, d, T, style, colour)
 
 
+# -- of a curved contact ---------------------------------------------------------------------------
+
+
+def _window(normal: Group) -> float:
+    """Half width in um of the window around a curved contact."""
+    x, y = values(normal, "x", UM), values(normal, "y", UM)
+    reach = np.hypot(*np.meshgrid(x, y, indexing="ij"))[_closed(normal)].max(initial=0.0)
+    return max(1.3 * float(reach), 3.0 * float(max(np.diff(x).max(), np.diff(y).max())))
+
+
+def _about_middle(title: str, group: Group, normal: Group, whole: Map, **more: Any) -> Chart:
+    """A map of the window around the contact, with Hertz's rim."""
+    half, a = _window(normal), scalar(group, "hertz_radius")
+    rim = (circle(a * UM, f"Hertz, a = {a * UM:.1f} µm"),) if a else ()
+    more = {"traces": rim, "columns": 3, "figure": "pressure", **more}
+    maps = (cut(whole, half, half),)
+    return Chart(title, _X_UM, _Y_UM, maps=maps, case=case_of(group).label, equal=True, **more)
+
+
+def _states_about_middle(group: Group, normal: Group, columns: int) -> Chart:
+    a, c = scalar(group, "hertz_radius"), scalar(group, "mindlin_stick_radius")
+    rims = [circle(a * UM, f"a, Hertz: {a * UM:.1f} µm")] if a else []
+    rims += [circle(c * UM, f"c, Mindlin: {c * UM:.1f} µm", dashed=True)] if c else []
+    note = "Blue sticks, orange slips"
+    if rims:
+        note += "; the lines are Hertz's contact radius and Cattaneo and Mindlin's stick radius"
+    more: dict[str, Any] = {"traces": tuple(rims), "note": f"{note}.", "figure": "stick_slip"}
+    more |= {"size": (4.6, 4.0), "columns": columns}
+    states = state_map(group, _closed(normal), UM)
+    return _about_middle("Stick and slip", group, normal, states, **more)
+
+
+def _of_load(sheared: Faces, normal: Group) -> list[Group]:
+    """The tangential loads after a normal one."""
+    return [one for case, (one,) in sheared.items() if case.load == case_of(normal).load]
+
+
+def _middle(field: Array) -> Array:
+    """The field along y = 0."""
+    return field[:, field.shape[1] // 2]
+
+
+def _section(loaded: Sequence[Group]) -> Chart:
+    traces: list[Trace] = []
+    widest = max(_window(group) for group in loaded)
+    for k, group in enumerate(loaded):
+        x, p, case = values(group, "x", UM), values(group, "pressure"), case_of(group).label
+        inside = np.abs(x) <= widest
+        traces.append(Trace(f"{case}, computed", x[inside], _middle(p)[inside], "points", k))
+        if "hertz_pressure" in group:
+            closed = values(group, "hertz_x", UM), values(group, "hertz_pressure")
+            traces.append(Trace(f"{case}, Hertz", *closed, "line", k))
+    title = "Pressure along y = 0"
+    return Chart(title, _X_UM, _PRESSURE, tuple(traces), figure="pressure", columns=3)
+
+
+def _three_sections(group: Group) -> Chart:
+    """Pressure along the middle and along the lattice lines nearest to half a radius from it, as
+    the thesis cuts it (its Figures 41 and 42).
+    """
+    x, y, p = values(group, "x", UM), values(group, "y", UM), values(group, "pressure")
+    a, p0, half = scalar(group, "hertz_radius"), scalar(group, "hertz_max_pressure"), _window(group)
+    inside = np.abs(x) <= half
+    off = 0.5 * (a * UM if a else half / 1.3)
+    traces: list[Trace] = []
+    for at, colour, style in _SECTIONS:
+        j = int(np.abs(y - at * off).argmin())
+        label = f"y = {y[j]:.0f} µm"
+        traces.append(Trace(f"{label}, computed", x[inside], p[inside, j], style, colour))
+        # The closed form is even in y.
+        if a and p0 and at >= 0.0:
+            reach = np.sqrt(max(0.0, (a * UM) ** 2 - y[j] ** 2))
+            along = np.linspace(-reach, reach, _ACROSS)
+            squared = np.maximum(0.0, 1.0 - (along**2 + y[j] ** 2) / (a * UM) ** 2)
+            closed, entry = p0 * np.sqrt(squared), "lines: Hertz"
+            traces.append(Trace(f"{label}, Hertz", along, closed, "line", colour, entry=entry))
+    title, case = "Pressure at three sections", case_of(group).label
+    return Chart(title, _X_UM, _PRESSURE, tuple(traces), case=case, figure="pressure_sections")
+
+
+#: title, name of the closed form, name, unit and its scale (thesis, Figures 43 and 44)
+_OVER_LOAD = (
+    ("Contact area", "hertz_area", "contact_area", "µm²", UM**2),
+    ("Largest pressure", "hertz_max_pressure", "max_pressure", "MPa", 1.0),
+)
+
+
+def _over_load(group: Group, title: str, closed: str, name: str, unit: str, scale: float) -> Chart:
+    traces = [Trace("computed", values(group, "load"), values(group, name, scale), "points", 0)]
+    if closed in group:
+        line = values(group, "hertz_normal_force"), values(group, closed, scale)
+        traces.append(Trace("Hertz", *line, closed=True))
+    axes, more = (_FORCE, Axis(title.lower(), unit, low=0.0)), {"figure": "over_load", "columns": 3}
+    return Chart(f"{title} over load", *axes, tuple(traces), **more)  # type: ignore[arg-type]
+
+
+def _beyond_3a(group: Group) -> dict[str, str]:
+    """Variable -> body whose compression beyond depth 3a it is."""
+    return {k: str(v.attributes["body"]) for k, v in group.items() if "body" in v.attributes}
+
+
+def _compressions(group: Group) -> Chart:
+    """What lies beyond depth 3a in each body, per cent of the approach (thesis, Figure 50);
+    half-spaces have it too.
+    """
+    F, approach = values(group, "load"), values(group, "loaded_approach")
+    traces: list[Trace] = []
+    for colour, (name, body) in enumerate(_beyond_3a(group).items()):
+        share = 100.0 * values(group, name) / approach
+        traces.append(Trace(body, F, share, "both", colour))
+        if f"hertz_{name}" in group:
+            # Hertz's approach goes with F^(2/3): straight in it, so interpolation is exact.
+            points = values(group, "hertz_normal_force") ** (2.0 / 3.0)
+            total = np.interp(F ** (2.0 / 3.0), points, values(group, "hertz_approach"))
+            closed = 100.0 * values(group, f"hertz_{name}") / total
+            traces.append(Trace(f"{body}, half-space", F, closed, closed=True, entry="half-space"))
+    top = 1.4 * max(float(t.y.max()) for t in traces)
+    axes = _FORCE, Axis("share of the approach beyond 3a", "%", low=0.0, high=top)
+    title = "Compression of the bodies over load"
+    return Chart(title, *axes, tuple(traces), figure="over_load", columns=3)
+
+
+def _tractions(normal: Group, tangential: Sequence[Group]) -> Chart:
+    computed: list[Trace] = []
+    closed: list[Trace] = []
+    half, lines = _window(normal), "lines: Cattaneo-Mindlin"
+    for k, group in enumerate(tangential):
+        x, q = values(group, "x", UM), values(group, "traction")
+        inside, name = np.abs(x) <= half, f"T/µN={case_of(group).ratio:g}"
+        along = _middle(q[..., 0] if q.ndim == 3 else q)[inside]
+        computed.append(Trace(f"{name}, computed", x[inside], along, "points", k, entry=name))
+        if "mindlin_traction" in group:
+            at, y = values(group, "mindlin_x", UM), values(group, "mindlin_traction")
+            near, label = np.abs(at) <= half, f"{name}, Cattaneo-Mindlin"
+            closed.append(Trace(label, at[near], y[near], "line", k, entry=lines))
+    traces, case = (*computed, *closed), case_of(normal).label
+    # Room for the legend above the curves.
+    ordinate = Axis("traction", "MPa", high=1.45 * float(max(t.y.max() for t in traces)) or None)
+    title = "Tangential traction along y = 0"
+    return Chart(title, _X_UM, ordinate, traces, case=case, figure="traction")
+
+
+def _split(loaded: Sequence[Group]) -> list[Chart]:
+    """Share of the approach near the contact and in each body beyond depth 3a."""
+    groups = [group for group in loaded if "finite_body" in group]
+    if not groups:
+        return []
+    approach = np.array([float(group["approach"].data) for group in groups])
+    beyond = {
+        f"{body} beyond 3a": np.array([float(g[name].data) for g in groups])
+        for name, body in _beyond_3a(groups[0]).items()
+    }
+    lengths = {"within 3a of the contact": approach - sum(beyond.values())} | beyond
+    bars = Bars(
+        tuple(case_of(group).label for group in groups),
+        {label: 100.0 * v / approach for label, v in lengths.items()},
+        {label: tuple(f"{one * UM:.3g} µm" for one in v) for label, v in lengths.items()},
+    )
+    title = "Approach: near the contact and in the bodies"
+    axes = Axis("share of the approach", "%"), Axis("")
+    return [Chart(title, *axes, bars=(bars,), figure="force_approach")]
+
+
+def _loop(group: Group) -> Chart:
+    bodies = scalar(group, "finite_body_compliance")
+    label = "computed, with the bodies" if bodies is None else "computed, bulk compliance removed"
+    traces = [_path(label, group, 0, compliance=bodies or 0.0)]
+    if "mindlin_force" in group:
+        d, T = values(group, "mindlin_displacement", UM), values(group, "mindlin_force")
+        traces.append(Trace("Mindlin-Deresiewicz", d, T, "dashed", closed=True))
+    axes = Axis("tangential displacement", "µm"), Axis("tangential force T", "N")
+    return Chart("Hysteresis", *axes, tuple(traces), case=case_of(group).label, figure="hysteresis")
+
+
 # -- of flat faces ---------------------------------------------------------------------------------
 
 
-def flat_charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
-    """Pressure, opening, deformed surface, stick and slip, force over approach and over
-    displacement, contact points.
-    """
-    del summary
-    normal = loaded_cases(arrays)
-    first = next(iter(normal), None)
-    return [
-        *(_pressure(c, g, sheet=k < _SHOWN) for k, (c, g) in enumerate(normal.items())),
-        *([_per_length(normal)] if normal else []),
-        *(_opening(case, groups, sheet=case == first) for case, groups in normal.items()),
-        *(
-            _surface(case, groups, sheet=case == first)
-            for case, groups in normal.items()
-            if all("surface_displacement" in group for group in groups)
-        ),
-        *state_charts(arrays, normal, curved=False),
-        *approach_charts(arrays),
-        *_pressure_over_force(arrays),
-        *_paths(arrays, "path"),
-        *_paths(arrays, "cycle"),
-        *_laws(arrays, normal, first),
-    ]
+def _frames(groups: Iterable[Group]) -> tuple[Trace, ...]:
+    """Edges of the faces."""
+    out = []
+    for group in groups:
+        (left, right), (low, high) = (values(group, axis)[[0, -1]] for axis in "xy")
+        x, y = np.array([left, right, right, left, left]), np.array([low, low, high, high, low])
+        out.append(Trace("", x, y, outline=True))
+    return tuple(out)
+
+
+def face_chart(title: str, groups: list[Group], case: str, figure: str, **more: Any) -> Chart:
+    """A chart of faces with their edges, lengths in mm alike; ``more`` are fields of it."""
+    more = FACE | {"traces": _frames(groups)} | more
+    return Chart(title, case=case, figure=figure, equal=True, **more)
+
+
+def _states(case: Case, groups: list[Group], normal: list[Group], **more: Any) -> Chart:
+    pairs = zip(groups, normal, strict=True)
+    maps = tuple(state_map(group, _closed(under), 1.0) for group, under in pairs)
+    more |= {"maps": maps, "size": (5.4, 4.0), "note": "Blue sticks, orange slips."}
+    return face_chart("Stick and slip", groups, case.label, "stick_slip", **more)
 
 
 def _joined(groups: list[Group], name: str) -> Array:
@@ -232,16 +417,9 @@ def _per_length(normal: Faces) -> Chart:
             Band("middle of our loaded bands", "x", at, at, dashed=True)
             for at in values(group, "worn_zone_middle").tolist()
         ]
-    return Chart(
-        "Normal force per length",
-        FACE_X,
-        Axis("force per length", "N/mm", low=0.0),
-        tuple(traces),
-        figure="pressure",
-        bands=tuple(bands),
-        columns=3,
-        size=FACE_SIZE,
-    )
+    more = FACE | {"y": Axis("force per length", "N/mm", low=0.0), "bands": tuple(bands)}
+    more |= {"figure": "pressure", "columns": 3}
+    return Chart("Normal force per length", traces=tuple(traces), **more)
 
 
 def _opening(case: Case, groups: list[Group], sheet: bool) -> Chart:
@@ -260,11 +438,11 @@ def _opening(case: Case, groups: list[Group], sheet: bool) -> Chart:
             traces.append(Trace(label, x[nodes], y[nodes], style, colour))
     # Room for the legend above the nodes.
     width = np.ptp(np.concatenate([trace.x for trace in traces]))
-    upwards = replace(FACE_Y, high=float(max(values(g, "y")[-1] for g in groups) + 0.1 * width))
+    upwards = replace(FACE["y"], high=float(max(values(g, "y")[-1] for g in groups) + 0.1 * width))
     note = f"{n} of {x.size} nodes are in contact; crosses are open."
-    more: dict[str, Any] = {"note": note, "sheet": sheet, "columns": 1, "traces": tuple(traces)}
-    found = face_chart("Nodes in contact", groups, case.label, "contact_open", **more)
-    return replace(found, y=upwards)
+    more: dict[str, Any] = {"note": note, "sheet": sheet, "columns": 1, "y": upwards}
+    traced = tuple(traces)
+    return face_chart("Nodes in contact", groups, case.label, "contact_open", traces=traced, **more)
 
 
 def _surface(case: Case, groups: list[Group], sheet: bool) -> Chart:
@@ -282,10 +460,9 @@ def _surface(case: Case, groups: list[Group], sheet: bool) -> Chart:
     return face_chart(title, groups, case.label, "surface", **more)
 
 
-def _pressure_over_force(arrays: Arrays) -> list[Chart]:
+def _pressures_over_force(arrays: Arrays) -> list[Chart]:
     labels = {"max_pressure": "maximum (at an edge)", "mean_pressure": "mean over the contact"}
-    axes = Axis("normal force F", "N", low=0.0), Axis("pressure", "MPa", low=0.0)
-    out = []
+    title, out = "Pressure over normal force", []
     for group in with_content(arrays, "force-approach"):
         if labels.keys() <= set(group):
             F = values(group, "normal_force")
@@ -293,8 +470,7 @@ def _pressure_over_force(arrays: Arrays) -> list[Chart]:
                 Trace(label, F, values(group, name), "both", k)
                 for k, (name, label) in enumerate(labels.items())
             )
-            title = "Pressure over normal force"
-            out.append(Chart(title, *axes, traces, figure="force_approach"))
+            out.append(Chart(title, _FORCE, _PRESSURE, traces, figure="force_approach"))
     return out
 
 
@@ -312,7 +488,7 @@ def _path_chart(direction: str, groups: list[Group], cycle: bool) -> Chart:
     traces, bands = [], []
     for k, group in enumerate(groups):
         load, limit = Case(load=case_of(group).load).label, scalar(group, "friction_limit")
-        traces.append(path_trace(load, group, k, "line" if cycle else "both"))
+        traces.append(_path(load, group, k, "line" if cycle else "both"))
         if limit is not None and not cycle:
             bands.append(Band("µ F_N", "y", limit, limit, k, dashed=True))
     if not cycle:
@@ -327,14 +503,6 @@ def _path_chart(direction: str, groups: list[Group], cycle: bool) -> Chart:
         figure="force_displacement",
         bands=tuple(bands),
     )
-
-
-def _laws(arrays: Arrays, normal: Faces, first: Case | None) -> list[Chart]:
-    return [
-        _law(group, normal.get(case_of(group), []), sheet=case_of(group) == first)
-        for group in with_content(arrays, "contact law")
-        if "report_x" in group
-    ]
 
 
 def _law(group: Group, faces: list[Group], sheet: bool) -> Chart:

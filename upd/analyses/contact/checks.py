@@ -6,37 +6,37 @@ the size of the contact, the onset of yield, the effects left out.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.analyses.base import conditions
+from upd.analyses.contact import loading
 from upd.analyses.contact.bodies import product_checks
-from upd.analyses.contact.effects import beta_of, checks_of
-from upd.analyses.contact.faces import lattices, rim_nodes
-from upd.analyses.contact.loading import (
-    LoadPath,
-    Sheared,
-    as_normal,
-    contact_points_of,
-    opened_by_shear,
-    shear_nodes,
-    tangential_compliance,
-    tilt_arms,
-)
-from upd.analyses.contact.plan import NORMAL, ContactPlan, wider_patch
+from upd.analyses.contact.faces import lattices, rim_nodes, tractions
+from upd.analyses.contact.plan import NORMAL, REMEDIES, beta_of, wider_patch
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
-from upd.analyses.contact.yielding import yield_checks
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
+from upd.contact.subsurface import most_stressed, partial_slip_ratio
 from upd.mesh import recipes
+from upd.reference import hertz_yield_load, hertz_yield_point
 from upd.results import NO_CASE, Case, Check
 from upd.scene import Scene
 
 Array = NDArray[np.float64]
 #: fewest node spacings across flat faces
 _ACROSS = 4
+#: a check that does not end the run
+_warning = partial(Check, fatal=False)
 _EPS, _TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
+_YIELDS = (
+    "the body yields before this load, and the contact is then larger and its pressure lower than "
+    "computed: lower the load, take a harder material or a larger contact"
+)
 
 
 def rounding(n: int) -> float:
@@ -53,11 +53,10 @@ def normal_checks(
     case: Case,
     load: float,
     answer: NormalContact,
-    compliance: Array,
-    gap: Array,
+    model: ContactModel,
     carried: float,
-    reaction: Mapping[str, float],
-    turned: Array | None = None,
+    turned: Array,
+    reaction: Mapping[str, float] | None = None,
 ) -> list[Check]:
     """Balance of forces, no tension, no penetration, and no force across a gap.
 
@@ -69,63 +68,42 @@ def normal_checks(
     ----------
     load
         N on the whole contact.
-    compliance
-        C (n, n), of both bodies, mm/N.
-    gap
-        h (n,) mm before the load.
     carried
         Sum of the contact forces on the whole contact, N.
+    turned
+        T theta (n,) mm, what a free tilt, or shear, adds to the approach.
     reaction
         Body -> N on its distant set, where that is known.
-    turned
-        T theta (n,) mm, what a free tilt adds to the approach.
     """
-    f, limit = answer.force, rounding(len(answer.force))
-    diagonal = np.diagonal(compliance)
+    f, limit, C = answer.force, rounding(len(answer.force)), model.compliance(NORMAL)
+    diagonal = np.diagonal(C)
     # |C_ij| <= sqrt(C_ii C_jj)
     row = np.sqrt(diagonal * diagonal.max())
-    more = np.zeros(len(f)) if turned is None else turned
-    scale = np.abs(gap) + abs(answer.approach) + np.abs(more) + row * float(np.abs(f).sum())
-    g = (gap + compliance @ f - answer.approach - more) / scale
+    scale = np.abs(model.gap) + abs(answer.approach) + np.abs(turned) + row * float(np.abs(f).sum())
+    g = (model.gap + C @ f - answer.approach - turned) / scale
     allowed = limit * float((scale / row).max()) / load
-    balance = max(abs(r / load - 1.0) for r in (carried, *reaction.values()))
-    return [
-        Check(
-            "reaction",
-            case,
-            balance,
-            1e-8,
-            "|reaction of the distant set, or sum of the contact forces - F| / F",
-            'the linear solve lost accuracy: try solver.name = "superlu" and report the mesh',
-        ),
-        Check(
-            "no tension",
-            case,
-            float(max(0.0, -answer.unclipped.min())) / load,
-            allowed,
-            "largest tensile force / F, before clipping",
-            "report this",
-        ),
-        Check(
+    balance = max(abs(r / load - 1.0) for r in (carried, *(reaction or {}).values()))
+    tension = float(max(0.0, -answer.unclipped.min())) / load
+    across = float(np.abs(f) @ np.abs(g)) / float(np.abs(f).sum())
+    rows = (
+        ("no tension", tension, allowed, "largest tensile force / F, before clipping"),
+        (
             "no penetration",
-            case,
-            float(max(0.0, -g.min())),
+            max(0.0, -g.min()),
             limit,
             "largest penetration h + C f - d / its terms",
-            "report this",
         ),
-        Check(
-            "no force across a gap",
-            case,
-            float(np.abs(f) @ np.abs(g)) / float(np.abs(f).sum()),
-            limit,
-            "sum f |h + C f - d| / F, over its terms",
-            "report this",
-        ),
+        ("no force across a gap", across, limit, "sum f |h + C f - d| / F, over its terms"),
+    )
+    what = "|reaction of the distant set, or sum of the contact forces - F| / F"
+    remedy = 'the linear solve lost accuracy: try solver.name = "superlu" and report the mesh'
+    return [
+        *conditions(case, remedy, ("reaction", balance, 1e-8, what)),
+        *conditions(case, "report this", *rows),
     ]
 
 
-def tangential_checks(case: Case, model: ContactModel, t: Sheared) -> list[Check]:
+def tangential_checks(case: Case, model: ContactModel, t: loading.Sheared) -> list[Check]:
     """Coulomb's law node by node, and the balance, after one tangential load step.
 
     The slip is made again from the compliance, dw = d - C t - w_before: none where a node sticks;
@@ -133,7 +111,7 @@ def tangential_checks(case: Case, model: ContactModel, t: Sheared) -> list[Check
     (K. L. Johnson, Contact Mechanics, 1985, section 7.2).
     """
     n, k = len(t.loaded), len(t.components)
-    C = tangential_compliance(model, t.components, t.loaded)
+    C = loading.tangential_compliance(model, t.components, t.loaded)
     allowed, diagonal = rounding(k * n), np.diagonal(C)
     force = t.force.reshape(k, n)
     row = np.sqrt(diagonal * diagonal.max())
@@ -150,100 +128,24 @@ def tangential_checks(case: Case, model: ContactModel, t: Sheared) -> list[Check
     along = np.maximum(0.0, (slip * force).sum(axis=0)) / np.maximum(length**2, _TINY)
     beside = np.abs(slip - along * force) / size
     largest, slips = float(t.limit.max()), ~t.stick
-    force_allowed = allowed * float((size / diagonal.reshape(k, n)).max()) / largest
-    remedy = "report this case"
-    return [
-        Check(
-            "tangential balance",
-            case,
-            float(np.abs(force.sum(axis=1) - t.load).max() / t.limit.sum()),
-            allowed,
-            "|sum of tractions - T| / mu N",
-            remedy,
-        ),
-        Check(
-            "Coulomb limit",
-            case,
-            max(0.0, float((length - t.limit).max()) / largest),
-            force_allowed,
-            "largest (|t| - mu f) / max(mu f), before projection",
-            remedy,
-        ),
-        Check(
-            "slip at the limit",
-            case,
-            float(np.abs(length - t.limit)[slips].max(initial=0.0)) / largest,
-            force_allowed,
-            "largest ||t| - mu f| / max(mu f) where nodes slip",
-            remedy,
-        ),
-        Check(
-            "stick",
-            case,
-            float((np.abs(slip) / size)[:, t.stick].max(initial=0.0)),
-            allowed,
-            "largest slip d - C t / its terms where nodes stick",
-            remedy,
-        ),
-        Check(
-            "slip direction",
-            case,
-            float(beside[:, slips].max(initial=0.0)),
-            allowed,
-            "slip beside or against the traction / its terms",
-            remedy,
-        ),
-    ]
+    bound = allowed * float((size / diagonal.reshape(k, n)).max()) / largest
+    left = np.abs(force.sum(axis=1) - t.load).max() / t.limit.sum()
+    beyond = (length - t.limit) / largest
+    over, short = max(0.0, beyond.max()), np.abs(beyond)[slips].max(initial=0.0)
+    stuck = (np.abs(slip) / size)[:, t.stick].max(initial=0.0)
+    astray = beside[:, slips].max(initial=0.0)
+    return conditions(
+        case,
+        "report this case",
+        ("tangential balance", left, allowed, "|sum of tractions - T| / mu N"),
+        ("Coulomb limit", over, bound, "largest (|t| - mu f) / max(mu f), before projection"),
+        ("slip at the limit", short, bound, "largest ||t| - mu f| / max(mu f) where nodes slip"),
+        ("stick", stuck, allowed, "largest slip d - C t / its terms where nodes stick"),
+        ("slip direction", astray, allowed, "slip beside or against the traction / its terms"),
+    )
 
 
-def pressed_checks(
-    plan: ContactPlan, model: ContactModel, case: NormalCase, carried: float, turned: Array
-) -> list[Check]:
-    """Of a normal load: `normal_checks`, and those of the shear that pressure alone makes.
-
-    Parameters
-    ----------
-    case
-        A normal load of a solution.
-    carried
-        Sum of the contact forces on the whole contact, N.
-    turned
-        (n,) mm that a free tilt adds to the approach.
-    """
-    checks: list[Check] = []
-    if case.state is not None:
-        nodes = shear_nodes(model, plan.scene.contact.friction, case.state)
-        checks = tangential_checks(case.case, model, nodes)
-        turned = turned - opened_by_shear(model, case.state)
-    C, load = model.compliance(NORMAL), case.force
-    return [
-        *checks,
-        *normal_checks(
-            case.case, load, case.solution, C, model.gap, carried, case.reaction, turned
-        ),
-    ]
-
-
-def sheared_checks(plan: ContactPlan, model: ContactModel, t: TangentialCase) -> list[Check]:
-    """Of a tangential load of a solution: `tangential_checks`, and where the pressure follows the
-    shear `normal_checks` of the forces under it.
-    """
-    checks = tangential_checks(t.case, model, t.nodes)
-    if t.state is None:
-        return checks
-    answer = as_normal(t.state, float("nan"))
-    turned = -opened_by_shear(model, t.state)
-    if t.state.motion[3:].size:
-        turned = turned + tilt_arms(plan, model) @ t.state.motion[3:]
-    C, carried = model.compliance(NORMAL), float(answer.unclipped.sum())
-    load = t.normal.force
-    return [
-        *checks,
-        *normal_checks(t.case, load, answer, C, model.gap, carried, {}, turned),
-    ]
-
-
-def loop_check(path: LoadPath) -> Check:
+def _loop_check(path: loading.LoadPath) -> Check:
     """Area of a cycle's loop against the work of slip."""
     error = abs(path.loop_area / path.slip_work - 1.0) if path.slip_work else path.loop_area
     remedy = "the loop is drawn with too few steps: raise loads.cycle_steps"
@@ -253,17 +155,15 @@ def loop_check(path: LoadPath) -> Check:
 def _left_out_checks(solution: ContactSolution) -> list[Check]:
     """Of the effects left out; they carry the names the plan gives them."""
     plan, scene = solution.plan, solution.plan.scene
-    checks = checks_of(solution.left_out, scene)
+    checks = [one.check(scene.left_out, REMEDIES[one.effect]) for one in solution.left_out]
     if plan.effect("friction") and not scene.coupled:
         checks.append(_coupling_check(scene))
     if scene.mesh.element == "hex8":
         checks.append(_locking_check(solution))
-    text, remedy = (
-        "sum |df| / 2 F at T = mu N",
-        "gross slip would move much of the pressure: trust the first loading only",
-    )
+    what = "sum |df| / 2 F at T = mu N"
+    remedy = "gross slip would move much of the pressure: trust the first loading only"
     return checks + [
-        Check("pressure moved by shear", case, value, 0.5, text, remedy, fatal=False)
+        _warning("pressure moved by shear", case, value, 0.5, what, remedy)
         for case, value in solution.moved.items()
     ]
 
@@ -274,15 +174,13 @@ def _coupling_check(scene: Scene) -> Check:
     Bodies of finite shape couple the two problems whatever their materials: nearly not at all
     where the contact is small against both, much where it is as large as they are.
     """
-    return Check(
-        "Dundurs beta",
-        NO_CASE,
-        beta_of(scene),
-        scene.contact.coupling_limit,
-        "|beta|: how much pressure shears half-spaces of unlike materials",
+    what = "|beta|: how much pressure shears half-spaces of unlike materials"
+    remedy = (
         "pressure shears the contact of these materials, which the tangential numbers leave out: "
-        'set contact.coupling = "coupled", or raise contact.coupling_limit to accept it',
-        fatal=False,
+        'set contact.coupling = "coupled", or raise contact.coupling_limit to accept it'
+    )
+    return _warning(
+        "Dundurs beta", NO_CASE, beta_of(scene), scene.contact.coupling_limit, what, remedy
     )
 
 
@@ -293,31 +191,19 @@ def _locking_check(solution: ContactSolution) -> Check:
     10, 56, 233 % off Hertz with nu = 0.3, 0.4, 0.45, 0.48, 0.49, 0.499, 0.4999; hex8i's -0.4 to
     -2.1 %. (T. J. R. Hughes, The Finite Element Method, 2000, section 4.3: volumetric locking.)
     """
-    scene = solution.plan.scene
-    return Check(
-        "locking",
-        NO_CASE,
-        max(one.nu for one in scene.materials.values()),
-        0.48,
-        "Poisson's ratio of bodies of hex8",
+    remedy = (
         "hex8 locks where a body is nearly incompressible: pressures are more than about 5 % too "
-        'high, and at 0.4999 more than three times the right ones: set mesh.element = "hex8i"',
-        fatal=False,
+        'high, and at 0.4999 more than three times the right ones: set mesh.element = "hex8i"'
     )
+    largest = max(one.nu for one in solution.plan.scene.materials.values())
+    return _warning("locking", NO_CASE, largest, 0.48, "Poisson's ratio of bodies of hex8", remedy)
 
 
-def _missing(plan: ContactPlan, made: set[str]) -> Iterable[Check]:
+def _missing(shown: Iterable[str], made: set[str]) -> Iterable[Check]:
     """A failed check for every effect left out whose check was not made."""
-    for effect in plan.effects if plan.scene.left_out.solves else ():
-        if effect.check and effect.word == "no" and effect.check not in made:
-            yield Check(
-                effect.check,
-                NO_CASE,
-                1,
-                0,
-                f"the check of {effect.name} was not made",
-                "report this scene",
-            )
+    for name in (one for one in shown if one not in made):
+        what, remedy = f"the check of {name} was not made", "report this scene"
+        yield Check(name, NO_CASE, 1, 0, what, remedy)
 
 
 # -- size and place of the contact -----------------------------------------------------------------
@@ -338,15 +224,10 @@ def _rim_check(solution: ContactSolution, case: NormalCase) -> Check:
         return Check("patch rim", case.case, 0, 0, "the contact is flat: its rim belongs to it")
     radius = half**2 / (2.0 * corner)
     needed = 2.6 * float(np.cbrt(0.75 * case.force * radius / solution.modulus))
-    return Check(
-        "patch rim",
-        case.case,
-        rim_nodes(solution, case),
-        0,
-        "rim nodes in contact",
-        f"the contact reaches the rim of the {2 * half:.4g} mm patch: "
-        + wider_patch(solution.plan.scene, needed),
-    )
+    remedy = f"the contact reaches the rim of the {2 * half:.4g} mm patch: "
+    remedy += wider_patch(solution.plan.scene, needed)
+    nodes = rim_nodes(solution, case)
+    return Check("patch rim", case.case, nodes, 0, "rim nodes in contact", remedy)
 
 
 def _resolution_check(solution: ContactSolution, case: NormalCase) -> Check:
@@ -361,16 +242,9 @@ def _resolution_check(solution: ContactSolution, case: NormalCase) -> Check:
         if ways
         else f"mesh the contact surface with elements of {radius / 3.0:.3g} mm or less"
     )
-    return Check(
-        "resolution",
-        case.case,
-        3.0 * spacing / max(radius, 1e-300),
-        1.0,
-        "3 h / a (a contact radius, h node spacing)",
-        "fewer than 3 nodes along the contact radius, so the numbers of this load are "
-        f"rough: {finer}",
-        fatal=False,
-    )
+    rough = "fewer than 3 nodes along the contact radius, so the numbers of this load are rough: "
+    value, what = 3.0 * spacing / max(radius, 1e-300), "3 h / a (a contact radius, h node spacing)"
+    return _warning("resolution", case.case, value, 1.0, what, rough + finer)
 
 
 def _flat_resolution_check(solution: ContactSolution) -> Check:
@@ -396,15 +270,9 @@ def _flat_resolution_check(solution: ContactSolution) -> Check:
         if recipes.has_parameter(scene.recipe, name)
         else f"mesh the contact with {enough} elements or more along each edge"
     )
-    return Check(
-        "resolution",
-        NO_CASE,
-        enough / fewest,
-        1.0,
-        f"{enough} / lines of elements across the contact",
-        f"the stiffnesses are wrong by more than about 5 %: {way}",
-        fatal=False,
-    )
+    what = f"{enough} / lines of elements across the contact"
+    remedy = f"the stiffnesses are wrong by more than about 5 %: {way}"
+    return _warning("resolution", NO_CASE, enough / fewest, 1.0, what, remedy)
 
 
 def _curved_checks(solution: ContactSolution) -> list[Check]:
@@ -422,7 +290,7 @@ def _curved_checks(solution: ContactSolution) -> list[Check]:
     checks.append(_steepness_check(solution))
     if solution.no_shares:
         text, remedy = solution.no_shares, "use a larger or finer body"
-        checks.append(Check("body compression", NO_CASE, 1, 0, text, remedy, fatal=False))
+        checks.append(_warning("body compression", NO_CASE, 1, 0, text, remedy))
     return checks
 
 
@@ -457,16 +325,88 @@ def _asymmetry(solution: ContactSolution, case: NormalCase) -> float:
     return float(max(np.abs(f - f[::-1]).max(), np.abs(f - f[:, ::-1]).max()) / f.max())
 
 
-def _moment_check(solution: ContactSolution, case: NormalCase, arms: Array) -> Check:
-    force, points = case.solution.force, contact_points_of(solution.model)[:, :2]
-    moment = float(np.abs(arms.T @ force).max())
-    return Check(
-        "moment balance",
-        case.case,
-        moment / (float(force.sum()) * float(np.ptp(points, axis=0).max())),
-        1e-8,
-        "moment about the load line / (F patch length)",
-        "report this",
+# -- onset of yield --------------------------------------------------------------------------------
+
+
+def yield_checks(solution: ContactSolution) -> Iterator[Check]:
+    """Von Mises stress against the yield stress of the bodies that have one.
+
+    The contact itself stays elastic: the check shows where that ends. Of a sphere by Hertz's
+    pressure, under a tangential load with Cattaneo's traction; of other contacts by the computed
+    pressure and tractions on half-spaces.
+    """
+    scene, model = solution.plan.scene, solution.model
+    limited = [b for b in (model.upper, model.lower) if scene.materials[b.name].yield_stress]
+    pressure = model.multipliers.pressure
+    loads: list[tuple[NormalCase | TangentialCase, float, bool, list[Array]]] = [
+        (c, c.force, True, [pressure(c.solution.force)]) for c in solution.normal if c.force > 0.0
+    ]
+    for t in solution.tangential:
+        shear = np.zeros((2, len(t.pressed)))
+        shear[list(t.nodes.components)] = tractions(solution, t)
+        closed = solution.closed_form_traction(t) is not None
+        fields = [pressure(np.maximum(t.pressed, 0.0)), *shear]
+        loads.append((t, t.normal.force, closed, fields))
+    for one, force, closed, fields in loads if limited else ():
+        by_hertz = closed and solution.hertz_of(force) is not None
+        faces = [] if by_hertz else [k.even(fields) for k in lattices(solution)]
+        for body in limited:
+            limit = scene.materials[body.name].yield_stress
+            assert limit is not None
+            if by_hertz:
+                stress, what = _hertz_stress(solution, one.case, force, body.name)
+            else:
+                # the upper body feels the tractions the other way round
+                sign = -1.0 if body is model.upper else 1.0
+                stress, what = _half_space_stress(faces, sign, scene.materials[body.name].nu)
+            what = f"largest von Mises stress / yield stress of {body.name}, {what}"
+            case = replace(one.case, body=body.name)
+            yield _warning("onset of yield", case, stress / limit, 1.0, what, _YIELDS)
+
+
+def _hertz_stress(
+    solution: ContactSolution, case: Case, force: float, body: str
+) -> tuple[float, str]:
+    """MPa in a body of a sphere's contact, and what it is."""
+    scene, hertz = solution.plan.scene, solution.hertz_of(force)
+    material, radius = scene.materials[body], scene.sphere_radius
+    assert hertz is not None and radius is not None and material.yield_stress is not None
+    worst = hertz_yield_point(material.nu)
+    if case.ratio is None:
+        stress = worst.ratio * hertz.max_pressure
+        begins = hertz_yield_load(material.yield_stress, material.nu, radius, solution.modulus)
+        return stress, (
+            f"Hertz without friction: {stress:.4g} MPa at depth {worst.depth * hertz.radius:.3g} "
+            f"mm; yields from {begins:.4g} N"
+        )
+    ratio = partial_slip_ratio(scene.contact.friction, case.ratio, material.nu)
+    # friction never relieves the most stressed place
+    stress = max(ratio, worst.ratio) * hertz.max_pressure
+    return stress, f"Hertz's pressure and Cattaneo's traction on a half-space: {stress:.4g} MPa"
+
+
+def _half_space_stress(
+    faces: Sequence[tuple[Array, Array, list[Array]]], sign: float, nu: float
+) -> tuple[float, str]:
+    """MPa in a half-space under the worst patch, with what the lattice leaves open of it.
+
+    Parameters
+    ----------
+    faces
+        Of each patch, lattice lines in mm, and nodal pressure and, under a tangential load,
+        tractions on the lower body along x and y, MPa.
+    sign
+        Of the tractions on the body.
+    """
+    found = [
+        most_stressed(x, y, [p, *(sign * t for t in shear)], nu) for x, y, (p, *shear) in faces
+    ]
+    worst = max(found, key=lambda one: one.value)
+    sheared = any(len(fields) > 1 for _, _, fields in faces)
+    return worst.value * (1.0 + worst.resolution), (
+        f"computed pressure{' and friction' if sheared else ', no friction,'} on a half-space: "
+        f"{worst.value:.4g} MPa at depth {worst.place[2]:.3g} mm, "
+        f"and {100.0 * worst.resolution:.2g} % that the lattice leaves open"
     )
 
 
@@ -477,34 +417,51 @@ def check_solution(solution: ContactSolution) -> list[Check]:
     """All self-checks; the ones that replace a left-out effect carry the name the plan gives
     them.
     """
-    checks = [c for case in solution.normal for c in _normal_case_checks(solution, case)]
-    checks += [c for t in solution.tangential for c in _tangential_case_checks(solution, t)]
-    checks += [loop_check(path) for path in solution.paths if path.cycle]
+    checks = [c for case in solution.normal for c in _normal(solution, case)]
+    checks += [c for t in solution.tangential for c in _tangential(solution, t)]
+    checks += [_loop_check(path) for path in solution.paths if path.cycle]
     checks += yield_checks(solution)
     checks += _left_out_checks(solution)
     checks += _curved_checks(solution) if solution.curved else [_flat_resolution_check(solution)]
-    return [*checks, *_missing(solution.plan, {c.name for c in checks})]
+    return [*checks, *_missing(solution.plan.shown, {c.name for c in checks})]
 
 
-def _normal_case_checks(solution: ContactSolution, case: NormalCase) -> list[Check]:
-    model, plan, force = solution.model, solution.plan, case.solution.force
-    checks = [_rim_check(solution, case)] if solution.curved else []
-    if not case.force > 0.0:
+def _normal(solution: ContactSolution, one: NormalCase) -> list[Check]:
+    model, plan, force, case = solution.model, solution.plan, one.solution.force, one.case
+    checks = [_rim_check(solution, one)] if solution.curved else []
+    if not one.force > 0.0:
         return checks
     if solution.curved:
-        checks += product_checks(model, case.case, (NORMAL,), force)
-        checks.append(_resolution_check(solution, case))
-    arms = tilt_arms(plan, model)
-    turned = np.zeros(len(force)) if case.tilt is None else arms @ case.tilt
-    checks += pressed_checks(plan, model, case, plan.copies * float(force.sum()), turned)
-    return checks if case.tilt is None else [*checks, _moment_check(solution, case, arms)]
-
-
-def _tangential_case_checks(solution: ContactSolution, t: TangentialCase) -> list[Check]:
-    checks = sheared_checks(solution.plan, solution.model, t)
-    if not solution.curved:
+        checks += product_checks(model, case, (NORMAL,), force)
+        checks.append(_resolution_check(solution, one))
+    arms = loading.tilt_arms(plan, model)
+    turned = np.zeros(len(force)) if one.tilt is None else arms @ one.tilt
+    if one.state is not None:
+        nodes = loading.shear_nodes(model, plan.scene.contact.friction, one.state)
+        checks += tangential_checks(case, model, nodes)
+        turned = turned - loading.opened_by_shear(model, one.state)
+    carried = plan.copies * float(force.sum())
+    checks += normal_checks(case, one.force, one.solution, model, carried, turned, one.reaction)
+    if one.tilt is None:
         return checks
-    tractions = np.zeros((len(t.nodes.components), len(solution.model.gap)))
-    tractions[:, t.nodes.loaded] = t.nodes.force.reshape(len(tractions), -1)
-    products = product_checks(solution.model, t.case, t.nodes.components, tractions.ravel())
-    return [*checks, *products]
+    length = float(np.ptp(loading.contact_points_of(model)[:, :2], axis=0).max())
+    moment = float(np.abs(arms.T @ force).max()) / (float(force.sum()) * length)
+    what = "moment about the load line / (F patch length)"
+    return [*checks, *conditions(case, "report this", ("moment balance", moment, 1e-8, what))]
+
+
+def _tangential(solution: ContactSolution, t: TangentialCase) -> list[Check]:
+    """Where the pressure follows the shear also of the normal forces under it."""
+    plan, model = solution.plan, solution.model
+    checks = tangential_checks(t.case, model, t.nodes)
+    if t.state is not None:
+        answer = loading.as_normal(t.state, float("nan"))
+        turned = loading.tilt_arms(plan, model) @ t.state.motion[3:]
+        turned -= loading.opened_by_shear(model, t.state)
+        carried = float(answer.unclipped.sum())
+        checks += normal_checks(t.case, t.normal.force, answer, model, carried, turned)
+    if solution.curved:
+        shear = np.zeros((len(t.nodes.components), len(model.gap)))
+        shear[:, t.nodes.loaded] = t.nodes.force.reshape(len(shear), -1)
+        checks += product_checks(model, t.case, t.nodes.components, shear.ravel())
+    return checks

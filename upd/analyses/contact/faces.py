@@ -3,6 +3,9 @@ the axes they are reported in.
 
 Report axes: of a curved contact those of the model, of a flat one with the origin at the bottom
 left corner of all patches together, x along the damper, y up the slope, as in the source thesis.
+
+Of flat faces the contact points of a dynamic model, where the pressure peaks, and the bands of the
+damper that the load comes from.
 """
 
 from __future__ import annotations
@@ -12,11 +15,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
+from upd.analyses.contact.loading import contact_points_of
+from upd.analyses.contact.plan import NORMAL
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
 from upd.contact.edge import LocatedArea, located_area
+from upd.contact.law import ContactLaw, contact_points
 from upd.contact.normal import NormalContact
 from upd.contact.patch import ContactMeasures, Patch, measure
+from upd.mesh import IntArray, Mesh
 
 Array = NDArray[np.float64]
 
@@ -168,3 +177,169 @@ def corner(solution: ContactSolution) -> Array:
         return np.zeros(2)
     found = lattices(solution)
     return np.array([min(k.X.min() for k in found), min(k.Y.min() for k in found)])
+
+
+# -- contact points of a dynamic model -------------------------------------------------------------
+
+
+def contact_law(solution: ContactSolution, case: NormalCase) -> ContactLaw | None:
+    """Contact points of a dynamic model, contact axes, from the fields after one normal load.
+
+    None under no load.
+    """
+    choice, upper = solution.plan.scene.law, solution.model.upper.name
+    force, both = case.solution.force, solution.plan.scene.law.bodies == "both"
+    if case.force == 0.0 or not force.any():
+        return None
+
+    def sheared(direction: float) -> float:
+        """Of the model, N/mm."""
+        ways = [stuck for d, stuck in case.stuck.items() if d % 180.0 == direction]
+        totals = [total if both else of[upper] for total, of in ways]
+        return totals[0] / solution.plan.copies if totals else 0.0
+
+    # Shared out like the pressure, which pushes everywhere; stiffness fields may pull at single
+    # nodes, which no spring can. The total is that with the tilt held: the tilt is the dynamic
+    # body's own.
+    share = force / force.sum()
+    answer = case if both else case.alone[upper]
+    totals = [share * answer.solution.stiffness, share * sheared(0.0), share * sheared(90.0)]
+    points, areas, fields, patches = _whole(solution, [force, *totals])
+    preload, k_n, k_x, k_y = fields
+    return contact_points(
+        points,
+        areas,
+        preload,
+        k_n,
+        np.column_stack([k_x, k_y]),
+        choice.rows,
+        choice.columns,
+        choice.weight,
+        patches,
+    )
+
+
+def tilt_stiffness(solution: ContactSolution, case: NormalCase) -> dict[str, float]:
+    """Resistance of the contact to a tilt of the damper, N mm per rad, by the axis its arms run
+    along.
+
+    About the centre of stiffness, contact set held. A tilt along x is odd about the mirror plane:
+    known on the full model only.
+    """
+    model = solution.model
+    on = np.flatnonzero(case.solution.contact)
+    if len(on) < 3:
+        return {}
+    points = contact_points_of(model)[on]
+    B = np.linalg.inv(model.compliance(NORMAL)[np.ix_(on, on)])
+    e, out = B.sum(axis=1), {}
+    for k, axis in enumerate("xy"):
+        if axis == "y" or 0 not in solution.plan.mirrors:
+            arm = points[:, k] - float(e @ points[:, k]) / float(e.sum())
+            out[axis] = solution.plan.copies * float(arm @ B @ arm)
+    return out
+
+
+def _whole(
+    solution: ContactSolution, fields: list[Array]
+) -> tuple[Array, Array, list[Array], list[NDArray[np.int64]]]:
+    """Points, areas and extensive fields of the whole contact, and the nodes of each patch in
+    them.
+    """
+    faces = lattices(solution)
+    points = [k.nodes() for k in faces]
+    ends = np.cumsum([X.size for X, _ in points])
+    whole = [np.concatenate([k.field(f, extensive=True).ravel() for k in faces]) for f in fields]
+    return (
+        np.vstack([np.column_stack([X.ravel(), Y.ravel()]) for X, Y in points]),
+        np.concatenate([k.area().ravel() for k in faces]),
+        whole,
+        np.split(np.arange(ends[-1]), ends[:-1]),
+    )
+
+
+# -- peaks of the pressure of flat faces, and the bands that the load comes from -------------------
+
+
+def band_centres(solution: ContactSolution) -> list[float]:
+    """Middles along x (contact axes, mm) of the parts of the damper's distant set, which the loads
+    come from, both sides of a mirror.
+    """
+    upper = solution.model.upper.mesh
+    nodes = upper.nodes["distant"]
+    x, weights = upper.points[nodes, 0], upper.weights.get("distant")
+    found = []  # lower and upper end, middle
+    for part in _joined(upper, nodes):
+        # A set without weights is as wide as its nodes lie apart.
+        low, high = float(x[part].min()), float(x[part].max())
+        middle = 0.5 * (low + high)
+        if weights is not None:
+            middle = float(weights[part] @ x[part] / weights[part].sum())
+        if 0 not in solution.plan.mirrors:
+            found.append((low, high, middle))
+        elif low > 0.0:
+            found += [(low, high, middle), (-high, -low, -middle)]
+        else:
+            found.append((-high, high, 0.0))
+    return [middle for _, _, middle in sorted(found)]
+
+
+def _joined(mesh: Mesh, nodes: IntArray) -> list[IntArray]:
+    """Positions in ``nodes`` of those that elements join, part by part."""
+    number = np.full(mesh.n_node, -1)
+    number[nodes] = np.arange(len(nodes))
+    at = number[mesh.hexes]
+    first = np.broadcast_to(at.max(axis=1, keepdims=True), at.shape)
+    both = at >= 0
+    links = coo_array((np.ones(both.sum()), (first[both], at[both])), shape=(len(nodes),) * 2)
+    count, part = connected_components(links, directed=False)
+    return [np.flatnonzero(part == k) for k in range(count)]
+
+
+def band_middles(solution: ContactSolution) -> list[float]:
+    """The same in report axes, mm."""
+    return [float(c - corner(solution)[0]) for c in band_centres(solution)]
+
+
+def line_pressure(lattice: FaceLattice, force: Array) -> Array:
+    """(len(X),) normal force per length along x in N/mm.
+
+    Nodal forces summed over y, over the length each column stands for.
+    """
+    return np.asarray(
+        lattice.field(force, extensive=True).sum(axis=1)
+        * np.ptp(lattice.Y)
+        / lattice.area().sum(axis=1)
+    )
+
+
+def pressure_peaks(solution: ContactSolution, case: NormalCase) -> list[tuple[float, float]]:
+    """Where the pressure peaks, report axes in mm.
+
+    Middle at half height of each peak of the force per length, centre of force across it.
+
+    The outermost columns are left out: the edge of a flat punch has a peak of its own on any mesh.
+    A peak stands out by a tenth of the largest value. Without lattice lines there is no force per
+    length, and no peak is sought.
+    """
+    # slow to import: only where it is called
+    from scipy.signal import find_peaks, peak_widths
+
+    found, origin = [], corner(solution)
+    for lattice in (k for k in lattices(solution) if k.lattice):
+        force = lattice.field(case.solution.force, extensive=True)[1:-1]
+        X, p = lattice.X[1:-1], line_pressure(lattice, case.solution.force)[1:-1]
+        tops, _ = find_peaks(p, prominence=0.1 * float(p.max(initial=0.0)), plateau_size=1)
+        _, _, left, right = peak_widths(p, tops, rel_height=0.5)
+        places = np.arange(len(X))
+        for begin, end in zip(left, right, strict=True):
+            inside = (places >= begin) & (places <= end)
+            middle = float(np.interp([begin, end], places, X).mean())
+            found.append(
+                (middle - origin[0], _centre(force[inside].sum(axis=0), lattice.Y) - origin[1])
+            )
+    return [(float(x), float(y)) for x, y in found]
+
+
+def _centre(force: Array, Y: Array) -> float:
+    return float(force @ Y / force.sum())

@@ -12,7 +12,7 @@ it:
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 from typing import Literal
 
@@ -20,44 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import Resolved
+from upd.analyses.contact import plan as planned
 from upd.analyses.contact.bodies import prepare
-from upd.analyses.contact.effects import (
-    COUPLED_NUMBERS,
-    COUPLING,
-    DIRECTIONS,
-    LARGE,
-    MATERIALS,
-    TILT,
-    TIPS,
-    largest_ratio,
-)
-from upd.analyses.contact.loading import (
-    LOAD_STEP,
-    load_history,
-    raised,
-    slope,
-    slope_loads,
-    tilt_arms,
-)
-from upd.analyses.contact.plan import (
-    ACROSS,
-    ALONG,
-    NORMAL,
-    OWN_LEVEL,
-    ContactPlan,
-    Family,
-    direction_name,
-)
+from upd.analyses.contact.loading import LOAD_STEP, slope_loads
+from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan
 from upd.analyses.contact.results import make_results
-from upd.analyses.contact.solution import ContactSolution, NormalCase
-from upd.analyses.contact.solve import solve_plan
-from upd.analyses.contact.tangential import Frozen, note_moved
+from upd.analyses.contact.solution import ContactSolution, NormalCase, PressedContact
+from upd.analyses.contact.solve import Frozen, press, solve_plan
 from upd.contact.checks import few_threads
 from upd.contact.model import ContactModel
-from upd.contact.normal import normal_contact
-from upd.contact.tangential import tangential_path
 from upd.contact.tangential_step import TangentialHistory
-from upd.contact.tilt import tilted_contact
 from upd.errors import InputError, UpdError
 from upd.progress import Stages
 from upd.results import Case, Result
@@ -67,24 +39,22 @@ from upd.scene.contact import Coupling
 from upd.vary.wanted import Wanted, solve_wanted
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Pressed:
-    """A frictionless contact: approach in mm, forces (n,) in N."""
-
-    approach: float
-    force: Array
-
-
-#: gap (n,) mm and load in N -> contact of the companion
-Press = Callable[[Array, float], Pressed]
-
-
-def left_out(plan: ContactPlan, name: str) -> bool:
-    """Whether the plan leaves out an effect that applies, and is to show what it changes."""
-    solves = plan.scene.left_out.solves
-    return solves and any(e.name == name and e.word == "no" for e in plan.effects)
+#: Numbers that show what coupling changes, of them those that a run has; and where no stiffness is
+#: asked for.
+_COUPLED = (
+    "K_N_tangent_raw",
+    "K_T_initial_raw",
+    "K_Tx_initial_raw",
+    "K_Ty_initial_raw",
+    "contact_area",
+    "stick_area",
+)
+_WITHOUT_STIFFNESS = ("approach", "K_T_secant_raw")
+#: of a damper that tips over when its tilt is free
+_TIPS = (
+    "the load line runs beside the contact, so that a damper free to tilt tips over: give a "
+    "contact.load_point inside the contact, or choose another contact.distant set"
+)
 
 
 def solve(wanted: Wanted, plan: ContactPlan, stages: Stages) -> ContactSolution:
@@ -94,14 +64,13 @@ def solve(wanted: Wanted, plan: ContactPlan, stages: Stages) -> ContactSolution:
     """
     found, estimates = solve_wanted(wanted, plan, stages)
     solution: ContactSolution = replace(found, estimates=estimates)
-    plan, companion = solution.plan, solution.plan.companion
+    shown, companion = solution.plan.shown, solution.plan.companion
     cases = [one for one in solution.normal if one.force]
-    tilts = left_out(plan, TILT)
-    if companion is None and not tilts:
+    if not shown:
         return solution
     try:
         with stages("effects left out", "the tilt; the others on a coarser whole model"):
-            if tilts:
+            if planned.TILT in shown:
                 solution.left_out += [_tilted(solution, case) for case in cases]
             if companion is not None:
                 try:
@@ -109,7 +78,7 @@ def solve(wanted: Wanted, plan: ContactPlan, stages: Stages) -> ContactSolution:
                     with few_threads(model.gap):
                         solution.left_out += list(_on_companion(solution, model))
                 except UpdError:
-                    solution.left_out += _not_solved(plan, [one.case for one in cases])
+                    solution.left_out += _not_solved(solution.plan, [one.case for one in cases])
     except BaseException as error:
         error.partial = solution  # type: ignore[attr-defined]
         raise
@@ -123,56 +92,75 @@ def _tilted(solution: ContactSolution, case: NormalCase) -> Resolved:
     A half model is its own mirror image, which leaves the tilt along the plane. A body that tips
     over has neither stiffness nor approach: 0 N/mm, or NaN.
     """
-    plan, model = solution.plan, solution.model
-    stiff = plan.scene.wants("stiffness")
+    plan, remedy = solution.plan, ""
     quantity, unit = _quantity(plan.scene)
-    without = case.stiffness if stiff else 1e3 * case.solution.approach
-    remedy, arms = "", tilt_arms(plan, model, held=False)
+    stiff = unit == "N/mm"
+
+    def number(one: PressedContact) -> float:
+        return one.stiffness if stiff else 1e3 * one.solution.approach
+
+    def tilting(coupling: Coupling, loads: Sequence[float]) -> float:
+        contact = replace(plan.scene.contact, tilt="free", coupling=coupling)
+        free = replace(plan, scene=replace(plan.scene, contact=contact))
+        return number(press(ContactSolution(free, solution.model), loads)[case.force])
+
     try:
-        found = tilted_contact(
-            model.compliance(NORMAL),
-            model.gap,
-            arms,
-            load=case.force / plan.copies,
-            start=case.solution.contact,
-            free=(0 not in plan.mirrors, 1 not in plan.mirrors),
-        )
-        included = plan.copies * found.free_stiffness if stiff else 1e3 * found.normal.approach
+        included = tilting("uncoupled", [case.force])
         if case.state is not None:
             # It does not tip over; with friction again.
-            states = raised(model, plan.scene.contact.friction, slope_loads([case.force]), arms)
-            approach = 1e3 * float(states[case.force].motion[0])
-            included = slope(states, case.force) if stiff else approach
+            included = tilting("coupled", slope_loads([case.force]))
     except InputError:
-        included, remedy = 0.0 if stiff else float("nan"), TIPS
+        included, remedy = 0.0 if stiff else float("nan"), _TIPS
     except UpdError:
         included = float("nan")
-    return Resolved(TILT, quantity, case.case, without, included, unit, remedy)
+    return Resolved(planned.TILT, quantity, case.case, number(case), included, unit, remedy)
 
 
 def _on_companion(solution: ContactSolution, model: ContactModel) -> Iterator[Resolved]:
     """Every number that shows what an effect left out changes, on the companion ``model``."""
-    plan, scene = solution.plan, solution.plan.scene
-    arms = tilt_arms(variant(plan, 2), model)
-
-    def press(gap: Array, load: float) -> Pressed:
-        if scene.coupled:
-            state = raised(model, scene.contact.friction, [load], arms, gap=gap)[load]
-            return Pressed(float(state.motion[0]), state.force[:, 0])
-        C = model.compliance(NORMAL)
-        found = (
-            tilted_contact(C, gap, arms, load=load).normal
-            if arms.size
-            else normal_contact(C, gap, load=load)
-        )
-        return Pressed(found.approach, found.force)
-
-    for case in solution.normal:
+    plan = solution.plan
+    for case in solution.normal if planned.LARGE in plan.shown else ():
         if case.force:
-            yield from _displaced_changes(plan, model, press, case.case, case.force)
+            yield _displaced(plan, model, case.case, case.force)
     # Coupled contact has the other effects.
-    if not scene.coupled:
+    if not plan.scene.coupled:
         yield from _sheared(solution, model)
+
+
+def _displaced(plan: ContactPlan, model: ContactModel, case: Case, load: float) -> Resolved:
+    """What displaced faces change of the tangent stiffness, or of the approach where no stiffness
+    is asked for; NaN when it is not found.
+
+    Parameters
+    ----------
+    model
+        The companion's.
+    load
+        N on the whole contact.
+    """
+    quantity, unit = _quantity(plan.scene)
+    assert plan.companion is not None
+    companion = ContactSolution(plan.companion, model)
+
+    @cache
+    def pressed(load: float, displaced: bool) -> PressedContact:
+        one = companion
+        if displaced:
+            gap = displaced_gap(model, pressed(load, False).solution.force)
+            one = replace(companion, model=replace(model, gap=gap))
+        return press(one, [load])[load]
+
+    def number(displaced: bool) -> float:
+        loads = [load] if unit == "um" else [load * (1.0 - LOAD_STEP), load * (1.0 + LOAD_STEP)]
+        try:
+            approaches = [pressed(one, displaced).solution.approach for one in loads]
+            if unit == "um":
+                return 1e3 * approaches[0]
+            return 2.0 * LOAD_STEP * load / (approaches[1] - approaches[0])
+        except (UpdError, np.linalg.LinAlgError):
+            return float("nan")
+
+    return Resolved(planned.LARGE, quantity, case, number(False), number(True), unit)
 
 
 def _sheared(solution: ContactSolution, model: ContactModel) -> Iterator[Resolved]:
@@ -180,20 +168,21 @@ def _sheared(solution: ContactSolution, model: ContactModel) -> Iterator[Resolve
     companion = partial(solve_plan, stages=Stages(), model=model, companion=True)
     mine = companion(variant(plan, scene.contact.directions))
     numbers = make_results(mine)
-    note_moved(solution, mine)
-
-    def again(directions: Literal[1, 2], coupling: Coupling = "uncoupled") -> list[Result]:
-        return make_results(companion(variant(plan, directions, coupling=coupling)))
-
-    yield from _coupled_changes(plan, numbers, lambda: again(2, "coupled"))
+    for case in () if solution.curved else mine.normal:
+        for direction in scene.loads.directions:
+            way = Frozen(mine, case, direction)
+            solution.moved[mine.sheared_case(case, direction)] = way.moved_pressure()
+    if planned.COUPLING in plan.shown:
+        coupled = variant(plan, 2, coupling="coupled")
+        yield from _coupled_changes(scene, numbers, lambda: make_results(companion(coupled)))
     directions = scene.loads.directions
-    if left_out(plan, DIRECTIONS):
-        both = again(2)
+    if planned.DIRECTIONS in plan.shown:
+        both = make_results(companion(variant(plan, 2)))
         names = ["K_T_initial_raw", "K_T_secant_raw", "cycle_energy"]
-        names += [f"K_T{direction_name(d)}_initial_raw" for d in directions]
-        found = list(_changes(DIRECTIONS, names, numbers, both))
-        yield from found or _changes(DIRECTIONS, ("K_T_tangent_raw",), numbers, both)
-    if left_out(plan, MATERIALS):
+        names += [f"K_T{planned.direction_name(d)}_initial_raw" for d in directions]
+        found = list(_changes(planned.DIRECTIONS, names, numbers, both))
+        yield from found or _changes(planned.DIRECTIONS, ("K_T_tangent_raw",), numbers, both)
+    if planned.MATERIALS in plan.shown:
         for case in (one for one in mine.normal if one.force):
             for direction in directions:
                 own = mine.sheared_case(case, direction)
@@ -205,17 +194,21 @@ def _unlike(
     mine: ContactSolution, case: NormalCase, direction: float, numbers: Sequence[Result]
 ) -> Iterator[Resolved]:
     """The tangential loads along a direction with the slip of the pressure alone already there."""
-    scene, model = mine.plan.scene, mine.model
     way = Frozen(mine, case, direction)
-    before = pressure_slip(model, way.components, case.solution.force, way.loaded)
-    for one in (r for r in numbers if r.name == "K_T_secant_raw"):
-        assert one.case.ratio is not None
-        load = one.case.ratio * scene.contact.friction * case.force * way.unit
-        K = _slipped_stiffness(way.compliance, way.limit, before, load)
-        yield Resolved(MATERIALS, one.name, one.case, one.value, K, one.unit)
-    for one in (r for r in numbers if r.name == "cycle_energy"):
-        work = way.cycle(one.case, before).slip_work
-        yield Resolved(MATERIALS, one.name, one.case, one.value, work, one.unit)
+    before = pressure_slip(mine.model, way.components, case.solution.force, way.loaded)
+    for one in numbers:
+        if one.name == q.K_T_SECANT_RAW.name:
+            assert one.case.ratio is not None
+            try:
+                load, moved, _ = way.march(np.array([0.0, one.case.ratio]), before)
+                included = float(load[2] / (moved[2] - moved[1]))
+            except UpdError:
+                included = float("nan")
+        elif one.name == q.CYCLE_ENERGY.name:
+            included = q.CYCLE_ENERGY.scale * way.cycle(one.case, before).slip_work
+        else:
+            continue
+        yield Resolved(planned.MATERIALS, one.name, one.case, one.value, included, one.unit)
 
 
 def _changes(
@@ -229,36 +222,8 @@ def _changes(
             yield Resolved(effect, r.name, r.case, r.value, theirs[r.name, r.case], r.unit)
 
 
-def _displaced_changes(
-    plan: ContactPlan, model: ContactModel, press: Press, case: Case, load: float
-) -> Iterator[Resolved]:
-    """What displaced faces change of the normal stiffness, or of the approach where no stiffness
-    is asked for.
-
-    Parameters
-    ----------
-    model, press
-        The companion and its contact.
-    load
-        N on the whole contact.
-    """
-    if not left_out(plan, LARGE):
-        return
-
-    @cache
-    def plain(load: float) -> Pressed:
-        return press(model.gap, load)
-
-    def displaced(load: float) -> float:
-        return press(displaced_gap(model, plain(load).force), load).approach
-
-    quantity, unit = _quantity(plan.scene)
-    numbers = [_number(plan.scene, way, load) for way in (lambda F: plain(F).approach, displaced)]
-    yield Resolved(LARGE, quantity, case, numbers[0], numbers[1], unit)
-
-
 def _coupled_changes(
-    plan: ContactPlan, uncoupled: Iterable[Result], solve: Callable[[], Iterable[Result]]
+    scene: Scene, uncoupled: Iterable[Result], solve: Callable[[], Iterable[Result]]
 ) -> Iterator[Resolved]:
     """What normal and tangential contact at once change of the stiffnesses and of the areas in
     contact and in stick; of the approach and the secant where no stiffness is asked for.
@@ -270,17 +235,15 @@ def _coupled_changes(
     solve
         Its numbers, coupled.
     """
-    if not left_out(plan, COUPLING):
-        return
-    others = () if plan.scene.wants("stiffness") else ("approach", "K_T_secant_raw")
+    names = _COUPLED if scene.wants("stiffness") else (*_COUPLED, *_WITHOUT_STIFFNESS)
     # Nothing is coupled without a load.
-    mine = [r for r in uncoupled if r.name in (*COUPLED_NUMBERS, *others) and r.case.load]
+    mine = [r for r in uncoupled if r.name in names and r.case.load]
     try:
         again = list(solve())
     except (UpdError, np.linalg.LinAlgError):
         again = [replace(r, value=float("nan")) for r in mine]
-    areas = {r.case.load: r.value for r in mine if r.name == "contact_area"}
-    for one in _changes(COUPLING, [r.name for r in mine], mine, again):
+    areas = {r.case.load: r.value for r in mine if r.name == q.CONTACT_AREA.name}
+    for one in _changes(planned.COUPLING, names, mine, again):
         area = areas.get(one.case.load, 0.0)
         known = one.quantity == q.STICK_AREA.name and area > 0.0
         yield replace(one, over=(area, q.STICK_AREA.part_of)) if known else one
@@ -289,17 +252,6 @@ def _coupled_changes(
 def _quantity(scene: Scene) -> tuple[str, str]:
     """Name and unit of the normal number that a run has."""
     return ("K_N_tangent_raw", "N/mm") if scene.wants("stiffness") else ("approach", "um")
-
-
-def _number(scene: Scene, approach: Callable[[float], float], load: float) -> float:
-    """Tangent stiffness in N/mm at the load, or the approach in um; NaN when it is not found."""
-    try:
-        if not scene.wants("stiffness"):
-            return 1e3 * approach(load)
-        low, high = (approach(load * (1.0 + s)) for s in (-LOAD_STEP, LOAD_STEP))
-        return 2.0 * LOAD_STEP * load / (high - low)
-    except (UpdError, np.linalg.LinAlgError):
-        return float("nan")
 
 
 def pressure_slip(
@@ -350,7 +302,7 @@ def variant(
     scene, companion = plan.scene, plan.companion
     assert companion is not None
     want = [w for w in ("stiffness", "tangential") if scene.wants(w)]
-    ratio = largest_ratio(scene)
+    ratio = planned.largest_ratio(scene)
     if scene.wants("cycle") and not scene.wants("stiffness") and not ratio > 0.0:
         want.append("cycle")
     smaller = replace(
@@ -359,32 +311,17 @@ def variant(
         contact=replace(scene.contact, directions=directions, coupling=coupling),
         loads=replace(scene.loads, tangential=(ratio,)),
     )
-    family = Family((NORMAL, *(ALONG, ACROSS)[:directions]))
+    family = planned.Family((NORMAL, *(ALONG, ACROSS)[:directions]))
     return replace(companion, scene=smaller, families=(family,))
-
-
-def _slipped_stiffness(C: Array, limit: Array, before: TangentialHistory, load: Array) -> float:
-    """Secant tangential stiffness in N/mm along the load (1 or 2,) in N, after a slip that is
-    already there; NaN when it is not found.
-    """
-    size = float(np.linalg.norm(load))
-    unit = load / size
-    try:
-        path = tangential_path(
-            C, limit, loads=load_history(np.array([0.0, size]), unit), history=before
-        )
-    except UpdError:
-        return float("nan")
-    first, last = path.displacement.reshape(2, len(unit)) @ unit
-    return size / float(last - first)
 
 
 def _not_solved(plan: ContactPlan, cases: Iterable[Case]) -> list[Resolved]:
     """What the checks show when the companion has no answer."""
     quantity, unit = _quantity(plan.scene)
+    none = float("nan")
     return [
-        Resolved(e.name, quantity, case, float("nan"), float("nan"), unit)
-        for e in plan.effects
-        if e.check and e.word == "no" and e.name not in OWN_LEVEL
+        Resolved(name, quantity, case, none, none, unit)
+        for name in plan.shown
+        if name != planned.TILT
         for case in cases
     ]

@@ -55,12 +55,9 @@ def load_point(plan: ContactPlan, model: ContactModel) -> Array:
     return np.asarray(middle if 0 not in plan.mirrors else middle * np.array([0.0, 1.0]))
 
 
-def tilt_arms(plan: ContactPlan, model: ContactModel, *, held: bool | None = None) -> Array:
-    """(n, k) mm from the load line to the nodes, for the k free tilts.
-
-    ``held``: in place of the scene's choice.
-    """
-    if plan.scene.contact.tilt != "free" if held is None else held:
+def tilt_arms(plan: ContactPlan, model: ContactModel) -> Array:
+    """(n, k) mm from the load line to the nodes, for the k free tilts."""
+    if plan.scene.contact.tilt != "free":
         return np.zeros((len(model.gap), 0))
     return contact_points_of(model)[:, :2] - load_point(plan, model)
 
@@ -230,7 +227,6 @@ def raised(
     arms: Array,
     *,
     body: Body | None = None,
-    gap: Array | None = None,
 ) -> dict[float, CoupledState]:
     """States of the positive normal loads in N, each on the way to the next, without a tangential
     load.
@@ -241,8 +237,6 @@ def raised(
         (n, k) mm of the k free tilts.
     body
         Against a rigid counterpart; None: both.
-    gap
-        (n,) mm, in place of the model's.
     """
     n, out = len(model.gap), {}
     found: CoupledContact | None = None
@@ -258,7 +252,7 @@ def raised(
             columns[:, :3], columns[:n, 3:] = np.kron(np.eye(3), np.ones((n, 1))), arms
             found = coupled_contact(
                 tangential_compliance(model, COMPONENTS, np.arange(n), body),
-                model.gap if gap is None else gap,
+                model.gap,
                 friction,
                 load=way,
                 columns=columns,

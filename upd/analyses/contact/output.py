@@ -11,19 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.contact.closed_forms import (
-    beyond_3a,
-    closed_form_traction,
-    hertz_of,
-    shear_compliance,
-    stick_radius,
-)
-from upd.analyses.contact.faces import FaceLattice, corner, lattices, tractions
-from upd.analyses.contact.law import contact_law
+from upd.analyses.contact import faces
+from upd.analyses.contact.faces import FaceLattice, corner, lattices
 from upd.analyses.contact.loading import LoadPath
 from upd.analyses.contact.results import printed_of
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
-from upd.analyses.contact.worn_zones import band_middles
 from upd.contact.law import ContactLaw
 from upd.labels import file_name
 from upd.mesh import recipes
@@ -93,7 +85,7 @@ def _normal(solution: ContactSolution, k: FaceLattice, case: NormalCase) -> Vari
         return out | _approach_split(case) | _hertz(solution, case)
     out["worn_zone_middle"] = variable(
         "worn_zone",
-        band_middles(solution),
+        faces.band_middles(solution),
         "mm",
         "middle of the bands of the damper that the load comes from",
     )
@@ -120,7 +112,7 @@ def _sheared(
 
 
 def _tangential(solution: ContactSolution, k: FaceLattice, t: TangentialCase) -> Variables:
-    traction, XY = tractions(solution, t), _dims(k)
+    traction, XY = faces.tractions(solution, t), _dims(k)
     out = _sheared(k, traction, list(t.slip.T), t.stick)
     if solution.curved and len(traction) == 1:
         # One direction has no dimension of its own.
@@ -151,7 +143,7 @@ def _approach_split(case: NormalCase) -> Variables:
 
 
 def _hertz(solution: ContactSolution, case: NormalCase) -> Variables:
-    hertz = hertz_of(solution, case.force)
+    hertz = solution.hertz_of(case.force)
     if hertz is None:
         return {}
     x = np.linspace(-hertz.radius, hertz.radius, _ACROSS)
@@ -166,14 +158,14 @@ def _hertz(solution: ContactSolution, case: NormalCase) -> Variables:
 
 
 def _cattaneo(solution: ContactSolution, t: TangentialCase) -> Variables:
-    hertz, c = hertz_of(solution, t.normal.force), stick_radius(solution, t)
+    hertz, c = solution.hertz_of(t.normal.force), solution.stick_radius(t)
     if hertz is None or c is None:
         return {}
     out: Variables = {
         "hertz_radius": variable("", hertz.radius, "mm"),
         "mindlin_stick_radius": variable("", c, "mm"),
     }
-    closed = closed_form_traction(solution, t)
+    closed = solution.closed_form_traction(t)
     if closed is not None:
         x = np.linspace(-_BEYOND * hertz.radius, _BEYOND * hertz.radius, _ACROSS)
         out["mindlin_x"] = variable("mindlin_x", x, "mm")
@@ -189,10 +181,10 @@ def _deresiewicz(solution: ContactSolution, cycle: LoadPath) -> Variables:
         out["finite_body_compliance"] = variable(
             "", normal.finite_body_shear, "mm/N", "shear of the finite, held bodies"
         )
-    hertz, ratio = hertz_of(solution, normal.force), cycle.case.ratio
+    hertz, ratio = solution.hertz_of(normal.force), cycle.case.ratio
     if hertz is None or ratio is None:
         return out
-    mu, C = solution.plan.scene.contact.friction, shear_compliance(solution)
+    mu, C = solution.plan.scene.contact.friction, solution.shear_compliance()
     peak = ratio * mu * normal.force
     T = np.linspace(peak, -peak, _ALONG)
     d = mindlin.unloading(T, peak, mu, normal.force, hertz.radius, C)
@@ -232,7 +224,7 @@ def _approach_over_load(solution: ContactSolution, d: Array, F: Array) -> Variab
         bodies = split[-1].finite_body / split[-1].force * F
         out["approach_contact"] = variable("point", d - bodies, "mm")
     force = np.linspace(0.0, float(F[-1]), _ALONG)
-    hertz = [h for load in force[1:] if (h := hertz_of(solution, float(load))) is not None]
+    hertz = [h for load in force[1:] if (h := solution.hertz_of(float(load))) is not None]
     if hertz:
         out["hertz_normal_force"] = variable("hertz_point", force, "N")
         for name, unit in (("area", "mm2"), ("max_pressure", "MPa"), ("approach", "mm")):
@@ -244,17 +236,16 @@ def _approach_over_load(solution: ContactSolution, d: Array, F: Array) -> Variab
 def _along(solution: ContactSolution) -> Variables:
     """Contact area, largest pressure and each body's compression at the loaded points."""
     points, dims = solution.curve, "loaded_point"
+    area, pressure = zip(*((p.measures.area, p.measures.max_pressure) for p in points), strict=True)
     out: Variables = {
         "load": variable(dims, [p.force for p in points], "N"),
-        "contact_area": variable(dims, [p.measures.area for p in points], "mm2"),
-        "max_pressure": variable(dims, [p.measures.max_pressure for p in points], "MPa"),
+        "contact_area": variable(dims, area, "mm2"),
+        "max_pressure": variable(dims, pressure, "MPa"),
         "loaded_approach": variable(dims, [p.approach for p in points], "mm"),
     }
-    closed = [beyond_3a(solution, p.force) for p in points]
+    closed, words = [solution.beyond_3a(p.force) for p in points], "approach beyond depth 3a"
     for body in points[0].compression:
-        name = f"compression_{file_name(body)}"
-        beyond = [p.compression[body] for p in points]
-        words = "approach beyond depth 3a"
+        name, beyond = f"compression_{file_name(body)}", [p.compression[body] for p in points]
         out[name] = variable(dims, beyond, "mm", words, body=body)
         if all(closed):
             out[f"hertz_{name}"] = variable(dims, [c[body] for c in closed], "mm")
@@ -296,7 +287,7 @@ def _laws(solution: ContactSolution) -> dict[str, ArrayGroup]:
     scene = solution.plan.scene
     out: dict[str, ArrayGroup] = {}
     for case in solution.normal if scene.wants("contact_law") else ():
-        law = contact_law(solution, case)
+        law = faces.contact_law(solution, case)
         if law is not None:
             placed = law.placed(*recipes.placement(scene.recipe, solution.plan.parameters))
             groups = {

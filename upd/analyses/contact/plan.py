@@ -1,5 +1,5 @@
-"""What a plan of a contact of two bodies holds: normal loads, mirror planes and load families, what
-the recipe is given, and what its meshes must name.
+"""What a plan of a contact of two bodies holds: normal loads, mirror planes and load families,
+effects simulated and omitted, what the recipe is given, and what its meshes must name.
 """
 
 from __future__ import annotations
@@ -11,24 +11,42 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.base import Plan
+from upd.analyses.base import Effect, Plan
 from upd.analyses.cost import NODES
 from upd.contact.equilibrium import FaceForces, equilibrium
 from upd.errors import InputError, OwnMeshError
 from upd.mesh import Mesh, recipes
 from upd.mesh.checks import require_sets
 from upd.mesh.recipe_modules import is_mesh
-from upd.reference import contact_modulus, hertz_sphere, sphere_gap
+from upd.reference import contact_modulus, dundurs_beta, hertz_sphere, sphere_gap
 from upd.results import Case
-from upd.scene import Scene, friction_on
+from upd.scene import FRICTION_WANTS, Scene, friction_on
 
 Array = NDArray[np.float64]
 
 NORMAL, ALONG, ACROSS = 2, 0, 1
 #: all three, in the order of a coupled contact
 COMPONENTS = (NORMAL, ALONG, ACROSS)
-#: effects left out that are solved again with the run's own compliance
-OWN_LEVEL = ("tilt of the damper",)
+
+TILT, DIRECTIONS, COUPLING, MATERIALS, LARGE = (
+    "tilt of the damper",
+    "slip in two directions",
+    "normal-tangential coupling",
+    "unlike materials",
+    "large displacement",
+)
+#: why coupled contact slips in two directions
+_TOGETHER = "pressure and shear are solved at once"
+#: What to do about an effect that changes a number too much.
+REMEDIES = {
+    TILT: 'set contact.tilt = "free" (with a contact.load_point inside the contact), or choose '
+    "another contact.distant set",
+    DIRECTIONS: "set contact.directions = 2",
+    COUPLING: 'set contact.coupling = "coupled", or trust the number to this change only',
+    MATERIALS: 'the pressure shears these materials: set contact.coupling = "coupled", choose '
+    "materials of equal stiffness, or trust the number to this change only",
+    LARGE: "the contact is too large for small-displacement theory: lower the load",
+}
 
 
 @dataclass(frozen=True)
@@ -82,9 +100,9 @@ class ContactPlan(Plan[Scene]):
         )
 
     @property
-    def solve_seconds(self) -> float:
-        """Predicted seconds without figures and files."""
-        return self.seconds - self.files_seconds
+    def shown(self) -> tuple[str, ...]:
+        """Effects left out whose change of a number the run shows."""
+        return tuple(e.check for e in self.effects if e.check and self.scene.left_out.solves)
 
 
 def is_curved(scene: Scene) -> bool:
@@ -159,23 +177,21 @@ def normal_loads(scene: Scene) -> tuple[DamperLoad, ...]:
 
 def choose_symmetry(scene: Scene) -> tuple[str, str]:
     """Part of the model that is solved, and why. Raises InputError for one that does not serve."""
-    asked, reasons = scene.mesh.symmetry, []
-    if not recipes.has_parameter(scene.recipe, "symmetry"):
-        reasons.append("the geometry has no mirror plane")
-    if scene.coupled:
-        reasons.append("normal and tangential contact at once are solved on the full model")
-    elif friction_on(scene) and scene.slip_directions == 2:
-        reasons.append("slip in two directions is solved on the full model")
-    if scene.contact.tilt == "free":
-        reasons.append("the damper may tilt about both axes")
-    if scene.geometry.get("pad_offset", 0.0) != 0.0:
-        reasons.append("the pads have unequal heights")
+    asked, two = scene.mesh.symmetry, friction_on(scene) and scene.slip_directions == 2
+    hindered = {
+        "the geometry has no mirror plane": not recipes.has_parameter(scene.recipe, "symmetry"),
+        "normal and tangential contact at once are solved on the full model": scene.coupled,
+        "slip in two directions is solved on the full model": two and not scene.coupled,
+        "the damper may tilt about both axes": scene.contact.tilt == "free",
+        "the pads have unequal heights": scene.geometry.get("pad_offset", 0.0) != 0.0,
+    }
+    reasons = "; ".join(why for why, applies in hindered.items() if applies)
     if asked not in ("auto", "full") and reasons:
-        raise InputError(f'mesh.symmetry: {"; ".join(reasons)}; use "full" or "auto"')
+        raise InputError(f'mesh.symmetry: {reasons}; use "full" or "auto"')
     if asked != "auto":
         return asked, "asked for in the scene"
     if reasons:
-        return "full", "; ".join(reasons)
+        return "full", reasons
     if is_curved(scene):
         return "quarter", "geometry, load and effects share both mirror planes"
     return "half", "geometry and loads share the mirror plane x = 0"
@@ -197,6 +213,141 @@ def make_families(scene: Scene, symmetry: str) -> tuple[Family, ...]:
     if ALONG in shear:
         families.append(Family((ALONG,), {"plane_x": (1, 2), **beside}))
     return tuple(families)
+
+
+# -- effects ---------------------------------------------------------------------------------------
+
+
+def _effect(name: str, on: bool, why: str, *switch: str, shows: bool = False) -> Effect:
+    """An effect; one left out has its check where that ``shows`` something, and else does not
+    apply.
+    """
+    check = name if shows and not on else ""
+    return Effect(name, on, why, check, () if on else switch, on or shows)
+
+
+def make_effects(scene: Scene, symmetry: str, why: str, loaded: bool) -> tuple[Effect, ...]:
+    """Effects simulated and omitted.
+
+    Parameters
+    ----------
+    why
+        Of the symmetry.
+    loaded
+        Whether any normal load presses the bodies.
+    """
+    curved, curve, inside = is_curved(scene), scene.wants("curve"), ", ".join(_inside(scene))
+    free = scene.contact.tilt == "free"
+    tilt = "no moment about the load line" if free else "its distant set only translates"
+    return (
+        Effect(
+            "unilateral contact",
+            True,
+            "the gap is curved: the contact set depends on the load"
+            if curved
+            else "edges may lift off; one linear solve when none does",
+        ),
+        *([] if curved else [_effect(TILT, free, tilt, "contact.tilt=free", shows=loaded)]),
+        *_friction_effects(scene, loaded),
+        _effect("mirror symmetry", symmetry != "full", why),
+        _effect(
+            "load curve",
+            curve,
+            f"{scene.loads.curve_points} points asked for" if curve else "single loads only",
+        ),
+        _effect(
+            "internal displacement",
+            bool(inside),
+            f"a back-substitution per load for {inside}"
+            if inside
+            else "no output asks for it: contact nodes only",
+        ),
+        _effect("inertia", False, "every output is static: M is not assembled"),
+        _effect(
+            LARGE,
+            False,
+            "the contact is small against the body"
+            if curved
+            else "the approach is small against the patch",
+            shows=loaded,
+        ),
+    )
+
+
+def _friction_effects(scene: Scene, loaded: bool) -> list[Effect]:
+    curved, mu, coupled = is_curved(scene), scene.contact.friction, scene.coupled
+    coupling, materials = _coupling_effects(scene, loaded)
+    if not friction_on(scene):
+        asked = scene.wants(*FRICTION_WANTS)
+        why = "mu = 0: no tangential force can be carried" if asked else "no output asks for it"
+        return [_effect("friction", False, why), *[coupling] * (mu > 0.0)]
+    outputs = ", ".join(w for w in scene.want if w in FRICTION_WANTS)
+    stepped, steps = True, "first loading, in small steps"
+    if scene.wants("cycle"):
+        steps = "a full cycle is asked for"
+    elif curved and not coupled:
+        stepped, steps = False, "first loading only"
+    two, why = scene.slip_directions == 2, _TOGETHER if coupled else "asked for"
+    if not two:
+        why = "the load has one direction" if curved else "loads run along the axes"
+    shows = loaded and (not curved or _slip_shows(scene))
+    return [
+        _effect("friction", True, f"mu = {mu:g} and the outputs {outputs}"),
+        _effect(DIRECTIONS, two, why, "contact.directions=2", shows=shows),
+        coupling,
+        materials,
+        _effect("load history", stepped, steps),
+    ]
+
+
+def _coupling_effects(scene: Scene, loaded: bool) -> tuple[Effect, Effect]:
+    """Normal-tangential coupling, and what of it the difference of the materials makes."""
+    beta, limit, coupled = beta_of(scene), scene.contact.coupling_limit, scene.coupled
+    unlike = beta > 0.0 and (scene.wants("cycle") or largest_ratio(scene) > 0.0)
+    why = (
+        "beta = 0: pressure alone does not shear the contact"
+        if not beta > 0.0
+        else f"|beta| = {beta:.3g}: the shear of the pressure alone is not simulated"
+        if unlike
+        else "no output depends on the shear of the pressure alone"
+    )
+    frozen = "normal forces stay frozen under shear: exact for half-spaces of like materials alone"
+    if scene.contact.friction > 0.0 and beta > limit:
+        frozen += (
+            f"; |beta| = {beta:.3g} is above contact.coupling_limit = {limit:.3g}: set "
+            "contact.coupling = coupled"
+        )
+    how, on = "asked for" if coupled else frozen, coupled and unlike
+    return (
+        _effect(COUPLING, coupled, how, "contact.coupling=coupled", shows=loaded),
+        _effect(MATERIALS, on, _TOGETHER if on else why, shows=unlike and loaded),
+    )
+
+
+def _slip_shows(scene: Scene) -> bool:
+    """Whether a number of the run depends on the directions of slip."""
+    shear = scene.wants("stiffness") and scene.sphere_radius is not None
+    loads = scene.wants("tangential") and len(scene.loads.tangential) > 0
+    return shear or loads or scene.wants("cycle")
+
+
+def _inside(scene: Scene) -> list[str]:
+    """Outputs that ask for displacements inside the bodies."""
+    if not is_curved(scene):
+        return [w for w in scene.want if w == "fields"]
+    wanted = ("fields", "body_compression", "stiffness")
+    return [w for w in scene.want if w in wanted or (w == "tangential" and friction_on(scene))]
+
+
+def beta_of(scene: Scene) -> float:
+    """Size of Dundurs' beta of the scene's two materials: how far pressure shears the contact."""
+    first, second = list(scene.materials.values())[:2]
+    return abs(float(dundurs_beta(first.E, first.nu, second.E, second.nu)))
+
+
+def largest_ratio(scene: Scene) -> float:
+    """Largest T / (mu N) of the tangential loads asked for; zero without any."""
+    return max(scene.loads.tangential, default=0.0) if scene.wants("tangential") else 0.0
 
 
 # -- what the recipe is given ----------------------------------------------------------------------

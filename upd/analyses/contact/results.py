@@ -12,40 +12,29 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from upd.analyses import printed
-from upd.analyses.contact.closed_forms import (
-    beyond_3a,
-    closed_form_traction,
-    hertz_of,
-    loop_energy,
-    shear_compliance,
-    stick_radius,
-)
-from upd.analyses.contact.faces import area_of, lattices, tractions
-from upd.analyses.contact.law import contact_law, tilt_stiffness
+from upd.analyses.contact import faces
+from upd.analyses.contact.faces import lattices
 from upd.analyses.contact.loading import pressed_by
 from upd.analyses.contact.plan import NORMAL, direction_name, normal_loads
-from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
-from upd.analyses.contact.worn_zones import band_middles, pressure_peaks
+from upd.analyses.contact.solution import ContactSolution, NormalCase, References, TangentialCase
 from upd.contact.patch import consistent_average
 from upd.contact.stiffness import without_body
 from upd.mesh import recipes
 from upd.plot.chart import Entry
-from upd.reference import HertzPoint, hertz_pressure, mindlin
+from upd.reference import hertz_pressure
 from upd.reference.printed import Lookup, Printed
 from upd.results import Case, ErrorPart, Result, with_parts
 from upd.results import quantities as q
 from upd.results.quantity import Quantity
 from upd.scene import Scene
 
-_HERTZ, _MINDLIN = "Hertz", "Cattaneo-Mindlin"
-_HERTZ_3A = "Hertz, within 3a"
 # How errors were estimated.
 _BETTI = "Betti's theorem: displacements less those of half-spaces and of the bodies' share"
 # Sources of numbers of a contact whose edge is located between nodes.
-_LOCATED = {
-    q.CONTACT_AREA.name: "edge located between nodes",
-    q.MEAN_PRESSURE.name: "load over the located area",
-    q.CONTACT_AREA_NODES.name: "tributary areas of the nodes in contact",
+_LOCATED: References = {
+    q.CONTACT_AREA.name: (None, "edge located between nodes"),
+    q.MEAN_PRESSURE.name: (None, "load over the located area"),
+    q.CONTACT_AREA_NODES.name: (None, "tributary areas of the nodes in contact"),
 }
 # Raw, and with the bulk compliance removed: one mesh's error is in both.
 _OF_APPROACH = (q.APPROACH.name, q.APPROACH_CONTACT.name)
@@ -120,9 +109,10 @@ def make_results(solution: ContactSolution, *, misfits: bool = True) -> list[Res
     scene = solution.plan.scene
     out = _equilibrium(solution)
     for case in solution.normal:
-        out += _normal(solution, case)
+        known = solution.normal_references(case)
+        out += _normal(solution, case, known)
         if scene.wants("stiffness") and case.force > 0.0:
-            out += _stiffness(solution, case)
+            out += _stiffness(solution, case, known)
         if scene.wants("worn_zones"):
             out += _worn_zones(solution, case)
         if scene.wants("contact_law"):
@@ -130,9 +120,7 @@ def make_results(solution: ContactSolution, *, misfits: bool = True) -> list[Res
         for t in (t for t in solution.tangential if t.normal is case):
             out += _tangential(solution, t, misfits=misfits)
         for path in (p for p in solution.paths if p.cycle and p.normal == case.case):
-            energy = loop_energy(solution, case.force)
-            by = "Mindlin-Deresiewicz"
-            out.append(_beside(q.CYCLE_ENERGY, path.slip_work, path.case, energy, by))
+            out += _beside(path.case, known, (q.CYCLE_ENERGY, path.slip_work))
     return printed.with_printed([*out, *_working_slope(solution)], printed_of(scene))
 
 
@@ -154,15 +142,9 @@ def printed_of(scene: Scene) -> Lookup:
     return under_load
 
 
-def _beside(
-    quantity: Quantity, value: float, case: Case, closed: float | None, source: str, n: object = ""
-) -> Result:
-    """A number beside its closed form, where it has one."""
-    return quantity.of(value, case, closed, "" if closed is None else source, n=n)
-
-
-def _of(hertz: HertzPoint[float] | None, name: str) -> float | None:
-    return None if hertz is None else float(getattr(hertz, name))
+def _beside(case: Case, known: References, *rows: tuple[Quantity, float]) -> list[Result]:
+    """Numbers of a case beside their closed forms, where they have one."""
+    return [one.of(value, case, *known.get(one.name, (None, ""))) for one, value in rows]
 
 
 def _area(solution: ContactSolution, area: Quantity) -> Quantity:
@@ -186,38 +168,33 @@ def _equilibrium(solution: ContactSolution) -> list[Result]:
 # -- normal loads ----------------------------------------------------------------------------------
 
 
-def _normal(solution: ContactSolution, case: NormalCase) -> list[Result]:
-    m, at, hertz = case.measures, case.case, hertz_of(solution, case.force)
-    radii = [
-        (q.RADIUS_MOMENT, m.radius_moment, "radius"),
-        (q.RADIUS_AREA, m.radius_area, "radius"),
-        (q.RADIUS_OUTERMOST, m.radius_outermost, "radius"),
+def _normal(solution: ContactSolution, case: NormalCase, known: References) -> list[Result]:
+    m, at = case.measures, case.case
+    resolution = m.area_resolution
+    rows = [
+        (q.APPROACH, case.approach),
+        (_area(solution, q.CONTACT_AREA), m.area),
+        (_area(solution, q.CONTACT_AREA_NODES), m.area_nodes),
+        (q.MAX_PRESSURE, m.max_pressure),
+        (q.MEAN_PRESSURE, m.mean_pressure),
     ]
-    table = [
-        *(radii if solution.curved else ()),
-        (q.APPROACH, case.approach, "approach"),
-        (_area(solution, q.CONTACT_AREA), m.area, "area"),
-        (_area(solution, q.CONTACT_AREA_NODES), m.area_nodes, "area"),
-        (q.MAX_PRESSURE, m.max_pressure, "max_pressure"),
-        (q.MEAN_PRESSURE, m.mean_pressure, "mean_pressure"),
-    ]
-    located = _LOCATED if m.area_resolution is not None else {}
-    out = [
-        quantity.of(value, at, closed, _HERTZ)
-        if (closed := _of(hertz, name)) is not None
-        else quantity.of(value, at, source=located.get(quantity.name, ""))
-        for quantity, value, name in table
-    ]
-    if m.area_resolution is not None:
-        out.append(_area(solution, q.CONTACT_AREA_RESOLUTION).of(m.area_resolution, at))
-    if solution.plan.effect("friction"):
-        out.append(_area(solution, q.STICK_AREA).of(area_of(solution, case.stick), at))
     if solution.curved:
-        out += _approach_split(solution, case, hertz)
-        if hertz is not None:
-            out.append(q.CLOSED_FORM_ERROR.of(hertz.approach**2 / hertz.radius**2, at))
-        return [_with_estimate(result, case) for result in out]
-    return out + _of_faces(solution, case)
+        radii = m.radius_moment, m.radius_area, m.radius_outermost
+        names = q.RADIUS_MOMENT, q.RADIUS_AREA, q.RADIUS_OUTERMOST
+        rows = [*zip(names, radii, strict=True), *rows]
+    if resolution is not None:
+        rows.append((_area(solution, q.CONTACT_AREA_RESOLUTION), resolution))
+    if solution.plan.effect("friction"):
+        stick = faces.area_of(solution, case.stick)
+        rows.append((_area(solution, q.STICK_AREA), stick))
+    out = _beside(at, known if resolution is None else _LOCATED, *rows)
+    if not solution.curved:
+        return out + _of_faces(solution, case)
+    out += _approach_split(case, known)
+    hertz = solution.hertz_of(case.force)
+    if hertz is not None:
+        out.append(q.CLOSED_FORM_ERROR.of(hertz.approach**2 / hertz.radius**2, at))
+    return [_with_estimate(result, case) for result in out]
 
 
 def _of_faces(solution: ContactSolution, case: NormalCase) -> list[Result]:
@@ -251,61 +228,47 @@ def _with_estimate(result: Result, case: NormalCase) -> Result:
     return with_parts(result, parts)
 
 
-def _approach_split(
-    solution: ContactSolution, case: NormalCase, hertz: HertzPoint[float] | None
-) -> list[Result]:
+def _approach_split(case: NormalCase, known: References) -> list[Result]:
     """The approach less the bodies' share, and within depth 3a."""
     if not case.shares:
         return []
-    at, phi = case.case, {body: s.compression for body, s in case.shares.items()}
-    far = sum(s.far_mesh for s in case.shares.values())
-    beyond = sum(beyond_3a(solution, case.force).values())
-    within = None if hertz is None else hertz.approach - beyond
-    left = case.approach - sum(phi.values())
-    whole = _of(hertz, "approach")
+    at, bodies = case.case, case.shares.items()
+    far = sum(share.far_mesh for _, share in bodies)
     return [
-        _beside(q.APPROACH_CONTACT, case.approach - case.finite_body, at, whole, _HERTZ),
+        *_beside(at, known, (q.APPROACH_CONTACT, case.approach - case.finite_body)),
         q.APPROACH_FINITE_BODY.of(case.finite_body, at),
         q.APPROACH_FAR_MESH.of(far, at),
-        *(q.COMPRESSION_3A.of(value, at, n=body) for body, value in phi.items()),
-        _beside(q.APPROACH_WITHIN_3A, left, at, within, _HERTZ_3A),
+        *(q.COMPRESSION_3A.of(share.compression, at, n=body) for body, share in bodies),
+        *_beside(at, known, (q.APPROACH_WITHIN_3A, _within_3a(case))),
     ]
+
+
+def _within_3a(case: NormalCase) -> float:
+    """Approach within depth 3a, mm."""
+    return case.approach - sum(share.compression for share in case.shares.values())
 
 
 # -- stiffness -------------------------------------------------------------------------------------
 
 
-def _stiffness(solution: ContactSolution, case: NormalCase) -> list[Result]:
-    hertz, at = hertz_of(solution, case.force), case.case
-    secant = case.force / (case.approach - _touch(solution))
-    tangent_of, secant_of = _of(hertz, "tangent_stiffness"), _of(hertz, "secant_stiffness")
-    out = [
-        _beside(q.K_N_TANGENT_RAW, case.stiffness, at, tangent_of, _HERTZ),
-        _beside(q.K_N_SECANT_RAW, secant, at, secant_of, _HERTZ),
-    ]
+def _stiffness(solution: ContactSolution, case: NormalCase, known: References) -> list[Result]:
+    at, secant = case.case, case.force / (case.approach - _touch(solution))
+    raw = (q.K_N_TANGENT_RAW, case.stiffness), (q.K_N_SECANT_RAW, secant)
+    out = _beside(at, known, *raw)
     if not solution.curved:
         return out + _stiffness_of_faces(solution, case)
-    K_N = without_body(case.stiffness, case.finite_body / case.force)
+    bodies = case.finite_body / case.force
+    K_N, rows = without_body(case.stiffness, bodies), list[tuple[Quantity, float]]()
     if case.shares:
-        K_N_secant = without_body(secant, case.finite_body / case.force)
-        out += [
-            _within_3a(solution, case, hertz),
-            _beside(q.K_N_TANGENT, K_N, at, tangent_of, _HERTZ),
-            _beside(q.K_N_SECANT, K_N_secant, at, secant_of, _HERTZ),
-        ]
+        out.append(_tangent_within_3a(solution, case, known))
+        rows += [(q.K_N_TANGENT, K_N), (q.K_N_SECANT, without_body(secant, bodies))]
     stuck = next((total for total, _ in case.stuck.values()), None)
-    if stuck is None or hertz is None:
-        return out
-    closed = mindlin.initial_tangential_stiffness(hertz.radius, shear_compliance(solution))
-    out.append(q.K_T_INITIAL_RAW.of(stuck, at, closed, _MINDLIN))
-    if case.shear_shares:
-        K_T = without_body(stuck, case.finite_body_shear)
-        ratio = closed / hertz.tangent_stiffness
-        out += [
-            q.K_T_INITIAL.of(K_T, at, closed, _MINDLIN),
-            q.K_T_OVER_K_N.of(K_T / K_N, at, ratio, "Mindlin"),
-        ]
-    return out
+    if stuck is not None and known:
+        rows.append((q.K_T_INITIAL_RAW, stuck))
+        if case.shear_shares:
+            K_T = without_body(stuck, case.finite_body_shear)
+            rows += [(q.K_T_INITIAL, K_T), (q.K_T_OVER_K_N, K_T / K_N)]
+    return out + _beside(at, known, *rows)
 
 
 def _touch(solution: ContactSolution) -> float:
@@ -349,22 +312,18 @@ def finer(scene: Scene) -> str:
     return "mesh the contact surface finer"
 
 
-def _within_3a(
-    solution: ContactSolution, case: NormalCase, hertz: HertzPoint[float] | None
-) -> Result:
+def _tangent_within_3a(solution: ContactSolution, case: NormalCase, known: References) -> Result:
     """Tangent stiffness of the approach within 3a, 1.5 F / d as F goes with d^1.5: what the thesis
     takes for the contact's (its section 6.5).
 
     23 % of a half-space's displacement lies beyond 3a, so it is 30 % above K_N by Hertz itself.
     """
-    within = case.approach - sum(s.compression for s in case.shares.values())
+    within = _within_3a(case)
     # The rounding of a sum of three: nothing of the approach is left within 3a.
     if within <= 4.0 * np.finfo(float).eps * case.approach:
         reason = "the depth 3a lies within the first element under the contact"
         return q.K_N_TANGENT_3A.withheld(case.case, f"{reason}; {finer(solution.plan.scene)}")
-    beyond = sum(beyond_3a(solution, case.force).values())
-    closed = None if hertz is None else 1.5 * case.force / (hertz.approach - beyond)
-    return _beside(q.K_N_TANGENT_3A, 1.5 * case.force / within, case.case, closed, _HERTZ_3A)
+    return _beside(case.case, known, (q.K_N_TANGENT_3A, 1.5 * case.force / within))[0]
 
 
 def _working_slope(solution: ContactSolution) -> list[Result]:
@@ -390,7 +349,7 @@ def _worn_zones(solution: ContactSolution, case: NormalCase) -> list[Result]:
     """
     if case.force <= 0.0 or not all(k.lattice for k in lattices(solution)):
         return []
-    peaks, bands = pressure_peaks(solution, case), band_middles(solution)
+    peaks, bands = faces.pressure_peaks(solution, case), faces.band_middles(solution)
     out = [q.PRESSURE_PEAKS.of(len(peaks), case.case)]
     for i, (x, y) in enumerate(peaks):
         nearest = min(bands, key=lambda c: abs(c - x)) if len(bands) == len(peaks) else None
@@ -401,7 +360,7 @@ def _worn_zones(solution: ContactSolution, case: NormalCase) -> list[Result]:
 
 
 def _law(solution: ContactSolution, case: NormalCase) -> list[Result]:
-    law, at = contact_law(solution, case), case.case
+    law, at = faces.contact_law(solution, case), case.case
     if law is None:
         return []
     out = [
@@ -413,7 +372,7 @@ def _law(solution: ContactSolution, case: NormalCase) -> list[Result]:
     ]
     own = dict(zip("xy", law.tilt_stiffness(), strict=True))
     if solution.plan.scene.law.bodies == "both":
-        for axis, true in tilt_stiffness(solution, case).items():
+        for axis, true in faces.tilt_stiffness(solution, case).items():
             out.append(q.LAW_TILT.of(own[axis], at, true, "contact's own", n=axis))
     return out
 
@@ -422,9 +381,15 @@ def _law(solution: ContactSolution, case: NormalCase) -> list[Result]:
 
 
 def _tangential(solution: ContactSolution, t: TangentialCase, *, misfits: bool) -> Iterable[Result]:
-    area = area_of(solution, t.stick)
+    area = faces.area_of(solution, t.stick)
     if solution.curved:
-        yield from _partial_slip(solution, t, area, misfits=misfits)
+        known = solution.shear_references(t)
+        rows = [(q.STICK_RADIUS, float(np.sqrt(area / np.pi))), (q.SHEAR_RAW, t.displacement)]
+        if t.normal.shear_shares:
+            bodies = t.load * t.normal.finite_body_shear
+            rows.append((q.SHEAR, t.displacement - bodies))
+        yield from _beside(t.case, known, *rows)
+        yield from _misfits(solution, t) if misfits else ()
     else:
         yield q.TANGENTIAL_LOAD.of(t.load, t.case)
         yield q.DISPLACEMENT.of(t.displacement, t.case)
@@ -435,43 +400,23 @@ def _tangential(solution: ContactSolution, t: TangentialCase, *, misfits: bool) 
         yield q.K_T_SECANT_RAW.of(t.load / t.displacement, t.case)
 
 
-def _partial_slip(
-    solution: ContactSolution, t: TangentialCase, area: float, *, misfits: bool
-) -> Iterable[Result]:
-    """Beside Cattaneo and Mindlin where they have a closed form."""
-    mu, N, c = solution.plan.scene.contact.friction, t.normal.force, stick_radius(solution, t)
-    hertz, closed = hertz_of(solution, N), None
-    if hertz is not None:
-        C = shear_compliance(solution)
-        closed = float(mindlin.displacement(t.load, mu, N, hertz.radius, C))
-    yield _beside(q.STICK_RADIUS, float(np.sqrt(area / np.pi)), t.case, c, _MINDLIN)
-    yield _beside(q.SHEAR_RAW, t.displacement, t.case, closed, _MINDLIN)
-    if t.normal.shear_shares:
-        bodies = t.load * t.normal.finite_body_shear
-        yield _beside(q.SHEAR, t.displacement - bodies, t.case, closed, _MINDLIN)
-    if misfits and hertz is not None:
-        yield from _misfits(solution, t, hertz)
-
-
-def _misfits(
-    solution: ContactSolution, t: TangentialCase, hertz: HertzPoint[float]
-) -> list[Result]:
-    """Root mean square difference of the traction from the closed form, over that of the closed
-    form and over that of mu p.
+def _misfits(solution: ContactSolution, t: TangentialCase) -> list[Result]:
+    """Root mean square difference of the traction from Cattaneo and Mindlin's, where they have a
+    closed form, over that of the closed form and over that of mu p.
     """
-    closed = closed_form_traction(solution, t)
-    if closed is None or solution.model.patch.quads is not None:
+    hertz, closed = solution.hertz_of(t.normal.force), solution.closed_form_traction(t)
+    if hertz is None or closed is None or solution.model.patch.quads is not None:
         return []
     patch, mu = solution.model.patch, solution.plan.scene.contact.friction
     area, theirs = patch.area(), consistent_average(patch, closed)
     limit = consistent_average(
         patch, lambda r: mu * hertz_pressure(r, hertz.radius, hertz.max_pressure)
     )
-    traction = tractions(solution, t)[0]
+    traction = faces.tractions(solution, t)[0]
     misfit = np.sqrt((area * (patch.whole(traction) - theirs) ** 2).sum())
     lost = f"the contact lies between the nodes; {finer(solution.plan.scene)}"
     return [
-        quantity.of(misfit / size, t.case, source=_MINDLIN)
+        quantity.of(misfit / size, t.case, source="Cattaneo-Mindlin")
         if (size := float(np.sqrt((area * scale**2).sum()))) > 0.0
         else quantity.withheld(t.case, lost)
         for quantity, scale in ((q.MISFIT, theirs), (q.MISFIT_OF_LIMIT, limit))

@@ -1,5 +1,5 @@
-"""Plan of a contact, curved or flat: effects simulated and omitted, cost, and the coarser whole
-model of what is solved again.
+"""Plan of a contact, curved or flat, with its cost and the coarser whole model of what is solved
+again.
 """
 
 from __future__ import annotations
@@ -11,38 +11,13 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.base import Effect
-from upd.analyses.contact.effects import (
-    DIRECTIONS,
-    LARGE,
-    TILT,
-    TOGETHER,
-    coupling_effects,
-    omitted,
-)
-from upd.analyses.contact.plan import (
-    ACROSS,
-    ALONG,
-    COMPONENTS,
-    NORMAL,
-    OWN_LEVEL,
-    ContactPlan,
-    Family,
-    auto_core_depth,
-    auto_patch,
-    choose_symmetry,
-    component,
-    is_curved,
-    make_families,
-    normal_loads,
-    recipe_parameters,
-    require_contact_sets,
-    require_held,
-)
+from upd.analyses.contact import plan as planned
+from upd.analyses.contact.plan import ALONG, NORMAL, ContactPlan, Family, is_curved
 from upd.analyses.cost import NODES, START_BYTES, CostModel, dense_s
 from upd.errors import InputError, UpdError
 from upd.linalg.routes import EACH, FIRST
 from upd.mesh import recipes
-from upd.scene import FRICTION_WANTS, Scene, friction_on
+from upd.scene import Scene, friction_on
 
 
 def make_plan(scene: Scene) -> ContactPlan:
@@ -55,12 +30,13 @@ def make_plan(scene: Scene) -> ContactPlan:
             f"materials: a contact has two bodies, {len(scene.materials)} given "
             f"({', '.join(scene.materials)})"
         )
-    loaded = any(load.force > 0.0 for load in normal_loads(scene))
+    loaded = any(load.force > 0.0 for load in planned.normal_loads(scene))
     if not is_curved(scene):
         _require_fitting(scene)
-    symmetry, why = choose_symmetry(scene)
-    families, effects = make_families(scene, symmetry), _effects(scene, symmetry, why, loaded)
-    parameters = recipe_parameters(scene, symmetry)
+    symmetry, why = planned.choose_symmetry(scene)
+    families = planned.make_families(scene, symmetry)
+    effects = planned.make_effects(scene, symmetry, why, loaded)
+    parameters = planned.recipe_parameters(scene, symmetry)
     return _with_companion(contact_plan(scene, symmetry, families, effects, parameters))
 
 
@@ -71,12 +47,12 @@ def _require_fitting(scene: Scene) -> None:
         problems.append(
             'mesh.symmetry: a damper\'s face has one mirror plane; use "half", "full" or "auto"'
         )
-    axes = {component(d) for d in scene.loads.directions}
-    if scene.wants("contact_law") and friction_on(scene) and not {ALONG, ACROSS} <= axes:
+    axes = {planned.component(d) for d in scene.loads.directions}
+    if scene.wants("contact_law") and friction_on(scene) and not {ALONG, planned.ACROSS} <= axes:
         problems.append(
             'loads.directions: contact_law needs the stiffness along both axes; give ["x", "y"]'
         )
-    oblique = [d for d in scene.loads.directions if component(d) is None]
+    oblique = [d for d in scene.loads.directions if planned.component(d) is None]
     if oblique and friction_on(scene) and scene.slip_directions == 1:
         problems.append(
             f"loads.directions: {oblique[0]:g} deg lies between the axes and slips in two "
@@ -84,86 +60,6 @@ def _require_fitting(scene: Scene) -> None:
         )
     if problems:
         raise InputError("\n".join(problems))
-
-
-# -- effects ---------------------------------------------------------------------------------------
-
-
-def _simulated(name: str, on: bool, why: str) -> Effect:
-    """An effect that the scene's question has where it is simulated, and else not."""
-    return Effect(name, on, why, applies=on)
-
-
-def _effects(scene: Scene, symmetry: str, why_symmetry: str, loaded: bool) -> list[Effect]:
-    edge = "edges may lift off; one linear solve when none does"
-    small, tilt = "the approach is small against the patch", [_tilt_effect(scene, loaded)]
-    if is_curved(scene):
-        edge = "the gap is curved: the contact set depends on the load"
-        small, tilt = "the contact is small against the body", []
-    curve, inside = scene.wants("curve"), ", ".join(_inside(scene))
-    points = f"{scene.loads.curve_points} points asked for" if curve else "single loads only"
-    fields = (
-        f"a back-substitution per load for {inside}"
-        if inside
-        else "no output asks for it: contact nodes only"
-    )
-    return [
-        Effect("unilateral contact", True, edge),
-        *tilt,
-        *_friction_effects(scene, loaded),
-        _simulated("mirror symmetry", symmetry != "full", why_symmetry),
-        _simulated("load curve", curve, points),
-        _simulated("internal displacement", bool(inside), fields),
-        _simulated("inertia", False, "every output is static: M is not assembled"),
-        omitted(LARGE, small, applies=loaded),
-    ]
-
-
-def _tilt_effect(scene: Scene, loaded: bool) -> Effect:
-    if scene.contact.tilt == "free":
-        return Effect(TILT, True, "no moment about the load line")
-    return omitted(TILT, "its distant set only translates", "contact.tilt=free", applies=loaded)
-
-
-def _friction_effects(scene: Scene, loaded: bool) -> list[Effect]:
-    curved, mu = is_curved(scene), scene.contact.friction
-    if not friction_on(scene):
-        asked = scene.wants(*FRICTION_WANTS)
-        why = "mu = 0: no tangential force can be carried" if asked else "no output asks for it"
-        coupling = coupling_effects(scene, loaded)[:1] if mu > 0.0 else ()
-        return [_simulated("friction", False, why), *coupling]
-    outputs = ", ".join(w for w in scene.want if w in FRICTION_WANTS)
-    stepped, steps = True, "first loading, in small steps"
-    if scene.wants("cycle"):
-        steps = "a full cycle is asked for"
-    elif curved and not scene.coupled:
-        stepped, steps = False, "first loading only"
-    directions = Effect(DIRECTIONS, True, TOGETHER if scene.coupled else "asked for")
-    if scene.slip_directions == 1:
-        why = "the load has one direction" if curved else "loads run along the axes"
-        shows = loaded and (not curved or _slip_shows(scene))
-        directions = omitted(DIRECTIONS, why, "contact.directions=2", applies=shows)
-    return [
-        _simulated("friction", True, f"mu = {mu:g} and the outputs {outputs}"),
-        directions,
-        *coupling_effects(scene, loaded),
-        _simulated("load history", stepped, steps),
-    ]
-
-
-def _slip_shows(scene: Scene) -> bool:
-    """Whether a number of the run depends on the directions of slip."""
-    shear = scene.wants("stiffness") and scene.sphere_radius is not None
-    loads = scene.wants("tangential") and len(scene.loads.tangential) > 0
-    return shear or loads or scene.wants("cycle")
-
-
-def _inside(scene: Scene) -> list[str]:
-    """Outputs that ask for displacements inside the bodies."""
-    if not is_curved(scene):
-        return [w for w in scene.want if w == "fields"]
-    wanted = ("fields", "body_compression", "stiffness")
-    return [w for w in scene.want if w in wanted or (w == "tangential" and friction_on(scene))]
 
 
 # -- size and cost ---------------------------------------------------------------------------------
@@ -189,10 +85,12 @@ def contact_plan(
             + (f"; {', '.join(missing)} has no material" if missing else "")
             + (f"; {', '.join(spare)} is not one of them" if spare else "")
         )
-    require_held(scene, parameters, size)
+    planned.require_held(scene, parameters, size)
     if recipes.counted_by_mesh(scene.recipe):
         # The mesh is there: what it lacks is reported before anything is written.
-        require_contact_sets(scene, recipes.build_mesh(scene.recipe, parameters)[0], families)
+        planned.require_contact_sets(
+            scene, recipes.build_mesh(scene.recipe, parameters)[0], families
+        )
     cost, on = CostModel(scene), {effect.name for effect in effects if effect.on}
     products = [(family, _products(scene, on, family)) for family in families]
     _add_bodies(cost, scene, size, products, recipes.weighted_sets(scene.recipe, parameters))
@@ -334,8 +232,7 @@ def _with_companion(plan: ContactPlan) -> ContactPlan:
     coarser.
     """
     scene = plan.scene
-    needed = (e.check and e.word == "no" and e.name not in OWN_LEVEL for e in plan.effects)
-    if not scene.left_out.solves or not any(needed):
+    if not {*plan.shown} - {planned.TILT}:
         return plan
     off = ("load curve", "internal displacement")
     effects = [replace(e, on=e.on and e.name not in off) for e in plan.effects]
@@ -345,7 +242,7 @@ def _with_companion(plan: ContactPlan) -> ContactPlan:
     # What couples the directions is looked up in the whole compliance.
     route = "condensed" if scene.solver.route == "products" else scene.solver.route
     smaller = replace(scene, want=want, solver=replace(scene.solver, route=route))
-    whole, family = _whole_parameters(scene), (Family(COMPONENTS),)
+    whole, family = _whole_parameters(scene), (Family(planned.COMPONENTS),)
     try:
         companion = contact_plan(smaller, "full", family, effects, _coarse(scene, whole))
     except UpdError:
@@ -377,13 +274,13 @@ def _whole_parameters(scene: Scene) -> dict[str, Any]:
 
     The patch is no larger than the largest load needs it.
     """
-    parameters = recipe_parameters(scene, "full")
+    parameters = planned.recipe_parameters(scene, "full")
     if scene.sphere_radius is not None and max(scene.loads.forces) > 0.0:
-        needed = auto_patch(scene)
+        needed = planned.auto_patch(scene)
         if needed < float(parameters["patch"]):
             share = needed / float(parameters["patch"])
             parameters["patch"] = needed
             parameters["divisions"] = 2 * round(0.5 * share * int(parameters["divisions"])) or 2
             if scene.geometry.get("core_depth", "auto") == "auto":
-                parameters["core_depth"] = auto_core_depth(scene, needed)
+                parameters["core_depth"] = planned.auto_core_depth(scene, needed)
     return parameters

@@ -2,10 +2,12 @@
 
 Fields are those of the model's contact nodes, (n,); mirror symmetry may make the model a part of
 the whole, which loads and stiffnesses are those of. `faces` has the fields on the whole contact.
+It knows what Hertz, Cattaneo and Mindlin have for the loads of a sphere on a plane.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,10 +20,21 @@ from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
 from upd.contact.patch import ContactMeasures
 from upd.contact.stiffness import BodyShare
-from upd.reference import contact_modulus
+from upd.reference import (
+    HertzPoint,
+    contact_modulus,
+    hertz_axial_displacement,
+    hertz_sphere,
+    mindlin,
+    tangential_compliance_modulus,
+)
 from upd.results import Case, Estimates
+from upd.results import quantities as q
 
 Array = NDArray[np.float64]
+#: name of a number -> its closed form in mm, N, and the source
+References = dict[str, tuple[float | None, str]]
+_HERTZ, _MINDLIN = "Hertz", "Cattaneo-Mindlin"
 
 
 @dataclass
@@ -192,3 +205,89 @@ class ContactSolution:
         """A normal load with a tangential one; a curved contact has one direction."""
         name = "" if self.curved else direction_name(direction)
         return replace(normal.case, direction=name, ratio=ratio)
+
+    # -- closed forms of a sphere on a plane -----------------------------------------------------
+
+    def hertz_of(self, load: float) -> HertzPoint[float] | None:
+        """Closed form of a normal load in N, or None when the scene has none."""
+        radius = self.plan.scene.sphere_radius
+        return None if radius is None or load <= 0.0 else hertz_sphere(load, radius, self.modulus)
+
+    def shear_compliance(self) -> float:
+        """C = (2 - nu1)/G1 + (2 - nu2)/G2 in 1/MPa."""
+        m1, m2 = (self.plan.scene.materials[b.name] for b in (self.model.upper, self.model.lower))
+        return tangential_compliance_modulus(m1.E, m1.nu, m2.E, m2.nu)
+
+    def stick_radius(self, case: TangentialCase) -> float | None:
+        """Cattaneo and Mindlin's radius of the stick zone in mm, or None without a closed form."""
+        hertz, N = self.hertz_of(case.normal.force), case.normal.force
+        mu = self.plan.scene.contact.friction
+        return (
+            None if hertz is None else float(mindlin.stick_radius(case.load, mu, N, hertz.radius))
+        )
+
+    def closed_form_traction(self, case: TangentialCase) -> Callable[[Array], Array] | None:
+        """Cattaneo and Mindlin's traction in MPa over the distance from the centre, mm."""
+        hertz, c = self.hertz_of(case.normal.force), self.stick_radius(case)
+        if hertz is None or c is None or case.load <= 0.0:
+            return None
+        mu, N = self.plan.scene.contact.friction, case.normal.force
+        return lambda r: mindlin.traction(r, hertz.radius, c, mu, N)
+
+    def beyond_3a(self, load: float) -> dict[str, float]:
+        """Displacement of each half-space at depth 3a under a normal load in N: body -> mm, empty
+        without a closed form.
+        """
+        hertz, model = self.hertz_of(load), self.model
+        if hertz is None:
+            return {}
+        out = {}
+        for name in (model.upper.name, model.lower.name):
+            data = self.plan.scene.materials[name]
+            a, p0 = hertz.radius, hertz.max_pressure
+            out[name] = float(hertz_axial_displacement(3.0 * a, a, p0, data.E, data.nu))
+        return out
+
+    def normal_references(self, case: NormalCase) -> References:
+        """Closed forms of the numbers of a normal load, of its stiffnesses and of a cycle after it;
+        empty without them.
+        """
+        hertz, F = self.hertz_of(case.force), case.force
+        if hertz is None:
+            return {}
+        C, within = self.shear_compliance(), hertz.approach - sum(self.beyond_3a(F).values())
+        K_T, K_N = mindlin.initial_tangential_stiffness(hertz.radius, C), hertz.tangent_stiffness
+        by_hertz = (
+            (hertz.radius, (q.RADIUS_MOMENT, q.RADIUS_AREA, q.RADIUS_OUTERMOST)),
+            (hertz.approach, (q.APPROACH, q.APPROACH_CONTACT)),
+            (hertz.area, (q.CONTACT_AREA, q.CONTACT_AREA_NODES)),
+            (hertz.max_pressure, (q.MAX_PRESSURE,)),
+            (hertz.mean_pressure, (q.MEAN_PRESSURE,)),
+            (K_N, (q.K_N_TANGENT_RAW, q.K_N_TANGENT)),
+            (hertz.secant_stiffness, (q.K_N_SECANT_RAW, q.K_N_SECANT)),
+        )
+        out: References = {
+            one.name: (float(value), _HERTZ) for value, alike in by_hertz for one in alike
+        }
+        scene = self.plan.scene
+        if self.plan.effect("friction"):
+            amplitude, mu = scene.loads.cycle_amplitude, scene.contact.friction
+            energy = float(mindlin.cycle_energy(amplitude, mu, F, hertz.radius, C))
+            out[q.CYCLE_ENERGY.name] = energy, "Mindlin-Deresiewicz"
+        return out | {
+            q.APPROACH_WITHIN_3A.name: (within, "Hertz, within 3a"),
+            q.K_N_TANGENT_3A.name: (1.5 * F / within, "Hertz, within 3a"),
+            q.K_T_INITIAL_RAW.name: (K_T, _MINDLIN),
+            q.K_T_INITIAL.name: (K_T, _MINDLIN),
+            q.K_T_OVER_K_N.name: (K_T / K_N, "Mindlin"),
+        }
+
+    def shear_references(self, t: TangentialCase) -> References:
+        """Closed forms of the numbers of a tangential load; empty without them."""
+        hertz, c = self.hertz_of(t.normal.force), self.stick_radius(t)
+        if hertz is None or c is None:
+            return {}
+        mu, C = self.plan.scene.contact.friction, self.shear_compliance()
+        moved = float(mindlin.displacement(t.load, mu, t.normal.force, hertz.radius, C))
+        values = {q.STICK_RADIUS: c, q.SHEAR_RAW: moved, q.SHEAR: moved}
+        return {one.name: (value, _MINDLIN) for one, value in values.items()}

@@ -1,39 +1,52 @@
 """Quasi-static contact of two bodies.
 
-Mesh, stiffness, condensation, every normal load with the force-approach curve, tangential contact.
-Arrays in, arrays out.
+Mesh, stiffness, condensation, every normal load with the force-approach curve; after each normal
+load stiffness, tangential loads and cycles, with the normal forces frozen, or with normal and
+tangential contact at once, where the pressure follows the shear. Arrays in, arrays out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
 
-from upd.analyses.contact.bodies import prepare, show_normal
+from upd.analyses.contact import loading
+from upd.analyses.contact import plan as planned
+from upd.analyses.contact.bodies import learns, prepare, show_normal, solve_inside
 from upd.analyses.contact.faces import measured
-from upd.analyses.contact.loading import (
-    LOAD_STEP,
-    CoupledState,
-    as_normal,
-    raised,
-    slope,
-    slope_loads,
-    tilt_arms,
+from upd.analyses.contact.plan import NORMAL, ContactPlan, DamperLoad
+from upd.analyses.contact.solution import (
+    ContactSolution,
+    NormalCase,
+    PressedContact,
+    TangentialCase,
 )
-from upd.analyses.contact.plan import NORMAL, ContactPlan, DamperLoad, normal_loads
-from upd.analyses.contact.shares import solve_inside
-from upd.analyses.contact.solution import ContactSolution, NormalCase, PressedContact
-from upd.analyses.contact.tangential import solve_tangential
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import normal_contact, normal_curve
-from upd.contact.products import KNOWN, settled
+from upd.contact.products import KNOWN, KNOWN_STIFFNESS, settled
+from upd.contact.tangential import TangentialPath, tangential_contact, tangential_path
+from upd.contact.tangential_step import TangentialContact, TangentialHistory
 from upd.contact.tilt import tilted_contact
 from upd.progress import Stages
+from upd.results import Case
 
 Array = NDArray[np.float64]
+#: loads in N of the whole contact and displacements in mm along them, from zero on; what the k-th
+#: load leaves, for a case with its ratio
+Marched = tuple[Array, Array, Callable[[int, float], TangentialCase]]
+
+#: Shares of mu N of the force-displacement curve: even steps, then closer to gross slip.
+PATH_SHARES = np.concatenate(
+    [np.linspace(0.05, 0.9, 18), [0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 0.999]]
+)
+# On the way to the tangential loads of a curved contact where the pressure follows the shear.
+_SHARES = np.arange(1, 20) / 20.0
+#: tangential load of an initial stiffness of coupled contact, as a part of mu N
+SMALL_SHEAR = 1e-3
 
 
 def solve_plan(
@@ -71,16 +84,16 @@ def solve_plan(
 def solve_normal(solution: ContactSolution, stages: Stages) -> None:
     """Every normal load and the force-approach curve."""
     plan = solution.plan
-    loads = normal_loads(plan.scene)
+    loads = planned.normal_loads(plan.scene)
     wanted = [load.force for load in loads]
     curve = _curve_loads(plan, max(wanted), solution.curved)
-    around = slope_loads(wanted) if _by_slope(solution) else []
+    around = loading.slope_loads(wanted) if _by_slope(solution) else []
     with stages("normal contact", f"{len({*wanted, *curve, *around})} loads"):
-        found = _pressed(solution, [*wanted, *curve, *around])
+        found = press(solution, [*wanted, *curve, *around])
         solution.normal = [_case(solution, load, found) for load in loads]
         solution.curve = [_case(solution, DamperLoad(F), found) for F in curve]
         for body in _bodies_alone(solution):
-            alone = _pressed(solution, [*wanted, *around], body)
+            alone = press(solution, [*wanted, *around], body)
             for case in solution.normal:
                 case.alone[body.name] = alone[case.force]
 
@@ -107,7 +120,7 @@ def _curve_loads(plan: ContactPlan, largest: float, curved: bool) -> list[float]
     return [top * k / n for k in range(1, n + 1)]
 
 
-def _pressed(
+def press(
     solution: ContactSolution, forces: Iterable[float], body: Body | None = None
 ) -> dict[float, PressedContact]:
     """Answers of the forces in N on the whole contact, by force.
@@ -124,7 +137,7 @@ def _pressed(
     distinct = sorted(set(forces))
     if plan.scene.coupled:
         return _sheared_too(solution, distinct, body)
-    loads, arms = [F / plan.copies for F in distinct], tilt_arms(plan, model)
+    loads, arms = [F / plan.copies for F in distinct], loading.tilt_arms(plan, model)
     if solution.curved:
         show_normal(model, loads)
 
@@ -132,9 +145,9 @@ def _pressed(
         return model.compliance(NORMAL) if body is None else model.body_compliance(body, NORMAL)
 
     if arms.size:
-        found = []
+        found, free = [], (0 not in plan.mirrors, 1 not in plan.mirrors)
         for F in loads:
-            t = tilted_contact(compliance(), model.gap, arms, load=F)
+            t = tilted_contact(compliance(), model.gap, arms, load=F, free=free)
             found.append(PressedContact(t.normal, plan.copies * t.free_stiffness, tilt=t.tilt))
     else:
         answers = settled(
@@ -146,10 +159,10 @@ def _pressed(
         found = [PressedContact(one, plan.copies * one.stiffness) for one in answers]
     out = dict(zip(distinct, found, strict=True))
     for F in distinct if _by_slope(solution) else ():
-        ends = [out.get(F * (1.0 + s)) for s in (-LOAD_STEP, LOAD_STEP)]
+        ends = [out.get(F * (1.0 + s)) for s in (-loading.LOAD_STEP, loading.LOAD_STEP)]
         if F > 0.0 and ends[0] and ends[1]:
             moved = ends[1].solution.approach - ends[0].solution.approach
-            out[F].stiffness = 2.0 * LOAD_STEP * F / moved
+            out[F].stiffness = 2.0 * loading.LOAD_STEP * F / moved
     return out
 
 
@@ -160,21 +173,21 @@ def _sheared_too(
     where it is known.
     """
     model, mu = solution.model, solution.plan.scene.contact.friction
-    arms = tilt_arms(solution.plan, model)
-    states = raised(model, mu, forces, arms, body=body)
+    arms = loading.tilt_arms(solution.plan, model)
+    states = loading.raised(model, mu, forces, arms, body=body)
     # no load: friction has nothing to hold
     none = partial(normal_contact, model.compliance(NORMAL), model.gap, load=0.0)
     out = {F: PressedContact(none(), 0.0) for F in forces if not F > 0.0}
     for F, state in states.items():
-        sloped = all(F * (1.0 + s) in states for s in (-LOAD_STEP, LOAD_STEP))
-        free = slope(states, F) if sloped else float("nan")
+        sloped = all(F * (1.0 + s) in states for s in (-loading.LOAD_STEP, loading.LOAD_STEP))
+        free = loading.slope(states, F) if sloped else float("nan")
         held = _held_stiffness(state) if arms.size and sloped and body is None else free
         tilt = state.motion[3:] if arms.size else None
-        out[F] = PressedContact(as_normal(state, held), free, state, tilt)
+        out[F] = PressedContact(loading.as_normal(state, held), free, state, tilt)
     return out
 
 
-def _held_stiffness(state: CoupledState) -> float:
+def _held_stiffness(state: loading.CoupledState) -> float:
     """dF/d approach in N/mm with the tilts held and the states kept, shifts following."""
     return float(1.0 / np.linalg.inv(state.found.stiffness()[:3, :3])[0, 0])
 
@@ -194,3 +207,267 @@ def _case(
 ) -> NormalCase:
     measures = measured(solution, found[load.force].solution, load.force)
     return NormalCase(**vars(found[load.force]), load=load, measures=measures)
+
+
+# -- tangential loads ------------------------------------------------------------------------------
+
+
+def march_shares(plan: ContactPlan, curved: bool, *, companion: bool = False) -> Array:
+    """Shares of mu N that the march to the tangential loads takes: of flat faces to gross slip, for
+    a curve.
+
+    On a companion that march takes four steps to the largest load: exact along one direction; along
+    two the slip turns a little from step to step. Coupled, which nodes stick depends on the steps:
+    the run's.
+    """
+    ratio = planned.largest_ratio(plan.scene)
+    if curved:
+        return np.asarray(_SHARES[ratio > _SHARES])
+    if not companion:
+        return PATH_SHARES
+    few = ratio * np.array([0.25, 0.5, 0.75])
+    return np.asarray(PATH_SHARES[ratio > PATH_SHARES] if plan.scene.coupled else few)
+
+
+def solve_tangential(solution: ContactSolution, stages: Stages, *, companion: bool = False) -> None:
+    """Stiffness, tangential loads, curve and cycle of every direction after every normal load."""
+    plan, scene = solution.plan, solution.plan.scene
+    shares = march_shares(plan, solution.curved, companion=companion)
+    with stages("tangential contact", f"{len(solution.normal)} normal loads"):
+        loaded = [case for case in solution.normal if case.solution.force.any()]
+        # Twice: what one load teaches changes the answers of the others within the tolerance.
+        # Nothing is learned afterwards, so that every result and check sees one compliance.
+        for case in 2 * loaded if learns(solution.model) else ():
+            Frozen(solution, case, 0.0).learn()
+        for case in loaded:
+            for direction in scene.loads.directions:
+                _sheared(solution, case, direction, shares)
+
+
+def _sheared(solution: ContactSolution, case: NormalCase, direction: float, shares: Array) -> None:
+    """Stiffness, single loads, curve and cycle of one direction after one normal load."""
+    scene, own = solution.plan.scene, solution.sheared_case(case, direction)
+    way = (Frozen if case.state is None else _Coupled)(solution, case, direction)
+    # Flat faces share their law by the stuck contact.
+    if not solution.curved or scene.wants("stiffness"):
+        case.stuck[direction] = way.stuck()
+    loads = scene.loads.tangential if scene.wants("tangential") else ()
+    # Each load of a curved contact with frozen forces alone, all others on one way.
+    marches = [np.array([ratio]) for ratio in loads]
+    if scene.wants("tangential") and not (solution.curved and case.state is None):
+        marches = [np.unique(np.concatenate([shares, loads]))]
+    for ratios in marches:
+        load, moved, at = way.march(ratios)
+        if not solution.curved:
+            solution.paths.append(loading.LoadPath(own, case.case, load, moved))
+        for ratio in (r for r in loads if r in ratios):
+            solution.tangential.append(at(int(np.searchsorted(ratios, ratio)), ratio))
+    if scene.wants("cycle"):
+        amplitude = scene.loads.cycle_amplitude if solution.curved else None
+        solution.paths.append(way.cycle(solution.sheared_case(case, direction, amplitude)))
+
+
+class Frozen:
+    """Tangential loads along a direction that leave the normal forces as they are."""
+
+    def __init__(self, solution: ContactSolution, case: NormalCase, direction: float) -> None:
+        scene, force = solution.plan.scene, case.solution.force
+        self.solution, self.case, self.direction = solution, case, direction
+        self.components = planned.slip_components(scene, direction)
+        self.unit = planned.unit_vector(direction, self.components)
+        self.friction, self.loads = scene.contact.friction, scene.loads
+        self.copies = solution.plan.copies
+        self.loaded = np.flatnonzero(force > 0.0)
+        self.limit = self.friction * force[self.loaded]
+        #: mu N on the model
+        self.total = float(self.limit.sum())
+        if solution.curved:
+            self.total = self.friction * case.force / self.copies
+
+    def _found(
+        self,
+        ratio: float,
+        displacement: float,
+        K: Array,
+        fields: tuple[Array, Array],
+        nodes: loading.Sheared,
+        state: loading.CoupledState | None = None,
+    ) -> TangentialCase:
+        """The load, with the tangent K (1, 1) or (2, 2) of the model, forces and slip."""
+        # with the motion across the load held, or free to follow; 0 where nothing holds
+        tangent = float(K[0, 0])
+        if not self.solution.curved:
+            free = np.linalg.pinv(K, hermitian=True)
+            tangent = 1.0 / float(self.unit @ free @ self.unit) if K.any() else 0.0
+        case = self.solution.sheared_case(self.case, self.direction, ratio)
+        load = ratio * self.friction * self.case.force
+        return TangentialCase(
+            self.case, case, load, displacement, self.copies * tangent, *fields, nodes, state
+        )
+
+    @property
+    def compliance(self) -> Array:
+        """Of the loaded nodes; it changes while bodies learn."""
+        return loading.tangential_compliance(self.solution.model, self.components, self.loaded)
+
+    def _moved(self, compliance: Array) -> tuple[Array, float]:
+        """Tractions of stuck nodes that move by one along the direction, T = e' C^-1 e."""
+        e = np.repeat(self.unit, len(compliance) // len(self.unit))
+        t = cho_solve(cho_factor(compliance), e)
+        return t, self.copies * float(e @ t)
+
+    def stuck(self) -> tuple[float, dict[str, float]]:
+        """Stiffness of the stuck contact set, of both bodies and of each on a rigid counterpart."""
+        model, of = self.solution.model, {}
+        for body in (model.upper, model.lower):
+            if body.name in self.case.alone:
+                on = np.flatnonzero(self.case.alone[body.name].solution.force > 0.0)
+                C = loading.tangential_compliance(model, self.components, on, body)
+                of[body.name] = self._moved(C)[1]
+        return self._moved(self.compliance)[1], of
+
+    def march(self, ratios: Array, history: TangentialHistory | None = None) -> Marched:
+        """Shares of mu N one after the other.
+
+        ``history``: before the first; None starts from no slip.
+        """
+        loads = loading.load_history(ratios * self.total, self.unit)
+        path = tangential_path(self.compliance, self.limit, loads=loads, history=history)
+        return *loading.along(path, self.unit, self.copies), partial(self._at, path)
+
+    def _at(self, path: TangentialPath, k: int, ratio: float) -> TangentialCase:
+        before = path.slip[k - 1] if k else np.zeros(len(self.compliance))
+        d, stick = np.atleast_1d(path.displacement[k]), path.state[k] == 0
+        load, force = ratio * self.total * self.unit, path.unclipped[k]
+        nodes = loading.Sheared(
+            self.components, self.loaded, self.limit, force, before, d, load, stick
+        )
+        fields = self._spread(path.force[k]), self._spread(path.slip[k])
+        K = np.atleast_2d(path.stiffness[k])
+        return self._found(ratio, float(d @ self.unit), K, fields, nodes)
+
+    def cycle(self, case: Case, history: TangentialHistory | None = None) -> loading.LoadPath:
+        """The full cycle, first loading and the closed loop.
+
+        ``history``: before the first step; None starts from no slip.
+        """
+        path, quarter = self._cycle_path(history)
+        T, d = loading.along(path, self.unit, self.copies)
+        work = self.copies * float(np.sum(path.slip_work[quarter:]))
+        return loading.closed_loop(case, self.case.case, T, d, work, quarter)
+
+    def _cycle_path(self, history: TangentialHistory | None = None) -> tuple[TangentialPath, int]:
+        shares, quarter = loading.cycle_shares(self.loads.cycle_steps)
+        values = loading.load_history(self.loads.cycle_amplitude * self.total * shares, self.unit)
+        path = tangential_path(self.compliance, self.limit, loads=values, history=history)
+        return path, quarter
+
+    def learn(self) -> None:
+        """Show bodies that learn the tractions of every tangential load and of the cycle.
+
+        Raises ConvergenceError where a product does not converge.
+        """
+        scene, model = self.solution.plan.scene, self.solution.model
+        n = len(model.gap)
+        at = np.concatenate([self.loaded + k * n for k in range(len(self.components))])
+
+        def whole(tractions: Array) -> Array:
+            """Tractions at the loaded nodes, on all nodes; column by column."""
+            out = np.zeros((n * len(self.components), *tractions.shape[1:]))
+            out[at] = tractions
+            return out.reshape(len(out), -1)
+
+        def shown(solve: Callable[[], Array], limit: float = KNOWN) -> None:
+            settled(model, self.components, solve, lambda found: [(whole(found), limit)])
+
+        def single(load: Array) -> TangentialContact:
+            target = load if len(load) == 2 else float(load[0])
+            return tangential_contact(self.compliance, self.limit, load=target)
+
+        def both(found: TangentialContact) -> Iterable[tuple[Array, float]]:
+            yield whole(found.force), KNOWN
+            if found.rates is not None:
+                yield whole(found.rates), KNOWN_STIFFNESS
+
+        shown(lambda: self._moved(self.compliance)[0], KNOWN_STIFFNESS)
+        gross = np.zeros(len(self.components) * len(self.limit))
+        gross[: len(self.limit)] = self.limit
+        shown(lambda: gross)
+        for ratio in scene.loads.tangential if scene.wants("tangential") else ():
+            settled(model, self.components, partial(single, ratio * self.total * self.unit), both)
+        if scene.wants("cycle"):
+            shown(lambda: self._cycle_path()[0].force.T)
+
+    def moved_pressure(self) -> float:
+        """How far shear with T = mu N would change the normal forces that are frozen.
+
+        Sum |df| / 2 N over the nodes kept in contact.
+
+        The tangential forces t open or close the contact by C_nt t; kept closed at the same load,
+        the normal forces change by df = -C_nn^-1 (C_nt t - d e), e'df = 0.
+        """
+        model, answer = self.solution.model, self.case.solution
+        on, total = np.flatnonzero(answer.contact), float(answer.force.sum())
+        t = self._spread(self._moved(self.compliance)[0]) @ self.unit
+        t = t * (self.friction * total / float(t.sum()))
+        opened = sum(
+            u * (model.compliance(NORMAL, c) @ t)
+            for c, u in zip(self.components, self.unit, strict=True)
+        )
+        factor = cho_factor(model.compliance(NORMAL)[np.ix_(on, on)])
+        e = cho_solve(factor, np.ones(len(on)))
+        df = -cho_solve(factor, opened[on])
+        df -= e * (df.sum() / e.sum())
+        return float(np.abs(df).sum() / (2.0 * answer.force.sum()))
+
+    def _spread(self, values: Array) -> Array:
+        """(n, 1 or 2) of values at the loaded nodes."""
+        out = np.zeros((len(self.solution.model.gap), len(self.unit)))
+        out[self.loaded] = values.reshape(len(self.unit), len(self.loaded)).T
+        return out
+
+
+class _Coupled(Frozen):
+    """The same with normal and tangential contact at once: the pressure follows the shear."""
+
+    def __init__(self, solution: ContactSolution, case: NormalCase, direction: float) -> None:
+        super().__init__(solution, case, direction)
+        assert case.state is not None
+        self.state, self.total = case.state, self.friction * case.force
+
+    def stuck(self) -> tuple[float, dict[str, float]]:
+        """Secant of a small tangential load, of both bodies and of each on a rigid counterpart."""
+
+        def secant(state: loading.CoupledState) -> float:
+            size = SMALL_SHEAR * self.friction * float(state.found.load[-1, 0])
+            return size / float(loading.sheared(state, np.array([size]), self.unit, size)[1][0])
+
+        alone = {name: one.state for name, one in self.case.alone.items()}
+        of = {name: secant(state) for name, state in alone.items() if state is not None}
+        return secant(self.state), of
+
+    def march(self, ratios: Array, history: TangentialHistory | None = None) -> Marched:
+        """Shares of mu N one after the other; friction remembers the normal load."""
+        del history
+        needed = max(self.loads.tangential, default=0.0) * self.total
+        states, moved = loading.sheared(self.state, ratios * self.total, self.unit, needed)
+        load = np.insert(ratios[: len(states)] * self.total, 0, 0.0)
+        return load, np.insert(moved, 0, 0.0), partial(self._to, states, moved)
+
+    def _to(
+        self, states: list[loading.CoupledState], moved: Array, k: int, ratio: float
+    ) -> TangentialCase:
+        state = states[k]
+        nodes = loading.shear_nodes(self.solution.model, self.friction, state)
+        slip = np.zeros((len(state.force), 2))
+        slip[nodes.loaded] = state.found.slip[-1][nodes.loaded]
+        fields = state.force[:, 1:], slip
+        return self._found(ratio, float(moved[k]), state.shear_stiffness, fields, nodes, state)
+
+    def cycle(self, case: Case, history: TangentialHistory | None = None) -> loading.LoadPath:
+        """The full cycle; friction remembers the normal load."""
+        del history
+        peak, steps = self.loads.cycle_amplitude * self.total, self.loads.cycle_steps
+        return loading.coupled_loop(
+            case, self.case.case, self.state, peak=peak, steps=steps, unit=self.unit
+        )

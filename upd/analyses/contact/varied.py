@@ -39,8 +39,7 @@ from upd.analyses.contact.plan import (
 from upd.analyses.contact.results import make_results
 from upd.analyses.contact.scene_plan import contact_plan, make_plan
 from upd.analyses.contact.solution import ContactSolution, NormalCase
-from upd.analyses.contact.solve import solve_normal, solve_plan
-from upd.analyses.contact.tangential import solve_tangential
+from upd.analyses.contact.solve import solve_normal, solve_plan, solve_tangential
 from upd.errors import InputError, UpdError
 from upd.mesh import recipes
 from upd.progress import Stages

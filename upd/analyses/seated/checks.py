@@ -6,8 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from upd.analyses.base import conditions
 from upd.analyses.seated.interface import Array, Interface
-from upd.analyses.seated.solve import RAISED, Phase, SeatedSolution
+from upd.analyses.seated.plan import RAISED
+from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, SLIP
 from upd.results import Check
 
@@ -15,7 +17,6 @@ from upd.results import Check
 ROUNDING = 1e-9
 #: the same of works
 WORK_ROUNDING = 1e-8
-_REPORT = "report this scene"
 
 
 def check_solution(solution: SeatedSolution) -> list[Check]:
@@ -26,62 +27,57 @@ def check_solution(solution: SeatedSolution) -> list[Check]:
     return checks + [one.check(limits) for one in solution.omissions]
 
 
-def _phase(solution: SeatedSolution, phase: Phase) -> Iterator[Check]:
-    of, found, mu, case = solution.interface, phase.found, phase.friction, phase.case
-    yield Check(
-        "equilibrium",
-        case,
-        _off_balance(solution, phase),
-        ROUNDING,
-        "force and moment left on the damper / (F_C, F_C times its size)",
-        _REPORT,
-    )
+def _phase(solution: SeatedSolution, phase: Phase) -> list[Check]:
+    of, found, mu = solution.interface, phase.found, phase.friction
     normal = found.force[..., 0]
     size = normal.max(axis=1, initial=np.finfo(float).tiny)
     shear = np.linalg.norm(found.force[..., 1:], axis=-1)
     beyond = np.maximum(shear - mu * normal, -normal).max(axis=1)
-    yield Check(
-        "Coulomb's cone",
-        case,
-        float((beyond / size).max()),
-        ROUNDING,
-        "largest |t| - mu n or tension / largest n",
-        _REPORT,
-    )
     gap, step = _kinematics(solution, phase)
     moves = np.abs(found.displacement).max() + np.abs(phase.moved).max()
     reach = float(np.abs(of.columns[: of.n]).max()) * moves
-    yield Check(
-        "no penetration",
-        case,
-        float(np.maximum(-gap, np.where(normal > 0.0, np.abs(gap), 0.0)).max() / reach),
-        ROUNDING,
-        "overlap, or gap under pressure / motion of the damper",
-        _REPORT,
-    )
-    yield Check(
-        "sticking nodes",
-        case,
-        _stick_misfit(found.state, found.force[..., 1:], step) / reach if mu else 0.0,
-        ROUNDING,
-        "slip of sticking nodes, or slip against its friction / motion of the damper",
-        _REPORT,
-    )
-    yield Check(
-        "energy balance",
-        case,
-        _energy_misfit(solution, phase, gap, step),
-        WORK_ROUNDING,
-        "work in less elastic energy and friction / work of all forces",
-        _REPORT,
+    overlap = np.maximum(-gap, np.where(normal > 0.0, np.abs(gap), 0.0)).max() / reach
+    slip = _stick_misfit(found.state, found.force[..., 1:], step) / reach if mu else 0.0
+    work = _energy_misfit(solution, phase, gap, step)
+    return conditions(
+        phase.case,
+        "report this scene",
+        (
+            "equilibrium",
+            _off_balance(solution, phase),
+            ROUNDING,
+            "force and moment left on the damper / (F_C, F_C times its size)",
+        ),
+        (
+            "Coulomb's cone",
+            (beyond / size).max(),
+            ROUNDING,
+            "largest |t| - mu n or tension / largest n",
+        ),
+        (
+            "no penetration",
+            overlap,
+            ROUNDING,
+            "overlap, or gap under pressure / motion of the damper",
+        ),
+        (
+            "sticking nodes",
+            slip,
+            ROUNDING,
+            "slip of sticking nodes, or slip against its friction / motion of the damper",
+        ),
+        (
+            "energy balance",
+            work,
+            WORK_ROUNDING,
+            "work in less elastic energy and friction / work of all forces",
+        ),
     )
 
 
 def _off_balance(solution: SeatedSolution, phase: Phase) -> float:
     """Forces and moments on the damper, from the nodes' places and the faces' frames."""
-    of = solution.interface
-    assert solution.bodies is not None
-    body = solution.bodies.damper
+    of, body = solution.interface, solution.bodies.damper
     F = np.zeros((len(phase.centrifugal), 3))
     F[:, 2] = phase.centrifugal / of.copies
     # into the blades: the damper feels the opposite
@@ -102,17 +98,11 @@ def _off_balance(solution: SeatedSolution, phase: Phase) -> float:
 
 def _kinematics(solution: SeatedSolution, phase: Phase) -> tuple[Array, Array]:
     """Gap (k, n) and slip of each step (k, n, 2) in mm, from forces and motions."""
-    of, found = solution.interface, phase.found
-    assert solution.gap is not None
+    of, found, before = solution.interface, phase.found, phase.before
     w = _motion(of, found.force, found.displacement, phase.moved)
     n = of.n
     gap = solution.gap - w[:, :n]
-    before = phase.before
-    at = (
-        np.zeros((1, 3 * n))
-        if before is None
-        else _motion(of, before.force[None], before.motion[None], np.zeros((1, 3)))
-    )
+    at = _motion(of, before.force[None], before.motion[None], np.zeros((1, 3)))
     ways = np.vstack((at, w))[:, n:].reshape(-1, 2, n).transpose(0, 2, 1)
     return gap, np.diff(ways, axis=0)
 
@@ -141,20 +131,17 @@ def _energy_misfit(solution: SeatedSolution, phase: Phase, gap: Array, step: Arr
 
     By the trapezoidal rule, under which the balance is exact: f' dw = p' ds - f' du - d(f'C f)/2.
     """
-    of, found = solution.interface, phase.found
-    before = phase.before
-    assert solution.gap is not None
-    none = np.zeros_like(found.force[0])
-    force = np.concatenate(((none if before is None else before.force)[None], found.force))
-    gaps = np.vstack((solution.gap if before is None else before.gap, gap))
+    of, found, before = solution.interface, phase.found, phase.before
+    force = np.concatenate((before.force[None], found.force))
+    gaps = np.vstack((before.gap, gap))
     mean = 0.5 * (force[1:] + force[:-1])
     friction = (mean[..., 1:] * step).sum(axis=(1, 2))
     closing = -(mean[..., 0] * np.diff(gaps, axis=0)).sum(axis=1)
     f = force.transpose(0, 2, 1).reshape(len(force), -1)
     elastic = 0.5 * np.diff(((f @ of.compliance) * f).sum(axis=1))
     # What the forces do in motions that cancel is the measure: a damper carried along does no work.
-    start = np.zeros(found.displacement.shape[1]) if before is None else before.motion
-    moves = np.abs(np.diff(np.vstack((start, found.displacement)), axis=0)) @ np.abs(of.columns.T)
+    motion = np.vstack((before.motion, found.displacement))
+    moves = np.abs(np.diff(motion, axis=0)) @ np.abs(of.columns.T)
     size = float((np.abs(f[1:]) * moves).sum())
     return float(np.abs(found.work - elastic - friction - closing).max() / size)
 

@@ -19,7 +19,7 @@ from scipy.linalg import cho_factor, cho_solve, qr
 from upd.analyses.base import Plan
 from upd.analyses.seated.bodies import Blade, Bodies, free_dofs, is_half
 from upd.analyses.seated.lattice import lattice, patch_frame
-from upd.contact import CoupledContact, CoupledHistory, coupled_contact
+from upd.contact import CoupledContact, coupled_contact
 from upd.errors import InputError
 from upd.fem import Material, mass, stiffness
 from upd.linalg import factorise
@@ -94,7 +94,6 @@ class Interface:
         *,
         gap: Array | None = None,
         moved: Array | None = None,
-        history: CoupledHistory | None = None,
     ) -> CoupledContact:
         """Raise and lower F_C, and move the right blade.
 
@@ -108,8 +107,6 @@ class Interface:
             (n,) mm before any load; None: the faces fit.
         moved
             (k, 3) mm, shift of what holds the right blade after each step; None: it stays.
-        history
-            Of a seating before.
 
         Returns
         -------
@@ -130,7 +127,6 @@ class Interface:
             load=load,
             columns=self.columns,
             offset=offset,
-            history=history,
         )
 
     def seat_on(

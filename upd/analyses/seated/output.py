@@ -1,4 +1,8 @@
-"""What a seated damper leaves behind: histories, fields of both faces, the states, meshes."""
+"""What a seated damper leaves behind: histories, fields of both faces, the states, meshes.
+
+Fields are on the lattices of the whole contact, mirror images included: x along the damper from its
+middle, y up the slope from the patch's lower edge.
+"""
 
 from __future__ import annotations
 
@@ -7,32 +11,39 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from upd.analyses.seated.faces import FacePatch, face_patches
+from upd.analyses.contact.faces import FaceLattice
+from upd.analyses.seated.plan import AGAIN, LOWERED, RAISED, WAYS
 from upd.analyses.seated.results import platform_force
-from upd.analyses.seated.solve import (
-    AGAIN,
-    LOWERED,
-    RAISED,
-    WAYS,
-    Phase,
-    SeatedSolution,
-)
-from upd.analyses.seated.state import faces_group, state_group, state_name
+from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, STICK
+from upd.contact.patch import make_patch
+from upd.mesh import IntArray, Mesh
 from upd.results import ArrayGroup, variable
-from upd.scene.forced_contact import SIDES
+from upd.scene.forced_contact import SIDES, Side
 
 Variables = dict[str, Any]
 #: what the groups of result.nc hold, their attribute ``content``
 HISTORY, FACE, MOVED = "seating", "face", "moved"
 #: the phases that are one history
 SEATING = (RAISED, LOWERED, AGAIN)
+_STATES = "open stick slip"
+#: parts of the state after a way of loading
+_STATE: dict[str, tuple[str, str]] = {
+    "force": ("contact_node component", "N"),
+    "slip": ("contact_node tangent", "mm"),
+    "gap": ("contact_node", "mm"),
+    "motion": ("motion", "mm"),
+    "step": ("contact_node tangent", "mm"),
+    "load": ("motion", "N"),
+}
 
 
 def sizes(solution: SeatedSolution) -> dict[str, int]:
     """Nodes of both faces in the model."""
-    return {"n_pairs": 0 if solution.of is None else solution.of.n}
+    return {"n_pairs": solution.interface.n}
 
 
 def arrays(solution: SeatedSolution) -> dict[str, ArrayGroup]:
@@ -43,37 +54,59 @@ def arrays(solution: SeatedSolution) -> dict[str, ArrayGroup]:
     dict
         Group -> variable -> (dimensions, array, attributes). Contents: "seating" (histories over
         F_C), "moved" (over the blade's shift), "face" (fields on a face's lattice after each way of
-        loading), "seated faces" and "seated state" (what a forced response starts from).
+        loading), "seated faces" and "seated state" (of the nodes of both faces, left ones first).
     """
-    if solution.of is None or solution.gap is None:
-        return {}
     out: dict[str, ArrayGroup] = {}
     for phase in solution.phases.values():
         content = MOVED if phase.moved.any() else HISTORY
         out[f"{content} {phase.name}"] = ArrayGroup(
             _history(solution, phase), content=content, case=phase.case
         )
-    patches = face_patches(solution)
+    faces = _faces(solution)
     for phase in solution.phases.values():
-        for patch in patches:
-            name = f"face {patch.side} {patch.name} {phase.name}".replace("  ", " ")
+        for side, face in faces:
+            name = f"face {side} {face.name} {phase.name}".replace("  ", " ")
             out[name] = ArrayGroup(
-                _face(solution, patch, phase),
+                _face(solution, face, phase),
                 content=FACE,
-                case=replace(phase.case, side=patch.side),
-                **({"patch": patch.name} if patch.name else {}),
+                case=replace(phase.case, side=side),
+                **({"patch": face.name} if face.name else {}),
             )
-    out["faces"] = faces_group(solution.of, solution.gap)
+    out["faces"] = _nodes(solution)
     for phase in solution.phases.values():
         if phase.name in (*SEATING, *WAYS):
-            out[state_name(phase.name)] = state_group(
-                phase.found.history,
-                phase.found.state[-1],
-                phase.case,
-                centrifugal=float(phase.centrifugal[-1]),
-                mu=phase.friction,
-            )
+            out[f"state {phase.name}"] = _state(phase)
     return out
+
+
+def _nodes(solution: SeatedSolution) -> ArrayGroup:
+    """The nodes of both faces."""
+    of, node = solution.interface, "contact_node"
+    axes = "normal into the blade, along the damper, up the slope"
+    return ArrayGroup(
+        {
+            "position": variable("contact_node axis", of.position, "mm"),
+            "face": variable(node, of.face, flag_meanings="left right"),
+            "area": variable(node, of.area, "mm2"),
+            "gap": variable(node, solution.gap, "mm", "gap before any load"),
+            "frame": variable("side component axis", of.frame, "", axes),
+            "copies": variable("", of.copies, "", "models that make the whole"),
+        },
+        content="seated faces",
+    )
+
+
+def _state(phase: Phase) -> ArrayGroup:
+    """Forces, slip, gap and motion after a way of loading, in the layout of `Interface`."""
+    found = phase.found
+    variables: Variables = {
+        name: variable(dims, getattr(found.history, name), unit)
+        for name, (dims, unit) in _STATE.items()
+    }
+    variables["state"] = variable("contact_node", found.state[-1], flag_meanings=_STATES)
+    variables["centrifugal"] = variable("", float(phase.centrifugal[-1]), "N")
+    variables["friction"] = variable("", phase.friction, "1")
+    return ArrayGroup(variables, content="seated state", case=phase.case)
 
 
 def _history(solution: SeatedSolution, phase: Phase) -> Variables:
@@ -107,32 +140,66 @@ def _history(solution: SeatedSolution, phase: Phase) -> Variables:
     return out
 
 
-def _face(solution: SeatedSolution, patch: FacePatch, phase: Phase) -> Variables:
+def _face(solution: SeatedSolution, k: FaceLattice, phase: Phase) -> Variables:
     """Pressure, traction, slip and state on a face's lattice after a phase."""
     of, found, place = solution.interface, phase.found, "x y"
     force, slip = found.force[-1], found.slip[-1]
-    area = patch.field(of.area, extensive=True)
-    normal = patch.field(force[:, 0], extensive=True)
+    area, normal = (k.field(one, extensive=True) for one in (of.area, force[:, 0]))
     out: Variables = {
-        "x": variable("x", patch.x, "mm", "along the damper, from its middle"),
-        "y": variable("y", patch.y, "mm", "up the slope, from the lower edge"),
+        "x": variable("x", k.X, "mm", "along the damper, from its middle"),
+        "y": variable("y", k.Y, "mm", "up the slope, from the lower edge"),
         "normal_force": variable(place, normal, "N"),
         "pressure": variable(place, normal / area, "MPa"),
-        "gap": variable(place, patch.field(found.gap[-1]), "mm"),
-        "state": variable(place, patch.field(found.state[-1]), flag_meanings="open stick slip"),
+        "gap": variable(place, k.field(found.gap[-1]), "mm"),
+        "state": variable(place, k.field(found.state[-1]), flag_meanings=_STATES),
     }
-    for j, name in ((0, "along"), (1, "up")):
-        odd = j == 0
-        shear = patch.field(force[:, 1 + j], extensive=True, odd=odd)
+    # the mirror image has the opposite along the damper
+    image = np.where((k.X < 0.0) & (of.copies > 1), -1.0, 1.0)[:, None]
+    for j, name, sign in ((0, "along", image), (1, "up", np.ones_like(image))):
+        shear = sign * k.field(force[:, 1 + j], extensive=True)
         out[f"traction_{name}"] = variable(place, shear / area, "MPa")
-        out[f"slip_{name}"] = variable(place, patch.field(slip[:, j], odd=odd), "mm")
+        out[f"slip_{name}"] = variable(place, sign * k.field(slip[:, j]), "mm")
     return out
+
+
+def _faces(solution: SeatedSolution) -> list[tuple[Side, FaceLattice]]:
+    """The parts of both faces, left first, along the damper; "pad 1" and so on where they are
+    several.
+    """
+    of, out = solution.interface, []
+    half = of.copies > 1
+    _, along, up = np.einsum("nc,nfc->fn", of.position, of.frame[of.face])
+    for k, side in enumerate(SIDES):
+        mine = np.flatnonzero(of.face == k)
+        points = np.column_stack([along, up - up[mine].min()])
+        found = []
+        for part in _parts(solution.bodies.blades[side].mesh):
+            # the line on the plane once
+            on_plane = half and bool((along[mine[part]] == 0.0).any())
+            patch = make_patch(points, of.area, (on_plane, False), mine[part])
+            images = (False, True) if half and not on_plane else (False,)
+            found += [FaceLattice("", patch, flipped) for flipped in images]
+        found.sort(key=lambda one: float(one.X[0]))
+        several = len(found) > 1
+        out += [
+            (side, replace(one, name=f"pad {i + 1}" if several else ""))
+            for i, one in enumerate(found)
+        ]
+    return out
+
+
+def _parts(mesh: Mesh) -> list[IntArray]:
+    """Places in the nodes of the patch of each connected part."""
+    nodes, faces = np.unique(mesh.faces["patch"][:, :4], return_inverse=True)
+    faces, n = faces.reshape(-1, 4), len(nodes)
+    ends = np.concatenate([faces[:, [k, (k + 1) % 4]] for k in range(4)])
+    graph = coo_array((np.ones(len(ends)), ends.T), shape=(n, n))
+    count, part = connected_components(graph, directed=False)
+    return [np.flatnonzero(part == k) for k in range(count)]
 
 
 def write_files(solution: SeatedSolution, folder: Path) -> None:
     """Meshes of both blades and the damper."""
-    if solution.bodies is None:
-        return
     # meshio is slow to import: only when files are wanted.
     from upd.mesh.export import write_mesh
 

@@ -1,9 +1,14 @@
-"""Plan of a seated damper: what is simulated and left out, size and cost."""
+"""Plan of a seated damper: ways of loading, what is simulated and left out, size and cost."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from upd.analyses.base import Effect, Needs, Plan
 from upd.analyses.cost import NODES, CostModel, dense_s
@@ -16,6 +21,12 @@ from upd.scene.rotation import damper_mass
 from upd.units import UNITS
 
 SeatedPlan = Plan[SeatedScene]
+Array = NDArray[np.float64]
+
+RAISED, LOWERED, AGAIN = "raised", "lowered", "raised again"
+OVER, SHAKEN, SMOOTH = "over-pressed", "vibrated in", "frictionless"
+#: ways to F_C that differ by friction
+WAYS = (RAISED, AGAIN, OVER, SHAKEN)
 
 #: checks of effects omitted; each solves the faces' forces again with it
 WORN = "worn faces"
@@ -36,6 +47,76 @@ _STEP_S = 2e-3
 _MATRICES = 14.0
 # Figures, files and page.
 _FILES_S = 6.0
+
+
+# -- ways of loading -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way of loading, k steps.
+
+    Attributes
+    ----------
+    name
+        What is done.
+    centrifugal : (k,) ndarray
+        F_C after each step, N.
+    moved : (k, 3) ndarray
+        Shift of what holds the right blade after each step, mm.
+    after
+        The way whose state it starts from; "": nothing pressed.
+    """
+
+    name: str
+    centrifugal: Array
+    moved: Array
+    after: str = RAISED
+
+
+def ways(scene: SeatedScene) -> list[list[Way]]:
+    """F_C raised, and all that is asked for beside it, row by row: every row after the first starts
+    from the raised state.
+    """
+    F, s = scene.damper.centrifugal, scene.seating
+    raised = F * np.arange(1, s.steps + 1) / s.steps
+    lowered, back = _legs(s.steps, 1.0, s.lowest), _legs(s.steps, s.lowest, 1.0)
+    rows = [[_still(RAISED, raised, "")]]
+    rows.append([_still(LOWERED, F * lowered), _still(AGAIN, F * back, LOWERED)])
+    if scene.wants("band"):
+        rows.append([_still(OVER, F * _legs(s.steps, 1.0, s.over, 1.0))])
+        rows.append([shaken(scene)])
+        rows.append([_still(SMOOTH, np.array([F]), "")])
+    m = scene.moved
+    # out to the amplitude, then whole cycles, in even steps
+    out, cycle = _legs(m.steps, 0.0, 1.0), _legs(2 * m.steps, *[1.0, -1.0] * m.cycles, 1.0)
+    for axis in m.directions if scene.wants("moved") else ():
+        way = m.amplitude * np.concatenate([out, cycle])
+        moved = np.outer(way, np.arange(3) == "xyz".index(axis))
+        rows.append([Way(f"moved along {axis}", np.full(len(moved), F), moved)])
+    return rows
+
+
+def _legs(steps: int, *ends: float) -> Array:
+    """From each end to the next in even steps."""
+    return np.concatenate([np.linspace(a, b, steps + 1)[1:] for a, b in pairwise(ends)])
+
+
+def _still(name: str, centrifugal: Array, after: str = RAISED) -> Way:
+    return Way(name, centrifugal, np.zeros((len(centrifugal), 3)), after)
+
+
+def shaken(scene: SeatedScene) -> Way:
+    """The right blade vibrates along x under F_C; its amplitude dies away evenly to nothing."""
+    s = scene.seating
+    t = np.arange(1, s.cycle_steps * s.cycles + 1) / s.cycle_steps
+    moved = np.zeros((len(t), 3))
+    moved[:, 0] = s.shake * (1.0 - t / s.cycles) * np.sin(2.0 * np.pi * t)
+    moved[-1] = 0.0
+    return Way(SHAKEN, np.full(len(t), scene.damper.centrifugal), moved)
+
+
+# -- the plan --------------------------------------------------------------------------------------
 
 
 def make_plan(scene: SeatedScene) -> SeatedPlan:
@@ -62,16 +143,10 @@ def make_plan(scene: SeatedScene) -> SeatedPlan:
 
 def load_steps(scene: SeatedScene) -> int:
     """Load steps of all that is asked for, and of what is solved again."""
-    s, m = scene.seating, scene.moved
-    shaken = s.cycle_steps * s.cycles
-    steps = 3 * s.steps
-    if scene.wants("band"):
-        steps += 2 * s.steps + shaken + 1
-    if scene.wants("moved"):
-        steps += len(m.directions) * m.steps * (1 + 4 * m.cycles)
+    steps = sum(len(way.centrifugal) for row in ways(scene) for way in row)
     if scene.left_out.solves:
-        steps += s.steps * (scene.contact.worn < 1.0)
-        steps += 0 if scene.wants("band") else shaken
+        steps += scene.seating.steps * (scene.contact.worn < 1.0)
+        steps += 0 if scene.wants("band") else len(shaken(scene).moved)
     return steps
 
 
@@ -88,7 +163,7 @@ def _cost(
         for _ in range(2 if twice and body != "damper" else 1):
             cost.condensed(f"{body}, compliance", hexes, nodes, 3 * count["contact"])
     m = 3.0 * (size["left"]["contact"] + size["right"]["contact"])
-    calls = 4 + 3 * scene.wants("band") + scene.wants("moved") * len(scene.moved.directions)
+    calls = 1 + sum(map(len, ways(scene)))
     kind = scene.arrangement
     step = _FACTORS[kind] * 2.0 / 3.0 * (_CLOSED[kind] * m) ** 3
     step += _NEWTON[kind] * _PASSES[kind] * m**2
@@ -98,11 +173,6 @@ def _cost(
     cost.kept_bytes += _MATRICES * 8.0 * m**2
     memory, workers = cost.side_by_side(min(2, cost.threads), 2)
     return cost, memory, workers
-
-
-def solve_seconds(plan: SeatedPlan) -> float:
-    """Predicted seconds of the plan without its files."""
-    return plan.seconds - _FILES_S
 
 
 def needs(plan: SeatedPlan, threads: int) -> Needs:

@@ -8,16 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from upd.analyses.seated.lattice import rigid_balance
-from upd.analyses.seated.solve import (
-    AGAIN,
-    LOWERED,
-    RAISED,
-    SHAKEN,
-    SMOOTH,
-    WAYS,
-    Phase,
-    SeatedSolution,
-)
+from upd.analyses.seated.plan import AGAIN, LOWERED, RAISED, SHAKEN, SMOOTH, WAYS
+from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, SLIP
 from upd.plot.chart import Entry
 from upd.results import Case, Result
@@ -176,7 +168,6 @@ def _damper(solution: SeatedSolution) -> Iterator[Result]:
     """Mass of the damper, and its shift and turn as F_C is raised."""
     of = solution.interface
     case = Case(name=RAISED)
-    assert solution.bodies is not None
     yield q.DAMPER_MASS.of(of.copies * solution.bodies.damper.mass, case)
     motion = of.motions(solution.phases[RAISED].found)[-1]
     for k in of.kept:
@@ -187,9 +178,10 @@ def _damper(solution: SeatedSolution) -> Iterator[Result]:
 def _losses(solution: SeatedSolution) -> Iterator[Result]:
     """Friction loss of the seating's loop and of the last cycle of each motion."""
     of = solution.interface
-    loop = [solution.phases[name] for name in (LOWERED, AGAIN)]
-    loss = of.copies * sum(float(one.friction_loss.sum()) for one in loop)
-    yield q.SEATING_LOSS.of(loss, Case(name=f"{LOWERED} and {AGAIN}"))
+    loop = [one for name, one in solution.phases.items() if name in (LOWERED, AGAIN)]
+    if len(loop) == 2:
+        loss = of.copies * sum(float(one.friction_loss.sum()) for one in loop)
+        yield q.SEATING_LOSS.of(loss, Case(name=f"{LOWERED} and {AGAIN}"))
     for phase in _moved(solution):
         last = 4 * solution.plan.scene.moved.steps
         axis = int(np.flatnonzero(phase.moved.any(axis=0))[0])

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +12,17 @@ from numpy.typing import NDArray
 from upd.analyses.base import Resolved
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.analyses.seated.interface import Interface, make_interface
-from upd.analyses.seated.plan import OTHER_WAYS, WORN, SeatedPlan
+from upd.analyses.seated.plan import (
+    OTHER_WAYS,
+    RAISED,
+    SHAKEN,
+    SMOOTH,
+    WORN,
+    SeatedPlan,
+    Way,
+    shaken,
+    ways,
+)
 from upd.contact import CoupledContact, CoupledHistory
 from upd.linalg.parallel import in_parallel
 from upd.progress import Stages
@@ -22,42 +30,25 @@ from upd.results import Case
 from upd.scene.forced_contact import SIDES
 
 Array = NDArray[np.float64]
-_X = 0
-RAISED, LOWERED, AGAIN = "raised", "lowered", "raised again"
-OVER, SHAKEN, SMOOTH = "over-pressed", "vibrated in", "frictionless"
-#: ways to F_C that differ by friction
-WAYS = (RAISED, AGAIN, OVER, SHAKEN)
 
 
-@dataclass(frozen=True)
-class Phase:
-    """One way of loading, k steps.
+@dataclass(frozen=True, kw_only=True)
+class Phase(Way):
+    """A way of loading, solved.
 
     Attributes
     ----------
-    name
-        What was done.
-    centrifugal : (k,) ndarray
-        F_C after each step, N.
-    moved : (k, 3) ndarray
-        Shift of what holds the right blade after each step, mm.
     friction
         Coefficient.
     found
         Its answers.
     before
-        State it started from; None: nothing pressed.
-    seconds
-        By the clock.
+        State it started from.
     """
 
-    name: str
-    centrifugal: Array
-    moved: Array
     friction: float
     found: CoupledContact
-    before: CoupledHistory | None
-    seconds: float
+    before: CoupledHistory
 
     @property
     def case(self) -> Case:
@@ -71,16 +62,9 @@ class Phase:
         The mean over a step is what the work of all forces balances with; the traction after the
         step alone is off by the step's share.
         """
-        shear, slip = self.found.force[..., 1:], self.found.slip
-        none = np.zeros_like(shear[:1])
-        before = (
-            (none, none)
-            if self.before is None
-            else (self.before.force[None, :, 1:], self.before.slip[None])
-        )
-        tractions, slips = (
-            np.concatenate((one, many)) for one, many in zip(before, (shear, slip), strict=True)
-        )
+        before, found = self.before, self.found
+        tractions = np.concatenate((before.force[None, :, 1:], found.force[..., 1:]))
+        slips = np.concatenate((before.slip[None], found.slip))
         mean = 0.5 * (tractions[1:] + tractions[:-1])
         return np.asarray((mean * np.diff(slips, axis=0)).sum(axis=(1, 2)))
 
@@ -91,7 +75,7 @@ class SeatedSolution:
 
     Attributes
     ----------
-    bodies, of
+    bodies, interface
         Meshes and matrices; both faces as one contact.
     gap : (n,) ndarray
         mm, before any load.
@@ -106,47 +90,43 @@ class SeatedSolution:
     """
 
     plan: SeatedPlan
-    bodies: Bodies | None = None
-    of: Interface | None = None
-    gap: Array | None = None
+    bodies: Bodies
+    interface: Interface
+    gap: Array
     phases: dict[str, Phase] = field(default_factory=dict)
     worn: CoupledContact | None = None
     platforms: Interface | None = None
     omissions: list[Resolved] = field(default_factory=list)
 
-    @property
-    def interface(self) -> Interface:
-        """The contact of both faces, once it is made."""
-        assert self.of is not None
-        return self.of
-
-    def forces(self, name: str, step: int = -1) -> Array:
+    def forces(self, name: str) -> Array:
         """(2, 3) N on the faces after a phase: normal, along the damper, up the slope."""
-        return np.asarray(self.interface.face_forces(self.phases[name].found)[step])
+        return np.asarray(self.interface.face_forces(self.phases[name].found)[-1])
 
 
 def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
     """Run everything the plan calls for.
 
-    An error raised on the way carries what converged so far as ``partial``.
+    An error after F_C was raised carries what converged so far as ``partial``.
     """
-    solution = SeatedSolution(plan)
+    scene = plan.scene
+    with stages("mesh and assembly", f"both blades and the {scene.arrangement} damper"):
+        bodies = make_bodies(plan)
+    with stages("condensation", "both blades and the damper on the nodes of both faces"):
+        of = make_interface(plan, bodies, scene.blades.held)
+    worn, F = scene.contact.worn, scene.damper.centrifugal
+    gap = worn * of.worn_gap(F) if worn else np.zeros(of.n)
+    solution = SeatedSolution(plan, bodies, of, gap)
+    (raised,), *others = ways(scene)
+    with stages("seating", f"{RAISED}, {scene.seating.steps} load steps"):
+        _phase(solution, raised)
     try:
-        scene = plan.scene
-        with stages("mesh and assembly", f"both blades and the {scene.arrangement} damper"):
-            solution.bodies = make_bodies(plan)
-        with stages("condensation", "both blades and the damper on the nodes of both faces"):
-            solution.of = make_interface(plan, solution.bodies, scene.blades.held)
-        solution.gap = _gap(solution, scene.contact.worn)
-        with stages("seating", f"{RAISED}, {scene.seating.steps} load steps"):
-            _phase(solution, _raised(solution))
-        _go_on(solution, stages)
+        _go_on(solution, others, stages)
         if scene.wants("stiffness"):
             with stages("stiffness", "platforms held"):
                 solution.platforms = (
-                    solution.of
+                    of
                     if scene.blades.held == "platforms"
-                    else make_interface(plan, solution.bodies, "platforms", like=solution.of)
+                    else make_interface(plan, bodies, "platforms", like=of)
                 )
         if scene.left_out.solves:
             solution.omissions = list(_solve_again(solution, stages))
@@ -156,55 +136,15 @@ def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
     return solution
 
 
-def _gap(solution: SeatedSolution, fit: float) -> Array:
-    of, F = solution.interface, solution.plan.scene.damper.centrifugal
-    return fit * of.worn_gap(F) if fit else np.zeros(of.n)
-
-
-@dataclass(frozen=True)
-class _Way:
-    """A way of loading, from the state after another; moved blades keep F_C."""
-
-    name: str
-    centrifugal: Array
-    moved: Array
-    after: str = RAISED
-    friction: float | None = None
-
-
-def _raised(solution: SeatedSolution) -> _Way:
-    """F_C raised from nothing."""
-    F, s = solution.plan.scene.damper.centrifugal, solution.plan.scene.seating
-    return _still(RAISED, F * np.arange(1, s.steps + 1) / s.steps, "")
-
-
-def _still(name: str, centrifugal: Array, after: str = RAISED) -> _Way:
-    return _Way(name, centrifugal, np.zeros((len(centrifugal), 3)), after)
-
-
-def _go_on(solution: SeatedSolution, stages: Stages) -> None:
+def _go_on(solution: SeatedSolution, rows: Sequence[Sequence[Way]], stages: Stages) -> None:
     """F_C lowered and raised again, and every other way that is asked for: each from the raised
     state, and so side by side.
     """
-    scene, plan = solution.plan.scene, solution.plan
-    F, s = scene.damper.centrifugal, scene.seating
-    way = np.linspace(1.0, s.lowest, s.steps + 1)[1:] * F
-    back = np.linspace(s.lowest, 1.0, s.steps + 1)[1:] * F
-    rows = [[_still(LOWERED, way), _still(AGAIN, back, LOWERED)]]
-    if scene.wants("band"):
-        over = np.linspace(1.0, s.over, s.steps + 1)[1:]
-        down = np.linspace(s.over, 1.0, s.steps + 1)[1:]
-        rows.append([_still(OVER, F * np.concatenate((over, down)))])
-        rows.append([_shaken(plan)])
-        rows.append([_Way(SMOOTH, np.array([F]), np.zeros((1, 3)), "", 0.0)])
-    if scene.wants("moved"):
-        for axis in scene.moved.directions:
-            moved = _cycles(plan, "xyz".index(axis))
-            rows.append([_Way(f"moved along {axis}", np.full(len(moved), F), moved)])
+    scene = solution.plan.scene
     names = [way.name for row in rows for way in row]
     steps = sum(len(way.centrifugal) for row in rows for way in row)
 
-    def done(row: Sequence[_Way]) -> None:
+    def done(row: Sequence[Way]) -> None:
         for way in row:
             _phase(solution, way)
 
@@ -219,48 +159,24 @@ def _go_on(solution: SeatedSolution, stages: Stages) -> None:
 
 def _worn(solution: SeatedSolution) -> None:
     """F_C raised on faces worn in, an effect left out."""
-    of, scene, raised = solution.interface, solution.plan.scene, _raised(solution)
-    gap = of.worn_gap(scene.damper.centrifugal)
-    solution.worn = of.seat(scene.contact.friction, raised.centrifugal, gap=gap)
+    of, scene = solution.interface, solution.plan.scene
+    gap, raised = of.worn_gap(scene.damper.centrifugal), solution.phases[RAISED].centrifugal
+    solution.worn = of.seat(scene.contact.friction, raised, gap=gap)
 
 
-def _shaken(plan: SeatedPlan) -> _Way:
-    """The right blade vibrates along x under F_C; its amplitude dies away evenly to nothing."""
-    s = plan.scene.seating
-    t = np.arange(1, s.cycle_steps * s.cycles + 1) / s.cycle_steps
-    moved = np.zeros((len(t), 3))
-    moved[:, _X] = s.shake * (1.0 - t / s.cycles) * np.sin(2.0 * np.pi * t)
-    moved[-1] = 0.0
-    return _Way(SHAKEN, np.full(len(t), plan.scene.damper.centrifugal), moved)
-
-
-def _cycles(plan: SeatedPlan, axis: int) -> Array:
-    """(k, 3) mm: out to the amplitude, then whole cycles, in even steps."""
-    m = plan.scene.moved
-    corners = [0.0, 1.0, *[-1.0, 1.0] * m.cycles]
-    way = [
-        np.linspace(a, b, m.steps * (1 if k == 0 else 2) + 1)[1:]
-        for k, (a, b) in enumerate(pairwise(corners))
-    ]
-    out = np.zeros((sum(map(len, way)), 3))
-    out[:, axis] = m.amplitude * np.concatenate(way)
-    return out
-
-
-def _phase(solution: SeatedSolution, way: _Way) -> None:
+def _phase(solution: SeatedSolution, way: Way) -> None:
     """Solve one way of loading."""
-    of, mu = solution.interface, solution.plan.scene.contact.friction
-    begin = time.perf_counter()
+    of, friction = solution.interface, solution.plan.scene.contact.friction
     if way.after:
         last = solution.phases[way.after].found
-        before: CoupledHistory | None = last.history
-        moved = way.moved if way.moved.any() else None
+        before, moved = last.history, way.moved if way.moved.any() else None
         found = of.seat_on(last, way.centrifugal, moved=moved)
     else:
-        mu, before = mu if way.friction is None else way.friction, None
-        found = of.seat(mu, way.centrifugal, gap=solution.gap)
-    took = time.perf_counter() - begin
-    solution.phases[way.name] = Phase(way.name, way.centrifugal, way.moved, mu, found, before, took)
+        friction = 0.0 if way.name == SMOOTH else friction
+        found = of.seat(friction, way.centrifugal, gap=solution.gap)
+        none, still = np.zeros((of.n, 3)), np.zeros(len(of.kept))
+        before = CoupledHistory(none, none[:, 1:], solution.gap, still, none[:, 1:], still)
+    solution.phases[way.name] = Phase(**vars(way), friction=friction, found=found, before=before)
 
 
 def _solve_again(solution: SeatedSolution, stages: Stages) -> Iterator[Resolved]:
@@ -280,7 +196,7 @@ def _solve_again(solution: SeatedSolution, stages: Stages) -> Iterator[Resolved]
     if not scene.wants("band"):
         if SHAKEN not in solution.phases:
             with stages("seating", SHAKEN):
-                _phase(solution, _shaken(solution.plan))
+                _phase(solution, shaken(scene))
         included = float(solution.forces(SHAKEN)[side, 0])
         del solution.phases[SHAKEN]
         yield resolved(OTHER_WAYS, included, 'friction leaves the state open: add "band" to want')

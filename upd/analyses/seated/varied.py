@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from upd.analyses.base import require_memory
 from upd.analyses.seated.checks import ROUNDING, WORK_ROUNDING
-from upd.analyses.seated.plan import SeatedPlan, make_plan, solve_seconds
+from upd.analyses.seated.plan import RAISED, SeatedPlan, make_plan
 from upd.analyses.seated.results import make_results
-from upd.analyses.seated.solve import RAISED, SeatedSolution, solve
+from upd.analyses.seated.solve import SeatedSolution, solve
 from upd.contact.coulomb_conditions import OPEN, SLIP
 from upd.errors import InputError, one_line
 from upd.mesh import IntArray, recipes
@@ -127,14 +127,10 @@ def by_edges(solution: SeatedSolution) -> Estimates:
     A share counts whole nodes, and levels may agree by chance.
     """
     of, state = solution.interface, solution.phases[RAISED].found.state[-1]
-    assert solution.bodies is not None
     out: dict[Key, tuple[ErrorPart, ...]] = {}
-    first = 0
-    for side in SIDES:
+    for k, side in enumerate(SIDES):
         quads = solution.bodies.blades[side].mesh.faces["patch"][:, :4]
-        nodes, quads = np.unique(quads, return_inverse=True)
-        here = slice(first, first + len(nodes))
-        first = here.stop
+        quads, here = np.unique(quads, return_inverse=True)[1], of.face == k
         area, closed, slips = of.area[here], state[here] != OPEN, state[here] == SLIP
         if not closed.any():
             continue
@@ -178,7 +174,7 @@ def plan_with_estimates(scene: SeatedScene) -> SeatedPlan:
     for one in levels(plan).variations:
         # what the recipe does not take is the reason that the run gives
         with suppress(InputError):
-            again += solve_seconds(varied_plan(PROBLEM, scene, one))
+            again += varied_plan(PROBLEM, scene, one).solve_seconds
     return replace(plan, seconds=plan.seconds + again, estimate_seconds=again)
 
 
@@ -337,8 +333,8 @@ def _half_cost(plan: SeatedPlan, source: str, seconds: float, order: float) -> f
         overrides = _half_steps(scene)
     more = varied_plan(PROBLEM, scene, Variation(source, "half the error", overrides))
     require_memory(more.scene, more.memory_bytes)
-    own = solve_seconds(plan) - plan.estimate_seconds
-    return max(0.0, seconds * (solve_seconds(more) / own - 1.0))
+    own: float = plan.solve_seconds - plan.estimate_seconds
+    return max(0.0, seconds * (float(more.solve_seconds) / own - 1.0))
 
 
 PROBLEM = Problem(
