@@ -22,11 +22,9 @@ from upd.cache.arrays import cache_folder, load_arrays, save_arrays, unreadable
 from upd.cache.sources import source_digest
 from upd.errors import InputError, MeshError, OwnMeshError, UpdError, did_you_mean
 from upd.mesh import FloatArray
-from upd.mesh.checks import check_mesh
+from upd.mesh.checks import check_mesh, check_pairs, quality
 from upd.mesh.fields import DamperSizes
 from upd.mesh.hexmesh import Mesh
-from upd.mesh.pairing import check_pairs
-from upd.mesh.quality import quality
 from upd.mesh.recipe_modules import geometry_module, is_file, is_mesh, line_of, module_of
 from upd.mesh.section import SectionView, plain_views
 

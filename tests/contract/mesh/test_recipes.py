@@ -18,7 +18,7 @@ from upd.cache.arrays import cache_folder
 from upd.cache.sources import source_digest, user_files
 from upd.errors import InputError, MeshError
 from upd.mesh import Mesh, recipes
-from upd.mesh.pairing import check_pairs
+from upd.mesh.checks import check_pairs
 from upd.mesh.recipe_modules import module_of
 from upd.mesh.recipes import load_meshes
 
