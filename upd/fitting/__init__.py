@@ -5,7 +5,7 @@
 """
 
 from upd.fitting.answer import Fit
-from upd.fitting.intervals import Knowledge, Profile, knowledge
+from upd.fitting.intervals import Knowledge, knowledge
 from upd.fitting.parameters import VariedInput, read_parameters
 from upd.fitting.residuals import Residuals
 from upd.fitting.responses import FitResponses
@@ -18,7 +18,6 @@ __all__ = [
     "FitResponses",
     "FitTarget",
     "Knowledge",
-    "Profile",
     "Residuals",
     "Targets",
     "VariedInput",
