@@ -7,11 +7,10 @@ F_C whose worst peak is lowest from peaks of whole curves over F_C/F_E, of a rig
 from upd.hbm.peaks.over import PeaksOver
 from upd.sizing.choice import ChosenDamper
 from upd.sizing.choice_answer import BestDamper
-from upd.sizing.least_worst import LowestWorst, lowest_worst
 from upd.sizing.search import design
 from upd.sizing.statics import DamperStatics, damper_statics
 from upd.sizing.statics_answer import DamperDesign
-from upd.sizing.worst_peak import WorstPeak
+from upd.sizing.worst_peak import LowestWorst, WorstPeak, lowest_worst
 
 __all__ = [
     "BestDamper",

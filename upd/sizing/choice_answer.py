@@ -15,8 +15,7 @@ from upd.plot.chart import Axis, Band, Chart, Mark, Trace
 from upd.report.answer_folder import FigureAnswer
 from upd.results.answer_table import AnswerTable, Rounded
 from upd.scene.rotation import damper_mass
-from upd.sizing.choice import GROWTHS, UNITS_OF, ChosenDamper
-from upd.sizing.sensitivity import Sensitivity, sensitivities
+from upd.sizing.choice import GROWTHS, UNITS_OF, ChosenDamper, Sensitivity, sensitivities
 from upd.sizing.worst_peak import WorstPeak
 
 Array = NDArray[np.float64]
@@ -265,29 +264,16 @@ def _over_centrifugal(found: ChosenDamper) -> Chart:
 
 
 def _over_ratio(found: ChosenDamper) -> Chart:
-    """Every peak of the rigs of the optimum."""
+    """Every peak of the rigs of the optimum, as whole curves have it."""
     best = found.best
     traces: list[Trace] = []
-    heights: list[Array] = []
     for w, rig in best.rigs:
         word = "".join(f", {of.shown(v)}" for of, v in zip(found.ranges.unsure, w, strict=True))
-        s = np.linspace(rig.peaks.low, rig.peaks.high, _CURVE)
-        curves = rig.peaks.curves()
-        for name, curve in curves.items():
-            y = curve(s)
-            heights.append(np.exp(y[np.isfinite(y)]))
-            values = np.where(np.isfinite(y), np.exp(y), math.nan)
-            colour = len({t.colour for t in traces})
-            label = f"{name}{word}"
-            traces.append(Trace(label, np.exp(s), values, "line", colour))
-            solved = sorted(
-                (t, p[name].log_height) for t, p in rig.peaks.points.items() if name in p
-            )
-            x, v = np.exp(np.array(solved)).T
-            inside = (np.log(x) >= rig.peaks.low - SAME) & (np.log(x) <= rig.peaks.high + SAME)
-            traces.append(
-                Trace(f"{label}, solved", x[inside], v[inside], "points", colour, entry=label)
-            )
+        points = rig.peaks.points
+        for name in rig.peaks.curves():
+            solved = sorted((s, p[name].log_height) for s, p in points.items() if name in p)
+            x, y = np.exp(np.array(solved)).T
+            traces.append(Trace(f"{name}{word}", x, y, "both", len(traces)))
     c, f = best.best.log_centrifugal, best.worst.f
     marks = tuple(
         Mark(math.exp(p.s), math.exp(p.y), f"F_E {math.exp(c - p.s):.3g} N", 0)
@@ -297,7 +283,7 @@ def _over_ratio(found: ChosenDamper) -> Chart:
     return Chart(
         "Peaks over F_C/F_E",
         Axis("F_C/F_E", log=True),
-        _height_axis(replace(found, objective="peak"), "peak accelerance", *heights),
+        Axis("peak accelerance", UNITS_OF["peak"], log=True),
         traces=tuple(traces),
         marks=marks,
         bands=(Band("F_E of the optimum", "x", math.exp(c - f[1]), math.exp(c - f[0])),),
