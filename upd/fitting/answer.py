@@ -227,8 +227,11 @@ class Fit(FigureAnswer):
 
     @property
     def charts(self) -> list[Chart]:
-        """Measured curves, the family, and what each input does to the targets."""
-        return fit_charts(self)
+        """Measured curves, and what each input does to the targets."""
+        charts = [_over(one, k) for k, one in enumerate(self.measured)]
+        if self.targets:
+            charts += [_moves(self, k) for k in range(len(self.parameters))]
+        return [replace(chart, figure=self.figure, size=_SIZE) for chart in charts]
 
 
 def _farthest(found: Fit) -> str:
@@ -388,20 +391,6 @@ def _distinct(low: float, high: float) -> tuple[str, str]:
 
 
 # -- charts ---------------------------------------------------------------------------------------
-
-
-def fit_charts(found: Fit) -> list[Chart]:
-    """Measured curves, and what each parameter does to the targets.
-
-    Parameters
-    ----------
-    found : Fit
-        Of the fit.
-    """
-    charts = [_over(one, k) for k, one in enumerate(found.measured)]
-    if found.targets:
-        charts += [_moves(found, k) for k in range(len(found.parameters))]
-    return [replace(chart, figure=Fit.figure, size=_SIZE) for chart in charts]
 
 
 def _over(one: FittedCurve, k: int) -> Chart:

@@ -36,6 +36,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from upd.errors import UpdError, one_line
+from upd.fitting.models import is_seated
 from upd.fitting.residuals import Residuals
 from upd.fitting.responses import FitResponses
 from upd.fitting.targets import (
@@ -304,7 +305,7 @@ def rank_measurements(residuals: Residuals, best: Array) -> tuple[FurtherMeasure
     """
     made = residuals.responses
     scene, targets = made.scene, made.targets
-    friction = bool(targets.ratios) or (made.cheap and not _is_seated(scene))
+    friction = bool(targets.ratios) or (made.cheap and not is_seated(scene))
     asked = candidates(scene, targets, friction=friction)
     responses = FitResponses(scene, asked, made.parameters, needed=False, like=made)
     try:
@@ -326,10 +327,6 @@ def rank_measurements(residuals: Residuals, best: Array) -> tuple[FurtherMeasure
             ends = v - spread, v + spread
             out.append(FurtherMeasurement(one.name, one.unit, *ends, half, now, then))
     return tuple(sorted(out, key=lambda one: one.then))
-
-
-def _is_seated(scene: ForcedScene) -> bool:
-    return scene.contact.loaded and scene.contact.static == "seated"
 
 
 def _unit(of: str) -> str:

@@ -46,7 +46,7 @@ CONTACT_STEP = 0.02
 _KEPT = 3
 #: inputs that leave the reduced blades as they are
 _CHEAP = ("stiffness.", "contact.friction", "excitation.", "damper.centrifugal")
-_SEATED, _FRICTIONLESS = "seated", "frictionless"
+_FRICTIONLESS = "frictionless"
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class ModelSource:
         self._tangents: int | None = None
         none = np.zeros(len(self.parameters))
         self.exact = [is_known(self._ends(none, k)) for k in range(len(self.parameters))]
-        seated = bool(ratios) and scene.contact.loaded and scene.contact.static == _SEATED
+        seated = bool(ratios) and is_seated(scene)
         #: inputs that make new blades, or a new static state, with every evaluation
         self.dear = [
             p for p in paths if not p.startswith(_CHEAP) or (seated and p == "contact.friction")
@@ -232,6 +232,11 @@ class ModelSource:
 
     def _plan(self, scene: ForcedScene) -> ForcedPlan:
         return _remembered(self._plans, self._frame(scene), lambda: make_plan(scene))  # type: ignore[arg-type, return-value]
+
+
+def is_seated(scene: ForcedScene) -> bool:
+    """Whether friction changes the state at rest."""
+    return scene.contact.loaded and scene.contact.static == "seated"
 
 
 _DIRECTIONS: dict[int, Literal["one", "two"]] = {1: "one", 2: "two"}

@@ -67,8 +67,6 @@ PeakKey = tuple[Side, int]
 Curves = dict[Side, tuple[ComplexArray, ComplexArray]]
 #: mm to m
 _M = 1e-3
-#: frequencies solved at once
-_AT_ONCE = 64
 #: relative distance of a frequency asked for from a point of a path that is it
 _SAME = 1e-9
 
@@ -163,22 +161,14 @@ def limit_curve(
         made = [(m[:n, :n], c[:n, :n], k[:n, :n]) for m, c, k in made]
     else:
         M, C, K = system.M, system.C, system.K
-    harmonic = model.excitation.lowest
     value, slope = [], []
-    for part in np.array_split(frequency, max(1, -(-len(frequency) // _AT_ONCE))):
-        w = 2.0 * np.pi * harmonic * part[:, None, None]
-        D = K + 1j * w * C - w**2 * M
-        right = np.broadcast_to(both, (len(part), *both.shape))
-        q, z = np.moveaxis(np.linalg.solve(D, right), 2, 0)
-        w = w[:, 0, 0]
+    for f in frequency:
+        w = 2.0 * np.pi * model.excitation.lowest * f
+        q, z = np.linalg.solve(K + 1j * w * C - w**2 * M, both).T
         scale = -(w**2) * _M
         value.append(scale * (q @ both[:, 1]))
-        each = []
-        for dM, dC, dK in made:
-            by_K, by_C, by_M = (np.einsum("ki,ki->k", z @ A, q) for A in (dK, dC, dM))
-            each.append(-scale * (by_K + 1j * w * by_C - w**2 * by_M))
-        slope.append(np.array(each).reshape(len(changes), len(part)).T)
-    return np.concatenate(value), np.concatenate(slope)
+        slope.append([-scale * (z @ (dK + 1j * w * dC - w**2 * dM) @ q) for dM, dC, dK in made])
+    return np.array(value), np.array(slope, complex).reshape(len(frequency), len(changes))
 
 
 def _peaks(plan: ForcedPlan, model: Model, stuck: bool, side: Side) -> list[CurvePeak]:

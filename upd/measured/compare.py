@@ -277,16 +277,3 @@ def on_path(
     found = np.where(last & ~passed.any(axis=1), values[-1], found)
     one = (passed.sum(axis=1) == 1) | (last & (passed.sum(axis=1) == 0))
     return np.asarray(np.where(one, found, np.nan))
-
-
-def within(measured: NDArray[np.float64], low: float, high: float) -> NDArray[np.bool_]:
-    """Which of the measured frequencies lie in the computed band.
-
-    Parameters
-    ----------
-    measured
-        (n,) Hz.
-    low, high
-        Of the computed band, Hz.
-    """
-    return np.asarray((measured >= low) & (measured <= high))

@@ -79,17 +79,19 @@ def noise_mix(r: FloatArray, size: FloatArray) -> float:
     if not square.any():
         return 1.0
 
-    def likelihood(mix: float) -> float:
-        v = (1.0 - mix) + mix * size**2
-        return float(len(v) * np.log(np.mean(square / v)) + np.log(v).sum())
-
     # down to a constant that is less than one of n parts of the variance at the lowest point, in
     # even steps of its logarithm
     low = float(2.0 * np.log(max(float(size.min()), np.finfo(float).eps)) - np.log(len(size)))
     found = minimize_scalar(
-        lambda t: likelihood(float(-np.expm1(t))), bounds=(low, 0.0), method="bounded"
+        lambda t: _likelihood(square, size, -np.expm1(t)), bounds=(low, 0.0), method="bounded"
     )
     return float(-np.expm1(found.x))
+
+
+def _likelihood(square: FloatArray, size: FloatArray, mix: float) -> float:
+    """-2 ln L of a part but for a constant, of mean squares (n,), see `noise_mix`."""
+    v = np.maximum((1.0 - mix) + mix * size**2, np.finfo(float).tiny)
+    return float(len(v) * np.log(np.mean(square / v)) + np.log(v).sum())
 
 
 def noise_of(r: FloatArray, magnitude: FloatArray, unknowns: float = 0.0) -> NoiseLevel:
@@ -108,26 +110,14 @@ def noise_of(r: FloatArray, magnitude: FloatArray, unknowns: float = 0.0) -> Noi
     """
     top = float(magnitude.max())
     size = magnitude / top
-    mix = _simplest(r, size, noise_mix(r, size))
+    square, mix = (r**2).mean(axis=0), noise_mix(r, size)
+    if square.any():
+        likelihood = {m: len(r) * _likelihood(square, size, m) for m in (1.0, 0.0, mix)}
+        alone = min((1.0, 0.0), key=lambda m: likelihood[m])
+        mix = alone if likelihood[alone] <= likelihood[mix] + np.log(r.size) else mix
     v = (1.0 - mix) + mix * size**2
     variance = float((r**2 / v).sum()) / max(r.size - unknowns, 1.0)
     return NoiseLevel(np.sqrt(variance * mix) / top, np.sqrt(variance * (1.0 - mix)))
-
-
-def _simplest(r: FloatArray, size: FloatArray, mix: float) -> float:
-    """1 or 0, noise as a part of the value or constant, where the mixture is no better by more than
-    its unknown is worth.
-    """
-    square = (r**2).mean(axis=0)
-    if not square.any():
-        return mix
-
-    def twice(share: float) -> float:
-        v = np.maximum((1.0 - share) + share * size**2, np.finfo(float).tiny)
-        return float(len(r) * (len(v) * np.log(np.mean(square / v)) + np.log(v).sum()))
-
-    alone = min((1.0, 0.0), key=twice)
-    return alone if twice(alone) <= twice(mix) + float(np.log(r.size)) else mix
 
 
 @dataclass(frozen=True, repr=False)

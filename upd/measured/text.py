@@ -49,20 +49,14 @@ _DECIBEL = re.compile(r"(?<![^\W_])db(?![^\W_])", re.IGNORECASE)
 _COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?")
 #: last words of a column's name -> what of the response it holds
 _PARTS = {
-    "real": "real",
-    "re": "real",
-    "imaginary": "imaginary",
-    "imag": "imaginary",
-    "im": "imaginary",
-    "phase": "phase",
-    "phi": "phase",
-    "arg": "phase",
-    "angle": "phase",
-    "amplitude": "magnitude",
-    "magnitude": "magnitude",
-    "mag": "magnitude",
-    "modulus": "magnitude",
-    "abs": "magnitude",
+    word: part
+    for part, words in {
+        "real": "real re",
+        "imaginary": "imaginary imag im",
+        "phase": "phase phi arg angle",
+        "magnitude": "amplitude magnitude mag modulus abs",
+    }.items()
+    for word in words.split()
 }
 _WORDS = "|".join(_PARTS)
 #: "Phase angle of x", "Abs(x)"; "x_real", "x imaginary part"

@@ -4,7 +4,6 @@
 F_C whose worst peak is lowest from peaks of whole curves over F_C/F_E, of a rig or of any balance.
 """
 
-from upd.hbm.peaks.over import PeaksOver
 from upd.sizing.choice import ChosenDamper
 from upd.sizing.choice_answer import BestDamper
 from upd.sizing.search import design
@@ -18,7 +17,6 @@ __all__ = [
     "DamperDesign",
     "DamperStatics",
     "LowestWorst",
-    "PeaksOver",
     "WorstPeak",
     "damper_statics",
     "design",

@@ -205,12 +205,6 @@ class ChosenDamper:
                 out.append((math.exp(ends[0]), math.exp(ends[1])))
         return list(dict.fromkeys(out))
 
-    @property
-    def unreached(self) -> tuple[float, ...]:
-        """F_C/F_E whose highest peak was sought in vain, rising."""
-        lost = {math.exp(s) for one in self.best.worst.peaks for s in one.failed}
-        return tuple(sorted(lost))
-
 
 # -- how far the optimum reaches -------------------------------------------------------------------
 

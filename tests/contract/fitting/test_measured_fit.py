@@ -270,7 +270,8 @@ def test_targets_that_cannot_be_are_told_at_once(
     for part in (
         "peak_1_frequency: needs its F_C/F_E; write peak_1_frequency@194",
         "stuck_in_phase@194: has no F_C/F_E; write stuck_in_phase",
-        "of which state is this curve? Write stuck=",
+        f"{bare}: is no number that can be fitted",
+        "files of measured curves as free=, stuck= or F_C/F_E=FILE",
         "the scene's [measured] has no such curve; it has: none",
         "is no half-width above 0",
         "free: names no file",
