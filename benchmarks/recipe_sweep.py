@@ -18,8 +18,7 @@ import numpy as np
 from upd.errors import InputError, MeshError
 from upd.fem import Material, mass_properties
 from upd.mesh import Mesh
-from upd.mesh.pairing import check_pairs
-from upd.mesh.quality import quality
+from upd.mesh.checks import check_pairs, quality
 from upd.mesh.recipes import LEAST_JACOBIAN, parameters
 
 UNIT = Material(E=1.0, nu=0.3, rho=1.0)

@@ -34,7 +34,7 @@ def test_share_is_that_of_a_solve_for_the_difference_of_the_fields() -> None:
     from scipy.sparse.linalg import spsolve
 
     from upd.fem.elements import gauss
-    from upd.mesh.boundary import boundary_quads
+    from upd.mesh.hexmesh import boundary_quads
 
     solution = solved(1.6)
     model, (case,) = solution.model, solution.normal

@@ -19,8 +19,8 @@ from upd.cache.journal import Journal
 from upd.hbm import FrequencyResponse, contacts, frequency_response
 from upd.hbm.peaks.over import AGREES, JUMP_STEP, Deciding, PeakPoint, PeaksOver, peak_point
 from upd.reference.friction import jenkins_peak
-from upd.sizing import LowestWorst, WorstPeak, least_worst, lowest_worst
-from upd.sizing.margins import STILL_AT, how_far, how_far_force
+from upd.sizing import LowestWorst, WorstPeak, lowest_worst, worst_peak
+from upd.sizing.choice import STILL_AT, how_far, how_far_force
 
 #: limit of the slider per unit of "F_C", spring, and F_C/F_E between which peaks are asked for
 MU, K_T = 0.5, 1.3
@@ -211,7 +211,7 @@ def test_a_search_that_ends_early_tells_no_less_than_its_curves(
     """What was solved before others showed a higher peak there is not told."""
     early = 0
     for rounds, step in itertools.product((4, 6), (0.8, 1.0, 1.3, 3.0)):
-        monkeypatch.setattr(least_worst, "ROUNDS", rounds)
+        monkeypatch.setattr(worst_peak, "ROUNDS", rounds)
         peaks = PeaksOver(_Jumps(known_slopes).at, -2.0, 5.0, step=step)
         best = lowest_worst(WorstPeak([peaks], (1.0, math.exp(2.5))), math.exp(0.5), math.exp(5.0))
         early += best.status == "bracketed"

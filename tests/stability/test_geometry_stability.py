@@ -17,7 +17,7 @@ from geometry.blocks import hexahedron
 from geometry.sphere_block import SphereBlock, build
 from upd.errors import MeshError
 from upd.mesh import Mesh
-from upd.mesh.quality import quality
+from upd.mesh.checks import quality
 
 TINY: dict[str, Any] = {"divisions": 4, "growth": 2.0}
 

@@ -354,13 +354,12 @@ def fit(
     vary: Annotated[list[str], Parameter(consume_multiple=True)],
     set: SetOption = None,
     starts: int | None = None,
-    profiles: Annotated[bool | None, Parameter(negative="--no-profiles")] = None,
     out: Path | None = None,
 ) -> int:
     """Find inputs of a forced response that give wanted numbers or measured curves.
 
-    Reports what these leave unknown: directions, the family of inputs that fit equally well, and
-    which further measurement would distinguish them. Writes the scene with the fitted values,
+    Reports what these leave unknown: directions, how far each input may move while the others still
+    fit, and which further measurement would narrow that. Writes the scene with the fitted values,
     figure, numbers and report.html. Ends with 1 when the targets are not reached; the files then
     hold the nearest. Kill it at any moment; called again it continues.
 
@@ -378,11 +377,6 @@ def fit(
     starts
         Of the search; by default 8 where only contact stiffnesses move, 4 with friction, 2 where
         new blades are made.
-    profiles
-        Trace the sets that fit equally well, by some hundred evaluations for each input; by default
-        where only contact stiffnesses move and nothing is followed with friction, and, by some
-        dozen, of an input whose interval of first order is not to be trusted, unless new blades are
-        made.
     out
         Folder; by default runs/fit-NAME.
     """
@@ -392,9 +386,7 @@ def fit(
     with Live() as live:
         loaded = load_scene(scene, set or [])
         folder = out or Path("runs") / f"fit-{loaded.name}"
-        found = fit_inputs(
-            loaded, to, vary, starts=starts, profiles=profiles, out=folder, progress=live
-        )
+        found = fit_inputs(loaded, to, vary, starts=starts, out=folder, progress=live)
         for line in (
             str(found),
             f"Scene: {folder / found.scene.name}.toml",

@@ -19,10 +19,9 @@ from upd.cli.terminal import check_ending
 from upd.errors import InputError
 from upd.labels import number
 from upd.mesh import Mesh, recipes
+from upd.mesh.checks import Pairs, centre_of, check_pairs, quality
 from upd.mesh.export import ENDINGS, write_mesh
 from upd.mesh.fields import table
-from upd.mesh.pairing import Pairs, check_pairs
-from upd.mesh.quality import centre_of, quality
 from upd.progress import Listener, Stages
 from upd.scene.keys import recipe_keys
 

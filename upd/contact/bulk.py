@@ -9,7 +9,7 @@ from upd.contact.model import Body
 from upd.contact.patch import Patch
 from upd.errors import MeshError
 from upd.fem.elements import gauss
-from upd.mesh.boundary import boundary_quads
+from upd.mesh.hexmesh import boundary_quads
 from upd.reference import boussinesq, boussinesq_stress, cerruti, cerruti_stress, love_rectangle
 
 Array = NDArray[np.float64]

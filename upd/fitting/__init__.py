@@ -5,23 +5,20 @@
 """
 
 from upd.fitting.answer import Fit
-from upd.fitting.intervals import Knowledge, Profile, knowledge
-from upd.fitting.parameters import VariedInput, read_parameters
+from upd.fitting.intervals import Knowledge, knowledge
+from upd.fitting.parameters import read_parameters
 from upd.fitting.residuals import Residuals
 from upd.fitting.responses import FitResponses
 from upd.fitting.search import fit
-from upd.fitting.targets import CurveTarget, FitTarget, Targets, read_targets
+from upd.fitting.targets import CurveTarget, Targets, read_targets
 
 __all__ = [
     "CurveTarget",
     "Fit",
     "FitResponses",
-    "FitTarget",
     "Knowledge",
-    "Profile",
     "Residuals",
     "Targets",
-    "VariedInput",
     "fit",
     "knowledge",
     "read_parameters",

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.errors import InputError
-from upd.fitting.intervals import SHOWN, Knowledge, Profile, is_bent
-from upd.fitting.next_measurement import FurtherMeasurement
+from upd.fitting.intervals import SHOWN, FurtherMeasurement, Knowledge, is_bent
 from upd.fitting.parameters import VariedInput, fitted_scene
 from upd.fitting.residuals import CurveNoise, Start
 from upd.fitting.targets import CurveTarget, FitTarget
@@ -41,7 +40,7 @@ _FURTHER, _GAIN = 6, 0.9
 #: sets of inputs that are printed
 _MEMBERS = 5
 _SIZE = (6.4, 4.6)
-#: reach of the tangents where curves would need new blades, in ln(factor)
+#: reach of the tangents in ln(factor)
 _REACH = 0.05
 
 
@@ -99,11 +98,9 @@ class Fit(FigureAnswer):
         (m, n) their derivatives by ln(factor).
     known : Knowledge
         What the targets tell, to first order.
-    profiles : tuple of Profile
-        Sets that fit as well, by the parameter moved; only of those that were traced.
-    curves : tuple of ndarray
-        (k, 1 + m) for every parameter: its ln(factor), and the numbers as it moves alone; empty
-        where an evaluation takes seconds.
+    ends : ndarray
+        (n, 2) ln(factor) between which sets of inputs fit as well, the others fitted; nan where
+        these were not sought.
     further : tuple of FurtherMeasurement
         What measurements that were not made would tell, the most telling first.
     starts : list of Start
@@ -128,18 +125,13 @@ class Fit(FigureAnswer):
     numbers: Array
     slopes: Array
     known: Knowledge
-    profiles: tuple[Profile, ...]
-    curves: tuple[Array, ...]
+    ends: Array
     further: tuple[FurtherMeasurement, ...]
     starts: list[Start]
     directions: str
     exact: tuple[bool, ...]
     evaluations: int
     seconds: float
-
-    def is_traced(self, k: int) -> bool:
-        """Whether there is a profile of a parameter, by its number."""
-        return any(one.parameter == k for one in self.profiles)
 
     @property
     def widths(self) -> bool:
@@ -196,11 +188,10 @@ class Fit(FigureAnswer):
     @property
     def tables(self) -> tuple[AnswerTable, ...]:
         """Inputs, other sets of inputs, directions, targets, and what to measure next."""
-        members = family_members(self)
-        which = "Family that meets the targets" if members else "Other sets"
+        which = "Others of the family" if self.status == "family" else "Other sets"
         return (
             _inputs(self),
-            _sets(f"{which}, times the scene's values", self, members or self.answers[1:]),
+            _sets(f"{which}, times the scene's values", self, self.answers[1:]),
             _directions(self),
             _targets(self),
             _measurements(self),
@@ -210,18 +201,15 @@ class Fit(FigureAnswer):
     def notes(self) -> tuple[str, ...]:
         """What makes intervals wrong, and the cost."""
         known, names, out = self.known, [one.name for one in self.parameters], list[str]()
-        if self.status == "family" and not self.profiles:
-            out.append("The family was not traced: every evaluation makes new blades.")
         bent = [
             name
             for k, name in enumerate(names)
-            if known.rises is not None and not self.is_traced(k) and is_bent(known.rises[k], SHOWN)
+            if known.rises is not None
+            and not _is_sought(self, k)
+            and is_bent(known.rises[k], SHOWN)
         ]
         if bent:
-            out.append(
-                f"The misfit is not quadratic within the interval of {', '.join(bent)}: ask for "
-                "profiles."
-            )
+            out.append(f"The misfit is not quadratic within the interval of {', '.join(bent)}.")
         out += [
             f"{one.target.name}: residuals of neighbouring points are correlated "
             f"({one.noise.correlation:+.2f}, limit {one.noise.limit:.2f}): the model lacks "
@@ -239,8 +227,11 @@ class Fit(FigureAnswer):
 
     @property
     def charts(self) -> list[Chart]:
-        """Measured curves, the family, and what each input does to the targets."""
-        return fit_charts(self)
+        """Measured curves, and what each input does to the targets."""
+        charts = [_over(one, k) for k, one in enumerate(self.measured)]
+        if self.targets:
+            charts += [_moves(self, k) for k in range(len(self.parameters))]
+        return [replace(chart, figure=self.figure, size=_SIZE) for chart in charts]
 
 
 def _farthest(found: Fit) -> str:
@@ -275,7 +266,7 @@ def _inputs(found: Fit) -> AnswerTable:
 
 
 def _interval_note(found: Fit) -> str:
-    own = [one.name for k, one in enumerate(found.parameters) if found.is_traced(k)]
+    own = [one.name for k, one in enumerate(found.parameters) if _is_sought(found, k)]
     kind = "By profiles" if own else "To first order"
     if 0 < len(own) < len(found.parameters):
         kind = f"To first order, of {' and '.join(own)} by the profile"
@@ -372,13 +363,17 @@ def on_bound(found: Fit, k: int) -> bool:
     return min(z - low, high - z) < 1e-3 * (high - low)
 
 
+def _is_sought(found: Fit, k: int) -> bool:
+    """Whether the ends of a parameter are those of its profile."""
+    return bool(np.isfinite(found.ends[k]).all())
+
+
 def interval(found: Fit, k: int) -> tuple[float, float] | None:
-    """ln(factor) between which a parameter fits as well: of all sets that profiles passed through
-    where it has one, else to first order; without half-widths, for targets that are off by `_OFF`.
+    """ln(factor) between which a parameter fits as well: by its profile where that was sought, else
+    to first order; without half-widths, for targets that are off by `_OFF`.
     """
-    if found.is_traced(k):
-        traced = np.concatenate([one.z[:, k] for one in found.profiles])
-        return float(traced.min()), float(traced.max())
+    if _is_sought(found, k):
+        return float(found.ends[k, 0]), float(found.ends[k, 1])
     if found.known.error is None:
         return None
     off = 1.0 if found.widths else _OFF
@@ -395,42 +390,7 @@ def _distinct(low: float, high: float) -> tuple[str, str]:
     return ends
 
 
-def family_members(found: Fit) -> list[Array]:
-    """Some sets of a family that was traced, from end to end."""
-    one = family_profile(found)
-    if one is None:
-        return []
-    return [one.z[i] for i in np.unique(np.linspace(0, len(one.z) - 1, _MEMBERS).astype(int))]
-
-
-def family_profile(found: Fit) -> Profile | None:
-    """The profile of the parameter that moves most along the unknown directions; None without."""
-    if not found.profiles or not found.known.unknown.any():
-        return None
-    moved = np.abs(found.known.directions[found.known.unknown]).max(axis=0)
-    return found.profiles[int(np.argmax(moved))]
-
-
 # -- charts ---------------------------------------------------------------------------------------
-
-
-def fit_charts(found: Fit) -> list[Chart]:
-    """Measured curves, the family where there is one, and what each parameter does to the
-    targets.
-
-    Parameters
-    ----------
-    found : Fit
-        Of the fit.
-    """
-    charts: list[Chart] = []
-    family = family_profile(found)
-    if family is not None and len(found.parameters) > 1:
-        charts.append(_family(found, family))
-    charts = [_over(one, k) for k, one in enumerate(found.measured)] + charts
-    if found.targets:
-        charts += [_moves(found, k) for k in range(len(found.parameters))]
-    return [replace(chart, figure=Fit.figure, size=_SIZE) for chart in charts]
 
 
 def _over(one: FittedCurve, k: int) -> Chart:
@@ -449,65 +409,23 @@ def _over(one: FittedCurve, k: int) -> Chart:
     )
 
 
-def _axis(found: Fit, k: int) -> Axis:
-    one = found.parameters[k]
+def _moves(found: Fit, k: int) -> Chart:
+    """The numbers as one parameter moves alone, to first order."""
+    one, z = found.parameters[k], float(found.answers[0][k])
+    at = np.array([-_REACH, _REACH])
+    numbers = found.numbers + at[:, None] * found.slopes[:, k]
+    x = one.values[0] * np.exp(z + at)
     # the name of a table stands once: a second line would lie on the legend
     table = one.paths[0].rpartition(".")[0] + "."
-    more = (path.removeprefix(table) for path in one.paths[1:])
-    return Axis(" + ".join((one.paths[0], *more)), one.unit, log=True)
-
-
-def _values(found: Fit, k: int, z: np.ndarray) -> np.ndarray:
-    return np.asarray(found.parameters[k].values[0] * np.exp(z))
-
-
-def _family(found: Fit, one: Profile) -> Chart:
-    k = one.parameter
-    x = _values(found, k, one.z[:, k])
-    others = [j for j in range(len(found.parameters)) if j != k]
-    best = found.answers[0]
+    name = " + ".join((one.paths[0], *(path.removeprefix(table) for path in one.paths[1:])))
     return Chart(
-        f"{found.source.name}: sets that fit equally well",
-        _axis(found, k),
-        Axis("factor of the scene's value", log=True),
-        traces=(
-            *(
-                Trace(found.parameters[j].name, x, np.exp(one.z[:, j]), "line", colour)
-                for colour, j in enumerate(others)
-            ),
-            *(
-                Trace(
-                    f"the one written, {found.parameters[j].name}",
-                    _values(found, k, best[k : k + 1]),
-                    np.exp(best[j : j + 1]),
-                    "star",
-                    colour,
-                    entry="the one written",
-                )
-                for colour, j in enumerate(others)
-            ),
-        ),
-        note="Along these lines no target changes by more than it is known.",
-    )
-
-
-def _moves(found: Fit, k: int) -> Chart:
-    z = float(found.answers[0][k])
-    if found.curves:
-        at, numbers = found.curves[k][:, 0], found.curves[k][:, 1:]
-    else:
-        at = z + np.array([-_REACH, _REACH])
-        numbers = found.numbers + (at - z)[:, None] * found.slopes[:, k]
-    x = _values(found, k, at)
-    here = _values(found, k, np.array([z]))
-    return Chart(
-        f"What {found.parameters[k].name} does",
-        _axis(found, k),
+        f"What {one.name} does",
+        Axis(name, one.unit, log=True),
         Axis("number over its target, less 1", "%"),
         traces=tuple(
-            Trace(one.name, x, 100.0 * (numbers[:, i] / one.value - 1.0), "line", i)
-            for i, one in enumerate(found.targets)
+            Trace(target.name, x, 100.0 * (numbers[:, i] / target.value - 1.0), "line", i)
+            for i, target in enumerate(found.targets)
         ),
-        bands=(Band("fitted", "x", float(here[0]), float(here[0]), dashed=True),),
-        note="" if found.curves else "To first order.",
+        bands=(Band("fitted", "x", one.value(z), one.value(z), dashed=True),),
+        note="To first order.",
     )

@@ -1,41 +1,67 @@
-"""What the targets of a fit leave unknown: to first order, and by profiles, one parameter moved and
-the others fitted.
+r"""What the targets of a fit leave unknown: to first order, and by the ends of profiles, one
+parameter moved and the others fitted; and which further measurement would tell most of it.
 
 J = dr/dz at the answer shows what is known: with the singular values s and right singular vectors w
 of J diag(high - low), a share t of the room along w_i moves the residuals by s_i t. The covariance
 of z is (J'J)^-1, in squared half-widths of the targets.
 
+Beyond what the targets tell, the bounds are all that is known: half of the room between them,
+
+    C = (J'J + P)^-1,   P = diag(1 / (half of the room))^2.
+
+A further measurement of a number with the derivatives g and the half-width s leaves
+
+    C' = C - C g g'C / (s^2 + g'C g),
+
+and is ranked by the largest eigenvalue of C', the square of the half-width of the widest direction
+(E-optimality).
+
 References
 ----------
-G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), 3.3 and 5.4.
+G. A. F. Seber, C. J. Wild, Nonlinear Regression (1989), 3.3 and 5.4; F. Pukelsheim, Optimal Design
+of Experiments (2006), ch. 6; A. C. Atkinson, A. N. Donev, R. D. Tobias, Optimum Experimental
+Designs, with SAS (2007), ch. 10 (augmented designs).
 """
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from upd.errors import UpdError
-from upd.fitting.residuals import Residuals, Start
+from upd.errors import UpdError, one_line
+from upd.fitting.models import is_seated
+from upd.fitting.residuals import Residuals
+from upd.fitting.responses import FitResponses
+from upd.fitting.targets import (
+    CONTACT_TOTALS,
+    PEAK_NUMBERS,
+    STUCK_MODES,
+    FitTarget,
+    Targets,
+)
+from upd.scene import ForcedScene
 
+log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 #: quantile of 95 % intervals
 _T = float(norm.ppf(0.975))
 #: shares of a first-order half-width by which its ends may be off: without a note; and such that
 #: a 95 % interval keeps its probability to half of its last digit, 2 t phi(t) share = 0.005
 SHOWN, KEPT = 0.1, 0.005 / (2.0 * _T * float(norm.pdf(_T)))
-#: points of a profile to each side at most, and cuts of the interval that holds an end
-_POINTS, _CUTS = 40, 10
-_LONGER = 1.3
-#: first step of a profile, and how closely its ends are found, as shares of the half-width
-FIRST, _CLOSE = 0.25, 5e-3
-#: least share of an interval that is cut off
-_CUT = 0.05
+#: steps to an end of a profile at most, growth from one to the next, and halvings of the last
+_STEPS, _LONGER, _HALVINGS = 40, 1.3, 8
+#: half-widths that are assumed of a measurement, as a part of its value, by its unit, where no
+#: target has that unit
+_ASSUMED = {"Hz": 1e-3, "(m/s2)/N": 0.05, "N/mm": 0.05}
+#: F_C/F_E beside the scene's own, as parts of its lowest
+_LOWER = (0.3, 0.1)
 
 
 @dataclass(frozen=True)
@@ -59,7 +85,7 @@ class Knowledge:
         size alone; None where directions are unknown.
     rises : ndarray, optional
         (n, 2) how far the misfit rises to the ends of the intervals, 1 where it is quadratic; None
-        where there are none, or all profiles were traced.
+        where there are none.
     """
 
     singular: Array
@@ -153,32 +179,12 @@ def knowledge(residuals: Residuals, z: Array) -> Knowledge:
     return Knowledge(s, V, unknown, correlation, error)
 
 
-# -- profiles --------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Profile:
-    """Sets of parameters that fit as well as the answer, one parameter moved, the others fitted.
-
-    Attributes
-    ----------
-    parameter : int
-        Which is moved.
-    z : ndarray
-        (k, n) sets, rising in the parameter moved.
-    """
-
-    parameter: int
-    z: Array
-
-
-def profile(
-    residuals: Residuals, known: Knowledge, best: Array, k: int, first: float = FIRST
-) -> Profile:
-    """The profile of one parameter, from the answer to both sides.
+def profile_ends(residuals: Residuals, known: Knowledge, best: Array, k: int) -> Array:
+    """Between which values of one parameter sets fit as well as the answer, the others fitted.
 
     A set fits as well while |r|^2 rises by no more than 1, with half-widths: an interval in the
-    same multiple of standard deviations as they are; without, while the targets are met.
+    same multiple of standard deviations as they are; without, while the targets are met. First
+    steps lead to the ends of first order, where there are any.
 
     Parameters
     ----------
@@ -190,88 +196,155 @@ def profile(
         (n,) the answer.
     k
         Number of the parameter.
-    first
-        Step from the answer, as a share of the first-order half-width where there is one.
+
+    Returns
+    -------
+    ndarray
+        (2,) ln(factor).
     """
     least = float((residuals(best) ** 2).sum())
     span = float(residuals.high[k] - residuals.low[k])
-    step = span / _POINTS
+    first = span / _STEPS
     if residuals.known and known.error is not None:
-        step = min(step, first * float(known.error[k]))
+        first = min(first, float(known.error[k]))
+    others = np.arange(len(best)) != k
 
-    def fits(one: Start) -> bool:
-        if residuals.known:
-            return one.misfit - least <= 1.0
-        return bool(np.isfinite(one.misfit)) and residuals.met(one.end)
-
-    def at(place: float, near: Array) -> Start:
+    def moved(place: float, near: Array) -> tuple[bool, Array]:
+        """Whether the set with the parameter there fits as well, sought from another set."""
         begin = near.copy()
         begin[k] = place
-        others = np.arange(len(begin)) != k
         begin[others] = residuals.inside(begin)[others]
-        return residuals.solve(begin, held=k)
+        one = residuals.solve(begin, held=k)
+        if residuals.known:
+            return one.misfit - least <= 1.0, one.end
+        return bool(np.isfinite(one.misfit)) and residuals.met(one.end), one.end
 
-    sides = []
+    ends = []
     for sign, bound in ((-1.0, residuals.low[k]), (1.0, residuals.high[k])):
-        rows, here, length = [(best, 0.0)], best, step
-        for _ in range(_POINTS):
-            place = here[k] + sign * length
-            on_bound = bool(sign * (place - bound) >= 0.0)
-            one = at(float(bound) if on_bound else float(place), here)
-            if not fits(one):
-                rows += _closed_in(at, fits, rows[-1], one, k, least)
-                break
-            here = one.end
-            rows.append((here, one.misfit - least))
-            if on_bound:
-                break
-            length = min(length * _LONGER, span / _POINTS)
-        sides.append(rows)
-    low, high = sides
-    rows = [*reversed(low[1:]), *high]
-    return Profile(k, np.array([row for row, _ in rows]))
+        near, step, outside = best, first, math.nan
+        while math.isnan(outside) and near[k] != bound:
+            place = bound if sign * (bound - near[k]) <= step else near[k] + sign * step
+            fits, z = moved(float(place), near)
+            near, outside = (z, outside) if fits else (near, float(place))
+            step = min(step * _LONGER, span / _STEPS)
+        for _ in range(0 if math.isnan(outside) else _HALVINGS):
+            middle = 0.5 * (float(near[k]) + outside)
+            fits, z = moved(middle, near)
+            near, outside = (z, outside) if fits else (near, middle)
+        ends.append(near[k])
+    return np.array(ends)
 
 
-def _closed_in(
-    at: Callable[[float, Array], Start],
-    fits: Callable[[Start], bool],
-    inside: tuple[Array, float],
-    outside: Start,
-    k: int,
-    least: float,
-) -> list[tuple[Array, float]]:
-    """Sets that fit as well, ever nearer to the end of a profile, with their rises.
+# -- what to measure next --------------------------------------------------------------------------
 
-    The root of the rise is proportional to the distance where the misfit is quadratic: its chord
-    leads to where it is 1; where the outer set has none, the middle does.
+
+@dataclass(frozen=True)
+class FurtherMeasurement:
+    """What a measurement that was not made would tell.
+
+    Attributes
+    ----------
+    name, unit
+        Of the number, as a target names it.
+    low, high
+        What the fit predicts for it today.
+    half_width
+        Assumed of the measurement.
+    widest
+        Half-width of the widest direction today, as a factor of the inputs.
+    then
+        The same with the measurement.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    half_width: float
+    widest: float
+    then: float
+
+
+def candidates(scene: ForcedScene, targets: Targets, *, friction: bool) -> Targets:
+    """Measurements that may be made: modes and peaks of the limits, peaks with friction at the
+    scene's F_C/F_E and below, contact stiffness of the damper alone.
 
     Parameters
     ----------
-    at
-        The set with a value of the parameter moved, from another set.
-    fits
-        Whether one fits as well.
-    inside
-        The last set that does, and its rise.
-    outside
-        One beyond the end.
-    k
-        Number of the parameter.
-    least
-        |r|^2 of the answer.
+    targets
+        Those that were made; they are left out.
+    friction
+        Whether peaks with friction are among them.
     """
-    rows: list[tuple[Array, float]] = []
-    for _ in range(_CUTS):
-        z, rise = rows[-1] if rows else inside
-        low, high = float(z[k]), float(outside.end[k])
-        q, top = (math.sqrt(max(v, 0.0)) for v in (rise, outside.misfit - least))
-        wanted = 1.0 - 0.5 * _CLOSE
-        share = (wanted - q) / (top - q) if top > 1.0 and math.isfinite(top) else 0.5
-        one = at(low + min(max(share, _CUT), 1.0 - _CUT) * (high - low), z)
-        if not fits(one):
-            outside = one
-            continue
-        rows.append((one.end, one.misfit - least))
-        if 1.0 - _CLOSE <= math.sqrt(max(rows[-1][1], 0.0)) <= 1.0:
-            break
-    return rows
+    names: list[tuple[str, float | None]] = [(one, None) for one in STUCK_MODES]
+    names += [(name, None) for name, (kind, *_) in PEAK_NUMBERS.items() if kind]
+    if friction:
+        own = scene.excitation.centrifugal_to_force
+        ratios = sorted({*own, *(round(part * min(own), 6) for part in _LOWER)})
+        names += [
+            (name, ratio)
+            for ratio in ratios
+            for name, (kind, side, *_) in PEAK_NUMBERS.items()
+            if not kind and side == "right"
+        ]
+    names += [(one, None) for one in CONTACT_TOTALS]
+    made = {one.name for one in targets.numbers}
+    found = [FitTarget(of, 1.0, None, _unit(of), ratio) for of, ratio in names]
+    return Targets(tuple(one for one in found if one.name not in made))
+
+
+def rank_measurements(residuals: Residuals, best: Array) -> tuple[FurtherMeasurement, ...]:
+    """Measurements by how much each would narrow the widest direction, the most telling first.
+
+    Parameters
+    ----------
+    residuals
+        Of the fit.
+    best
+        (n,) the answer.
+    """
+    made = residuals.responses
+    scene, targets = made.scene, made.targets
+    friction = bool(targets.ratios) or (made.cheap and not is_seated(scene))
+    asked = candidates(scene, targets, friction=friction)
+    responses = FitResponses(scene, asked, made.parameters, needed=False, like=made)
+    try:
+        value, slope = responses.at(best)
+    except UpdError as error:
+        log.info("further measurements: %s", one_line(error))
+        return ()
+    J = residuals.jacobian(best)
+    if not residuals.known:
+        each = [_half(one.unit, one.value, targets) for one in targets.numbers]
+        J = J * (residuals.target / each)[:, None]
+    room = 0.5 * (residuals.high - residuals.low)
+    C = np.linalg.inv(J.T @ J + np.diag(room**-2.0))
+    now, out = _widest(C), []
+    for one, v, g in zip(asked.numbers, value.tolist(), slope, strict=True):
+        if np.isfinite(v) and np.isfinite(g).all():
+            half, spread = _half(one.unit, v, targets), float(np.sqrt(g @ C @ g))
+            then = _widest(C - np.outer(C @ g, C @ g) / (half**2 + spread**2))
+            ends = v - spread, v + spread
+            out.append(FurtherMeasurement(one.name, one.unit, *ends, half, now, then))
+    return tuple(sorted(out, key=lambda one: one.then))
+
+
+def _unit(of: str) -> str:
+    if of in CONTACT_TOTALS:
+        return "N/mm"
+    return "(m/s2)/N" if of.endswith("accelerance") else "Hz"
+
+
+def _half(unit: str, value: float, targets: Targets) -> float:
+    """Half-width of a measurement: relative, as the widest of the targets of that unit."""
+    known = [
+        one.half_width / one.value
+        for one in targets.numbers
+        if one.unit == unit and one.half_width is not None
+    ]
+    return abs(value) * max(known, default=_ASSUMED[unit])
+
+
+def _widest(C: NDArray[Any]) -> float:
+    """Half-width along the widest direction, as a factor of the inputs."""
+    return float(np.exp(np.sqrt(np.linalg.eigvalsh(C)[-1])))

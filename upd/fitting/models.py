@@ -25,7 +25,7 @@ from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
 from upd.cache.arrays import cache_folder
 from upd.cache.files import write_text
 from upd.cache.sources import key_of
-from upd.fitting.parameters import VariedInput, scene_with
+from upd.fitting.parameters import VariedInput, fitted_scene
 from upd.linalg.parallel import threads_for
 from upd.mesh import recipes
 from upd.progress import Stages
@@ -46,7 +46,7 @@ CONTACT_STEP = 0.02
 _KEPT = 3
 #: inputs that leave the reduced blades as they are
 _CHEAP = ("stiffness.", "contact.friction", "excitation.", "damper.centrifugal")
-_SEATED, _FRICTIONLESS = "seated", "frictionless"
+_FRICTIONLESS = "frictionless"
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class ModelSource:
         self.scene, self.parameters, self.ratios = scene, tuple(parameters), tuple(ratios)
         paths = [path for one in parameters for path in one.paths]
         self.stiffness = stiffness_of(scene, paths)
-        one_model(scene, self.stiffness, "a fit", friction=bool(ratios))
+        one_model(scene, self.stiffness, "a fit")
         #: models made
         self.made = 0
         self._stages = Stages()
@@ -101,7 +101,7 @@ class ModelSource:
         self._tangents: int | None = None
         none = np.zeros(len(self.parameters))
         self.exact = [is_known(self._ends(none, k)) for k in range(len(self.parameters))]
-        seated = bool(ratios) and scene.contact.loaded and scene.contact.static == _SEATED
+        seated = bool(ratios) and is_seated(scene)
         #: inputs that make new blades, or a new static state, with every evaluation
         self.dear = [
             p for p in paths if not p.startswith(_CHEAP) or (seated and p == "contact.friction")
@@ -142,7 +142,7 @@ class ModelSource:
         InputError
             Where the scene refuses the parameters.
         """
-        made = self._model(self.bare(scene_with(self.scene, self.parameters, z)))
+        made = self._model(self.bare(fitted_scene(self.scene, self.parameters, z)))
         if not changes:
             return made
         found = tuple(
@@ -156,14 +156,14 @@ class ModelSource:
 
     def totals(self, z: Array) -> dict[Side, FaceLaw]:
         """Contact stiffness of both faces."""
-        scene = self.bare(scene_with(self.scene, self.parameters, z))
+        scene = self.bare(fitted_scene(self.scene, self.parameters, z))
         return face_laws(scene.stiffnesses[self.stiffness], self._stages)
 
     def directions(self, z: Array) -> str:
         """What contact.directions has to say in the scene with these parameters to give these
         numbers; "" where its own word does.
         """
-        scene = scene_with(self.scene, self.parameters, z)
+        scene = fitted_scene(self.scene, self.parameters, z)
         if scene.contact.directions != "auto":
             return ""
         used = self.at(z).model.contacts.tangents
@@ -178,7 +178,7 @@ class ModelSource:
         """What is needed alone: one stiffness, the F_C/F_E that are followed, nothing estimated or
         solved again; a contact scene with the rig's geometry, unless its numbers do not count.
         """
-        one = one_model(scene, self.stiffness, "a fit", friction=False)
+        one = one_model(scene, self.stiffness, "a fit")
         contact, excitation, stiffness = one.contact, one.excitation, dict(one.stiffness)
         if self._tangents is not None:
             contact = replace(contact, directions=_DIRECTIONS[self._tangents])
@@ -198,7 +198,7 @@ class ModelSource:
         for shift in (0.0, -STEP, STEP):
             moved = np.array(z, float)
             moved[k] += shift
-            there = scene_with(self.scene, self.parameters, moved)
+            there = fitted_scene(self.scene, self.parameters, moved)
             scenes.append(self.bare(there, contact_moves=False))
         one = self.parameters[k]
         value = one.value(float(z[k]))
@@ -232,6 +232,11 @@ class ModelSource:
 
     def _plan(self, scene: ForcedScene) -> ForcedPlan:
         return _remembered(self._plans, self._frame(scene), lambda: make_plan(scene))  # type: ignore[arg-type, return-value]
+
+
+def is_seated(scene: ForcedScene) -> bool:
+    """Whether friction changes the state at rest."""
+    return scene.contact.loaded and scene.contact.static == "seated"
 
 
 _DIRECTIONS: dict[int, Literal["one", "two"]] = {1: "one", 2: "two"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from upd.units import unit_inside
 Array = NDArray[np.float64]
 #: factors between which an input is sought without bounds of its own: stiffnesses, all others
 _WIDE, _NARROW = 100.0, 2.0
-_STIFFNESS, FRICTION = "stiffness", "contact.friction"
+_STIFFNESS = "stiffness"
 
 
 @dataclass(frozen=True)
@@ -118,58 +118,12 @@ def _input(scene: ForcedScene, keys: Mapping[str, SceneKey], path: str) -> tuple
 
 def _check_ends(scene: ForcedScene, one: VariedInput, *, own: bool) -> None:
     """Raise InputError where the scene refuses an end of the bounds."""
-    # a positive stiffness is all it takes
-    read = scene_with if all(map(is_stiffness, one.paths)) else fitted_scene
     check_ends(
-        lambda value: read(scene, [one], np.log([value / one.values[0]])),
+        lambda value: fitted_scene(scene, [one], np.log([value / one.values[0]])),
         (one.low * one.values[0], one.high * one.values[0]),
         one.kind,
         f"give {'other' if own else 'your own'} bounds, {one.paths[0]}=low:high",
     )
-
-
-def scene_with(scene: ForcedScene, parameters: Sequence[VariedInput], z: Array) -> ForcedScene:
-    """The scene with parameters moved.
-
-    Parameters
-    ----------
-    parameters
-        (n,) of the fit.
-    z
-        (n,) logarithms of their factors.
-
-    Raises
-    ------
-    InputError
-        Where the scene refuses them.
-    """
-    if all(p == FRICTION or is_stiffness(p) for one in parameters for p in one.paths):
-        return _with_contact(scene, parameters, z)
-    return fitted_scene(scene, parameters, z)
-
-
-def is_stiffness(path: str) -> bool:
-    """Whether an input is a contact stiffness."""
-    return path.split(".")[0] == _STIFFNESS
-
-
-def _with_contact(scene: ForcedScene, parameters: Sequence[VariedInput], z: Array) -> ForcedScene:
-    """Without reading the scene again: the ends of their bounds were."""
-    tables, contact = dict(scene.stiffness), scene.contact
-    for one, factor in zip(parameters, np.exp(z), strict=True):
-        for path, value in zip(one.paths, one.values, strict=True):
-            moved = float(value * factor)
-            if path == FRICTION:
-                contact = replace(contact, friction=moved)
-            else:
-                _, name, *steps = path.split(".")
-                tables[name] = _put(tables[name], steps, moved)
-    return replace(scene, stiffness=tables, contact=contact)
-
-
-def _put(table: Any, steps: Sequence[str], value: float) -> Any:
-    head, *rest = steps
-    return replace(table, **{head: _put(getattr(table, head), rest, value) if rest else value})
 
 
 def fitted_scene(
@@ -180,8 +134,10 @@ def fitted_scene(
 
     Parameters
     ----------
-    parameters, z
-        As of `scene_with`.
+    parameters
+        (n,) of the fit.
+    z
+        (n,) logarithms of their factors.
     **more
         Other keys of the scene.
 

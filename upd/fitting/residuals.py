@@ -8,7 +8,7 @@ by the trust-region reflective method. Scales of measured curves are stated half
 ones estimated from what the fit leaves.
 
 With residuals r of N values and p inputs, the noise sigma^2 = (a |H|)^2 + b^2 follows by
-`upd.measured.noise` and the half-width is t sigma, t of Student's distribution with N - p degrees
+`upd.measured.damping` and the half-width is t sigma, t of Student's distribution with N - p degrees
 of freedom at 95 %. It holds for independent errors: what the curve has and the model has not makes
 neighbouring residuals alike, and `CurveNoise.correlation` shows it.
 
@@ -32,7 +32,7 @@ from scipy.stats import t as student
 from upd.errors import ConvergenceError, UpdError, one_line
 from upd.fitting.responses import FitResponses
 from upd.fitting.targets import CurveTarget
-from upd.measured.noise import noise_of
+from upd.measured.damping import noise_of
 
 Array = NDArray[np.float64]
 #: half of the digits: below, a change of an exact number is rounding

@@ -16,18 +16,17 @@ from numpy.typing import NDArray
 
 from upd.cache.journal import Journal
 from upd.cache.sources import key_of, source_digest
-from upd.errors import ConvergenceError, InputError, UpdError
+from upd.errors import ConvergenceError, InputError
 from upd.fitting.answer import Fit, FittedCurve, Status
 from upd.fitting.intervals import (
     KEPT,
     Knowledge,
-    Profile,
     is_bent,
     knowledge,
     misfit_rises,
-    profile,
+    profile_ends,
+    rank_measurements,
 )
-from upd.fitting.next_measurement import rank_measurements
 from upd.fitting.parameters import VariedInput, read_parameters
 from upd.fitting.residuals import ROUNDING, Residuals, Start, as_complex
 from upd.fitting.responses import FitResponses
@@ -43,8 +42,6 @@ Array = NDArray[np.float64]
 #: starts where evaluations take milliseconds, where something is followed with friction, and where
 #: they make new bodies
 _STARTS, _SOME, _FEW = 8, 4, 2
-#: points of the curves of the targets over each parameter
-_CURVE = 41
 #: rounds in which the weights of curves are renewed, and change of a weight below which they end
 _ROUNDS, _SETTLED = 12, 1e-3
 #: seconds of a start that is reported when it ends
@@ -60,7 +57,6 @@ def fit(
     *,
     overrides: Sequence[str] | Mapping[str, Any] = (),
     starts: int | None = None,
-    profiles: bool | None = None,
     out: str | Path | None = None,
     progress: Listener = silent,
 ) -> Fit:
@@ -86,11 +82,6 @@ def fit(
     starts
         Of the search; without, 8 where evaluations take milliseconds, 4 where peaks or curves with
         friction are followed, 2 where new blades are made.
-    profiles
-        Whether the sets that fit equally well are traced, by some hundred evaluations for each
-        parameter; without, where evaluations take milliseconds, and, by some dozen evaluations, for
-        parameters whose misfit is not quadratic within the first-order interval, unless evaluations
-        make new blades.
     out
         Folder that gets the files; None writes nothing.
     progress
@@ -121,7 +112,7 @@ def fit(
     if journal.lines:
         known = len(journal.lines)
         progress("fit", f"continues from {known} evaluations of an earlier call", 0.0)
-    result = _found(responses, starts, profiles, progress)
+    result = _found(responses, starts, progress)
     result = replace(result, seconds=time.perf_counter() - begin)
     if out is not None:
         result = result.write(out)
@@ -129,15 +120,9 @@ def fit(
     return result
 
 
-def _found(
-    responses: FitResponses, starts: int | None, asked: bool | None, progress: Listener
-) -> Fit:
-    """The answer, what is known of it, and what to measure next.
-
-    Parameters
-    ----------
-    starts, asked
-        Of the search, and whether profiles are traced; None: by what an evaluation costs.
+def _found(responses: FitResponses, starts: int | None, progress: Listener) -> Fit:
+    """The answer, what is known of it, and what to measure next; the number of starts is by what
+    an evaluation costs where it is not given.
     """
     targets, parameters = responses.targets, responses.parameters
     residuals, stages = Residuals(responses), Stages(progress)
@@ -157,11 +142,9 @@ def _found(
         best = found[0]
         known = knowledge(residuals, best)
         status = status_of(residuals, known, found)
-    profiles, curves, rises = _spread(residuals, known, best, status, asked, stages)
+    ends, rises = _ends(residuals, known, best, stages)
     with stages("further measurements", "what each would narrow"):
-        # profiles of single inputs do not say how far predictions reach
-        family = profiles if rises is None else ()
-        further = rank_measurements(residuals, best, family)
+        further = rank_measurements(residuals, best)
     value, slope = responses.at(best)
     m = len(targets.numbers)
     return Fit(
@@ -180,8 +163,7 @@ def _found(
         value[:m],
         slope[:m],
         replace(known, rises=rises),
-        profiles,
-        curves,
+        ends,
         further,
         done,
         responses.source.directions(best),
@@ -191,37 +173,28 @@ def _found(
     )
 
 
-def _spread(
-    residuals: Residuals,
-    known: Knowledge,
-    best: Array,
-    status: Status,
-    asked: bool | None,
-    stages: Stages,
-) -> tuple[tuple[Profile, ...], tuple[Array, ...], Array | None]:
-    """Profiles where they are asked for or cheap, and of parameters whose misfit is not quadratic
-    within the interval of first order; curves of the numbers, and the rises of the misfit.
+def _ends(
+    residuals: Residuals, known: Knowledge, best: Array, stages: Stages
+) -> tuple[Array, Array | None]:
+    """Ends of profiles (n, 2), nan where they are not sought, and the rises of the misfit.
+
+    They are sought where they are cheap: of parameters whose misfit is not quadratic within the
+    interval of first order, and of all where the targets leave a direction unknown and nothing is
+    followed with friction.
     """
-    responses = residuals.responses
-    each, targets = range(len(best)), responses.targets
-    profiles: tuple[Profile, ...] = ()
-    curves: tuple[Array, ...] = ()
-    if asked or (asked is None and responses.cheap and not targets.ratios):
-        with stages("profiles", "sets of parameters that fit as well"):
-            if (status == "family" or residuals.known) and status != "not reached":
-                profiles = tuple(profile(residuals, known, best, k) for k in each)
-            if targets.numbers:
-                curves = tuple(_curve(residuals, best, k) for k in each)
-    if not residuals.known or profiles or known.error is None:
-        return profiles, curves, None
-    with stages("intervals", "the misfit at their ends"):
-        rises = misfit_rises(residuals, known, best, residuals.low, residuals.high)
-    if asked is None and responses.cheap:
-        with stages("intervals", "profiles of those that are not of first order"):
-            # the end by first order is one step away
-            bent = [k for k in each if is_bent(rises[k], KEPT)]
-            profiles = tuple(profile(residuals, known, best, k, first=1.0) for k in bent)
-    return profiles, curves, rises
+    responses, ends = residuals.responses, np.full((len(best), 2), math.nan)
+    wanted, rises = list[int](), None
+    if known.error is None:
+        wanted = [] if responses.targets.ratios or not residuals.met(best) else [*range(len(best))]
+    elif residuals.known:
+        with stages("intervals", "the misfit at their ends"):
+            rises = misfit_rises(residuals, known, best, residuals.low, residuals.high)
+        wanted = [k for k, one in enumerate(rises) if is_bent(one, KEPT)]
+    if responses.cheap and wanted:
+        with stages("intervals", "sets of inputs that fit as well"):
+            for k in wanted:
+                ends[k] = profile_ends(residuals, known, best, k)
+    return ends, rises
 
 
 def _key(scene: ForcedScene, targets: Targets, parameters: Sequence[VariedInput]) -> str:
@@ -238,20 +211,6 @@ def _key(scene: ForcedScene, targets: Targets, parameters: Sequence[VariedInput]
             "sources": source_digest(scene.recipe),
         }
     )
-
-
-def _curve(residuals: Residuals, best: Array, k: int) -> Array:
-    """The numbers while one parameter moves from bound to bound; nan where one is not there."""
-    rows = []
-    for place in np.linspace(residuals.low[k], residuals.high[k], _CURVE):
-        z = best.copy()
-        z[k] = place
-        try:
-            numbers = residuals.responses.value(z)[: residuals.numbers]
-        except UpdError:
-            numbers = np.full(residuals.numbers, np.nan)
-        rows.append([place, *numbers])
-    return np.array(rows)
 
 
 # -- the search ------------------------------------------------------------------------------------

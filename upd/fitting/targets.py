@@ -9,7 +9,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +44,6 @@ PEAK_NUMBERS: dict[str, tuple[str, Side, int, str]] = {
 KNOWN = (*STUCK_MODES, *PEAK_NUMBERS, *CONTACT_TOTALS)
 #: the state of a measured curve as its target names it
 _CURVE = re.compile(r"(?:(left|right)_)?(?:(free|stuck)|(\d[\d.eE+]*))")
-#: endings of files of measured curves
-_FILES = (".csv", ".txt", ".dat", ".tsv", ".nc", ".nc4")
 _MEASURED = "measured"
 
 
@@ -262,15 +259,6 @@ def _curves(
             raise InputError(f"the scene's [measured] has no such curve; it has: {there}")
         made = [CurveTarget(f"{_MEASURED}.{one}", tables[one].read()) for one in wanted]
         return [_with_half(one, half) for one in made]
-    if "=" not in whole and Path(bare).suffix.lower() in _FILES:
-        place = Path(bare).resolve()
-        named = [one for one, table in tables.items() if Path(table.file) == place]
-        if not named:
-            raise InputError(
-                f"of which state is this curve? Write stuck={bare}, free={bare} or 194={bare} (its "
-                "F_C/F_E), with left_ in front of the left blade's, or name it in [measured]"
-            )
-        return [_with_half(CurveTarget(bare, tables[one].read()), half) for one in named]
     found = _CURVE.fullmatch(name)
     if found is None:
         return None

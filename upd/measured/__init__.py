@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from upd.measured.compare import frac, magnitude_correlation
+from upd.measured.compare import MeasuredPeak, frac, magnitude_correlation, noisy_peaks
 from upd.measured.curve import MeasuredCurve
 from upd.measured.damping import DampingFit, fit_damping
-from upd.measured.peaks import MeasuredPeak, noisy_peaks
 from upd.measured.read import read_measured
 
 __all__ = [

@@ -1,10 +1,15 @@
-"""A measured response: accelerance of one blade over frequency."""
+"""A measured response: accelerance of one blade over frequency; which curve of a file it is, by the
+blade, linear limit or F_C/F_E that the file itself gives; and what is wrong with a file.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,24 +143,83 @@ def response_unit(own: str, given: str | None) -> str:
     return unit
 
 
-def checked_curve(frequency: FloatArray) -> list[tuple[int, str]]:
-    """What is wrong with the frequencies (n,) of a curve: (number of the point, words)."""
-    found = [
-        (k, f"{f:g} Hz is not a frequency above 0") for k, f in enumerate(frequency) if not f > 0.0
-    ]
-    step = np.diff(frequency)
+@dataclass
+class Faults:
+    """All that is wrong with a file, each with its place."""
+
+    found: list[str] = field(default_factory=list)
+
+    def add(self, place: str, words: object) -> None:
+        """A fault of a place, "line 3, column 2"."""
+        self.found.append(f"{place}: {words}")
+
+    @contextmanager
+    def at(self, place: str) -> Iterator[None]:
+        """Keep an InputError with its place."""
+        try:
+            yield
+        except InputError as error:
+            self.add(place, error)
+
+    def check(self) -> None:
+        """Raise InputError where something is wrong."""
+        if self.found:
+            raise InputError("\n".join(self.found))
+
+
+class ReadCurve(NamedTuple):
+    """Frequency (n,) in Hz, rising, and the response (n,), complex or magnitudes, in ``unit``;
+    ``label`` is what the file gives of it.
+    """
+
+    frequency: FloatArray
+    values: ComplexArray | FloatArray
+    unit: str
+    label: CurveLabel
+
+
+def checked_curve(
+    curve: ReadCurve, faults: Faults, place: Callable[[str, int], str], remedy: str
+) -> ReadCurve:
+    """A curve with rising frequencies, as the file has it or turned round.
+
+    Parameters
+    ----------
+    curve
+        In the order of the file.
+    faults
+        Gets what is wrong.
+    place
+        Of the frequency or the magnitude of a point, by its number.
+    remedy
+        What to give instead of negative magnitudes.
+
+    Raises
+    ------
+    InputError
+        Where frequencies do not rise or fall all the way from above 0, or magnitudes are negative.
+    """
+    f, values = curve.frequency, curve.values
+    step = np.diff(f)
     rising = np.median(step) > 0.0 if len(step) else True
-    wrong = np.flatnonzero(step <= 0.0 if rising else step >= 0.0)
+    doubled = np.append(False, step <= 0.0 if rising else step >= 0.0)
     way = "rises" if rising else "falls"
-    found += [
-        (
-            int(k) + 1,
-            f"{frequency[k + 1]:g} Hz comes after {frequency[k]:g} Hz, where the frequency {way}: "
-            "sort the lines and leave out doubled ones",
-        )
-        for k in wrong
-    ]
-    return sorted(found)
+    for k in range(len(f)):
+        if not f[k] > 0.0:
+            faults.add(place("frequency", k), f"{f[k]:g} Hz is not a frequency above 0")
+        if doubled[k]:
+            faults.add(
+                place("frequency", k),
+                f"{f[k]:g} Hz comes after {f[k - 1]:g} Hz, where the frequency {way}: sort the "
+                "lines and leave out doubled ones",
+            )
+    if not np.iscomplexobj(values):
+        for k in np.flatnonzero(values < 0.0).tolist():
+            words = f"the magnitude {values[k]:g} is negative; give {remedy}"
+            faults.add(place("magnitude", k), words)
+    faults.check()
+    turned = slice(None) if f[-1] > f[0] else slice(None, None, -1)
+    return curve._replace(frequency=f[turned], values=values[turned])
 
 
 def the_one(names: list[str], wanted: str | None, word: str) -> str:
@@ -187,3 +251,149 @@ def the_one(names: list[str], wanted: str | None, word: str) -> str:
             '"accelerance [(m/s2)/N]"'
         )
     raise InputError(f"{len(names)} responses, {', '.join(names)}; name one by column = ...")
+
+
+# -- which curve of a file -------------------------------------------------------------------------
+
+#: names of a column, or of an attribute, that gives what a curve is -> what it gives
+LABELS = {
+    "blade": "blade",
+    "state": "state",
+    "f_c/f_e": "force_ratio",
+    "fc/fe": "force_ratio",
+    "centrifugal_to_force": "force_ratio",
+    "force_ratio": "force_ratio",
+}
+_SHOWN = {"blade": "blade", "state": "state", "force_ratio": "F_C/F_E"}
+_WORDS = {"blade": get_args(Blade), "state": get_args(State)}
+
+
+@dataclass(frozen=True)
+class CurveLabel:
+    """What a curve is, each None where it is not given.
+
+    Attributes
+    ----------
+    blade : {"right", "left"} or None
+    state : {"free", "stuck"} or None
+    force_ratio : float or None
+        F_C/F_E.
+    """
+
+    blade: Blade | None = None
+    state: State | None = None
+    force_ratio: float | None = None
+
+    @property
+    def words(self) -> str:
+        """As messages show it."""
+        given = [(name, getattr(self, name)) for name in _SHOWN]
+        return ", ".join(f"{_SHOWN[k]} {_shown(v)}" for k, v in given if v is not None)
+
+    @property
+    def condition(self) -> str | None:
+        """A linear limit or F_C/F_E: the one excludes the other."""
+        given = self.state if self.force_ratio is None else self.force_ratio
+        return None if given is None else _shown(given)
+
+    def agrees(self, wanted: CurveLabel) -> bool:
+        """Whether nothing it gives is other than what is wanted."""
+        pairs = ((self.blade, wanted.blade), (self.condition, wanted.condition))
+        return all(None in pair or pair[0] == pair[1] for pair in pairs)
+
+
+class AskedCurve(NamedTuple):
+    """Which response of a file is asked for.
+
+    Attributes
+    ----------
+    column : str or None
+        Name of the response without its unit, where the file holds several; of a netCDF file the
+        variable, its groups in front of it with a slash.
+    unit : str or None
+        Of the response, where the file names none.
+    label : CurveLabel
+        Which curve, where the file gives it.
+    """
+
+    column: str | None = None
+    unit: str | None = None
+    label: CurveLabel = CurveLabel()
+
+
+#: nothing given, nothing wanted
+ANY = CurveLabel()
+
+
+def _shown(value: Any) -> str:
+    # as the labels of computed curves tell ratios apart
+    return str(value) if isinstance(value, str) else f"{value:.6g}"
+
+
+def read_label(name: str, given: Any) -> Any:
+    """What a cell or an attribute gives of a curve.
+
+    Parameters
+    ----------
+    name
+        "blade", "state" or "force_ratio".
+    given
+        Words or a number; nothing given is None.
+
+    Raises
+    ------
+    InputError
+        Where it gives something else.
+    """
+    if given is None or not str(given).strip():
+        return None
+    if name in _WORDS:
+        word = str(given).strip().casefold()
+        if word not in _WORDS[name]:
+            raise InputError(f"{given!r} is no {name}; write {' or '.join(_WORDS[name])}")
+        return word
+    try:
+        ratio = float(given)
+    except (TypeError, ValueError):
+        ratio = math.nan
+    if not (math.isfinite(ratio) and ratio > 0.0):
+        raise InputError(f"{given!r} is no F_C/F_E; give a number above 0, or leave it empty")
+    return ratio
+
+
+def label_of(given: Mapping[str, Any]) -> CurveLabel:
+    """A curve's label from what is given under names of `LABELS`.
+
+    Raises
+    ------
+    InputError
+        As `read_label` does.
+    """
+    known = {LABELS[key]: value for key, value in given.items() if key in LABELS}
+    return CurveLabel(**{name: read_label(name, value) for name, value in known.items()})
+
+
+def the_curve(found: Sequence[CurveLabel], wanted: CurveLabel) -> CurveLabel:
+    """The one curve of a file that is wanted.
+
+    Parameters
+    ----------
+    found
+        Labels of the curves there are, each once.
+    wanted
+        What is asked for.
+
+    Raises
+    ------
+    InputError
+        Where none is it, or several are.
+    """
+    fitting = [one for one in found if one.agrees(wanted)]
+    if len(fitting) == 1:
+        return fitting[0]
+    there = "; ".join(one.words for one in fitting or found)
+    if not fitting:
+        raise InputError(f"no curve of {wanted.words}; the file has {there}")
+    raise InputError(
+        f"{len(fitting)} curves, {there}; choose one by blade, state or centrifugal_to_force"
+    )

@@ -26,23 +26,23 @@ References
 ----------
 .. [1] D. J. Ewins, Modal Testing: Theory, Practice and Application, 2nd ed. (2000), 4.4 to 4.6.
 .. [2] R. J. Carroll, D. Ruppert, Transformation and Weighting in Regression (1988), ch. 2, 3
-   (pseudo-likelihood of the variance).
+   (pseudo-likelihood of the variance); G. Schwarz, Ann. Statist. 6 (1978) 461.
 """
 
 from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, minimize_scalar
 
 from upd.errors import InputError
 from upd.labels import Shown
+from upd.measured.compare import noisy_peaks
 from upd.measured.curve import ComplexArray, MeasuredCurve
-from upd.measured.noise import NoiseLevel, noise_mix
-from upd.measured.peaks import noisy_peaks
 from upd.mesh import FloatArray
 
 #: unknowns of a mode, and residual terms
@@ -53,6 +53,71 @@ _ROUNDS, _SETTLED = 30, 1e-4
 _FEW, _MOST = 30, 500
 #: most modes whose signs are tried one by one where no phase was measured
 _MOST_SIGNS = 5
+
+
+class NoiseLevel(NamedTuple):
+    """Standard deviation of a part: as a part of the value, and (m/s2)/N beside it."""
+
+    relative: float
+    constant: float
+
+
+def noise_mix(r: FloatArray, size: FloatArray) -> float:
+    """Share of the noise that is a part of the value, of the variance at the highest point.
+
+    Least normal pseudo-likelihood of residuals r (parts, n) with variance s^2 v,
+    v = (1 - mix) + mix size^2: n ln s^2 + sum ln v, s^2 = mean r^2 / v.
+
+    Parameters
+    ----------
+    r : (parts, n) ndarray
+        Residuals.
+    size : (n,) ndarray
+        Magnitudes over the highest.
+    """
+    square = (r**2).mean(axis=0)
+    if not square.any():
+        return 1.0
+
+    # down to a constant that is less than one of n parts of the variance at the lowest point, in
+    # even steps of its logarithm
+    low = float(2.0 * np.log(max(float(size.min()), np.finfo(float).eps)) - np.log(len(size)))
+    found = minimize_scalar(
+        lambda t: _likelihood(square, size, -np.expm1(t)), bounds=(low, 0.0), method="bounded"
+    )
+    return float(-np.expm1(found.x))
+
+
+def _likelihood(square: FloatArray, size: FloatArray, mix: float) -> float:
+    """-2 ln L of a part but for a constant, of mean squares (n,), see `noise_mix`."""
+    v = np.maximum((1.0 - mix) + mix * size**2, np.finfo(float).tiny)
+    return float(len(v) * np.log(np.mean(square / v)) + np.log(v).sum())
+
+
+def noise_of(r: FloatArray, magnitude: FloatArray, unknowns: float = 0.0) -> NoiseLevel:
+    """Noise of a curve from residuals, as a part of the value or constant, both where the residuals
+    show both: where the information criterion of Schwarz, -2 ln L + ln N for one more unknown, is
+    lower.
+
+    Parameters
+    ----------
+    r : (parts, n) ndarray
+        Residuals of real and imaginary part, or of the magnitude, (m/s2)/N.
+    magnitude : (n,) ndarray
+        Of the fitted curve, (m/s2)/N.
+    unknowns : float
+        Fitted to it: so many values less are free.
+    """
+    top = float(magnitude.max())
+    size = magnitude / top
+    square, mix = (r**2).mean(axis=0), noise_mix(r, size)
+    if square.any():
+        likelihood = {m: len(r) * _likelihood(square, size, m) for m in (1.0, 0.0, mix)}
+        alone = min((1.0, 0.0), key=lambda m: likelihood[m])
+        mix = alone if likelihood[alone] <= likelihood[mix] + np.log(r.size) else mix
+    v = (1.0 - mix) + mix * size**2
+    variance = float((r**2 / v).sum()) / max(r.size - unknowns, 1.0)
+    return NoiseLevel(np.sqrt(variance * mix) / top, np.sqrt(variance * (1.0 - mix)))
 
 
 @dataclass(frozen=True, repr=False)

@@ -19,16 +19,21 @@ from upd.errors import InputError, one_line
 from upd.measured.curve import (
     LEAST_POINTS,
     QUANTITIES,
+    AskedCurve,
     Blade,
+    CurveLabel,
+    Faults,
     MeasuredCurve,
+    ReadCurve,
     State,
     as_accelerance,
     checked_curve,
+    label_of,
     response_unit,
+    the_curve,
     the_one,
 )
-from upd.measured.label import AskedCurve, CurveLabel, label_of, the_curve
-from upd.measured.text import TextCurve, read_text
+from upd.measured.text import read_text
 from upd.results import open_netcdf
 from upd.units import UNITS, unit_factor
 
@@ -36,8 +41,8 @@ _AXIS = "frequency"
 _RESPONSE_UNITS = frozenset(unit for kind in QUANTITIES for unit in UNITS[kind])
 
 
-def read_variables(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, list[str]]:
-    """A response of a netCDF file, and all that is wrong with the file.
+def read_variables(path: Path, asked: AskedCurve, faults: Faults) -> ReadCurve:
+    """A response of a netCDF file.
 
     Parameters
     ----------
@@ -45,66 +50,52 @@ def read_variables(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, lis
         The file.
     asked
         Which response.
+    faults
+        Gets what is wrong with the file, with variable and place.
 
-    Returns
-    -------
-    TextCurve or None
-        None where something is wrong.
-    list of str
-        Faults with variable and place.
+    Raises
+    ------
+    InputError
+        Where something is wrong.
     """
     try:
         with open_netcdf(path) as file:
-            return _read(file, *asked)
+            return _read(file, asked, faults)
     except OSError as error:
         reason = one_line(error)
-        return None, [f"is no netCDF-4 file ({reason}); write it as netCDF-4, or as CSV"]
+        raise InputError(
+            f"is no netCDF-4 file ({reason}); write it as netCDF-4, or as CSV"
+        ) from None
 
 
-def _read(
-    file: Any, column: str | None, unit: str | None, wanted: CurveLabel
-) -> tuple[TextCurve | None, list[str]]:
-    found = dict(_responses(file, "", unit))
-    try:
-        labels = {name: label_of(_said(*one)) for name, one in found.items()}
-        fitting = [name for name, label in labels.items() if label.agrees(wanted)]
-        name = the_one(fitting if column is None and fitting else list(found), column, "variables")
-        label = the_curve([labels[name]], wanted)
-    except InputError as error:
-        return None, [str(error)]
+def _read(file: Any, asked: AskedCurve, faults: Faults) -> ReadCurve:
+    found = dict(_responses(file, "", asked.unit))
+    labels = {name: label_of(_said(*one)) for name, one in found.items()}
+    fitting = [name for name, label in labels.items() if label.agrees(asked.label)]
+    names = fitting if asked.column is None and fitting else list(found)
+    name = the_one(names, asked.column, "variables")
+    label = the_curve([labels[name]], asked.label)
     group, variable = found[name]
-    axis, faults = group.variables[_AXIS], []
-    scale, own_unit = 1.0, ""
-    try:
+    axis, scale, unit = group.variables[_AXIS], 1.0, ""
+    with faults.at(f"variable {_AXIS}, attribute units"):
         scale = unit_factor(_units(axis), ["frequency"])[1]
-    except InputError as error:
-        faults.append(f"variable {_AXIS}, attribute units: {error}")
-    try:
-        own_unit = response_unit(_units(variable), unit)
-    except InputError as error:
-        faults.append(f"variable {name}, attribute units: {error}")
+    with faults.at(f"variable {name}, attribute units"):
+        unit = response_unit(_units(variable), asked.unit)
     f, data = scale * np.asarray(axis[...], float), np.asarray(variable[...], float)
     for which, values in ((_AXIS, f), (name, data)):
         for k in np.argwhere(~np.isfinite(values)):
             at = ", ".join(map(str, k))
-            faults.append(f"variable {which}, place [{at}]: no finite number; leave it out")
+            faults.add(f"variable {which}, place [{at}]", "no finite number; leave it out")
     if len(f) < LEAST_POINTS:
-        faults.append(f"variable {_AXIS}: {len(f)} points; a curve has {LEAST_POINTS} or more")
-    if faults:
-        return None, faults
-    faults += [f"variable {_AXIS}, place [{k}]: {words}" for k, words in checked_curve(f)]
-    if data.ndim == 2:
-        data = data[:, 0] + 1j * data[:, 1]
-    else:
-        faults += [
-            f"variable {name}, place [{k}]: the magnitude {data[k]:g} is negative; give "
-            "magnitudes, or a last dimension of real and imaginary part"
-            for k in np.flatnonzero(data < 0.0)
-        ]
-    if faults:
-        return None, faults
-    way = slice(None) if f[-1] > f[0] else slice(None, None, -1)
-    return TextCurve(f[way], data[way], own_unit, label), []
+        faults.add(f"variable {_AXIS}", f"{len(f)} points; a curve has {LEAST_POINTS} or more")
+    faults.check()
+    values = data[:, 0] + 1j * data[:, 1] if data.ndim == 2 else data
+    return checked_curve(
+        ReadCurve(f, values, unit, label),
+        faults,
+        lambda what, k: f"variable {_AXIS if what == 'frequency' else name}, place [{k}]",
+        "magnitudes, or a last dimension of real and imaginary part",
+    )
 
 
 def _said(group: Any, variable: Any) -> dict[str, Any]:
@@ -215,7 +206,7 @@ def read_measured(
     )
 
 
-def found_in(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, list[str]]:
+def found_in(path: Path, asked: AskedCurve) -> tuple[ReadCurve | None, list[str]]:
     """What a file holds, or its faults; files that did not change are read once.
 
     Parameters
@@ -235,7 +226,11 @@ def found_in(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, list[str]
 @lru_cache(maxsize=64)
 def _found(
     path: Path, changed: int, size: int, asked: AskedCurve
-) -> tuple[TextCurve | None, list[str]]:
+) -> tuple[ReadCurve | None, list[str]]:
     del changed, size
     read = read_variables if path.suffix.lower() in _NETCDF else read_text
-    return read(path, asked)
+    faults = Faults()
+    try:
+        return read(path, asked, faults), []
+    except InputError as error:
+        return None, faults.found or [str(error)]

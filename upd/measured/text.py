@@ -18,21 +18,28 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from upd.errors import InputError
 from upd.measured.curve import (
+    ANY,
+    LABELS,
     LEAST_POINTS,
     QUANTITIES,
+    AskedCurve,
     ComplexArray,
+    CurveLabel,
+    Faults,
+    ReadCurve,
     checked_curve,
+    read_label,
     response_unit,
+    the_curve,
     the_one,
 )
-from upd.measured.label import ANY, LABELS, AskedCurve, CurveLabel, read_label, the_curve
 from upd.mesh import FloatArray
 from upd.units import UNITS, unit_factor
 
@@ -42,20 +49,14 @@ _DECIBEL = re.compile(r"(?<![^\W_])db(?![^\W_])", re.IGNORECASE)
 _COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?")
 #: last words of a column's name -> what of the response it holds
 _PARTS = {
-    "real": "real",
-    "re": "real",
-    "imaginary": "imaginary",
-    "imag": "imaginary",
-    "im": "imaginary",
-    "phase": "phase",
-    "phi": "phase",
-    "arg": "phase",
-    "angle": "phase",
-    "amplitude": "magnitude",
-    "magnitude": "magnitude",
-    "mag": "magnitude",
-    "modulus": "magnitude",
-    "abs": "magnitude",
+    word: part
+    for part, words in {
+        "real": "real re",
+        "imaginary": "imaginary imag im",
+        "phase": "phase phi arg angle",
+        "magnitude": "amplitude magnitude mag modulus abs",
+    }.items()
+    for word in words.split()
 }
 _WORDS = "|".join(_PARTS)
 #: "Phase angle of x", "Abs(x)"; "x_real", "x imaginary part"
@@ -78,32 +79,13 @@ class FileColumn:
     unit: str
 
 
-@dataclass
-class Faults:
-    """What is wrong with a file, each with its place; no more than a person reads."""
-
-    found: list[str] = field(default_factory=list)
-
-    def add(self, words: str, line: int, column: int = 0, name: str = "") -> None:
-        """A fault of a line, of a cell of it where the column counts from 1."""
-        at = f"line {line}" + (f", column {column}" if column else "")
-        self.found.append(f"{at}{f' ({name})' if name else ''}: {words}")
+def _cell(line: int, place: int, name: str) -> str:
+    """Where a cell is, as faults say it."""
+    return f"line {line}, column {place + 1} ({name})"
 
 
-@dataclass(frozen=True)
-class TextCurve:
-    """Frequency (n,) in Hz, rising, and the response (n,), complex or magnitudes, in ``unit``;
-    ``label`` is what the file gives of it.
-    """
-
-    frequency: FloatArray
-    values: ComplexArray | FloatArray
-    unit: str
-    label: CurveLabel = ANY
-
-
-def read_text(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, list[str]]:
-    """A response of a text file, and all that is wrong with the file.
+def read_text(path: Path, asked: AskedCurve, faults: Faults) -> ReadCurve:
+    """A response of a text file.
 
     Parameters
     ----------
@@ -111,77 +93,63 @@ def read_text(path: Path, asked: AskedCurve) -> tuple[TextCurve | None, list[str
         The file.
     asked
         Which response.
+    faults
+        Gets what is wrong with the file, with line and column.
 
-    Returns
-    -------
-    TextCurve or None
-        None where something is wrong.
-    list of str
-        Faults with line and column.
+    Raises
+    ------
+    InputError
+        Where something is wrong.
     """
-    faults = Faults()
     lines = _lines(path, faults)
-    if [text.strip() for _, text in lines[:2]] == ["-1", "58"]:
-        faults.add(
-            "is a universal file (data set 58); export it as CSV with the columns frequency, real "
-            "and imaginary, each with its unit",
-            lines[0][0],
-        )
-        return None, faults.found
-    if not lines:
-        if not faults.found:
-            faults.add("no values; give lines of frequency and response", 1)
-        return None, faults.found
     separator = _separator(lines)
     split = [(n, [cell.strip().strip('"') for cell in text.split(separator)]) for n, text in lines]
     columns, body, head = _columns(split, separator)
-    chosen = _chosen(columns, asked.column, asked.unit, head, faults)
-    if chosen is None:
-        return None, faults.found
-    parts, scale, own_unit = chosen
+    parts, scale, unit = _chosen(columns, asked, head, faults)
     label, body = _labelled(columns, body, asked.label, separator, head, faults)
     rows = _numbers(body, parts, separator, faults, max(c.place for c in columns) + 1)
-    if faults.found:
-        return None, faults.found
+    faults.check()
     at = [n for n, _ in body]
     if len(at) < LEAST_POINTS:
         last = at[-1] if at else head
-        faults.add(f"ends with {len(at)} points; a curve has {LEAST_POINTS} or more", last)
-        return None, faults.found
-    f = scale * rows["frequency"]
-    place = parts["frequency"].place + 1
-    for k, words in checked_curve(f):
-        faults.add(words, at[k], place, "frequency")
-    values = _response(rows, parts)
-    if not np.iscomplexobj(values):
-        mine = next(c for kind, c in parts.items() if kind == "magnitude")
-        for k in np.flatnonzero(values < 0.0).tolist():
-            faults.add(
-                f"the magnitude {values[k]:g} is negative; give linear magnitudes, or name the "
-                "columns real and imaginary",
-                at[k],
-                mine.place + 1,
-                mine.name,
-            )
-    if faults.found:
-        return None, faults.found
-    way = slice(None) if f[-1] > f[0] else slice(None, None, -1)
-    return TextCurve(f[way], values[way], own_unit, label), []
+        words = f"ends with {len(at)} points; a curve has {LEAST_POINTS} or more"
+        faults.add(f"line {last}", words)
+        faults.check()
+
+    def place(what: str, k: int) -> str:
+        return _cell(at[k], parts[what].place, parts[what].name or what)
+
+    return checked_curve(
+        ReadCurve(scale * rows["frequency"], _response(rows, parts), unit, label),
+        faults,
+        place,
+        "linear magnitudes, or name the columns real and imaginary",
+    )
 
 
 def _lines(path: Path, faults: Faults) -> list[tuple[int, str]]:
     """Lines with something in them and their numbers from 1, without comments."""
+    text = ""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         line = path.read_bytes()[: error.start].count(b"\n") + 1
-        faults.add("is no text in UTF-8; save the file as CSV in UTF-8", line)
-        return []
+        faults.add(f"line {line}", "is no text in UTF-8; save the file as CSV in UTF-8")
     if "\0" in text:
-        faults.add("holds NUL, so it is no text; save the file as CSV in UTF-8", 1)
-        return []
+        faults.add("line 1", "holds NUL, so it is no text; save the file as CSV in UTF-8")
+    faults.check()
     numbered = enumerate(text.splitlines(), 1)
-    return [(n, line) for n, line in numbered if line.strip() and not line.lstrip().startswith("#")]
+    lines = [(n, one) for n, one in numbered if one.strip() and not one.lstrip().startswith("#")]
+    if [one.strip() for _, one in lines[:2]] == ["-1", "58"]:
+        faults.add(
+            f"line {lines[0][0]}",
+            "is a universal file (data set 58); export it as CSV with the columns frequency, real "
+            "and imaginary, each with its unit",
+        )
+    if not lines:
+        faults.add("line 1", "no values; give lines of frequency and response")
+    faults.check()
+    return lines
 
 
 def _separator(lines: Sequence[tuple[int, str]]) -> str:
@@ -259,55 +227,62 @@ def _paired(columns: list[FileColumn]) -> list[FileColumn]:
 
 
 def _chosen(
-    columns: Sequence[FileColumn], wanted: str | None, unit: str | None, line: int, faults: Faults
-) -> tuple[dict[str, FileColumn], float, str] | None:
+    columns: Sequence[FileColumn], asked: AskedCurve, line: int, faults: Faults
+) -> tuple[dict[str, FileColumn], float, str]:
     """The columns of frequency and of the response by their parts, factor to Hz, unit."""
-    axis = [c for c in columns if c.part == "frequency"]
+    axis, unit = [c for c in columns if c.part == "frequency"], asked.unit
     if len(axis) != 1:
         faults.add(
+            f"line {line}",
             f"{len(axis) or 'no'} column{'s' * (len(axis) > 1)} of frequency; name one "
             '"frequency [Hz]"',
-            line,
         )
-        return None
+        faults.check()
     scale = 1.0
-    try:
-        scale = unit_factor(axis[0].unit, ["frequency"])[1]
-    except InputError as error:
-        faults.add(_without_unit(axis[0].unit, error), line, axis[0].place + 1, "frequency")
+    with faults.at(_cell(line, axis[0].place, "frequency")):
+        scale = _factor(axis[0].unit, ["frequency"])
     names = list(dict.fromkeys(c.name for c in columns if c.name and _is_response(c, unit)))
-    if not names and wanted is None:
+    if not names and asked.column is None:
         # its unit is what is wrong: reported below
         names = list(dict.fromkeys(c.name for c in columns if c.name))[:1]
-    try:
-        name = the_one(names, wanted, "columns")
-    except InputError as error:
-        faults.add(str(error), line)
-        return None
+    name = ""
+    with faults.at(f"line {line}"):
+        name = the_one(names, asked.column, "columns")
+    if not name:
+        faults.check()
     parts = _parts([c for c in columns if c.name == name], name, line, faults)
-    responses = [c for kind, c in parts.items() if kind not in ("frequency", "phase")]
-    units = {unit or c.unit for c in responses}
+    responses = [c for kind, c in parts.items() if kind != "phase"]
     for c in responses:
-        try:
+        with faults.at(_cell(line, c.place, c.name)):
+            if not (c.unit or unit):
+                _factor("", QUANTITIES)
             response_unit(c.unit, unit)
-        except InputError as error:
-            faults.add(_without_unit(unit or c.unit, error), line, c.place + 1, c.name)
+    units = {unit or c.unit for c in responses}
     if len(units) > 1:
-        faults.add(f"the parts of {name} have different units, {' and '.join(units)}", line)
+        words = f"the parts of {name} have different units, {' and '.join(units)}"
+        faults.add(f"line {line}", words)
     magnitudes = {c.name for c in columns if c.part == "magnitude"}
     for c in columns:
         if c.part == "phase" and c.name not in magnitudes and "phase" not in parts:
             words = f'a phase of no response; name it "{name} phase", or remove it'
-            faults.add(words, line, c.place + 1, c.name)
+            faults.add(_cell(line, c.place, c.name), words)
     if "phase" in parts:
-        try:
-            unit_factor(parts["phase"].unit, ["angle"])
-        except InputError as error:
-            c = parts["phase"]
-            faults.add(_without_unit(c.unit, error), line, c.place + 1, f"{c.name} phase")
-    if faults.found:
-        return None
+        c = parts["phase"]
+        with faults.at(_cell(line, c.place, f"{c.name} phase")):
+            _factor(c.unit, ["angle"])
+    faults.check()
     return {"frequency": axis[0], **parts}, scale, unit or responses[0].unit
+
+
+def _factor(unit: str, kinds: Sequence[str]) -> float:
+    """From a column's unit to the inner one; InputError with a remedy where it has none."""
+    try:
+        return unit_factor(unit, kinds)[1]
+    except InputError as error:
+        if unit:
+            raise
+        known = str(error).partition("; ")[2]
+        raise InputError(f"no unit; write it in brackets behind the name ({known})") from None
 
 
 def _is_response(c: FileColumn, unit: str | None) -> bool:
@@ -321,26 +296,20 @@ def _is_response(c: FileColumn, unit: str | None) -> bool:
     return True
 
 
-def _without_unit(unit: str, error: InputError) -> str:
-    if unit:
-        return str(error)
-    return f"no unit; write it in brackets behind the name ({str(error).partition('; ')[2]})"
-
-
 def _parts(
     mine: Sequence[FileColumn], name: str, line: int, faults: Faults
 ) -> dict[str, FileColumn]:
     """Real and imaginary part, or magnitude and phase, or magnitude alone."""
     found = {c.part: c for c in mine}
     if len(found) < len(mine):
-        faults.add(f"several columns {name}; give each its own name", line)
+        faults.add(f"line {line}", f"several columns {name}; give each its own name")
     if {"real", "imaginary"} <= set(found):
         return {part: found[part] for part in ("real", "imaginary")}
     if "magnitude" in found:
         return {part: found[part] for part in ("magnitude", "phase") if part in found}
     (have,) = list(found)[:1]
     lacks = {"real": "imaginary", "imaginary": "real", "phase": "magnitude"}[have]
-    faults.add(f"{name} has a column {have} but none {lacks}; add it", line)
+    faults.add(f"line {line}", f"{name} has a column {have} but none {lacks}; add it")
     return {}
 
 
@@ -363,18 +332,14 @@ def _labelled(
             cell = cells[c.place] if c.place < len(cells) else ""
             if c.part == "force_ratio":
                 cell = cell.replace(",", ".") if separator != "," else cell
-            try:
+            with faults.at(_cell(at, c.place, c.part)):
                 given[c.part] = read_label(c.part, cell)
-            except InputError as error:
-                faults.add(str(error), at, c.place + 1, c.part)
         labels.append(CurveLabel(**given))
-    if faults.found:
-        return ANY, body
-    try:
+    faults.check()
+    label = ANY
+    with faults.at(f"line {line}"):
         label = the_curve(list(dict.fromkeys(labels)), wanted)
-    except InputError as error:
-        faults.add(str(error), line)
-        return ANY, body
+    faults.check()
     return label, [row for row, one in zip(body, labels, strict=True) if one == label]
 
 
@@ -389,26 +354,21 @@ def _numbers(
     out: dict[str, list[complex]] = {kind: [] for kind in parts}
     for line, cells in body:
         if len(cells) > width and any(cells[width:]):
-            faults.add(f"{len(cells)} cells where there are {width} columns", line)
+            faults.add(f"line {line}", f"{len(cells)} cells where there are {width} columns")
         for kind, c in parts.items():
-            name = kind if kind == "frequency" else c.name
-            if c.place >= len(cells) or not cells[c.place]:
-                faults.add(
-                    "nothing there; give a number, or remove the line", line, c.place + 1, name
-                )
-                continue
-            value: complex | None = _number(cells[c.place], separator)
+            cell = cells[c.place] if c.place < len(cells) else ""
+            value: complex | None = _number(cell, separator)
             if value is None and kind == "magnitude" and "phase" not in parts:
-                value = _complex(cells[c.place])
-            if value is None or not np.isfinite(value):
-                faults.add(
-                    f"{cells[c.place]!r} is no finite number; correct it, or remove the line",
-                    line,
-                    c.place + 1,
-                    name,
-                )
+                value = _complex(cell)
+            if value is not None and np.isfinite(value):
+                out[kind].append(value)
                 continue
-            out[kind].append(value)
+            words = (
+                f"{cell!r} is no finite number; correct it, or remove the line"
+                if cell
+                else "nothing there; give a number, or remove the line"
+            )
+            faults.add(_cell(line, c.place, c.name or kind), words)
     return {kind: np.array(values) for kind, values in out.items()}
 
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from upd.cache.files import placed_file
 from upd.errors import InputError
 from upd.mesh import FloatArray, IntArray, Mesh
-from upd.mesh.boundary import owners
+from upd.mesh.hexmesh import owners
 
 _CELL = {8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"}
 _QUAD = {4: "quad", 8: "quad8", 9: "quad9"}

@@ -19,9 +19,9 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from upd.errors import InputError, OwnMeshError
-from upd.mesh.boundary import boundary_faces
-from upd.mesh.hexmesh import CENTRES, FACE_SIZE, FloatArray, IntArray, Mesh, NamedElements
-from upd.mesh.pairing import OUT_OF_LINE, in_pairs
+from upd.mesh import FloatArray, IntArray, Mesh
+from upd.mesh.checks import OUT_OF_LINE, in_pairs
+from upd.mesh.hexmesh import CENTRES, FACE_SIZE, NamedElements, boundary_faces
 
 #: beginnings of the names of elements without a volume: plane and axisymmetric ones, shells,
 #: membranes, bars

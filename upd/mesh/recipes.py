@@ -22,11 +22,9 @@ from upd.cache.arrays import cache_folder, load_arrays, save_arrays, unreadable
 from upd.cache.sources import source_digest
 from upd.errors import InputError, MeshError, OwnMeshError, UpdError, did_you_mean
 from upd.mesh import FloatArray
-from upd.mesh.checks import check_mesh
+from upd.mesh.checks import check_mesh, check_pairs, quality
 from upd.mesh.fields import DamperSizes
 from upd.mesh.hexmesh import Mesh
-from upd.mesh.pairing import check_pairs
-from upd.mesh.quality import quality
 from upd.mesh.recipe_modules import geometry_module, is_file, is_mesh, line_of, module_of
 from upd.mesh.section import SectionView, plain_views
 
@@ -53,39 +51,32 @@ def save_meshes(where: Path, key: str, meshes: Mapping[str, Mesh]) -> None:
 
 
 def _arrays(meshes: Mapping[str, Mesh]) -> dict[str, NDArray[np.generic]]:
-    """Arrays by number, so that any name of a body or a set will do.
-
-    The names are stored as text.
-    """
-    arrays: dict[str, NDArray[np.generic]] = {"bodies": np.array(list(meshes), dtype=np.str_)}
-    for b, mesh in enumerate(meshes.values()):
-        arrays |= {f"{b}.points": mesh.points, f"{b}.hexes": mesh.hexes}
+    """Arrays under body, kind and name as JSON, so that any name of a body or a set will do."""
+    arrays: dict[tuple[str, ...], NDArray[np.generic]] = {}
+    for body, mesh in meshes.items():
+        arrays |= {(body, "points"): mesh.points, (body, "hexes"): mesh.hexes}
         for kind in _SETS:
-            sets = getattr(mesh, kind)
-            arrays[f"{b}.{kind}"] = np.array(list(sets), dtype=np.str_)
-            arrays |= {f"{b}.{kind}.{k}": one for k, one in enumerate(sets.values())}
-    return arrays
+            arrays |= {(body, kind, name): one for name, one in getattr(mesh, kind).items()}
+    return {json.dumps(key): one for key, one in arrays.items()}
 
 
 def _meshes(arrays: Mapping[str, NDArray[np.generic]]) -> dict[str, Mesh]:
-    meshes = {}
-    for b, name in enumerate(arrays["bodies"].tolist()):
-        sets: dict[str, Any] = {
-            kind: {
-                str(key): arrays[f"{b}.{kind}.{k}"].astype(dtype, copy=False)
-                for k, key in enumerate(arrays[f"{b}.{kind}"].tolist())
-            }
-            for kind, dtype in _SETS.items()
-        }
-        points = arrays[f"{b}.points"].astype(np.float64, copy=False)
-        hexes = arrays[f"{b}.hexes"].astype(np.int64, copy=False)
+    bodies: dict[str, dict[str, Any]] = {}
+    for key, one in arrays.items():
+        body, kind, *name = json.loads(key)
+        mine = bodies.setdefault(body, {kind: {} for kind in _SETS})
+        if name:
+            mine[kind][name[0]] = one.astype(_SETS[kind], copy=False)
+        else:
+            mine[kind] = one.astype(np.int64 if kind == "hexes" else np.float64, copy=False)
+    meshes = {body: Mesh(**mine) for body, mine in bodies.items()}
+    for mesh in meshes.values():
         if (
-            points.ndim != 2
-            or hexes.ndim != 2
-            or (hexes.size and not 0 <= hexes.min() <= hexes.max() < len(points))
+            mesh.points.ndim != 2
+            or mesh.hexes.ndim != 2
+            or (mesh.hexes.size and not 0 <= mesh.hexes.min() <= mesh.hexes.max() < mesh.n_node)
         ):
             raise ValueError("the arrays are not those of a mesh")
-        meshes[str(name)] = Mesh(points, hexes, **sets)
     return meshes
 
 
@@ -93,12 +84,6 @@ log = logging.getLogger(__name__)
 
 #: smallest scaled Jacobian a solver is given
 LEAST_JACOBIAN = 0.1
-
-
-# Meshes of users' recipes that no folder keeps, so that a plan does not run these once more for
-# each question: that of the plan and that of its coarser companion.
-_not_kept: dict[str, dict[str, Mesh]] = {}
-_MOST_NOT_KEPT = 2
 
 
 def build_mesh(
@@ -120,8 +105,6 @@ def build_mesh(
     say = progress or log.info
     folder = cache_folder(cache_dir)
     key = _key(recipe, module, chosen)
-    if key in _not_kept:
-        return _not_kept[key], True
     cached = load_meshes(folder, key)
     if cached is not None:
         say(f"{recipe}: meshes taken from {folder}")
@@ -135,10 +118,6 @@ def build_mesh(
             raise
         raise OwnMeshError(f"recipe {recipe!r}: {problem}") from None
     save_meshes(folder, key, meshes)
-    if is_file(recipe) and load_meshes(folder, key) is None:
-        while len(_not_kept) >= _MOST_NOT_KEPT:
-            del _not_kept[next(iter(_not_kept))]
-        _not_kept[key] = meshes
     return meshes, False
 
 

@@ -8,8 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from upd.mesh.boundary import boundary_quads
-from upd.mesh.hexmesh import EDGES, FloatArray, IntArray, Mesh
+from upd.mesh.hexmesh import EDGES, FloatArray, IntArray, Mesh, boundary_quads
 
 #: distance by which the plane of a section is moved off lattice planes, relative to the meshes
 _BESIDE = 1e-5

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch as LegendPatch
 from numpy.typing import NDArray
 
 from upd.mesh import IntArray, Mesh
-from upd.mesh.boundary import boundary_quads, outward_area
+from upd.mesh.hexmesh import boundary_quads, outward_area
 from upd.plot.modes import frame_axes, shaded_sides, view_axes
 from upd.plot.sheet import Drawing, draw_sheet
 from upd.plot.style import COLOURS

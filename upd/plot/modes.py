@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from upd.errors import InputError
 from upd.mesh import FloatArray, IntArray, Mesh
-from upd.mesh.boundary import boundary_quads
+from upd.mesh.hexmesh import boundary_quads
 from upd.plot.sheet import own_axes
 
 #: largest displacement drawn, as a part of the diagonal of the box around all bodies

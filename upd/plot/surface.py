@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.mesh import FloatArray, IntArray, Mesh
-from upd.mesh.quality import quality
+from upd.mesh.checks import quality
 from upd.plot.plotly import pack
 
 #: a displacement is drawn at most this part of the bodies' size
@@ -124,7 +124,7 @@ def read_surface(path: Path, names: list[str], label: str = "") -> Surface:
 
 def _body(name: str, mesh: Mesh) -> SurfaceBody:
     # Pictures of modes draw the same faces.
-    from upd.mesh.boundary import boundary_quads
+    from upd.mesh.hexmesh import boundary_quads
 
     quads = boundary_quads(mesh)
     nodes, flat = np.unique(quads, return_inverse=True)

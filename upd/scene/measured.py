@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.errors import InputError
-from upd.measured.curve import QUANTITIES, MeasuredCurve
+from upd.measured.curve import QUANTITIES, AskedCurve, CurveLabel, MeasuredCurve, label_of
 from upd.measured.damping import DampingFit, fit_damping
-from upd.measured.label import AskedCurve, CurveLabel, label_of
 from upd.measured.read import MOST_TOLD, found_in, read_measured
 from upd.scene import quantities as q
 from upd.scene.base import STRICT

@@ -164,7 +164,6 @@ def one_model(
     stiffness: str,
     what: str,
     *,
-    friction: bool = True,
     more: Iterable[str] = (),
 ) -> ForcedScene:
     """A scene of contact points with one contact stiffness and one mesh, nothing estimated or
@@ -176,8 +175,6 @@ def one_model(
         Its name.
     what
         Needs it: "a fit".
-    friction
-        Whether curves with friction are solved.
     more
         What else is wrong with the scene.
 

@@ -4,14 +4,12 @@
 F_C whose worst peak is lowest from peaks of whole curves over F_C/F_E, of a rig or of any balance.
 """
 
-from upd.hbm.peaks.over import PeaksOver
 from upd.sizing.choice import ChosenDamper
 from upd.sizing.choice_answer import BestDamper
-from upd.sizing.least_worst import LowestWorst, lowest_worst
 from upd.sizing.search import design
 from upd.sizing.statics import DamperStatics, damper_statics
 from upd.sizing.statics_answer import DamperDesign
-from upd.sizing.worst_peak import WorstPeak
+from upd.sizing.worst_peak import LowestWorst, WorstPeak, lowest_worst
 
 __all__ = [
     "BestDamper",
@@ -19,7 +17,6 @@ __all__ = [
     "DamperDesign",
     "DamperStatics",
     "LowestWorst",
-    "PeaksOver",
     "WorstPeak",
     "damper_statics",
     "design",

@@ -15,16 +15,13 @@ from upd.plot.chart import Axis, Band, Chart, Mark, Trace
 from upd.report.answer_folder import FigureAnswer
 from upd.results.answer_table import AnswerTable, Rounded
 from upd.scene.rotation import damper_mass
-from upd.sizing.choice import GROWTHS, UNITS_OF, ChosenDamper
-from upd.sizing.sensitivity import Sensitivity, sensitivities
+from upd.sizing.choice import GROWTHS, UNITS_OF, ChosenDamper, Sensitivity, sensitivities
 from upd.sizing.worst_peak import WorstPeak
 
 Array = NDArray[np.float64]
 #: points of a curve
 _CURVE = 301
 _SIZE = (6.4, 4.8)
-#: room above and below the curves, as a factor
-_ROOM = 1.25
 #: relative difference of F_C up to which two are one
 ALIKE = 0.03
 
@@ -137,8 +134,13 @@ class BestDamper(FigureAnswer):
 
     @property
     def charts(self) -> list[Chart]:
-        """Worst peaks over F_C, and peaks over F_C/F_E."""
-        return choice_charts(self.found)
+        """Worst peaks over F_C with the optimum, all peaks over F_C/F_E with the points solved, and
+        the least worst peak over what else is chosen.
+        """
+        found = self.found
+        charts = [_over_centrifugal(found), _over_ratio(found)]
+        charts += [_over_shape(found, k) for k in range(len(found.ranges.shapes))]
+        return [replace(one, figure=self.figure, size=_SIZE, columns=len(charts)) for one in charts]
 
 
 def _chosen(found: ChosenDamper) -> list[Sensitivity]:
@@ -196,9 +198,10 @@ def warnings(found: ChosenDamper) -> list[str]:
         out.append("At a jump of the worst peak over F_C: beyond it another peak decides, higher.")
     low = math.exp(found.best.best.reached[0])
     if low > found.best.ends[0] * (1.0 + ALIKE):
+        lost = sorted({math.exp(s) for one in found.best.worst.peaks for s in one.failed})
         out.append(
             f"Not known for F_C below {low:.4g} N: no whole curve reaches its end at F_C/F_E "
-            f"{', '.join(f'{r:.4g}' for r in found.unreached)}."
+            f"{', '.join(f'{r:.4g}' for r in lost)}."
         )
     return out
 
@@ -206,34 +209,13 @@ def warnings(found: ChosenDamper) -> list[str]:
 # -- charts ---------------------------------------------------------------------------------------
 
 
-def choice_charts(found: ChosenDamper) -> list[Chart]:
-    """Worst peaks over F_C with the optimum, all peaks over F_C/F_E with the points solved, and the
-    least worst peak over what else is chosen.
-
-    Parameters
-    ----------
-    found : ChosenDamper
-        The optimum.
-    """
-    charts = [_over_centrifugal(found), _over_ratio(found)]
-    charts += [_over_shape(found, k) for k in range(len(found.ranges.shapes))]
-    return [
-        replace(one, figure=BestDamper.figure, size=_SIZE, columns=len(charts)) for one in charts
-    ]
-
-
-def _height_axis(found: ChosenDamper, name: str, *values: Array) -> Axis:
-    known = np.concatenate([v[np.isfinite(v) & (v > 0.0)] for v in values])
-    ends = (known.min() / _ROOM, known.max() * _ROOM) if known.size else (None, None)
-    return Axis(name, UNITS_OF[found.objective], log=True, low=ends[0], high=ends[1])
-
-
 def _curve(worst: WorstPeak, low: float, high: float) -> tuple[Array, Array]:
     """F_C [N] from end to end and heights, nan where they are not known."""
     c, y = worst.over(math.log(low), math.log(high))
     every = slice(None, None, max(1, len(c) // _CURVE))
     c, y = c[every], y[every]
-    return np.exp(c), np.where(c >= worst.known_from() - SAME, np.exp(y), math.nan)
+    known = (c >= worst.known_from() - SAME) & np.isfinite(y)
+    return np.exp(c), np.where(known, np.exp(y), math.nan)
 
 
 def _over_centrifugal(found: ChosenDamper) -> Chart:
@@ -253,7 +235,7 @@ def _over_centrifugal(found: ChosenDamper) -> Chart:
     return Chart(
         f"{scene.name}: worst peak",
         Axis(name, "N" if press is None else press.unit, log=True),
-        _height_axis(found, "worst peak", robust, plain, np.array([found.worst])),
+        Axis("worst peak", UNITS_OF[found.objective], log=True),
         traces=(
             Trace("over the ranges", shown(F), robust, "line", 0),
             Trace("the scene's own values", shown(G), plain, "dashed", 1),
@@ -265,29 +247,16 @@ def _over_centrifugal(found: ChosenDamper) -> Chart:
 
 
 def _over_ratio(found: ChosenDamper) -> Chart:
-    """Every peak of the rigs of the optimum."""
+    """Every peak of the rigs of the optimum, as whole curves have it."""
     best = found.best
     traces: list[Trace] = []
-    heights: list[Array] = []
     for w, rig in best.rigs:
         word = "".join(f", {of.shown(v)}" for of, v in zip(found.ranges.unsure, w, strict=True))
-        s = np.linspace(rig.peaks.low, rig.peaks.high, _CURVE)
-        curves = rig.peaks.curves()
-        for name, curve in curves.items():
-            y = curve(s)
-            heights.append(np.exp(y[np.isfinite(y)]))
-            values = np.where(np.isfinite(y), np.exp(y), math.nan)
-            colour = len({t.colour for t in traces})
-            label = f"{name}{word}"
-            traces.append(Trace(label, np.exp(s), values, "line", colour))
-            solved = sorted(
-                (t, p[name].log_height) for t, p in rig.peaks.points.items() if name in p
-            )
-            x, v = np.exp(np.array(solved)).T
-            inside = (np.log(x) >= rig.peaks.low - SAME) & (np.log(x) <= rig.peaks.high + SAME)
-            traces.append(
-                Trace(f"{label}, solved", x[inside], v[inside], "points", colour, entry=label)
-            )
+        points = rig.peaks.points
+        for name in rig.peaks.curves():
+            solved = sorted((s, p[name].log_height) for s, p in points.items() if name in p)
+            x, y = np.exp(np.array(solved)).T
+            traces.append(Trace(f"{name}{word}", x, y, "both", len(traces)))
     c, f = best.best.log_centrifugal, best.worst.f
     marks = tuple(
         Mark(math.exp(p.s), math.exp(p.y), f"F_E {math.exp(c - p.s):.3g} N", 0)
@@ -297,7 +266,7 @@ def _over_ratio(found: ChosenDamper) -> Chart:
     return Chart(
         "Peaks over F_C/F_E",
         Axis("F_C/F_E", log=True),
-        _height_axis(replace(found, objective="peak"), "peak accelerance", *heights),
+        Axis("peak accelerance", UNITS_OF["peak"], log=True),
         traces=tuple(traces),
         marks=marks,
         bands=(Band("F_E of the optimum", "x", math.exp(c - f[1]), math.exp(c - f[0])),),
@@ -313,7 +282,7 @@ def _over_shape(found: ChosenDamper, k: int) -> Chart:
     return Chart(
         f"Least worst peak over {shape.path}",
         Axis(shape.path, shape.unit),
-        _height_axis(found, "worst peak at its best F_C", robust, plain),
+        Axis("worst peak at its best F_C", UNITS_OF[found.objective], log=True),
         traces=(
             Trace("over the ranges", x, robust, "both", 0),
             Trace("the scene's own values", x, plain, "both", 1),

@@ -1,7 +1,7 @@
 """`upd.design`: the statics of a scene's damper, or the damper whose worst peak over ranges of
 excitation and of uncertain inputs is lowest.
 
-F_C is sought by `upd.sizing.least_worst` on the curves of one rig; what else is chosen makes a new
+F_C is sought by `upd.sizing.worst_peak` on the curves of one rig; what else is chosen makes a new
 rig for every value, tried on a grid and then by bounded minimisation between the neighbours of its
 best. Several such inputs are moved by turns, the others at the best so far, and along the way that
 a turn led (R. Hooke, T. A. Jeeves, J. ACM 8 (1961) 212), until a turn gains nothing; where worst
@@ -38,19 +38,20 @@ from upd.sizing.choice import (
     GROWTHS,
     ChosenDamper,
     Objective,
+    Reach,
     Tried,
     best_of,
+    how_far,
+    how_far_force,
     is_along,
     nominal_of,
 )
 from upd.sizing.choice_answer import BestDamper
-from upd.sizing.least_worst import has_moved, lowest_worst
-from upd.sizing.margins import Reach, how_far, how_far_force
 from upd.sizing.ranges import FORCE, InputRange, Ranges, read_ranges
 from upd.sizing.rig_peaks import RigPeaks, bare
 from upd.sizing.statics import damper_statics
 from upd.sizing.statics_answer import DamperDesign
-from upd.sizing.worst_peak import COMPARED_STEP, WorstPeak
+from upd.sizing.worst_peak import COMPARED_STEP, WorstPeak, has_moved, lowest_worst
 
 log = logging.getLogger(__name__)
 #: values of what is chosen beside F_C on the first grid; more between the neighbours of the best,
@@ -60,6 +61,8 @@ GRID, MORE, CLOSE = 5, 8, 0.01
 _TURNS = 4
 #: looks at whole curves around the optimum
 _LOOKS = 4
+#: inputs with their values, in the units inside
+Inputs = tuple[tuple[InputRange, float], ...]
 #: of the range of F_E, as ln F_E: steps between the first whole curves
 _SHARE = 0.5
 #: beyond a range of F_E up to which its ends are sought, as ln F_E
@@ -309,7 +312,7 @@ class _Search:
 
     def _tried(self, place: tuple[float, ...]) -> Tried:
         r = self.ranges
-        chosen = {of.path: of.text(v) for of, v in zip(r.shapes, place, strict=True)}
+        chosen = tuple(zip(r.shapes, place, strict=True))
         scene = self._with(chosen)
         press = r.pressing
         F = scene.damper.centrifugal
@@ -322,7 +325,10 @@ class _Search:
         window = ends[0] / max(forces), ends[1] / min(forces)
         own = tuple(one.nominal for one in r.unsure)
         corners = itertools.product(*((one.low, one.high) for one in r.unsure))
-        rigs = {w: self._rig(chosen, w, place, window) for w in sorted({*corners, own})}
+        rigs = {
+            w: self._rig((*chosen, *zip(r.unsure, w, strict=True)), window)
+            for w in sorted({*corners, own})
+        }
         counted = [
             rig.peaks
             for w, rig in rigs.items()
@@ -387,32 +393,24 @@ class _Search:
         with self.stages("search", detail), threads_for(len(rigs[0][1].model.M)):
             yield
 
-    def _rig(
-        self,
-        chosen: dict[str, object],
-        unsure: tuple[float, ...],
-        place: tuple[float, ...],
-        window: tuple[float, float],
-    ) -> RigPeaks:
-        r = self.ranges
-        given = [*zip(r.shapes, place, strict=True), *zip(r.unsure, unsure, strict=True)]
-        values = chosen | {of.path: of.text(v) for of, v in given}
-        words = self._words(values)
-        scene = self._with(values)
+    def _rig(self, given: Inputs, window: tuple[float, float]) -> RigPeaks:
+        words, scene = self._words(given), self._with(given)
 
         def report(text: str) -> None:
             self.progress("peaks", f"{words}: {text}", None)
 
         # one curve in its window rules an F_C out: two curves in each are enough
-        step = max(SCAN_STEP, _SHARE * math.log(r.forces[1] / r.forces[0]))
+        low, high = self.ranges.forces
+        step = max(SCAN_STEP, _SHARE * math.log(high / low))
         with self.stages("peaks", words):
-            return RigPeaks(scene, window, step, tuple(given), self.bodies, self.stages, report)
+            return RigPeaks(scene, window, step, given, self.bodies, self.stages, report)
 
-    def _with(self, values: dict[str, object]) -> ForcedScene:
-        if not values:
+    def _with(self, given: Inputs) -> ForcedScene:
+        if not given:
             return self.scene
+        values = {of.path: of.text(value) for of, value in given}
         return bare(with_values(self.ranges.scene, values), self.stiffness)
 
-    def _words(self, values: dict[str, object]) -> str:
-        texts = (f"{path} = {value}" for path, value in values.items())
+    def _words(self, given: Inputs) -> str:
+        texts = (f"{of.path} = {of.text(value)}" for of, value in given)
         return ", ".join([self.ranges.scene.name, *texts])

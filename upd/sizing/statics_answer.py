@@ -1,35 +1,27 @@
-"""The statics of a damper as an answer: verdict, tables, notes, and charts: maps of angles and
-friction, limits of its forces.
-"""
+"""The statics of a damper as an answer: verdict, tables, notes, and maps of angles and friction."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.contact.damper_section import admissible_forces
-from upd.contact.equilibrium import face_forces
-from upd.errors import InputError
-from upd.plot.chart import Area, Axis, Band, Chart, Map, Trace
+from upd.plot.chart import Axis, Band, Chart, Map, Trace
 from upd.report.answer_folder import FigureAnswer
 from upd.results.answer_table import AnswerTable, Rounded
-from upd.scene.forced_contact import SIDES, Side
+from upd.scene.forced_contact import SIDES
 from upd.sizing.statics import JAMS, OUTCOMES, DamperStatics, MotionState, outcomes
 
 Array = NDArray[np.float64]
-#: points of a map along one axis, of a curve over friction
-_MAP, _CURVE = 121, 97
+#: points of a map along one axis
+_MAP = 121
 #: least angle of a map [deg]; friction to which maps reach at least, and beyond that of the scene
 _LEAST, _FRICTION, _BEYOND = 1.0, 1.2, 1.6
 #: end of the axes of angles [deg]: room for a mark at 90
 _EDGE = 95.0
-#: forces are shown to so many times those without friction
-_TIMES = 4.0
 _SIZE = (6.0, 5.0)
 #: rounding of angles measured on a mesh [deg]
 _SAME = 1e-6
@@ -118,7 +110,7 @@ class DamperDesign(FigureAnswer):
 
     @property
     def charts(self) -> list[Chart]:
-        """Maps of its angles and friction, and limits of its forces."""
+        """Maps of its angles and friction."""
         return statics_charts(self.statics)
 
 
@@ -152,7 +144,7 @@ def _outcome(state: MotionState) -> str:
 
 
 def statics_charts(found: DamperStatics) -> list[Chart]:
-    """Maps of angles and friction with the damper marked, and limits of its forces.
+    """Maps of angles and friction with the damper marked.
 
     Parameters
     ----------
@@ -160,29 +152,13 @@ def statics_charts(found: DamperStatics) -> list[Chart]:
         Of the damper.
     """
     tied = abs(found.section.left.angle - found.section.right.angle) <= _SAME
-    turned = (True,) * 2 if tied else ()
     over = (
-        [_over_friction(found, "both faces", *turned)]
+        [("both faces", True, True)]
         if tied
-        else [
-            _over_friction(found, "left face", True, False),
-            _over_friction(found, "right face", False, True),
-        ]
+        else [("left face", True, False), ("right face", False, True)]
     )
-    sides = SIDES[:1] if tied and _mirrored(found) else SIDES
-    charts = [_angles(found), *over, *(_limits(found, s, sides) for s in sides)]
-    columns = 3 if len(charts) > 4 else 2
-    return [
-        replace(chart, figure=DamperDesign.figure, size=_SIZE, columns=columns) for chart in charts
-    ]
-
-
-def _mirrored(found: DamperStatics) -> bool:
-    """Whether both faces are each other's mirror image."""
-    left, right = found.section.faces
-    (x, z), (xx, zz) = left.middle, right.middle
-    apart = (x + xx, z - zz, left.half_length - right.half_length)
-    return max(map(abs, apart)) <= _SAME
+    charts = [_angles(found), *(_over_friction(found, *one) for one in over)]
+    return [replace(one, figure=DamperDesign.figure, size=_SIZE, columns=2) for one in charts]
 
 
 def _map(x: Array, y: Array, states: NDArray[np.int64]) -> Map:
@@ -225,6 +201,8 @@ def _angles(found: DamperStatics) -> Chart:
 
 def _over_friction(found: DamperStatics, what: str, left: bool, right: bool) -> Chart:
     """The map over the angle of one face or of both, and friction."""
+    known = [mu for mu, _ in found.known_within]
+    bands = (Band("friction, known within", "y", known[0], known[1], dashed=True),) if known else ()
     own = [face.angle for face in found.section.faces]
     angle = np.linspace(_LEAST, 90.0, _MAP)
     top = max(_FRICTION, _BEYOND * found.friction)
@@ -238,61 +216,5 @@ def _over_friction(found: DamperStatics, what: str, left: bool, right: bool) -> 
         Axis("friction coefficient", low=0.0, high=top),
         maps=(_map(angle, mu, outcomes(found.section, a, b, mu)),),
         traces=(_here(here, found.friction, f"{here:.4g} deg, mu {found.friction:g}"),),
-        bands=_known(found, "y"),
+        bands=bands,
     )
-
-
-def _known(found: DamperStatics, axis: Literal["x", "y"]) -> tuple[Band, ...]:
-    """Within which the scene knows friction."""
-    if not found.known_within:
-        return ()
-    low, high = (mu for mu, _ in found.known_within)
-    return (Band("friction, known within", axis, low, high, dashed=axis == "y"),)
-
-
-def _limits(found: DamperStatics, side: Side, sides: tuple[Side, ...]) -> Chart:
-    """Least and greatest N and T of one face over friction, none of which tilts the damper."""
-    k, F = SIDES.index(side), found.centrifugal
-    top = max(_FRICTION, _BEYOND * found.friction)
-    mu = np.linspace(0.0, top, _CURVE)
-    limits = F * np.array([admissible_forces(found.section, float(m)).limits[:, k] for m in mu])
-    plain = _frictionless(found, k)
-    high = _TIMES * max(plain, F)
-    shown = np.clip(limits, -high, high)
-    what = f"{side} face" if len(sides) > 1 else "each face"
-    N, T = shown[:, 0].T, shown[:, 1].T
-    lines = (
-        (Trace("N without friction", np.array([0.0, top]), np.full(2, plain), closed=True),)
-        if plain > 0.0
-        else ()
-    )
-    return Chart(
-        f"Limits of the forces of {what}, F_C = {F:g} N",
-        Axis("friction coefficient", low=0.0, high=top),
-        Axis("force", "N", low=-high, high=high),
-        areas=(Area("N, normal", mu, N[0], N[1], 0), Area("T, up the slope", mu, T[0], T[1], 1)),
-        traces=(
-            *lines,
-            *(
-                Trace(f"{name} {end}", mu, values, "line", colour, entry=f"{name}, limits")
-                for colour, (name, both) in enumerate((("N", N), ("T", T)))
-                for end, values in zip(("least", "greatest"), both, strict=True)
-            ),
-        ),
-        bands=(
-            Band("this damper", "x", found.friction, found.friction, dashed=True),
-            *_known(found, "x"),
-        ),
-        note="Of all states in balance that do not tilt the damper; what reaches the frame has no "
-        "limit.",
-    )
-
-
-def _frictionless(found: DamperStatics, face: int) -> float:
-    """N of a face without friction; 0 where nothing holds the damper then."""
-    left, right = (f.angle for f in found.section.faces)
-    try:
-        known = face_forces(left, right, found.centrifugal, 0.0)
-    except InputError:
-        return 0.0
-    return (known.normal_left, known.normal_right)[face]

@@ -80,7 +80,7 @@ def test_by_default_all_formats_and_a_picture_in_a_folder_of_their_own(
 
 
 def test_worst_elements_are_where_it_says(capsys: pytest.CaptureFixture[str]) -> None:
-    from upd.mesh.quality import edge_ratio, scaled_jacobian
+    from upd.mesh.checks import edge_ratio, scaled_jacobian
 
     assert call("sphere_block", *SMALL["sphere_block"], "-o", "a.msh", "--no-picture") == 0
     told = capsys.readouterr().out

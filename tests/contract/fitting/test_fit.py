@@ -119,10 +119,13 @@ def test_more_parameters_than_targets_are_told_as_a_family(scene: ForcedScene) -
     # along the direction nothing moves to first order, across it something does
     along, across = (residuals.jacobian(found.answers[0]) @ v for v in (row, [1.0, 1.0, 1.0]))
     assert np.abs(along).max() < 1e-12 < 1e-4 < np.abs(across).max()
-    # every member that is traced meets the targets, and the family is long
-    for one in found.profiles:
-        assert all(residuals.met(z) for z in one.z)
-    assert max(math.exp(np.ptp(one.z[:, one.parameter])) for one in found.profiles) > 10.0
+    # every member meets the targets, and the family is long
+    assert all(residuals.met(z) for z in found.answers)
+    assert max(np.exp(np.ptp(found.ends, axis=1))) > 10.0
+    for k, z in enumerate(found.ends[:, 0]):
+        begin = np.array(found.answers[0])
+        begin[k] = z
+        assert residuals.met(residuals.solve(residuals.inside(begin), held=k).end)
     assert str(found).count("not determined") == 1
 
 
@@ -140,7 +143,9 @@ def test_friction_moves_no_linear_number(scene: ForcedScene) -> None:
 
 
 def test_half_widths_become_intervals(scene: ForcedScene) -> None:
-    """A narrow profile ends where first order says; twice the half-width, twice the interval."""
+    """To first order, as the misfit is quadratic there; twice the half-width, twice the
+    interval.
+    """
     made = numbers(scene, "stuck_in_phase,stuck_out_of_phase", [RIGHT, LEFT], [0.4, 0.07])
     half = []
     for width in (0.001, 0.002):
@@ -149,38 +154,31 @@ def test_half_widths_become_intervals(scene: ForcedScene) -> None:
         assert found.known.error is not None
         J = found.slopes / width
         assert found.known.error == pytest.approx(np.sqrt(np.diag(np.linalg.inv(J.T @ J))))
-        for one, error in zip(found.profiles, found.known.error, strict=True):
-            z = found.answers[0][one.parameter]
-            assert one.z[-1, one.parameter] - z == pytest.approx(error, rel=0.02)
-            assert z - one.z[0, one.parameter] == pytest.approx(error, rel=0.02)
+        assert found.known.rises == pytest.approx(np.ones((2, 2)), abs=0.02)
+        assert np.isnan(found.ends).all()
         half.append(found.known.error)
     assert half[1] == pytest.approx(2.0 * half[0])
 
 
 def test_an_interval_that_is_not_of_first_order_is_the_profile_s(scene: ForcedScene) -> None:
-    """By default: ends at which one number is off by its half-width, where first order has others;
-    asked for none, first order is told with a word.
-    """
+    """Ends at which one number is off by its half-width, where first order has others."""
     to, vary = "peak_2_accelerance@100={:.12g} (m/s2)/N +- {:.12g} (m/s2)/N", ["contact.friction"]
     height = numbers(scene, "peak_2_accelerance@100", vary, [1.0])[0]
     width = 0.3 * height
     found = upd.fit(scene, to.format(height, width), vary, starts=1)
-    (one,) = found.profiles
+    (ends,) = found.ends
     assert found.known.rises is not None and found.known.error is not None
     first = found.answers[0][0] + np.array([-1.0, 1.0]) * found.known.error[0]
     off = [
         numbers(scene, "peak_2_accelerance@100", vary, [math.exp(z)])[0] - height
-        for z in (*one.z[[0, -1], 0], *first)
+        for z in (*ends, *first)
     ]
     told = np.abs(off) / width
-    inside = np.abs(one.z[[0, -1], 0]) < math.log(2.0)
+    inside = np.abs(ends) < math.log(2.0)
     assert inside.any()
     assert told[:2][inside] == pytest.approx(1.0, abs=0.02)
     assert np.abs(told[2:] - 1.0).max() > 0.1
     assert "By profiles, in the same multiple" in " ".join(str(found).split())
-    asked = upd.fit(scene, to.format(height, width), vary, starts=1, profiles=False)
-    assert not asked.profiles
-    assert "contact.friction: ask for profiles" in " ".join(str(asked).split())
 
 
 def test_what_a_target_within_limits_cannot_tell_is_unknown(scene: ForcedScene) -> None:

@@ -19,7 +19,7 @@ from upd.errors import InputError
 from upd.fem import Material, mass, stiffness
 from upd.linalg import factorise
 from upd.mesh import FloatArray, Mesh
-from upd.mesh.quality import quality
+from upd.mesh.checks import quality
 
 EPS = np.finfo(float).eps
 STEEL = Material(E=2.0e5, nu=0.3, rho=7.8e-9)

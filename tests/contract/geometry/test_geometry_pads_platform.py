@@ -25,8 +25,7 @@ from upd.errors import InputError
 from upd.fem import Material
 from upd.fem.inertia import MassProperties, mass_properties
 from upd.mesh import Mesh
-from upd.mesh.pairing import check_pairs
-from upd.mesh.quality import quality
+from upd.mesh.checks import check_pairs, quality
 
 EPS = np.finfo(float).eps
 SMALL: dict[str, Any] = {"divisions": 3, "divisions_long": 5, "growth": 1.8}

@@ -7,7 +7,7 @@ import pytest
 
 from geometry.blocks.hexahedron import REFERENCE, flipped, mirrored
 from upd.mesh import FloatArray, Mesh
-from upd.mesh.quality import edge_ratio, quality, scaled_jacobian
+from upd.mesh.checks import edge_ratio, quality, scaled_jacobian
 
 CUBE = REFERENCE[:8].astype(float)
 EPS = np.finfo(float).eps

@@ -14,7 +14,7 @@ import pytest
 from geometry.sphere_block import SphereBlock, build, count
 from upd.errors import InputError
 from upd.mesh import FloatArray, Mesh
-from upd.mesh.quality import quality
+from upd.mesh.checks import quality
 
 EPS = np.finfo(float).eps
 SMALL = {"divisions": 6, "growth": 1.8}

@@ -18,8 +18,7 @@ from upd.errors import InputError
 from upd.fem import Material
 from upd.fem.inertia import MassProperties, mass_properties
 from upd.mesh import FloatArray, Mesh
-from upd.mesh.pairing import check_pairs
-from upd.mesh.quality import quality
+from upd.mesh.checks import check_pairs, quality
 from upd.mesh.recipes import load_meshes, save_meshes
 
 EPS = np.finfo(float).eps

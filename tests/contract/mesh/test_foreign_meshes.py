@@ -18,9 +18,8 @@ from geometry.blocks import session
 from upd.errors import InputError, UpdError
 from upd.fem import box_mesh
 from upd.mesh import Mesh, recipes
+from upd.mesh.checks import check_pairs, quality
 from upd.mesh.export import write_mesh
-from upd.mesh.pairing import check_pairs
-from upd.mesh.quality import quality
 from upd.results import Result
 
 SCENE = """

@@ -12,9 +12,9 @@ import pytest
 import upd
 from upd.errors import InputError, UpdError
 from upd.mesh import Mesh, recipes
-from upd.mesh.boundary import boundary_faces, boundary_quads
+from upd.mesh.checks import check_pairs
 from upd.mesh.export import write_mesh
-from upd.mesh.pairing import check_pairs
+from upd.mesh.hexmesh import boundary_faces, boundary_quads
 from upd.report.notes import warnings
 
 EXAMPLES = Path(upd.__file__).parent / "scenes" / "examples"

@@ -18,7 +18,7 @@ from upd.cache.arrays import cache_folder
 from upd.cache.sources import source_digest, user_files
 from upd.errors import InputError, MeshError
 from upd.mesh import Mesh, recipes
-from upd.mesh.pairing import check_pairs
+from upd.mesh.checks import check_pairs
 from upd.mesh.recipe_modules import module_of
 from upd.mesh.recipes import load_meshes
 
@@ -126,7 +126,7 @@ def test_damaged_cache_is_made_again_with_a_word(
         np.savez(path, a=np.zeros(3))
     elif damage == "indices":
         arrays = dict(np.load(path))
-        arrays["0.hexes"][0, 0] = 10**6
+        arrays['["sphere", "hexes"]'][0, 0] = 10**6
         np.savez(path, **arrays)
     else:
         flipped = with_flipped_bit(data, data.index(good["sphere"].points.tobytes()) + 100)

@@ -8,7 +8,7 @@ import pytest
 from geometry.blocks import REFERENCE
 from upd.errors import MeshError
 from upd.mesh import FloatArray, IntArray, Mesh
-from upd.mesh.boundary import outward_area, upper_and_lower
+from upd.mesh.hexmesh import outward_area, upper_and_lower
 
 CUBE = (REFERENCE[:8] + 1.0) / 2.0
 

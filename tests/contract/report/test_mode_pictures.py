@@ -17,7 +17,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from upd.errors import InputError
 from upd.fem import box_mesh
 from upd.mesh import FloatArray, Mesh
-from upd.mesh.boundary import boundary_quads
+from upd.mesh.hexmesh import boundary_quads
 from upd.plot.modes import draw_mode
 from upd.plot.sheet import write_sheet
 

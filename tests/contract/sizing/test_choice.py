@@ -26,9 +26,8 @@ from upd.errors import InputError
 from upd.plot.png import png_size
 from upd.scene import load_scene
 from upd.sizing import BestDamper, search
-from upd.sizing.choice import Tried, is_along
+from upd.sizing.choice import Tried, is_along, sensitivities
 from upd.sizing.ranges import read_ranges
-from upd.sizing.sensitivity import sensitivities
 from upd.sizing.worst_peak import WorstPeak
 
 #: a rig of six contact points that is reduced at once

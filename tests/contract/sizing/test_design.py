@@ -218,7 +218,7 @@ def test_friction_known_within_limits() -> None:
     told = "at 0.5 both faces carry in every motion; at 0.7 jams, left face lifts off"
     assert told in " ".join(str(found).split())
     ends = [(b.low, b.high) for c in found.charts for b in c.bands if "known within" in b.label]
-    assert ends == [pytest.approx((0.5, 0.7))] * 4
+    assert ends == [pytest.approx((0.5, 0.7))] * 2
 
 
 def test_in_a_notebook() -> None:

@@ -46,7 +46,7 @@ from upd.linalg.select import PRODUCTS
 from upd.linalg.solvers import DirectSolver, Solver
 from upd.linalg.symmetric import Symmetric, submatrix_of
 from upd.mesh import Mesh, recipes
-from upd.mesh.boundary import upper_and_lower
+from upd.mesh.hexmesh import upper_and_lower
 from upd.progress import Stages
 from upd.reduction.guyan import Condensed, condense, require_held
 from upd.reduction.learned import LearnedCompliance

@@ -21,7 +21,7 @@ from upd.measured import (
     magnitude_correlation,
     noisy_peaks,
 )
-from upd.measured.compare import paired, within
+from upd.measured.compare import paired
 from upd.measured.curve import LEAST_POINTS
 from upd.results import ArrayGroup, Case, Check, ErrorPart, Result, variable, with_parts
 from upd.results import quantities as q
@@ -122,7 +122,7 @@ def _criterion(curve: MeasuredCurve) -> Quantity:
 def _correlation(name: str, curve: MeasuredCurve, one: Computed) -> list[Result]:
     """FRAC over the common band, or the correlation of magnitudes, at the measured frequencies."""
     case, what = replace(one.case, name=name), _criterion(curve)
-    on = within(curve.frequency, *one.band)
+    on = (curve.frequency >= one.band[0]) & (curve.frequency <= one.band[1])
     if on.sum() < LEAST_POINTS:
         return [what.withheld(case, _apart(curve, one))]
     H, mine = one.at(curve.frequency[on]), curve.accelerance[on]
