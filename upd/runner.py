@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import math
 import threading
@@ -13,11 +12,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from upd.analyses import analysis_of, make_plan
 from upd.analyses.base import Analysis, Plan, refuse_oversize
-from upd.cache.files import write_text
+from upd.cache.files import json_text, write_text
 from upd.cache.folders import OwnFolder, own_folder
 from upd.cache.sources import versions
 from upd.errors import ConvergenceError, InputError, UpdError, disk_fault, one_line
@@ -323,21 +320,7 @@ def _write_summary(result: RunResult, folder: Path) -> None:
     data, arrays = result.summary(), folder / "result.nc"
     if arrays.is_file():
         data = {**data, DIGEST: file_digest(arrays)}
-    text = json.dumps(_json(data), indent=1, allow_nan=False)
-    write_text(folder / "summary.json", text + "\n")
-
-
-def _json(value: Any) -> Any:
-    """The value as JSON has it: what is not finite is null."""
-    if isinstance(value, Mapping):
-        return {str(key): _json(inner) for key, inner in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_json(inner) for inner in value]
-    if isinstance(value, (np.generic, np.ndarray)):
-        return _json(value.tolist())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return str(value) if isinstance(value, Path) else value
+    write_text(folder / "summary.json", json_text(data))
 
 
 def _effects(plan: Plan[Any], checks: Sequence[Check]) -> list[dict[str, Any]]:

@@ -252,6 +252,26 @@ def read_part(data: Mapping[str, Any]) -> ErrorPart:
     return ErrorPart(**{**data, "error": math.nan if error is None else error})
 
 
+def read_result(data: Mapping[str, Any], case: Case | None = None) -> Result:
+    """The number that `Result.as_dict` wrote, of the case that its fields give where none is."""
+    value = data["value"]
+    return Result(
+        data["name"],
+        Case(**data["case_fields"]) if case is None else case,
+        math.nan if value is None else value,
+        data["unit"],
+        data["reference"],
+        data.get("source", ""),
+        data.get("thesis_error"),
+        data.get("estimated_error"),
+        data.get("half_error_cost_s"),
+        data.get("exact", True),
+        data.get("withheld", ""),
+        tuple(map(read_part, data.get("error_parts", ()))),
+        tuple(map(read_input_part, data.get("input_parts", ()))),
+    )
+
+
 def with_estimates(results: Iterable[Result], estimates: Estimates) -> tuple[Result, ...]:
     """The numbers with the parts of their errors; those that have some keep their own."""
     return tuple(
