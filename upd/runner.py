@@ -40,7 +40,7 @@ from upd.results import (
     write_netcdf,
 )
 from upd.scene import AnyScene, as_scene
-from upd.scene.written import scene_as_run
+from upd.scene.keys import scene_as_run
 from upd.vary.inputs import input_parts
 
 log = logging.getLogger("upd")

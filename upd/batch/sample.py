@@ -29,7 +29,7 @@ from upd.errors import InputError
 from upd.results.sampled import Array, SampledNumber, sampled_number
 from upd.scene import AnyScene
 from upd.scene.quantities import Uncertainty
-from upd.scene.uncertain import put_back
+from upd.scene.toml import put_back
 from upd.units import unit_inside
 
 

@@ -91,7 +91,7 @@ class ModelSource:
         self.scene, self.parameters, self.ratios = scene, tuple(parameters), tuple(ratios)
         paths = [path for one in parameters for path in one.paths]
         self.stiffness = stiffness_of(scene, paths)
-        one_model(scene, self.stiffness, "a fit", friction=bool(ratios))
+        one_model(scene, self.stiffness, "a fit")
         #: models made
         self.made = 0
         self._stages = Stages()
@@ -178,7 +178,7 @@ class ModelSource:
         """What is needed alone: one stiffness, the F_C/F_E that are followed, nothing estimated or
         solved again; a contact scene with the rig's geometry, unless its numbers do not count.
         """
-        one = one_model(scene, self.stiffness, "a fit", friction=False)
+        one = one_model(scene, self.stiffness, "a fit")
         contact, excitation, stiffness = one.contact, one.excitation, dict(one.stiffness)
         if self._tangents is not None:
             contact = replace(contact, directions=_DIRECTIONS[self._tangents])

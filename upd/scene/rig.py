@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -110,20 +110,17 @@ def rig_parameters(scene: Any, symmetry: str, element_nodes: int) -> dict[str, A
     }
 
 
-def rig_problems(scene: RigBase) -> list[str]:
+def rig_problems(scene: RigBase) -> Iterator[str]:
     """What of material, mesh and solver does not fit the rig."""
-    problems: list[str] = []
-    add = problems.append
     if scene.material.yield_stress is not None:
-        add("material.yield_stress: is checked in a contact scene, body by body; remove it here")
+        yield "material.yield_stress: is checked in a contact scene, body by body; remove it here"
     if scene.mesh.symmetry == "quarter":
-        add('mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"')
+        yield 'mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"'
     if scene.solver.name == "amg":
-        add(
+        yield (
             'solver.name: condensations of the blades need a direct solver; use "auto", '
             '"pardiso" or "superlu"'
         )
-    return problems
 
 
 def unreachable_accuracy(scene: RigBase, what: str, instead: str) -> list[str]:
