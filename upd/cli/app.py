@@ -6,8 +6,9 @@ import logging
 import os
 import sys
 from dataclasses import asdict, dataclass, replace
+from inspect import getdoc, signature
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
@@ -111,6 +112,13 @@ class StudyWorkers:
 _ANY_MESH, _ALL_POINTS, _ONE_WORKER = MeshConfiguration(), SweepPoints(), StudyWorkers()
 
 
+def _loaded(scene: str, set: SetOption) -> Any:
+    # slow to import
+    from upd.scene import load_scene
+
+    return load_scene(scene, set or [])
+
+
 @app.command
 def run(
     scene: str,
@@ -120,7 +128,7 @@ def run(
     report: Annotated[bool, Parameter(negative="--no-report")] = True,
     full: bool = False,
 ) -> None:
-    """Run a scene: mesh, solve, check, print the answer and write the run folder.
+    """Solve a scene, print the answer and write the run folder.
 
     Parameters
     ----------
@@ -135,9 +143,8 @@ def run(
     """
     from upd.cli.tables import print_result
     from upd.runner import run as run_scene
-    from upd.scene import load_scene
 
-    loaded = load_scene(scene, set or [])
+    loaded = _loaded(scene, set)
     with Live(stages=full) as live:
         try:
             result = run_scene(
@@ -165,14 +172,14 @@ def run(
 
 @app.command
 def plan(scene: str, *, set: SetOption = None) -> None:
-    """Show what will be simulated, what is omitted and why, and the predicted size, memory and
-    seconds. Nothing is solved.
+    """Show what will be simulated, dofs, memory and seconds; nothing is solved.
+
+    Also what is omitted, and why.
     """
     from upd.analyses import make_plan
     from upd.cli.tables import print_plan
-    from upd.scene import load_scene
 
-    loaded = load_scene(scene, set or [])
+    loaded = _loaded(scene, set)
     print_plan(terminal.console, make_plan(loaded))
 
 
@@ -188,9 +195,9 @@ def mesh(
     no_picture: bool = False,
     list: bool = False,
 ) -> None:
-    """Mesh a recipe or a scene, whole, and write it for other programs, with a picture.
+    """Mesh a recipe or a scene, as .msh, .vtu and .inp for other programs, with a picture.
 
-    Prints contact pairs, and the worst elements with their places.
+    The whole model. Prints contact pairs, and the worst elements with their places.
 
     Parameters
     ----------
@@ -236,7 +243,7 @@ def study(
     out: Path | None = None,
     who: StudyWorkers = _ONE_WORKER,
 ) -> int:
-    """Show what accuracy costs, or what parameters move.
+    """Show what accuracy costs in seconds and memory, or what parameters move.
 
     Run a ladder, fit the convergence rate, write table and work-precision figure.
 
@@ -268,9 +275,8 @@ def study(
     from upd.batch.studies import plan_study, run_study, scene_at, study_workers
     from upd.cli.batch import print_study, print_study_plan
     from upd.labels import file_name
-    from upd.scene import load_scene
 
-    loaded = scene_at(load_scene(scene, set or []), at)
+    loaded = scene_at(_loaded(scene, set), at)
     load = "" if at is None else f"-at-{file_name(at)}"
     with Live() as live:
         live("planning", "the points", None)
@@ -295,7 +301,7 @@ def sweep(
     follow: str = "",
     plan_only: bool = False,
 ) -> int:
-    """Run a scene over a grid of parameters, or over a sample of its uncertain inputs.
+    """Run a grid of parameters, or a sample of uncertain inputs, on many cores.
 
     Table, netCDF file with named axes, figures, report.html.
 
@@ -317,9 +323,8 @@ def sweep(
     from upd.batch.store import PointStore
     from upd.batch.sweeps import run_sweep
     from upd.cli.batch import print_sample, print_sweep, print_sweep_plan
-    from upd.scene import load_scene
 
-    loaded = load_scene(scene, set or [])
+    loaded = _loaded(scene, set)
     kind = "sweep" if points.sample is None else "sample"
     folder = out or Path("runs") / f"{kind}-{loaded.name}"
     if not plan_only:
@@ -339,11 +344,59 @@ def sweep(
     return OK if len(result.failed) < len(result.outcomes) else FAILED
 
 
-app.command(
-    "upd.cli.design:design",
-    help="Which damper: does it jam, lift off or tilt, in closed form, before any dynamics; with "
-    "--minimise, which one has the lowest worst peak.",
-)
+@app.command
+def design(
+    scene: str,
+    *,
+    minimise: Literal["peak", "acceleration"] | None = None,
+    over: list[str] | None = None,
+    for_: Annotated[list[str] | None, Parameter(name="--for")] = None,
+    set: SetOption = None,
+    out: Path | None = None,
+) -> None:
+    """Show whether a damper jams, lifts off or tilts; find the one with the lowest peak.
+
+    In closed form, before any dynamics; with --minimise, the damper whose worst resonance peak is
+    lowest. Maps of its angles and friction with the damper marked, and the limits of the forces on
+    both faces under F_C: design.png, summary.json and report.html. Of a choice choice.png instead.
+    Kill a choice at any moment: called again it continues from the peaks it has.
+
+    Parameters
+    ----------
+    scene
+        Ready name or .toml file of a forced response or a seated damper.
+    minimise
+        peak: the highest accelerance of the right blade within the scene's band, per newton of F_E;
+        acceleration: the highest acceleration.
+    over
+        What is chosen, path=low:high; may be repeated: one input that sets F_C
+        (damper.centrifugal=50:2000; radius or speed where the scene gives them), and others
+        (geometry.front_angle=30:60), each of which multiplies the cost.
+    for_
+        What the damper has to stand, path=low:high; may be repeated: excitation.force=0.5:5, and
+        other inputs (contact.friction=0.3:0.7), all of whose corners count.
+    out
+        Folder; by default runs/design-NAME, or runs/choice-NAME.
+    """
+    from upd.sizing import BestDamper, DamperDesign
+    from upd.sizing import design as design_damper
+
+    loaded = _loaded(scene, set)
+    if minimise is None and (over or for_):
+        raise InputError("--over and --for belong to a choice: add --minimise peak")
+    found: DamperDesign | BestDamper
+    if minimise is None:
+        found = design_damper(loaded)
+    else:
+        with Live() as live:
+            found = design_damper(
+                loaded, minimise=minimise, over=over or [], for_=for_ or [], progress=live
+            )
+    terminal.console.print(str(found), soft_wrap=True)
+    folder = out or Path("runs") / f"{found.figure}-{loaded.name}"
+    found.write(folder)
+    terminal.console.print(f"Report: {folder / 'report.html'}", soft_wrap=True)
+    terminal.console.print(f"Figure: {folder / f'{found.figure}.png'}", soft_wrap=True)
 
 
 @app.command
@@ -357,7 +410,7 @@ def fit(
     profiles: Annotated[bool | None, Parameter(negative="--no-profiles")] = None,
     out: Path | None = None,
 ) -> int:
-    """Find inputs of a forced response that give wanted numbers or measured curves.
+    """Find inputs of a forced response that give measured numbers or curves.
 
     Reports what these leave unknown: directions, the family of inputs that fit equally well, and
     which further measurement would distinguish them. Writes the scene with the fitted values,
@@ -387,10 +440,9 @@ def fit(
         Folder; by default runs/fit-NAME.
     """
     from upd.fitting import fit as fit_inputs
-    from upd.scene import load_scene
 
     with Live() as live:
-        loaded = load_scene(scene, set or [])
+        loaded = _loaded(scene, set)
         folder = out or Path("runs") / f"fit-{loaded.name}"
         found = fit_inputs(
             loaded, to, vary, starts=starts, profiles=profiles, out=folder, progress=live
@@ -407,9 +459,7 @@ def fit(
 
 @app.command
 def report(runs: list[Path], *, out: Path | None = None) -> None:
-    """Make the page of a run or a sweep again from its folder.
-
-    Of several runs, one page that compares them.
+    """Make the page of a run or a sweep again; of several runs, a comparison.
 
     Parameters
     ----------
@@ -447,7 +497,7 @@ def scenes() -> None:
 def describe(
     what: str, key: str = "", *, set: SetOption = None, drawing: Path | None = None
 ) -> None:
-    """Explain the keys of a scene or recipe: meaning, unit, value, bounds and effect on cost.
+    """Explain every key of a scene or recipe: meaning, unit, bounds and effect on cost.
 
     Parameters
     ----------
@@ -468,7 +518,7 @@ def describe(
 
 @app.command
 def new(scene: str, file: Path) -> None:
-    """Write a commented copy of a scene to start from: every key with what it means.
+    """Write a copy of a scene to edit: every key with what it means.
 
     Parameters
     ----------
@@ -484,7 +534,7 @@ def new(scene: str, file: Path) -> None:
 
 @app.command
 def doctor() -> int:
-    """Show versions, BLAS, threads, the linear solver found and the libraries gmsh needs."""
+    """Show versions, threads, the linear solver and the libraries gmsh needs."""
     from upd.cli.doctor import examine
     from upd.cli.tables import columns_of, print_table
 
@@ -493,6 +543,22 @@ def doctor() -> int:
     table = columns_of({"what": "text", "found": "words"}, (row[:2] for row in rows))
     print_table(terminal.console, table, styles=bad)
     return FAILED if bad else OK
+
+
+def command_table() -> list[tuple[str, str]]:
+    """Every command as it is called, with what it needs, and what it does in a sentence."""
+    rows = []
+    for name in (name for name in app if not name.startswith("-")):
+        function: Any = app[name].default_command
+        words = ["upd", name]
+        for one in signature(function).parameters.values():
+            required, value = one.default is one.empty, one.name.upper()
+            if one.kind is one.POSITIONAL_OR_KEYWORD:
+                words.append(value if required else f"[{value}]")
+            elif required:
+                words.append(f"--{one.name} {value}")
+        rows.append((" ".join(words), str(getdoc(function)).partition("\n")[0]))
+    return rows
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -1,7 +1,7 @@
 """Build the manual: `./run.sh docs` writes plain files to build/manual. Warnings are errors.
 
-The sources are copied first, and what is taken from the program (keys of scenes and recipes) is
-written beside the copy, so that nothing generated lies in the repository.
+The sources are copied first, and what is taken from the program (commands, keys of scenes and
+recipes) is written beside the copy, so that nothing generated lies in the repository.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator
 from itertools import groupby
 from pathlib import Path
 
+from upd.cli.app import command_table
 from upd.mesh.recipe_modules import READY
 from upd.scene import load_scene
 from upd.scene.keys import SceneKey, absent_keys, recipe_keys, scene_keys
@@ -39,6 +40,9 @@ def main() -> int:
         write(source / f"reference/scene_{kind}.md", f"Keys of a {scene.analysis} (`{what}`)", keys)
     for recipe in READY:
         write(source / f"reference/{recipe}.md", f"Recipe `{recipe}`", recipe_keys(recipe))
+    rows = ["| command | what it does |", "|---|---|"]
+    rows += [f"| `{usage}` | {text} |" for usage, text in command_table()]
+    (source / "reference/command_table.md").write_text("\n".join(rows) + "\n", encoding="utf-8")
     command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html"]
     return subprocess.call([*command, str(source), str(target / "manual")])
 
