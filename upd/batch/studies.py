@@ -12,8 +12,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from upd.analyses import analysis_of, ladders_of
-from upd.batch.dask import check_address
-from upd.batch.engine import Batch, Watcher, Workers, check_numbers, fitting, run_points
+from upd.batch.engine import (
+    Batch,
+    Watcher,
+    Workers,
+    check_address,
+    check_numbers,
+    fitting,
+    run_points,
+)
 from upd.batch.plan import point_needs
 from upd.batch.point import Task
 from upd.batch.store import PointStore
