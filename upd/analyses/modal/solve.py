@@ -324,13 +324,17 @@ def probe(mesh: Mesh, name: str) -> int:
     return 3 * int(mesh.nodes[name][0]) + _AXIS_X
 
 
+def probes(mesh: Mesh) -> tuple[int, int]:
+    """Dofs of the force and of the accelerometer of a blade."""
+    return probe(mesh, "force"), probe(mesh, "accelerometer")
+
+
 def _response(solution: ModalSolution) -> RigResponse:
     scene = solution.plan.scene
     choice, arrangement = scene.response, scene.modes.arrangements[0]
     grid = np.linspace(choice.start, choice.stop, choice.points)
     free, body, family = _system_modes(free_set(solution, arrangement), ("right",))
-    mesh, static = body.mesh, _static(body, family)
-    force, output = probe(mesh, "force"), probe(mesh, "accelerometer")
+    static, (force, output) = _static(body, family), probes(body.mesh)
     band = (choice.start, choice.stop)
     system = modal_system(free, choice.damping, static=static)
     zeta = choice.damping
@@ -375,7 +379,7 @@ def _peak_with_more_modes(solution: ModalSolution) -> float | None:
     system = modal_system(
         replace(found, shapes=shapes), response.damping, static=_static(body, family)
     )
-    force, output = probe(body.mesh, "force"), probe(body.mesh, "accelerometer")
+    force, output = probes(body.mesh)
     band = (scene.response.start, scene.response.stop)
     return float(peak_response(system, force, [output], band)[1])
 
@@ -441,21 +445,28 @@ def modal_error(own: Modes, body: RigBody, family: str) -> float:
     """Undamped modal response, static correction included, against direct solves of K - w^2 M off
     resonance: what the band leaves out.
     """
-    free = body.free(FAMILIES.get(family, ()))
-    force, output = probe(body.mesh, "force"), probe(body.mesh, "accelerometer")
+    free, (force, output) = body.free(FAMILIES.get(family, ())), probes(body.mesh)
     f = np.zeros(3 * body.mesh.n_node)
     f[force] = 1.0
     natural, rest = (2.0 * np.pi * own.frequency) ** 2, _static(body, family)(f)
+    direct = _undamped(body, free)
     worst = 0.0
     for part in OFF_RESONANCE:
         w2 = (part**2) * natural[0]
-        u = np.zeros(3 * body.mesh.n_node)
-        A = whole(combined(body.K.submatrix(free), -w2, body.M.submatrix(free)))
-        u[free] = spsolve(A.tocsc(), (0.5 if family else 1.0) * f[free])
+        u = (0.5 if family else 1.0) * direct(w2)
         share = own.shapes[force]
         modal = own.shapes[output] @ (share / (natural - w2) - share / natural) + rest[output]
-        worst = max(worst, abs(float(modal) / float(u[output]) - 1.0))
+        worst = max(worst, abs(float(modal) / u - 1.0))
     return worst
+
+
+def _undamped(body: RigBody, free: NDArray[np.int64]) -> Callable[[float], float]:
+    """w^2 -> displacement of the accelerometer per unit force, by a direct solve of K - w^2 M."""
+    K, M = body.K.submatrix(free), body.M.submatrix(free)
+    force, output = np.searchsorted(free, probes(body.mesh))
+    f = np.zeros(len(free))
+    f[force] = 1.0
+    return lambda w2: float(spsolve(whole(combined(K, -w2, M)).tocsc(), f)[output])
 
 
 def _against_full(solution: ModalSolution) -> dict[float, tuple[float, float]]:
@@ -465,17 +476,11 @@ def _against_full(solution: ModalSolution) -> dict[float, tuple[float, float]]:
     one = next((r for r in solution.reductions if r.body.name == "right"), None)
     if one is None:
         return {}
-    body, free = one.body, one.free
-    force, output = (
-        int(np.searchsorted(free, probe(body.mesh, name))) for name in ("force", "accelerometer")
-    )
-    f = np.zeros(len(free))
-    f[force] = 1.0
+    force, output = (int(at) for at in np.searchsorted(one.free, probes(one.body.mesh)))
+    direct = _undamped(one.body, one.free)
     out = {}
-    K, M = body.K.submatrix(free), body.M.submatrix(free)
     for part in OFF_RESONANCE:
         w2 = (2.0 * np.pi * part * float(one.full[0])) ** 2
-        full = float(spsolve(whole(combined(K, -w2, M)).tocsc(), f)[output])
         q = np.linalg.solve(one.model.K - w2 * one.model.M, one.model.at([force])[0])
-        out[part] = (-1e-3 * w2 * float(one.model.at([output])[0] @ q), -1e-3 * w2 * full)
+        out[part] = (-1e-3 * w2 * float(one.model.at([output])[0] @ q), -1e-3 * w2 * direct(w2))
     return out
