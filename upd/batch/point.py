@@ -21,8 +21,8 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from upd.cache.arrays import LIMIT_BYTES
-from upd.cache.shared import Store, condensation_folder, sharing
+from upd.cache.arrays import LIMIT_BYTES, cache_folder
+from upd.cache.shared import Store, sharing
 from upd.cache.sources import key_of, source_digest
 from upd.errors import UpdError
 from upd.linalg.pardiso import load as load_pardiso
@@ -158,7 +158,7 @@ def _solved(task: Task) -> Outcome:
 
 
 def _store(task: Task) -> Store:
-    mine = condensation_folder(), task.threads, task.limit_bytes
+    mine = cache_folder() / "condensed", task.threads, task.limit_bytes
     return _stores.setdefault(mine, Store(*mine))
 
 

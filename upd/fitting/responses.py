@@ -28,7 +28,7 @@ from upd.analyses.forced.mode_peaks import CANDIDATES, tell_stuck_peaks, unmoved
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.paths import balance_of
 from upd.analyses.forced.plan import ForcedPlan, grid
-from upd.cache.journal import Journal
+from upd.cache.arrays import Journal
 from upd.errors import ConvergenceError
 from upd.fitting.friction import CurveWithFriction, PeakKey
 from upd.fitting.models import STEP, FittedModel, ModelSource

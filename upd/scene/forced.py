@@ -16,7 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.scene import quantities as q
-from upd.scene.base import STRICT, MeshChoice, repeated
+from upd.scene.base import (
+    STRICT,
+    DamperChoice,
+    MeshChoice,
+    RigBase,
+    repeated,
+    rig_problems,
+    unreachable_accuracy,
+)
 from upd.scene.forced_contact import GAUSS, SIDES, FrictionChoice, Side, StiffnessChoice
 from upd.scene.measured import (
     FROM_MEASURED,
@@ -26,7 +34,6 @@ from upd.scene.measured import (
     measured_problems,
     modal_ratios,
 )
-from upd.scene.rig import DamperChoice, RigBase, rig_problems, unreachable_accuracy
 
 #: Outputs a forced response can give.
 FORCED_WANTS = (

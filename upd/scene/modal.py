@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
 from upd.scene import quantities as q
-from upd.scene.base import STRICT, MeshChoice, repeated
+from upd.scene.base import STRICT, MeshChoice, RigBase, repeated, rig_problems
 from upd.scene.measured import FROM_MEASURED, UNTIL_READ, MeasuredChoice, measured_problems
-from upd.scene.rig import RigBase, rig_problems
 
 #: Outputs a rig scene can ask for.
 MODAL_WANTS = ("free", "glued", "reduction", "response", "pictures", "matrices")

@@ -7,12 +7,13 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from upd.scene import quantities as q
-from upd.scene.base import STRICT, repeated
-from upd.scene.rig import (
+from upd.scene.base import (
+    STRICT,
     DamperChoice,
     FaceFriction,
     Fit,
     RigBase,
+    repeated,
     rig_problems,
     unreachable_accuracy,
 )
