@@ -31,13 +31,12 @@ from upd.errors import InputError
 from upd.scene import AnyScene
 from upd.scene.quantities import Uncertainty
 from upd.scene.toml import put_back, value_of
-from upd.units import unit_inside
+from upd.units import number_and_unit, unit_inside
 
 Array = NDArray[np.float64]
 
 #: More points than this are refused: their files alone would fill a disk.
 MOST_POINTS = 200_000
-_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\s\d].*?)?\s*")
 _FORMS = "write path=first:last:count, path=first:last:count:log or path=value,value,..."
 
 
@@ -125,10 +124,10 @@ def _axis(text: str, scene: Mapping[str, Any]) -> GridAxis:
     if not sep or not path or not given:
         raise InputError(f"--vary {text!r}: {_FORMS}")
     parts = [part.strip() for part in given.split(":")]
-    ends = [end for end in map(_quantity, parts[:2]) if end is not None]
+    ends = [end for end in map(number_and_unit, parts[:2]) if end is not None]
     now = _entry(scene, path)
     wrapped = isinstance(now, list)
-    mine = _quantity(now[0] if wrapped and now else now)
+    mine = number_and_unit(str(now[0] if wrapped and now else now))
     own = "" if mine is None else mine[1]
     if len(ends) == 2:
         values = _range(path, parts, ends, own)
@@ -188,20 +187,11 @@ def _entry(scene: Mapping[str, Any], path: str) -> Any:
 
 def _numbers(values: Sequence[Any]) -> tuple[tuple[float, ...] | None, str]:
     """The values as numbers in their common unit, when they are."""
-    if any(isinstance(v, bool) for v in values):
-        return None, ""
-    numbers = [(float(v), "") if isinstance(v, (int, float)) else _quantity(v) for v in values]
-    found = [one for one in numbers if one is not None]
+    found = [one for v in values if (one := number_and_unit(str(v))) is not None]
     units = {unit for _, unit in found}
-    if len(found) < len(numbers) or len(units) != 1:
+    if len(found) < len(values) or len(units) != 1:
         return None, ""
     return tuple(number for number, _ in found), units.pop()
-
-
-def _quantity(value: Any) -> tuple[float, str] | None:
-    """The number and the unit of a text; None where it is none."""
-    match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
-    return None if match is None else (float(match[1]), match[2] or "")
 
 
 # -- a sample of a scene's uncertain inputs --------------------------------------------------------

@@ -62,54 +62,28 @@ class MeshConfiguration:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class SweepPoints:
-    """Which points a sweep solves, and who solves them.
+class WhoSolves:
+    """Who solves the points of a sweep or study.
 
     Parameters
     ----------
-    sample
-        Points drawn evenly from the limits of all inputs with a half-width (0.6 +- 0.1), in place
-        of --vary: a check of the bands by the inputs, which runs give to first order.
-    seed
-        Of the draw; without, that of the sample in the folder, else 0.
     workers
-        Processes side by side; by default as many as cores and memory allow.
+        Processes side by side. Of a sweep by default as many as cores and memory allow; of a study
+        one, a fresh process for every point: more than one blurs what a point costs.
     threads
-        Threads of each process. The last digits of numbers depend on it.
+        Threads of each process, on which the last digits of numbers depend. Of a sweep by default
+        one; of a study all there are, divided by the workers.
     cluster
         Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs
         updampers[cluster].
     """
 
-    sample: int | None = None
-    seed: int | None = None
     workers: int | None = None
-    threads: int = 1
-    cluster: str = ""
-
-
-@Parameter(name="*")
-@dataclass(frozen=True)
-class StudyWorkers:
-    """Who solves the points of a study.
-
-    Parameters
-    ----------
-    workers
-        Points side by side, each in a fresh process; more than one blurs what a point costs.
-    threads
-        Threads of each point; by default all there are, divided by the workers.
-    cluster
-        Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs
-        updampers[cluster].
-    """
-
-    workers: int = 1
     threads: int | None = None
     cluster: str = ""
 
 
-_ANY_MESH, _ALL_POINTS, _ONE_WORKER = MeshConfiguration(), SweepPoints(), StudyWorkers()
+_ANY_MESH, _ANYBODY = MeshConfiguration(), WhoSolves()
 
 
 def _loaded(scene: str, set: SetOption) -> Any:
@@ -241,7 +215,7 @@ def study(
     at: str | None = None,
     set: SetOption = None,
     out: Path | None = None,
-    who: StudyWorkers = _ONE_WORKER,
+    who: WhoSolves = _ANYBODY,
 ) -> int:
     """Show what accuracy costs in seconds and memory, or what parameters move.
 
@@ -281,7 +255,8 @@ def study(
     with Live() as live:
         live("planning", "the points", None)
         planned = plan_study(loaded, vary, tuple(levels) if levels else None)
-        workers = study_workers(loaded, planned, who.workers, who.threads, who.cluster)
+        count = 1 if who.workers is None else who.workers
+        workers = study_workers(loaded, planned, count, who.threads, who.cluster)
     print_study_plan(terminal.console, f"{loaded.title or loaded.name}, {vary}", planned, workers)
     folder = out or Path("runs") / f"study-{loaded.name}-{vary}{load}"
     with terminal.batch_progress() as watch:
@@ -295,7 +270,9 @@ def sweep(
     scene: str,
     *,
     vary: list[str] | None = None,
-    points: SweepPoints = _ALL_POINTS,
+    sample: int | None = None,
+    seed: int | None = None,
+    who: WhoSolves = _ANYBODY,
     set: SetOption = None,
     out: Path | None = None,
     follow: str = "",
@@ -312,6 +289,11 @@ def sweep(
     ----------
     vary
         path=first:last:count[:log] or path=value,value,...; repeat for a grid.
+    sample
+        Points drawn evenly from the limits of all inputs with a half-width (0.6 +- 0.1), in place
+        of --vary: a check of the bands by the inputs, which runs give to first order.
+    seed
+        Of the draw; without, that of the sample in the folder, else 0.
     out
         Sweep folder; by default runs/sweep-NAME, or runs/sample-NAME.
     follow
@@ -325,13 +307,14 @@ def sweep(
     from upd.cli.batch import print_sample, print_sweep, print_sweep_plan
 
     loaded = _loaded(scene, set)
-    kind = "sweep" if points.sample is None else "sample"
+    kind = "sweep" if sample is None else "sample"
     folder = out or Path("runs") / f"{kind}-{loaded.name}"
     if not plan_only:
         PointStore(folder, "sweep").check()
     with Live() as live:
         live("planning", "what the points share", None)
-        planned = plan_sweep(loaded, vary or (), folder, **asdict(points))
+        asked = asdict(who) | ({"threads": 1} if who.threads is None else {})
+        planned = plan_sweep(loaded, vary or (), folder, sample=sample, seed=seed, **asked)
     print_sweep_plan(terminal.console, planned)
     if plan_only:
         return OK

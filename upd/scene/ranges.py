@@ -81,13 +81,13 @@ def read_range(text: str, kind: str, value: float) -> tuple[RangeEnd, RangeEnd]:
 
 def _end(text: str, kind: str, value: float) -> RangeEnd:
     if text.startswith("x"):
-        factor = _quantity(text[1:], "fraction")
+        factor = bare_quantity(text[1:], "fraction")
         return RangeEnd(factor * value, factor)
-    found = _quantity(text, kind)
+    found = bare_quantity(text, kind)
     return RangeEnd(found, found / value)
 
 
-def _quantity(text: str, kind: str) -> float:
+def bare_quantity(text: str, kind: str) -> float:
     """A quantity, or a bare number in the unit inside."""
     try:
         number = float(text)
