@@ -7,7 +7,7 @@ import math
 import threading
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -334,17 +334,7 @@ def _effects(plan: Plan[Any], checks: Sequence[Check]) -> list[dict[str, Any]]:
         if mine:
             worst = worst_check(mine)
             verdict = f"{worst['verdict']}: {check_words(worst)}"
-        out.append(
-            {
-                "name": effect.name,
-                "on": effect.on,
-                "applies": effect.applies,
-                "why": effect.why,
-                "check": effect.check,
-                "switch": list(effect.switch),
-                "verdict": verdict,
-            }
-        )
+        out.append(asdict(effect) | {"switch": list(effect.switch), "verdict": verdict})
     return out
 
 

@@ -22,9 +22,9 @@ import pytest
 
 from upd import load_scene
 from upd.batch import store as point_store
-from upd.batch import sweep
 from upd.batch.engine import ATTEMPTS, Job, Progress, dispatch
 from upd.batch.point import OTHER_CODE, Task, solve_task
+from upd.batch.sweeps import sweep
 from upd.errors import InputError, UpdError
 from upd.vary.outcome import Outcome, read_outcome
 

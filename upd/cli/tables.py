@@ -89,11 +89,6 @@ def columns_of(heads: Mapping[str, str], rows: Iterable[Sequence[str]]) -> list[
     ]
 
 
-def _effects(rows: Iterable[tuple[str, str, str, str]], last: str) -> list[TextColumn]:
-    """Effects: name, whether it is simulated, why, and its check."""
-    return columns_of({"effect": "words", "simulated": "text", "why": "words", last: "words"}, rows)
-
-
 def _way(plan: Plan[Any], ways: Sequence[Any]) -> tuple[str, ...]:
     """A way to see the bodies of a contact, how to choose it, and its cost over all tasks."""
     products = ways[0].name.startswith(PRODUCTS)
@@ -120,8 +115,10 @@ def _way(plan: Plan[Any], ways: Sequence[Any]) -> tuple[str, ...]:
 
 def print_plan(console: Console, plan: Plan[Any]) -> None:
     """Print what a plan simulates, leaves out, and is predicted to cost."""
-    effects = _effects(
-        ((e.name, e.word, e.why, e.check) for e in plan.effects), "check after the solve"
+    heads = {"effect": "words", "simulated": "text", "why": "words"}
+    effects = columns_of(
+        heads | {"check after the solve": "words"},
+        ((e.name, e.word, e.why, e.check) for e in plan.effects),
     )
     print_table(console, effects, title=plan.scene.title or plan.scene.name)
     sizes = columns_of(

@@ -205,24 +205,19 @@ class Result:
             "error": self.error,
             "thesis_error": self.printed_error,
         }
-        estimates = {
+        known = {
             "estimated_error": self.estimated_error,
             "half_error_cost_s": self.half_error_cost_s,
+            "error_parts": [part.as_dict() for part in self.parts] or None,
+            "input_parts": [part.as_dict() for part in self.inputs] or None,
+            "withheld": self.withheld or None,
         }
         return (
             out
-            | {k: v for k, v in estimates.items() if v is not None}
-            | ({"error_parts": [p.as_dict() for p in self.parts]} if self.parts else {})
-            | self._inputs_as_dict()
-            | ({"withheld": self.withheld} if self.withheld else {})
+            | ({"input_error": self.input_error} if self.inputs else {})
+            | {key: value for key, value in known.items() if value is not None}
             | {"case_fields": self.case.given()}
         )
-
-    def _inputs_as_dict(self) -> dict[str, Any]:
-        if not self.inputs:
-            return {}
-        parts = [part.as_dict() for part in self.inputs]
-        return {"input_error": self.input_error, "input_parts": parts}
 
 
 def with_inputs(results: Iterable[Result], found: InputParts) -> tuple[Result, ...]:

@@ -15,12 +15,11 @@ import numpy as np
 import pytest
 
 from upd import load_scene, run
-from upd.batch import sweep
 from upd.batch.engine import Progress
 from upd.batch.grid import parse_axes, places, settings
 from upd.batch.point import Task, solve_task
 from upd.batch.store import PointStore
-from upd.batch.sweeps import draw
+from upd.batch.sweeps import draw, sweep
 from upd.batch.table import csv_text, make_columns, reasons
 from upd.cache.shared import Store, active
 from upd.cli import main
