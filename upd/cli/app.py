@@ -472,7 +472,7 @@ def scenes() -> None:
 
     loaded = map(load_scene, ready_scenes())
     rows = ((one.name, one.title, ", ".join(one.want)) for one in loaded)
-    heads = {"scene": "text", "what it is": "words", "outputs": "words"}
+    heads = ("scene", "~what it is", "~outputs")
     print_table(terminal.console, columns_of(heads, rows))
 
 
@@ -523,7 +523,7 @@ def doctor() -> int:
 
     rows = examine()
     bad = {found: "red" for _, found, fine in rows if not fine}
-    table = columns_of({"what": "text", "found": "words"}, (row[:2] for row in rows))
+    table = columns_of(("what", "~found"), (row[:2] for row in rows))
     print_table(terminal.console, table, styles=bad)
     return FAILED if bad else OK
 
