@@ -114,13 +114,13 @@ class Resolved:
             change = abs(included - without) / whole if whole else math.inf
             note = note or f"part of the {name}"
         after = number(included, self.unit) if math.isfinite(included) else "a value not found"
-        says = f"change of {number_label(self.quantity)}, {number(without)} to {after}"
+        statement = f"change of {number_label(self.quantity)}, {number(without)} to {after}"
         return Check(
             self.effect,
             self.case,
             change,
             limits.limit(self.unit),
-            says + (f" ({note})" if note else ""),
+            statement + (f" ({note})" if note else ""),
             self.remedy or remedy,
             fatal=False,
             quantity=self.quantity,

@@ -37,8 +37,8 @@ def check_solution(solution: ModalSolution) -> list[Check]:
         remedy = "the modes left out matter here: raise modes.below"
         compared.append(("modal response", response.modal_error, text, remedy))
     checks += [
-        Check(name, NO_CASE, value, 0.02, says, remedy, fatal=False)
-        for name, value, says, remedy in compared
+        Check(name, NO_CASE, value, 0.02, statement, remedy, fatal=False)
+        for name, value, statement, remedy in compared
     ]
     return checks + _left_out(solution)
 
@@ -70,10 +70,10 @@ def _modes_checks(found: ModeSet) -> list[Check]:
     case, report = found.case, "report this mesh"
     families = [_family(found, body, family, m) for body, family, m in found.found]
     residual, off = (max(worst, default=0.0) for worst in zip(*families, strict=True))
-    says = "||K x - lambda M x|| / ||lambda M x|| beyond rounding"
+    statement = "||K x - lambda M x|| / ||lambda M x|| beyond rounding"
     searches = [(f"{body.name} {family}".strip(), m) for body, family, m in found.found]
     return [
-        Check("mode residual", case, residual, RESIDUAL_LIMIT, says, report),
+        Check("mode residual", case, residual, RESIDUAL_LIMIT, statement, report),
         Check("orthogonality", case, off, 1e-8, "largest |X'MX - 1|", report),
         no_mode_missed(case, searches),
     ]
@@ -113,8 +113,6 @@ def _family(found: ModeSet, body: RigBody, family: str, solved: Modes) -> tuple[
 
 def _upper_bound(r: ReducedBlade) -> Check:
     """A Ritz method never lowers a frequency."""
-    lowered, says = (
-        max(0.0, float((1.0 - r.frequency / r.full).max())),
-        "largest 1 - f reduced / f full",
-    )
-    return Check("upper bound", Case(body=r.body.name), lowered, 1e-7, says, "report this mesh")
+    lowered, case = max(0.0, float((1.0 - r.frequency / r.full).max())), Case(body=r.body.name)
+    statement = "largest 1 - f reduced / f full"
+    return Check("upper bound", case, lowered, 1e-7, statement, "report this mesh")
