@@ -58,7 +58,8 @@ if TYPE_CHECKING:
     )
     from upd.analyses import make_plan
     from upd.analyses.base import Plan
-    from upd.batch import study, sweep
+    from upd.batch.studies import study
+    from upd.batch.sweeps import sweep
     from upd.fitting import fit
     from upd.measured import fit_damping, read_measured
     from upd.report.load import load
@@ -78,8 +79,8 @@ _HOME = {
     "load": "upd.report.load",
     "read_measured": "upd.measured",
     "fit_damping": "upd.measured",
-    "sweep": "upd.batch",
-    "study": "upd.batch",
+    "sweep": "upd.batch.sweeps",
+    "study": "upd.batch.studies",
     "design": "upd.sizing",
     "fit": "upd.fitting",
     "make_plan": "upd.analyses",

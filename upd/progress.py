@@ -10,7 +10,6 @@ import resource
 import sys
 import threading
 import time
-import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -69,32 +68,21 @@ class _PeakMemory:
     """
 
     def __init__(self, period_s: float = 0.05) -> None:
-        self._peak = _resident_mb()
-        self._stop = threading.Event()
-        # The thread knows this object weakly: it ends when nobody asks any more.
-        threading.Thread(
-            target=_watch, args=(weakref.ref(self), self._stop, period_s), daemon=True
-        ).start()
-
-    def note(self) -> None:
-        """Look at the resident set now."""
-        self._peak = max(self._peak, _resident_mb())
+        self._peak, self._stop = [_resident_mb()], threading.Event()
+        # the thread does not know this object: it ends when nobody asks any more
+        watch = (self._peak, self._stop, period_s)
+        threading.Thread(target=_watch, args=watch, daemon=True).start()
 
     def peak_mb(self) -> float:
-        self.note()
-        return self._peak
+        return max(*self._peak, _resident_mb())
 
     def __del__(self) -> None:
         self._stop.set()
 
 
-def _watch(watched: weakref.ref[_PeakMemory], stop: threading.Event, period_s: float) -> None:
+def _watch(peak: list[float], stop: threading.Event, period_s: float) -> None:
     while not stop.wait(period_s):
-        memory = watched()
-        if memory is None:
-            return
-        memory.note()
-        del memory
+        peak[0] = max(peak[0], _resident_mb())
 
 
 def _resident_mb() -> float:

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import math
 import threading
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from upd.analyses import analysis_of, make_plan
 from upd.analyses.base import Analysis, Plan, refuse_oversize
-from upd.cache.files import write_text
+from upd.cache.files import json_text, write_text
 from upd.cache.folders import OwnFolder, own_folder
 from upd.cache.sources import versions
 from upd.errors import ConvergenceError, InputError, UpdError, disk_fault, one_line
@@ -43,7 +40,7 @@ from upd.results import (
     write_netcdf,
 )
 from upd.scene import AnyScene, as_scene
-from upd.scene.written import scene_as_run
+from upd.scene.keys import scene_as_run
 from upd.vary.inputs import input_parts
 
 log = logging.getLogger("upd")
@@ -323,21 +320,7 @@ def _write_summary(result: RunResult, folder: Path) -> None:
     data, arrays = result.summary(), folder / "result.nc"
     if arrays.is_file():
         data = {**data, DIGEST: file_digest(arrays)}
-    text = json.dumps(_json(data), indent=1, allow_nan=False)
-    write_text(folder / "summary.json", text + "\n")
-
-
-def _json(value: Any) -> Any:
-    """The value as JSON has it: what is not finite is null."""
-    if isinstance(value, Mapping):
-        return {str(key): _json(inner) for key, inner in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_json(inner) for inner in value]
-    if isinstance(value, (np.generic, np.ndarray)):
-        return _json(value.tolist())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return str(value) if isinstance(value, Path) else value
+    write_text(folder / "summary.json", json_text(data))
 
 
 def _effects(plan: Plan[Any], checks: Sequence[Check]) -> list[dict[str, Any]]:
@@ -351,17 +334,7 @@ def _effects(plan: Plan[Any], checks: Sequence[Check]) -> list[dict[str, Any]]:
         if mine:
             worst = worst_check(mine)
             verdict = f"{worst['verdict']}: {check_words(worst)}"
-        out.append(
-            {
-                "name": effect.name,
-                "on": effect.on,
-                "applies": effect.applies,
-                "why": effect.why,
-                "check": effect.check,
-                "switch": list(effect.switch),
-                "verdict": verdict,
-            }
-        )
+        out.append(asdict(effect) | {"switch": list(effect.switch), "verdict": verdict})
     return out
 
 

@@ -64,10 +64,10 @@ def parse_quantity(value: Any, kind: str) -> float:
             )
         number, unit = _float(value), ""
     else:
-        match = _NUMBER.fullmatch(value)
-        if match is None:
+        parts = number_and_unit(value)
+        if parts is None:
             raise InputError(f"{value!r} is not a number with a unit ({known})")
-        number, unit = float(match[1]), match[2]
+        number, unit = parts
     if unit not in table:
         if not unit:
             raise InputError(f"{value!r} has no unit: add one of {known}")
@@ -86,6 +86,12 @@ def parse_quantity(value: Any, kind: str) -> float:
         if factor < 1.0 and abs(round(1.0 / factor) * factor - 1.0) < 1e-12
         else number * factor
     )
+
+
+def number_and_unit(text: str) -> tuple[float, str] | None:
+    """Both parts of "5 mm", the unit as it is written; None of another text."""
+    match = _NUMBER.fullmatch(text)
+    return None if match is None else (float(match[1]), match[2])
 
 
 def unit_factor(unit: str, kinds: Sequence[str]) -> tuple[str, float]:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from upd.results import Case
+from upd.results import Case, Result
 from upd.vary.curves import ConvergenceCurve, make_curves
-from upd.vary.outcome import Outcome, PointResult, SolvedPoint
+from upd.vary.outcome import Outcome, SolvedPoint
 from upd.vary.tables import enough
 from upd.vary.variation import Variation
 
@@ -20,10 +20,7 @@ def ladder(curve: str, numbers: dict[str, list[float]], n_dof: int, **closed: fl
             Variation(curve, f"level {k}", (), H[k]),
             Outcome(
                 results=tuple(
-                    PointResult(
-                        name, CASE, "", v[k], v[k] / closed[name] - 1 if name in closed else None
-                    )
-                    for name, v in numbers.items()
+                    Result(name, CASE, v[k], "", closed.get(name)) for name, v in numbers.items()
                 ),
                 n_dof=n_dof * (k + 1),
             ),

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from upd.cache.journal import Journal
+from upd.cache.arrays import Journal
 from upd.hbm import FrequencyResponse, contacts, frequency_response
 from upd.hbm.peaks.over import AGREES, JUMP_STEP, Deciding, PeakPoint, PeaksOver, peak_point
 from upd.reference.friction import jenkins_peak

@@ -13,7 +13,7 @@ from upd.errors import InputError
 from upd.report import write_report
 from upd.report.notebook import RunResult, charts
 from upd.scene import load_scene
-from upd.scene.written import scene_as_run
+from upd.scene.keys import scene_as_run
 
 FORCES: list[dict[str, Any]] = [
     {"blade": "right"},

@@ -18,10 +18,10 @@ from upd.batch.studies import plan_study
 from upd.errors import ConvergenceError, InputError
 from upd.report.folder import read_arrays
 from upd.report.notebook import RunResult, charts, headline
-from upd.results import Case, read_netcdf
+from upd.results import Case, Result, read_netcdf
 from upd.scene import load_scene
 from upd.vary.curves import finest_curves
-from upd.vary.outcome import Outcome, PointResult, SolvedPoint
+from upd.vary.outcome import Outcome, SolvedPoint
 from upd.vary.variation import Variation
 
 CHEAP: dict[str, Any] = {
@@ -367,7 +367,7 @@ def test_ladders_compare_with_their_finest_level() -> None:
         found += [("peak_2_frequency", case, 500.0)]
         return SolvedPoint(
             Variation("harmonics", label, ()),
-            Outcome(tuple(PointResult(n, c, "", v) for n, c, v in found), seconds=9.0),
+            Outcome(tuple(Result(n, c, v, "") for n, c, v in found), seconds=9.0),
         )
 
     # Linear curves and what no level moves have nothing to show.

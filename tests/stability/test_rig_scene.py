@@ -12,8 +12,13 @@ from scipy.sparse import csr_array
 
 import upd
 from upd.analyses import modal
-from upd.analyses.modal.ladders import DIMENSIONS, MODES_ONLY, frequency_derivatives
-from upd.analyses.modal.sensitivity import STEP, frequency_changes
+from upd.analyses.modal.ladders import (
+    DIMENSIONS,
+    MODES_ONLY,
+    STEP,
+    frequency_changes,
+    frequency_derivatives,
+)
 from upd.batch.engine import Batch, Workers, run_points
 from upd.batch.store import PointStore
 from upd.batch.studies import plan_study, point_task, run_study

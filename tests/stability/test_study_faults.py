@@ -16,9 +16,8 @@ import pytest
 
 from upd import load_scene
 from upd.batch import store as point_store
-from upd.batch import study
 from upd.batch.engine import ATTEMPTS, Progress, Workers
-from upd.batch.studies import Study, plan_study, run_study
+from upd.batch.studies import Study, plan_study, run_study, study
 from upd.errors import InputError, UpdError
 from upd.vary.ladder import StudyReport
 from upd.vary.variation import Variation

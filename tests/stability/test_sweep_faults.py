@@ -22,9 +22,9 @@ import pytest
 
 from upd import load_scene
 from upd.batch import store as point_store
-from upd.batch import sweep
 from upd.batch.engine import ATTEMPTS, Job, Progress, dispatch
 from upd.batch.point import OTHER_CODE, Task, solve_task
+from upd.batch.sweeps import sweep
 from upd.errors import InputError, UpdError
 from upd.vary.outcome import Outcome, read_outcome
 
@@ -271,7 +271,7 @@ def test_cluster_with_a_worker_killed_gives_the_same_table(
 def test_cluster_that_goes_away_is_told_and_what_was_solved_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from upd.batch import dask as module
+    from upd.batch import engine as module
 
     monkeypatch.setattr(module, "PATIENCE_S", 1.0)
     with cluster(tmp_path, 1) as (address, workers):
@@ -300,7 +300,7 @@ def test_cluster_that_goes_away_is_told_and_what_was_solved_is_kept(
 def test_bad_cluster_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, address: str, told: str
 ) -> None:
-    from upd.batch import dask as module
+    from upd.batch import engine as module
 
     monkeypatch.setattr(module, "PATIENCE_S", 1.0)
     with pytest.raises(InputError, match=told):
@@ -342,7 +342,7 @@ def test_disk_full_in_mid_sweep_is_one_clear_error_and_keeps_what_was_there(
 def test_disk_full_at_the_end_keeps_the_earlier_table(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from upd.batch import output
+    from upd.batch import sweeps as output
 
     sweep("hertz", ["contact.friction=0.2,0.4"], overrides=TINY, out=tmp_path, workers=0)
     before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}

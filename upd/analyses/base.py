@@ -5,6 +5,7 @@ Its plan (effects, size, cost), its solution, its numbers, checks, arrays, chart
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,12 +13,14 @@ from typing import Any, Generic, TypeVar
 
 from upd.analyses.cost import NODES
 from upd.errors import InputError
+from upd.labels import number
 from upd.linalg import select
 from upd.linalg.routes import Route
 from upd.plot.chart import Arrays, Chart, Entry
 from upd.progress import Stages
-from upd.results import ArrayGroup, Case, Check, Estimates, Result, left_out_check
+from upd.results import ArrayGroup, Case, Check, Estimates, Result
 from upd.results.answer_table import AnswerTable
+from upd.results.quantities import number_label
 from upd.scene import AnyScene
 from upd.scene.base import LeftOut
 from upd.vary.inputs import InputDerivatives
@@ -104,17 +107,25 @@ class Resolved:
 
     def check(self, limits: LeftOut, remedy: str = "") -> Check:
         """Its check against the scene's limits; ``remedy`` where it has none of its own."""
-        return left_out_check(
+        without, included, note = self.without, self.included, self.note
+        change = abs(included / without - 1.0) if without else math.inf
+        if self.over is not None:
+            whole, name = self.over
+            change = abs(included - without) / whole if whole else math.inf
+            note = note or f"part of the {name}"
+        after = number(included, self.unit) if math.isfinite(included) else "a value not found"
+        statement = f"change of {number_label(self.quantity)}, {number(without)} to {after}"
+        return Check(
             self.effect,
             self.case,
-            self.quantity,
-            without=self.without,
-            included=self.included,
-            unit=self.unit,
-            limit=limits.limit(self.unit),
-            remedy=self.remedy or remedy,
-            note=self.note,
-            over=self.over,
+            change,
+            limits.limit(self.unit),
+            statement + (f" ({note})" if note else ""),
+            self.remedy or remedy,
+            fatal=False,
+            quantity=self.quantity,
+            without=float(without),
+            included=float(included),
         )
 
 

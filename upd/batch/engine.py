@@ -1,24 +1,35 @@
 """Points to workers, outcomes to files as they come: what sweeps and studies run on.
 
 Points of one group follow each other on one worker, a dead worker's point is given out again. Who
-solves them is this process, processes of this machine, or a cluster (`upd.batch.dask`).
+solves them is this process, processes of this machine, or the workers of a Dask cluster: `local:N`
+on this machine, or of the scheduler at `tcp://host:port`.
 """
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
 import logging
 import math
 import multiprocessing
 import os
+import re
 import signal
 import threading
 import time
 from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 from upd.batch.point import OTHER_CODE, Task, forget, solve_task
 from upd.batch.store import PointStore
@@ -34,6 +45,20 @@ _THREADS = (
     "NUMBA_NUM_THREADS",
     "VECLIB_MAXIMUM_THREADS",
 )
+
+
+#: A point whose worker dies this often is given up.
+ATTEMPTS = 3
+#: Seconds after which an executor is asked again who is there.
+_LOOK_S = 1.0
+#: Seconds to wait for the first worker, and for one to come back when all are gone.
+PATIENCE_S = 60.0
+_LOCAL, _SCHEDULER = re.compile(r"local:([1-9]\d*)"), re.compile(r"(tcp|tls)://.+:\d+")
+_MISSING = (
+    '--cluster needs Dask: pip install "updampers[cluster]", or leave it out to use this machine'
+)
+_LOST = "the connection to the cluster's scheduler was lost"
+_AGAIN = ", then the same command; it takes up where it stood"
 
 
 class Executor(Protocol):
@@ -159,10 +184,127 @@ def _environment(values: dict[str, str]) -> Iterator[None]:
                 os.environ[name] = value
 
 
-#: A point whose worker dies this often is given up.
-ATTEMPTS = 3
-#: Seconds after which an executor is asked again who is there.
-_LOOK_S = 1.0
+class DaskCluster:
+    """The workers of a scheduler, each with one point at a time.
+
+    A worker that dies is Dask's to replace; its point is given out again.
+
+    Workers live on from point to point: the memory of a point counts what earlier ones left there.
+
+    Parameters
+    ----------
+    address
+        "local:4" (workers on this machine) or "tcp://host:port".
+
+    Raises
+    ------
+    InputError
+        When the address is none, Dask is missing, or no worker comes within a minute.
+    """
+
+    def __init__(self, address: str) -> None:
+        check_address(address)
+        dask = importlib.import_module("distributed")
+        self.deaths: tuple[type[BaseException], ...] = (dask.KilledWorker, CancelledError, OSError)
+        self._patience, self._levels = PATIENCE_S, _quiet()
+        self._executors: dict[str, Any] = {}
+        self._known: tuple[float, list[str]] = (-_LOOK_S, [])
+        self._seen = time.monotonic()
+        self._local: Any = None
+        local = _LOCAL.fullmatch(address)
+        if local is not None:
+            self._local = dask.LocalCluster(
+                n_workers=int(local[1]),
+                threads_per_worker=1,
+                host="127.0.0.1",
+                # any free port: without an address dask takes 8787, which another may have
+                dashboard_address=":0",
+                worker_dashboard_address=None,
+            )
+        try:
+            self._client = dask.Client(self._local or address, timeout=min(self._patience, 15.0))
+        except OSError as error:
+            raise InputError(
+                f"--cluster {address}: no scheduler answers there ({type(error).__name__}): start "
+                "one with `dask scheduler`"
+            ) from None
+        try:
+            self._client.wait_for_workers(1, timeout=self._patience)
+        except OSError:
+            self.close()
+            raise InputError(
+                f"--cluster {address}: no worker came within {self._patience:g} s: start some "
+                f"with `dask worker {address} --nthreads 1`"
+            ) from None
+
+    def workers(self) -> Sequence[str]:
+        """Addresses of the workers there are, asked for once a second.
+
+        A look costs as much as a point's traffic.
+        """
+        if self._client.status not in ("running", "connecting"):
+            raise UpdError(f"{_LOST}: start it again{_AGAIN}")
+        now = time.monotonic()
+        if now - self._known[0] > _LOOK_S:
+            try:
+                self._known = (now, sorted(self._client.nthreads()))
+            except (OSError, RuntimeError) as error:
+                raise UpdError(
+                    f"{_LOST} ({type(error).__name__}): start it again{_AGAIN}"
+                ) from None
+        if self._known[1]:
+            self._seen = now
+        elif now - self._seen > self._patience:
+            raise UpdError(
+                f"the cluster has had no worker for {self._patience:g} s: start some{_AGAIN}"
+            )
+        return self._known[1]
+
+    def submit(self, worker: str, task: str) -> Future[str]:
+        if worker not in self._executors:
+            # pure=False: Dask must not take two equal texts for one.
+            self._executors[worker] = self._client.get_executor(workers=[worker], pure=False)
+        future: Future[str] = self._executors[worker].submit(solve_task, task)
+        return future
+
+    def close(self) -> None:
+        try:
+            if self._local is None and self._client.status == "running":
+                for executor in self._executors.values():
+                    executor.shutdown(wait=False)
+                # Other people's workers keep nothing of ours.
+                self._client.run(forget, on_error="ignore")
+        except OSError:
+            pass
+        self._client.close(timeout=5)
+        if self._local is not None:
+            self._local.close(timeout=10)
+        for logger, level in self._levels.items():
+            logger.setLevel(level)
+
+
+def _quiet() -> dict[logging.Logger, int]:
+    """Dask's loggers silenced, and their levels before.
+
+    What goes wrong is reported once, by an error of ours.
+    """
+    known = list(logging.root.manager.loggerDict)
+    loggers = [logging.getLogger(name) for name in known if name.startswith("distributed")]
+    levels = {logger: logger.level for logger in loggers}
+    for logger in levels:
+        logger.setLevel(logging.CRITICAL + 1)
+    return levels
+
+
+def check_address(address: str) -> None:
+    """Raise InputError for an address that is none, or when Dask is missing."""
+    if not (_LOCAL.fullmatch(address) or _SCHEDULER.fullmatch(address)):
+        raise InputError(
+            f"--cluster {address}: write local:4 (workers on this machine) or the "
+            "scheduler's address, tcp://host:port"
+        )
+    if importlib.util.find_spec("distributed") is None:
+        raise InputError(_MISSING)
 
 
 @dataclass(frozen=True)
@@ -189,8 +331,6 @@ class Workers:
     def open(self) -> Executor:
         """The workers, not yet started. Raises InputError when there is no such cluster."""
         if self.cluster:
-            from upd.batch.dask import DaskCluster
-
             return DaskCluster(self.cluster)
         if self.count == 0:
             return InProcess()

@@ -1,5 +1,15 @@
-"""The grid of a sweep: axes from texts like ``contact.friction=0.1:0.6:6`` and the full factorial
-of their values.
+"""The points of a sweep.
+
+A grid: axes from texts like ``contact.friction=0.1:0.6:6`` and the full factorial of their values.
+A sample of a scene's uncertain inputs: points drawn between the limits of all of them.
+
+A Latin hypercube: every input has one point in each of n slices of its interval, evenly drawn there
+and in an order of its own.
+
+References
+----------
+M. D. McKay, R. J. Beckman, W. J. Conover (1979), A comparison of three methods for selecting values
+of input variables, Technometrics 21, 239-245.
 """
 
 from __future__ import annotations
@@ -7,18 +17,26 @@ from __future__ import annotations
 import itertools
 import math
 import re
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import tomli_w
+from numpy.typing import NDArray
+from scipy.stats import qmc
 
 from upd.errors import InputError
-from upd.scene.toml import value_of
+from upd.scene import AnyScene
+from upd.scene.quantities import Uncertainty
+from upd.scene.toml import put_back, value_of
+from upd.units import number_and_unit, unit_inside
+
+Array = NDArray[np.float64]
 
 #: More points than this are refused: their files alone would fill a disk.
 MOST_POINTS = 200_000
-_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\s\d].*?)?\s*")
 _FORMS = "write path=first:last:count, path=first:last:count:log or path=value,value,..."
 
 
@@ -106,10 +124,10 @@ def _axis(text: str, scene: Mapping[str, Any]) -> GridAxis:
     if not sep or not path or not given:
         raise InputError(f"--vary {text!r}: {_FORMS}")
     parts = [part.strip() for part in given.split(":")]
-    ends = [end for end in map(_quantity, parts[:2]) if end is not None]
+    ends = [end for end in map(number_and_unit, parts[:2]) if end is not None]
     now = _entry(scene, path)
     wrapped = isinstance(now, list)
-    mine = _quantity(now[0] if wrapped and now else now)
+    mine = number_and_unit(str(now[0] if wrapped and now else now))
     own = "" if mine is None else mine[1]
     if len(ends) == 2:
         values = _range(path, parts, ends, own)
@@ -169,17 +187,103 @@ def _entry(scene: Mapping[str, Any], path: str) -> Any:
 
 def _numbers(values: Sequence[Any]) -> tuple[tuple[float, ...] | None, str]:
     """The values as numbers in their common unit, when they are."""
-    if any(isinstance(v, bool) for v in values):
-        return None, ""
-    numbers = [(float(v), "") if isinstance(v, (int, float)) else _quantity(v) for v in values]
-    found = [one for one in numbers if one is not None]
+    found = [one for v in values if (one := number_and_unit(str(v))) is not None]
     units = {unit for _, unit in found}
-    if len(found) < len(numbers) or len(units) != 1:
+    if len(found) < len(values) or len(units) != 1:
         return None, ""
     return tuple(number for number, _ in found), units.pop()
 
 
-def _quantity(value: Any) -> tuple[float, str] | None:
-    """The number and the unit of a text; None where it is none."""
-    match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
-    return None if match is None else (float(match[1]), match[2] or "")
+# -- a sample of a scene's uncertain inputs --------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Points drawn from the limits of a scene's inputs.
+
+    Attributes
+    ----------
+    seed
+        Of the draw.
+    inputs
+        Those known within limits.
+    shifts
+        (1 + n, n_input) half-widths from their values: zeros, then the n points drawn.
+    """
+
+    seed: int
+    inputs: tuple[Uncertainty, ...]
+    shifts: Array
+
+    @property
+    def count(self) -> int:
+        """Points drawn."""
+        return len(self.shifts) - 1
+
+    def as_dict(self) -> dict[str, Any]:
+        """What identifies the sample, for the sweep folder."""
+        return {
+            "count": self.count,
+            "seed": self.seed,
+            "inputs": {one.path: one.given for one in self.inputs},
+        }
+
+
+def draw_sample(scene: AnyScene, count: int, seed: int) -> Sample:
+    """Draw ``count`` points from the limits of the scene's uncertain inputs.
+
+    Raises
+    ------
+    InputError
+        Where no input is known within limits, and for a number of points or a seed that is none.
+    """
+    inputs = tuple(scene.uncertain.values())
+    # a plane through the numbers has a height and a slope for every input: fewer points always
+    # lie on one, and tell nothing of what the first order leaves
+    least, problems = len(inputs) + 2, []
+    if not inputs:
+        problems.append(
+            f"--sample {count}: the scene knows all its inputs exactly; to fix it: write what "
+            'is known of them, for example --set contact.friction="0.6 +- 0.1"'
+        )
+    elif not least <= count <= MOST_POINTS:
+        known = "1 input" if len(inputs) == 1 else f"{len(inputs)} inputs"
+        problems.append(
+            f"--sample {count}: {known} known within limits need {least} points or more, at most "
+            f"{MOST_POINTS}; some tens tell a band to a tenth"
+        )
+    if seed < 0:
+        problems.append(f"--seed {seed}: give 0 or a larger whole number")
+    if problems:
+        raise InputError("\n".join(problems))
+    drawn = qmc.LatinHypercube(len(inputs), rng=np.random.default_rng(seed)).random(count)
+    return Sample(seed, inputs, np.vstack([np.zeros(len(inputs)), 2.0 * drawn - 1.0]))
+
+
+def sample_axes(sample: Sample) -> tuple[GridAxis, ...]:
+    """A parameter for every input, with its values at all points in the unit inside."""
+    out = []
+    for one, shifts in zip(sample.inputs, sample.shifts.T, strict=True):
+        unit = unit_inside(one.kind)
+        numbers = tuple(float(one.value + shift * one.half_width) for shift in shifts)
+        values = tuple(f"{number!r} {unit}" for number in numbers) if unit else numbers
+        out.append(GridAxis(one.path, values, numbers, unit))
+    return tuple(out)
+
+
+def sample_places(sample: Sample) -> tuple[Place, ...]:
+    """The k-th value of every input together, point by point."""
+    return tuple((k,) * len(sample.inputs) for k in range(len(sample.shifts)))
+
+
+def sample_texts(scene: AnyScene, sample: Sample, axes: Sequence[GridAxis]) -> list[str]:
+    """The scenes of all points as TOML: first as given with its half-widths, whose run gives the
+    first-order bands; then with the values drawn alone.
+    """
+    out = []
+    for k in range(len(sample.shifts)):
+        data = tomllib.loads(scene.text)
+        for one, axis in zip(sample.inputs, axes, strict=True):
+            data = put_back(data, one.steps, axis.values[k] if k else one.given)
+        out.append(tomli_w.dumps(data))
+    return out

@@ -14,18 +14,20 @@ from typing import NamedTuple
 
 from upd.analyses import analysis_of, make_plan
 from upd.analyses.base import Needs
-from upd.batch.dask import check_address
-from upd.batch.engine import Workers, check_numbers, fitting
-from upd.batch.grid import GridAxis, Place, parse_axes, places, settings
-from upd.batch.point import Task, load_point
-from upd.batch.sample import (
+from upd.batch.engine import Workers, check_address, check_numbers, fitting
+from upd.batch.grid import (
+    GridAxis,
+    Place,
     Sample,
     draw_sample,
-    kept_seed,
+    parse_axes,
+    places,
     sample_axes,
     sample_places,
     sample_texts,
+    settings,
 )
+from upd.batch.point import Task, load_point
 from upd.batch.store import PointStore
 from upd.cache.arrays import cache_limit
 from upd.cache.sources import source_digest
@@ -135,7 +137,8 @@ def plan_sweep(
     if cluster:
         check_address(cluster)
     check_numbers(workers, threads)
-    drawn = _drawn(scene, vary, folder, sample, seed)
+    store = PointStore(folder, "sweep")
+    drawn = _drawn(scene, vary, store, sample, seed)
     if drawn is None:
         axes = parse_axes(vary, tomllib.loads(scene.text))
         grid = tuple(places(axes))
@@ -148,7 +151,7 @@ def plan_sweep(
     tasks = tuple(
         Task(text, changed, threads, limit, scene.recipe, code) for text, changed in given
     )
-    kept = PointStore(folder, "sweep").finished(tasks)
+    kept = store.finished(tasks)
     needs, refused = point_needs(tasks, kept)
     if len(refused) == len(grid):
         raise InputError(
@@ -177,7 +180,7 @@ def plan_sweep(
 
 
 def _drawn(
-    scene: AnyScene, vary: Sequence[str], folder: Path, count: int | None, seed: int | None
+    scene: AnyScene, vary: Sequence[str], store: PointStore, count: int | None, seed: int | None
 ) -> Sample | None:
     """The sample that is asked for; None for a grid."""
     if count is None:
@@ -190,7 +193,7 @@ def _drawn(
             "grid goes through values that are given; to fix it: give one of both (--set fixes "
             "a value in a sample)"
         )
-    return draw_sample(scene, count, kept_seed(folder) if seed is None else seed)
+    return draw_sample(scene, count, store.kept_seed() if seed is None else seed)
 
 
 class PointNeeds(NamedTuple):

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import logging
-import math
 import os
 import socket
 import threading
@@ -22,17 +21,16 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from upd.cache.arrays import LIMIT_BYTES
-from upd.cache.shared import Store, condensation_folder, sharing
+from upd.cache.arrays import LIMIT_BYTES, cache_folder
+from upd.cache.shared import Store, sharing
 from upd.cache.sources import key_of, source_digest
 from upd.errors import UpdError
 from upd.linalg.pardiso import load as load_pardiso
 from upd.linalg.select import has_pardiso
 from upd.report.notebook import RunResult
-from upd.results import Result
 from upd.scene import AnyScene, load_scene
 from upd.scene.quantities import UNKNOWN
-from upd.vary.outcome import Outcome, PointResult
+from upd.vary.outcome import Outcome
 
 log = logging.getLogger(__name__)
 
@@ -160,7 +158,7 @@ def _solved(task: Task) -> Outcome:
 
 
 def _store(task: Task) -> Store:
-    mine = condensation_folder(), task.threads, task.limit_bytes
+    mine = cache_folder() / "condensed", task.threads, task.limit_bytes
     return _stores.setdefault(mine, Store(*mine))
 
 
@@ -176,7 +174,7 @@ def _failed(error: Exception, seconds: float) -> Outcome:
 
 def _outcome(result: RunResult, shared: Mapping[str, int]) -> Outcome:
     return Outcome(
-        tuple(map(_number, result.results)),
+        result.results,
         seconds=float(result.cost["total_s"]),
         memory_mb=float(result.cost["peak_rss_mb"]),
         stages=dict(result.cost["stages"]),
@@ -192,25 +190,6 @@ def _outcome(result: RunResult, shared: Mapping[str, int]) -> Outcome:
         shared=shared,
         where=_where(),
     )
-
-
-def _number(row: Result) -> PointResult:
-    return PointResult(
-        row.name,
-        row.case,
-        row.unit,
-        _finite(row.value),
-        _finite(row.error),
-        _finite(row.printed_error),
-        row.exact,
-        row.withheld,
-        _finite(row.estimated_error),
-        row.inputs,
-    )
-
-
-def _finite(value: float | None) -> float | None:
-    return None if value is None or not math.isfinite(value) else float(value)
 
 
 def _where() -> str:

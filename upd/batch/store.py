@@ -130,6 +130,13 @@ class PointStore:
         with self.writing():
             write_text(file, json.dumps(grid, indent=1) + "\n")
 
+    def kept_seed(self) -> int:
+        """The seed of the sample that the folder holds; 0 where it holds none."""
+        try:
+            return int(json.loads((self.folder / GRID).read_text("utf-8"))["sample"]["seed"])
+        except (OSError, ValueError, TypeError, KeyError):
+            return 0
+
     def _check_ours(self) -> None:
         try:
             there = {entry.name for entry in self.folder.iterdir()}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import time
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -12,8 +11,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from upd.analyses import analysis_of, ladders_of
-from upd.batch.dask import check_address
-from upd.batch.engine import Batch, Watcher, Workers, check_numbers, fitting, run_points
+from upd.batch.engine import (
+    Batch,
+    Watcher,
+    Workers,
+    check_address,
+    check_numbers,
+    fitting,
+    run_points,
+)
 from upd.batch.plan import point_needs
 from upd.batch.point import Task
 from upd.batch.store import PointStore
@@ -24,7 +30,7 @@ from upd.linalg import select
 from upd.plot.matplotlib import draw_all, write_sheets
 from upd.scene import AnyScene, load_scene
 from upd.scene.quantities import UNKNOWN
-from upd.units import parse_quantity
+from upd.scene.ranges import bare_quantity
 from upd.vary.ladder import Asked, StudyReport
 from upd.vary.outcome import SolvedPoint
 from upd.vary.tables import markdown_table
@@ -316,8 +322,11 @@ def scene_at(scene: Any, at: float | str | None) -> AnyScene:
             f"--at {at}: the scene has no load to choose; leave it out, or study a forced response"
         )
     path, unit, chosen = _LOADS[analysis]
-    load = _positive(at, unit)
-    if load is None:
+    try:
+        load = bare_quantity(str(at), "force" if unit else "fraction")
+    except InputError:
+        load = 0.0
+    if not load > 0.0:
         form = 'force, for example --at "200 N"' if unit else "number without a unit, as --at 194"
         raise InputError(f"--at {at}: chooses {chosen}; write a positive {form}")
     value: Any = f"{load!r} {unit}" if unit else load
@@ -329,15 +338,3 @@ def scene_at(scene: Any, at: float | str | None) -> AnyScene:
     except InputError as problem:
         raise InputError(f"--at {at}: the scene does not take it: {problem}") from None
     return changed
-
-
-def _positive(at: float | str, unit: str) -> float | None:
-    """The load, a force in N where it may have a unit; None where it is none."""
-    try:
-        load = float(at)
-    except ValueError:
-        try:
-            load = float(parse_quantity(at, "force")) if unit else math.nan
-        except InputError:
-            return None
-    return load if 0.0 < load < math.inf else None

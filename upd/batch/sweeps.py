@@ -4,25 +4,90 @@ and figures.
 
 from __future__ import annotations
 
+import json
 import logging
+import math
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from upd.batch.engine import Batch, Watcher, run_points
-from upd.batch.output import SweepResult, draw, write_outputs
+from upd.batch.grid import GridAxis, Sample, values_at
 from upd.batch.plan import SweepPlan, plan_sweep
-from upd.batch.sample import sampled_numbers
 from upd.batch.store import PointStore
-from upd.batch.table import check_follow, make_columns, patterns
-from upd.errors import one_line
+from upd.batch.table import Column, as_csv, check_follow, csv_text, make_columns, patterns, reasons
+from upd.cache.files import json_text, write_text
+from upd.cache.sources import versions
+from upd.errors import InputError, one_line
+from upd.plot.matplotlib import draw_all, write_sheets
+from upd.plot.sample_charts import sample_charts
+from upd.plot.sweep_charts import figure_names, sweep_charts
+from upd.results import write_netcdf
+from upd.results.sampled import SampledNumber, sampled_number
 from upd.scene import load_scene
 from upd.vary.outcome import Outcome
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, repr=False)
+class SweepResult:
+    """A finished sweep: its plan, the outcome of every point in the grid's order, the followed
+    numbers, seconds of this call, files, what went wrong with its pictures, and of a sample what it
+    makes of the numbers.
+    """
+
+    plan: SweepPlan
+    outcomes: tuple[Outcome, ...]
+    columns: tuple[Column, ...]
+    seconds: float
+    folder: Path
+    files: tuple[Path, ...] = ()
+    faults: tuple[str, ...] = ()
+    sampled: tuple[SampledNumber, ...] = ()
+
+    def __repr__(self) -> str:
+        points = len(self.outcomes)
+        head = f"Sweep: {points - len(self.failed)} of {points} points solved; {self.folder}"
+        ranges = [
+            f"  {c.title}: {np.nanmin(c.values):.5g} to {np.nanmax(c.values):.5g} {c.unit}".rstrip()
+            for c in self.columns
+            if np.isfinite(c.values).any()
+        ]
+        more = [f"  and {len(ranges) - 7} more numbers"] * (len(ranges) > 8)
+        return "\n".join([head, *ranges[: 7 if more else 8], *more])
+
+    def plot(self) -> list[Axes]:
+        """Draw the followed numbers with matplotlib, and return the axes."""
+        if self.sampled:
+            return draw_all(sample_charts(self.sampled, [c.values for c in self.columns]))
+        return draw_all(sweep_charts(self.plan.axes, self.columns)[:6])
+
+    @property
+    def failed(self) -> list[int]:
+        """Numbers of the points that failed."""
+        return [k for k, outcome in enumerate(self.outcomes) if outcome.failure]
+
+    def column(self, name: str, case: str | None = None) -> Column:
+        """The followed number ``name`` of ``case`` (the first when None).
+
+        Raises InputError when there is none.
+        """
+        for column in self.columns:
+            if column.name == name and case in (None, column.case):
+                return column
+        raise InputError(
+            f"no followed number {name!r} of case {case!r}; there are "
+            f"{', '.join(c.title for c in self.columns)}"
+        )
 
 
 def sweep(
@@ -135,7 +200,7 @@ def run_sweep(
         batch = Batch(plan.tasks, plan.workers, known, plan.label, plan.groups, plan.seconds)
         found = run_points(batch, store, check=check, watch=watch)
         columns = tuple(make_columns(found, patterns(plan.scene, follow)))
-        sampled = () if plan.sample is None else sampled_numbers(plan.sample, columns)
+        sampled = () if plan.sample is None else _sampled(plan.sample, columns)
         seconds = time.perf_counter() - begin
         result = SweepResult(plan, found, columns, seconds, folder, sampled=sampled)
         with store.writing():
@@ -157,8 +222,190 @@ def run_sweep(
     return replace(result, files=tuple(files), faults=tuple(faults))
 
 
+def _sampled(sample: Sample, columns: Sequence[Column]) -> tuple[SampledNumber, ...]:
+    """What the sample makes of every followed number."""
+    paths = [one.path for one in sample.inputs]
+    return tuple(
+        sampled_number(c.name, c.case, c.unit, c.values, sample.shifts, paths, c.inputs)
+        for c in columns
+    )
+
+
 def _write_page(folder: Path) -> list[Path]:
     # Templates and charts are slow to import: only when a page is made.
     from upd.report import write_report
 
     return [write_report(folder)]
+
+
+# -- what a sweep leaves: table.csv, sweep.nc with named axes, sweep.json; then the figures --------
+
+
+def write_outputs(store: PointStore, result: SweepResult) -> list[Path]:
+    """Write the numbers; returns the paths, the table first.
+
+    The figures of an earlier call, which may have followed other numbers, are removed.
+    Raises OSError when the disk does not take it.
+    """
+    folder, plan = store.folder, result.plan
+    earlier = _earlier(folder)
+    table, arrays, data = (folder / f"{name}" for name in ("table.csv", "sweep.nc", "sweep.json"))
+    write_text(table, csv_text(plan.axes, plan.places, result.outcomes, result.columns))
+    write_netcdf(arrays, {"": _arrays(result)})
+    write_text(data, json_text(_summary(store, result)))
+    _remove_figures(folder, earlier)
+    if plan.sample is None:
+        return [table, arrays, data]
+    compared = folder / "sample.csv"
+    heads = [field.name for field in fields(SampledNumber)]
+    write_text(compared, as_csv([heads, *(one.as_dict().values() for one in result.sampled)]))
+    return [compared, table, arrays, data]
+
+
+def draw(
+    folder: Path,
+    axes: Sequence[GridAxis],
+    columns: Sequence[Column],
+    sampled: Sequence[SampledNumber] = (),
+) -> list[Path]:
+    """Write the figures into ``folder``, of a grid or of a sample; earlier ones are removed.
+
+    Returns their paths.
+    """
+    _remove_figures(folder, ((column.name, column.case) for column in columns))
+    if sampled:
+        values = [column.values for column in columns]
+        return write_sheets(sample_charts(sampled, values), folder)
+    return write_sheets(sweep_charts(axes, columns), folder)
+
+
+def _remove_figures(folder: Path, followed: Iterable[tuple[str, str]]) -> None:
+    """Remove the figures a sweep of these numbers has; other pictures there are the user's."""
+    for name in figure_names(followed):
+        (folder / f"{name}.png").unlink(missing_ok=True)
+
+
+def _earlier(folder: Path) -> list[tuple[str, str]]:
+    """Name and case of the numbers that an earlier call followed."""
+    try:
+        followed = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))["followed"]
+        return [(str(one["name"]), str(one["case"])) for one in followed]
+    except (OSError, ValueError, TypeError, KeyError):
+        return []
+
+
+def dimension(axis: GridAxis, axes: Sequence[GridAxis]) -> str:
+    """Short name of an axis.
+
+    The last word of its path, or the whole path when that would not be its own.
+    """
+    last = [other.path.rpartition(".")[2] for other in axes]
+    own = axis.path.rpartition(".")[2]
+    return (
+        own
+        if last.count(own) == 1 and own not in ("status", "seconds")
+        else axis.path.replace(".", "_")
+    )
+
+
+def _arrays(result: SweepResult) -> dict[str, Any]:
+    plan, axes = result.plan, result.plan.axes
+    names = tuple(dimension(axis, axes) for axis in axes)
+    if plan.sample is None:
+        shape, dims = tuple(len(axis.values) for axis in axes), names
+    else:
+        shape, dims = (len(plan.places),), ("point",)
+    out: dict[str, Any] = {}
+    for name, axis in zip(names, axes, strict=True):
+        notes = {"long_name": axis.path, **({"units": axis.unit} if axis.unit else {})}
+        along = (name,) if plan.sample is None else dims
+        out[name] = (along, *_coordinate(axis, notes))
+    for column in result.columns:
+        notes = {"long_name": column.title, "units": column.unit or "1"}
+        out[_free(column.variable, out)] = (dims, column.values.reshape(shape), notes)
+    failed = np.array([bool(outcome.failure) for outcome in result.outcomes], np.int8)
+    flags = {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "ok failed"}
+    out["status"] = (dims, failed.reshape(shape), flags)
+    seconds = np.array([outcome.seconds for outcome in result.outcomes])
+    out["seconds"] = (dims, seconds.reshape(shape), {"units": "s"})
+    return out
+
+
+def _coordinate(axis: GridAxis, notes: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+    """Numbers as they are; words as numbers with their meanings (CF conventions, flag_values and
+    flag_meanings).
+    """
+    if axis.numbers is not None:
+        return np.array(axis.numbers, float), notes
+    codes = np.arange(len(axis.values), dtype=np.int32)
+    words = [str(value).replace(" ", "_") for value in axis.values]
+    return codes, notes | {"flag_values": codes, "flag_meanings": " ".join(words)}
+
+
+def _free(name: str, taken: dict[str, Any]) -> str:
+    k, candidate = 1, name
+    while candidate in taken or candidate in ("status", "seconds"):
+        k += 1
+        candidate = f"{name}_{k}"
+    return candidate
+
+
+def _summary(store: PointStore, result: SweepResult) -> dict[str, Any]:
+    plan, sample = result.plan, result.plan.sample
+    why = reasons(result.outcomes, result.columns)
+    numbers = [one.as_dict() for one in result.sampled]
+    drawn = {} if sample is None else {"sample": sample.as_dict() | {"numbers": numbers}}
+    return drawn | {
+        "scene": plan.scene.name,
+        "title": plan.scene.title,
+        "version": versions()["upd"],
+        "versions": versions(),
+        "axes": [{"path": a.path, "unit": a.unit, "values": list(a.values)} for a in plan.axes],
+        "followed": [{"name": c.name, "case": c.case, "unit": c.unit} for c in result.columns],
+        "plan": {
+            "points": len(plan.places),
+            "kept": len(plan.kept),
+            "refused": len(plan.refused),
+            "meshes": plan.meshes,
+            "condensations": plan.condensations,
+            "workers": plan.workers.cluster or plan.workers.count,
+            "threads": plan.workers.threads,
+            "notes": list(plan.notes),
+        },
+        "cost": _cost(result),
+        "points": [_point(store, result, number, reason) for number, reason in enumerate(why)],
+        "text": plan.scene.text,
+    }
+
+
+def _cost(result: SweepResult) -> dict[str, Any]:
+    stages: dict[str, float] = {}
+    shared: dict[str, int] = {}
+    for outcome in result.outcomes:
+        for name, took in outcome.stages.items():
+            stages[name] = stages.get(name, 0.0) + took
+        for name, count in outcome.shared.items():
+            shared[name] = shared.get(name, 0) + count
+    return {
+        "this_call_s": round(result.seconds, 3),
+        "points_s": round(math.fsum(outcome.seconds for outcome in result.outcomes), 3),
+        "stages_s": {name: round(took, 3) for name, took in stages.items()},
+        "shared": shared,
+        "peak_rss_mb": max((outcome.memory_mb for outcome in result.outcomes), default=0.0),
+    }
+
+
+def _point(store: PointStore, result: SweepResult, number: int, reason: str) -> dict[str, Any]:
+    plan, outcome = result.plan, result.outcomes[number]
+    values = [float(column.values[number]) for column in result.columns]
+    kept = outcome.final and number not in plan.refused
+    file = store.path(plan.tasks[number]).relative_to(store.folder).as_posix() if kept else ""
+    return {
+        "set": dict(plan.tasks[number].settings) or values_at(plan.axes, plan.places[number]),
+        "values": values,
+        "status": "failed" if outcome.failure else "ok",
+        "reason": reason,
+        "warnings": list(outcome.warnings),
+        "seconds": round(outcome.seconds, 3),
+        "file": file,
+    }

@@ -17,9 +17,9 @@ from upd.analyses import analysis_of
 from upd.batch.grid import GridAxis, Place
 from upd.errors import InputError
 from upd.labels import file_name
-from upd.results import Case, InputPart, shared_label
+from upd.results import Case, InputPart, Result, shared_label
 from upd.scene import AnyScene
-from upd.vary.outcome import Outcome, PointResult
+from upd.vary.outcome import Outcome
 
 Array = NDArray[np.float64]
 
@@ -110,7 +110,7 @@ _Key = tuple[tuple[str, Any], ...]
 def _columns(name: str, outcomes: Sequence[Outcome]) -> list[Column]:
     found = [[one for one in outcome.results if one.name == name] for outcome in outcomes]
     ranks = _set_by_parameters([[one.case for one in mine] for mine in found])
-    rows: dict[_Key, dict[int, PointResult]] = {}
+    rows: dict[_Key, dict[int, Result]] = {}
     for k, mine in enumerate(found):
         places = {field: of_points[k] for field, of_points in ranks.items()}
         for one in mine:
@@ -151,15 +151,15 @@ def _key(case: Case, places: Mapping[str, Mapping[Any, int]]) -> _Key:
 
 
 def _with_known_modes(
-    rows: Mapping[_Key, Mapping[int, PointResult]],
-) -> dict[_Key, dict[int, PointResult]]:
+    rows: Mapping[_Key, Mapping[int, Result]],
+) -> dict[_Key, dict[int, Result]]:
     """Rows of every column: a withheld peak of no known mode is that of the mode which others
     have.
     """
     out = {key: dict(mine) for key, mine in rows.items()}
     for key, mine in rows.items():
         alike = [k for k in rows if k != key and _without(k, "mode") == key]
-        if alike and all(one.value is None for one in mine.values()):
+        if alike and all(one.withheld for one in mine.values()):
             del out[key]
             for other in alike:
                 out[other] = {**mine, **out[other]}
@@ -173,24 +173,22 @@ def _without(key: _Key, *fields: str) -> _Key:
 def _column(
     name: str,
     key: _Key,
-    rows: Mapping[int, PointResult],
+    rows: Mapping[int, Result],
     outcomes: Sequence[Outcome],
     varying: Sequence[str],
 ) -> Column:
     cases = [one.case for one in rows.values()]
     cases = [case for case in cases if case.mode] or cases
-    values = [one.value if (one := rows.get(k)) else None for k in range(len(outcomes))]
+    known = {k: one for k, one in rows.items() if not one.withheld}
     missing = [
-        "" if not results or value is not None else _why(rows.get(k), key, results)
-        for k, (value, results) in enumerate(
-            zip(values, (o.results for o in outcomes), strict=True)
-        )
+        _why(rows.get(k), key, outcome.results) if outcome.results and k not in known else ""
+        for k, outcome in enumerate(outcomes)
     ]
     return Column(
         name,
         shared_label(cases, varying),
         next(iter(rows.values())).unit,
-        np.array([np.nan if value is None else value for value in values]),
+        np.array([known[k].value if k in known else np.nan for k in range(len(outcomes))]),
         tuple(missing),
         next((one.inputs for _, one in sorted(rows.items()) if one.inputs), ()),
     )
@@ -200,10 +198,10 @@ def _column(
 _WITHIN = ("mode", "peak", "side")
 
 
-def _why(one: PointResult | None, key: _Key, results: Sequence[PointResult]) -> str:
+def _why(one: Result | None, key: _Key, results: Sequence[Result]) -> str:
     """Why a point has no value: its number's reason, or that of another which its curve lacks."""
     if one is not None:
-        return one.withheld or "not finite"
+        return one.withheld
     cases = [other.case.given() for other in results]
     fields = [field for field, value in key if isinstance(value, tuple)]
     there = {field: {given[field] for given in cases if field in given} for field in fields}

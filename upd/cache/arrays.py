@@ -1,7 +1,13 @@
-"""Arrays kept on disk under a key: .npz files without pickle, in a folder of bounded size."""
+"""What is kept on disk under a key: arrays as .npz files without pickle, in a folder of bounded
+size; and what a long search found, line by line.
+
+A search takes the same way every time: begun again after it was stopped, it reads what is kept and
+continues from there.
+"""
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import time
@@ -106,3 +112,40 @@ def trim(folder: Path, limit_bytes: float, newest: str) -> None:
         with suppress(OSError):
             path.unlink(missing_ok=True)
         total -= size
+
+
+class Journal:
+    """Lines of JSON in a file of the cache.
+
+    Parameters
+    ----------
+    name
+        Of what is sought, with the key of all that it depends on.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.path = cache_folder() / f"{name}.jsonl"
+        #: what an earlier call kept; a last line that was cut short is omitted
+        self.lines: list[Any] = []
+        try:
+            text = self.path.read_text("utf-8") if self.path.exists() else ""
+        except (OSError, UnicodeDecodeError) as problem:
+            unreadable(self.path, problem)
+            return
+        for line in text.splitlines():
+            with suppress(ValueError):
+                self.lines.append(json.loads(line))
+
+    def keep(self, line: Any) -> None:
+        """Add a line; where the disk does not take it, only a log line."""
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with self.path.open("a", encoding="utf-8") as file:
+                file.write(f"{json.dumps(line)}\n")
+        except OSError as problem:
+            log.warning("%s: not kept (%s)", self.path, problem)
+
+    def done(self) -> None:
+        """Remove the file: the search has ended."""
+        with suppress(OSError):
+            self.path.unlink(missing_ok=True)

@@ -14,6 +14,7 @@ import shutil
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from itertools import count
 from pathlib import Path
 
 from upd.errors import InputError, UpdError
@@ -83,13 +84,10 @@ class OwnFolder:
         self._release()
 
     def _next_to(self, error: OSError) -> Path:
-        for candidate in numbered(self.place):
-            if candidate.exists():
-                continue
-            with suppress(OSError):
-                shutil.move(self.path, candidate)
-                return candidate
-            break
+        candidate = next(place for place in numbered(self.place) if not place.exists())
+        with suppress(OSError):
+            shutil.move(self.path, candidate)
+            return candidate
         kept = self.path.with_name(self.path.name.lstrip("."))
         with suppress(OSError):
             # Under a name that no later call takes for what a killed process left.
@@ -163,10 +161,8 @@ def own_folder(
 def numbered(place: Path) -> Iterator[Path]:
     """NAME, NAME-2, NAME-3 and so on."""
     yield place
-    k = 2
-    while True:
+    for k in count(2):
         yield place.with_name(f"{place.name}-{k}")
-        k += 1
 
 
 def _part_name(name: str) -> str:

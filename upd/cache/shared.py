@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from upd.cache.arrays import LIMIT_BYTES, cache_folder
+from upd.cache.arrays import LIMIT_BYTES
 from upd.cache.sources import key_of
 
 Found = TypeVar("Found")
@@ -83,8 +83,3 @@ def shared(kind: str, parts: Mapping[str, Any], make: Callable[[], Found]) -> Fo
         if store is None
         else store.remembered(kind, key_of({**parts, "threads": store.threads}), make)
     )
-
-
-def condensation_folder() -> Path:
-    """condensed/ in the folder of the cache."""
-    return cache_folder() / "condensed"

@@ -6,8 +6,9 @@ import logging
 import os
 import sys
 from dataclasses import asdict, dataclass, replace
+from inspect import getdoc, signature
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
@@ -61,54 +62,35 @@ class MeshConfiguration:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class SweepPoints:
-    """Which points a sweep solves, and who solves them.
+class WhoSolves:
+    """Who solves the points of a sweep or study.
 
     Parameters
     ----------
-    sample
-        Points drawn evenly from the limits of all inputs with a half-width (0.6 +- 0.1), in place
-        of --vary: a check of the bands by the inputs, which runs give to first order.
-    seed
-        Of the draw; without, that of the sample in the folder, else 0.
     workers
-        Processes side by side; by default as many as cores and memory allow.
+        Processes side by side. Of a sweep by default as many as cores and memory allow; of a study
+        one, a fresh process for every point: more than one blurs what a point costs.
     threads
-        Threads of each process. The last digits of numbers depend on it.
+        Threads of each process, on which the last digits of numbers depend. Of a sweep by default
+        one; of a study all there are, divided by the workers.
     cluster
         Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs
         updampers[cluster].
     """
 
-    sample: int | None = None
-    seed: int | None = None
     workers: int | None = None
-    threads: int = 1
-    cluster: str = ""
-
-
-@Parameter(name="*")
-@dataclass(frozen=True)
-class StudyWorkers:
-    """Who solves the points of a study.
-
-    Parameters
-    ----------
-    workers
-        Points side by side, each in a fresh process; more than one blurs what a point costs.
-    threads
-        Threads of each point; by default all there are, divided by the workers.
-    cluster
-        Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs
-        updampers[cluster].
-    """
-
-    workers: int = 1
     threads: int | None = None
     cluster: str = ""
 
 
-_ANY_MESH, _ALL_POINTS, _ONE_WORKER = MeshConfiguration(), SweepPoints(), StudyWorkers()
+_ANY_MESH, _ANYBODY = MeshConfiguration(), WhoSolves()
+
+
+def _loaded(scene: str, set: SetOption) -> Any:
+    # slow to import
+    from upd.scene import load_scene
+
+    return load_scene(scene, set or [])
 
 
 @app.command
@@ -120,7 +102,7 @@ def run(
     report: Annotated[bool, Parameter(negative="--no-report")] = True,
     full: bool = False,
 ) -> None:
-    """Run a scene: mesh, solve, check, print the answer and write the run folder.
+    """Solve a scene, print the answer and write the run folder.
 
     Parameters
     ----------
@@ -135,9 +117,8 @@ def run(
     """
     from upd.cli.tables import print_result
     from upd.runner import run as run_scene
-    from upd.scene import load_scene
 
-    loaded = load_scene(scene, set or [])
+    loaded = _loaded(scene, set)
     with Live(stages=full) as live:
         try:
             result = run_scene(
@@ -165,14 +146,14 @@ def run(
 
 @app.command
 def plan(scene: str, *, set: SetOption = None) -> None:
-    """Show what will be simulated, what is omitted and why, and the predicted size, memory and
-    seconds. Nothing is solved.
+    """Show what will be simulated, dofs, memory and seconds; nothing is solved.
+
+    Also what is omitted, and why.
     """
     from upd.analyses import make_plan
     from upd.cli.tables import print_plan
-    from upd.scene import load_scene
 
-    loaded = load_scene(scene, set or [])
+    loaded = _loaded(scene, set)
     print_plan(terminal.console, make_plan(loaded))
 
 
@@ -188,9 +169,9 @@ def mesh(
     no_picture: bool = False,
     list: bool = False,
 ) -> None:
-    """Mesh a recipe or a scene, whole, and write it for other programs, with a picture.
+    """Mesh a recipe or a scene, as .msh, .vtu and .inp for other programs, with a picture.
 
-    Prints contact pairs, and the worst elements with their places.
+    The whole model. Prints contact pairs, and the worst elements with their places.
 
     Parameters
     ----------
@@ -234,9 +215,9 @@ def study(
     at: str | None = None,
     set: SetOption = None,
     out: Path | None = None,
-    who: StudyWorkers = _ONE_WORKER,
+    who: WhoSolves = _ANYBODY,
 ) -> int:
-    """Show what accuracy costs, or what parameters move.
+    """Show what accuracy costs in seconds and memory, or what parameters move.
 
     Run a ladder, fit the convergence rate, write table and work-precision figure.
 
@@ -268,14 +249,14 @@ def study(
     from upd.batch.studies import plan_study, run_study, scene_at, study_workers
     from upd.cli.batch import print_study, print_study_plan
     from upd.labels import file_name
-    from upd.scene import load_scene
 
-    loaded = scene_at(load_scene(scene, set or []), at)
+    loaded = scene_at(_loaded(scene, set), at)
     load = "" if at is None else f"-at-{file_name(at)}"
     with Live() as live:
         live("planning", "the points", None)
         planned = plan_study(loaded, vary, tuple(levels) if levels else None)
-        workers = study_workers(loaded, planned, who.workers, who.threads, who.cluster)
+        count = 1 if who.workers is None else who.workers
+        workers = study_workers(loaded, planned, count, who.threads, who.cluster)
     print_study_plan(terminal.console, f"{loaded.title or loaded.name}, {vary}", planned, workers)
     folder = out or Path("runs") / f"study-{loaded.name}-{vary}{load}"
     with terminal.batch_progress() as watch:
@@ -289,13 +270,15 @@ def sweep(
     scene: str,
     *,
     vary: list[str] | None = None,
-    points: SweepPoints = _ALL_POINTS,
+    sample: int | None = None,
+    seed: int | None = None,
+    who: WhoSolves = _ANYBODY,
     set: SetOption = None,
     out: Path | None = None,
     follow: str = "",
     plan_only: bool = False,
 ) -> int:
-    """Run a scene over a grid of parameters, or over a sample of its uncertain inputs.
+    """Run a grid of parameters, or a sample of uncertain inputs, on many cores.
 
     Table, netCDF file with named axes, figures, report.html.
 
@@ -306,6 +289,11 @@ def sweep(
     ----------
     vary
         path=first:last:count[:log] or path=value,value,...; repeat for a grid.
+    sample
+        Points drawn evenly from the limits of all inputs with a half-width (0.6 +- 0.1), in place
+        of --vary: a check of the bands by the inputs, which runs give to first order.
+    seed
+        Of the draw; without, that of the sample in the folder, else 0.
     out
         Sweep folder; by default runs/sweep-NAME, or runs/sample-NAME.
     follow
@@ -317,16 +305,16 @@ def sweep(
     from upd.batch.store import PointStore
     from upd.batch.sweeps import run_sweep
     from upd.cli.batch import print_sample, print_sweep, print_sweep_plan
-    from upd.scene import load_scene
 
-    loaded = load_scene(scene, set or [])
-    kind = "sweep" if points.sample is None else "sample"
+    loaded = _loaded(scene, set)
+    kind = "sweep" if sample is None else "sample"
     folder = out or Path("runs") / f"{kind}-{loaded.name}"
     if not plan_only:
         PointStore(folder, "sweep").check()
     with Live() as live:
         live("planning", "what the points share", None)
-        planned = plan_sweep(loaded, vary or (), folder, **asdict(points))
+        asked = asdict(who) | ({"threads": 1} if who.threads is None else {})
+        planned = plan_sweep(loaded, vary or (), folder, sample=sample, seed=seed, **asked)
     print_sweep_plan(terminal.console, planned)
     if plan_only:
         return OK
@@ -339,11 +327,59 @@ def sweep(
     return OK if len(result.failed) < len(result.outcomes) else FAILED
 
 
-app.command(
-    "upd.cli.design:design",
-    help="Which damper: does it jam, lift off or tilt, in closed form, before any dynamics; with "
-    "--minimise, which one has the lowest worst peak.",
-)
+@app.command
+def design(
+    scene: str,
+    *,
+    minimise: Literal["peak", "acceleration"] | None = None,
+    over: list[str] | None = None,
+    for_: Annotated[list[str] | None, Parameter(name="--for")] = None,
+    set: SetOption = None,
+    out: Path | None = None,
+) -> None:
+    """Show whether a damper jams, lifts off or tilts; find the one with the lowest peak.
+
+    In closed form, before any dynamics; with --minimise, the damper whose worst resonance peak is
+    lowest. Maps of its angles and friction with the damper marked, and the limits of the forces on
+    both faces under F_C: design.png, summary.json and report.html. Of a choice choice.png instead.
+    Kill a choice at any moment: called again it continues from the peaks it has.
+
+    Parameters
+    ----------
+    scene
+        Ready name or .toml file of a forced response or a seated damper.
+    minimise
+        peak: the highest accelerance of the right blade within the scene's band, per newton of F_E;
+        acceleration: the highest acceleration.
+    over
+        What is chosen, path=low:high; may be repeated: one input that sets F_C
+        (damper.centrifugal=50:2000; radius or speed where the scene gives them), and others
+        (geometry.front_angle=30:60), each of which multiplies the cost.
+    for_
+        What the damper has to stand, path=low:high; may be repeated: excitation.force=0.5:5, and
+        other inputs (contact.friction=0.3:0.7), all of whose corners count.
+    out
+        Folder; by default runs/design-NAME, or runs/choice-NAME.
+    """
+    from upd.sizing import BestDamper, DamperDesign
+    from upd.sizing import design as design_damper
+
+    loaded = _loaded(scene, set)
+    if minimise is None and (over or for_):
+        raise InputError("--over and --for belong to a choice: add --minimise peak")
+    found: DamperDesign | BestDamper
+    if minimise is None:
+        found = design_damper(loaded)
+    else:
+        with Live() as live:
+            found = design_damper(
+                loaded, minimise=minimise, over=over or [], for_=for_ or [], progress=live
+            )
+    terminal.console.print(str(found), soft_wrap=True)
+    folder = out or Path("runs") / f"{found.figure}-{loaded.name}"
+    found.write(folder)
+    terminal.console.print(f"Report: {folder / 'report.html'}", soft_wrap=True)
+    terminal.console.print(f"Figure: {folder / f'{found.figure}.png'}", soft_wrap=True)
 
 
 @app.command
@@ -356,7 +392,7 @@ def fit(
     starts: int | None = None,
     out: Path | None = None,
 ) -> int:
-    """Find inputs of a forced response that give wanted numbers or measured curves.
+    """Find inputs of a forced response that give measured numbers or curves.
 
     Reports what these leave unknown: directions, how far each input may move while the others still
     fit, and which further measurement would narrow that. Writes the scene with the fitted values,
@@ -381,10 +417,9 @@ def fit(
         Folder; by default runs/fit-NAME.
     """
     from upd.fitting import fit as fit_inputs
-    from upd.scene import load_scene
 
     with Live() as live:
-        loaded = load_scene(scene, set or [])
+        loaded = _loaded(scene, set)
         folder = out or Path("runs") / f"fit-{loaded.name}"
         found = fit_inputs(loaded, to, vary, starts=starts, out=folder, progress=live)
         for line in (
@@ -399,9 +434,7 @@ def fit(
 
 @app.command
 def report(runs: list[Path], *, out: Path | None = None) -> None:
-    """Make the page of a run or a sweep again from its folder.
-
-    Of several runs, one page that compares them.
+    """Make the page of a run or a sweep again; of several runs, a comparison.
 
     Parameters
     ----------
@@ -431,7 +464,7 @@ def scenes() -> None:
 
     loaded = map(load_scene, ready_scenes())
     rows = ((one.name, one.title, ", ".join(one.want)) for one in loaded)
-    heads = {"scene": "text", "what it is": "words", "outputs": "words"}
+    heads = ("scene", "~what it is", "~outputs")
     print_table(terminal.console, columns_of(heads, rows))
 
 
@@ -439,7 +472,7 @@ def scenes() -> None:
 def describe(
     what: str, key: str = "", *, set: SetOption = None, drawing: Path | None = None
 ) -> None:
-    """Explain the keys of a scene or recipe: meaning, unit, value, bounds and effect on cost.
+    """Explain every key of a scene or recipe: meaning, unit, bounds and effect on cost.
 
     Parameters
     ----------
@@ -460,7 +493,7 @@ def describe(
 
 @app.command
 def new(scene: str, file: Path) -> None:
-    """Write a commented copy of a scene to start from: every key with what it means.
+    """Write a copy of a scene to edit: every key with what it means.
 
     Parameters
     ----------
@@ -476,15 +509,31 @@ def new(scene: str, file: Path) -> None:
 
 @app.command
 def doctor() -> int:
-    """Show versions, BLAS, threads, the linear solver found and the libraries gmsh needs."""
+    """Show versions, threads, the linear solver and the libraries gmsh needs."""
     from upd.cli.doctor import examine
     from upd.cli.tables import columns_of, print_table
 
     rows = examine()
     bad = {found: "red" for _, found, fine in rows if not fine}
-    table = columns_of({"what": "text", "found": "words"}, (row[:2] for row in rows))
+    table = columns_of(("what", "~found"), (row[:2] for row in rows))
     print_table(terminal.console, table, styles=bad)
     return FAILED if bad else OK
+
+
+def command_table() -> list[tuple[str, str]]:
+    """Every command as it is called, with what it needs, and what it does in a sentence."""
+    rows = []
+    for name in (name for name in app if not name.startswith("-")):
+        function: Any = app[name].default_command
+        words = ["upd", name]
+        for one in signature(function).parameters.values():
+            required, value = one.default is one.empty, one.name.upper()
+            if one.kind is one.POSITIONAL_OR_KEYWORD:
+                words.append(value if required else f"[{value}]")
+            elif required:
+                words.append(f"--{one.name} {value}")
+        rows.append((" ".join(words), str(getdoc(function)).partition("\n")[0]))
+    return rows
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -13,9 +13,9 @@ from rich.console import Console
 from rich.text import Text
 
 from upd.batch.engine import Workers
-from upd.batch.output import SweepResult
 from upd.batch.plan import SweepPlan
 from upd.batch.studies import Study, StudyResult
+from upd.batch.sweeps import SweepResult
 from upd.cli.tables import print_table
 from upd.cli.terminal import counted, duration
 from upd.plot.sweep_charts import is_constant

@@ -20,9 +20,16 @@ from upd.mesh import recipes
 from upd.mesh.fields import table
 from upd.mesh.recipe_modules import READY, is_file
 from upd.scene import load_scene
-from upd.scene.keys import SceneKey, absent_keys, chosen_keys, params_of, recipe_keys, scene_keys
+from upd.scene.keys import (
+    SceneKey,
+    absent_keys,
+    chosen_keys,
+    params_of,
+    recipe_keys,
+    scene_keys,
+    scene_to_start_from,
+)
 from upd.scene.quantities import is_name
-from upd.scene.written import scene_to_start_from
 
 #: what an input may carry beside its value
 UNCERTAINTY = '"VALUE +- HALF-WIDTH" or "VALUE +- 10 %"'

@@ -129,14 +129,7 @@ def _print_shapes(console: Console, meshes: Mapping[str, Mesh]) -> None:
         ):
             place = ", ".join(f"{x + 0.0:.3g}" for x in centre_of(mesh, worst))
             rows.append((*row, measure, value, place))
-    heads = {
-        "body": "text",
-        "nodes": "number",
-        "hexahedra": "number",
-        "worst of": "text",
-        "value": "number",
-        "at x, y, z, mm": "text",
-    }
+    heads = ("body", "#nodes", "#hexahedra", "worst of", "#value", "at x, y, z, mm")
     title = "Bodies and their worst elements"
     print_table(console, columns_of(heads, rows), title=title, box=SIMPLE_HEAD)
 
@@ -162,13 +155,7 @@ def _print_pairs(console: Console, pairs: Sequence[Pairs], meshes: Mapping[str, 
         )
         for p in pairs
     ]
-    heads = {
-        "bodies": "text",
-        "node sets": "text",
-        "pairs": "number",
-        "largest offset, mm": "number",
-        "largest gap, mm": "number",
-    }
+    heads = ("bodies", "node sets", "#pairs", "#largest offset, mm", "#largest gap, mm")
     print_table(console, columns_of(heads, rows), title="Pairs of contact nodes", box=SIMPLE_HEAD)
 
 

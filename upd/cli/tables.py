@@ -74,24 +74,19 @@ def print_table(
     return left_out
 
 
-def columns_of(heads: Mapping[str, str], rows: Iterable[Sequence[str]]) -> list[TextColumn]:
+def columns_of(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> list[TextColumn]:
     """Columns of rows of cells.
 
     Parameters
     ----------
     heads
-        Head -> what its cells are: "text"; "words", which may be folded; "number", flush right.
+        Those that begin with # hold numbers, flush right; those with ~ words, which may be folded.
     """
     cells = list(zip(*rows, strict=True)) or [()] * len(heads)
     return [
-        TextColumn(head, mine, right=kind == "number", folds=_WORDS if kind == "words" else 0)
-        for (head, kind), mine in zip(heads.items(), cells, strict=True)
+        TextColumn(head.lstrip("#~"), mine, right=head[0] == "#", folds=_WORDS * (head[0] == "~"))
+        for head, mine in zip(heads, cells, strict=True)
     ]
-
-
-def _effects(rows: Iterable[tuple[str, str, str, str]], last: str) -> list[TextColumn]:
-    """Effects: name, whether it is simulated, why, and its check."""
-    return columns_of({"effect": "words", "simulated": "text", "why": "words", last: "words"}, rows)
 
 
 def _way(plan: Plan[Any], ways: Sequence[Any]) -> tuple[str, ...]:
@@ -120,16 +115,13 @@ def _way(plan: Plan[Any], ways: Sequence[Any]) -> tuple[str, ...]:
 
 def print_plan(console: Console, plan: Plan[Any]) -> None:
     """Print what a plan simulates, leaves out, and is predicted to cost."""
-    effects = _effects(
-        ((e.name, e.word, e.why, e.check) for e in plan.effects), "check after the solve"
+    effects = columns_of(
+        ("~effect", "simulated", "~why", "~check after the solve"),
+        ((e.name, e.word, e.why, e.check) for e in plan.effects),
     )
     print_table(console, effects, title=plan.scene.title or plan.scene.name)
     sizes = columns_of(
-        {
-            "body": "text",
-            **dict.fromkeys(("hexahedra", "nodes", "dofs", "contact nodes"), "number"),
-            "linear solver": "words",
-        },
+        ("body", "#hexahedra", "#nodes", "#dofs", "#contact nodes", "~linear solver"),
         (
             (
                 body,
@@ -147,7 +139,7 @@ def print_plan(console: Console, plan: Plan[Any]) -> None:
     if plan.ways:
         # each task lists its ways in one order: the condensing one, then those by products
         ways = columns_of(
-            {"way": "words", "set with": "words", "s": "number", "GB": "number", "for": "words"},
+            ("~way", "~set with", "#s", "#GB", "~for"),
             (_way(plan, ways) for ways in zip(*plan.ways.values(), strict=True)),
         )
         title = "Ways to see the bodies (one thread, all bodies and families of loads)"

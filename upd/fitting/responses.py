@@ -34,7 +34,7 @@ from upd.analyses.forced.mode_peaks import CANDIDATES, numbered_peaks, tell_stuc
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.paths import balance_of, quiet, respond
 from upd.analyses.forced.plan import ForcedPlan, grid
-from upd.cache.journal import Journal
+from upd.cache.arrays import Journal
 from upd.errors import ConvergenceError
 from upd.fitting.models import STEP, FittedModel, ModelSource
 from upd.fitting.parameters import VariedInput

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.cache.journal import Journal
+from upd.cache.arrays import Journal
 from upd.cache.sources import key_of, source_digest
 from upd.errors import ConvergenceError, InputError
 from upd.fitting.answer import Fit, FittedCurve, Status

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from upd.errors import InputError
 from upd.measured import MeasuredCurve, read_measured
-from upd.results.quantity import LEFT
+from upd.results.quantities import LEFT
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import SIDES, Side
 from upd.scene.ranges import InputProblems

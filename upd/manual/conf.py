@@ -22,7 +22,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["gallery/*", "_examples/*"]
+exclude_patterns = ["gallery/*", "_examples/*", "reference/command_table.md"]
 myst_enable_extensions = ["dollarmath", "colon_fence", "substitution"]
 myst_heading_anchors = 3
 html_theme = "furo"

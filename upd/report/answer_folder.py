@@ -24,7 +24,7 @@ from upd.report.page import Section, Verdict, page_text, versions_text
 from upd.report.panels import make_panels
 from upd.results.answer_table import AnswerTable
 from upd.scene import AnyScene
-from upd.scene.written import scene_as_run
+from upd.scene.keys import scene_as_run
 
 #: characters of a line of an answer: a terminal of 80 columns shows it whole
 WIDTH = 79

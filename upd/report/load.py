@@ -6,12 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 from upd.plot.chart import Arrays, Entry
 from upd.report.folder import read_run
 from upd.report.notebook import RunResult
-from upd.results import ArrayGroup, Case, Check, Result, read_input_part, read_part
+from upd.results import ArrayGroup, Case, Check, read_result
 
 _FIELDS = frozenset(f.name for f in fields(Case))
 
@@ -41,7 +40,7 @@ def load(folder: str | Path) -> RunResult:
         scene=summary["scene"],
         title=summary["title"],
         status=summary["status"],
-        results=tuple(_result(entry) for entry in summary["results"]),
+        results=tuple(read_result(entry, _case(entry)) for entry in summary["results"]),
         effects=tuple(dict(effect) for effect in summary["effects"]),
         checks=tuple(_check(entry) for entry in summary["checks"]),
         size=summary["size"],
@@ -62,25 +61,6 @@ def _case(entry: Entry) -> Case:
 def _number(value: float | None) -> float:
     """A number of summary.json, which has null for what is none."""
     return math.nan if value is None else value
-
-
-def _result(entry: Entry) -> Result:
-    estimates: dict[str, Any] = {
-        key: entry.get(key) for key in ("estimated_error", "half_error_cost_s")
-    }
-    return Result(
-        entry["name"],
-        _case(entry),
-        _number(entry["value"]),
-        entry["unit"],
-        entry["reference"],
-        entry.get("source", ""),
-        entry.get("thesis_error"),
-        withheld=entry.get("withheld", ""),
-        parts=tuple(read_part(part) for part in entry.get("error_parts", ())),
-        inputs=tuple(read_input_part(part) for part in entry.get("input_parts", ())),
-        **estimates,
-    )
 
 
 def _check(entry: Entry) -> Check:

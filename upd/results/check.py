@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from upd.labels import check_words, number
+from upd.labels import check_words
 from upd.results.case import Case
 from upd.results.number import Result
 from upd.results.quantities import number_label
@@ -132,51 +132,6 @@ class Check:
         """Name, case, value and limit, and the remedy."""
         case = f" ({self.case.label})" if self.case.label else ""
         return f"{self.name}{case}: {check_words(self.as_dict())}; {self.remedy}"
-
-
-def left_out_check(
-    name: str,
-    case: Case,
-    quantity: str,
-    *,
-    without: float,
-    included: float,
-    unit: str,
-    limit: float,
-    remedy: str,
-    note: str = "",
-    over: tuple[float, str] | None = None,
-) -> Check:
-    """An effect left out, verified on the number itself: solved again with the effect.
-
-    Parameters
-    ----------
-    name
-        Of the check, as the effect of the plan gives it.
-    case, quantity
-        The result that was solved again.
-    without, included
-        Its value without the effect and with it, both at the level of the second solve (which may
-        be coarser than the run).
-    unit
-        Of both.
-    limit
-        Largest relative change before the run warns; the scene may set it.
-    note
-        What the change does not cover, in words.
-    over
-        What the change is a part of, and its name, for a number that may vanish: an area in stick.
-    """
-    change = abs(included / without - 1.0) if without else math.inf
-    if over is not None:
-        change = abs(included - without) / over[0] if over[0] else math.inf
-        note = note or f"part of the {over[1]}"
-    after = number(included, unit) if math.isfinite(included) else "a value not found"
-    words = f"change of {number_label(quantity)}, {number(without)} to {after}"
-    words += f" ({note})" if note else ""
-    return Check(
-        name, case, change, limit, words, remedy, False, quantity, float(without), float(included)
-    )
 
 
 _RANK = {"passed": 0, "warning": 1, "failed": 2}

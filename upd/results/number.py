@@ -205,24 +205,19 @@ class Result:
             "error": self.error,
             "thesis_error": self.printed_error,
         }
-        estimates = {
+        known = {
             "estimated_error": self.estimated_error,
             "half_error_cost_s": self.half_error_cost_s,
+            "error_parts": [part.as_dict() for part in self.parts] or None,
+            "input_parts": [part.as_dict() for part in self.inputs] or None,
+            "withheld": self.withheld or None,
         }
         return (
             out
-            | {k: v for k, v in estimates.items() if v is not None}
-            | ({"error_parts": [p.as_dict() for p in self.parts]} if self.parts else {})
-            | self._inputs_as_dict()
-            | ({"withheld": self.withheld} if self.withheld else {})
+            | ({"input_error": self.input_error} if self.inputs else {})
+            | {key: value for key, value in known.items() if value is not None}
             | {"case_fields": self.case.given()}
         )
-
-    def _inputs_as_dict(self) -> dict[str, Any]:
-        if not self.inputs:
-            return {}
-        parts = [part.as_dict() for part in self.inputs]
-        return {"input_error": self.input_error, "input_parts": parts}
 
 
 def with_inputs(results: Iterable[Result], found: InputParts) -> tuple[Result, ...]:
@@ -250,6 +245,26 @@ def read_part(data: Mapping[str, Any]) -> ErrorPart:
     """The part that `ErrorPart.as_dict` wrote."""
     error = data["error"]
     return ErrorPart(**{**data, "error": math.nan if error is None else error})
+
+
+def read_result(data: Mapping[str, Any], case: Case | None = None) -> Result:
+    """The number that `Result.as_dict` wrote, of the case that its fields give where none is."""
+    value = data["value"]
+    return Result(
+        data["name"],
+        Case(**data["case_fields"]) if case is None else case,
+        math.nan if value is None else value,
+        data["unit"],
+        data["reference"],
+        data.get("source", ""),
+        data.get("thesis_error"),
+        data.get("estimated_error"),
+        data.get("half_error_cost_s"),
+        data.get("exact", True),
+        data.get("withheld", ""),
+        tuple(map(read_part, data.get("error_parts", ()))),
+        tuple(map(read_input_part, data.get("input_parts", ()))),
+    )
 
 
 def with_estimates(results: Iterable[Result], estimates: Estimates) -> tuple[Result, ...]:

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -91,13 +91,13 @@ class SampledNumber:
     deviation: float | None
     low: float | None
     high: float | None
-    band: float | None
-    band_low: float | None
-    band_high: float | None
-    shift: float | None
-    shift_error: float | None
-    outcome: str
-    verdict: str
+    band: float | None = None
+    band_low: float | None = None
+    band_high: float | None = None
+    shift: float | None = None
+    shift_error: float | None = None
+    outcome: str = UNKNOWN_BAND
+    verdict: str = ""
 
     @property
     def resolved(self) -> bool:
@@ -133,38 +133,26 @@ def sampled_number(
     """
     known = np.isfinite(values)
     drawn, nominal = values[1:][known[1:]], float(values[0]) if known[0] else None
-    out: dict[str, Any] = {
-        "name": name,
-        "case": case,
-        "unit": unit,
-        "nominal": nominal,
-        "first_order": None,
-        "count": len(drawn),
-        **_moments(drawn),
-        **dict.fromkeys(("band", "band_low", "band_high", "shift", "shift_error")),
-        "outcome": UNKNOWN_BAND,
-    }
-
-    def found(verdict: str, **more: Any) -> SampledNumber:
-        missing = len(values) - 1 - len(drawn)
-        lost = f"; {missing} of {len(values) - 1} points have no such number" if missing else ""
-        return SampledNumber(**out | more, verdict=verdict + lost)
-
-    if nominal is None:
-        return found("no number with the inputs at their values")
-    if nominal == 0.0:
-        return found("the number is 0: nothing is relative to it")
-    if out["deviation"] is None:
-        return found("too few points have it for a standard deviation")
-    out["band"] = LIMITS * out["deviation"] / abs(nominal)
     why = _unknown(inputs, paths)
-    if why:
-        return found(why)
     changes = {part.path: part.change for part in inputs}
-    c = np.array([changes[path] for path in paths])
-    out["first_order"] = float(np.linalg.norm(c))
-    predicted = nominal * (1.0 + shifts[1:][known[1:]] @ c)
-    return found(**_compared(drawn, predicted, nominal, float(out["first_order"]), out["band"]))
+    mean, deviation, low, high = _moments(drawn)
+    found = SampledNumber(name, case, unit, nominal, None, len(drawn), mean, deviation, low, high)
+    if nominal is None:
+        found = replace(found, verdict="no number with the inputs at their values")
+    elif nominal == 0.0:
+        found = replace(found, verdict="the number is 0: nothing is relative to it")
+    elif deviation is None:
+        found = replace(found, verdict="too few points have it for a standard deviation")
+    else:
+        found = replace(found, band=LIMITS * deviation / abs(nominal), verdict=why)
+        if not why:
+            c = np.array([changes[path] for path in paths])
+            predicted = nominal * (1.0 + shifts[1:][known[1:]] @ c)
+            found = replace(found, first_order=float(np.linalg.norm(c)))
+            found = _compared(found, drawn, predicted, nominal)
+    missing = len(values) - 1 - len(drawn)
+    lost = f"; {missing} of {len(values) - 1} points have no such number" if missing else ""
+    return replace(found, verdict=found.verdict + lost)
 
 
 def _unknown(inputs: Sequence[InputPart], paths: Sequence[str]) -> str:
@@ -177,52 +165,48 @@ def _unknown(inputs: Sequence[InputPart], paths: Sequence[str]) -> str:
     return f"no first-order band ({'; '.join(lost)})" if lost else ""
 
 
-def _moments(drawn: Array) -> dict[str, float | None]:
-    """Mean, deviation and ends of the sample."""
-    names = ("mean", "deviation", "low", "high")
+def _moments(drawn: Array) -> list[float | None]:
+    """Mean, deviation and both ends of the sample."""
     if not len(drawn):
-        return dict.fromkeys(names)
+        return [None] * 4
     resolved = TAIL * len(drawn) >= 1.0
     low, high = np.quantile(drawn, (TAIL, 1.0 - TAIL) if resolved else (0.0, 1.0))
     deviation = float(np.std(drawn, ddof=1)) if len(drawn) > 2 else None
-    return dict(zip(names, (float(drawn.mean()), deviation, float(low), float(high)), strict=True))
+    return [float(drawn.mean()), deviation, float(low), float(high)]
 
 
-def _compared(
-    drawn: Array, first: Array, nominal: float, band: float, plain: float
-) -> dict[str, Any]:
+def _compared(found: SampledNumber, drawn: Array, first: Array, nominal: float) -> SampledNumber:
     """The sample's band and mean against those to first order."""
-    n = len(drawn)
+    n, band = len(drawn), found.first_order or 0.0
     if not np.ptp(first):
         still = not np.ptp(drawn)
-        verdict = "nothing moves it" if still else f"{percent_of(plain)} where first order has none"
-        return {"outcome": AGREES if still else DIFFERS, "verdict": verdict}
+        moved = f"{percent_of(found.band)} where first order has none"
+        verdict = "nothing moves it" if still else moved
+        return replace(found, outcome=AGREES if still else DIFFERS, verdict=verdict)
     t = float(stdtrit(n - 1, 1.0 - TAIL))
     left = (drawn - first) / abs(nominal)
     shift, shift_error = float(left.mean()), t * float(np.std(left, ddof=1)) / math.sqrt(n)
     log_ratio = 0.5 * float(np.log(np.var(drawn) / np.var(first))) if np.ptp(drawn) else -math.inf
     error = t * _jackknife(drawn, first)
-    ends = [band * math.exp(log_ratio + sign * error) for sign in (-1.0, 1.0)]
-    found = {
-        "band": band * math.exp(log_ratio),
-        "band_low": ends[0],
-        "band_high": ends[1],
-        "shift": shift,
-        "shift_error": shift_error,
-    }
+    low, high = (band * math.exp(log_ratio + sign * error) for sign in (-1.0, 1.0))
     # a band is reported with two digits: closer is the same
     digit = 0.5 * 10.0 ** (math.floor(math.log10(band)) - 1)
-    same_band = ends[0] <= band + digit and ends[1] >= band - digit
-    same_mean = abs(shift) <= shift_error + digit
     words = []
-    if not same_band:
+    if not (low <= band + digit and high >= band - digit):
         by = percent_of(abs(math.expm1(log_ratio)))
         words.append(f"{by} {'wider' if log_ratio > 0.0 else 'narrower'} than first order")
-    if not same_mean:
+    if not abs(shift) <= shift_error + digit:
         words.append(f"mean off by {'+' if shift > 0.0 else '-'}{percent_of(abs(shift))}")
-    if words:
-        return found | {"outcome": DIFFERS, "verdict": ", ".join(words)}
-    return found | {"outcome": AGREES, "verdict": AGREES}
+    return replace(
+        found,
+        band=band * math.exp(log_ratio),
+        band_low=low,
+        band_high=high,
+        shift=shift,
+        shift_error=shift_error,
+        outcome=DIFFERS if words else AGREES,
+        verdict=", ".join(words) or AGREES,
+    )
 
 
 def _jackknife(drawn: Array, first: Array) -> float:

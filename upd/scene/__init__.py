@@ -7,8 +7,7 @@ from __future__ import annotations
 from upd.scene.contact import FRICTION_WANTS, WANTS, Scene, friction_on
 from upd.scene.forced import FORCED_WANTS, ForcedScene
 from upd.scene.modal import MODAL_WANTS, ModalScene
-from upd.scene.read import AnyScene, as_scene, load_scene, ready_scenes
-from upd.scene.recipe_keys import geometry_parameters
+from upd.scene.read import AnyScene, as_scene, geometry_parameters, load_scene, ready_scenes
 from upd.scene.seated import SEATED_WANTS, SeatedScene
 
 #: names that scripts know

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
@@ -221,43 +221,40 @@ def friction_on(scene: Scene) -> bool:
     return scene.contact.friction > 0.0 and scene.wants(*FRICTION_WANTS)
 
 
-def contact_problems(scene: Scene) -> list[str]:
+def contact_problems(scene: Scene) -> Iterator[str]:
     """What does not fit together."""
     loads, contact = scene.loads, scene.contact
-    problems = repeated("loads.normal", loads.normal) + repeated(
-        "loads.tangential", loads.tangential
-    )
+    yield from repeated("loads.normal", loads.normal)
+    yield from repeated("loads.tangential", loads.tangential)
     if scene.wanted_accuracy is None and scene.geometry.get("divisions") == "auto":
-        problems.append('geometry.divisions: "auto" needs an accuracy, for example "1 %"')
+        yield 'geometry.divisions: "auto" needs an accuracy, for example "1 %"'
     try:
         kind = scene.analysis
     except InputError:
         # a problem of geometry.recipe, found there
-        return problems
+        return
     if kind not in CONTACT_WANTS:
         known = ", ".join(CONTACT_WANTS)
-        return [*problems, f"geometry.recipe: its ANALYSIS is {kind!r}; write one of {known}, rig"]
+        yield f"geometry.recipe: its ANALYSIS is {kind!r}; write one of {known}, rig"
+        return
     known = ", ".join(CONTACT_WANTS[kind])
-    problems += [
-        f"want: {w!r} is no output of a {kind}; choose among {known}"
-        for w in scene.want
-        if w not in CONTACT_WANTS[kind]
-    ]
-    add = problems.append
+    for w in scene.want:
+        if w not in CONTACT_WANTS[kind]:
+            yield f"want: {w!r} is no output of a {kind}; choose among {known}"
     word = next((v for v in loads.normal if isinstance(v, str)), "")
     if kind == "flat contact":
-        problems += repeated("loads.directions", [f"{d % 360.0:g} deg" for d in loads.directions])
+        yield from repeated("loads.directions", [f"{d % 360.0:g} deg" for d in loads.directions])
         if word and loads.centrifugal == 0.0:
-            add(
+            yield (
                 f"loads.centrifugal: 0 N presses nothing together, so {word!r} has no answer; "
                 'give the force at speed, for example "350 N"'
             )
         if 0.0 in loads.normal:
-            add("loads.normal: 0 N presses nothing together; give a positive force")
+            yield "loads.normal: 0 N presses nothing together; give a positive force"
         if loads.curve_to == 0.0:
-            add("loads.curve_to: 0 N gives no curve; give a positive force")
+            yield "loads.curve_to: 0 N gives no curve; give a positive force"
         if word and loads.centrifugal is None:
-            add(
+            yield (
                 f"loads.normal: {word!r} needs loads.centrifugal, the centrifugal force on the "
                 "damper"
             )
@@ -273,8 +270,7 @@ def contact_problems(scene: Scene) -> list[str]:
             "law": scene.law != LawChoice(),
         }
         if word:
-            add(f"loads.normal: {word!r} is for flat damper faces; give a force with its unit")
+            yield f"loads.normal: {word!r} is for flat damper faces; give a force with its unit"
         for where, given in only_flat.items():
             if given:
-                add(f"{where}: has no meaning for a {kind}; remove it")
-    return problems
+                yield f"{where}: has no meaning for a {kind}; remove it"

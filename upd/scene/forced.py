@@ -8,7 +8,7 @@ from __future__ import annotations
 import cmath
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
@@ -16,16 +16,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.scene import quantities as q
-from upd.scene.base import STRICT, MeshChoice
-from upd.scene.forced_contact import FrictionChoice, Side, StiffnessChoice
+from upd.scene.base import (
+    STRICT,
+    DamperChoice,
+    MeshChoice,
+    RigBase,
+    repeated,
+    rig_problems,
+    unreachable_accuracy,
+)
+from upd.scene.forced_contact import GAUSS, SIDES, FrictionChoice, Side, StiffnessChoice
 from upd.scene.measured import (
     FROM_MEASURED,
     UNTIL_READ,
     FittedMode,
     MeasuredChoice,
+    measured_problems,
     modal_ratios,
 )
-from upd.scene.rig import DamperChoice, RigBase
 
 #: Outputs a forced response can give.
 FORCED_WANTS = (
@@ -55,14 +63,6 @@ MARCHED_WANTS = ("hysteresis", "damper_motion")
 MOST_HARMONICS = 31
 HarmonicNumber = Annotated[
     int, q.must(lambda v: 1 <= v <= MOST_HARMONICS, "is no harmonic, 1 to 31", "1 to 31")
-]
-Harmonics = Annotated[
-    Any,
-    q.must(
-        lambda v: q.is_whole(v) and 1 <= v <= MOST_HARMONICS,
-        "is no number of harmonics; give the highest, 1 to 31",
-        "1 to 31",
-    ),
 ]
 Samples = Annotated[
     Any,
@@ -177,7 +177,7 @@ class BalanceChoice:
 
     __pydantic_config__ = STRICT
     method: Literal["balance", "march"] = "balance"
-    harmonics: Harmonics = 7
+    harmonics: HarmonicNumber = 7
     samples: Samples = "auto"
     slider: Literal["zero", "static", "mid", "upper", "lower"] = "zero"
 
@@ -280,3 +280,126 @@ def combined_forces(e: ExcitationChoice) -> dict[tuple[Side, int], complex]:
         for at, values in parts.items()
         if abs(sum(values)) > math.sqrt(sys.float_info.epsilon) * sum(map(abs, values))
     }
+
+
+# -- what does not fit together --------------------------------------------------------------------
+
+
+def forced_problems(scene: ForcedScene) -> Iterator[str]:
+    """What does not fit together."""
+    e, b, known = scene.excitation, scene.balance, ", ".join(scene.stiffness)
+    springs = scene.contact.model == "springs"
+    yield from repeated("excitation.centrifugal_to_force", e.centrifugal_to_force)
+    if not e.start < e.stop:
+        yield f"excitation.start: {e.start:g} Hz is not below excitation.stop, {e.stop:g} Hz"
+    if scene.damper.centrifugal <= 0.0:
+        yield (
+            "damper.centrifugal: 0 N leaves the damper loose and the excitation F_C / ratio "
+            "without size; give a positive force"
+        )
+    highest = max(b.harmonics, e.highest_harmonic)
+    if b.samples != "auto" and b.samples <= 2 * highest:
+        yield (
+            f"balance.samples: {b.samples} cannot carry harmonic {highest}; take more than "
+            f"{2 * highest}"
+        )
+    if not combined_forces(e):
+        yield "excitation.forces: cancel each other; give forces that excite something"
+    elif (springs or b.method == "balance") and b.harmonics < e.highest_harmonic:
+        yield (
+            f"balance.harmonics: {b.harmonics} do not carry the force in harmonic "
+            f"{e.highest_harmonic}; write {e.highest_harmonic} or more"
+        )
+    if scene.performance.lowest >= scene.performance.highest:
+        yield "performance.lowest: is not below performance.highest"
+    for name in scene.contact.stiffness:
+        if name not in scene.stiffness:
+            yield f"contact.stiffness: there is no table [stiffness.{name}]; known: {known}"
+    yield from (_springs_problems if springs else _whole_faces_problems)(scene)
+    yield from rig_problems(scene)
+    yield from measured_problems(scene.measured)
+    yield from _static_problems(scene)
+    for name, s in scene.stiffness.items():
+        yield from _stiffness_problems(f"stiffness.{name}", s, scene.arrangement)
+
+
+def _springs_problems(scene: ForcedScene) -> Iterator[str]:
+    """What springs have not: partly worn faces, Gauss points at lines."""
+    c, gauss = scene.contact, scene.contact.rule == GAUSS
+    if c.worn not in (0.0, 1.0):
+        yield (
+            f"contact.fit: {c.worn:g} is for whole faces; springs fit loaded or unloaded: write "
+            'one of these, or contact.model = "interface"'
+        )
+    if gauss and c.share != "area":
+        yield 'contact.share: Gauss points have their own shares; write "area"'
+    if gauss and not all(isinstance(one, int) for side in SIDES for one in c.lines(side)):
+        yield 'contact.rule: "gauss" needs numbers of points, for example rows = 4 and columns = 2'
+
+
+def _whole_faces_problems(scene: ForcedScene) -> Iterator[str]:
+    """What whole faces have not, or by time integration alone."""
+    # they have no estimates that could prove an accuracy
+    yield from unreachable_accuracy(scene, "a forced response", "geometry.refine")
+    others = [one for one in scene.want if one not in WHOLE_FACES_WANTS]
+    integrated = [one for one in scene.want if one in MARCHED_WANTS]
+    if scene.mesh.element not in ("hex8", "hex8i"):
+        yield (
+            f"mesh.element: {scene.mesh.element} has nodes that do not carry the contact alike; "
+            'contact.model = "interface" needs "hex8i"'
+        )
+    if others:
+        known = ", ".join(WHOLE_FACES_WANTS)
+        yield f'want: contact.model = "interface" has no {", ".join(others)}; take of {known}'
+    if integrated and scene.balance.method == "balance":
+        which = ", ".join(integrated)
+        yield f'want: {which} of whole faces: from sweeps alone, write balance.method = "march"'
+
+
+def _static_problems(scene: ForcedScene) -> Iterator[str]:
+    """Ratios of one face and forces of the other, more than friction, faces that pull."""
+    given, mu = scene.contact.static, scene.contact.friction
+    ratios = [] if isinstance(given, str) else [isinstance(given[side], float) for side in SIDES]
+    if len(set(ratios)) > 1:
+        yield (
+            "contact.static: T/N of one face and forces of the other; give both faces alike: the "
+            "ratios of both, or N and T of both"
+        )
+    for side in SIDES if len(set(ratios)) == 1 else ():
+        one = given[side]
+        if isinstance(one, float):
+            if abs(one) > mu:
+                yield (
+                    f"contact.static.{side}: |T/N| = {abs(one):g} is beyond friction, {mu:g}; give "
+                    "at most that"
+                )
+        elif one["N"] < 0.0:
+            yield (
+                f"contact.static.{side}: N = {one['N']:g} N pulls; a contact carries only pressure"
+            )
+
+
+def _stiffness_problems(where: str, s: StiffnessChoice, arrangement: str) -> Iterator[str]:
+    """What of totals and contact analysis does not go together."""
+    if (s.K_N is None) != (s.K_T is None):
+        missing = "K_N" if s.K_N is None else "K_T"
+        yield f"{where}: K_N and K_T come together; add {missing}"
+        return
+    without = [side for side in SIDES if s.face(side) is None]
+    if s.scene is not None and s.run is not None:
+        yield f"{where}: scene and run are both given; give one"
+    if s.from_contact and s.K_N is not None:
+        yield (
+            f"{where}: K_N and K_T beside a contact analysis; give one of them, or left = "
+            "{ K_N = ..., K_T = ... } for one face"
+        )
+    if not s.from_contact and without:
+        yield (
+            f"{where}: no stiffness for the {' and the '.join(without)} face; give K_N and K_T, or "
+            "scene, or run"
+        )
+    if s.from_contact and arrangement == "asymmetric" and s.left is None:
+        yield (
+            f"{where}: a contact analysis gives the pads on the right; the left face needs left = "
+            "{ K_N = ..., K_T = ... }"
+        )

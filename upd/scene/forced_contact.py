@@ -10,8 +10,7 @@ from pydantic import BeforeValidator
 
 from upd.errors import InputError
 from upd.scene import quantities as q
-from upd.scene.base import STRICT
-from upd.scene.rig import FaceFriction, Fit
+from upd.scene.base import STRICT, FaceFriction, Fit
 from upd.units import parse_quantity
 
 Stiffness = Annotated[float, q.quantity("stiffness"), q.positive, q.Example('"1e6 N/mm"')]

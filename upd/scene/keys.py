@@ -12,8 +12,10 @@ import inspect
 import math
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, is_dataclass, replace
+from itertools import groupby
+from textwrap import wrap
 from typing import Any, Literal, get_args, get_origin
 
 from upd.errors import InputError
@@ -21,7 +23,9 @@ from upd.mesh import recipes
 from upd.mesh.fields import table
 from upd.mesh.recipe_modules import READY
 from upd.scene.base import INSIDE
-from upd.scene.hints import (
+from upd.scene.quantities import (
+    Noted,
+    Rule,
     hint_at,
     hints,
     must_be_given,
@@ -30,9 +34,8 @@ from upd.scene.hints import (
     quantity_kind,
     without_notes,
 )
-from upd.scene.quantities import Noted, Rule
 from upd.scene.rotation import damper_mass
-from upd.scene.toml import toml_key, toml_value
+from upd.scene.toml import put_back, toml_key, toml_value
 from upd.units import UNITS, parse_quantity, quantity_text, unit_inside
 
 #: tables of physical inputs, and such inputs of other tables: what may be known within limits
@@ -49,6 +52,8 @@ _LAST = ("mesh", "solver", "left_out")
 _NO_VALUE = ("none", '"auto"', '"from speed"')
 _MUST = "must be given"
 _NONE = "none"
+#: columns of a scene's file
+_WIDTH = 100
 #: stands for the names of tables
 _NAME = "NAME"
 Steps = tuple[str, ...]
@@ -398,3 +403,79 @@ def _text(value: Any, kind: str) -> str:
     if isinstance(value, float) and kind in UNITS and kind != "fraction":
         return toml_value(quantity_text(value, kind))
     return toml_value(value)
+
+
+# -- a loaded scene written as a file again, with every value it has -------------------------------
+
+
+def scene_as_run(scene: Any) -> str:
+    """The scene with every value, those that its file does not give marked "default".
+
+    Reads back as the same scene.
+    """
+    head = '# The scene as run: every value. Those marked "default" were not given.\n'
+    return head + _written(scene, given_data(scene), commented=False)
+
+
+def scene_to_start_from(scene: Any, name: str) -> str:
+    """The scene under another name, each key with its meaning, unit, bounds and effect on cost."""
+    head = (
+        f'# Begun as a copy of {scene.name}. Lines marked "default" may be left out.\n'
+        "# A quantity carries its unit; in brackets: the unit of the bounds, and the bounds.\n\n"
+    )
+    return head + _written(scene, given_data(scene) | {"name": name}, commented=True)
+
+
+def given_data(scene: Any, without: Container[str] = ()) -> dict[str, Any]:
+    """The scene's data with everything that its file gives; limits of some paths left out."""
+    data = tomllib.loads(scene.text)
+    for one in scene.uncertain.values():
+        if one.path not in without:
+            data = put_back(data, one.steps, one.given)
+    return data
+
+
+def _written(scene: Any, given: Mapping[str, Any], *, commented: bool) -> str:
+    lines: list[str] = []
+    for tables, keys in groupby(scene_keys(scene), key=lambda k: k.steps[:-1]):
+        if tables:
+            lines += ["", f"[{'.'.join(map(toml_key, tables))}]"]
+        for key in keys:
+            if commented:
+                lines += ["", *comment(key)]
+            lines.append(_line(key, given))
+    return "\n".join(lines).lstrip("\n") + "\n"
+
+
+def comment(key: SceneKey) -> list[str]:
+    """What a key means, in lines of a file."""
+    facts = "; ".join(fact for fact in (key.unit, key.bounds) if fact)
+    # a sign and its number stay on one line
+    facts = re.sub(r"([<>]=?) ", "\\1\u00a0", facts)
+    text = " ".join(
+        part
+        for part in (
+            key.meaning,
+            f"({facts})" if facts else "",
+            "" if key.cost == "none" else f"Cost: {key.cost}.",
+        )
+        if part
+    )
+    lines = wrap(text, _WIDTH, initial_indent="# ", subsequent_indent="# ")
+    return [line.replace("\u00a0", " ") for line in lines]
+
+
+def _line(key: SceneKey, given: Mapping[str, Any]) -> str:
+    name = toml_key(key.name)
+    if key.given:
+        value: Any = given
+        for step in key.steps:
+            value = value[step]
+        return f"{name} = {toml_value(value)}"
+    if key.value != key.default:
+        # put in for a word like "from speed", or worked out of another key
+        return f"# {name} = {key.value}    # follows from other keys"
+    # what no file can give: nothing, or a default of a recipe of one's own that is no value of TOML
+    if key.value == "none" or not key.writable:
+        return f"# {name} = {key.value}    # default"
+    return f"{name} = {key.value}    # default"

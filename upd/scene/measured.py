@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -145,29 +146,27 @@ def digest_of_file(path: Path) -> str:
         return ""
 
 
-def measured_problems(measured: Mapping[str, MeasuredChoice]) -> list[str]:
+def measured_problems(measured: Mapping[str, MeasuredChoice]) -> Iterator[str]:
     """What is wrong with measured curves and their files, every fault with line and column."""
-    problems: list[str] = []
     for name, one in measured.items():
         where, path = f"measured.{name}", Path(one.file)
         if (one.state is None) == (one.centrifugal_to_force is None):
             given = "are both given" if one.state is not None else "are both missing"
-            problems.append(
+            yield (
                 f"{where}: state and centrifugal_to_force {given}; give one: state = "
                 '"free" or "stuck", or F_C/F_E'
             )
         now = digest_of_file(path)
         if one.digest is not None and now and one.digest != now:
-            problems.append(
+            yield (
                 f"{where}.file: {path} is not the file that the scene was run with (digest); "
                 "give that file, or remove digest to take this one"
             )
             continue
         _, faults = found_in(path, AskedCurve(one.column, one.unit, one.label))
-        problems += [f"{where}.file: {path.name}, {fault}" for fault in faults[:MOST_TOLD]]
+        yield from [f"{where}.file: {path.name}, {fault}" for fault in faults[:MOST_TOLD]]
         if len(faults) > MOST_TOLD:
-            problems.append(f"{where}.file: {path.name}: and {len(faults) - MOST_TOLD} more")
-    return problems
+            yield f"{where}.file: {path.name}: and {len(faults) - MOST_TOLD} more"
 
 
 def fitted_modes(measured: Mapping[str, MeasuredChoice], table: str) -> tuple[FittedMode, ...]:
@@ -207,9 +206,6 @@ def fitted_modes(measured: Mapping[str, MeasuredChoice], table: str) -> tuple[Fi
     return tuple(out)
 
 
-_fits: dict[tuple[Any, ...], DampingFit] = {}
-
-
 def fit_of(choice: MeasuredChoice) -> DampingFit:
     """Damping fitted to a measured curve; one that did not change is fitted once.
 
@@ -218,10 +214,14 @@ def fit_of(choice: MeasuredChoice) -> DampingFit:
     InputError
         As `upd.measured.fit_damping` does.
     """
-    key = (digest_of_file(Path(choice.file)), choice)
-    if key not in _fits:
-        _fits[key] = fit_damping(choice.read())
-    return _fits[key]
+    return _fit(digest_of_file(Path(choice.file)), choice)
+
+
+@cache
+def _fit(digest: str, choice: MeasuredChoice) -> DampingFit:
+    """The digest tells that the file is the same."""
+    del digest
+    return fit_damping(choice.read())
 
 
 def modal_ratios(

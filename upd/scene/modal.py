@@ -4,14 +4,13 @@ bases.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
 from upd.scene import quantities as q
-from upd.scene.base import STRICT, MeshChoice, repeated
+from upd.scene.base import STRICT, MeshChoice, RigBase, repeated, rig_problems
 from upd.scene.measured import FROM_MEASURED, UNTIL_READ, MeasuredChoice, measured_problems
-from upd.scene.rig import RigBase, rig_problems
 
 #: Outputs a rig scene can ask for.
 MODAL_WANTS = ("free", "glued", "reduction", "response", "pictures", "matrices")
@@ -128,30 +127,29 @@ class ModalScene(RigBase):
     measured: Mapping[q.Name, MeasuredChoice] = field(default_factory=dict)
 
 
-def modal_problems(scene: ModalScene) -> list[str]:
+def modal_problems(scene: ModalScene) -> Iterator[str]:
     """What does not fit together."""
     response, below = scene.response, scene.modes.below
     given = [
         name for name in ("modes", "below", "error") if getattr(scene.reduction, name) is not None
     ]
-    problems = repeated("modes.arrangements", scene.modes.arrangements)
-    problems += measured_problems(scene.measured) + rig_problems(scene)
-    add = problems.append
+    yield from repeated("modes.arrangements", scene.modes.arrangements)
+    yield from measured_problems(scene.measured)
+    yield from rig_problems(scene)
     stop = f"response.stop, {response.stop:g} Hz"
     if not response.start < response.stop:
-        add(f"response.start: {response.start:g} Hz is not below {stop}")
+        yield f"response.start: {response.start:g} Hz is not below {stop}"
     if scene.wants("response") and below < response.stop:
-        add(f"modes.below: {below:g} Hz is below {stop}; the response needs its modes")
+        yield f"modes.below: {below:g} Hz is below {stop}; the response needs its modes"
     if scene.measured and not scene.wants("response"):
-        add('measured: nothing is computed beside it; add "response" to want')
+        yield 'measured: nothing is computed beside it; add "response" to want'
     for name, one in scene.measured.items():
         if one.centrifugal_to_force is not None:
-            add(
+            yield (
                 f"measured.{name}: centrifugal_to_force: a rig has no friction; give state, or "
                 'make it a forced response (analysis = "forced response")'
             )
     if len(given) > 1:
-        add(f"reduction: {' and '.join(given)} are given; give one of modes, below, error")
+        yield f"reduction: {' and '.join(given)} are given; give one of modes, below, error"
     if scene.wants("matrices") and not scene.wants("reduction"):
-        add("want: 'matrices' needs \"reduction\" too")
-    return problems
+        yield "want: 'matrices' needs \"reduction\" too"

@@ -4,7 +4,6 @@ one model of a forced response that they move.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -12,9 +11,9 @@ from typing import Any, NamedTuple
 
 from upd.errors import InputError, one_line
 from upd.scene.forced import ForcedScene
+from upd.scene.keys import given_data
 from upd.scene.quantities import UNKNOWN
 from upd.scene.read import load_scene
-from upd.scene.uncertain import put_back
 from upd.units import parse_quantity, quantity_text, unit_inside
 
 
@@ -82,13 +81,13 @@ def read_range(text: str, kind: str, value: float) -> tuple[RangeEnd, RangeEnd]:
 
 def _end(text: str, kind: str, value: float) -> RangeEnd:
     if text.startswith("x"):
-        factor = _quantity(text[1:], "fraction")
+        factor = bare_quantity(text[1:], "fraction")
         return RangeEnd(factor * value, factor)
-    found = _quantity(text, kind)
+    found = bare_quantity(text, kind)
     return RangeEnd(found, found / value)
 
 
-def _quantity(text: str, kind: str) -> float:
+def bare_quantity(text: str, kind: str) -> float:
     """A quantity, or a bare number in the unit inside."""
     try:
         number = float(text)
@@ -134,11 +133,7 @@ def with_values(scene: ForcedScene, values: Mapping[str, Any]) -> ForcedScene:
     InputError
         Where the scene refuses them.
     """
-    data = tomllib.loads(scene.text)
-    for known in scene.uncertain.values():
-        if known.path not in values:
-            data = put_back(data, known.steps, known.given)
-    return load_scene(data, dict(values))  # type: ignore[no-any-return]
+    return load_scene(given_data(scene, values), dict(values))  # type: ignore[no-any-return]
 
 
 def stiffness_of(scene: ForcedScene, paths: Iterable[str]) -> str:

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import MISSING, fields, replace
+from dataclasses import MISSING, Field, fields, replace
 from datetime import date, datetime, time
 from functools import cache
 from importlib import resources
@@ -18,28 +18,38 @@ from typing import Any
 import tomli_w
 from pydantic import TypeAdapter, ValidationError
 
-from upd.errors import InputError
+from upd.errors import InputError, did_you_mean
 from upd.mesh import recipes
 from upd.mesh.recipe_modules import is_file
 from upd.scene.base import INSIDE, SceneBase
 from upd.scene.contact import Scene, contact_problems
-from upd.scene.forced import FORCED, FORCED_ONLY, ForcedScene
-from upd.scene.forced_problems import forced_problems
+from upd.scene.forced import FORCED, FORCED_ONLY, ForcedScene, forced_problems
 from upd.scene.measured import note_files
 from upd.scene.modal import ModalScene, modal_problems
-from upd.scene.recipe_keys import CHOSEN_BY_MESH, geometry_parameters, never
 from upd.scene.rotation import DERIVED
 from upd.scene.seated import SEATED, SEATED_ONLY, SeatedScene, seated_problems
 from upd.scene.sentences import sentence
 from upd.scene.toml import plain, read_overrides
 from upd.scene.uncertain import taken_out, uncertainties
+from upd.units import parse_quantity
 
 AnyScene = Scene | ModalScene | ForcedScene | SeatedScene
 
+#: Parameters of a recipe that may be "auto".
+_AUTO = ("patch", "core_depth", "divisions")
+#: Parameters of a recipe that the [mesh] table sets.
+CHOSEN_BY_MESH = {
+    "symmetry": "mesh.symmetry",
+    "element_nodes": "mesh.element",
+    "arrangement": "modes.arrangements",
+    "damper": 'want ("free", "glued")',
+}
+#: Largest whole number: counts beyond it fill any memory.
+_MOST = 100_000
 #: Letters before and after what a very long problem leaves out.
 _HALF = 300
 #: Class of a scene -> what does not fit together in it.
-_PROBLEMS: dict[type[AnyScene], Callable[[Any], list[str]]] = {
+_PROBLEMS: dict[type[AnyScene], Callable[[Any], Iterable[str]]] = {
     Scene: contact_problems,
     ModalScene: modal_problems,
     ForcedScene: forced_problems,
@@ -307,3 +317,85 @@ def _kind(data: Mapping[str, Any], analyses: Sequence[str]) -> type[AnyScene]:
         return ModalScene if analyses[0] == "rig" else Scene
     # without a recipe the other keys show which scene is meant
     return max((Scene, ModalScene), key=lambda kind: sum(f.name in data for f in fields(kind)))
+
+
+# -- the [geometry] table: which recipe, and its parameters in mm ----------------------------------
+
+
+def geometry_parameters(
+    table: Mapping[str, Any], own: Sequence[str] = ()
+) -> tuple[dict[str, Any], list[str]]:
+    """Parameters of the recipe in mm from the scene's [geometry] table, and the problems found.
+
+    `own`: those no other table chooses.
+    """
+    recipe = table.get("recipe")
+    if not isinstance(recipe, str):
+        return {}, ["geometry.recipe: is missing: name a recipe or a .py file"]
+    try:
+        cls = recipes.parameters(recipe)
+    except InputError as error:
+        return {}, [f"geometry.recipe: {error}"]
+    known = {f.name: f for f in fields(cls)}
+    out: dict[str, Any] = {}
+    problems: list[str] = []
+    for key, value in table.items():
+        if key == "recipe":
+            continue
+        where = f"geometry.{key}"
+        if key in CHOSEN_BY_MESH and key not in own:
+            problems.append(f"{where}: set {CHOSEN_BY_MESH[key]} instead")
+        elif key not in known:
+            others = f"known here: {', '.join(known)}"
+            problems.append(f"{where}: unknown key{did_you_mean(key, known, others)}")
+        elif value == "auto" and key not in _AUTO:
+            problems.append(f'{where}: cannot be "auto"; give it a value')
+        else:
+            try:
+                out[key] = value if value == "auto" else _parameter(value, known[key])
+            except InputError as error:
+                problems.append(f"{where}: {error}")
+    if not problems:
+        # What "auto" stands for is chosen later and fits: problems of its stand-in are not the
+        # user's.
+        chosen = {key for key, value in out.items() if value == "auto"}
+        try:
+            recipes.made(recipe, {key: value for key, value in out.items() if key not in chosen})
+        except InputError as error:
+            message = [line.strip() for line in str(error).splitlines()]
+            problems += [
+                f"geometry: {line}"
+                for line in message
+                if not any(f"{key}:" in line for key in chosen)
+            ]
+    return out, problems
+
+
+def _parameter(value: Any, parameter: Field[Any]) -> Any:
+    """A value of a recipe's parameter, quantities in the unit inside. Raises InputError."""
+    quantity, kind = parameter.metadata.get("quantity"), str(parameter.type)
+    if quantity is not None or "float" in kind:
+        return parse_quantity(value, quantity or "fraction")
+    if "int" not in kind:
+        return value
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise InputError(
+            f"{value!r} is not a whole number; write digits without quotes, for example 12"
+        )
+    if message := never(value):
+        raise InputError(message)
+    return value
+
+
+def never(value: Any) -> str:
+    """What no key of a scene takes, though a number could be made of it.
+
+    True and false, numbers beyond all counts.
+    """
+    if isinstance(value, bool):
+        return f"{str(value).lower()} is no value of a scene; write a number, or text in quotes"
+    if isinstance(value, bytes):
+        return "is bytes; write text"
+    if isinstance(value, int) and abs(value) > _MOST:
+        return f"is more than the largest whole number of a scene, {_MOST}; give a smaller one"
+    return ""

@@ -94,10 +94,10 @@ def _fitted(
     scene: ModalScene | ForcedScene, data: Mapping[str, Any], table: str
 ) -> tuple[FittedMode, ...]:
     """Damping from the measured free curves where the table asks for it."""
+    asked = data.get(table, {}).get("damping") == FROM_MEASURED
     # damaged files are found with the other problems
-    if data.get(table, {}).get("damping") != FROM_MEASURED or measured_problems(scene.measured):
-        return ()
-    return fitted_modes(scene.measured, table)
+    fine = asked and not any(measured_problems(scene.measured))
+    return fitted_modes(scene.measured, table) if fine else ()
 
 
 def _contact(scene: Scene, data: Mapping[str, Any]) -> Scene:

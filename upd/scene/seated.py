@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from upd.scene import quantities as q
-from upd.scene.base import STRICT, repeated
-from upd.scene.rig import (
+from upd.scene.base import (
+    STRICT,
     DamperChoice,
     FaceFriction,
     Fit,
     RigBase,
+    repeated,
     rig_problems,
     unreachable_accuracy,
 )
@@ -145,23 +147,22 @@ class SeatedScene(RigBase):
         return self.mesh.symmetry == "full" or (self.mesh.symmetry == "auto" and along)
 
 
-def seated_problems(scene: SeatedScene) -> list[str]:
+def seated_problems(scene: SeatedScene) -> Iterator[str]:
     """What does not fit together."""
     directions = scene.moved.directions
     levels = "geometry.refine, geometry.patch_along_slope or pad_along_slope"
-    problems = repeated("moved.directions", directions) + rig_problems(scene)
-    problems += unreachable_accuracy(scene, "a seated damper", levels)
-    add = problems.append
+    yield from repeated("moved.directions", directions)
+    yield from rig_problems(scene)
+    yield from unreachable_accuracy(scene, "a seated damper", levels)
     if scene.damper.centrifugal <= 0.0:
-        add("damper.centrifugal: 0 N leaves the damper loose; give a positive force")
+        yield "damper.centrifugal: 0 N leaves the damper loose; give a positive force"
     if scene.mesh.element not in ("hex8", "hex8i"):
-        add(
+        yield (
             f"mesh.element: the seated damper needs faces of four nodes, not those of "
             f'"{scene.mesh.element}"; use "hex8i"'
         )
     if scene.mesh.symmetry == "half" and "y" in directions:
-        add(
+        yield (
             'moved.directions: a motion along "y" is not symmetric; set mesh.symmetry = "auto" or '
             '"full"'
         )
-    return problems

@@ -11,9 +11,9 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from upd.errors import did_you_mean
 from upd.scene.base import INSIDE
 from upd.scene.forced import FORCED, FORCED_ONLY
-from upd.scene.hints import hint_at, hints, must_be_given, path_of, without_notes
-from upd.scene.quantities import Example
+from upd.scene.quantities import Example, hint_at, hints, must_be_given, path_of, without_notes
 from upd.scene.seated import SEATED, SEATED_ONLY, SeatedScene
+from upd.scene.toml import toml_value
 
 #: pydantic's kinds of errors, or how they begin -> what a value is not
 _NOT = {
@@ -74,10 +74,10 @@ def _addition(location: Sequence[Any], scene: type[Any]) -> str:
 
 
 def _other_choice(value: Any, wanted: Any) -> str:
-    choices = [_toml(choice) for choice in get_args(without_notes(wanted))]
+    choices = [toml_value(choice) for choice in get_args(without_notes(wanted))]
     if len(choices) == 1:
         return f"{value!r} is not known; write {choices[0]}"
-    near = difflib.get_close_matches(_toml(value), choices, 1)
+    near = difflib.get_close_matches(toml_value(value), choices, 1)
     meant = f", did you mean {near[0]}?" if near else ""
     return f"{value!r} is none of its values{meant}; write one of {', '.join(choices)}"
 
@@ -111,7 +111,7 @@ def _items(wanted: Any, default: Any = None) -> tuple[str, ...]:
     if origin in (Union, types.UnionType):
         return _items(next(kind for kind in inside if kind is not type(None)), default)
     if origin is Literal:
-        return tuple(map(_toml, inside))
+        return tuple(map(toml_value, inside))
     if origin is tuple:
         items = _items(inside[0]) if inside[-1] is Ellipsis else [_example(kind) for kind in inside]
         return (f"[{', '.join(items)}]",)
@@ -121,7 +121,7 @@ def _items(wanted: Any, default: Any = None) -> tuple[str, ...]:
         return (_table(wanted),)
     usual = {int: "12", float: "0.5", str: '"text"'}
     plain = isinstance(default, (int, float, str)) and not isinstance(default, bool) and default
-    return (_toml(default) if plain else usual.get(wanted, '"text"'),)
+    return (toml_value(default) if plain else usual.get(wanted, '"text"'),)
 
 
 def _table(cls: Any) -> str:
@@ -133,7 +133,3 @@ def _table(cls: Any) -> str:
         for f in needed or known[:1]
     ]
     return f"{{ {', '.join(keys)} }}"
-
-
-def _toml(value: Any) -> str:
-    return f'"{value}"' if isinstance(value, str) else str(value)

@@ -59,3 +59,11 @@ def plain(data: Any) -> Any:
     if isinstance(data, (list, tuple)):
         return [plain(v) for v in data]
     return data.tolist() if hasattr(data, "tolist") else data
+
+
+def put_back(data: dict[str, Any], steps: Sequence[str | int], value: Any) -> dict[str, Any]:
+    """A copy of a scene's data with one value replaced."""
+    head, *rest = steps
+    out: Any = data.copy()
+    out[head] = put_back(out[head], rest, value) if rest else value
+    return out  # type: ignore[no-any-return]

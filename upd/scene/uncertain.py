@@ -23,9 +23,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from upd.errors import InputError
-from upd.scene.hints import path_of
 from upd.scene.keys import input_kind
-from upd.scene.quantities import Steps, Uncertainty
+from upd.scene.quantities import Steps, Uncertainty, path_of
+from upd.scene.toml import put_back
 from upd.units import parse_quantity
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -69,14 +69,6 @@ def _without(node: Any, steps: Steps, found: list[GivenBand]) -> Any:
     value: Any = f"{text} {unit}" if unit else number
     found.append(GivenBand(steps, node.strip(), value, unit, match["band"] or "", match["rest"]))
     return value
-
-
-def put_back(data: dict[str, Any], steps: Steps, value: Any) -> dict[str, Any]:
-    """A copy of a scene's data with one value replaced."""
-    head, *rest = steps
-    out: Any = data.copy()
-    out[head] = put_back(out[head], tuple(rest), value) if rest else value
-    return out  # type: ignore[no-any-return]
 
 
 def uncertainties(

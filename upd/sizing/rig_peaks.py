@@ -22,7 +22,7 @@ from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.analyses.forced.statics import static_state
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
-from upd.cache.journal import Journal
+from upd.cache.arrays import Journal
 from upd.cache.sources import key_of, source_digest
 from upd.errors import InputError
 from upd.hbm.peaks.over import Peaks, PeaksOver, peak_point

@@ -39,9 +39,9 @@ from upd.errors import InputError
 from upd.fem import Material, mass_properties
 from upd.mesh import Mesh, recipes
 from upd.scene import AnyScene
+from upd.scene.base import rig_parameters
 from upd.scene.forced import FORCED
 from upd.scene.forced_contact import SIDES
-from upd.scene.rig import rig_parameters
 from upd.scene.seated import SEATED
 
 Array = NDArray[np.float64]

@@ -23,7 +23,7 @@ from upd.progress import Stages
 from upd.results import InputPart, InputParts, Result
 from upd.scene import load_scene
 from upd.scene.quantities import Uncertainty
-from upd.scene.uncertain import put_back
+from upd.scene.toml import put_back
 from upd.vary.solve import changed
 from upd.vary.variation import ALONE, POWER, Key, Overrides
 

@@ -3,64 +3,15 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from fnmatch import fnmatchcase
 from functools import cached_property
 from typing import Any
 
-from upd.results import Case, InputPart, read_input_part
+from upd.cache.files import json_text
+from upd.results import Result, read_result
 from upd.vary.variation import Key, Variation
-
-
-@dataclass(frozen=True)
-class PointResult:
-    """One number of a point.
-
-    Attributes
-    ----------
-    value
-        None where the number is not finite.
-    error
-        Relative difference from the number's reference.
-    printed_error
-        That of a published value.
-    exact
-        Whether the reference is what the number should converge to.
-    withheld
-        Why the number was not reached.
-    estimated
-        Estimated relative error.
-    inputs
-        What the inputs known within limits do to it.
-    """
-
-    name: str
-    case: Case
-    unit: str
-    value: float | None
-    error: float | None = None
-    printed_error: float | None = None
-    exact: bool = True
-    withheld: str = ""
-    estimated: float | None = None
-    inputs: tuple[InputPart, ...] = ()
-
-    def as_dict(self) -> dict[str, Any]:
-        """The number for JSON: ``case`` in words, its attributes under ``case_fields``.
-
-        What is not given is omitted.
-        """
-        given = {
-            f.name: value for f in fields(self) if (value := getattr(self, f.name)) != f.default
-        }
-        return {
-            **given,
-            "case": self.case.label,
-            "case_fields": self.case.given(),
-            **({"inputs": [part.as_dict() for part in self.inputs]} if self.inputs else {}),
-        }
 
 
 @dataclass(frozen=True)
@@ -90,7 +41,7 @@ class Outcome:
         "host:process".
     """
 
-    results: tuple[PointResult, ...] = ()
+    results: tuple[Result, ...] = ()
     failure: str = ""
     final: bool = True
     seconds: float = 0.0
@@ -103,9 +54,9 @@ class Outcome:
 
     def text(self) -> str:
         """The outcome as JSON."""
-        data = {f.name: getattr(self, f.name) for f in fields(self)}
-        return json.dumps(
-            data | {"results": [r.as_dict() for r in self.results]}, indent=1, allow_nan=False
+        results = [one.as_dict() | {"exact": one.exact} for one in self.results]
+        return json_text(
+            {f.name: getattr(self, f.name) for f in fields(self)} | {"results": results}
         )
 
 
@@ -118,22 +69,8 @@ def read_outcome(text: str) -> Outcome:
         For any other text.
     """
     data = json.loads(text)
-    return Outcome(
-        **(
-            data
-            | {
-                "results": tuple(map(_read_result, data["results"])),
-                "warnings": tuple(data["warnings"]),
-            }
-        )
-    )
-
-
-def _read_result(data: Mapping[str, Any]) -> PointResult:
-    given = {**data}
-    case = Case(**given.pop("case_fields"))
-    inputs = tuple(map(read_input_part, given.get("inputs", ())))
-    return PointResult(**(given | {"case": case, "inputs": inputs}))
+    results = tuple(map(read_result, data["results"]))
+    return Outcome(**data | {"results": results, "warnings": tuple(data["warnings"])})
 
 
 @dataclass(frozen=True)
@@ -150,8 +87,8 @@ class SolvedPoint:
 
     @cached_property
     def values(self) -> dict[Key, float]:
-        """Its numbers; nan where one is not finite."""
-        return {(r.name, r.case): math.nan for r in self.outcome.results} | self._given("value")
+        """Its numbers; nan where one was not reached."""
+        return self._given("value")
 
     @cached_property
     def errors(self) -> dict[Key, float]:
@@ -167,7 +104,7 @@ class SolvedPoint:
     @cached_property
     def estimates(self) -> dict[Key, float]:
         """Relative errors as the run estimates them."""
-        return self._given("estimated")
+        return self._given("estimated_error")
 
     def _given(self, field: str) -> dict[Key, float]:
         found = ((r, getattr(r, field)) for r in self.outcome.results)

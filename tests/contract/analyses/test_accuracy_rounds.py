@@ -18,7 +18,7 @@ from upd.analyses.base import CHOSEN_BY_ACCURACY, Plan, chosen_by_accuracy, refu
 from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages
 from upd.results import Case, ErrorPart, Estimates, Result
-from upd.results.quantity import Quantity
+from upd.results.quantities import Quantity
 from upd.scene import load_scene
 from upd.vary.wanted import LevelChoice, LevelSearch, Wanted, require_named, shares_of, solve_wanted
 

@@ -13,7 +13,7 @@ from upd.analyses.forced.answer import answer, headline
 from upd.plot.chart import Entry
 from upd.results import Case, Result
 from upd.results.answer_table import AnswerTable
-from upd.results.quantity import Quantity
+from upd.results.quantities import Quantity
 
 OWN = Case(stiffness="own")
 MODES = {1: "in phase", 2: "out of phase"}

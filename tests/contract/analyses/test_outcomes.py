@@ -5,17 +5,18 @@ from dataclasses import replace
 
 import pytest
 
+from upd.analyses.base import Resolved
 from upd.results import (
     NO_CASE,
     Case,
     Check,
     Result,
-    left_out_check,
     outcome_of,
     status_of,
     warnings_of,
 )
 from upd.results.quantities import PEAK_FREQUENCY
+from upd.scene.base import LeftOut
 
 GOOD = Check("balance", NO_CASE, 0.0, 1e-9, "misfit", "report this")
 WARNS = replace(GOOD, name="truncation", case=Case(force_ratio=194.0), value=1.0, fatal=False)
@@ -73,16 +74,8 @@ def test_many_cases_are_counted() -> None:
 
 
 def test_what_was_not_found_is_no_nan_in_the_file() -> None:
-    check = left_out_check(
-        "faces",
-        NO_CASE,
-        "peak_1_frequency",
-        without=400.0,
-        included=float("nan"),
-        unit="Hz",
-        limit=0.05,
-        remedy="",
-    )
+    solved = Resolved("faces", "peak_1_frequency", NO_CASE, 400.0, float("nan"), "Hz")
+    check = solved.check(LeftOut())
     assert check.verdict == "warning"
     data = json.loads(json.dumps([check.as_dict(), MISSING.as_dict()], allow_nan=False))
     assert (data[0]["value"], data[0]["included"], data[1]["value"]) == (None, None, None)

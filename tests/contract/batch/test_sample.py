@@ -14,9 +14,9 @@ import pytest
 
 import upd
 from upd.batch.engine import Progress
-from upd.batch.output import SweepResult
 from upd.batch.plan import plan_sweep
 from upd.batch.point import point_settings
+from upd.batch.sweeps import SweepResult
 from upd.cli import main
 from upd.errors import InputError
 from upd.plot.sample_charts import sample_charts

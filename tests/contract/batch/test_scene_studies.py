@@ -24,10 +24,10 @@ from upd.cli.tables import print_table
 from upd.errors import InputError
 from upd.mesh.recipes import build_mesh
 from upd.plot.work_precision import change_charts, work_precision_charts
-from upd.results import Case
+from upd.results import Case, Result
 from upd.vary.curves import ESTIMATED, TRUE, accuracy_curves, finest_curves, make_curves
 from upd.vary.ladder import limit_report
-from upd.vary.outcome import Outcome, PointResult, SolvedPoint, read_outcome
+from upd.vary.outcome import Outcome, SolvedPoint, read_outcome
 from upd.vary.tables import markdown_table
 from upd.vary.variation import Variation
 
@@ -272,15 +272,15 @@ def test_load_steps_change_the_cycle_of_coupled_contact_alone(tmp_path: Path) ->
     assert abs(energies["coupled", 8] / energies["coupled", 16] - 1.0) > 1e-3
 
 
-def level(curve: str, n: int, *results: PointResult) -> SolvedPoint:
+def level(curve: str, n: int, *results: Result) -> SolvedPoint:
     """A level as it comes back from its file."""
     outcome = Outcome(results, seconds=1.0 * n, memory_mb=100.0, n_dof=9)
     return SolvedPoint(Variation(curve, str(n), (), 1.0 / n), read_outcome(outcome.text()))
 
 
-def peak(value: float, **more: Any) -> PointResult:
+def peak(value: float, **more: Any) -> Result:
     case = Case(stiffness="thesis", force_ratio=194.0, mode="in phase")
-    return PointResult("peak_1_frequency", case, "Hz", value, **more)
+    return Result("peak_1_frequency", case, value, "Hz", **more)
 
 
 def test_both_sweeps_have_their_order() -> None:
@@ -290,8 +290,8 @@ def test_both_sweeps_have_their_order() -> None:
         level(
             "steps",
             n,
-            PointResult("peak_1_frequency", up, "Hz", 300 - 8 / n**2),
-            PointResult("peak_1_frequency", down, "Hz", 320 + 4 / n),
+            Result("peak_1_frequency", up, 300 - 8 / n**2, "Hz"),
+            Result("peak_1_frequency", down, 320 + 4 / n, "Hz"),
         )
         for n in (1, 2, 4)
     ]
@@ -302,7 +302,7 @@ def test_both_sweeps_have_their_order() -> None:
 
 
 def test_seconds_are_those_of_what_the_levels_change() -> None:
-    spent = PointResult("curve_seconds", Case(), "s", 2.0)
+    spent = Result("curve_seconds", Case(), 2.0, "s")
     levels = [level("steps", n, peak(310.0 + 1 / n), spent) for n in (1, 2)]
     sweeps = [replace(one, outcome=replace(one.outcome, stages={"sweeps": 5.0})) for one in levels]
     for solved, seconds in ((levels, 2.0), (sweeps, 7.0)):
@@ -344,8 +344,8 @@ def test_a_ladder_of_accuracies_tells_estimated_and_true_errors(tmp_path: Path) 
 
 
 def test_an_estimate_comes_back_from_a_worker() -> None:
-    one = level("accuracy", 1, replace(peak(310.0), estimated=0.02))
-    assert [r.estimated for r in one.outcome.results] == [0.02]
+    one = level("accuracy", 1, replace(peak(310.0), estimated_error=0.02))
+    assert [r.estimated_error for r in one.outcome.results] == [0.02]
     key = (one.outcome.results[0].name, one.outcome.results[0].case)
     (curve,) = accuracy_curves([one], [key])
     assert (curve.curve, curve.error) == (ESTIMATED, (0.02,))
@@ -384,7 +384,7 @@ def test_figures_show_both_costs_and_the_estimate() -> None:
         SolvedPoint(
             Variation("hex20", f"refine {1 / h:g}", (), h),
             Outcome(
-                (peak(320.0 + 4.0 * h**2), PointResult("stuck", Case(kind="stuck"), "", 300.0 + h)),
+                (peak(320.0 + 4.0 * h**2), Result("stuck", Case(kind="stuck"), 300.0 + h, "")),
                 seconds=1.0 / h,
                 memory_mb=100.0 / h,
             ),

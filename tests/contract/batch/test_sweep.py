@@ -4,6 +4,7 @@ missing points run again.
 
 import csv
 import json
+import math
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -14,19 +15,18 @@ import numpy as np
 import pytest
 
 from upd import load_scene, run
-from upd.batch import sweep
 from upd.batch.engine import Progress
 from upd.batch.grid import parse_axes, places, settings
-from upd.batch.output import draw
 from upd.batch.point import Task, solve_task
 from upd.batch.store import PointStore
+from upd.batch.sweeps import draw, sweep
 from upd.batch.table import csv_text, make_columns, reasons
 from upd.cache.shared import Store, active
 from upd.cli import main
 from upd.errors import InputError
 from upd.reduction.stored import stored_condensation
-from upd.results import Case, shared_label
-from upd.vary.outcome import Outcome, PointResult, read_outcome
+from upd.results import Case, Result, shared_label
+from upd.vary.outcome import Outcome, read_outcome
 
 SCENE = {
     "contact": {"friction": 0.6},
@@ -391,7 +391,7 @@ def test_threads_and_workers_never_exceed_the_cores(
 
 
 def rows(*found: tuple[str, Case, float]) -> Outcome:
-    return Outcome(tuple(PointResult(name, case, "N", value) for name, case, value in found))
+    return Outcome(tuple(Result(name, case, value, "N") for name, case, value in found))
 
 
 def pressed(load: float) -> Case:
@@ -437,24 +437,24 @@ def test_peaks_stand_in_the_columns_of_their_modes() -> None:
     one, two = "peak_1_frequency", "peak_2_frequency"
     stopped = Outcome(
         (
-            PointResult(one, peak(50.0, "in phase"), "Hz", 300.0),
-            PointResult(two, peak(50.0, "out of phase"), "Hz", 444.0),
-            PointResult("friction_energy", peak(50.0, "out of phase", peak=2), "N mm", 1.0),
+            Result(one, peak(50.0, "in phase"), 300.0, "Hz"),
+            Result(two, peak(50.0, "out of phase"), 444.0, "Hz"),
+            Result("friction_energy", peak(50.0, "out of phase", peak=2), 1.0, "N mm"),
         )
     )
     short = Outcome(
         (
-            PointResult(two, peak(20.0, "out of phase"), "Hz", 443.0),
-            PointResult(one, peak(20.0, "in phase"), "Hz", None, withheld="it stopped at 290 Hz"),
-            PointResult("friction_energy", peak(20.0, "out of phase", peak=2), "N mm", 2.0),
+            Result(two, peak(20.0, "out of phase"), 443.0, "Hz"),
+            Result(one, peak(20.0, "in phase"), math.nan, "Hz", withheld="it stopped at 290 Hz"),
+            Result("friction_energy", peak(20.0, "out of phase", peak=2), 2.0, "N mm"),
         )
     )
     whole = Outcome(
         (
-            PointResult(two, peak(194.0, "out of phase"), "Hz", 450.0),
-            PointResult(one, peak(194.0, "in phase"), "Hz", 400.0),
-            PointResult("friction_energy", peak(194.0, "in phase", peak=1), "N mm", 3.0),
-            PointResult("friction_energy", peak(194.0, "out of phase", peak=2), "N mm", 4.0),
+            Result(two, peak(194.0, "out of phase"), 450.0, "Hz"),
+            Result(one, peak(194.0, "in phase"), 400.0, "Hz"),
+            Result("friction_energy", peak(194.0, "in phase", peak=1), 3.0, "N mm"),
+            Result("friction_energy", peak(194.0, "out of phase", peak=2), 4.0, "N mm"),
         )
     )
     found = [stopped, whole, short]
@@ -487,20 +487,20 @@ def test_a_withheld_peak_of_no_known_mode_has_its_reason_in_the_row_and_no_colum
         peak = (("in phase", 1), ("out of phase", 2))
         return Outcome(
             (
-                PointResult("path_points", case(ratio), "", 60.0),
+                Result("path_points", case(ratio), 60.0, ""),
                 *(
-                    PointResult(f"peak_{k}_frequency", case(ratio, mode), "Hz", k * ratio)
+                    Result(f"peak_{k}_frequency", case(ratio, mode), k * ratio, "Hz")
                     for mode, k in peak
                 ),
-                PointResult("energy", case(ratio, "in phase", peak=1), "N mm", 3.0),
+                Result("energy", case(ratio, "in phase", peak=1), 3.0, "N mm"),
             )
         )
 
     reason = "no peak between 200 and 250 Hz"
     lost = Outcome(
         (
-            PointResult("path_points", case(7.0), "", 60.0),
-            PointResult("peak_1_frequency", case(7.0), "Hz", None, withheld=reason),
+            Result("path_points", case(7.0), 60.0, ""),
+            Result("peak_1_frequency", case(7.0), math.nan, "Hz", withheld=reason),
         )
     )
     found = [both(5.0), lost, both(9.0)]
@@ -532,10 +532,17 @@ def test_shared_label() -> None:
 
 def test_outcome_survives_its_text() -> None:
     numbers = (
-        PointResult(
-            "p", Case(load=1.0, direction="x"), "MPa", 0.1 + 0.2, 1.0 / 3.0, -0.05, exact=False
+        Result(
+            "p",
+            Case(load=1.0, direction="x"),
+            0.1 + 0.2,
+            "MPa",
+            1.0 / 3.0,
+            "closed form",
+            -0.05,
+            exact=False,
         ),
-        PointResult("q", Case(), "", None, withheld="not reached"),
+        Result("q", Case(), math.nan, "", withheld="not reached"),
     )
     outcome = Outcome(numbers, seconds=1.5, stages={"mesh": 0.1}, n_dof=12, warnings=("rim",))
     again = read_outcome(outcome.text())

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from upd.batch import sweep
+from upd.batch.sweeps import sweep
 from upd.cli import main
 from upd.errors import InputError
 from upd.plot.sweep_charts import sweep_charts

@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -17,8 +18,8 @@ from upd.batch.engine import Workers
 from upd.batch.studies import plan_study, run_study
 from upd.cli.batch import print_study
 from upd.errors import InputError
-from upd.results import Case
-from upd.vary.outcome import Outcome, PointResult, SolvedPoint, read_outcome
+from upd.results import Case, Result
+from upd.vary.outcome import Outcome, SolvedPoint, read_outcome
 from upd.vary.variation import Variation
 
 STUCK: Mapping[str, Any] = {
@@ -84,16 +85,16 @@ def test_levels_a_user_asks_for() -> None:
         whole_faces_points(own)
 
 
-def level(curve: str, label: str, h: float, seconds: float, *results: PointResult) -> SolvedPoint:
+def level(curve: str, label: str, h: float, seconds: float, *results: Result) -> SolvedPoint:
     """A level as it comes back from its file."""
     outcome = Outcome(results, seconds=seconds, memory_mb=100.0, n_dof=9)
     return SolvedPoint(Variation(curve, label, (), h), read_outcome(outcome.text()))
 
 
-def peak(stiffness: str, k: int, height: float | None, **more: Any) -> PointResult:
+def peak(stiffness: str, k: int, height: float, **more: Any) -> Result:
     mode = {1: "in phase", 2: "out of phase"}[k]
     case = Case(stiffness=stiffness, force_ratio=194.0, mode=mode, choice=more.pop("choice", ""))
-    return PointResult(f"peak_{k}_accelerance", case, "(m/s2)/N", height, **more)
+    return Result(f"peak_{k}_accelerance", case, height, "(m/s2)/N", **more)
 
 
 STUDY = plan_study(load_scene("symmetric-response"), "contact")
@@ -104,7 +105,7 @@ LADDER = (
         "thesis",
         1.0,
         2.0,
-        PointResult("peak_1_accelerance", Case(stiffness="thesis", kind="stuck"), "", 1.0),
+        Result("peak_1_accelerance", Case(stiffness="thesis", kind="stuck"), 1.0, ""),
         peak("thesis", 2, 99.0),
         peak("thesis", 1, 120.0),
     ),
@@ -116,8 +117,8 @@ LADDER = (
         50.0,
         peak("interface", 1, 100.0, **UP),
         peak("interface", 1, 200.0, **DOWN),
-        peak("interface", 2, None, withheld="stopped at 300 Hz", **UP),
-        peak("interface", 2, None, withheld="stopped at 299 Hz", **DOWN),
+        peak("interface", 2, math.nan, withheld="stopped at 300 Hz", **UP),
+        peak("interface", 2, math.nan, withheld="stopped at 299 Hz", **DOWN),
     ),
     SolvedPoint(Variation("interface", "12 x 34", (), 0.08), Outcome(failure="no memory")),
 )
@@ -143,7 +144,7 @@ def test_rows_are_aligned_by_peak_with_ranges_and_reasons() -> None:
 
 def test_a_peak_that_one_sweep_alone_has_is_no_single_number() -> None:
     lone = (
-        peak("interface", 1, None, withheld="no peak between 300 and 500 Hz", **UP),
+        peak("interface", 1, math.nan, withheld="no peak between 300 and 500 Hz", **UP),
         peak("interface", 1, 60.0, **DOWN),
     )
     _, table, _ = STUDY.present([level("interface", "a", 0.5, 1.0, *lone)]).tables

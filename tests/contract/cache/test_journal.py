@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from upd.cache.journal import Journal
+from upd.cache.arrays import Journal
 
 
 def test_a_journal_cut_short_is_read_as_far_as_it_goes(

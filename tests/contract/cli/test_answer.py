@@ -29,7 +29,7 @@ from upd.results import (
     outcome_of,
     status_of,
 )
-from upd.results.quantity import Quantity
+from upd.results.quantities import Quantity
 from upd.scene import ready_scenes
 
 _RESPONSE: Mapping[str, Any] = {

@@ -19,8 +19,7 @@ from upd.report.notes import warnings
 from upd.report.tables import answer_tables
 from upd.results import NO_CASE, Case, Check, Result, status_of
 from upd.results.answer_table import AnswerTable
-from upd.results.quantities import number_label
-from upd.results.quantity import Quantity
+from upd.results.quantities import Quantity, number_label
 
 PEAKS = AnswerTable(
     "Peaks",

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from upd import run
-from upd.batch import sweep
+from upd.batch.sweeps import sweep
 from upd.errors import InputError
 from upd.report.columns import text_width
 

@@ -14,6 +14,7 @@ import pytest
 
 import upd
 from upd.cli import main
+from upd.cli.app import app, command_table
 
 ROOT = Path(__file__).resolve().parents[3]
 NAMES = ("README.md", "benchmarks/README.md", "geometry/README.md", "upd/scenes/README.md")
@@ -57,23 +58,28 @@ def test_there_are_commands_of_every_kind() -> None:
     assert all(COMMANDS.values()), "every document has commands"
 
 
-def test_subcommands_are_those_of_the_program(capsys: pytest.CaptureFixture[str]) -> None:
-    """The README's table names every subcommand; no document names another."""
-    with pytest.raises(SystemExit):
-        main(["--help"])
-    known = set(re.findall(r"^│ ([a-z]+) ", capsys.readouterr().out, re.MULTILINE))
+def test_the_table_of_commands_is_that_of_the_program() -> None:
+    """The README's table has every command with its arguments, and says of it what --help says; its
+    options exist, and no document names another command.
+    """
+    rows = re.findall(r"^\| `(upd [^`]+)` \| (.+) \|$", TEXT["README.md"], re.MULTILINE)
+    table = command_table()
+    assert [text for _, text in rows] == [text for _, text in table]
+    for (shown, _), (usage, _) in zip(rows, table, strict=True):
+        command, *arguments = usage.partition(" --")[0].removeprefix("upd ").split()
+        assert shown.startswith(" ".join(["upd", command, *arguments]))
+        known = {
+            name
+            for argument in app[command].assemble_argument_collection()
+            for name in argument.names
+        }
+        assert set(re.findall(r"(?<=[ [])--?[a-z]+", shown)) <= known
     named = {
         word
         for text in TEXT.values()
         for word in re.findall(r"`(?:\./run\.sh )?upd ([a-z]+)", text)
     }
-    table = {
-        word
-        for row in TEXT["README.md"].splitlines()
-        if row.startswith("| `upd ")
-        for word in re.findall(r"`upd ([a-z]+)", row)
-    }
-    assert table == named == known
+    assert named == {usage.split()[1] for usage, _ in table}
 
 
 @pytest.mark.full

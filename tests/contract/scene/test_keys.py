@@ -14,8 +14,16 @@ from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.recipe_modules import READY
 from upd.scene import ForcedScene, ModalScene, Scene, SeatedScene, load_scene, ready_scenes
-from upd.scene.keys import SceneKey, chosen_keys, class_keys, entries, recipe_keys, scene_keys
-from upd.scene.written import scene_as_run, scene_to_start_from
+from upd.scene.keys import (
+    SceneKey,
+    chosen_keys,
+    class_keys,
+    entries,
+    recipe_keys,
+    scene_as_run,
+    scene_keys,
+    scene_to_start_from,
+)
 from upd.units import UNITS, parse_quantity, quantity_text, unit_inside
 
 EXAMPLE = Path(recipes.__file__).parents[1] / "scenes" / "examples" / "own_damper.toml"

@@ -10,8 +10,8 @@ import pytest
 from upd.errors import InputError
 from upd.measured import MeasuredCurve, fit_damping
 from upd.scene import load_scene
+from upd.scene.keys import scene_as_run
 from upd.scene.measured import FittedMode, modal_ratios
-from upd.scene.written import scene_as_run
 
 SCENE = """
 name = "lab"

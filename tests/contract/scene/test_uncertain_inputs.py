@@ -9,7 +9,7 @@ import pytest
 from upd.cli.describe import described, print_keys
 from upd.errors import InputError
 from upd.scene import load_scene
-from upd.scene.written import scene_as_run, scene_to_start_from
+from upd.scene.keys import scene_as_run, scene_to_start_from
 
 RIG = "symmetric-response"
 

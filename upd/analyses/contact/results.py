@@ -25,7 +25,7 @@ from upd.reference import hertz_pressure
 from upd.reference.printed import Lookup, Printed
 from upd.results import Case, ErrorPart, Result, with_parts
 from upd.results import quantities as q
-from upd.results.quantity import Quantity
+from upd.results.quantities import Quantity
 from upd.scene import Scene
 
 # How errors were estimated.

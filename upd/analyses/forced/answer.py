@@ -14,8 +14,7 @@ from upd.labels import plus_minus
 from upd.plot.chart import Entry
 from upd.results import quantities as q
 from upd.results.answer_table import AnswerTable
-from upd.results.quantities import quantity_of
-from upd.results.quantity import Quantity
+from upd.results.quantities import Quantity, quantity_of
 
 #: the numbers that matter, most important first (shell patterns), in tables of sweeps and studies
 MAIN = (

@@ -15,12 +15,12 @@ from upd.analyses.seated.varied import PATCH
 from upd.errors import InputError
 from upd.labels import percent
 from upd.plot.work_precision import change_charts
-from upd.results import Case
+from upd.results import Case, Result
 from upd.results.quantities import PEAK_ACCELERANCE, PEAK_FREQUENCY, quantity_of
 from upd.scene import ForcedScene
 from upd.vary.curves import ConvergenceCurve, make_curve
 from upd.vary.ladder import Asked, Ladder, StudyReport, chosen_levels, even
-from upd.vary.outcome import PointResult, SolvedPoint, without_failed
+from upd.vary.outcome import SolvedPoint, without_failed
 from upd.vary.tables import level_table, points_table
 from upd.vary.variation import Key, Overrides, Variation
 
@@ -169,7 +169,7 @@ def peak_numbers(one: SolvedPoint) -> Numbers:
     Peaks are numbered by the mode in which the blades move, so that numbers of levels whose
     contacts have other names belong together.
     """
-    found: dict[str, list[PointResult]] = {}
+    found: dict[str, list[Result]] = {}
     for result in one.outcome.results:
         # curves of linear limits have no F_C/F_E
         if quantity_of(result.name)[0] in _KINDS and result.case.force_ratio is not None:
@@ -177,11 +177,11 @@ def peak_numbers(one: SolvedPoint) -> Numbers:
     return {name: _level_number(results) for name, results in found.items()}
 
 
-def _level_number(results: Sequence[PointResult]) -> LevelNumber:
+def _level_number(results: Sequence[Result]) -> LevelNumber:
     """One number of the sweeps of a level."""
     mode = next((r.case.mode for r in results if r.case.mode), "")
-    values = [r.value for r in results if r.value is not None]
-    why = next((r.withheld for r in results if r.value is None), "")
+    values = [r.value for r in results if not r.withheld]
+    why = next((r.withheld for r in results if r.withheld), "")
     return LevelNumber(mode, (min(values), max(values)) if values else None, why)
 
 

@@ -30,8 +30,7 @@ from upd.analyses.forced.solution import ForcedSolution
 from upd.progress import Stages
 from upd.results import Case, ErrorPart, Estimates, Result
 from upd.results import quantities as q
-from upd.results.quantities import quantity_of
-from upd.results.quantity import Quantity
+from upd.results.quantities import Quantity, quantity_of
 from upd.scene.forced_contact import SIDES, Side
 from upd.vary.orders import observed_order, two_level_error
 from upd.vary.variation import Variation

@@ -23,8 +23,8 @@ from upd.hbm.core.fourier import harmonics, sample_count
 from upd.hbm.core.kept_factors import SOLUTIONS, WORTH_KEEPING
 from upd.mesh import recipes
 from upd.scene import ForcedScene
+from upd.scene.base import rig_parameters
 from upd.scene.forced_contact import GAUSS
-from upd.scene.rig import rig_parameters
 
 Array = NDArray[np.float64]
 #: harmonics of the blades and samples in a period where the scene leaves them to the rule: two

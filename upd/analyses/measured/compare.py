@@ -25,7 +25,7 @@ from upd.measured.compare import paired
 from upd.measured.curve import LEAST_POINTS
 from upd.results import ArrayGroup, Case, Check, ErrorPart, Result, variable, with_parts
 from upd.results import quantities as q
-from upd.results.quantity import Quantity
+from upd.results.quantities import Quantity
 from upd.scene.measured import MeasuredChoice, fit_of
 
 Array = NDArray[np.float64]

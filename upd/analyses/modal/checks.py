@@ -5,114 +5,77 @@ Every mode's residual and orthogonality, none missed, the reduction's upper boun
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
+from upd.analyses.base import Resolved
 from upd.analyses.measured import fit_checks
 from upd.analyses.modal.plan import MODES_ABOVE
 from upd.analyses.modal.solve import FAMILIES, ModalSolution, ModeSet, ReducedBlade, RigBody
 from upd.linalg import Modes
 from upd.linalg.eigen import RESIDUAL_LIMIT
-from upd.results import NO_CASE, Case, Check, left_out_check
+from upd.results import NO_CASE, Case, Check
+from upd.results import quantities as q
 
 
 def check_solution(solution: ModalSolution) -> list[Check]:
     """All self-checks."""
     checks = [check for found in solution.sets for check in _modes_checks(found)]
     checks += [_upper_bound(r) for r in solution.reductions]
-    if solution.response is not None:
+    response, compared = solution.response, list[tuple[str, float, str, str]]()
+    if response is not None:
         checks += fit_checks(solution.plan.scene.measured)
-    if solution.response is not None and solution.reductions:
-        worst = max(abs(r / f - 1.0) for r, f in solution.response.against_full.values())
-        remedy = "keep more fixed-interface modes: raise reduction.modes"
-        checks.append(
-            Check(
-                "reduced response",
-                NO_CASE,
-                worst,
-                0.02,
-                "|reduced / full - 1| off resonance",
-                remedy,
-                fatal=False,
+        if solution.reductions:
+            worst = max(abs(r / f - 1.0) for r, f in response.against_full.values())
+            remedy = "keep more fixed-interface modes: raise reduction.modes"
+            compared.append(
+                ("reduced response", worst, "|reduced / full - 1| off resonance", remedy)
             )
-        )
-    if solution.response is not None:
-        remedy = "the modes left out matter here: raise modes.below"
         text = "|modal / direct - 1| off resonance, undamped"
-        checks.append(
-            Check(
-                "modal response",
-                NO_CASE,
-                solution.response.modal_error,
-                0.02,
-                text,
-                remedy,
-                fatal=False,
-            )
-        )
+        remedy = "the modes left out matter here: raise modes.below"
+        compared.append(("modal response", response.modal_error, text, remedy))
+    checks += [
+        Check(name, NO_CASE, value, 0.02, statement, remedy, fatal=False)
+        for name, value, statement, remedy in compared
+    ]
     return checks + _left_out(solution)
 
 
 def _left_out(solution: ModalSolution) -> list[Check]:
     """Modes above the limit in the response, and what hex8 leaves out, on the number itself."""
-    scene, again, response = solution.plan.scene, solution.again, solution.response
-    checks = []
+    scene, response = solution.plan.scene, solution.response
+    found = []
     if response is not None and response.peak is not None and scene.left_out.solves:
-        checks.append(
-            left_out_check(
-                MODES_ABOVE,
-                Case(kind="free", blade="right"),
-                "peak_accelerance",
-                without=response.peak[1],
-                included=float("nan") if again.peak is None else again.peak,
-                unit="(m/s2)/N",
-                limit=scene.left_out.peak,
-                remedy="raise modes.below",
-            )
-        )
+        quantity, case = q.FREE_PEAK_ACCELERANCE, Case(kind="free", blade="right")
+        peak = math.nan if solution.more_modes is None else solution.more_modes
+        remedy = "raise modes.below"
+        found.append((MODES_ABOVE, quantity, case, response.peak[1], peak, remedy))
     free = next((s for s in solution.sets if s.kind == "free" and s.modes), None)
-    if again.unlocked is not None and free is not None:
-        checks.append(
-            left_out_check(
-                "shear locking",
-                free.case,
-                "f1_free",
-                without=free.modes[0].frequency,
-                included=again.unlocked,
-                unit="Hz",
-                limit=scene.left_out.frequency,
-                remedy='fully integrated hex8 is too stiff in bending: use mesh.element = "hex20" '
-                'or "hex8i"',
-            )
+    if solution.unlocked is not None and free is not None:
+        first, remedy = free.modes[0].frequency, 'use mesh.element = "hex20" or "hex8i"'
+        remedy = f"fully integrated hex8 is too stiff in bending: {remedy}"
+        found.append(("shear locking", q.F_FREE, free.case, first, solution.unlocked, remedy))
+    return [
+        Resolved(effect, quantity.named(1), case, without, included, quantity.unit, remedy).check(
+            scene.left_out
         )
-    return checks
+        for effect, quantity, case, without, included, remedy in found
+    ]
 
 
 def _modes_checks(found: ModeSet) -> list[Check]:
     """Residual and orthogonality of the modes as they are written, from K and M; none missed."""
-    case = found.case
+    case, report = found.case, "report this mesh"
     families = [_family(found, body, family, m) for body, family, m in found.found]
+    residual, off = (max(worst, default=0.0) for worst in zip(*families, strict=True))
+    statement = "||K x - lambda M x|| / ||lambda M x|| beyond rounding"
+    searches = [(f"{body.name} {family}".strip(), m) for body, family, m in found.found]
     return [
-        Check(
-            "mode residual",
-            case,
-            max((residual for residual, _ in families), default=0.0),
-            RESIDUAL_LIMIT,
-            "||K x - lambda M x|| / ||lambda M x|| beyond rounding",
-            "report this mesh",
-        ),
-        Check(
-            "orthogonality",
-            case,
-            max((off for _, off in families), default=0.0),
-            1e-8,
-            "largest |X'MX - 1|",
-            "report this mesh",
-        ),
-        no_mode_missed(
-            case, [(f"{body.name} {family}".strip(), m) for body, family, m in found.found]
-        ),
+        Check("mode residual", case, residual, RESIDUAL_LIMIT, statement, report),
+        Check("orthogonality", case, off, 1e-8, "largest |X'MX - 1|", report),
+        no_mode_missed(case, searches),
     ]
 
 
@@ -150,12 +113,6 @@ def _family(found: ModeSet, body: RigBody, family: str, solved: Modes) -> tuple[
 
 def _upper_bound(r: ReducedBlade) -> Check:
     """A Ritz method never lowers a frequency."""
-    lowered = max(0.0, float((1.0 - r.frequency / r.full).max(initial=0.0)))
-    return Check(
-        "upper bound",
-        Case(body=r.body.name),
-        lowered,
-        1e-7,
-        "largest 1 - f reduced / f full",
-        "report this mesh",
-    )
+    lowered, case = max(0.0, float((1.0 - r.frequency / r.full).max())), Case(body=r.body.name)
+    statement = "largest 1 - f reduced / f full"
+    return Check("upper bound", case, lowered, 1e-7, statement, "report this mesh")

@@ -5,6 +5,7 @@ Modes, responses, reduced models, pictures of the mode shapes.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,29 +27,6 @@ from upd.results import ArrayGroup, Case, variable
 #: modes drawn of each configuration
 _DRAWN = 4
 _SIZE = (4.2, 5.2)
-
-
-def write_pictures(solution: ModalSolution, folder: Path) -> list[Path]:
-    """Write modes_free.png and modes_glued.png, the lowest modes of every arrangement.
-
-    Returns their paths.
-    """
-    made: list[Path] = []
-    for kind in ("free", "glued"):
-        drawings = [d for s in solution.sets if s.kind == kind for d in mode_drawings(solution, s)]
-        made += write_sheet(folder / f"modes_{kind}.png", drawings, _DRAWN, _SIZE)
-    return made
-
-
-def mode_drawings(solution: ModalSolution, found: ModeSet) -> list[Drawing]:
-    """One drawing per mode, lowest first."""
-    meshes, shapes = whole_shapes(solution, found)
-    out: list[Drawing] = []
-    for k, (mode, shape) in enumerate(shapes[:_DRAWN]):
-        who = "" if mode.body.name == "rig" else f", {mode.body.name} blade"
-        title = f"{found.arrangement}, {found.kind} {k + 1}{who}\n{mode.frequency:.2f} Hz"
-        out.append(lambda ax, s=shape, t=title: draw_mode(meshes, s, ax, title=t))  # type: ignore[misc]
-    return out
 
 
 #: what the groups of result.nc hold, their attribute ``content``
@@ -137,25 +115,31 @@ def write_files(solution: ModalSolution, folder: Path) -> None:
                 folder / "matrices" / f"{name}.mapping", DofMap.of_dofs(r.free[r.model.boundary])
             )
     if scene.wants("pictures"):
-        # matplotlib is slow to import: only when pictures are wanted.
-        from upd.analyses.modal.output import write_pictures
-
-        write_pictures(solution, folder)
         _write_shapes(solution, folder)
 
 
 def _write_shapes(solution: ModalSolution, folder: Path) -> None:
-    """Meshes with the mode shapes of every configuration."""
+    """Meshes with the mode shapes of every configuration; pictures of the lowest ones in
+    modes_free.png and modes_glued.png.
+    """
     # meshio is slow to import: only when files are wanted.
     from upd.mesh.export import write_fields
 
+    drawings: dict[str, list[Drawing]] = {}
     for found in solution.sets:
         meshes, shapes = whole_shapes(solution, found)
         data: dict[str, dict[str, Array]] = {name: {} for name in meshes}
-        for k, (mode, shape) in enumerate(shapes):
+        for k, (mode, shape) in enumerate(shapes, 1):
             for name, u in shape.items():
-                data[name][f"mode_{k + 1:02d}_{mode.frequency:.1f}Hz"] = u
+                data[name][f"mode_{k:02d}_{mode.frequency:.1f}Hz"] = u
+            if k <= _DRAWN:
+                who = "" if mode.body.name == "rig" else f", {mode.body.name} blade"
+                title = f"{found.arrangement}, {found.kind} {k}{who}\n{mode.frequency:.2f} Hz"
+                picture = partial(draw_mode, meshes, shape, title=title)
+                drawings.setdefault(found.kind, []).append(picture)
         write_fields(folder / f"modes_{found.kind}_{found.arrangement}.vtu", meshes, data)
+    for kind, mine in drawings.items():
+        write_sheet(folder / f"modes_{kind}.png", mine, _DRAWN, _SIZE)
 
 
 # -- mode shapes on whole bodies: what half a rig saves is mirrored about y = 0 --------------------

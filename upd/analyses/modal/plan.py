@@ -120,51 +120,38 @@ def needs(plan: ModalPlan, threads: int) -> Needs:
 
 
 def _effects(scene: RigScene, symmetry: str) -> list[Effect]:
-    half = symmetry == "half"
-    response = scene.wants("response")
-    higher = MORE_MODES * scene.modes.below
-    return [
-        Effect(
+    """Each with why it is simulated, and why it is not, where the scene does not ask for it."""
+    response, unasked = scene.wants("response"), "not asked for"
+    rows = [
+        (
             "mirror families",
-            half,
-            "modes even and odd about y = 0, each on half the rig"
-            if half
-            else "asked for in the scene",
-            applies=half,
+            symmetry == "half",
+            "modes even and odd about y = 0, each on half the rig",
+            "asked for in the scene",
         ),
-        Effect(
-            "damper",
-            scene.wants("glued"),
-            "glued to both platforms" if scene.wants("glued") else "no output asks for it",
-            applies=scene.wants("glued"),
-        ),
-        Effect(
-            f"modes above {scene.modes.below:g} Hz",
-            False,
-            "in the response by their static share" if response else "not asked for",
-            MODES_ABOVE if response else "",
-            (f"modes.below={higher:g} Hz",),
-            applies=response,
-        ),
-        Effect(
+        ("damper", scene.wants("glued"), "glued to both platforms", "no output asks for it"),
+        (
             "reduction",
             scene.wants("reduction"),
-            f"{scene.reduction.words} a blade beside patch and probes"
-            if scene.wants("reduction")
-            else "not asked for",
-            applies=scene.wants("reduction"),
+            f"{scene.reduction.words} a blade beside patch and probes",
+            unasked,
         ),
-        Effect(
-            "response",
-            response,
-            "modal, from the modes found" if response else "not asked for",
-            applies=response,
-        ),
-        Effect("centrifugal stiffening", False, "the rig does not turn", applies=False),
-        Effect(
+        ("response", response, "modal, from the modes found", unasked),
+        ("centrifugal stiffening", False, "", "the rig does not turn"),
+        (
             "friction",
             False,
+            "",
             "free and glued are linear; the damper's contact is the forced response's",
-            applies=False,
         ),
     ]
+    effects = [Effect(name, on, why if on else off, applies=on) for name, on, why, off in rows]
+    above = Effect(
+        f"modes above {scene.modes.below:g} Hz",
+        False,
+        "in the response by their static share" if response else unasked,
+        MODES_ABOVE if response else "",
+        (f"modes.below={MORE_MODES * scene.modes.below:g} Hz",),
+        applies=response,
+    )
+    return [*effects[:2], above, *effects[2:]]

@@ -14,7 +14,6 @@ from scipy.sparse.linalg import spsolve
 from upd.analyses.modal.plan import MORE_MODES, ModalPlan, configurations, parameters
 from upd.dynamics import (
     ModalSystem,
-    TunedDamping,
     find_peaks,
     frequency_response,
     modal_system,
@@ -46,8 +45,6 @@ class RigBody:
     """One body of one configuration: mesh (half or whole), K and M with all dofs."""
 
     name: str
-    arrangement: str
-    kind: str
     mesh: Mesh
     K: Symmetric
     M: Symmetric
@@ -120,7 +117,7 @@ class RigResponse:
     accelerance
         "free" or "glued" -> blade -> (n,) at its accelerometer, (m/s2)/N.
     damping
-        Modal damping ratio; ``tuned``: how it was found from a measured peak.
+        Modal damping ratio.
     peak
         Frequency in Hz and height in (m/s2)/N of the free right blade's peak in the band, if any.
     half_power
@@ -135,11 +132,9 @@ class RigResponse:
     """
 
     arrangement: str
-
     frequency: Array
     accelerance: dict[str, dict[str, NDArray[np.complex128]]]
     damping: float
-    tuned: TunedDamping | None
     peak: tuple[float, float] | None
     half_power: float
     participation: float
@@ -147,34 +142,28 @@ class RigResponse:
     against_full: dict[float, tuple[float, float]]
 
 
-@dataclass(frozen=True)
-class SolvedAgain:
-    """Numbers solved again with what the run leaves out.
+@dataclass
+class ModalSolution:
+    """All that was solved, for results, arrays and files.
 
     Attributes
     ----------
-    peak
+    more_modes
         Height of the free right blade's peak with the modes up to twice the limit, (m/s2)/N; None
         without a peak.
     unlocked
         First free frequency with the incompatible modes that hex8 leaves out, Hz; None for another
         element.
+    estimates
+        Of its numbers, where the levels were chosen by an accuracy.
     """
-
-    peak: float | None = None
-    unlocked: float | None = None
-
-
-@dataclass
-class ModalSolution:
-    """All that was solved, for results, arrays and files."""
 
     plan: ModalPlan
     sets: list[ModeSet] = field(default_factory=list)
     reductions: list[ReducedBlade] = field(default_factory=list)
     response: RigResponse | None = None
-    again: SolvedAgain = field(default_factory=SolvedAgain)
-    #: of its numbers, where the levels were chosen by an accuracy
+    more_modes: float | None = None
+    unlocked: float | None = None
     estimates: Estimates | None = None
 
 
@@ -194,7 +183,8 @@ def solve(plan: ModalPlan, stages: Stages) -> ModalSolution:
                 solution.response = _response(solution)
         if plan.scene.left_out.solves:
             with stages("effects left out", "each solved again"):
-                solution.again = SolvedAgain(_peak_with_more_modes(solution), _unlocked(solution))
+                solution.more_modes = _peak_with_more_modes(solution)
+                solution.unlocked = _unlocked(solution)
     except BaseException as error:
         error.partial = solution  # type: ignore[attr-defined]
         raise
@@ -209,8 +199,6 @@ def _bodies(plan: ModalPlan, arrangement: str, kind: str, symmetry: str) -> list
     def body(name: str, mesh: Mesh) -> RigBody:
         return RigBody(
             name,
-            arrangement,
-            kind,
             mesh,
             Symmetric.of(stiffness(mesh, material, scene.mesh.element)),
             Symmetric.of(mass(mesh, material)),
@@ -277,9 +265,8 @@ def _reduced(solution: ModalSolution, body: RigBody) -> ReducedBlade:
     free = body.free(())
     kept = np.concatenate([body.mesh.nodes[name] for name in ("patch", "force", "accelerometer")])
     boundary = np.searchsorted(free, (3 * np.unique(kept)[:, None] + np.arange(3)).ravel())
-    full = [
-        m.frequency for m in free_set(solution, body.arrangement).modes if m.body.name == body.name
-    ]
+    free_modes = free_set(solution, scene.modes.arrangements[0]).modes
+    full = [m.frequency for m in free_modes if m.body.name == body.name]
     if not full:
         raise InputError(
             f"modes.below: the {body.name} blade has no mode below {scene.modes.below:g} "
@@ -337,22 +324,23 @@ def probe(mesh: Mesh, name: str) -> int:
     return 3 * int(mesh.nodes[name][0]) + _AXIS_X
 
 
+def probes(mesh: Mesh) -> tuple[int, int]:
+    """Dofs of the force and of the accelerometer of a blade."""
+    return probe(mesh, "force"), probe(mesh, "accelerometer")
+
+
 def _response(solution: ModalSolution) -> RigResponse:
     scene = solution.plan.scene
     choice, arrangement = scene.response, scene.modes.arrangements[0]
     grid = np.linspace(choice.start, choice.stop, choice.points)
     free, body, family = _system_modes(free_set(solution, arrangement), ("right",))
-    mesh, static = body.mesh, _static(body, family)
-    force, output = probe(mesh, "force"), probe(mesh, "accelerometer")
+    static, (force, output) = _static(body, family), probes(body.mesh)
     band = (choice.start, choice.stop)
-    tuned = None
+    system = modal_system(free, choice.damping, static=static)
     zeta = choice.damping
     if choice.peak is not None:
-        tuned = tune_damping(
-            modal_system(free, zeta, static=static), force, [output], choice.peak, band=band
-        )
-        zeta = tuned.zeta
-    system = modal_system(free, zeta, static=static)
+        zeta = tune_damping(system, force, [output], choice.peak, band=band).zeta
+        system = modal_system(free, zeta, static=static)
     found = frequency_response(system, force, [output], grid)
     curves = {"free": {"right": found.H[:, 0], "left": np.zeros(len(grid), complex)}}
     at, height = peak_response(system, force, [output], band)
@@ -370,7 +358,6 @@ def _response(solution: ModalSolution) -> RigResponse:
         grid,
         curves,
         zeta,
-        tuned,
         peak,
         _half_power(system, force, output, at, zeta) if peak else float("nan"),
         1e-3 * abs(float(nearest[force] * nearest[output])),
@@ -392,7 +379,7 @@ def _peak_with_more_modes(solution: ModalSolution) -> float | None:
     system = modal_system(
         replace(found, shapes=shapes), response.damping, static=_static(body, family)
     )
-    force, output = probe(body.mesh, "force"), probe(body.mesh, "accelerometer")
+    force, output = probes(body.mesh)
     band = (scene.response.start, scene.response.stop)
     return float(peak_response(system, force, [output], band)[1])
 
@@ -458,21 +445,28 @@ def modal_error(own: Modes, body: RigBody, family: str) -> float:
     """Undamped modal response, static correction included, against direct solves of K - w^2 M off
     resonance: what the band leaves out.
     """
-    free = body.free(FAMILIES.get(family, ()))
-    force, output = probe(body.mesh, "force"), probe(body.mesh, "accelerometer")
+    free, (force, output) = body.free(FAMILIES.get(family, ())), probes(body.mesh)
     f = np.zeros(3 * body.mesh.n_node)
     f[force] = 1.0
     natural, rest = (2.0 * np.pi * own.frequency) ** 2, _static(body, family)(f)
+    direct = _undamped(body, free)
     worst = 0.0
     for part in OFF_RESONANCE:
         w2 = (part**2) * natural[0]
-        u = np.zeros(3 * body.mesh.n_node)
-        A = whole(combined(body.K.submatrix(free), -w2, body.M.submatrix(free)))
-        u[free] = spsolve(A.tocsc(), (0.5 if family else 1.0) * f[free])
+        u = (0.5 if family else 1.0) * direct(w2)
         share = own.shapes[force]
         modal = own.shapes[output] @ (share / (natural - w2) - share / natural) + rest[output]
-        worst = max(worst, abs(float(modal) / float(u[output]) - 1.0))
+        worst = max(worst, abs(float(modal) / u - 1.0))
     return worst
+
+
+def _undamped(body: RigBody, free: NDArray[np.int64]) -> Callable[[float], float]:
+    """w^2 -> displacement of the accelerometer per unit force, by a direct solve of K - w^2 M."""
+    K, M = body.K.submatrix(free), body.M.submatrix(free)
+    force, output = np.searchsorted(free, probes(body.mesh))
+    f = np.zeros(len(free))
+    f[force] = 1.0
+    return lambda w2: float(spsolve(whole(combined(K, -w2, M)).tocsc(), f)[output])
 
 
 def _against_full(solution: ModalSolution) -> dict[float, tuple[float, float]]:
@@ -482,17 +476,11 @@ def _against_full(solution: ModalSolution) -> dict[float, tuple[float, float]]:
     one = next((r for r in solution.reductions if r.body.name == "right"), None)
     if one is None:
         return {}
-    body, free = one.body, one.free
-    force, output = (
-        int(np.searchsorted(free, probe(body.mesh, name))) for name in ("force", "accelerometer")
-    )
-    f = np.zeros(len(free))
-    f[force] = 1.0
+    force, output = (int(at) for at in np.searchsorted(one.free, probes(one.body.mesh)))
+    direct = _undamped(one.body, one.free)
     out = {}
-    K, M = body.K.submatrix(free), body.M.submatrix(free)
     for part in OFF_RESONANCE:
         w2 = (2.0 * np.pi * part * float(one.full[0])) ** 2
-        full = float(spsolve(whole(combined(K, -w2, M)).tocsc(), f)[output])
         q = np.linalg.solve(one.model.K - w2 * one.model.M, one.model.at([force])[0])
-        out[part] = (-1e-3 * w2 * float(one.model.at([output])[0] @ q), -1e-3 * w2 * full)
+        out[part] = (-1e-3 * w2 * float(one.model.at([output])[0] @ q), -1e-3 * w2 * direct(w2))
     return out

@@ -118,8 +118,8 @@ def _by_modes(solution: ModalSolution, numbers: Sequence[Result]) -> Estimates:
         if full is not None:
             error = abs(one.value / full.value - 1.0)
             out[one.name, one.case] = (ErrorPart(KEPT, error, "against the full model"),)
-        if one.name == q.FREE_PEAK_ACCELERANCE.name and solution.again.peak is not None:
-            error = abs(solution.again.peak / one.value - 1.0)
+        if one.name == q.FREE_PEAK_ACCELERANCE.name and solution.more_modes is not None:
+            error = abs(solution.more_modes / one.value - 1.0)
             basis = "solved again with the modes up to twice the limit"
             out[one.name, one.case] = (ErrorPart(KEPT, error, basis),)
     return out

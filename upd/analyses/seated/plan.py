@@ -16,7 +16,7 @@ from upd.cache.sources import key_of
 from upd.labels import number
 from upd.mesh import recipes
 from upd.scene import SeatedScene
-from upd.scene.rig import rig_parameters
+from upd.scene.base import rig_parameters
 from upd.scene.rotation import damper_mass
 from upd.units import UNITS
 

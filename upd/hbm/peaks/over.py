@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from upd.cache.journal import Journal
+from upd.cache.arrays import Journal
 from upd.errors import ConvergenceError
 from upd.hbm.peaks.parameter_change import ParameterChange
 from upd.hbm.peaks.sensitivity import peak_derivatives
