@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from upd.errors import InputError
 from upd.hbm import NonlinearMode, contacts, frequency_response, nonlinear_mode
 from upd.hbm.core.fourier import harmonics
-from upd.hbm.springs.assembled import assembled
+from upd.hbm.springs.balance import assembled
 from upd.hbm.springs.nonlinear_mode import ExtendedBalance, stuck_modes
 
 FloatArray = NDArray[np.float64]

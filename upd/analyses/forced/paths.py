@@ -13,8 +13,7 @@ import numpy as np
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.hbm import FrequencyResponse, Settings, frequency_response, harmonics
-from upd.hbm.springs.assembled import assembled
-from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.balance import Balance, assembled
 
 #: half width of the band around a peak in which it is looked for, as a share of its frequency, and
 #: the points in it

@@ -176,7 +176,6 @@ class InterfaceEquations:
         m, r = len(model.frequency), len(model.load)
         self.rigid = slice(m, m + r)
         self.damper = model.columns.T @ self.by_moves
-        self.work = np.empty((3 * model.n, 3 * model.n))
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -375,28 +374,12 @@ class InterfaceEquations:
             F, Y, S = known.force.copy(), known.relative.copy(), known.state.copy()
         end, x0 = rigid.copy(), np.zeros(3 * n)
         done, given, fallbacks = 0, False, 0
+        rigid_rows = np.ascontiguousarray(step.Z[:, m : m + r].T)
+        parts = (rigid_rows, step.W, model.columns, step.J)
+        law, past = (model.friction, step.rho_n, step.rho_t), (F, Y, S, *self.kept)
         while True:
             done = given_blades(
-                done,
-                given,
-                known is not None,
-                pushes,
-                np.ascontiguousarray(step.Z[:, m : m + r].T),
-                step.W,
-                model.columns,
-                step.J,
-                model.load,
-                model.friction,
-                step.rho_n,
-                step.rho_t,
-                end,
-                c,
-                F,
-                Y,
-                S,
-                *self.kept,
-                x0,
-                self.work,
+                done, given, known is not None, pushes, parts, law, model.load, end, c, past, x0
             )
             if done == N:
                 break

@@ -51,9 +51,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve, expm
 
 from upd.errors import ConvergenceError
-from upd.hbm.faces.bases import suit_bases
 from upd.hbm.faces.kept import kept_inverses
-from upd.hbm.faces.period import Bases, Past, StepParts, march_steps
+from upd.hbm.faces.period import Bases, Past, StepParts, march_steps, suit_bases
 from upd.hbm.faces.state import FloatArray, InterfaceModel, InterfaceState
 from upd.hbm.faces.step import OPEN, STICK, judge
 
@@ -250,7 +249,7 @@ class InterfaceMarch:
             if model.springs is None
             else np.ascontiguousarray(model.springs, float),
         )
-        self.x0, self.work = np.zeros(3 * n), np.empty((3 * n, 3 * n))
+        self.x0 = np.zeros(3 * n)
         self.known, self.which = False, np.zeros(samples, np.int64)
         self.bases: Bases
         if like is None or not alike or like.model.n != n:
@@ -345,24 +344,36 @@ class InterfaceMarch:
         ConvergenceError
             When a step has no answer that any of the solvers finds.
         """
-        N = self.samples
-        out, sums, known = np.zeros((N, len(self.model.seen_modes))), np.zeros(4), self.known
-        done, given, fallbacks = 0, False, 0
+        out, sums = self.room()
+        fallbacks = self.advance(at, out, sums)
+        return self.period_of(out, sums, fallbacks, record=record)
+
+    def room(self) -> tuple[FloatArray, FloatArray]:
+        """Where `advance` writes: outputs (N, K), and four sums."""
+        return np.zeros((self.samples, len(self.model.seen_modes))), np.zeros(4)
+
+    def advance(self, at: InterfaceState, out: FloatArray, sums: FloatArray) -> int:
+        """March one period and leave of it what is written and the past.
+
+        Parameters
+        ----------
+        at : InterfaceState
+            Overwritten.
+        out, sums : ndarray
+            Overwritten as `upd.hbm.faces.period.march_steps` does.
+
+        Returns
+        -------
+        int
+            Steps that the slow solver had to finish.
+        """
+        sums[:] = 0.0
+        parts, motion, past = tuple(self.steps), at.arrays(), tuple(self.past)
+        N, known, done, given, fallbacks = self.samples, self.known, 0, False, 0
         while done < N:
+            bases = tuple(self.bases)
             done = march_steps(
-                done,
-                N,
-                given,
-                tuple(self.steps),
-                tuple(self.bases),
-                self.which,
-                at.arrays(),
-                known,
-                tuple(self.past),
-                self.x0,
-                self.work,
-                out,
-                sums,
+                done, N, given, parts, bases, self.which, motion, known, past, self.x0, out, sums
             )
             given = done < N
             if given:
@@ -370,25 +381,12 @@ class InterfaceMarch:
                 fallbacks += 1
         self.known = True
         self.suit()
-        return self.period_of(out, sums, fallbacks, record=record)
+        return fallbacks
 
     def period_of(
         self, out: FloatArray, sums: FloatArray, fallbacks: int, *, record: bool = False
     ) -> InterfacePeriod:
-        """The last period from its outputs and sums.
-
-        Parameters
-        ----------
-        out, sums
-            As `upd.hbm.faces.period.march_steps` leaves them.
-        fallbacks : int
-        record : bool
-            Whether forces and states of all samples are kept.
-
-        Returns
-        -------
-        InterfacePeriod
-        """
+        """The last period from its outputs and sums; parameters as of `advance` and `period`."""
         N, n, past = self.samples, self.model.n, self.past
         counts = np.array([(past.state == kind).sum() for kind in (OPEN, STICK)] + [0], float)
         counts[2] = n * N - counts.sum()

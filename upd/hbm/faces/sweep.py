@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import ConvergenceError, InputError
 from upd.hbm.faces.march import Fallback, InterfaceMarch
-from upd.hbm.faces.periods import WINDOW
-from upd.hbm.faces.settle import SteadyPoint, settle
+from upd.hbm.faces.settle import WINDOW, SteadyPoint, settle
 from upd.hbm.faces.state import ComplexArray, FloatArray, InterfaceModel, InterfaceState
 
 __all__ = ["SteadyPoint", "SteppedSine", "settle", "stepped_sine"]

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from upd.hbm.core.fourier import to_complex
 from upd.hbm.core.newton import Function, Settings, Solution, cross_section
 from upd.hbm.core.path_step import State, begin, direction_reversed, walk
 from upd.hbm.springs.balance import Balance
@@ -77,10 +76,8 @@ class _Measure:
 
     def amplitude(self, x: FloatArray, frequency: float) -> float:
         """|row @ q| alone, mm."""
-        b, j = self.b, self.place
-        F = to_complex(b.force(x).force.reshape(len(b.Psi), -1), b.harmonics)[:, j]
-        w = np.array([2 * np.pi * b.harmonics.dynamic[j] * frequency])
-        eta = b.modal.solve(w, b.loads[j : j + 1] - F @ b.Psi)[0]
+        F = self.b.force(x).force.reshape(len(self.b.Psi), -1)
+        eta = self.b.amplitudes(F, 2 * np.pi * frequency)[self.place]
         return float(abs(eta @ self.modal_row))
 
     def slope(self, x: FloatArray, p: float, direction: FloatArray) -> float:

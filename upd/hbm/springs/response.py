@@ -17,8 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from upd.errors import InputError
 from upd.hbm.core.fourier import Harmonics, harmonics, to_complex
 from upd.hbm.core.newton import Settings
-from upd.hbm.springs.assembled import assembled
-from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.balance import Balance, assembled
 from upd.hbm.springs.checks import measures
 from upd.hbm.springs.damper import RigidDamper
 from upd.hbm.springs.friction import Start
