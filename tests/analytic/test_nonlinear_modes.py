@@ -162,9 +162,8 @@ def test_jacobian_by_differences(amplitude: float, proportional: bool) -> None:
         preload=[1.0, 0.3],
     )
     static = np.array([0.1, 0.05])
-    b = assembled(one, damping, K, points, {}, static, samples=256, fast_exits=False)(
-        harmonics((0, 1, 2, 3))
-    )
+    h = harmonics((0, 1, 2, 3))
+    b = assembled(one, damping, K, points, {}, static, h, samples=256, fast_exits=False)
     stuck, omegas, number = stuck_modes(b, 1)
     extended = ExtendedBalance(b, stuck[:, number], float(omegas[number]))
     p, rng, h = np.log(amplitude), np.random.default_rng(0), 1e-6

@@ -93,19 +93,19 @@ def balance_of(
     if given is not None:
         slider = np.zeros((len(given), 2))
         slider[:, : given.shape[1]] = given
-    problem = assembled(
+    return assembled(
         model.M,
         model.C,
         model.K,
         model.contacts,
         model.harmonic_force(force),
         model.static,
+        harmonics(numbers),
         joined_to=(model.damper, model.damper_rows),
         samples=samples or (None if b.samples == "auto" else b.samples),
         start=b.slider,
         slider=slider,
     )
-    return problem(harmonics(numbers))
 
 
 @contextmanager

@@ -10,7 +10,7 @@ is (1 + d) n_point (2 H + 1) + n_rigid, whatever the size of K.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -606,14 +606,15 @@ def assembled(
     contacts: Contacts,
     force: Mapping[int, ComplexArray],
     static: FloatArray,
+    h: Harmonics,
     *,
     joined_to: tuple[RigidDamper, FloatArray] | None = None,
     samples: int | None = None,
     start: Start = "zero",
     slider: FloatArray | None = None,
     fast_exits: bool = True,
-) -> Callable[[Harmonics], Balance]:
-    """The condensed problem as a function of its harmonics.
+) -> Balance:
+    """The condensed problem of a system, with a damper where one is given.
 
     Parameters
     ----------
@@ -624,6 +625,7 @@ def assembled(
         Harmonic number -> (n,) complex amplitude [N].
     static : (n,) ndarray
         [N]
+    h : Harmonics
     joined_to : (RigidDamper, (n_point, 1 + d, n_dof of the damper) ndarray), optional
         A damper, whose dofs and centrifugal force are appended, and its share of the rows.
     samples : int, optional
@@ -635,8 +637,7 @@ def assembled(
 
     Returns
     -------
-    callable
-        Harmonics -> Balance.
+    Balance
     """
     if joined_to is not None:
         damper, rows = joined_to
@@ -645,13 +646,8 @@ def assembled(
         force = {k: np.concatenate([v, np.zeros(damper.n_dof)]) for k, v in force.items()}
     if fast_exits and contacts.tangents and not np.any(contacts.law.mu):
         contacts = frictionless(contacts)
-    system = modal(M, C, K)
-
-    def problem(h: Harmonics) -> Balance:
-        dynamic = np.zeros((len(h.dynamic), len(static)), dtype=complex)
-        for k, amplitude in force.items():
-            dynamic[h.place(k)] = amplitude
-        count = sample_count(h, samples)
-        return Balance(system, contacts, h, count, static, dynamic, start, slider)
-
-    return problem
+    dynamic = np.zeros((len(h.dynamic), len(static)), dtype=complex)
+    for k, amplitude in force.items():
+        dynamic[h.place(k)] = amplitude
+    count = sample_count(h, samples)
+    return Balance(modal(M, C, K), contacts, h, count, static, dynamic, start, slider)

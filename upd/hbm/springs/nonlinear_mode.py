@@ -29,7 +29,7 @@ from upd.hbm.core.continuation import follow
 from upd.hbm.core.fourier import harmonics as harmonics_of
 from upd.hbm.core.newton import Settings, solve
 from upd.hbm.springs import response
-from upd.hbm.springs.balance import Balance, assembled
+from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.checks import measures
 from upd.hbm.springs.damper import RigidDamper
 from upd.hbm.springs.friction import Start
@@ -255,26 +255,11 @@ def nonlinear_mode(
         problems.append("a preload is negative")
     if problems:
         raise InputError(f"nonlinear_mode: {'; '.join(problems)}")
-    A = response.dense("nonlinear_mode", M, C, K)
-    n = len(A[0])
-    static = np.zeros(n) if static_force is None else np.asarray(static_force, dtype=float)
-    paired = (damper is None) == (damper_rows is None)
-    none = {1: np.zeros(n, dtype=complex)}
-    response.require("nonlinear_mode", np.ones(1), static, none, contacts, n, paired, start)
-    response.require_static("nonlinear_mode", h, static, damper)
-    if slider is not None:
-        slider = response.sliders_of("nonlinear_mode", slider, contacts)
-    b = assembled(
-        *A,
-        contacts,
-        none,
-        static,
-        joined_to=None if damper is None or damper_rows is None else (damper, damper_rows),
-        samples=samples,
-        start=start,
-        slider=slider,
-        fast_exits=False,
-    )(h)
+    rows = (damper, damper_rows)
+    given = response.System(
+        M, C, K, contacts, static_force, *rows, h.numbers, samples, start, slider
+    )
+    b = given.balance("nonlinear_mode", np.ones(1), None, fast_exits=False)
     with threads_for(b.size):
         return _along(b, mode, np.log(a), settings or Settings())
 
