@@ -472,10 +472,8 @@ class Balance:
 
     def _sprung(self, w: FloatArray, loads: ComplexArray, k: FloatArray) -> ComplexArray:
         """Motion (n, c) of rows on springs k (c,) at w (n,) rad/s under modal loads (n, m)."""
-        real, imag = self.modal.receptance(self.Psi, w)
-        free = self.modal.solve(w, loads) @ self.Psi.T
-        A = np.eye(len(k)) + (real + 1j * imag) * k
-        return np.asarray(np.linalg.solve(A, free[..., None])[..., 0])
+        G, u = self.modal.receptance(self.Psi, w, loads)
+        return np.asarray(np.linalg.solve(np.eye(len(k)) + G * k, u[..., None])[..., 0])
 
     def displacement(self, omega: FloatArray, force: FloatArray, rigid: FloatArray) -> FloatArray:
         """Displacement of all dofs from the contact forces.

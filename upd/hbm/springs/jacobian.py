@@ -217,7 +217,7 @@ class BalanceJacobian(NamedTuple):
         D, of, o = self.every_derivative(), self.of, self.of.offset
         n_point, d1, size = D.shape[:3]
         c, m, D = len(of.Psi), len(of.Psi) * size, D.reshape(n_point, d1, size, -1)
-        real, imag = of.modal.receptance(of.Psi, self.w)
+        real, imag = of.modal.receptance_parts(of.Psi, self.w)
         G = (real + 1j * imag).reshape(-1, c, n_point, d1)
         force = D[:, :, o::2] - 1j * D[:, :, o + 1 :: 2]
         # (harmonic, point, row, column of the point)
@@ -373,7 +373,7 @@ class EveryPoint(Factors):
         rigid = len(D) - n
         across, column = self._by_coefficient(normal[:-1]), self._by_coefficient(dp) * p_scale
         self._factorise(
-            (*of.modal.receptance(of.Psi, J.w), of.G0, of.R, np.zeros((rigid, rigid))),
+            (*of.modal.receptance_parts(of.Psi, J.w), of.G0, of.R, np.zeros((rigid, rigid))),
             J.DF if len(J.DF) == len(J.state) else J.every_derivative(),
             np.ascontiguousarray(D[:n].reshape(c, size).T),
             (across, np.zeros((size, c)), column, float(normal[-1])),
@@ -404,7 +404,7 @@ class Eliminated(Factors):
         s, m = np.flatnonzero(held), np.flatnonzero(~held)
         self.s, self.m = s, m
         K = J.held.ravel()[s]
-        real, imag = of.modal.receptance(of.Psi, J.w)
+        real, imag = of.modal.receptance_parts(of.Psi, J.w)
         G = real + 1j * imag
         one, down, own = np.eye(len(s)), s[:, None], m[:, None]
         # (I + G_ss K)^-1 and with it G_sm
@@ -498,7 +498,7 @@ class LowRank(Factors):
         place = np.arange(size)
         H[:, place, place, :] += held[:, None, :]
         DF = np.ascontiguousarray(H.transpose(0, 1, 3, 2))[None]
-        real, imag = of.modal.receptance(basis.T @ of.Psi, J.w)
+        real, imag = of.modal.receptance_parts(basis.T @ of.Psi, J.w)
         # one size for all coordinates of a coefficient
         unit = D[:n].reshape(c, size).max(axis=0)
         self.unit = np.repeat(unit, r)

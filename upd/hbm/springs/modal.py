@@ -93,8 +93,10 @@ class Modal:
             inverse = 1 / (self.eigenvalues - w[:, None] ** 2 + 1j * w[:, None] * diagonal)
             return np.abs(inverse @ (Psi**2).T)
 
-    def receptance(self, Psi: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Receptance between rows, Psi D^-1 Psi'.
+    def receptance(
+        self, Psi: FloatArray, w: FloatArray, load: ComplexArray
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Receptance between rows, and their motion under a load.
 
         Parameters
         ----------
@@ -102,17 +104,35 @@ class Modal:
             Rows on the modes.
         w : (n_w,) ndarray
             Angular frequencies [rad/s].
+        load : (n_w, m) ndarray of complex
+            Modal loads.
 
         Returns
         -------
-        real, imag : (n_w, r, r) ndarray
-            [mm/N], not finite at an undamped natural frequency.
+        G : (n_w, r, r) ndarray of complex
+            Psi D^-1 Psi' [mm/N], not finite at an undamped natural frequency.
+        u : (n_w, r) ndarray of complex
+            Psi D^-1 load [mm].
         """
+        if self.proportional:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                inverse = 1 / self._diagonal(w)
+                # one real product: a complex one with a real matrix is several times slower
+                parts = np.concatenate([inverse.real, inverse.imag])[:, None, :] * Psi
+                P = (parts.reshape(-1, Psi.shape[1]) @ Psi.T).reshape(-1, len(Psi), len(Psi))
+                return P[: len(w)] + 1j * P[len(w) :], (inverse * load) @ Psi.T
+        across = np.broadcast_to(Psi.T, (len(w), *Psi.T.shape))
+        right = np.concatenate([across, load[:, :, None]], axis=2)
+        Y = np.asarray(Psi @ np.linalg.solve(self._matrix(w), right))
+        return Y[..., :-1], Y[..., -1]
+
+    def receptance_parts(self, Psi: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Real and imaginary part of the receptance alone, compiled where damping is diagonal."""
         if self.proportional:
             across = np.ascontiguousarray(Psi.T)
             real, imag = receptances(w, self.eigenvalues, self.damping, Psi, across)
             return real, imag
-        G = Psi @ np.linalg.solve(self._matrix(w), np.broadcast_to(Psi.T, (len(w), *Psi.T.shape)))
+        G, _ = self.receptance(Psi, w, np.zeros((len(w), Psi.shape[1]), complex))
         return np.ascontiguousarray(G.real), np.ascontiguousarray(G.imag)
 
     def _diagonal(self, w: FloatArray) -> ComplexArray:

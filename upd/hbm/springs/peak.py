@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from upd.hbm.core.continuation import State, advance, begin
+from upd.hbm.core.fourier import to_complex
 from upd.hbm.core.newton import Function, Settings, Solution, correct
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.residuals import FREQUENCY_SHARE, over_frequency, scale_of
@@ -76,8 +77,10 @@ class _Measure:
 
     def amplitude(self, x: FloatArray, frequency: float) -> float:
         """|row @ q| alone, mm."""
-        F = self.b.force(x).force.reshape(len(self.b.Psi), -1)
-        eta = self.b.amplitudes(F, 2 * np.pi * frequency)[self.place]
+        b, j = self.b, self.place
+        F = to_complex(b.force(x).force.reshape(len(b.Psi), -1), b.harmonics)[:, j]
+        w = np.array([2 * np.pi * b.harmonics.dynamic[j] * frequency])
+        eta = b.modal.solve(w, b.loads[j : j + 1] - F @ b.Psi)[0]
         return float(abs(eta @ self.modal_row))
 
     def slope(self, x: FloatArray, p: float, direction: FloatArray) -> float:
