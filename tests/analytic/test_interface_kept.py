@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from tests.analytic.test_interface_march import by_base
 from upd.analyses import make_plan
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
 from upd.analyses.seated.bodies import make_bodies
@@ -60,7 +61,7 @@ def test_steps_by_kept_inverses() -> None:
     for sample in range(200):
         turn = 2.0 * np.pi * sample / 100.0
         now = asked + 0.1 * (np.cos(turn) * ways[0] + np.sin(turn) * ways[1])
-        x0 = march.L @ now
+        x0 = by_base(march) @ now
         step = (x0, (march.bases.open, march.bases.Tt), 0, laws, node)
         if not sample:
             assert contact_step(*step, False, scratch) > 0

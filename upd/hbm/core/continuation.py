@@ -265,12 +265,12 @@ def advance(
     state : State
         The next state; the same one when the step fails.
     """
-    step = _Step(function, state, scale, p_scale, settings)
+    step = _PathStep(function, state, scale, p_scale, settings)
     found = step.taken(np.zeros(0) if marks is None else marks)
     return (None, state) if found is None else found
 
 
-class _Step:
+class _PathStep:
     """Steps from a state, in its scaled coordinates."""
 
     def __init__(

@@ -48,12 +48,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import cho_factor, cho_solve, expm
+from scipy.linalg import cho_solve, expm
 
 from upd.errors import ConvergenceError
 from upd.hbm.faces.kept import kept_inverses
 from upd.hbm.faces.period import Bases, Past, StepParts, march_steps, suit_bases
-from upd.hbm.faces.state import FloatArray, InterfaceModel, InterfaceState
+from upd.hbm.faces.state import FloatArray, InterfaceModel, InterfaceState, factored, in_columns
 from upd.hbm.faces.step import OPEN, STICK, judge
 
 #: steps in a period from which a mode is stepped exactly
@@ -105,6 +105,10 @@ def modal_step(omega: FloatArray, damping: FloatArray, dt: float, scale: float) 
     by = np.where(resolved(omega, dt)[:, None, None], _held(A, scale), _implicit(A))
     units = np.array([[1.0, dt, dt**2, dt**2], [1.0 / dt, 1.0, dt, dt]])
     return np.ascontiguousarray((by * units).transpose(1, 2, 0).reshape(8, -1))
+
+
+def _flat(values: FloatArray) -> FloatArray:
+    return np.ascontiguousarray(values, float)
 
 
 def _held(A: FloatArray, scale: float) -> FloatArray:
@@ -197,8 +201,7 @@ class InterfaceMarch:
         self.fallback = fallback
         self.model, self.frequency, self.samples = model, frequency, samples
         self.dt = 1.0 / (frequency * samples)
-        amplitude = np.asarray(drive, complex)
-        amplitude = amplitude[:, None] if amplitude.ndim == 1 else amplitude
+        amplitude = in_columns(drive)
         k = np.arange(1, amplitude.shape[1] + 1)
         # the harmonics of the excitation; without any the first is looked at
         self.orders = tuple(int(one) for one in k[np.any(amplitude != 0.0, axis=0)]) or (1,)
@@ -208,17 +211,11 @@ class InterfaceMarch:
         # sinc(x / pi) = sin(x) / x
         self.sinc = float(np.sinc(2.0 * self.orders[0] * frequency * self.dt))
         self.blades = modal_step(model.omega, model.damping, self.dt, 1.0 / self.sinc)
-        self.inverse_mass = np.linalg.inv(model.mass)
+        self.inverse_mass = np.asarray(np.linalg.inv(model.mass), float)
         rigid = 0.5 * self.dt**2 * model.columns @ self.inverse_mass @ model.columns.T
         A = model.compliance + (model.shapes * self.blades[3]) @ model.shapes.T + rigid
         self.A = 0.5 * (A + A.T)
-        try:
-            factor = cho_factor(self.A, lower=True)
-        except np.linalg.LinAlgError as error:
-            raise ConvergenceError(
-                "interface march: the compliance of the step is not positive definite: more modes "
-                "were removed than the static compliance holds; use fewer modes a blade"
-            ) from error
+        factor = factored(self.A, "interface march: the compliance of the step")
         W = cho_solve(factor, np.eye(3 * model.n))
         self.W = np.ascontiguousarray(0.5 * (W + W.T))
         taken = [model.shapes, model.columns, model.seen_contact.T, model.pushed]
@@ -229,25 +226,18 @@ class InterfaceMarch:
         self.rho_n = 1.0 / diagonal[0]
         self.rho_t = 2.0 / (diagonal[1] + diagonal[2])
         n, alike = model.n, like is not None and like.samples == samples
+        held = np.where(resolved(model.omega, self.dt), self.sinc - 1.0, 0.0)
         self.steps = StepParts(
             self.dt,
             self.drive,
             self.blades,
+            (2.0 * model.damping * model.omega, _flat(model.places), held),
             self.taken,
-            np.ascontiguousarray(self.inverse_mass, float),
-            np.ascontiguousarray(model.load, float),
-            np.ascontiguousarray(model.gap, float),
-            np.ascontiguousarray(model.friction, float),
-            self.rho_n,
-            self.rho_t,
-            2.0 * model.damping * model.omega,
-            np.ascontiguousarray(model.places, float),
-            np.where(resolved(model.omega, self.dt), self.sinc - 1.0, 0.0),
-            np.ascontiguousarray(model.seen_modes, float),
-            np.ascontiguousarray(model.seen_drive, float),
-            np.zeros(3 * n)
-            if model.springs is None
-            else np.ascontiguousarray(model.springs, float),
+            (_flat(self.inverse_mass), _flat(model.load)),
+            _flat(model.gap),
+            (_flat(model.friction), self.rho_n, self.rho_t),
+            (_flat(model.seen_modes), _flat(model.seen_drive)),
+            np.zeros(3 * n) if model.springs is None else _flat(model.springs),
         )
         self.x0 = np.zeros(3 * n)
         self.known, self.which = False, np.zeros(samples, np.int64)
@@ -263,31 +253,6 @@ class InterfaceMarch:
         else:
             self._hold(like.bases.open)
             self.which, self.past, self.known = like.which.copy(), like.past, like.known
-
-    @property
-    def base(self) -> NDArray[np.bool_]:
-        """(n,) the nodes that the first base has open."""
-        return np.asarray(self.bases.open[0])
-
-    @property
-    def Tt(self) -> FloatArray:
-        """(3 n, 3 n) transpose of T, of the first base."""
-        return np.asarray(self.bases.Tt[0])
-
-    @property
-    def Z(self) -> FloatArray:
-        """(r + m + L, 3 n) what the first base gives by motions and excitation."""
-        return np.asarray(self.bases.Z[0])
-
-    @property
-    def L(self) -> FloatArray:
-        """(3 n, 3 n) from forces of everything stuck and closed to what the first base gives."""
-        O = np.tile(self.base, 3)
-        L = np.eye(len(O))
-        if O.any():
-            S = np.linalg.inv(self.W[np.ix_(O, O)])
-            L[np.ix_(~O, O)], L[np.ix_(O, O)] = -self.W[np.ix_(~O, O)] @ S, S
-        return L
 
     def rebase(self, open_: NDArray[np.bool_]) -> None:
         """Choose which nodes the steps take for open until they find otherwise.

@@ -27,20 +27,19 @@ class StepParts(NamedTuple):
         Excitation at the samples [N].
     blades : (8, m) ndarray
         Step of each mode: q by q, v, and by its force before and after; v by the same.
+    modes : tuple of ndarray
+        2 zeta omega (m,), modes at the places of excitation (m, L), and what of the modal forces at
+        rest is added to them (m,).
     taken : (3 n, m + r + K + L) ndarray
         What contact forces do to modes, rigid motions, outputs and places of excitation.
-    inverse_mass, load : (r, r) and (r,) ndarray
-        Of the damper.
-    gap, mu, rho_n, rho_t : (n,) ndarray
-        Gap before any load [mm]; friction; weights of displacements against forces [N/mm].
-    loss : (m,) ndarray
-        2 zeta omega.
-    places : (m, L) ndarray
-        Modes at the places of excitation.
-    held : (m,) ndarray
-        What of the modal forces at rest is added to them.
-    seen_modes, seen_drive : (K, m), (K, L) ndarray
-        What the outputs are made of.
+    damper : tuple of ndarray
+        Inverse mass (r, r) and static load (r,).
+    gap : (n,) ndarray
+        Gap before any load [mm].
+    law : tuple of three (n,) ndarray
+        Friction; weights rho_n, rho_t of displacements against forces [N/mm].
+    seen : tuple of ndarray
+        What the outputs are made of: by modes (K, m), by the excitation (K, L).
     springs : (3 n,) ndarray
         Compliance of each node's own springs, zero without [mm/N].
     """
@@ -48,18 +47,12 @@ class StepParts(NamedTuple):
     dt: float
     drive: FloatArray
     blades: FloatArray
+    modes: tuple[FloatArray, FloatArray, FloatArray]
     taken: FloatArray
-    inverse_mass: FloatArray
-    load: FloatArray
+    damper: tuple[FloatArray, FloatArray]
     gap: FloatArray
-    mu: FloatArray
-    rho_n: FloatArray
-    rho_t: FloatArray
-    loss: FloatArray
-    places: FloatArray
-    held: FloatArray
-    seen_modes: FloatArray
-    seen_drive: FloatArray
+    law: tuple[FloatArray, FloatArray, FloatArray]
+    seen: tuple[FloatArray, FloatArray]
     springs: FloatArray
 
 
@@ -298,32 +291,18 @@ def march_steps(  # type: ignore[no-untyped-def]
     int
         Where it ended: `last`, or the sample before a step without an answer.
     """
-    (
-        dt,
-        drive,
-        blades,
-        taken,
-        inverse_mass,
-        load,
-        gap,
-        mu,
-        rho_n,
-        rho_t,
-        loss,
-        places,
-        held_share,
-        seen_modes,
-        seen_drive,
-        springs,
-    ) = parts
+    dt, drive, blades, modes, taken, damper, gap, law, outputs, springs = parts
+    loss, places, held_share = modes
+    inverse_mass, load = damper
+    seen_modes, seen_drive = outputs
     q, v, p, s, sv, sa, f, y, slip, state, held = at
     bases_open, Tt, Z = bases
     forces, moves, states, _, _ = past
-    suited, law, node = (bases_open, Tt), (mu, rho_n, rho_t), (f, y, state)
+    suited, node = (bases_open, Tt), (f, y, state)
     bias = held_share * held
     c, w = begin(bases, gap, slip)
-    scratch = contact_scratch(len(mu))
-    n, m, r, L = len(mu), len(q), len(s), drive.shape[1]
+    scratch = contact_scratch(len(gap))
+    n, m, r, L = len(gap), len(q), len(s), drive.shape[1]
     K, wide = out.shape[1], taken.shape[1]
     seen, carried, weights = seen_modes.T.copy(), np.empty(3 * n, np.int64), np.empty(3 * n)
     moved, total_of, every = np.empty(3 * n), np.empty(K), np.arange(r + m + L)

@@ -256,7 +256,7 @@ def nonlinear_mode(
     if problems:
         raise InputError(f"nonlinear_mode: {'; '.join(problems)}")
     rows = (damper, damper_rows)
-    given = response.System(
+    given = response.GivenSystem(
         M, C, K, contacts, static_force, *rows, h.numbers, samples, start, slider
     )
     b = given.balance("nonlinear_mode", np.ones(1), None, fast_exits=False)

@@ -375,7 +375,7 @@ def frequency_response(
     """
     f = np.asarray(frequencies, dtype=float).ravel()
     rows = (damper, damper_rows)
-    given = System(M, C, K, contacts, static_force, *rows, harmonics, samples, start, slider)
+    given = GivenSystem(M, C, K, contacts, static_force, *rows, harmonics, samples, start, slider)
     b = given.balance("frequency_response", f, _force(harmonic_force), fast_exits=fast_exits)
     order = np.unique(f)[::-1] if sweep_down else np.unique(f)
     with threads_for(b.size):
@@ -431,7 +431,7 @@ def _omitted(h: Harmonics) -> str:
     return ", ".join([*map(str, between), f"above {h.highest}"])
 
 
-class System(NamedTuple):
+class GivenSystem(NamedTuple):
     """A system with contacts as it is given, see `frequency_response`."""
 
     M: ArrayLike
