@@ -45,6 +45,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -105,10 +106,6 @@ def modal_step(omega: FloatArray, damping: FloatArray, dt: float, scale: float) 
     by = np.where(resolved(omega, dt)[:, None, None], _held(A, scale), _implicit(A))
     units = np.array([[1.0, dt, dt**2, dt**2], [1.0 / dt, 1.0, dt, dt]])
     return np.ascontiguousarray((by * units).transpose(1, 2, 0).reshape(8, -1))
-
-
-def _flat(values: FloatArray) -> FloatArray:
-    return np.ascontiguousarray(values, float)
 
 
 def _held(A: FloatArray, scale: float) -> FloatArray:
@@ -226,18 +223,19 @@ class InterfaceMarch:
         self.rho_n = 1.0 / diagonal[0]
         self.rho_t = 2.0 / (diagonal[1] + diagonal[2])
         n, alike = model.n, like is not None and like.samples == samples
+        flat = partial(np.ascontiguousarray, dtype=float)
         held = np.where(resolved(model.omega, self.dt), self.sinc - 1.0, 0.0)
         self.steps = StepParts(
             self.dt,
             self.drive,
             self.blades,
-            (2.0 * model.damping * model.omega, _flat(model.places), held),
+            (2.0 * model.damping * model.omega, flat(model.places), held),
             self.taken,
-            (_flat(self.inverse_mass), _flat(model.load)),
-            _flat(model.gap),
-            (_flat(model.friction), self.rho_n, self.rho_t),
-            (_flat(model.seen_modes), _flat(model.seen_drive)),
-            np.zeros(3 * n) if model.springs is None else _flat(model.springs),
+            (flat(self.inverse_mass), flat(model.load)),
+            flat(model.gap),
+            (flat(model.friction), self.rho_n, self.rho_t),
+            (flat(model.seen_modes), flat(model.seen_drive)),
+            np.zeros(3 * n) if model.springs is None else flat(model.springs),
         )
         self.x0 = np.zeros(3 * n)
         self.known, self.which = False, np.zeros(samples, np.int64)
@@ -309,13 +307,9 @@ class InterfaceMarch:
         ConvergenceError
             When a step has no answer that any of the solvers finds.
         """
-        out, sums = self.room()
+        out, sums = np.zeros((self.samples, len(self.model.seen_modes))), np.zeros(4)
         fallbacks = self.advance(at, out, sums)
         return self.period_of(out, sums, fallbacks, record=record)
-
-    def room(self) -> tuple[FloatArray, FloatArray]:
-        """Where `advance` writes: outputs (N, K), and four sums."""
-        return np.zeros((self.samples, len(self.model.seen_modes))), np.zeros(4)
 
     def advance(self, at: InterfaceState, out: FloatArray, sums: FloatArray) -> int:
         """March one period and leave of it what is written and the past.
@@ -324,7 +318,7 @@ class InterfaceMarch:
         ----------
         at : InterfaceState
             Overwritten.
-        out, sums : ndarray
+        out, sums : (N, K), (4,) ndarray
             Overwritten as `upd.hbm.faces.period.march_steps` does.
 
         Returns

@@ -74,7 +74,7 @@ def settle(
     changes: list[list[float]] = []
     seen: list[FloatArray] = []
     fallbacks, remaining = 0, np.inf
-    out, sums = march.room()
+    out, sums = np.zeros((N, len(march.model.seen_modes))), np.zeros(4)
     while len(seen) < most_periods and not remaining <= tolerance:
         start = at.copy()
         fallbacks += march.advance(at, out, sums)

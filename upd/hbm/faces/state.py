@@ -234,7 +234,25 @@ def in_columns(drive: ArrayLike) -> ComplexArray:
 
 
 def factored(A: FloatArray, what: str) -> tuple[FloatArray, bool]:
-    """Cholesky factors of a compliance; ConvergenceError where it is not positive definite."""
+    """Cholesky factors of a compliance.
+
+    Parameters
+    ----------
+    A : (k, k) ndarray
+        [mm/N]
+    what : str
+        Its name in the message.
+
+    Returns
+    -------
+    tuple
+        As `scipy.linalg.cho_factor` gives them.
+
+    Raises
+    ------
+    ConvergenceError
+        Where it is not positive definite.
+    """
     try:
         L, lower = cho_factor(A, lower=True)
     except np.linalg.LinAlgError as error:

@@ -31,7 +31,7 @@ from upd.hbm.springs.friction import (
     harmonic_force,
     march,
 )
-from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart, damping_rows, linear_part
+from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart, linear_part
 from upd.hbm.springs.modal import Modal, modal
 from upd.hbm.springs.points import Contacts, frictionless, stuck_constant, stuck_stiffness
 from upd.hbm.springs.terms import contact_terms, residual_terms
@@ -125,14 +125,10 @@ class Balance:
         return np.asarray(given @ self.modal.Phi)
 
     @cached_property
-    def _shape(self) -> tuple[int, int, int]:
-        """Shape of the coefficients."""
-        return self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size
-
-    @cached_property
-    def _count(self) -> int:
-        """Number of the coefficients."""
-        return len(self.Psi) * self.harmonics.size
+    def _layout(self) -> tuple[int, tuple[int, int, int]]:
+        """Number and shape of the coefficients."""
+        shape = (self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size)
+        return len(self.Psi) * self.harmonics.size, shape
 
     @property
     def rigid(self) -> int:
@@ -142,7 +138,7 @@ class Balance:
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return self._count + self.rigid
+        return self._layout[0] + self.rigid
 
     def split(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Coefficients and rigid amplitudes of one answer.
@@ -159,7 +155,8 @@ class Balance:
         a : (n_rigid,) ndarray
             Static amplitudes of the rigid modes.
         """
-        return x[: self._count].reshape(self._shape), x[self._count :]
+        n, shape = self._layout
+        return x[:n].reshape(shape), x[n:]
 
     def coefficients(self, x: FloatArray) -> FloatArray:
         """Coefficients of the contact displacements of many answers.
@@ -174,11 +171,12 @@ class Balance:
         (n, n_point, 1 + d, size) ndarray
             Coefficients [mm].
         """
-        return x[:, : self._count].reshape(len(x), *self._shape).copy()
+        n, shape = self._layout
+        return x[:, :n].reshape(len(x), *shape).copy()
 
     def rigid_part(self, x: FloatArray) -> FloatArray:
         """Static rigid amplitudes (n, n_rigid) of many answers (n, n_unknown)."""
-        return x[:, self._count :]
+        return x[:, self._layout[0] :]
 
     def embedded(self, x: FloatArray, old: Balance) -> FloatArray:
         """Unknowns of an answer with other harmonics, as an initial guess for this problem.
@@ -274,7 +272,7 @@ class Balance:
         """
         W, a = self.split(x)
         linear, static, c = self.linear, self.harmonics.static, len(self.Psi)
-        slider = self._unmoved if self.slider is None else self.slider
+        slider = np.zeros((self.contacts.n_point, 2)) if self.slider is None else self.slider
         begin = (START_CODE[self.start], slider, MOST_PERIODS)
         F, state, DF = contact_terms(
             W, self._transform, static, self.contacts.law.arrays, begin, jacobian
@@ -312,10 +310,6 @@ class Balance:
         """Synthesis and analysis matrices as compiled loops take them."""
         E, Q = self.E, self.Q
         return E, np.ascontiguousarray(E.T), Q, np.ascontiguousarray(Q.T)
-
-    @cached_property
-    def _unmoved(self) -> FloatArray:
-        return np.zeros((self.contacts.n_point, 2))
 
     def amplitudes(self, F: FloatArray, omega: float) -> ComplexArray:
         """Amplitudes (n_k, m) of the modes under the loads and contact forces F (c, size) [N]."""
@@ -541,7 +535,8 @@ class Balance:
         """
         off = xi if self.modal.proportional else xi * np.eye(len(self.modal.eigenvalues))
         modal = replace(self.modal, damping=self.modal.damping - off)
-        linear = self.linear._replace(modal=modal, damping=damping_rows(modal))
+        rows = np.ascontiguousarray(np.atleast_2d(modal.damping))
+        linear = self.linear._replace(modal=modal, damping=rows)
         return self._changed(modal=modal, linear=linear)
 
     def with_sliders(self, start: Start, slider: FloatArray | None = None) -> Balance:

@@ -16,6 +16,7 @@ Gas Turbines Power 132 (2010) 082501.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -72,7 +73,7 @@ class Law(Shown):
     preload: FloatArray
     gap: FloatArray
 
-    @property
+    @cached_property
     def arrays(self) -> tuple[FloatArray, ...]:
         """Its arrays in the order of its fields, as compiled code takes them."""
         return tuple(getattr(self, f.name) for f in fields(self))

@@ -94,14 +94,28 @@ class LinearPart(NamedTuple):
 def linear_part(
     modal: Modal, Psi: FloatArray, G0: FloatArray, k: NDArray[np.int64], offset: int
 ) -> LinearPart:
-    """The linear part of a balance; parameters as the attributes of `LinearPart`."""
+    """The linear part of a balance.
+
+    Parameters
+    ----------
+    modal, Psi, G0
+        As in `LinearPart`.
+    k : (n_k,) ndarray of int
+        Harmonics above 0.
+    offset : int
+        Coefficients before theirs.
+
+    Returns
+    -------
+    LinearPart
+    """
     U, size, _ = np.linalg.svd(Psi, full_matrices=False)
     rank = int(np.count_nonzero(size > max(Psi.shape) * EPS * size.max(initial=0.0)))
     return LinearPart(
         modal,
         Psi,
         np.ascontiguousarray(Psi.T),
-        damping_rows(modal),
+        np.ascontiguousarray(np.atleast_2d(modal.damping)),
         np.ascontiguousarray(U[:, :rank]) if 0 < rank < len(Psi) else None,
         G0,
         np.ascontiguousarray(Psi[:, modal.rigid] if offset else Psi[:, :0]),
@@ -109,11 +123,6 @@ def linear_part(
         offset,
         KeptFactors(),
     )
-
-
-def damping_rows(modal: Modal) -> FloatArray:
-    """Modal damping (m, m), or one row (1, m) where it is diagonal."""
-    return np.ascontiguousarray(np.atleast_2d(modal.damping))
 
 
 class BalanceJacobian(NamedTuple):
@@ -236,12 +245,12 @@ class BalanceJacobian(NamedTuple):
         return J
 
 
-def complex_part(X: FloatArray, o: int) -> ComplexArray:
+def _complex_part(X: FloatArray, o: int) -> ComplexArray:
     """Amplitudes a - i b (n_k, c) of coefficients (c, size), the first at column o."""
     return np.asarray((X[:, o::2] - 1j * X[:, o + 1 :: 2]).T)
 
 
-def real_part(X: ComplexArray, static: FloatArray, o: int) -> FloatArray:
+def _real_part(X: ComplexArray, static: FloatArray, o: int) -> FloatArray:
     """Coefficients (c, size) of amplitudes (n_k, c) and a mean (c,)."""
     out = np.empty((X.shape[1], o + 2 * len(X)))
     out[:, o::2], out[:, o + 1 :: 2] = X.real.T, -X.imag.T
@@ -424,8 +433,8 @@ class Eliminated(Factors):
         scaled = normal[:n].reshape(c, size)
         self.V = scaled[s] / D[:n].reshape(c, size)[s]
         # the border on the held points is one on the forces of the others
-        q = np.einsum("ks,ksm->km", complex_part(self.V, of.offset).conj(), self.across)
-        by_force = real_part(-q.conj(), -(self.V[:, 0] @ self.across0), of.offset)
+        q = np.einsum("ks,ksm->km", _complex_part(self.V, of.offset).conj(), self.across)
+        by_force = _real_part(-q.conj(), -(self.V[:, 0] @ self.across0), of.offset)
         column, share, self.moved_by_p = self._reduced(self.dp, self.dp_rigid)
         border_rigid = normal[n:-1] + D[n:] * (self.V[:, 0] @ self.by_rigid)
         across = np.concatenate([scaled[m].T.ravel(), border_rigid])

@@ -473,8 +473,7 @@ class GivenSystem(NamedTuple):
         self._require(what, f, static, force)
         slider = self._sliders(what)
         h = harmonics(self.harmonics)
-        _require_harmonics(h, force)
-        self._require_static(what, h, static)
+        self._require_harmonics(what, h, static, force)
         if self.damper is not None and self.damper_rows is not None:
             joined_to = self.damper, self.damper_rows
         return assembled(
@@ -538,8 +537,16 @@ class GivenSystem(NamedTuple):
         if problems := [words for bad, words in found if bad]:
             raise InputError(f"{what}: " + "; ".join(problems))
 
-    def _require_static(self, what: str, h: Harmonics, static: FloatArray) -> None:
-        """Refuse static loads that no harmonic of the balance carries."""
+    def _require_harmonics(
+        self, what: str, h: Harmonics, static: FloatArray, force: dict[int, ComplexArray]
+    ) -> None:
+        """Refuse loads that no harmonic of the balance carries."""
+        missing = sorted(set(force) - set(h.numbers))
+        if missing:
+            raise InputError(
+                f"harmonics: the excitation acts in {', '.join(map(str, missing))}, not among "
+                f"{h.numbers}; to fix it: harmonics = {tuple(sorted({*h.numbers, *missing}))}"
+            )
         loads = ["static_force"] if np.any(static) else []
         if self.damper is not None and np.any(self.damper.force):
             loads.append("the damper's centrifugal force")
@@ -568,13 +575,3 @@ def _force(given: ArrayLike | Mapping[int, ArrayLike]) -> dict[int, ComplexArray
     if isinstance(given, Mapping):
         return {int(k): np.asarray(v, dtype=complex) for k, v in given.items()}
     return {1: np.asarray(given, dtype=complex)}
-
-
-def _require_harmonics(h: Harmonics, force: dict[int, ComplexArray]) -> None:
-    """Refuse forces in harmonics that are not kept."""
-    missing = sorted(set(force) - set(h.numbers))
-    if missing:
-        raise InputError(
-            f"harmonics: the excitation acts in {', '.join(map(str, missing))}, not among "
-            f"{h.numbers}; to fix it: harmonics = {tuple(sorted({*h.numbers, *missing}))}"
-        )
