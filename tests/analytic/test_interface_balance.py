@@ -13,7 +13,7 @@ import upd.hbm.core.kept_factors as kept_factors
 import upd.hbm.faces.corrector as corrector
 import upd.hbm.faces.corrector as steps
 import upd.hbm.faces.equations as module
-import upd.hbm.faces.linear as linear
+import upd.hbm.faces.newton as linear
 from upd.analyses import make_plan
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
 from upd.analyses.seated.bodies import make_bodies
@@ -352,6 +352,12 @@ def test_a_motion_jumps_at_a_fold() -> None:
     np.testing.assert_allclose(np.abs(again.amplitude[0, 1, RIGHT]), here[-1], rtol=5e-3)
 
 
+def copied(one: Any) -> Any:
+    if isinstance(one, tuple):
+        return tuple(copied(part) for part in one)
+    return one.copy() if isinstance(one, np.ndarray) else one
+
+
 def test_steps_left_unsolved_are_finished_by_the_solver_behind(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -365,9 +371,9 @@ def test_steps_left_unsolved_are_finished_by_the_solver_behind(
         if first == 0:
             real(0, given, known, pushes[:20], *rest)
             # the sample beyond on copies: leaves x0 as a sample that fails does
-            ahead = [one.copy() if isinstance(one, np.ndarray) else one for one in rest]
+            ahead = copied(rest)
             real(20, False, known, pushes[:21], *ahead)
-            rest[-2][:] = ahead[-2]
+            rest[-1][:] = ahead[-1]
             return 20
         return int(real(first, given, known, pushes, *rest))
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from tests.analytic.test_interface_march import by_base
 from upd.analyses import make_plan
 from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
 from upd.analyses.seated.bodies import make_bodies
@@ -55,18 +56,17 @@ def test_steps_by_kept_inverses() -> None:
     model, n = march.model, march.model.n
     kept, inverses = kept_inverses(1, n)
     laws = (model.friction, march.rho_n, march.rho_t)
-    work = np.empty((3 * n, 3 * n))
-    f, y, state = np.zeros(3 * n), np.zeros(3 * n), np.ones(n, np.int64)
+    node = f, _, state = np.zeros(3 * n), np.zeros(3 * n), np.ones(n, np.int64)
     formed, changed, ways = [], 0, rng.standard_normal((2, 3 * n))
     for sample in range(200):
         turn = 2.0 * np.pi * sample / 100.0
         now = asked + 0.1 * (np.cos(turn) * ways[0] + np.sin(turn) * ways[1])
-        x0 = march.L @ now
-        step = (x0, march.bases.Tt, march.bases.open, 0, *laws)
+        x0 = by_base(march) @ now
+        step = (x0, (march.bases.open, march.bases.Tt), 0, laws, node)
         if not sample:
-            assert contact_step(*step, f, y, state, False, work, *scratch) > 0
+            assert contact_step(*step, False, scratch) > 0
         before = state.copy()
-        formed.append(kept_step(0, *step, f, y, state, kept, inverses, work, *scratch))
+        formed.append(kept_step(0, *step, (kept, inverses), scratch))
         changed += int((state != before).any())
         want = by_coulomb(march.A, model.friction, march.A @ now)
         assert want is not None and formed[-1] >= 0, f"sample {sample}"
@@ -78,15 +78,16 @@ def test_steps_by_kept_inverses() -> None:
 
 def test_border_is_the_inverse_of_the_new_states() -> None:
     """Nodes that stick, slip and open: as the matrix of all rows formed and inverted anew."""
-    march, (cols, sign, b, G), rng, asked = stepped()
+    march, scratch, rng, asked = stepped()
     model, n = march.model, march.model.n
     kept, inverses = kept_inverses(1, n)
     laws, base = (model.friction, march.rho_n, march.rho_t), march.bases.open
-    f, y, H = asked.copy(), 1e-5 * rng.standard_normal(3 * n), np.empty((3 * n, 3 * n))
+    bases, H = (base, march.bases.Tt), scratch[-1]
+    f, y = asked.copy(), 1e-5 * rng.standard_normal(3 * n)
     states = rng.integers(0, 3, n)
 
     def matrix(state: Any) -> Any:
-        k = newton_rows(asked, march.bases.Tt, base, 0, *laws, f, y, state, H, cols, sign, b, G)
+        k = newton_rows(asked, bases, 0, laws, (f, y, state), scratch)
         assert k > FEW
         return np.linalg.inv(H[:k, :k])
 
@@ -94,14 +95,14 @@ def test_border_is_the_inverse_of_the_new_states() -> None:
     for _ in range(20):
         for i in rng.choice(n, 2, replace=False):
             states[i] = rng.choice([one for one in (OPEN, STICK, SLIP) if one != states[i]])
-        assert border(0, march.bases.Tt, base, 0, *laws, f, y, states, kept, inverses)
+        assert border(0, bases, 0, laws, (f, y, states), (kept, inverses))
         kept[0] = 2 * states + base[0]
         want = matrix(states)
         k = len(want)
         off = np.abs(inverses[0, : k * k].reshape(k, k) - want).max()
         assert off < 1e-8 * np.abs(want).max()
     kept[0] = 2 * states + ~base[0]
-    assert not border(0, march.bases.Tt, base, 0, *laws, f, y, states, kept, inverses)
+    assert not border(0, bases, 0, laws, (f, y, states), (kept, inverses))
 
 
 def test_settling_by_kept_inverses_ends_in_the_same_motion() -> None:

@@ -12,7 +12,6 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 import upd.hbm.faces.march as module
-import upd.hbm.faces.settle as settling
 from upd.analyses import make_plan
 from upd.analyses.forced.interface_model import (
     by_coulomb,
@@ -27,7 +26,6 @@ from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, mass, stiffness
 from upd.hbm.faces.march import InterfaceMarch, modal_step, resolved
 from upd.hbm.faces.period import march_steps
-from upd.hbm.faces.periods import UNSOLVED
 from upd.hbm.faces.settle import settle
 from upd.hbm.faces.state import InterfaceModel, InterfaceState, resting
 from upd.hbm.faces.step import OPEN, SLIP, STICK, contact_scratch, contact_step, judge
@@ -111,13 +109,22 @@ def test_modes_that_steps_do_not_resolve_follow() -> None:
     assert (off[0] / off[1] > 3.5).all()
 
 
+def by_base(march: InterfaceMarch) -> np.ndarray:
+    """From forces of everything stuck and closed to what the base gives."""
+    O, L = np.tile(march.bases.open[0], 3), np.eye(3 * march.model.n)
+    if O.any():
+        S = np.linalg.inv(march.W[np.ix_(O, O)])
+        L[np.ix_(~O, O)], L[np.ix_(O, O)] = -march.W[np.ix_(~O, O)] @ S, S
+    return L
+
+
 def test_steps_against_the_solver_of_coupled_contact() -> None:
     """1000 random samples in all states, from random bases and starts: the same forces."""
     model, _ = worn()
     march = InterfaceMarch(model, 450.0, [1.0], 128)
     rng, n = np.random.default_rng(3), model.n
-    found, work = np.zeros(3, int), (np.empty((3 * n, 3 * n)), *contact_scratch(n))
-    f, y, state = np.zeros(3 * n), np.zeros(3 * n), np.ones(n, np.int64)
+    found, work = np.zeros(3, int), contact_scratch(n)
+    node = f, y, state = np.zeros(3 * n), np.zeros(3 * n), np.ones(n, np.int64)
     for sample in range(1000):
         # near forces within friction, beyond it, and pulling, in shares that differ by sample
         pressed = rng.uniform(-1.0, 1.0, n) + rng.uniform(-1.0, 1.0)
@@ -125,12 +132,12 @@ def test_steps_against_the_solver_of_coupled_contact() -> None:
         t = share * np.array([np.cos(angle), np.sin(angle)])
         b = march.A @ np.concatenate([pressed, *t])
         march.rebase(rng.random(n) < rng.choice([0.0, 0.3, 0.9]))
-        x0 = march.L @ march.W @ b
+        x0 = by_base(march) @ march.W @ b
         laws = (model.friction, march.rho_n, march.rho_t)
-        step = (x0, march.Tt[None], march.base[None], 0, *laws)
-        used = contact_step(*step, f, y, state, True, *work)
+        step = (x0, (march.bases.open, march.bases.Tt), 0, laws, node)
+        used = contact_step(*step, True, work)
         if used < 0:
-            used = contact_step(*step, f, y, state, False, *work)
+            used = contact_step(*step, False, work)
         want = by_coulomb(march.A, model.friction, b)
         assert used >= 0 and want is not None, f"sample {sample}"
         size = np.abs(want[0]).max()
@@ -727,7 +734,6 @@ def test_steps_left_unsolved_are_finished_by_the_solver_behind(
     march.fallback = None
     with pytest.raises(ConvergenceError, match=r"453 Hz .* more samples"):
         march.period(start.copy())
-    monkeypatch.setattr(settling, "march_periods", lambda *_: UNSOLVED)
     answer = stepped_sine(model, [453.0], [-1j], start)
     assert answer.status == "stopped" and not answer.frequency.size and "453 Hz" in answer.message
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from upd.errors import InputError
 from upd.hbm import NonlinearMode, contacts, frequency_response, nonlinear_mode
 from upd.hbm.core.fourier import harmonics
-from upd.hbm.springs.assembled import assembled
+from upd.hbm.springs.balance import assembled
 from upd.hbm.springs.nonlinear_mode import ExtendedBalance, stuck_modes
 
 FloatArray = NDArray[np.float64]
@@ -162,9 +162,8 @@ def test_jacobian_by_differences(amplitude: float, proportional: bool) -> None:
         preload=[1.0, 0.3],
     )
     static = np.array([0.1, 0.05])
-    b = assembled(one, damping, K, points, {}, static, samples=256, fast_exits=False)(
-        harmonics((0, 1, 2, 3))
-    )
+    h = harmonics((0, 1, 2, 3))
+    b = assembled(one, damping, K, points, {}, static, h, samples=256, fast_exits=False)
     stuck, omegas, number = stuck_modes(b, 1)
     extended = ExtendedBalance(b, stuck[:, number], float(omegas[number]))
     p, rng, h = np.log(amplitude), np.random.default_rng(0), 1e-6

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
+from tests.whole_balance import evaluate
 from upd.hbm import contacts, harmonics
-from upd.hbm.springs import condensed
+from upd.hbm.springs import jacobian
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import LIFT, STICK
 from upd.hbm.springs.modal import modal
@@ -82,13 +83,15 @@ def test_condensed_correction_is_that_of_the_whole_matrix(
     proportional: bool,
 ) -> None:
     b, x = problem(seed, n, kinds, tangents, static, proportional)
-    whole = b.evaluate(x, omega)
+    whole = evaluate(b, x, omega)
     residual, parts, slope = b.linearised(x, omega)
     assert parts is not None
-    assert whole.jacobian is not None
     assert list(parts.state) == [seen_state(one) for one in whole.contact.march.state]
     assume([int(s) for s in parts.state] == kinds)
     size = np.abs(whole.residual).max()
+    np.testing.assert_allclose(
+        parts.matrix(), whole.jacobian, atol=1e-11 * np.abs(whole.jacobian).max()
+    )
     np.testing.assert_allclose(residual, whole.residual, atol=1e-11 * size)
     np.testing.assert_allclose(
         slope, whole.by_frequency, atol=1e-9 * np.abs(whole.by_frequency).max()
@@ -101,7 +104,7 @@ def test_condensed_correction_is_that_of_the_whole_matrix(
         [np.column_stack([whole.jacobian * D, whole.by_frequency * p_scale]), normal[None]]
     )
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(condensed, "WORTH", worth)
+        patch.setattr(jacobian, "WORTH", worth)
         factors = parts.bordered(slope, D, p_scale, normal)
     assert type(factors).__name__ == how
     wanted = np.linalg.solve(A, np.append(r, right))
@@ -127,7 +130,7 @@ def test_points_that_only_slipped_before_are_not_taken_for_sticking() -> None:
     )
     # amplitude below the limit, mean above it: from the slider at zero the first sample slips
     x = np.array([0.0, 0.0, 0.0, 2.0, 0.5, 0.0])
-    whole = b.evaluate(x, 1.0)
+    whole = evaluate(b, x, 1.0)
     _, parts, _ = b.linearised(x, 1.0)
     assert parts is not None
     assert (whole.contact.march.state[0, 32:] == 0).all()

@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 from tests.literature.test_hbm_blade_damper_blade import Y2, response
 from tests.property.test_hbm_condensed import MOVES, OPEN, STICKS, problem
 from tests.stability.test_hbm_hard_cases import gap_oscillator
+from tests.whole_balance import evaluate
 from upd.hbm.core import kept_factors
 from upd.hbm.core.kept_factors import LEFT, LEFT_OF_TANGENT, KeptFactors
 from upd.hbm.core.newton import bordered_factors
-from upd.hbm.springs import condensed
+from upd.hbm.springs import jacobian
 
 
 class Dense(NamedTuple):
@@ -39,7 +40,7 @@ class Dense(NamedTuple):
 @pytest.fixture
 def always(monkeypatch: pytest.MonkeyPatch) -> None:
     """Factors are kept of small matrices, and solutions are cheap beside them."""
-    monkeypatch.setattr(condensed, "WORTH_KEEPING", 0)
+    monkeypatch.setattr(jacobian, "WORTH_KEEPING", 0)
     monkeypatch.setattr(kept_factors, "SOLUTIONS", 0.01)
 
 
@@ -76,7 +77,7 @@ def test_corrections_from_an_earlier_point_are_those_of_the_matrix(
     rng = np.random.default_rng(seed + 1)
     other = x * rng.uniform(0.97, 1.03, b.size)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(condensed, "WORTH_KEEPING", 0)
+        patch.setattr(jacobian, "WORTH_KEEPING", 0)
         patch.setattr(kept_factors, "SOLUTIONS", 0.01)
         patch.setattr(kept_factors, "LEFT", LEFT_OF_TANGENT)
         _, parts, slope = b.linearised(x, 1.3)
@@ -90,8 +91,7 @@ def test_corrections_from_an_earlier_point_are_those_of_the_matrix(
         assert type(found).__name__ == "_Near"
         correction, tangent = found.solve(r, right), found.tangent()
         sign = found.sign
-    whole = b.evaluate(other, 1.31)
-    assert whole.jacobian is not None
+    whole = evaluate(b, other, 1.31)
     top = np.column_stack([whole.jacobian * D, whole.by_frequency * p_scale])
     A = np.vstack([top, normal[None]])
     wanted = np.linalg.solve(A, np.append(r, right))
@@ -199,10 +199,10 @@ def test_curves_are_those_of_new_factors_each_time(monkeypatch: pytest.MonkeyPat
         return found(*args, **options)
 
     monkeypatch.setattr(kept_factors, "gmres", counted)
-    monkeypatch.setattr(condensed, "WORTH_KEEPING", 0)
+    monkeypatch.setattr(jacobian, "WORTH_KEEPING", 0)
     monkeypatch.setattr(kept_factors, "SOLUTIONS", 0.5)
     near = curves()
-    assert all(one.balance._fixed.rows.kept._factors is None for one in near)
+    assert all(one.balance.linear.kept._factors is None for one in near)
     assert len(used) > 500
     for row, one, other in zip((Y2, [1.0]), usual, near, strict=True):
         assert (one.status, other.status) == ("complete", "complete")

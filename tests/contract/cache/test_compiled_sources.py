@@ -12,16 +12,16 @@ from upd.linalg import compiled as room
 from upd.linalg.compiled import sources_digest
 
 ROOT = Path(room.__file__).parents[2]
-LOOPS = "upd/hbm/faces/periods.py"
+LOOPS = "upd/hbm/faces/period.py"
 
 
 @pytest.mark.parametrize(
     ("changed", "told"),
     [
-        ("upd/hbm/faces/periods.py", True),
         ("upd/hbm/faces/period.py", True),
+        ("upd/hbm/faces/kept.py", True),
         # two imports away
-        ("upd/hbm/faces/step.py", True),
+        ("upd/linalg/compiled.py", True),
         ("upd/hbm/springs/balance.py", False),
     ],
 )

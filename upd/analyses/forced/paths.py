@@ -13,8 +13,7 @@ import numpy as np
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.plan import ForcedPlan
 from upd.hbm import FrequencyResponse, Settings, frequency_response, harmonics
-from upd.hbm.springs.assembled import assembled
-from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.balance import Balance, assembled
 
 #: half width of the band around a peak in which it is looked for, as a share of its frequency, and
 #: the points in it
@@ -94,19 +93,19 @@ def balance_of(
     if given is not None:
         slider = np.zeros((len(given), 2))
         slider[:, : given.shape[1]] = given
-    problem = assembled(
+    return assembled(
         model.M,
         model.C,
         model.K,
         model.contacts,
         model.harmonic_force(force),
         model.static,
+        harmonics(numbers),
         joined_to=(model.damper, model.damper_rows),
         samples=samples or (None if b.samples == "auto" else b.samples),
         start=b.slider,
         slider=slider,
     )
-    return problem(harmonics(numbers))
 
 
 @contextmanager

@@ -1,24 +1,37 @@
-"""Pseudo-arclength continuation of r(x, p) = 0.
+"""Pseudo-arclength continuation of r(x, p) = 0: past folds, round corners, onto wanted parameters.
 
-It passes folds, lands on wanted parameter values, and its message gives place and reason of a stop.
+Its message gives place and reason of a stop. Lengths are measured in units of `scale`, which may
+follow the solution, so that unknowns of any size weigh alike.
 
 References
 ----------
 H. B. Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems (1977);
-R. Seydel, Practical Bifurcation and Stability Analysis (2010), ch. 4.
+R. Seydel, Practical Bifurcation and Stability Analysis (2010), ch. 4; E. L. Allgower and K. Georg,
+Introduction to Numerical Continuation Methods (2003), ch. 15: paths of equations that are smooth
+piece by piece.
 """
 
 from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.core.newton import EPS, ROUNDING, FloatArray, Function, Scale, Settings
-from upd.hbm.core.path_step import State, advance, begin
+from upd.hbm.core.newton import (
+    EPS,
+    ROUNDING,
+    FloatArray,
+    Function,
+    Scale,
+    Settings,
+    Solution,
+    bordered_factors,
+    correct,
+    finite_jacobian,
+)
 from upd.labels import Shown
 
 log = logging.getLogger(__name__)
@@ -26,6 +39,36 @@ log = logging.getLogger(__name__)
 Status = Literal["complete", "stopped", "step limit"]
 #: growth of the solution while p stands still that is taken for one without bound
 UNBOUNDED = 10.0
+#: how far the corrector may move from the predicted point, in steps: farther away lies another
+#: piece of the path
+STRAY = 2.0
+
+
+class State(NamedTuple):
+    """Where a path stands: enough to go on.
+
+    Attributes
+    ----------
+    x : (n,) ndarray
+        Unknowns.
+    p : float
+        Parameter.
+    tangent : (n + 1,) ndarray
+        In scaled coordinates.
+    step : float
+        Next step, in scaled arclength.
+    direction : float
+        Direction of p at the start of the path, +1 or -1.
+    sign : float
+        Sign of the determinant of the equations bordered by the tangent.
+    """
+
+    x: FloatArray
+    p: float
+    tangent: FloatArray
+    step: float
+    direction: float
+    sign: float
 
 
 @dataclass(frozen=True, repr=False)
@@ -105,29 +148,26 @@ def follow(
     rest = 0
     xs, ps, counts = [state.x], [state.p], [0]
     passed: dict[float, list[FloatArray]] = {float(mark): [] for mark in marks}
+    status: Status = "stopped"
     while len(ps) < s.most_points:
         if (end - state.p) * state.direction <= 0:
-            return _path(
-                xs, ps, counts, state, "complete", f"reached p = {end:.9g} in {len(ps)} points"
-            )
-        found, state = advance(function, state, marks, scale, p_scale, s)
+            status, message = "complete", f"reached p = {end:.9g} in {len(ps)} points"
+            break
+        found, state = advance(function, state, scale, p_scale, s, marks)
         if found is None:
             message = (
                 f"stopped at p = {state.p:.9g}: no convergence with the smallest step; refine "
                 "the samples or change the start"
             )
-            log.warning(message)
-            return _path(xs, ps, counts, state, "stopped", message)
+            break
         rest = len(ps) if abs(found.p - ps[-1]) > 4 * EPS * abs(found.p) else rest
         if rest < len(ps) and np.abs(found.x).max() > UNBOUNDED * np.abs(xs[rest]).max() > 0:
+            xs, ps, counts = xs[: rest + 1], ps[: rest + 1], counts[: rest + 1]
             message = (
                 f"stopped at p = {found.p:.9g}: the answer grows without bound there; it needs "
                 "damping, or more friction"
             )
-            log.warning(message)
-            return _path(
-                xs[: rest + 1], ps[: rest + 1], counts[: rest + 1], state, "stopped", message
-            )
+            break
         left = rest == len(ps)
         xs.append(found.x)
         ps.append(found.p)
@@ -138,34 +178,248 @@ def follow(
                 f"stopped at p = {found.p:.9g}: the path came to the same solution a second time; "
                 "it is closed, or runs back on itself"
             )
-            log.warning(message)
-            return _path(xs, ps, counts, state, "stopped", message)
+            break
         there.append(found.x)
         if turned is not None and (turned - state.p) * state.direction > 0:
             message = (
                 f"stopped at p = {state.p:.9g}: the path reversed its direction and came back "
                 f"past {turned:.9g}"
             )
-            log.warning(message)
-            return _path(xs, ps, counts, state, "stopped", message)
-    return _path(
-        xs,
-        ps,
-        counts,
-        state,
-        "step limit",
-        f"{s.most_points} points used before p = {end:.9g}; it is at p = {state.p:.9g}",
-    )
+            break
+    else:
+        status = "step limit"
+        message = f"{s.most_points} points used before p = {end:.9g}; it is at p = {state.p:.9g}"
+    if status == "stopped":
+        log.warning(message)
+    iterations = np.array(counts, dtype=np.int64)
+    return Path(np.array(xs), np.array(ps), iterations, state, status, message)
 
 
-def _path(
-    xs: list[FloatArray],
-    ps: list[float],
-    counts: list[int],
+def begin(
+    function: Function,
+    x: FloatArray,
+    p: float,
+    scale: Scale,
+    p_scale: float,
+    settings: Settings,
+    end: float = np.inf,
+) -> State:
+    """State at a solved point (x, p), towards larger p, or towards an end.
+
+    Parameters
+    ----------
+    function, scale
+        As in `follow`.
+    x : (n,) ndarray
+        Unknowns of the point.
+    p : float
+        Its parameter.
+    p_scale : float
+        Size of the parameter.
+    settings : Settings
+    end : float
+        Value of the parameter to go to.
+
+    Returns
+    -------
+    State
+    """
+    D = scale(x)
+    _, J, dp = function(x, p, True)
+    direction = 1.0 if end >= p else -1.0
+    normal = np.zeros(len(x) + 1)
+    normal[-1] = direction
+    lu = bordered_factors(J, dp, D, p_scale, normal)
+    return State(x, p, lu.tangent(), settings.first_step, direction, lu.sign)
+
+
+def advance(
+    function: Function,
     state: State,
-    status: Status,
-    message: str,
-) -> Path:
-    return Path(
-        np.array(xs), np.array(ps), np.array(counts, dtype=np.int64), state, status, message
+    scale: Scale,
+    p_scale: float,
+    settings: Settings,
+    marks: FloatArray | None = None,
+) -> tuple[Solution | None, State]:
+    """One accepted step, round corners too, or None when even the smallest fails.
+
+    Along one piece of the path the determinant keeps its sign but at bifurcations, which the
+    tangent passes straight: a step whose determinant has another sign fell on another piece, or
+    beyond the kink at which the path turns back, and is shortened.
+
+    Parameters
+    ----------
+    function, scale
+        As in `follow`.
+    state : State
+        Where the path stands.
+    p_scale : float
+        Size of the parameter.
+    settings : Settings
+    marks : (k,) ndarray, optional
+        Values of the parameter that are hit exactly.
+
+    Returns
+    -------
+    solution : Solution or None
+    state : State
+        The next state; the same one when the step fails.
+    """
+    step = _PathStep(function, state, scale, p_scale, settings)
+    found = step.taken(np.zeros(0) if marks is None else marks)
+    return (None, state) if found is None else found
+
+
+class _PathStep:
+    """Steps from a state, in its scaled coordinates."""
+
+    def __init__(
+        self, function: Function, state: State, scale: Scale, p_scale: float, settings: Settings
+    ) -> None:
+        self.function, self.state, self.scale = function, state, scale
+        self.p_scale, self.s, self.D = p_scale, settings, scale(state.x)
+
+    def taken(self, marks: FloatArray) -> tuple[Solution, State] | None:
+        """The first step that is good, of shorter and shorter ones."""
+        s, state, h = self.s, self.state, self.state.step
+        while h >= s.smallest_step:
+            length, hit = self._to_mark(marks, h)
+            guess, p = self._along(state.tangent, length)
+            normal = state.tangent
+            if hit is not None:
+                p, normal = hit, self._across(state.tangent[-1])
+            found = self._corrected(guess, p, normal, STRAY * length)
+            if hit is not None and length > s.kink_step:
+                way = self._distance(found, state.x, state.p)
+                # a chord turns by less than the tangents at its ends: beyond, it leads to another
+                # pass
+                if self._ahead(found) < np.cos(s.angle) * way:
+                    found = found._replace(tangent=None)
+            if hit is None and found.tangent is not None:
+                found = self._on_mark(found, marks)
+            if found.tangent is not None:
+                cosine = float(np.clip(found.tangent @ state.tangent, -1, 1))
+                angle = float(np.arccos(cosine))
+                straight = angle <= s.angle or length <= s.kink_step
+                # beyond a fold at a wanted p the sign is that of the opposite direction
+                same = found.sign == state.sign or (
+                    length <= s.bifurcation_step if angle <= s.angle else hit is not None
+                )
+                if straight and same:
+                    tried = max(length, min(h, s.kink_step)) if hit is None else h
+                    # at a wanted p the border does not tell the side: the path goes straight on, or
+                    # as the determinant decides
+                    on = cosine > np.cos(s.angle) or hit is None
+                    side = 1.0 if on else found.sign * state.sign
+                    return self._moved(found, side, _next_step(tried, angle, found.iterations, s))
+            h = min(h, length) / 2
+        return self._corner()
+
+    def _corner(self) -> tuple[Solution, State] | None:
+        """One step round a corner of more than a right angle.
+
+        A path has such corners where the equations are only piecewise smooth. Beyond the kink the
+        tangent is that of the other piece, on the side on which the determinant of the equations
+        bordered by the tangent keeps its sign: both pieces agree along the kink, hence so do their
+        tangents across it.
+
+        References
+        ----------
+        E. L. Allgower and K. Georg, Introduction to Numerical Continuation Methods (2003), ch. 15.
+        """
+        s, state = self.s, self.state
+        reach = 4 * s.smallest_step
+        while reach <= s.kink_step:
+            _, J, dp = self.function(*self._along(state.tangent, reach), True)
+            lu = None
+            if finite_jacobian(J):
+                lu = bordered_factors(J, dp, self.D, self.p_scale, state.tangent)
+            if lu is not None and not lu.singular:
+                tangent = lu.tangent() * (lu.sign * state.sign)
+                if tangent @ state.tangent < np.cos(s.angle):
+                    guess, p = self._along(tangent, reach)
+                    found = correct(self.function, guess, p, self.D, self.p_scale, tangent, s)
+                    near = self._distance(found, state.x, state.p) <= STRAY * reach
+                    # a tangent of the other sign runs back on the piece the path came from
+                    if near and found.tangent is not None and found.sign == state.sign:
+                        return self._moved(found, 1.0, reach)
+            reach *= 4
+        return None
+
+    def _on_mark(self, found: Solution, marks: FloatArray) -> Solution:
+        """The solution at a wanted p that an arclength step went past.
+
+        The step's own when none was passed or that one is not found. One that is not between both
+        ends of the step along its tangent is of another pass, as where Newton's method crosses a
+        fold: the step is none then.
+        """
+        state = self.state
+        lo, hi = sorted((state.p, found.p))
+        passed = marks[(marks > lo + 4 * EPS * abs(lo)) & (marks < hi)]
+        if not len(passed):
+            return found
+        mark = float(passed[0] if found.p > state.p else passed[-1])
+        share = (mark - state.p) / (found.p - state.p)
+        guess, most = (
+            state.x + share * (found.x - state.x),
+            self._distance(found, state.x, state.p),
+        )
+        there = self._corrected(guess, mark, self._across(found.p - state.p), most)
+        if there.tangent is None:
+            return found
+        between = 0.0 < self._ahead(there) < self._ahead(found)
+        return there if between else found._replace(tangent=None)
+
+    def _corrected(self, x: FloatArray, p: float, normal: FloatArray, most: float) -> Solution:
+        """The solution in the plane through a point, or none when it strays farther than `most`."""
+        found = correct(self.function, x, p, self.D, self.p_scale, normal, self.s)
+        return found if self._distance(found, x, p) <= most else found._replace(tangent=None)
+
+    def _along(self, direction: FloatArray, length: float) -> tuple[FloatArray, float]:
+        """The point at a scaled distance from the state."""
+        x = self.state.x + length * direction[:-1] * self.D
+        return x, self.state.p + length * float(direction[-1]) * self.p_scale
+
+    def _across(self, rate: float) -> FloatArray:
+        """Across the plane of one parameter value."""
+        normal = np.zeros_like(self.state.tangent)
+        normal[-1] = np.sign(rate)
+        return normal
+
+    def _ahead(self, found: Solution) -> float:
+        """How far a solution is from the state along its tangent, scaled."""
+        at = self.state
+        way = np.append((found.x - at.x) / self.D, (found.p - at.p) / self.p_scale)
+        return float(way @ at.tangent)
+
+    def _distance(self, found: Solution, x: FloatArray, p: float) -> float:
+        """Scaled length of the way from a point to a solution."""
+        return float(np.hypot(np.linalg.norm((found.x - x) / self.D), (found.p - p) / self.p_scale))
+
+    def _moved(self, found: Solution, side: float, step: float) -> tuple[Solution, State]:
+        """A solution, and the state there with its tangent to one side."""
+        assert found.tangent is not None
+        tangent = side * found.tangent
+        tangent[:-1] = tangent[:-1] * self.D / self.scale(found.x)
+        tangent /= np.linalg.norm(tangent)
+        direction = self.state.direction
+        return found, State(found.x, found.p, tangent, step, direction, side * found.sign)
+
+    def _to_mark(self, marks: FloatArray, h: float) -> tuple[float, float | None]:
+        """Step length cut at the next wanted p, and that p when it lies within the step."""
+        at = self.state
+        rate = at.tangent[-1] * self.p_scale
+        ahead = marks[(marks - at.p) * np.sign(rate) > 4 * EPS * abs(at.p)] if rate else marks[:0]
+        if not len(ahead):
+            return h, None
+        mark = float(ahead[np.argmin(np.abs(ahead - at.p))])
+        length = (mark - at.p) / rate
+        return (length, mark) if length <= h else (h, None)
+
+
+def _next_step(h: float, angle: float, iterations: int, s: Settings) -> float:
+    by_angle = s.angle / 2 / max(angle, s.angle / 16)
+    by_count = s.wanted_iterations / max(iterations, 1)
+    return float(
+        np.clip(h * np.clip(min(by_angle, by_count), 0.5, 2.0), 2 * s.smallest_step, s.largest_step)
     )

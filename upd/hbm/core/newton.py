@@ -161,42 +161,6 @@ def solve(
     return correct(function, x, p, scale(x), 1.0, normal, settings or Settings())
 
 
-def cross_section(
-    function: Function,
-    base: Solution,
-    D: FloatArray,
-    p_scale: float,
-    normal: FloatArray,
-    distance: float,
-    settings: Settings,
-) -> Solution:
-    """The solution in the plane across a direction.
-
-    Parameters
-    ----------
-    function : callable
-        As in `solve`.
-    base : Solution
-        Point the plane is measured from.
-    D : (n,) ndarray
-        Sizes of the unknowns.
-    p_scale : float
-        Size of the parameter.
-    normal : (n + 1,) ndarray
-        Direction across the plane, in scaled coordinates.
-    distance : float
-        Scaled distance of the plane from the base point.
-    settings : Settings
-
-    Returns
-    -------
-    Solution
-        Its tangent is None when not found.
-    """
-    x, p = base.x + distance * normal[:-1] * D, base.p + distance * float(normal[-1]) * p_scale
-    return correct(function, x, p, D, p_scale, normal, settings)
-
-
 def finite_jacobian(J: FloatArray | StructuredJacobian | None) -> bool:
     """Whether there is a Jacobian, all of whose entries are finite.
 
@@ -294,7 +258,8 @@ def correct(
     guess, p_guess : (n,) ndarray, float
         Where it begins.
     function, D, p_scale, normal, s
-        As in `cross_section`.
+        As in `solve`; size of the parameter; direction (n + 1,) across the plane, in scaled
+        coordinates; step control.
 
     Returns
     -------

@@ -15,10 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
 from upd.hbm.core.newton import Settings
-from upd.hbm.faces.curve import InterfaceCurve
+from upd.hbm.faces.curve import InterfaceCurve, InterfacePoint
 from upd.hbm.faces.equations import InterfaceEquations
 from upd.hbm.faces.march import Fallback
-from upd.hbm.faces.point import InterfacePoint
 from upd.hbm.faces.state import ComplexArray, FloatArray, InterfaceModel, InterfaceState
 from upd.linalg.parallel import SideBySide
 from upd.linalg.select import threads_used

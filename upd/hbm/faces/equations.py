@@ -20,14 +20,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_solve
 
 from upd.errors import ConvergenceError, InputError
 from upd.hbm.core.fourier import analysis, harmonics, synthesis
 from upd.hbm.faces.kept import kept_inverses
 from upd.hbm.faces.march import Fallback
 from upd.hbm.faces.samples import given_blades
-from upd.hbm.faces.state import FloatArray, InterfaceModel, InterfaceState
+from upd.hbm.faces.state import FloatArray, InterfaceModel, InterfaceState, factored, in_columns
 from upd.hbm.faces.step import STICK, judge
 from upd.linalg.parallel import SideBySide
 
@@ -128,8 +128,7 @@ class InterfaceEquations:
         samples: int,
         fallback: Fallback | None = None,
     ) -> None:
-        amplitude = np.asarray(drive, complex)
-        amplitude = amplitude[:, None] if amplitude.ndim == 1 else amplitude
+        amplitude = in_columns(drive)
         if highest < 1 or samples <= 2 * highest:
             raise InputError(
                 f"interface balance: {samples} samples cannot carry {highest} harmonics; take one "
@@ -163,20 +162,13 @@ class InterfaceEquations:
         self.kept = kept_inverses(samples, model.n)
         self._at: tuple[FloatArray, float] | None = None
         self._step: tuple[float, Step] | None = None
-        try:
-            factor = cho_factor(model.compliance, lower=True)
-        except np.linalg.LinAlgError as error:
-            raise ConvergenceError(
-                "interface balance: the compliance of the faces is not positive definite: more "
-                "modes were removed than the static compliance holds; use fewer modes a blade"
-            ) from error
+        factor = factored(model.compliance, "interface balance: the compliance of the faces")
         self.inverse = cho_solve(factor, np.eye(3 * model.n))
         self.moves = np.hstack([model.shapes, model.columns, model.pushed])
         self.by_moves = cho_solve(factor, self.moves)
         m, r = len(model.frequency), len(model.load)
         self.rigid = slice(m, m + r)
         self.damper = model.columns.T @ self.by_moves
-        self.work = np.empty((3 * model.n, 3 * model.n))
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -375,28 +367,12 @@ class InterfaceEquations:
             F, Y, S = known.force.copy(), known.relative.copy(), known.state.copy()
         end, x0 = rigid.copy(), np.zeros(3 * n)
         done, given, fallbacks = 0, False, 0
+        rigid_rows = np.ascontiguousarray(step.Z[:, m : m + r].T)
+        parts = (rigid_rows, step.W, model.columns, step.J)
+        law, past = (model.friction, step.rho_n, step.rho_t), (F, Y, S, *self.kept)
         while True:
             done = given_blades(
-                done,
-                given,
-                known is not None,
-                pushes,
-                np.ascontiguousarray(step.Z[:, m : m + r].T),
-                step.W,
-                model.columns,
-                step.J,
-                model.load,
-                model.friction,
-                step.rho_n,
-                step.rho_t,
-                end,
-                c,
-                F,
-                Y,
-                S,
-                *self.kept,
-                x0,
-                self.work,
+                done, given, known is not None, pushes, parts, law, model.load, end, c, past, x0
             )
             if done == N:
                 break

@@ -33,33 +33,22 @@ VERGE = 3
 
 
 @compiled
-def law_rows(  # type: ignore[no-untyped-def]
-    f, y, state, n, mu, rho_n, rho_t, on, nodes, cols, owner, P, left, keep, H, W
-):
+def law_rows(node, law, on, nodes, rows, H, W):  # type: ignore[no-untyped-def]
     """Dofs that are not held, the rows of their laws, and the matrix P W_R - Q.
 
     Parameters
     ----------
-    f, y : (3 n,) ndarray
-        Answer of a sample.
-    state : (n,) ndarray of int
-    n : int
-    mu, rho_n, rho_t : (n,) ndarray
+    node : tuple of two (3 n,) ndarray and an (n,) ndarray of int
+        Answer f, y of a sample, and states.
+    law : tuple of three (n,) ndarray
         Friction, weights of displacements against forces.
     on : (n,) ndarray of int
         The nodes that are not held, in the order of the rows.
     nodes : int
         How many.
-    cols : (k,) ndarray of int
-        Overwritten by the dofs.
-    owner : (k,) ndarray of int
-        Overwritten by the node of each.
-    P : (k, 3) ndarray
-        Overwritten: weights of the node's three forces in each row.
-    left : (k,) ndarray
-        Overwritten: what the row lacks [N].
-    keep : (k, 2) ndarray
-        Overwritten: -Q of each row, by the node's two slips.
+    rows : tuple of ndarray
+        Overwritten: dofs (k,), the node of each, weights P (k, 3) of the node's three forces in
+        each row, what the row lacks (k,) [N], and -Q (k, 2) of each row, by the node's two slips.
     H : (k, k) ndarray or larger
         Overwritten.
     W : (3 n, 3 n) ndarray
@@ -69,7 +58,10 @@ def law_rows(  # type: ignore[no-untyped-def]
     int
         Rows k.
     """
-    k = 0
+    f, y, state = node
+    mu, rho_n, rho_t = law
+    cols, owner, P, left, keep = rows
+    n, k = len(state), 0
     for o in range(nodes):
         i = on[o]
         for a in range(0 if state[i] == OPEN else 1, 3):
@@ -125,27 +117,7 @@ def law_rows(  # type: ignore[no-untyped-def]
 
 @compiled
 def factor_period(  # type: ignore[no-untyped-def]
-    first_sample,
-    last_sample,
-    F,
-    Y,
-    S,
-    W,
-    Z,
-    mu,
-    rho_n,
-    rho_t,
-    at,
-    square,
-    cols,
-    owner,
-    P,
-    left,
-    keep,
-    PZ,
-    Z_rows,
-    factors,
-    pivots,
+    first_sample, last_sample, samples, W, Z, law, rows
 ):
     """Rows of samples, and the factors of their matrices.
 
@@ -153,34 +125,30 @@ def factor_period(  # type: ignore[no-untyped-def]
     ----------
     first_sample, last_sample : int
         From the first on, up to the one before the last.
-    F, Y, S
-        Answers of all samples, as `upd.hbm.faces.samples.given_blades` leaves them; states with
-        the verges.
+    samples : tuple of ndarray
+        Answers F, Y of all samples, as `upd.hbm.faces.samples.given_blades` leaves them, and states
+        with the verges.
     W : (3 n, 3 n) ndarray
         Inverse of A [N/mm]; symmetric.
     Z : (3 n, m + r) ndarray
         W (Phi, B).
-    mu, rho_n, rho_t : (n,) ndarray
+    law : tuple of three (n,) ndarray
         Friction, weights of displacements against forces.
-    at, square : (N + 1,) ndarray of int
-        First row of each sample among all K, and first entry of its matrix among all.
-    cols, owner : (K,) ndarray of int
-        Overwritten: dofs, and the node of each.
-    P, left, keep : (K, 3), (K,), (K, 2) ndarray
-        Overwritten, as in `law_rows`.
-    PZ, Z_rows : (K, m + r) ndarray
-        Overwritten: P Z, and Z in the rows of the dofs.
-    factors : ndarray
-        Overwritten: LU of P W_R - Q of each sample, column by column, one after the other.
-    pivots : (K,) ndarray of int
-        Overwritten: rows that were exchanged.
+    rows : tuple of ndarray
+        at, square (N + 1,): first row of each sample among all K, and first entry of its matrix
+        among all. Overwritten are cols, owner (K,), P (K, 3), left (K,), keep (K, 2) as in
+        `law_rows`; PZ, Z_rows (K, m + r): P Z, and Z in the rows of the dofs; factors: LU of
+        P W_R - Q of each sample, column by column, one after the other; pivots (K,): rows that
+        were exchanged.
 
     Returns
     -------
     bool
         False where a sample's system is singular.
     """
-    n, wide = len(mu), Z.shape[1]
+    F, Y, S = samples
+    at, square, cols, owner, P, left, keep, PZ, Z_rows, factors, pivots = rows
+    n, wide = S.shape[1], Z.shape[1]
     most = 0
     for j in range(first_sample, last_sample):
         most = max(most, at[j + 1] - at[j])
@@ -196,24 +164,8 @@ def factor_period(  # type: ignore[no-untyped-def]
             if S[j, i] != STICK:
                 on[count] = i
                 count += 1
-        law_rows(
-            F[j],
-            Y[j],
-            S[j],
-            n,
-            mu,
-            rho_n,
-            rho_t,
-            on,
-            count,
-            cols[a:b],
-            owner[a:b],
-            P[a:b],
-            left[a:b],
-            keep[a:b],
-            H,
-            W,
-        )
+        own = (cols[a:b], owner[a:b], P[a:b], left[a:b], keep[a:b])
+        law_rows((F[j], Y[j], S[j]), law, on, count, own, H, W)
         for row in range(a, b):
             i = owner[row]
             for e in range(wide):
@@ -252,62 +204,36 @@ def invert_period(  # type: ignore[no-untyped-def]
 
 @compiled
 def march_directions(  # type: ignore[no-untyped-def]
-    S,
-    W,
-    Z,
-    M,
-    moved,
-    place,
-    at,
-    square,
-    cols,
-    owner,
-    P,
-    left,
-    keep,
-    PZ,
-    Z_rows,
-    factors,
-    pivots,
-    inverted,
-    J,
-    late,
-    motion,
-    faster,
-    verge,
-    R,
-    slips,
-    forces,
+    S, step, nodes, rows, inverted, change, ends, forces
 ):
     """March directions through the period: what they do to modal forces and end state.
 
     Parameters
     ----------
-    S, W, Z, at, square, cols, owner, P, left, keep, PZ, Z_rows, factors, pivots
-        As in `factor_period`.
+    S, rows
+        States and rows, as in `factor_period`.
+    step : tuple of ndarray
+        W, Z as in `factor_period`, M = (Phi, B)' W (Phi, B), J as in
+        `upd.hbm.faces.samples.given_blades`, and dJ (p - B' f) of the samples (N, r).
+    nodes : tuple of ndarray
+        Tangents of the nodes that move (2 c,), first ones, then second ones, and the number (3 n,)
+        of each dof among them, or -1.
     inverted : bool
         Whether the factors have been overwritten by inverses, which many directions share.
-    M : (m + r, m + r) ndarray
-        (Phi, B)' W (Phi, B).
-    moved : (2 c,) ndarray of int
-        Tangents of the nodes that move, first ones, then second ones.
-    place : (3 n,) ndarray of int
-        Number of each among them, or -1.
-    J : (r, r) ndarray
-        As in `upd.hbm.faces.samples.given_blades`.
-    late : (N, r) ndarray
-        dJ (p - B' f) of the samples, by the frequency.
-    motion : (N, m, C) ndarray
-        Changes of the blades' modes at the samples, in each of C directions.
-    faster, verge : (C,) ndarray
-        Changes of the frequency [rad/s]; share of what nodes on the verge do by themselves.
-    R : (3 r, C) ndarray
-        Change of the damper's state; overwritten by that after the period.
-    slips : (2 c, C) ndarray
-        The same of the slips of the nodes that move.
+    change : tuple of ndarray
+        In each of C directions: changes of the blades' modes at the samples (N, m, C) and of the
+        frequency (C,) [rad/s]; share (C,) of what nodes on the verge do by themselves.
+    ends : tuple of ndarray
+        Changes of the damper's state (3 r, C), and of the slips (2 c, C) of the nodes that move;
+        overwritten by those after the period.
     forces : (N, m, C) ndarray
         Overwritten: changes of the modal forces.
     """
+    W, Z, M, J, late = step
+    moved, place = nodes
+    at, square, cols, owner, P, left, keep, PZ, Z_rows, factors, pivots = rows
+    motion, faster, verge = change
+    R, slips = ends
     N, n, C = len(S), S.shape[1], len(faster)
     r, m, wide = len(J), motion.shape[1], Z.shape[1]
     most = 0

@@ -12,8 +12,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.hbm.faces.rows import add_rows
-from upd.hbm.faces.step import FEW, OPEN, SLIP, SOLVED, STICK, judge, newton_rows, slip_rows
+from upd.hbm.faces.step import (
+    FEW,
+    OPEN,
+    SLIP,
+    SOLVED,
+    STICK,
+    add_rows,
+    contact_step,
+    fetch_row,
+    judge,
+    newton_rows,
+    put,
+    slip_rows,
+)
 from upd.linalg.compiled import compiled, inlined
 
 #: a chord step must take at least this share of the misfit away; it only weighs costs
@@ -44,52 +56,79 @@ def kept_inverses(samples: int, n: int) -> tuple[np.ndarray, np.ndarray]:
     return np.full((samples, n), -1), np.empty((samples, rows**2 if rows > FEW else 0))
 
 
-@compiled
-def kept_step(  # type: ignore[no-untyped-def]
-    sample,
-    x0,
-    Tt,
-    base,
-    one,
-    mu,
-    rho_n,
-    rho_t,
-    f,
-    y,
-    state,
-    kept,
-    inverses,
-    H,
-    cols,
-    sign,
-    b,
-    G,
+@inlined
+def solve_sample(  # type: ignore[no-untyped-def]
+    sample, x0, bases, one, law, node, before, known, past, scratch
 ):
+    """One step of contact, from whatever is near and leads to an answer.
+
+    Parameters
+    ----------
+    sample : int
+        Of the period.
+    x0, bases, one, law, node, scratch
+        As in `upd.hbm.faces.step.contact_step`.
+    before : tuple of ndarray
+        As `node`, of the step before.
+    known : bool
+        Whether the past holds a period.
+    past : tuple of ndarray
+        Forces and relative motions (N, 3 n) and states (N, n) of the samples a period ago, and
+        `kept_inverses` of them.
+
+    Returns
+    -------
+    int
+        Newton steps, or inverses formed; -1 without an answer.
+    """
+    forces, moves, states, kept, inverses = past
+    used = -1
+    # from the sample a period ago, from the step before, from nothing
+    for start in range(0 if known else 1, 3):
+        if start == 0:
+            fetch_row(forces, sample, node[0])
+            fetch_row(moves, sample, node[1])
+            fetch_row(states, sample, node[2])
+            used = kept_step(sample, x0, bases, one, law, node, (kept, inverses), scratch)
+        elif start == 1:
+            put(before[0], node[0], 0)
+            put(before[1], node[1], 0)
+            put(before[2], node[2], 0)
+        if used < 0:
+            used = contact_step(x0, bases, one, law, node, start < 2, scratch)
+        if used >= 0:
+            break
+    return used
+
+
+@compiled
+def kept_step(sample, x0, bases, one, law, node, kept, scratch):  # type: ignore[no-untyped-def]
     """Forces and relative motions of one step.
 
     Parameters
     ----------
     sample : int
         Of the period.
-    x0, Tt, base, one, mu, rho_n, rho_t
+    x0, bases, one, law, scratch
         As in `contact_step`.
-    f, y : (3 n,) ndarray
-        Of the sample a period ago; overwritten by forces [N], and by minus gaps and slips [mm],
-        if there is an answer.
-    state : (n,) ndarray of int
-        Likewise.
-    kept, inverses
+    node : tuple of ndarray
+        f, y and states of the sample a period ago; overwritten as in `contact_step` if there is an
+        answer.
+    kept : tuple of ndarray
         As of `kept_inverses`; overwritten.
-    H, cols, sign, b, G
-        Scratch, as in `contact_step`.
 
     Returns
     -------
     int
         Inverses formed, or -1 without an answer.
     """
+    base, Tt = bases
+    mu, rho_n, rho_t = law
+    f, y, state = node
+    suits, inverses = kept
+    cols, sign, _, _, H = scratch
     n = len(mu)
-    k, same = _unknowns(sample, base, one, state, kept, cols, sign)
+    k, same = _unknowns(sample, base, one, state, suits, cols, sign)
     if k <= FEW or k * k > inverses.shape[1]:
         return -1
     allowed = 0.0
@@ -97,18 +136,14 @@ def kept_step(  # type: ignore[no-untyped-def]
         if not base[one, i]:
             allowed = max(allowed, SOLVED * max(abs(x0[i]), abs(x0[n + i]), abs(x0[2 * n + i])))
     fs, ys, states, x = f.copy(), y.copy(), state.copy(), np.empty(3 * n)
+    iterate = (fs, ys, states)
     z, left = np.empty(3 * n), np.empty(3 * n)
     formed, before, turned, started = 0, np.inf, False, False
     for _ in range(MOST_CHORDS):
         if not same:
-            bordered = not turned and border(
-                sample, Tt, base, one, mu, rho_n, rho_t, fs, ys, states, kept, inverses
-            )
-            if not bordered:
-                k = newton_rows(
-                    x0, Tt, base, one, mu, rho_n, rho_t, fs, ys, states, H, cols, sign, b, G
-                )
-                kept[sample, 0] = -1
+            if turned or not border(sample, bases, one, law, iterate, kept):
+                k = newton_rows(x0, bases, one, law, iterate, scratch)
+                suits[sample, 0] = -1
                 if formed == MOST_FORMED or k <= FEW or k * k > inverses.shape[1]:
                     return -1
                 try:
@@ -118,8 +153,8 @@ def kept_step(  # type: ignore[no-untyped-def]
                 inverses[sample, : k * k] = made.ravel()
                 formed += 1
             for i in range(n):
-                kept[sample, i] = 2 * states[i] + base[one, i]
-            k, same = _unknowns(sample, base, one, states, kept, cols, sign)
+                suits[sample, i] = 2 * states[i] + base[one, i]
+            k, same = _unknowns(sample, base, one, states, suits, cols, sign)
             started, turned, before = False, False, np.inf
         if not started:
             for r in range(k):
@@ -136,12 +171,12 @@ def kept_step(  # type: ignore[no-untyped-def]
         _split(x, z, base, one, cols, k, fs, ys)
         worst = judge(fs, ys, mu, rho_n, rho_t, states)
         if not worst < np.inf:
-            kept[sample, 0] = -1
+            suits[sample, 0] = -1
             return -1
         for d in range(3 * n):
             allowed = max(allowed, SOLVED * abs(fs[d]))
         for i in range(n):
-            if kept[sample, i] != 2 * states[i] + base[one, i]:
+            if suits[sample, i] != 2 * states[i] + base[one, i]:
                 same = False
         if same and worst <= allowed:
             for i in range(n):
@@ -207,9 +242,7 @@ def _lacks(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def border(  # type: ignore[no-untyped-def]
-    sample, Tt, base, one, mu, rho_n, rho_t, f, y, state, kept, inverses
-):
+def border(sample, bases, one, law, node, kept):  # type: ignore[no-untyped-def]
     """Take the nodes that changed their states into the inverse; other rows stay as they are.
 
     With M the matrix so far, E its rows that go, C what the rows that stay have of the unknowns
@@ -221,9 +254,9 @@ def border(  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    sample, Tt, base, one, mu, rho_n, rho_t, kept, inverses
+    sample, bases, one, law, kept
         As in `kept_step`.
-    f, y, state : ndarray
+    node : tuple of ndarray
         The iterate.
 
     Returns
@@ -231,7 +264,10 @@ def border(  # type: ignore[no-untyped-def]
     bool
         False where the base is another one, or so many nodes changed that it would not pay.
     """
-    n = len(mu)
+    base, Tt = bases
+    state = node[2]
+    suits, inverses = kept
+    n = len(state)
     was, cols = np.empty(3 * n, np.int64), np.empty(3 * n, np.int64)
     # rows that go; rows that stay, where they were and where they are; rows that come
     gone = np.empty(3 * n, np.int64)
@@ -240,7 +276,7 @@ def border(  # type: ignore[no-untyped-def]
     k0, k, lost, added, common = 0, 0, 0, 0, 0
     for i in range(n):
         open_ = base[one, i]
-        code = kept[sample, i]
+        code = suits[sample, i]
         if code < 0 or code % 2 != open_:
             return False
         now = 2 * state[i] + open_
@@ -276,13 +312,13 @@ def border(  # type: ignore[no-untyped-def]
     for a in range(common):
         d = was[stay[a]]
         i = d % n
-        _weights(d, f, y, n, mu, rho_n, rho_t, state, base[one, i], w, o)
+        _weights(d, node, law, base[one, i], w, o)
         for e in range(added):
             C[stay[a], e] = _entry(w, i, cols[new[e]], Tt, base, one)
     for e in range(added):
         d = cols[new[e]]
         i = d % n
-        _weights(d, f, y, n, mu, rho_n, rho_t, state, base[one, i], w, o)
+        _weights(d, node, law, base[one, i], w, o)
         for a in range(common):
             R[e, stay[a]] = _entry(w, i, was[stay[a]], Tt, base, one)
         for a in range(added):
@@ -320,8 +356,11 @@ def border(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _weights(d, f, y, n, mu, rho_n, rho_t, state, open_, w, o):  # type: ignore[no-untyped-def]
+def _weights(d, node, law, open_, w, o):  # type: ignore[no-untyped-def]
     """Row of a dof: weights of what the base fixes of its node, and of the node's unknowns."""
+    f, y, state = node
+    mu, rho_n, rho_t = law
+    n = len(mu)
     i, a = d % n, d // n
     w[:], o[:] = 0.0, 0.0
     if state[i] != SLIP or a == 0:

@@ -45,16 +45,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import cho_factor, cho_solve, expm
+from scipy.linalg import cho_solve, expm
 
 from upd.errors import ConvergenceError
-from upd.hbm.faces.bases import suit_bases
 from upd.hbm.faces.kept import kept_inverses
-from upd.hbm.faces.period import Bases, Past, StepParts, march_steps
-from upd.hbm.faces.state import FloatArray, InterfaceModel, InterfaceState
+from upd.hbm.faces.period import Bases, Past, StepParts, march_steps, suit_bases
+from upd.hbm.faces.state import FloatArray, InterfaceModel, InterfaceState, factored, in_columns
 from upd.hbm.faces.step import OPEN, STICK, judge
 
 #: steps in a period from which a mode is stepped exactly
@@ -198,8 +198,7 @@ class InterfaceMarch:
         self.fallback = fallback
         self.model, self.frequency, self.samples = model, frequency, samples
         self.dt = 1.0 / (frequency * samples)
-        amplitude = np.asarray(drive, complex)
-        amplitude = amplitude[:, None] if amplitude.ndim == 1 else amplitude
+        amplitude = in_columns(drive)
         k = np.arange(1, amplitude.shape[1] + 1)
         # the harmonics of the excitation; without any the first is looked at
         self.orders = tuple(int(one) for one in k[np.any(amplitude != 0.0, axis=0)]) or (1,)
@@ -209,17 +208,11 @@ class InterfaceMarch:
         # sinc(x / pi) = sin(x) / x
         self.sinc = float(np.sinc(2.0 * self.orders[0] * frequency * self.dt))
         self.blades = modal_step(model.omega, model.damping, self.dt, 1.0 / self.sinc)
-        self.inverse_mass = np.linalg.inv(model.mass)
+        self.inverse_mass = np.asarray(np.linalg.inv(model.mass), float)
         rigid = 0.5 * self.dt**2 * model.columns @ self.inverse_mass @ model.columns.T
         A = model.compliance + (model.shapes * self.blades[3]) @ model.shapes.T + rigid
         self.A = 0.5 * (A + A.T)
-        try:
-            factor = cho_factor(self.A, lower=True)
-        except np.linalg.LinAlgError as error:
-            raise ConvergenceError(
-                "interface march: the compliance of the step is not positive definite: more modes "
-                "were removed than the static compliance holds; use fewer modes a blade"
-            ) from error
+        factor = factored(self.A, "interface march: the compliance of the step")
         W = cho_solve(factor, np.eye(3 * model.n))
         self.W = np.ascontiguousarray(0.5 * (W + W.T))
         taken = [model.shapes, model.columns, model.seen_contact.T, model.pushed]
@@ -230,27 +223,21 @@ class InterfaceMarch:
         self.rho_n = 1.0 / diagonal[0]
         self.rho_t = 2.0 / (diagonal[1] + diagonal[2])
         n, alike = model.n, like is not None and like.samples == samples
+        flat = partial(np.ascontiguousarray, dtype=float)
+        held = np.where(resolved(model.omega, self.dt), self.sinc - 1.0, 0.0)
         self.steps = StepParts(
             self.dt,
             self.drive,
             self.blades,
+            (2.0 * model.damping * model.omega, flat(model.places), held),
             self.taken,
-            np.ascontiguousarray(self.inverse_mass, float),
-            np.ascontiguousarray(model.load, float),
-            np.ascontiguousarray(model.gap, float),
-            np.ascontiguousarray(model.friction, float),
-            self.rho_n,
-            self.rho_t,
-            2.0 * model.damping * model.omega,
-            np.ascontiguousarray(model.places, float),
-            np.where(resolved(model.omega, self.dt), self.sinc - 1.0, 0.0),
-            np.ascontiguousarray(model.seen_modes, float),
-            np.ascontiguousarray(model.seen_drive, float),
-            np.zeros(3 * n)
-            if model.springs is None
-            else np.ascontiguousarray(model.springs, float),
+            (flat(self.inverse_mass), flat(model.load)),
+            flat(model.gap),
+            (flat(model.friction), self.rho_n, self.rho_t),
+            (flat(model.seen_modes), flat(model.seen_drive)),
+            np.zeros(3 * n) if model.springs is None else flat(model.springs),
         )
-        self.x0, self.work = np.zeros(3 * n), np.empty((3 * n, 3 * n))
+        self.x0 = np.zeros(3 * n)
         self.known, self.which = False, np.zeros(samples, np.int64)
         self.bases: Bases
         if like is None or not alike or like.model.n != n:
@@ -264,31 +251,6 @@ class InterfaceMarch:
         else:
             self._hold(like.bases.open)
             self.which, self.past, self.known = like.which.copy(), like.past, like.known
-
-    @property
-    def base(self) -> NDArray[np.bool_]:
-        """(n,) the nodes that the first base has open."""
-        return np.asarray(self.bases.open[0])
-
-    @property
-    def Tt(self) -> FloatArray:
-        """(3 n, 3 n) transpose of T, of the first base."""
-        return np.asarray(self.bases.Tt[0])
-
-    @property
-    def Z(self) -> FloatArray:
-        """(r + m + L, 3 n) what the first base gives by motions and excitation."""
-        return np.asarray(self.bases.Z[0])
-
-    @property
-    def L(self) -> FloatArray:
-        """(3 n, 3 n) from forces of everything stuck and closed to what the first base gives."""
-        O = np.tile(self.base, 3)
-        L = np.eye(len(O))
-        if O.any():
-            S = np.linalg.inv(self.W[np.ix_(O, O)])
-            L[np.ix_(~O, O)], L[np.ix_(O, O)] = -self.W[np.ix_(~O, O)] @ S, S
-        return L
 
     def rebase(self, open_: NDArray[np.bool_]) -> None:
         """Choose which nodes the steps take for open until they find otherwise.
@@ -345,24 +307,32 @@ class InterfaceMarch:
         ConvergenceError
             When a step has no answer that any of the solvers finds.
         """
-        N = self.samples
-        out, sums, known = np.zeros((N, len(self.model.seen_modes))), np.zeros(4), self.known
-        done, given, fallbacks = 0, False, 0
+        out, sums = np.zeros((self.samples, len(self.model.seen_modes))), np.zeros(4)
+        fallbacks = self.advance(at, out, sums)
+        return self.period_of(out, sums, fallbacks, record=record)
+
+    def advance(self, at: InterfaceState, out: FloatArray, sums: FloatArray) -> int:
+        """March one period and leave of it what is written and the past.
+
+        Parameters
+        ----------
+        at : InterfaceState
+            Overwritten.
+        out, sums : (N, K), (4,) ndarray
+            Overwritten as `upd.hbm.faces.period.march_steps` does.
+
+        Returns
+        -------
+        int
+            Steps that the slow solver had to finish.
+        """
+        sums[:] = 0.0
+        parts, motion, past = tuple(self.steps), at.arrays(), tuple(self.past)
+        N, known, done, given, fallbacks = self.samples, self.known, 0, False, 0
         while done < N:
+            bases = tuple(self.bases)
             done = march_steps(
-                done,
-                N,
-                given,
-                tuple(self.steps),
-                tuple(self.bases),
-                self.which,
-                at.arrays(),
-                known,
-                tuple(self.past),
-                self.x0,
-                self.work,
-                out,
-                sums,
+                done, N, given, parts, bases, self.which, motion, known, past, self.x0, out, sums
             )
             given = done < N
             if given:
@@ -370,25 +340,12 @@ class InterfaceMarch:
                 fallbacks += 1
         self.known = True
         self.suit()
-        return self.period_of(out, sums, fallbacks, record=record)
+        return fallbacks
 
     def period_of(
         self, out: FloatArray, sums: FloatArray, fallbacks: int, *, record: bool = False
     ) -> InterfacePeriod:
-        """The last period from its outputs and sums.
-
-        Parameters
-        ----------
-        out, sums
-            As `upd.hbm.faces.period.march_steps` leaves them.
-        fallbacks : int
-        record : bool
-            Whether forces and states of all samples are kept.
-
-        Returns
-        -------
-        InterfacePeriod
-        """
+        """The last period from its outputs and sums; parameters as of `advance` and `period`."""
         N, n, past = self.samples, self.model.n, self.past
         counts = np.array([(past.state == kind).sum() for kind in (OPEN, STICK)] + [0], float)
         counts[2] = n * N - counts.sum()

@@ -1,4 +1,4 @@
-"""The steps of a period of `upd.hbm.faces.march`, compiled."""
+"""The steps of a period of `upd.hbm.faces.march`, and the bases that suit them, compiled."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.faces.bases import begin, bring_up
-from upd.hbm.faces.kept import kept_step
-from upd.hbm.faces.rows import add_rows, fetch_row, put, put_row
-from upd.hbm.faces.step import OPEN, contact_scratch, contact_step
+from upd.hbm.faces.kept import solve_sample
+from upd.hbm.faces.step import OPEN, add_rows, contact_scratch, fetch_row, put, put_row
 from upd.linalg.compiled import compiled, inlined
 
 FloatArray = NDArray[np.float64]
@@ -29,20 +27,19 @@ class StepParts(NamedTuple):
         Excitation at the samples [N].
     blades : (8, m) ndarray
         Step of each mode: q by q, v, and by its force before and after; v by the same.
+    modes : tuple of ndarray
+        2 zeta omega (m,), modes at the places of excitation (m, L), and what of the modal forces at
+        rest is added to them (m,).
     taken : (3 n, m + r + K + L) ndarray
         What contact forces do to modes, rigid motions, outputs and places of excitation.
-    inverse_mass, load : (r, r) and (r,) ndarray
-        Of the damper.
-    gap, mu, rho_n, rho_t : (n,) ndarray
-        Gap before any load [mm]; friction; weights of displacements against forces [N/mm].
-    loss : (m,) ndarray
-        2 zeta omega.
-    places : (m, L) ndarray
-        Modes at the places of excitation.
-    held : (m,) ndarray
-        What of the modal forces at rest is added to them.
-    seen_modes, seen_drive : (K, m), (K, L) ndarray
-        What the outputs are made of.
+    damper : tuple of ndarray
+        Inverse mass (r, r) and static load (r,).
+    gap : (n,) ndarray
+        Gap before any load [mm].
+    law : tuple of three (n,) ndarray
+        Friction; weights rho_n, rho_t of displacements against forces [N/mm].
+    seen : tuple of ndarray
+        What the outputs are made of: by modes (K, m), by the excitation (K, L).
     springs : (3 n,) ndarray
         Compliance of each node's own springs, zero without [mm/N].
     """
@@ -50,18 +47,12 @@ class StepParts(NamedTuple):
     dt: float
     drive: FloatArray
     blades: FloatArray
+    modes: tuple[FloatArray, FloatArray, FloatArray]
     taken: FloatArray
-    inverse_mass: FloatArray
-    load: FloatArray
+    damper: tuple[FloatArray, FloatArray]
     gap: FloatArray
-    mu: FloatArray
-    rho_n: FloatArray
-    rho_t: FloatArray
-    loss: FloatArray
-    places: FloatArray
-    held: FloatArray
-    seen_modes: FloatArray
-    seen_drive: FloatArray
+    law: tuple[FloatArray, FloatArray, FloatArray]
+    seen: tuple[FloatArray, FloatArray]
     springs: FloatArray
 
 
@@ -98,6 +89,128 @@ class Past(NamedTuple):
     state: NDArray[np.int64]
     kept: NDArray[np.int64]
     inverses: FloatArray
+
+
+@inlined
+def bring_up(c, w, slip, Tt, base, one):  # type: ignore[no-untyped-def]
+    """Bring c = -L W w_ref of a base up to the slips that were made since.
+
+    Parameters
+    ----------
+    c : (B, 3 n) ndarray
+        Overwritten.
+    w : (B, 2 n) ndarray
+        Sums of slips it is for; overwritten by `slip`.
+    slip : (2 n,) ndarray
+        Sums of slips now.
+    Tt, base, one
+        As `contact_step`.
+    """
+    n = base.shape[1]
+    for d in range(2 * n):
+        moved = slip[d] - w[one, d]
+        if moved != 0.0:
+            w[one, d] = slip[d]
+            if base[one, d % n]:
+                # L W of a node that is open in the base
+                c[one, n + d] -= moved
+            else:
+                for e in range(3 * n):
+                    c[one, e] -= moved * Tt[one, n + d, e]
+
+
+@compiled
+def begin(bases, gap, slip):  # type: ignore[no-untyped-def]
+    """-L W w_ref of each base, anew every period so that its rounding does not add up.
+
+    Parameters
+    ----------
+    bases : Bases
+    gap, slip : (n,), (2 n,) ndarray
+        Gap before any load, sums of slips [mm].
+
+    Returns
+    -------
+    c, w : (B, 3 n), (B, 2 n) ndarray
+        And the sums of slips it is for.
+    """
+    bases_open, bases_Tt, _ = bases
+    B, n = bases_open.shape
+    c, w = np.zeros((B, 3 * n)), np.empty((B, 2 * n))
+    for one in range(B):
+        w[one] = slip
+        for d in range(3 * n):
+            ref = gap[d] if d < n else slip[d - n]
+            if ref == 0.0:
+                continue
+            if bases_open[one, d % n]:
+                c[one, d] -= ref
+            else:
+                for e in range(3 * n):
+                    c[one, e] -= ref * bases_Tt[one, d, e]
+    return c, w
+
+
+@compiled
+def suit_bases(states, bases, which, pays):  # type: ignore[no-untyped-def]
+    """For every sample the base that most of its nodes agree with.
+
+    Parameters
+    ----------
+    states : (N, n) ndarray of int
+        Of the period before.
+    bases : (B, n) ndarray of bool
+    which : (N,) ndarray of int
+        Overwritten.
+    pays : float
+        Nodes a sample that a new base must spare.
+
+    Returns
+    -------
+    int
+        Sample whose open nodes would make a base that pays, or -1.
+    """
+    N, n = states.shape
+    least, total = np.empty(N, np.int64), 0
+    for t in range(N):
+        as_before = t > 0
+        for i in range(n):
+            if as_before and (states[t, i] == OPEN) != (states[t - 1, i] == OPEN):
+                as_before = False
+        if as_before:
+            least[t], which[t] = least[t - 1], which[t - 1]
+            total += least[t]
+            continue
+        least[t] = n + 1
+        for one in range(len(bases)):
+            off = 0
+            for i in range(n):
+                off += (states[t, i] == OPEN) != bases[one, i]
+            if off < least[t]:
+                least[t], which[t] = off, one
+        total += least[t]
+    if total <= pays * N:
+        return -1
+    # what each set of open nodes would save as a base
+    best, most = -1, pays * N
+    for k in range(N):
+        new = k == 0
+        for i in range(n):
+            if not new and (states[k, i] == OPEN) != (states[k - 1, i] == OPEN):
+                new = True
+        if not new:
+            continue
+        gain = 0
+        for t in range(N):
+            off = 0
+            for i in range(n):
+                if off >= least[t]:
+                    break
+                off += (states[t, i] == OPEN) != (states[k, i] == OPEN)
+            gain += max(least[t] - off, 0)
+        if gain > most:
+            best, most = k, float(gain)
+    return best
 
 
 @inlined
@@ -145,7 +258,7 @@ def touch(f, y, state, slid, was, springs, moved):  # type: ignore[no-untyped-de
 
 @compiled
 def march_steps(  # type: ignore[no-untyped-def]
-    first, last, given, parts, bases, which, at, known, past, x0, work, out, sums
+    first, last, given, parts, bases, which, at, known, past, x0, out, sums
 ):
     """March samples first + 1 to last of a period.
 
@@ -166,8 +279,8 @@ def march_steps(  # type: ignore[no-untyped-def]
         Whether the past holds a period: its samples are then what the steps start from.
     past : Past
         Overwritten.
-    x0, work : ndarray
-        Scratch (3 n,) and (3 n, 3 n); x0 is what the base gave of the last step.
+    x0 : (3 n,) ndarray
+        Overwritten by what the base gave of the last step.
     out : (N, K) ndarray
         Outputs, overwritten from `first` on.
     sums : (4,) ndarray
@@ -178,31 +291,18 @@ def march_steps(  # type: ignore[no-untyped-def]
     int
         Where it ended: `last`, or the sample before a step without an answer.
     """
-    (
-        dt,
-        drive,
-        blades,
-        taken,
-        inverse_mass,
-        load,
-        gap,
-        mu,
-        rho_n,
-        rho_t,
-        loss,
-        places,
-        held_share,
-        seen_modes,
-        seen_drive,
-        springs,
-    ) = parts
+    dt, drive, blades, modes, taken, damper, gap, law, outputs, springs = parts
+    loss, places, held_share = modes
+    inverse_mass, load = damper
+    seen_modes, seen_drive = outputs
     q, v, p, s, sv, sa, f, y, slip, state, held = at
     bases_open, Tt, Z = bases
-    forces, moves, states, kept, inverses = past
+    forces, moves, states, _, _ = past
+    suited, node = (bases_open, Tt), (f, y, state)
     bias = held_share * held
     c, w = begin(bases, gap, slip)
-    scratch = contact_scratch(len(mu))
-    n, m, r, L = len(mu), len(q), len(s), drive.shape[1]
+    scratch = contact_scratch(len(gap))
+    n, m, r, L = len(gap), len(q), len(s), drive.shape[1]
     K, wide = out.shape[1], taken.shape[1]
     seen, carried, weights = seen_modes.T.copy(), np.empty(3 * n, np.int64), np.empty(3 * n)
     moved, total_of, every = np.empty(3 * n), np.empty(K), np.arange(r + m + L)
@@ -211,6 +311,7 @@ def march_steps(  # type: ignore[no-untyped-def]
     back, felt = np.zeros(m + r + K + L), np.zeros(L)
     before, pull = np.empty(3 * n), np.empty(r)
     slid, was = np.empty(3 * n), np.empty(n, np.int64)
+    earlier = (before, slid, was)
     for d in range(3 * n):
         for place in range(L):
             felt[place] += f[d] * taken[d, m + r + K + place]
@@ -242,55 +343,7 @@ def march_steps(  # type: ignore[no-untyped-def]
             add_rows(x0, 1.0, inputs, every, len(inputs), Z, one)
             put(y, slid, 0)
             put(state, was, 0)
-            used = -1
-            if known:
-                fetch_row(forces, step, f)
-                fetch_row(moves, step, y)
-                fetch_row(states, step, state)
-                used = kept_step(
-                    step,
-                    x0,
-                    Tt,
-                    bases_open,
-                    one,
-                    mu,
-                    rho_n,
-                    rho_t,
-                    f,
-                    y,
-                    state,
-                    kept,
-                    inverses,
-                    work,
-                    *scratch,
-                )
-            # from the sample a period ago, from the step before, from nothing
-            for start in range(0 if known else 1, 3):
-                if used >= 0:
-                    break
-                if start == 0:
-                    fetch_row(forces, step, f)
-                    fetch_row(moves, step, y)
-                    fetch_row(states, step, state)
-                elif start == 1:
-                    put(before, f, 0)
-                    put(slid, y, 0)
-                    put(was, state, 0)
-                used = contact_step(
-                    x0,
-                    Tt,
-                    bases_open,
-                    one,
-                    mu,
-                    rho_n,
-                    rho_t,
-                    f,
-                    y,
-                    state,
-                    start < 2,
-                    work,
-                    *scratch,
-                )
+            used = solve_sample(step, x0, suited, one, law, node, earlier, known, past, scratch)
             if used < 0:
                 put(before, f, 0)
                 # for whoever solves the step, and comes back

@@ -17,34 +17,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.hbm.faces.kept import kept_step
-from upd.hbm.faces.step import contact_scratch, contact_step
+from upd.hbm.faces.kept import solve_sample
+from upd.hbm.faces.step import contact_scratch, fetch_row, put_row
 from upd.linalg.compiled import compiled
 
 
 @compiled
 def given_blades(  # type: ignore[no-untyped-def]
-    first,
-    given,
-    known,
-    pushes,
-    rigid,
-    W,
-    columns,
-    J,
-    load,
-    mu,
-    rho_n,
-    rho_t,
-    s,
-    c,
-    F,
-    Y,
-    S,
-    kept,
-    inverses,
-    x0,
-    work,
+    first, given, known, pushes, step, law, load, s, c, past, x0
 ):
     """Solve samples from `first` on.
 
@@ -53,85 +33,65 @@ def given_blades(  # type: ignore[no-untyped-def]
     first : int
         Sample to begin with.
     given : bool
-        Whether that one was solved elsewhere: its rows of F, Y and S hold the answer.
+        Whether that one was solved elsewhere: its rows of the past hold the answer.
     known : bool
-        Whether F, Y and S hold a guess of every sample; else each starts from the one before, and
+        Whether the past holds a guess of every sample; else each starts from the one before, and
         the first from its own row.
     pushes : (N, 3 n) ndarray
         W (-Phi q - E F) [N].
-    rigid : (r, 3 n) ndarray
-        (W B)' [N/mm].
-    W : (3 n, 3 n) ndarray
-        Inverse of A [N/mm].
-    columns : (3 n, r) ndarray
-        B.
-    J, load : (r, r), (r,) ndarray
-        Square of the step over the damper's masses; static load.
-    mu, rho_n, rho_t : (n,) ndarray
+    step : tuple of ndarray
+        (W B)' (r, 3 n) [N/mm], inverse W (3 n, 3 n) of A [N/mm], B (3 n, r), and the square of the
+        step over the damper's masses J (r, r).
+    law : tuple of three (n,) ndarray
         Friction, weights of displacements against forces [N/mm].
+    load : (r,) ndarray
+        Static load.
     s : (3, r) ndarray
         Damper's motion, velocity and acceleration in steps; overwritten.
     c : (3 n,) ndarray
         -W w_ref of the first sample; overwritten.
-    F, Y : (N, 3 n) ndarray
-        Forces [N]; minus gaps, and slips of the step [mm]; overwritten.
-    S : (N, n) ndarray of int
-        States; overwritten.
-    kept, inverses
-        As of `upd.hbm.faces.kept.kept_inverses`; overwritten.
-    x0, work : ndarray
-        Scratch (3 n,), (3 n, 3 n).
+    past : tuple of ndarray
+        Forces [N], minus gaps and slips of the step [mm] (N, 3 n), states (N, n), and
+        `upd.hbm.faces.kept.kept_inverses`; overwritten.
+    x0 : (3 n,) ndarray
+        Overwritten.
 
     Returns
     -------
     int
         Samples solved: N, or the sample without an answer; x0 then holds its forces if all stuck.
     """
-    N, n, r = len(pushes), len(mu), len(load)
-    one_base, only = np.zeros((1, n), np.bool_), W.reshape(1, 3 * n, 3 * n)
-    scratch = contact_scratch(n)
+    rigid, W, columns, J = step
+    F, Y, S, _, _ = past
+    N, n, r = len(pushes), len(law[0]), len(load)
+    bases, scratch = (np.zeros((1, n), np.bool_), W.reshape(1, 3 * n, 3 * n)), contact_scratch(n)
+    f, y, state = np.empty(3 * n), np.empty(3 * n), np.empty(n, np.int64)
+    node, before = (f, y, state), (np.empty(3 * n), np.empty(3 * n), np.empty(n, np.int64))
     z, b, pull = np.empty(r), np.empty(r), np.empty(r)
     for j in range(first, N):
-        f, y, state = F[j], Y[j], S[j]
         for i in range(r):
             z[i] = s[0, i] + s[1, i]
             for e in range(r):
                 z[i] += 0.5 * J[i, e] * load[e]
-        if not (given and j == first):
+        if given and j == first:
+            fetch_row(F, j, f)
+            fetch_row(Y, j, y)
+            fetch_row(S, j, state)
+        else:
             x0[:] = pushes[j] + c
             for i in range(r):
                 for d in range(3 * n):
                     x0[d] += z[i] * rigid[i, d]
-            used = -1
-            if known:
-                used = kept_step(
-                    j,
-                    x0,
-                    only,
-                    one_base,
-                    0,
-                    mu,
-                    rho_n,
-                    rho_t,
-                    f,
-                    y,
-                    state,
-                    kept,
-                    inverses,
-                    work,
-                    *scratch,
-                )
-            # from the sample's own guess, from the sample before, from nothing
-            for start in range(3):
-                if used >= 0 or (start == 0 and not (known or j == 0)) or (start == 1 and j == 0):
-                    continue
-                if start == 1:
-                    f[:], y[:], state[:] = F[j - 1], Y[j - 1], S[j - 1]
-                used = contact_step(
-                    x0, only, one_base, 0, mu, rho_n, rho_t, f, y, state, start < 2, work, *scratch
-                )
+            # the first sample starts from its own row
+            fetch_row(F, max(j - 1, 0), before[0])
+            fetch_row(Y, max(j - 1, 0), before[1])
+            fetch_row(S, max(j - 1, 0), before[2])
+            used = solve_sample(j, x0, bases, 0, law, node, before, known, past, scratch)
             if used < 0:
                 return j
+            put_row(f, F, j)
+            put_row(y, Y, j)
+            put_row(state, S, j)
         pull[:] = load
         for d in range(3 * n):
             if f[d] != 0.0:

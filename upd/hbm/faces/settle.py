@@ -12,21 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from upd.hbm.faces.march import PAYS, InterfaceMarch, InterfacePeriod
-from upd.hbm.faces.periods import (
-    COUNTERS,
-    KNOWN,
-    NEW_BASE,
-    PERIODS,
-    SAMPLE,
-    SEEN,
-    UNSOLVED,
-    WINDOW,
-    Settling,
-    march_periods,
-    memory,
-)
+from upd.hbm.faces.march import InterfaceMarch, InterfacePeriod
 from upd.hbm.faces.state import EPS, ComplexArray, FloatArray, InterfaceState
+
+#: periods in a window; the largest change of one window is compared with that of the one before:
+#: more than a beat of neighbouring harmonics, few against the hundreds that light damping takes
+WINDOW = 8
 
 
 @dataclass(frozen=True)
@@ -38,7 +29,6 @@ class SteadyPoint:
     """
 
     last: InterfacePeriod
-    first_harmonic: ComplexArray
     lowest: FloatArray
     highest: FloatArray
     remaining: float
@@ -48,6 +38,11 @@ class SteadyPoint:
     seconds: float
     harmonics: ComplexArray
     start: InterfaceState
+
+    @property
+    def first_harmonic(self) -> ComplexArray:
+        """(K,) of every output, the lowest harmonic that is excited."""
+        return np.asarray(self.harmonics[0])
 
 
 def settle(
@@ -71,56 +66,53 @@ def settle(
     -------
     SteadyPoint
     """
-    begin = time.perf_counter()
-    N, model = march.samples, march.model
+    begin, N = time.perf_counter(), march.samples
     turns = np.outer(march.orders, np.arange(1, N + 1)) / N
-    choice = Settling(
-        float(tolerance),
-        int(most_periods),
-        np.asarray(2.0 / N * np.exp(-2j * np.pi * turns)),
-        N * EPS,
-        PAYS,
-    )
-    K = len(model.seen_modes)
-    known = memory(model.n, K, len(march.orders))
-    count = np.zeros(COUNTERS, np.int64)
-    count[KNOWN] = march.known
-    before, out, sums, fallbacks = at.copy(), np.zeros((N, K)), np.zeros(4), 0
-    while True:
-        ended = march_periods(
-            tuple(march.steps),
-            tuple(march.bases),
-            march.which,
-            at.arrays(),
-            before.arrays(),
-            tuple(march.past),
-            march.x0,
-            march.work,
-            out,
-            sums,
-            tuple(choice),
-            tuple(known),
-            count,
-        )
-        if ended == UNSOLVED:
-            march.finish_step(int(count[SAMPLE]), at)
-            fallbacks += 1
-        elif ended == NEW_BASE:
-            march.suit()
-        else:
-            break
-    march.known = True
-    seen = known.seen[: min(int(count[SEEN]), WINDOW)]
+    Q = 2.0 / N * np.exp(-2j * np.pi * turns)
+    #: of motion and forces: what they were a period ago, and how they changed
+    known: tuple[FloatArray, FloatArray] | None = None
+    changes: list[list[float]] = []
+    seen: list[FloatArray] = []
+    fallbacks, remaining = 0, np.inf
+    out, sums = np.zeros((N, len(march.model.seen_modes))), np.zeros(4)
+    while len(seen) < most_periods and not remaining <= tolerance:
+        start = at.copy()
+        fallbacks += march.advance(at, out, sums)
+        harmonics = Q @ out
+        seen.append(np.abs(harmonics[0]))
+        moved = np.concatenate([harmonics.view(float).ravel(), out.mean(axis=0)])
+        now = (moved, at.f.copy())
+        if known is not None:
+            tops = (np.abs(out).max(), np.abs(at.f).max())
+            way = [float(np.linalg.norm(a - b)) for a, b in zip(now, known, strict=True)]
+            # a change that is rounding of what is summed in a period is none
+            changes.append(
+                [d if d > N * EPS * top else 0.0 for d, top in zip(way, tops, strict=True)]
+            )
+        known = now
+        if len(changes) >= 2 * WINDOW:
+            sizes = (float(np.linalg.norm(harmonics)), float(np.linalg.norm(at.f)))
+            of_each = zip(np.transpose(changes[-2 * WINDOW :]), sizes, strict=True)
+            remaining = max(_to_come(change, size, most_periods) for change, size in of_each)
     return SteadyPoint(
         march.period_of(out, sums, fallbacks),
-        known.harmonic[0],
-        np.min(seen, axis=0),
-        np.max(seen, axis=0),
-        float(known.remaining[0]),
-        bool(known.remaining[0] <= tolerance),
-        int(count[PERIODS]),
+        np.min(seen[-WINDOW:], axis=0),
+        np.max(seen[-WINDOW:], axis=0),
+        remaining,
+        remaining <= tolerance,
+        len(seen),
         fallbacks,
         time.perf_counter() - begin,
-        known.harmonic,
-        before,
+        harmonics,
+        start,
     )
+
+
+def _to_come(change: FloatArray, size: float, most: int) -> float:
+    """Estimate of the changes still to come, over `size`, from the last ones of both windows."""
+    d0, d1 = float(change[:WINDOW].max()), float(change[WINDOW:].max())
+    if d1 == 0.0:
+        return 0.0
+    r = (d1 / d0) ** (1.0 / WINDOW) if d0 > 0.0 else 1.0
+    still = d1 * min(1.0 / (1.0 - r) if r < 1.0 else np.inf, float(most))
+    return still / size if size > 0.0 else np.inf

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cho_factor
 
-from upd.errors import InputError
+from upd.errors import ConvergenceError, InputError
 from upd.hbm.faces.step import OPEN, STICK
 
 FloatArray = NDArray[np.float64]
@@ -224,3 +225,39 @@ def resting(
         np.where(open_, OPEN, STICK).astype(np.int64),
         p.copy(),
     )
+
+
+def in_columns(drive: ArrayLike) -> ComplexArray:
+    """Amplitudes (L, H) of an excitation, one column a harmonic, of (L,) or (L, H)."""
+    amplitude = np.asarray(drive, complex)
+    return amplitude[:, None] if amplitude.ndim == 1 else amplitude
+
+
+def factored(A: FloatArray, what: str) -> tuple[FloatArray, bool]:
+    """Cholesky factors of a compliance.
+
+    Parameters
+    ----------
+    A : (k, k) ndarray
+        [mm/N]
+    what : str
+        Its name in the message.
+
+    Returns
+    -------
+    tuple
+        As `scipy.linalg.cho_factor` gives them.
+
+    Raises
+    ------
+    ConvergenceError
+        Where it is not positive definite.
+    """
+    try:
+        L, lower = cho_factor(A, lower=True)
+    except np.linalg.LinAlgError as error:
+        raise ConvergenceError(
+            f"{what} is not positive definite: more modes were removed than the static compliance "
+            "holds; use fewer modes a blade"
+        ) from error
+    return L, lower

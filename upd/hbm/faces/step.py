@@ -26,7 +26,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.hbm.faces.rows import add_rows
 from upd.linalg.compiled import compiled, inlined
 
 OPEN, STICK, SLIP = 0, 1, 2
@@ -36,6 +35,94 @@ MOST_NEWTON = 40
 SOLVED = 1e-11
 #: rows up to which plain elimination is faster than a call of LAPACK; it only weighs costs
 FEW = 24
+
+# Rows of numbers: copied, and summed with weights. No view of a row is made: one costs two atomic
+# counts of references, as much as the row itself.
+
+
+@inlined
+def put(part, row, k):  # type: ignore[no-untyped-def]
+    """Numbers into a row, from a place on; the place after them.
+
+    Parameters
+    ----------
+    part, row : ndarray
+        `row` is overwritten.
+    k : int
+
+    Returns
+    -------
+    int
+    """
+    # loops: whole-array assignments take seconds to compile
+    for j in range(len(part)):
+        row[k + j] = part[j]
+    return k + len(part)
+
+
+@inlined
+def put_row(part, rows, k):  # type: ignore[no-untyped-def]
+    """Numbers into row k of an array.
+
+    Parameters
+    ----------
+    part : (j,) ndarray
+    rows : (i, j) ndarray
+        Overwritten.
+    k : int
+    """
+    for j in range(len(part)):
+        rows[k, j] = part[j]
+
+
+@inlined
+def fetch_row(rows, k, part):  # type: ignore[no-untyped-def]
+    """What `put_row` did, undone.
+
+    Parameters
+    ----------
+    rows : (i, j) ndarray
+    k : int
+    part : (j,) ndarray
+        Overwritten.
+    """
+    for j in range(len(part)):
+        part[j] = rows[k, j]
+
+
+@inlined
+def add_rows(x, sign, weights, rows, k, M, one):  # type: ignore[no-untyped-def]
+    """Add to x rows of M[one] with weights.
+
+    Parameters
+    ----------
+    x : (j,) ndarray
+        Overwritten.
+    sign : float
+        Of all weights, 1 or -1.
+    weights : (k,) ndarray or longer
+    rows : (k,) ndarray of int or longer
+        Which rows.
+    k : int
+    M : (B, i, j) ndarray
+    one : int
+    """
+    # four rows a pass: x is read and written a quarter as often, in the order of one by one
+    i = 0
+    while i + 4 <= k:
+        a, b, c, d = rows[i], rows[i + 1], rows[i + 2], rows[i + 3]
+        wa, wb = sign * weights[i], sign * weights[i + 1]
+        wc, wd = sign * weights[i + 2], sign * weights[i + 3]
+        for j in range(len(x)):
+            x[j] = (
+                x[j] + wa * M[one, a, j] + wb * M[one, b, j] + wc * M[one, c, j] + wd * M[one, d, j]
+            )
+        i += 4
+    while i < k:
+        a, wa = rows[i], sign * weights[i]
+        for j in range(len(x)):
+            x[j] += wa * M[one, a, j]
+        i += 1
 
 
 @inlined
@@ -217,15 +304,14 @@ def contact_scratch(n):  # type: ignore[no-untyped-def]
     Returns
     -------
     tuple of ndarray
-        (3 n,) dofs, signs and right sides of its rows; (3, 3 n) rows of a node.
+        (3 n,) dofs, signs and right sides of its rows; (3, 3 n) rows of a node; (3 n, 3 n) matrix.
     """
-    return np.empty(3 * n, np.int64), np.empty(3 * n), np.empty(3 * n), np.empty((3, 3 * n))
+    cols, sign, b = np.empty(3 * n, np.int64), np.empty(3 * n), np.empty(3 * n)
+    return cols, sign, b, np.empty((3, 3 * n)), np.empty((3 * n, 3 * n))
 
 
 @inlined
-def newton_rows(  # type: ignore[no-untyped-def]
-    x0, Tt, base, one, mu, rho_n, rho_t, f, y, state, H, cols, sign, b, G
-):
+def newton_rows(x0, bases, one, law, node, scratch):  # type: ignore[no-untyped-def]
     """The rows of one Newton step of `contact_step`, which has the same parameters.
 
     Returns
@@ -233,6 +319,10 @@ def newton_rows(  # type: ignore[no-untyped-def]
     int
         Rows, that is unknowns.
     """
+    base, Tt = bases
+    mu, rho_n, rho_t = law
+    f, y, state = node
+    cols, sign, b, G, H = scratch
     n, k = len(mu), 0
     for i in range(n):
         if state[i] != (OPEN if base[one, i] else STICK):
@@ -285,9 +375,7 @@ def newton_rows(  # type: ignore[no-untyped-def]
 
 
 @inlined
-def contact_step(  # type: ignore[no-untyped-def]
-    x0, Tt, base, one, mu, rho_n, rho_t, f, y, state, warm, H, cols, sign, b, G
-):
+def contact_step(x0, bases, one, law, node, warm, scratch):  # type: ignore[no-untyped-def]
     """Forces and relative motions of one step.
 
     Parameters
@@ -295,31 +383,30 @@ def contact_step(  # type: ignore[no-untyped-def]
     x0 : (3 n,) ndarray
         L F: forces of the closed nodes [N], minus gaps and slips of the open ones [mm], if all is
         as the base has it.
-    Tt : (B, 3 n, 3 n) ndarray
-        Transpose of T of each base, which is symmetric but for the sign of what couples closed and
-        open.
-    base : (B, n) ndarray of bool
-        Which nodes each base has open.
+    bases : tuple of (B, n) ndarray of bool and (B, 3 n, 3 n) ndarray
+        Which nodes each base has open, and the transpose of its T, which is symmetric but for the
+        sign of what couples closed and open.
     one : int
         The base.
-    mu, rho_n, rho_t : (n,) ndarray
-        Friction, and weights of displacements against forces [N/mm].
-    f, y : (3 n,) ndarray
-        Of the step before; overwritten by forces [N], and by minus gaps and slips [mm].
-    state : (n,) ndarray of int
-        Of the step before; overwritten.
+    law : tuple of three (n,) ndarray
+        Friction mu, and weights rho_n, rho_t of displacements against forces [N/mm].
+    node : tuple of two (3 n,) ndarray and an (n,) ndarray of int
+        f, y and states of the step before; overwritten by forces [N], by minus gaps and slips [mm],
+        and by the states.
     warm : bool
         Whether to start from the step before.
-    H : (3 n, 3 n) ndarray
-        Scratch.
-    cols, sign, b, G : ndarray
-        Scratch: from `contact_scratch`.
+    scratch : tuple of ndarray
+        From `contact_scratch`.
 
     Returns
     -------
     int
         Newton steps; 0 where all is as the base has it, -1 without an answer (f, y are then none).
     """
+    base, Tt = bases
+    mu, rho_n, rho_t = law
+    f, y, state = node
+    cols, sign, b, _, H = scratch
     n = len(mu)
     size = 0.0
     for i in range(n):
@@ -341,7 +428,7 @@ def contact_step(  # type: ignore[no-untyped-def]
         return 0
     judge(f, y, mu, rho_n, rho_t, state)
     for used in range(1, MOST_NEWTON + 1):
-        k = newton_rows(x0, Tt, base, one, mu, rho_n, rho_t, f, y, state, H, cols, sign, b, G)
+        k = newton_rows(x0, bases, one, law, node, scratch)
         if not gauss(H, b, k):
             return -1
         for d in range(3 * n):

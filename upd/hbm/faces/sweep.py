@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import ConvergenceError, InputError
 from upd.hbm.faces.march import Fallback, InterfaceMarch
-from upd.hbm.faces.periods import WINDOW
-from upd.hbm.faces.settle import SteadyPoint, settle
+from upd.hbm.faces.settle import WINDOW, SteadyPoint, settle
 from upd.hbm.faces.state import ComplexArray, FloatArray, InterfaceModel, InterfaceState
 
 __all__ = ["SteadyPoint", "SteppedSine", "settle", "stepped_sine"]
@@ -46,10 +45,6 @@ class SteppedSine:
         Periods integrated.
     energy : (k, 3) ndarray
         In the last period: work of the excitation, lost by damping, lost by friction [N mm].
-    newton : (k,) ndarray
-        Newton steps a time step, of the last period.
-    fallbacks : (k,) ndarray of int
-        Steps that the solver behind Newton's had to finish.
     harmonics : (k, h, K) ndarray
         As `amplitude`, in all harmonics that are excited.
     model : InterfaceModel
@@ -79,8 +74,6 @@ class SteppedSine:
     remaining: FloatArray
     periods: NDArray[np.int64]
     energy: FloatArray
-    newton: FloatArray
-    fallbacks: NDArray[np.int64]
     seconds: FloatArray
     state: InterfaceState
     status: str
@@ -165,8 +158,6 @@ def stepped_sine(
         np.array([p.remaining for p in points]),
         np.array([p.periods for p in points], int),
         np.array([p.last.energy for p in points]).reshape(k, 3),
-        np.array([p.last.newton for p in points]),
-        np.array([p.fallbacks for p in points], int),
         np.array([p.seconds for p in points]),
         at,
         status,

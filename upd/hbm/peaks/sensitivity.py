@@ -232,17 +232,16 @@ def _moved(
 ) -> _Moved:
     j, k = b.harmonics.place(harmonic), b.harmonics.dynamic
     omega, o, m = 2 * np.pi * frequency, b.harmonics.offset, len(b.modal.eigenvalues)
-    found = b.evaluate(x, omega)
-    assert found.jacobian is not None and found.contact.jacobian is not None
-    F = found.contact.force.reshape(len(b.Psi), -1)
-    w = np.asarray(k * omega, dtype=float)
-    eta = b.modal.solve(w, b.loads - (F[:, o::2] - 1j * F[:, o + 1 :: 2]).T @ b.Psi)
+    _, J, by_omega = b.linearised(x, omega)
+    assert J is not None
+    F = b.force(x).force.reshape(len(b.Psi), -1)
+    w, eta = np.asarray(k * omega, dtype=float), b.amplitudes(F, omega)
     mean = _mean(b, x, F)
     parts = [_direct(b, x, omega, eta, mean, change) for change in changes]
-    right = np.column_stack([found.by_frequency, *(part.residual for part in parts)])
-    dx: FloatArray = -np.asarray(np.linalg.solve(found.jacobian, right), dtype=float)
+    right = np.column_stack([by_omega, *(part.residual for part in parts)])
+    dx: FloatArray = -np.asarray(np.linalg.solve(J.matrix(), right), dtype=float)
     # amplitudes of the modes follow the forces and what acts on them directly
-    DF = found.contact.jacobian
+    DF = J.every_derivative()
     dW = dx[: b.Psi.shape[0] * b.harmonics.size].T.reshape(-1, *b.split(x)[0].shape)
     dF = np.einsum("pcldm,npdm->npcl", DF, dW).reshape(len(dW), len(b.Psi), -1)
     acts = np.zeros((len(dW), m), dtype=complex)

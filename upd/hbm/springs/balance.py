@@ -1,66 +1,199 @@
-"""Contact forces and residual of a condensed problem of harmonic balance."""
+"""Harmonic balance of a linear system with contacts, condensed to relative contact displacements.
+
+    w_k = u_k - G_k f_k(w),   G_k = B D_k^-1 B',   D_k = K + i k W C - (k W)^2 M,
+
+for every harmonic k > 0; u_k is the motion without contacts. Harmonic 0 has no compliance along
+rigid modes R (a damper held only by its contacts): their amplitudes a stay unknowns beside w, and
+R'(F_0 - B'f_0) = 0 is their equation. Unknowns: x = [w coefficients, a]. The size of the problem
+is (1 + d) n_point (2 H + 1) + n_rigid, whatever the size of K.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from upd.hbm.springs.condensed import BalanceJacobian
+from upd.errors import InputError
+from upd.hbm.core.fourier import Harmonics, analysis, embed, sample_count, synthesis, to_complex
+from upd.hbm.springs.damper import RigidDamper, attach
 from upd.hbm.springs.friction import (
     MOST_PERIODS,
     START_CODE,
     Harmonic,
     March,
+    Start,
     harmonic_force,
     march,
 )
-from upd.hbm.springs.linearised import Rows, rows_of
-from upd.hbm.springs.problem import ComplexArray, CondensedProblem, FloatArray
+from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart, linear_part
+from upd.hbm.springs.modal import Modal, modal
+from upd.hbm.springs.points import Contacts, frictionless, stuck_constant, stuck_stiffness
 from upd.hbm.springs.terms import contact_terms, residual_terms
 
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
 #: below every size, against division by none
 TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
-class Evaluation:
-    """Residual of the balance at one point.
+class Balance:
+    """The condensed problem: what it is made of, its unknowns, its residual, its linear answers.
 
     Attributes
     ----------
-    residual : (n,) ndarray
-        [mm], and [N] for the rigid equilibrium in modal coordinates.
-    jacobian : (n, n) ndarray or None
-        Derivative by the unknowns.
-    by_frequency : (n,) ndarray
-        Derivative by the angular frequency.
-    contact : Harmonic
-        The contact forces.
+    modal : Modal
+        The linear system.
+    contacts : Contacts
+        n_point points with d tangents.
+    harmonics : Harmonics
+        n_k harmonics above 0, `size` coefficients per signal.
+    samples : int
+        Samples per period.
+    static : (n_dof,) ndarray
+        Static loads [N].
+    dynamic : (n_k, n_dof) ndarray of complex
+        Amplitudes of the harmonics above 0 [N].
+    start : {"zero", "static", "mid", "upper", "lower"}
+        Position of the sliders before the march.
+    slider : (n_point, 2) ndarray or None
+        Slider positions [mm] where the start is given.
+    Psi : (c, m) ndarray
+        Rows of the contacts on the modes, c = (1 + d) n_point.
+    E : (samples, size) ndarray
+        Synthesis matrix.
+    Q : (size, samples) ndarray
+        Analysis matrix.
+    loads : (n_k, m) ndarray of complex
+        Dynamic loads on the modes.
+    G0 : (c, c) ndarray
+        Static compliance of the flexible modes [mm/N].
+    u0 : (c,) ndarray
+        Displacement the static loads cause in the flexible modes, without contacts [mm].
+    rigid_load : (n_rigid,) ndarray
+        Static loads on the rigid modes.
     """
 
-    residual: FloatArray
-    jacobian: FloatArray | None
-    by_frequency: FloatArray
-    contact: Harmonic
+    modal: Modal
+    contacts: Contacts
+    harmonics: Harmonics
+    samples: int
+    static: FloatArray
+    dynamic: ComplexArray
+    start: Start = "zero"
+    slider: FloatArray | None = None
+    Psi: FloatArray = field(init=False)
+    E: FloatArray = field(init=False)
+    Q: FloatArray = field(init=False)
+    loads: ComplexArray = field(init=False)
+    G0: FloatArray = field(init=False)
+    u0: FloatArray = field(init=False)
+    rigid_load: FloatArray = field(init=False)
 
+    def __post_init__(self) -> None:
+        Phi, free = self.modal.Phi, ~self.modal.rigid
+        Psi = np.ascontiguousarray(self.contacts.B @ Phi)
+        flexible = Psi[:, free] / self.modal.eigenvalues[free]
+        values = {
+            "Psi": Psi,
+            "E": synthesis(self.harmonics, self.samples),
+            "Q": analysis(self.harmonics, self.samples),
+            "loads": self.dynamic @ Phi,
+            "G0": flexible @ Psi[:, free].T,
+            "u0": flexible @ (Phi[:, free].T @ self.static),
+            "rigid_load": Phi[:, ~free].T @ self.static,
+        }
+        self.__dict__.update(values)
 
-class _Fixed(NamedTuple):
-    """What the compiled loops take beside the fields of the problem."""
+    def modal_row(self, row: ArrayLike) -> FloatArray:
+        """Row on the modes (m,) of a row (n_dof,) that weighs the displacements.
 
-    rows: Rows
-    Et: FloatArray
-    Qt: FloatArray
-    k: FloatArray
-    R: FloatArray
-    stiffness: FloatArray
-    unmoved: FloatArray
+        Raises InputError for a row of another length.
+        """
+        given = np.asarray(row, dtype=float)
+        if given.shape != (len(self.modal.Phi),):
+            raise InputError(
+                f"row has shape {given.shape}; to fix it: give one weight for every dof, "
+                f"({len(self.modal.Phi)},), those of a damper last"
+            )
+        return np.asarray(given @ self.modal.Phi)
 
+    @cached_property
+    def _layout(self) -> tuple[int, tuple[int, int, int]]:
+        """Number and shape of the coefficients."""
+        shape = (self.contacts.n_point, 1 + self.contacts.tangents, self.harmonics.size)
+        return len(self.Psi) * self.harmonics.size, shape
 
-class Balance(CondensedProblem):
-    """The condensed problem with its contact forces and its residual, made of the same fields."""
+    @property
+    def rigid(self) -> int:
+        """Static rigid unknowns beside the contact displacements (none without harmonic 0)."""
+        return int(self.modal.rigid.sum()) if self.harmonics.static else 0
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self._layout[0] + self.rigid
+
+    def split(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Coefficients and rigid amplitudes of one answer.
+
+        Parameters
+        ----------
+        x : (n_unknown,) ndarray
+            Unknowns.
+
+        Returns
+        -------
+        W : (n_point, 1 + d, size) ndarray
+            Coefficients of the contact displacements [mm].
+        a : (n_rigid,) ndarray
+            Static amplitudes of the rigid modes.
+        """
+        n, shape = self._layout
+        return x[:n].reshape(shape), x[n:]
+
+    def coefficients(self, x: FloatArray) -> FloatArray:
+        """Coefficients of the contact displacements of many answers.
+
+        Parameters
+        ----------
+        x : (n, n_unknown) ndarray
+            Unknowns.
+
+        Returns
+        -------
+        (n, n_point, 1 + d, size) ndarray
+            Coefficients [mm].
+        """
+        n, shape = self._layout
+        return x[:, :n].reshape(len(x), *shape).copy()
+
+    def rigid_part(self, x: FloatArray) -> FloatArray:
+        """Static rigid amplitudes (n, n_rigid) of many answers (n, n_unknown)."""
+        return x[:, self._layout[0] :]
+
+    def embedded(self, x: FloatArray, old: Balance) -> FloatArray:
+        """Unknowns of an answer with other harmonics, as an initial guess for this problem.
+
+        Parameters
+        ----------
+        x : (old.size,) ndarray
+            Unknowns of the other problem.
+        old : Balance
+            The other problem.
+
+        Returns
+        -------
+        (n_unknown,) ndarray
+        """
+        W, a = old.split(x)
+        return np.concatenate([embed(W, old.harmonics, self.harmonics).ravel(), a])
 
     def force(self, x: FloatArray, jacobian: bool = False) -> Harmonic:
         """Contact forces of one answer.
@@ -118,93 +251,6 @@ class Balance(CondensedProblem):
     def linearised(
         self, x: FloatArray, omega: float, jacobian: bool = True
     ) -> tuple[FloatArray, BalanceJacobian | None, FloatArray]:
-        """What `evaluate` gives, compiled, with the Jacobian in parts.
-
-        Parameters
-        ----------
-        x, omega, jacobian : (n_unknown,) ndarray, float, bool
-            As for `evaluate`.
-
-        Returns
-        -------
-        residual : (n,) ndarray
-        jacobian : BalanceJacobian or None
-        by_frequency : (n,) ndarray
-            Derivative by the angular frequency; zero unless asked for.
-        """
-        W, a = self.split(x)
-        law, static, fixed = self.contacts.law, self.harmonics.static, self._fixed
-        slider = fixed.unmoved if self.slider is None else self.slider
-        F, state, DF = contact_terms(
-            W,
-            self.E,
-            fixed.Et,
-            self.Q,
-            fixed.Qt,
-            static,
-            law.k_n,
-            law.k_t,
-            law.mu,
-            law.preload,
-            law.gap,
-            START_CODE[self.start],
-            slider,
-            MOST_PERIODS,
-            jacobian,
-        )
-        c, size = len(self.Psi), len(self.Q)
-        residual, by_frequency = residual_terms(
-            W.reshape(c, size),
-            a,
-            F.reshape(c, size),
-            fixed.k,
-            omega,
-            static,
-            self.modal.eigenvalues,
-            self.modal.rigid,
-            fixed.rows.damping,
-            self.loads,
-            self.Psi,
-            fixed.rows.transposed,
-            self.u0,
-            self.rigid_load,
-            jacobian,
-        )
-        if not jacobian:
-            return residual, None, by_frequency
-        parts = BalanceJacobian(
-            self.modal,
-            fixed.rows,
-            fixed.k * omega,
-            self.harmonics.offset,
-            self.G0,
-            fixed.R,
-            state,
-            fixed.stiffness,
-            DF,
-        )
-        return residual, parts, by_frequency
-
-    def forget_factors(self) -> None:
-        """Let the factors go that corrections keep for later ones: their memory."""
-        if "_fixed" in self.__dict__:
-            self._fixed.rows.kept.forget()
-
-    @cached_property
-    def _fixed(self) -> _Fixed:
-        # loads, preload and sliders may change in copies: none of them enters
-        rigid = self.Psi[:, self.modal.rigid] if self.harmonics.static else self.Psi[:, :0]
-        return _Fixed(
-            rows_of(self.Psi, self.modal),
-            np.ascontiguousarray(self.E.T),
-            np.ascontiguousarray(self.Q.T),
-            self.harmonics.dynamic.astype(float),
-            np.ascontiguousarray(rigid),
-            self._stiffness,
-            np.zeros((self.contacts.n_point, 2)),
-        )
-
-    def evaluate(self, x: FloatArray, omega: float, jacobian: bool = True) -> Evaluation:
         """Residual w - u + G f(w) and the rigid equilibrium, with exact derivatives.
 
         Parameters
@@ -218,33 +264,57 @@ class Balance(CondensedProblem):
 
         Returns
         -------
-        Evaluation
+        residual : (n,) ndarray
+            [mm], and [N] for the rigid equilibrium in modal coordinates.
+        jacobian : BalanceJacobian or None
+        by_frequency : (n,) ndarray
+            Derivative by the angular frequency; zero unless asked for.
         """
         W, a = self.split(x)
-        contact = self.force(x, jacobian)
-        k = self.harmonics.dynamic
-        G, u, dG, du = self.modal.receptance(
-            self.Psi, np.asarray(k * omega, dtype=float), self.loads, slopes=jacobian
+        linear, static, c = self.linear, self.harmonics.static, len(self.Psi)
+        slider = np.zeros((self.contacts.n_point, 2)) if self.slider is None else self.slider
+        begin = (START_CODE[self.start], slider, MOST_PERIODS)
+        F, state, DF = contact_terms(
+            W, self._transform, static, self.contacts.law.arrays, begin, jacobian
         )
-        c, o = len(self.Psi), self.harmonics.offset
-        F = contact.force.reshape(c, -1)
-        F_k = F[:, o::2] - 1j * F[:, o + 1 :: 2]
-        R, slope = W.reshape(c, -1).copy(), np.zeros((c, self.harmonics.size))
-        r = np.einsum("kcd,dk->ck", G, F_k) - u.T
-        R[:, o::2] += r.real
-        R[:, o + 1 :: 2] -= r.imag
-        if jacobian:
-            s = (np.einsum("kcd,dk->ck", dG, F_k) - du.T) * k
-            slope[:, o::2], slope[:, o + 1 :: 2] = s.real, -s.imag
-        below = np.zeros(0)
-        if self.harmonics.static:
-            R[:, 0] += self.G0 @ F[:, 0] - self.u0 - self._rigid_rows @ a
-            below = self._rigid_rows.T @ F[:, 0] - self.rigid_load
-        residual = np.concatenate([R.ravel(), below])
-        J = None if contact.jacobian is None else self._jacobian(G, contact.jacobian)
-        return Evaluation(
-            residual, J, np.concatenate([slope.ravel(), np.zeros(self.rigid)]), contact
+        residual, by_frequency = residual_terms(
+            W.reshape(c, -1),
+            a,
+            F.reshape(c, -1),
+            linear.k,
+            omega,
+            static,
+            linear.arrays,
+            (self.loads, self.u0, self.rigid_load),
+            jacobian,
         )
+        if not jacobian:
+            return residual, None, by_frequency
+        parts = BalanceJacobian(linear, linear.k * omega, state, self._stiffness, DF)
+        return residual, parts, by_frequency
+
+    def forget_factors(self) -> None:
+        """Let the factors go that corrections keep for later ones: their memory."""
+        if "linear" in self.__dict__:
+            self.linear.kept.forget()
+
+    @cached_property
+    def linear(self) -> LinearPart:
+        """The linear system as the contacts see it."""
+        # loads, preload and sliders may change in copies: none of them enters
+        h = self.harmonics
+        return linear_part(self.modal, self.Psi, self.G0, h.dynamic, h.offset)
+
+    @cached_property
+    def _transform(self) -> tuple[FloatArray, ...]:
+        """Synthesis and analysis matrices as compiled loops take them."""
+        E, Q = self.E, self.Q
+        return E, np.ascontiguousarray(E.T), Q, np.ascontiguousarray(Q.T)
+
+    def amplitudes(self, F: FloatArray, omega: float) -> ComplexArray:
+        """Amplitudes (n_k, m) of the modes under the loads and contact forces F (c, size) [N]."""
+        pushed = self.loads - to_complex(F, self.harmonics).T @ self.Psi
+        return self.modal.solve(np.asarray(self.harmonics.dynamic * omega, dtype=float), pushed)
 
     def misfit(self, x: FloatArray, omega: float) -> float:
         """Residual of the contact condition w - u + G f = 0 over its largest terms.
@@ -263,15 +333,12 @@ class Balance(CondensedProblem):
         -------
         float
         """
-        found = self.evaluate(x, omega, jacobian=False)
-        (W, a), k, o = self.split(x), self.harmonics.dynamic, self.harmonics.offset
-        c = len(self.Psi)
-        F, w = found.contact.force.reshape(c, -1), W.reshape(c, -1)
-        off = np.abs(found.residual[: W.size].reshape(c, -1))
-        G, u, _, _ = self.modal.receptance(
-            self.Psi, np.asarray(k * omega, dtype=float), self.loads, slopes=False
-        )
-        G_f = np.einsum("kcd,dk->ck", G, F[:, o::2] - 1j * F[:, o + 1 :: 2])
+        (W, a), o, c = self.split(x), self.harmonics.offset, len(self.Psi)
+        F, w = self.force(x).force.reshape(c, -1), W.reshape(c, -1)
+        residual = self.linearised(x, omega, False)[0]
+        off = np.abs(residual[: W.size].reshape(c, -1))
+        u = self.amplitudes(np.zeros_like(F), omega) @ self.Psi.T
+        G_f = u - self.amplitudes(F, omega) @ self.Psi.T
         rows: list[tuple[FloatArray, tuple[Any, ...]]] = [(off[:, o:], (w[:, o:], G_f, u))]
         if self.harmonics.static:
             terms = (w[:, 0], self.G0 @ F[:, 0], self.u0, self._rigid_rows @ a)
@@ -282,27 +349,298 @@ class Balance(CondensedProblem):
             for part, terms in rows
         )
 
-    def _jacobian(self, G: ComplexArray, DF: FloatArray) -> FloatArray:
-        n_point, d1, size = DF.shape[:3]
-        c, o, L = n_point * d1, self.harmonics.offset, d1 * size
-        D = DF.reshape(n_point, d1, size, L)
-        J = np.zeros((self.size, self.size))
-        top = np.zeros((c, size, n_point, L))
-        # (point, harmonic, row, column of the point)
-        g = G.reshape(len(G), c, n_point, d1).transpose(2, 0, 1, 3)
-        cos, sin = D[:, :, o::2].transpose(0, 2, 1, 3), D[:, :, o + 1 :: 2].transpose(0, 2, 1, 3)
-        top[:, o::2] = (g.real @ cos + g.imag @ sin).transpose(2, 1, 0, 3)
-        top[:, o + 1 :: 2] = (g.real @ sin - g.imag @ cos).transpose(2, 1, 0, 3)
-        m = c * size
+    @property
+    def _rigid_rows(self) -> FloatArray:
+        return self.Psi[:, self.modal.rigid]
+
+    @cached_property
+    def _stiffness(self) -> FloatArray:
+        # loads, preload and sliders may change in copies: none of them enters
+        return stuck_stiffness(self.contacts)
+
+    def stuck(self, omega: float) -> FloatArray:
+        """Unknowns of the linear answer with every point closed and sticking.
+
+        The sliders stand where they are given, else at zero.
+
+        Parameters
+        ----------
+        omega : float
+            Angular frequency [rad/s].
+
+        Returns
+        -------
+        (n_unknown,) ndarray
+        """
+        return self._linear(omega, self._stiffness.ravel(), *self._stuck_rest)
+
+    @property
+    def stuck_modal_stiffness(self) -> FloatArray:
+        """Stiffness (m, m) of the modes with closed points that stick [1/s2]."""
+        own = np.diag(np.where(self.modal.rigid, 0.0, self.modal.eigenvalues))
+        return np.asarray(own + (self.Psi.T * self._stiffness.ravel()) @ self.Psi)
+
+    @property
+    def stuck_constant(self) -> FloatArray:
+        """Force (n_point, 1 + d) of closed points that stick to given sliders, unmoved [N]."""
+        given = self.slider if self.start in ("zero", "static") else None
+        return stuck_constant(self.contacts, given)
+
+    def free(self, omega: float) -> FloatArray:
+        """Unknowns of the linear answer without contacts, rigid amplitudes zero.
+
+        Parameters
+        ----------
+        omega : float
+            Angular frequency [rad/s].
+
+        Returns
+        -------
+        (n_unknown,) ndarray
+        """
+        zero = np.zeros(len(self.Psi))
+        return self._linear(omega, zero, *self._linear_rest(zero, zero))
+
+    @cached_property
+    def _stuck_rest(self) -> tuple[FloatArray, FloatArray]:
+        return self._linear_rest(self._stiffness.ravel(), self.stuck_constant.ravel())
+
+    def _linear_rest(self, k: FloatArray, constant: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Mean displacements (c,) and rigid amplitudes of a linear answer."""
+        c, rows = len(self.Psi), self._rigid_rows
+        if not self.harmonics.static or not (np.any(k) or not self.rigid):
+            return np.zeros(c), np.zeros(self.rigid)
+        A = np.block(
+            [[np.eye(c) + self.G0 * k, -rows], [rows.T * k, np.zeros((self.rigid, self.rigid))]]
+        )
+        right = np.concatenate([self.u0 - self.G0 @ constant, self.rigid_load - rows.T @ constant])
+        # an unloaded or unsupported damper has no unique place: the smallest one
+        found = np.linalg.lstsq(A, right, rcond=None)[0]
+        return found[:c], found[c:]
+
+    def _linear(self, omega: float, k: FloatArray, mean: FloatArray, a: FloatArray) -> FloatArray:
+        c, o = len(self.Psi), self.harmonics.offset
+        at = np.asarray(self.harmonics.dynamic * omega, dtype=float)
+        try:
+            w = self._sprung(at, self.loads, k).T
+        except np.linalg.LinAlgError:
+            raise InputError(
+                f"frequency_response: no damping at a resonance of the sticking contacts, "
+                f"{omega / (2.0 * np.pi):.6g} Hz: the response has no bound; give damping, or "
+                "leave this frequency out"
+            ) from None
+        X = np.zeros((c, self.harmonics.size))
+        X[:, o::2], X[:, o + 1 :: 2] = w.real, -w.imag
         if self.harmonics.static:
-            top[:, 0] = (self.G0.reshape(c, n_point, d1).transpose(1, 0, 2) @ D[:, :, 0]).transpose(
-                1, 0, 2
-            )
-            R = self._rigid_rows
-            J[:m:size, m:] = -R
-            J[m:, :m] = np.einsum("pdr,pdL->rpL", R.reshape(n_point, d1, -1), D[:, :, 0]).reshape(
-                -1, m
-            )
-        J[:m, :m] = top.reshape(m, m)
-        J.flat[: m * (self.size + 1) : self.size + 1] += 1.0
-        return J
+            X[:, 0] = mean
+        return np.concatenate([X.ravel(), a])
+
+    def linear_displacement(
+        self, omega: FloatArray, stuck: bool, harmonic: int | None = None
+    ) -> ComplexArray:
+        """One harmonic of all dofs, without contacts or with all points closed and sticking.
+
+        Parameters
+        ----------
+        omega : (n,) ndarray
+            Angular frequencies [rad/s].
+        stuck : bool
+            Whether the points stick.
+        harmonic : int, optional
+            Its number; the lowest above 0 by default.
+
+        Returns
+        -------
+        (n, n_dof) ndarray of complex
+            Displacement [mm].
+        """
+        k = stuck_stiffness(self.contacts).ravel() if stuck else np.zeros(len(self.Psi))
+        j = self.harmonics.place(harmonic)
+        load = self.loads[j : j + 1]
+        out = np.empty((len(omega), len(self.modal.Phi)), dtype=complex)
+        for i, w in enumerate(self.harmonics.dynamic[j] * omega):
+            at = np.array([w])
+            pushed = load - (k * self._sprung(at, load, k)) @ self.Psi
+            out[i] = self.modal.solve(at, pushed)[0] @ self.modal.Phi.T
+        return out
+
+    def _sprung(self, w: FloatArray, loads: ComplexArray, k: FloatArray) -> ComplexArray:
+        """Motion (n, c) of rows on springs k (c,) at w (n,) rad/s under modal loads (n, m)."""
+        G, u = self.modal.receptance(self.Psi, w, loads)
+        return np.asarray(np.linalg.solve(np.eye(len(k)) + G * k, u[..., None])[..., 0])
+
+    def displacement(self, omega: FloatArray, force: FloatArray, rigid: FloatArray) -> FloatArray:
+        """Displacement of all dofs from the contact forces.
+
+        Parameters
+        ----------
+        omega : (n,) ndarray
+            Angular frequencies [rad/s].
+        force : (n, c, size) ndarray
+            Coefficients of the contact forces [N], c = (1 + d) n_point.
+        rigid : (n, n_rigid) ndarray
+            Static rigid amplitudes.
+
+        Returns
+        -------
+        (n, n_dof, size) ndarray
+            Coefficients [mm].
+        """
+        o, Phi, free = self.harmonics.offset, self.modal.Phi, ~self.modal.rigid
+        out = np.zeros((len(omega), len(Phi), self.harmonics.size))
+        for j, k in enumerate(self.harmonics.dynamic):
+            f = force[:, :, o + 2 * j] - 1j * force[:, :, o + 2 * j + 1]
+            q = self.modal.solve(k * omega, self.loads[j] - f @ self.Psi) @ Phi.T
+            out[:, :, o + 2 * j], out[:, :, o + 2 * j + 1] = q.real, -q.imag
+        if self.harmonics.static:
+            eta = np.zeros((len(omega), Phi.shape[1]))
+            eta[:, free] = (self.static @ Phi - force[:, :, 0] @ self.Psi)[
+                :, free
+            ] / self.modal.eigenvalues[free]
+            eta[:, ~free] = rigid
+            out[:, :, 0] = eta @ Phi.T
+        return out
+
+    def with_loads(self, static: float, dynamic: float) -> Balance:
+        """The same problem with its loads multiplied.
+
+        Parameters
+        ----------
+        static, dynamic : float
+            Factors on the static and on the dynamic loads.
+
+        Returns
+        -------
+        Balance
+        """
+        return self._changed(
+            static=static * self.static,
+            u0=static * self.u0,
+            rigid_load=static * self.rigid_load,
+            dynamic=dynamic * self.dynamic,
+            loads=dynamic * self.loads,
+        )
+
+    def shifted(self, xi: float) -> Balance:
+        """The same problem with xi off its modal damping, C - xi M.
+
+        Parameters
+        ----------
+        xi : float
+            [1/s]
+
+        Returns
+        -------
+        Balance
+        """
+        off = xi if self.modal.proportional else xi * np.eye(len(self.modal.eigenvalues))
+        modal = replace(self.modal, damping=self.modal.damping - off)
+        rows = np.ascontiguousarray(np.atleast_2d(modal.damping))
+        linear = self.linear._replace(modal=modal, damping=rows)
+        return self._changed(modal=modal, linear=linear)
+
+    def with_sliders(self, start: Start, slider: FloatArray | None = None) -> Balance:
+        """The same problem with another start of the sliders.
+
+        Parameters
+        ----------
+        start : {"zero", "static", "mid", "upper", "lower"}
+        slider : (n_point, 2) ndarray, optional
+            Positions [mm] where the start is given.
+
+        Returns
+        -------
+        Balance
+        """
+        return self._changed(start=start, slider=slider)
+
+    def pressed(self, P: FloatArray) -> Balance:
+        """The same problem with more preload and the static loads that balance it.
+
+        Sticking motions stay solutions.
+
+        Parameters
+        ----------
+        P : (n_point,) ndarray
+            Extra preload [N].
+
+        Returns
+        -------
+        Balance
+        """
+        law, shift = (
+            self.contacts.law,
+            np.zeros((self.contacts.n_point, 1 + self.contacts.tangents)),
+        )
+        shift[:, 0] = P
+        f = shift.ravel()
+        return self._changed(
+            contacts=replace(self.contacts, law=replace(law, preload=law.preload + P)),
+            u0=self.u0 + self.G0 @ f,
+            rigid_load=self.rigid_load + self._rigid_rows.T @ f,
+            static=self.static + self.contacts.B.T @ f,
+        )
+
+    def _changed(self, **values: object) -> Balance:
+        """A copy with these fields, derived ones included.
+
+        The matrices are kept, not made again.
+        """
+        out = copy(self)
+        out.__dict__.pop("_stuck_rest", None)
+        out.__dict__.update(values)
+        return out
+
+
+def assembled(
+    M: FloatArray,
+    C: FloatArray,
+    K: FloatArray,
+    contacts: Contacts,
+    force: Mapping[int, ComplexArray],
+    static: FloatArray,
+    h: Harmonics,
+    *,
+    joined_to: tuple[RigidDamper, FloatArray] | None = None,
+    samples: int | None = None,
+    start: Start = "zero",
+    slider: FloatArray | None = None,
+    fast_exits: bool = True,
+) -> Balance:
+    """The condensed problem of a system, with a damper where one is given.
+
+    Parameters
+    ----------
+    M, C, K : (n, n) ndarray
+        Mass [t], damping [N s/mm] and stiffness [N/mm].
+    contacts : Contacts
+    force : mapping
+        Harmonic number -> (n,) complex amplitude [N].
+    static : (n,) ndarray
+        [N]
+    h : Harmonics
+    joined_to : (RigidDamper, (n_point, 1 + d, n_dof of the damper) ndarray), optional
+        A damper, whose dofs and centrifugal force are appended, and its share of the rows.
+    samples : int, optional
+        Samples per period; by rule when None.
+    start, slider
+        As `upd.hbm.springs.response.frequency_response` takes them, sliders (n_point, 2).
+    fast_exits : bool
+        Leave the tangents out where there is no friction.
+
+    Returns
+    -------
+    Balance
+    """
+    if joined_to is not None:
+        damper, rows = joined_to
+        M, C, K, contacts = attach(M, C, K, contacts, damper, rows)
+        static = np.concatenate([static, damper.force])
+        force = {k: np.concatenate([v, np.zeros(damper.n_dof)]) for k, v in force.items()}
+    if fast_exits and contacts.tangents and not np.any(contacts.law.mu):
+        contacts = frictionless(contacts)
+    dynamic = np.zeros((len(h.dynamic), len(static)), dtype=complex)
+    for k, amplitude in force.items():
+        dynamic[h.place(k)] = amplitude
+    count = sample_count(h, samples)
+    return Balance(modal(M, C, K), contacts, h, count, static, dynamic, start, slider)

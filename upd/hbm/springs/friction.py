@@ -16,6 +16,7 @@ Gas Turbines Power 132 (2010) 082501.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -72,9 +73,14 @@ class Law(Shown):
     preload: FloatArray
     gap: FloatArray
 
+    @cached_property
+    def arrays(self) -> tuple[FloatArray, ...]:
+        """Its arrays in the order of its fields, as compiled code takes them."""
+        return tuple(getattr(self, f.name) for f in fields(self))
+
     def tiled(self, n: int) -> Law:
         """The same points n times over."""
-        return Law(*(np.tile(getattr(self, f.name), n) for f in fields(self)))
+        return Law(*(np.tile(one, n) for one in self.arrays))
 
 
 @dataclass(frozen=True)
@@ -161,27 +167,9 @@ def march(
     state, slope = np.zeros((n_point, n), dtype=np.int8), np.zeros((n_point, 3, n))
     tangent = np.zeros((n_point, rows - 1, n, rows * size) if jacobian else (1, 0, 0, 0))
     periodic, periods = np.zeros(n_point, dtype=np.bool_), np.zeros(n_point, dtype=np.int64)
-    slider = np.zeros((n_point, 2)) if slider is None else slider
-    march_points(
-        w,
-        E,
-        law.k_n,
-        law.k_t,
-        law.mu,
-        law.preload,
-        law.gap,
-        START_CODE[start],
-        slider,
-        MOST_PERIODS,
-        jacobian,
-        force,
-        weighed,
-        state,
-        slope,
-        tangent,
-        periodic,
-        periods,
-    )
+    begin = (START_CODE[start], np.zeros((n_point, 2)) if slider is None else slider, MOST_PERIODS)
+    filled = (force, weighed, state, slope, tangent)
+    march_points(w, E, law.arrays, begin, jacobian, filled, periodic, periods)
     return March(force, weighed, state, slope, tangent if jacobian else None, periodic, periods)
 
 

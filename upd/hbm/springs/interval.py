@@ -252,19 +252,14 @@ def _opening(T1, T2, a, b, D1, D2, mu, on_cone, jacobian, out, P):  # type: igno
 
 
 @compiled
-def friction_event(  # type: ignore[no-untyped-def]
-    T1, T2, a, b, D1, D2, mu, on_cone, plane, jacobian, out, P
-):
+def friction_event(passed, mu, on_cone, plane, jacobian, out, P):  # type: ignore[no-untyped-def]
     """Traction over an interval in which a point slips, closes or opens.
 
     Parameters
     ----------
-    T1, T2 : float
-        Traction at the sample before [N].
-    a, b : float
-        N_0 + k_n (w - gap) at the samples, at least one above zero [N].
-    D1, D2 : float
-        k_t times the change of the tangential displacement [N].
+    passed : tuple of float
+        T1, T2: traction at the sample before [N]. a, b: N_0 + k_n (w - gap) at the samples, at
+        least one above zero [N]. D1, D2: k_t times the change of the tangential displacement [N].
     mu : float
         Friction coefficient.
     on_cone : bool
@@ -283,6 +278,7 @@ def friction_event(  # type: ignore[no-untyped-def]
     int
         State at the sample after: STICK, SLIP or LIFT.
     """
+    T1, T2, a, b, D1, D2 = passed
     if a <= 0.0:
         return _closing(a, b, D1, D2, mu, jacobian, out, P)
     if b <= 0.0:

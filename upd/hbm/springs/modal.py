@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import LinAlgError, eigh, eigvalsh
 
 from upd.errors import InputError
+from upd.hbm.springs.terms import receptances
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -93,8 +94,8 @@ class Modal:
             return np.abs(inverse @ (Psi**2).T)
 
     def receptance(
-        self, Psi: FloatArray, w: FloatArray, load: ComplexArray, slopes: bool = True
-    ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+        self, Psi: FloatArray, w: FloatArray, load: ComplexArray
+    ) -> tuple[ComplexArray, ComplexArray]:
         """Receptance between rows, and their motion under a load.
 
         Parameters
@@ -105,51 +106,34 @@ class Modal:
             Angular frequencies [rad/s].
         load : (n_w, m) ndarray of complex
             Modal loads.
-        slopes : bool
-            Whether the derivatives are wanted.
 
         Returns
         -------
         G : (n_w, r, r) ndarray of complex
-            Psi D^-1 Psi' [mm/N].
+            Psi D^-1 Psi' [mm/N], not finite at an undamped natural frequency.
         u : (n_w, r) ndarray of complex
             Psi D^-1 load [mm].
-        dG, du : ndarray of complex
-            Derivatives of both by each entry of `w`; empty when not asked for.
         """
         if self.proportional:
-            return self._proportional(Psi, w, load, slopes)
-        D = self._matrix(w)
-        right = np.concatenate(
-            [np.broadcast_to(Psi.T, (len(w), *Psi.T.shape)), load[:, :, None]], axis=2
-        )
-        X = np.linalg.solve(D, right)
-        Y = np.asarray(Psi @ X)
-        dY = np.zeros((0, 1, 1), dtype=complex)
-        if slopes:
-            dX = -np.linalg.solve(
-                D, (1j * self.damping - 2 * w[:, None, None] * np.eye(len(self.eigenvalues))) @ X
-            )
-            dY = np.asarray(Psi @ dX, dtype=complex)
-        return Y[..., :-1], Y[..., -1], dY[..., :-1], dY[..., -1]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                inverse = 1 / self._diagonal(w)
+                # one real product: a complex one with a real matrix is several times slower
+                parts = np.concatenate([inverse.real, inverse.imag])[:, None, :] * Psi
+                P = (parts.reshape(-1, Psi.shape[1]) @ Psi.T).reshape(-1, len(Psi), len(Psi))
+                return P[: len(w)] + 1j * P[len(w) :], (inverse * load) @ Psi.T
+        across = np.broadcast_to(Psi.T, (len(w), *Psi.T.shape))
+        right = np.concatenate([across, load[:, :, None]], axis=2)
+        Y = np.asarray(Psi @ np.linalg.solve(self._matrix(w), right))
+        return Y[..., :-1], Y[..., -1]
 
-    def _proportional(
-        self, Psi: FloatArray, w: FloatArray, load: ComplexArray, slopes: bool
-    ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-        # at an undamped natural frequency the answer is infinite; whoever takes it sees that it is
-        # not finite
-        with np.errstate(divide="ignore", invalid="ignore"):
-            inverse = 1 / self._diagonal(w)
-            slope = -(inverse**2) * (1j * self.damping - 2 * w[:, None]) if slopes else inverse[:0]
-            # one real product: a complex one with a real matrix is several times slower
-            parts = (
-                np.concatenate([inverse.real, inverse.imag, slope.real, slope.imag])[:, None, :]
-                * Psi
-            )
-            P = (parts.reshape(-1, Psi.shape[1]) @ Psi.T).reshape(-1, len(Psi), len(Psi))
-            n, k = len(w), len(slope)
-            G, dG = P[:n] + 1j * P[n : 2 * n], P[2 * n : 2 * n + k] + 1j * P[2 * n + k :]
-            return G, (inverse * load) @ Psi.T, dG, (slope * load[:k]) @ Psi.T
+    def receptance_parts(self, Psi: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Real and imaginary part of the receptance alone, compiled where damping is diagonal."""
+        if self.proportional:
+            across = np.ascontiguousarray(Psi.T)
+            real, imag = receptances(w, self.eigenvalues, self.damping, Psi, across)
+            return real, imag
+        G, _ = self.receptance(Psi, w, np.zeros((len(w), Psi.shape[1]), complex))
+        return np.ascontiguousarray(G.real), np.ascontiguousarray(G.imag)
 
     def _diagonal(self, w: FloatArray) -> ComplexArray:
         return np.asarray(self.eigenvalues - w[:, None] ** 2 + 1j * w[:, None] * self.damping)

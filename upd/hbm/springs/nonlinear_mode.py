@@ -29,7 +29,6 @@ from upd.hbm.core.continuation import follow
 from upd.hbm.core.fourier import harmonics as harmonics_of
 from upd.hbm.core.newton import Settings, solve
 from upd.hbm.springs import response
-from upd.hbm.springs.assembled import assembled
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.checks import measures
 from upd.hbm.springs.damper import RigidDamper
@@ -256,26 +255,11 @@ def nonlinear_mode(
         problems.append("a preload is negative")
     if problems:
         raise InputError(f"nonlinear_mode: {'; '.join(problems)}")
-    A = response.dense("nonlinear_mode", M, C, K)
-    n = len(A[0])
-    static = np.zeros(n) if static_force is None else np.asarray(static_force, dtype=float)
-    paired = (damper is None) == (damper_rows is None)
-    none = {1: np.zeros(n, dtype=complex)}
-    response.require("nonlinear_mode", np.ones(1), static, none, contacts, n, paired, start)
-    response.require_static("nonlinear_mode", h, static, damper)
-    if slider is not None:
-        slider = response.sliders_of("nonlinear_mode", slider, contacts)
-    b = assembled(
-        *A,
-        contacts,
-        none,
-        static,
-        joined_to=None if damper is None or damper_rows is None else (damper, damper_rows),
-        samples=samples,
-        start=start,
-        slider=slider,
-        fast_exits=False,
-    )(h)
+    rows = (damper, damper_rows)
+    given = response.GivenSystem(
+        M, C, K, contacts, static_force, *rows, h.numbers, samples, start, slider
+    )
+    b = given.balance("nonlinear_mode", np.ones(1), None, fast_exits=False)
     with threads_for(b.size):
         return _along(b, mode, np.log(a), settings or Settings())
 
@@ -366,34 +350,31 @@ class ExtendedBalance:
 
     def fundamental(self, X: FloatArray) -> ComplexArray:
         """Modal amplitudes (m,) of the first harmonic."""
-        b, o = self.b.shifted(float(X[-1])), self.b.harmonics.offset
+        b = self.b.shifted(float(X[-1]))
         F = b.force(X[:-2]).force.reshape(len(b.Psi), -1)
-        pushed = np.asarray(-(F[:, o] - 1j * F[:, o + 1])[None] @ b.Psi, dtype=complex)
-        return np.asarray(b.modal.solve(X[-2:-1], pushed)[0])
+        return np.asarray(b.amplitudes(F, float(X[-2]))[0])
 
     def function(
         self, X: FloatArray, p: float, jacobian: bool
     ) -> tuple[FloatArray, FloatArray | None, FloatArray]:
         """Residual, Jacobian and derivative by log a, as the continuation takes them."""
         omega, b, a = float(X[-2]), self.b.shifted(float(X[-1])), float(np.exp(p))
-        found = b.evaluate(X[:-2], omega, jacobian)
+        found, parts, by_omega = b.linearised(X[:-2], omega, jacobian)
         c, o = len(b.Psi), b.harmonics.offset
         w = np.asarray(b.harmonics.dynamic * omega, dtype=float)
-        F = found.contact.force.reshape(c, -1)
-        pushed = np.asarray(-(F[:, o::2] - 1j * F[:, o + 1 :: 2]).T @ b.Psi, dtype=complex)
-        all_eta = b.modal.solve(w, pushed)
+        F = b.force(X[:-2]).force.reshape(c, -1)
+        all_eta = b.amplitudes(F, omega)
         eta, one = all_eta[0], w[:1]
         energy, phase = float((eta.conj() @ eta).real), float((self.shape @ eta).imag) / a
         amplitude = 0.5 * np.log(energy) - p if energy > 0.0 else -np.inf
-        residual = np.concatenate([found.residual, [amplitude, phase]])
+        residual = np.concatenate([found, [amplitude, phase]])
         by_p = np.zeros(len(residual))
         by_p[-2:] = -1.0, -phase
-        if not jacobian:
+        if parts is None:
             return residual, None, by_p
-        n, DF = len(found.residual), found.contact.jacobian
-        assert DF is not None and found.jacobian is not None
+        n, DF = len(found), parts.every_derivative()
         J = np.zeros((n + 2, n + 2))
-        J[:n, :n], J[:n, n] = found.jacobian, found.by_frequency
+        J[:n, :n], J[:n, n] = parts.matrix(), by_omega
         # xi acts on each harmonic as i k omega eta_k, a force
         moved = b.modal.solve(w, -1j * w[:, None] * all_eta) @ b.Psi.T
         by_xi = np.zeros((c, b.harmonics.size))

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
+from upd.hbm.core.continuation import State, advance, begin
 from upd.hbm.core.fourier import to_complex
-from upd.hbm.core.newton import Function, Settings, Solution, cross_section
-from upd.hbm.core.path_step import State, begin, direction_reversed, walk
+from upd.hbm.core.newton import Function, Settings, Solution, correct
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.residuals import FREQUENCY_SHARE, over_frequency, scale_of
 from upd.labels import Shown
@@ -152,9 +152,11 @@ def climb(
         return Peak(state.p, measure.amplitude(state.x, state.p), state.x, status)
 
     here = begin(function, x, frequency, scale, p_scale, s)._replace(step=reach)
-    here = here if slope(here) >= 0 else direction_reversed(here)
+    if slope(here) < 0:
+        # to be left in the opposite direction
+        here = here._replace(tangent=-here.tangent, sign=-here.sign)
     for _ in range(MOST_STEPS):
-        found, there = walk(function, here, scale, p_scale, s)
+        found, there = advance(function, here, scale, p_scale, s)
         if found is None:
             return peak(here, "no convergence along the path")
         if slope(there) > 0:
@@ -191,7 +193,9 @@ def _between(
     best = [origin]
 
     def slope(share: float) -> float:
-        found = cross_section(function, origin, D, p_scale, base.tangent, share * reach, s)
+        way, along = share * reach, base.tangent
+        x, p = base.x + way * along[:-1] * D, base.p + way * float(along[-1]) * p_scale
+        found = correct(function, x, p, D, p_scale, along, s)
         if found.tangent is None:
             raise ArithmeticError
         best[0] = found

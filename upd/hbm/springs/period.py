@@ -133,32 +133,20 @@ def _added(row, more):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def march_point(  # type: ignore[no-untyped-def]
-    w,
-    E,
-    k_n,
-    k_t,
-    mu,
-    preload,
-    gap,
-    mode,
-    slider,
-    most,
-    jacobian,
-    force,
-    weighed,
-    state,
-    slope,
-    tangent,
-):
+def march_point(w, E, law, p, start, jacobian, filled):  # type: ignore[no-untyped-def]
     """March one point until its traction repeats.
 
     Sliding along one line, a point that slips or opens forgets: where a period comes to the same
     traction as the one before, slipping, the rest of it is the same and is not integrated again. A
     point that sticks or is open through its first period does so through all.
 
-    Fills force, weighed (1 + d, n), state (n,), slope (3, n), tangent (d, n, (1 + d) size).
+    With law and start of all points, of which this is number p, as in `march_points`. Fills force,
+    weighed (1 + d, n), state (n,), slope (3, n), tangent (d, n, (1 + d) size).
     """
+    k_n, k_t, mu, preload, gap = law[0][p], law[1][p], law[2][p], law[3][p], law[4][p]
+    mode, sliders, most = start
+    slider = sliders[p]
+    force, weighed, state, slope, tangent = filled
     d, n, size = w.shape[0] - 1, w.shape[1], E.shape[1]
     signed = np.empty(n)
     _normal_forces(w[0], k_n, preload, gap, signed, force[0], weighed[0], slope)
@@ -205,20 +193,8 @@ def march_point(  # type: ignore[no-untyped-def]
                 else:
                     event = True
                     slipped = state[b] == SLIP
-                    state[j] = friction_event(
-                        T[0],
-                        T[1],
-                        signed[b],
-                        signed[j],
-                        D[0],
-                        D[1],
-                        mu,
-                        slipped,
-                        d == 2,
-                        jacobian,
-                        out,
-                        P,
-                    )
+                    passed = (T[0], T[1], signed[b], signed[j], D[0], D[1])
+                    state[j] = friction_event(passed, mu, slipped, d == 2, jacobian, out, P)
                     T[0], T[1] = out[0], out[1]
                     if jacobian:
                         for c in range(OUTPUTS):
@@ -270,24 +246,7 @@ def march_point(  # type: ignore[no-untyped-def]
 
 @compiled
 def march_points(  # type: ignore[no-untyped-def]
-    w,
-    E,
-    k_n,
-    k_t,
-    mu,
-    preload,
-    gap,
-    mode,
-    slider,
-    most,
-    jacobian,
-    force,
-    weighed,
-    state,
-    slope,
-    tangent,
-    periodic,
-    periods,
+    w, E, law, start, jacobian, filled, periodic, periods
 ):
     """March every point by itself until its traction repeats, through `most` periods at most.
 
@@ -297,37 +256,21 @@ def march_points(  # type: ignore[no-untyped-def]
         Relative displacements [mm].
     E : (n, size) ndarray
         Synthesis matrix of the samples.
-    k_n, k_t, mu, preload, gap : (n_point,) ndarray
-        Parameters of the points.
-    mode : int
-        Start of the sliders: GIVEN, MID, UPPER or LOWER.
-    slider : (n_point, 2) ndarray
-        Their positions where they are given [mm].
-    most : int
-        Most periods.
+    law : tuple of (n_point,) ndarray
+        k_n, k_t, mu, preload and gap of the points.
+    start : tuple
+        Start of the sliders: GIVEN, MID, UPPER or LOWER; their positions (n_point, 2) where they
+        are given [mm]; most periods.
     jacobian : bool
         Whether the derivative is wanted.
-    force, weighed, state, slope, tangent, periodic, periods : ndarray
-        Filled with the fields of `upd.hbm.springs.friction.March`; `tangent` is not touched without
-        the derivative.
+    filled : tuple of ndarray
+        Filled with force, weighed, state, slope and tangent of `upd.hbm.springs.friction.March`;
+        the tangent is not touched without the derivative.
+    periodic, periods : ndarray
+        Filled likewise.
     """
+    force, weighed, state, slope, tangent = filled
     for p in range(w.shape[0]):
         block = tangent[p] if jacobian else tangent[0]
-        periodic[p], periods[p] = march_point(
-            w[p],
-            E,
-            k_n[p],
-            k_t[p],
-            mu[p],
-            preload[p],
-            gap[p],
-            mode,
-            slider[p],
-            most,
-            jacobian,
-            force[p],
-            weighed[p],
-            state[p],
-            slope[p],
-            block,
-        )
+        own = (force[p], weighed[p], state[p], slope[p], block)
+        periodic[p], periods[p] = march_point(w[p], E, law, p, start, jacobian, own)

@@ -101,35 +101,27 @@ def contacts(
     """
     n = np.atleast_2d(np.asarray(normal, dtype=float))
     t = np.asarray(tangents, dtype=float)
-    t = (
-        t.reshape(0, *n.shape)
-        if t.size == 0
-        else t.reshape(-1, *t.shape[-2:])
-        if t.ndim > 2
-        else t.reshape(1, *np.atleast_2d(t).shape)
-    )
-    problems = (
-        []
-        if t.shape[1:] == n.shape and len(t) <= 2
-        else [f"tangents have shape {t.shape}; give (d, {n.shape[0]}, {n.shape[1]}), d <= 2"]
-    )
-    if k_t is None:
-        problems += (
-            ["k_t is missing; to fix it: give the tangential stiffness of the points with friction"]
-            if len(t) and np.any(np.asarray(mu, dtype=float) > 0)
-            else []
+    if t.size == 0:
+        t = t.reshape(0, *n.shape)
+    elif t.ndim > 2:
+        t = t.reshape(-1, *t.shape[-2:])
+    else:
+        t = np.atleast_2d(t)[None]
+    problems = []
+    if t.shape[1:] != n.shape or len(t) > 2:
+        problems.append(
+            f"tangents have shape {t.shape}; give (d, {n.shape[0]}, {n.shape[1]}), d <= 2"
         )
-        k_t = 1.0
-    numbers = {
-        name: _spread(value, len(n), name, problems)
-        for name, value in _named(k_n, k_t, mu, preload, gap)
-    }
+    if k_t is None and len(t) and np.any(np.asarray(mu, dtype=float) > 0):
+        problems.append(
+            "k_t is missing; to fix it: give the tangential stiffness of the points with friction"
+        )
+    given = {"k_n": k_n, "k_t": 1.0 if k_t is None else k_t, "mu": mu, "preload": preload}
+    given["gap"] = gap
+    numbers = {name: _spread(value, len(n), name, problems) for name, value in given.items()}
     problems += [f"{name} must be >= 0" for name in ("k_n", "mu") if np.any(numbers[name] < 0)]
-    problems += (
-        ["k_t must be above 0; for frictionless points give mu = 0"]
-        if np.any(numbers["k_t"] <= 0)
-        else []
-    )
+    if np.any(numbers["k_t"] <= 0):
+        problems.append("k_t must be above 0; for frictionless points give mu = 0")
     problems += [
         f"{name} is not finite"
         for name, a in [("normal", n), ("tangents", t), *numbers.items()]
@@ -139,12 +131,6 @@ def contacts(
         raise InputError("contacts: " + "; ".join(problems))
     rows = np.concatenate([n[:, None, :], np.swapaxes(t, 0, 1)], axis=1)
     return Contacts(np.ascontiguousarray(rows), Law(**numbers))
-
-
-def _named(
-    k_n: ArrayLike, k_t: ArrayLike, mu: ArrayLike, preload: ArrayLike, gap: ArrayLike
-) -> list[tuple[str, ArrayLike]]:
-    return [("k_n", k_n), ("k_t", k_t), ("mu", mu), ("preload", preload), ("gap", gap)]
 
 
 def _spread(value: ArrayLike, n: int, name: str, problems: list[str]) -> FloatArray:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from upd.hbm.core.newton import Function, Scale
 from upd.hbm.springs.balance import Balance
-from upd.hbm.springs.condensed import BalanceJacobian
+from upd.hbm.springs.jacobian import BalanceJacobian
 from upd.linalg.compiled import compiled
 
 FloatArray = NDArray[np.float64]

@@ -9,7 +9,7 @@ import logging
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, cast, get_args
+from typing import Literal, NamedTuple, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,8 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from upd.errors import InputError
 from upd.hbm.core.fourier import Harmonics, harmonics, to_complex
 from upd.hbm.core.newton import Settings
-from upd.hbm.springs.assembled import assembled
-from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.balance import Balance, assembled
 from upd.hbm.springs.checks import measures
 from upd.hbm.springs.damper import RigidDamper
 from upd.hbm.springs.friction import Start
@@ -375,37 +374,12 @@ def frequency_response(
     True
     """
     f = np.asarray(frequencies, dtype=float).ravel()
-    A = dense("frequency_response", M, C, K)
-    force = _force(harmonic_force)
-    n = len(A[0])
-    static = np.zeros(n) if static_force is None else np.asarray(static_force, dtype=float)
-    require(
-        "frequency_response",
-        f,
-        static,
-        force,
-        contacts,
-        n,
-        (damper is None) == (damper_rows is None),
-        start,
-    )
-    placed = None if slider is None else sliders_of("frequency_response", slider, contacts)
-    first = _harmonics(harmonics, force)
-    require_static("frequency_response", first, static, damper)
-    problem = assembled(
-        *A,
-        contacts,
-        force,
-        static,
-        joined_to=None if damper is None or damper_rows is None else (damper, damper_rows),
-        samples=samples,
-        start=start,
-        slider=placed,
-        fast_exits=fast_exits,
-    )
+    rows = (damper, damper_rows)
+    given = GivenSystem(M, C, K, contacts, static_force, *rows, harmonics, samples, start, slider)
+    b = given.balance("frequency_response", f, _force(harmonic_force), fast_exits=fast_exits)
     order = np.unique(f)[::-1] if sweep_down else np.unique(f)
-    with threads_for(problem(first).size):
-        b, curve = solve_curve(problem(first), order, fast_exits, settings)
+    with threads_for(b.size):
+        b, curve = solve_curve(b, order, fast_exits, settings)
         b.forget_factors()
         return _answer(b, curve)
 
@@ -457,160 +431,147 @@ def _omitted(h: Harmonics) -> str:
     return ", ".join([*map(str, between), f"above {h.highest}"])
 
 
-def dense(
-    what: str, M: ArrayLike, C: ArrayLike, K: ArrayLike
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The matrices as arrays. Raises InputError for sparse ones.
+class GivenSystem(NamedTuple):
+    """A system with contacts as it is given, see `frequency_response`."""
 
-    Parameters
-    ----------
-    what : str
-        Public function that was called, for the message.
-    M, C, K : (n, n) array_like
+    M: ArrayLike
+    C: ArrayLike
+    K: ArrayLike
+    contacts: Contacts
+    static_force: ArrayLike | None
+    damper: RigidDamper | None
+    damper_rows: FloatArray | None
+    harmonics: Iterable[int]
+    samples: int | None
+    start: Start
+    slider: ArrayLike | None
 
-    Returns
-    -------
-    tuple of three (n, n) ndarray
-    """
-    for name, A in (("M", M), ("C", C), ("K", K)):
-        if hasattr(A, "toarray"):
+    def balance(
+        self, what: str, f: FloatArray, force: dict[int, ComplexArray] | None, *, fast_exits: bool
+    ) -> Balance:
+        """The balance under harmonic forces.
+
+        Parameters
+        ----------
+        what : str
+            Public function that was called, for messages.
+        f : (k,) ndarray
+            Frequencies [Hz].
+        force : dict or None
+            Harmonic number -> (n,) complex amplitude [N]; None for none in the first harmonic.
+        fast_exits : bool
+            As in `frequency_response`.
+
+        Returns
+        -------
+        Balance
+        """
+        A = self._dense(what)
+        n, joined_to = len(A[0]), None
+        force = {1: np.zeros(n, dtype=complex)} if force is None else force
+        static = np.zeros(n) if self.static_force is None else np.asarray(self.static_force, float)
+        self._require(what, f, static, force)
+        slider = self._sliders(what)
+        h = harmonics(self.harmonics)
+        self._require_harmonics(what, h, static, force)
+        if self.damper is not None and self.damper_rows is not None:
+            joined_to = self.damper, self.damper_rows
+        return assembled(
+            *A,
+            self.contacts,
+            force,
+            static,
+            h,
+            joined_to=joined_to,
+            samples=self.samples,
+            start=self.start,
+            slider=slider,
+            fast_exits=fast_exits,
+        )
+
+    def _dense(self, what: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The matrices as arrays."""
+        for name, A in (("M", self.M), ("C", self.C), ("K", self.K)):
+            if hasattr(A, "toarray"):
+                raise InputError(
+                    f"{what}: {name} is sparse; to fix it: give {name}.toarray(), or large "
+                    "matrices to upd.matrices.response.forced_response, which reduces them"
+                )
+        M, C, K = (np.asarray(A, dtype=float) for A in (self.M, self.C, self.K))
+        return M, C, K
+
+    def _require(
+        self, what: str, f: FloatArray, static: FloatArray, force: dict[int, ComplexArray]
+    ) -> None:
+        """Refuse loads, rows and starts that do not fit the system; all problems are named."""
+        n, columns, starts = len(np.asarray(self.M)), self.contacts.rows.shape[2], get_args(Start)
+        found = [
+            (
+                not (len(f) and np.isfinite(f).all() and (f > 0).all()),
+                "frequencies must be finite and above 0",
+            ),
+            (static.shape != (n,), f"static_force has shape {static.shape}, give ({n},)"),
+            *(
+                (v.shape != (n,), f"harmonic_force {k} has shape {v.shape}, give ({n},)")
+                for k, v in force.items()
+            ),
+            (
+                any(k <= 0 for k in force),
+                "harmonic_force belongs to harmonics above 0; the mean goes into static_force",
+            ),
+            *(
+                (not np.isfinite(v).all(), f"loads at {name} are not finite")
+                for name, v in [("static_force", static), *force.items()]
+            ),
+            (columns != n, f"contact rows have {columns} columns, the system {n} dofs"),
+            (
+                (self.damper is None) != (self.damper_rows is None),
+                "damper and damper_rows come together",
+            ),
+            (
+                self.start not in starts,
+                f"start {self.start!r} is unknown; give one of {', '.join(starts)}",
+            ),
+            (not force, "harmonic_force is empty; give the amplitude of a harmonic"),
+        ]
+        if problems := [words for bad, words in found if bad]:
+            raise InputError(f"{what}: " + "; ".join(problems))
+
+    def _require_harmonics(
+        self, what: str, h: Harmonics, static: FloatArray, force: dict[int, ComplexArray]
+    ) -> None:
+        """Refuse loads that no harmonic of the balance carries."""
+        missing = sorted(set(force) - set(h.numbers))
+        if missing:
             raise InputError(
-                f"{what}: {name} is sparse; to fix it: give {name}.toarray(), or large "
-                "matrices to upd.matrices.response.forced_response, which reduces them"
+                f"harmonics: the excitation acts in {', '.join(map(str, missing))}, not among "
+                f"{h.numbers}; to fix it: harmonics = {tuple(sorted({*h.numbers, *missing}))}"
             )
-    return np.asarray(M, dtype=float), np.asarray(C, dtype=float), np.asarray(K, dtype=float)
+        loads = ["static_force"] if np.any(static) else []
+        if self.damper is not None and np.any(self.damper.force):
+            loads.append("the damper's centrifugal force")
+        if loads and not h.static:
+            raise InputError(
+                f"{what}: {' and '.join(loads)} would have no effect: harmonic 0 is not "
+                f"among {h.numbers}; to fix it: harmonics = {(0, *h.numbers)}"
+            )
 
-
-def require_static(what: str, h: Harmonics, static: FloatArray, damper: RigidDamper | None) -> None:
-    """Refuse static loads that no harmonic of the balance carries.
-
-    Parameters
-    ----------
-    what : str
-        Public function that was called, for the message.
-    h : Harmonics
-    static : (n,) ndarray
-        [N]
-    damper : RigidDamper or None
-    """
-    loads = ["static_force"] if np.any(static) else []
-    loads += (
-        ["the damper's centrifugal force"] if damper is not None and np.any(damper.force) else []
-    )
-    if loads and not h.static:
-        raise InputError(
-            f"{what}: {' and '.join(loads)} would have no effect: harmonic 0 is not "
-            f"among {h.numbers}; to fix it: harmonics = {(0, *h.numbers)}"
-        )
-
-
-def sliders_of(what: str, given: ArrayLike, points: Contacts) -> FloatArray:
-    """Places of the sliders along both tangents.
-
-    Parameters
-    ----------
-    what : str
-        Public function that was called, for the message.
-    given : (n_point, d) array_like
-        [mm]
-    points : Contacts
-
-    Returns
-    -------
-    (n_point, 2) ndarray
-    """
-    place = np.asarray(given, dtype=float)
-    if place.shape != (points.n_point, points.tangents) or not np.all(np.isfinite(place)):
-        raise InputError(
-            f"{what}: slider has shape {place.shape}; to fix it: give a finite place "
-            f"of every point along every tangent, ({points.n_point}, {points.tangents})"
-        )
-    out = np.zeros((points.n_point, 2))
-    out[:, : points.tangents] = place
-    return out
+    def _sliders(self, what: str) -> FloatArray | None:
+        """Places (n_point, 2) of the sliders along both tangents, where they are given [mm]."""
+        if self.slider is None:
+            return None
+        place, points = np.asarray(self.slider, dtype=float), self.contacts
+        if place.shape != (points.n_point, points.tangents) or not np.all(np.isfinite(place)):
+            raise InputError(
+                f"{what}: slider has shape {place.shape}; to fix it: give a finite place "
+                f"of every point along every tangent, ({points.n_point}, {points.tangents})"
+            )
+        out = np.zeros((points.n_point, 2))
+        out[:, : points.tangents] = place
+        return out
 
 
 def _force(given: ArrayLike | Mapping[int, ArrayLike]) -> dict[int, ComplexArray]:
     if isinstance(given, Mapping):
         return {int(k): np.asarray(v, dtype=complex) for k, v in given.items()}
     return {1: np.asarray(given, dtype=complex)}
-
-
-def require(
-    what: str,
-    f: FloatArray,
-    static: FloatArray,
-    force: dict[int, ComplexArray],
-    points: Contacts,
-    n: int,
-    paired: bool,
-    start: str,
-) -> None:
-    """Refuse loads, rows and starts that do not fit the system; all problems are named.
-
-    Parameters
-    ----------
-    what : str
-        Public function that was called, for the message.
-    f : (k,) ndarray
-        Frequencies [Hz].
-    static : (n,) ndarray
-        [N]
-    force : dict
-        Harmonic number -> (n,) complex amplitude [N].
-    points : Contacts
-    n : int
-        Dofs of the system.
-    paired : bool
-        Whether a damper and its rows are both given, or neither.
-    start : str
-        Of the sliders.
-    """
-    problems = (
-        []
-        if len(f) and np.all(np.isfinite(f)) and np.all(f > 0)
-        else ["frequencies must be finite and above 0"]
-    )
-    problems += (
-        [] if static.shape == (n,) else [f"static_force has shape {static.shape}, give ({n},)"]
-    )
-    problems += [
-        f"harmonic_force {k} has shape {v.shape}, give ({n},)"
-        for k, v in force.items()
-        if v.shape != (n,)
-    ]
-    problems += (
-        []
-        if all(k > 0 for k in force)
-        else ["harmonic_force belongs to harmonics above 0; the mean goes into static_force"]
-    )
-    problems += [
-        f"loads at {name} are not finite"
-        for name, v in [("static_force", static), *force.items()]
-        if not np.all(np.isfinite(v))
-    ]
-    problems += (
-        []
-        if points.rows.shape[2] == n
-        else [f"contact rows have {points.rows.shape[2]} columns, the system {n} dofs"]
-    )
-    problems += [] if paired else ["damper and damper_rows come together"]
-    problems += (
-        []
-        if start in get_args(Start)
-        else [f"start {start!r} is unknown; give one of {', '.join(get_args(Start))}"]
-    )
-    problems += [] if force else ["harmonic_force is empty; give the amplitude of a harmonic"]
-    if problems:
-        raise InputError(f"{what}: " + "; ".join(problems))
-
-
-def _harmonics(numbers: Iterable[int], force: dict[int, ComplexArray]) -> Harmonics:
-    h = harmonics(numbers)
-    missing = sorted(set(force) - set(h.numbers))
-    if missing:
-        raise InputError(
-            f"harmonics: the excitation acts in {', '.join(map(str, missing))}, not among "
-            f"{h.numbers}; to fix it: harmonics = {tuple(sorted({*h.numbers, *missing}))}"
-        )
-    return h

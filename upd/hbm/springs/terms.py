@@ -71,20 +71,18 @@ def _normal_tangent(slope, E, Q, k_n, rows, out):  # type: ignore[no-untyped-def
 
 
 @compiled
-def contact_terms(  # type: ignore[no-untyped-def]
-    W, E, Et, Q, Qt, static, k_n, k_t, mu, preload, gap, mode, slider, most, jacobian
-):
+def contact_terms(W, transform, static, law, start, jacobian):  # type: ignore[no-untyped-def]
     """Coefficients of the contact force and their derivative.
 
     Parameters
     ----------
     W : (n_point, 1 + d, size) ndarray
         Coefficients of the relative displacements [mm].
-    E, Et, Q, Qt : ndarray
-        Synthesis (n, size) and analysis matrix (size, n), and both transposed.
+    transform : tuple of ndarray
+        Synthesis matrix (n, size) and its transpose, analysis matrix (size, n) and its transpose.
     static : bool
         Whether harmonic 0 is among the coefficients.
-    k_n, k_t, mu, preload, gap, mode, slider, most, jacobian
+    law, start, jacobian
         As in `upd.hbm.springs.period.march_points`.
 
     Returns
@@ -96,6 +94,9 @@ def contact_terms(  # type: ignore[no-untyped-def]
     DF : (n_moving, 1 + d, size, 1 + d, size) ndarray
         Derivative of those that move, in order; empty unless asked for [N/mm].
     """
+    E, Et, Q, Qt = transform
+    k_n, k_t, mu, preload, gap = law
+    mode, slider, _ = start
     n_point, d1, size = W.shape
     n = len(E)
     F, state = np.zeros((n_point, d1, size)), np.zeros(n_point, np.int8)
@@ -104,6 +105,7 @@ def contact_terms(  # type: ignore[no-untyped-def]
     marks, slope = np.empty(n, np.int8), np.empty((3, n))
     tangent = np.empty((d1 - 1 if jacobian else 0, n, d1 * size))
     rows = np.empty((n if jacobian else 0, size))
+    filled = (force, weighed, marks, slope, tangent)
     moving = 0
     for p in range(n_point):
         w = np.dot(W[p], Et)
@@ -120,24 +122,7 @@ def contact_terms(  # type: ignore[no-untyped-def]
                     if static:
                         F[p, i, 0] -= k_t[p] * slider[p, i - 1]
             continue
-        march_point(
-            w,
-            E,
-            k_n[p],
-            k_t[p],
-            mu[p],
-            preload[p],
-            gap[p],
-            mode,
-            slider[p],
-            most,
-            jacobian,
-            force,
-            weighed,
-            marks,
-            slope,
-            tangent,
-        )
+        march_point(w, E, law, p, start, jacobian, filled)
         F[p] = np.dot(weighed, Qt)
         if jacobian:
             block = np.zeros((size, size))
@@ -174,7 +159,7 @@ def _modal_solve(w, right, eigenvalues, damping):  # type: ignore[no-untyped-def
 
 @compiled
 def residual_terms(  # type: ignore[no-untyped-def]
-    W, a, F, k, omega, static, eigenvalues, rigid, damping, loads, Psi, PsiT, u0, rigid_load, slopes
+    W, a, F, k, omega, static, linear, acting, slopes
 ):
     """Residual w - u + G f and the rigid equilibrium, from modal amplitudes.
 
@@ -190,16 +175,12 @@ def residual_terms(  # type: ignore[no-untyped-def]
         Angular frequency [rad/s].
     static : bool
         Whether harmonic 0 is among the coefficients.
-    eigenvalues, rigid : (m,) ndarray
-        Of the modes, and which are rigid.
-    damping : (1, m) or (m, m) ndarray
-        Modal damping, one row where it is diagonal.
-    loads : (n_k, m) ndarray of complex
-        Dynamic modal loads.
-    Psi, PsiT : ndarray
-        Rows of the contacts on the modes (c, m), and their transpose.
-    u0, rigid_load : ndarray
-        Static motion (c,) without contacts, static loads (n_rigid,) on the rigid modes.
+    linear : tuple of ndarray
+        Eigenvalues of the modes (m,), and which are rigid; modal damping (m, m), or one row (1, m)
+        where it is diagonal; rows Psi (c, m) of the contacts on the modes, and their transpose.
+    acting : tuple of ndarray
+        Dynamic modal loads (n_k, m), complex; static motion (c,) without contacts; static loads
+        (n_rigid,) on the rigid modes.
     slopes : bool
         Whether the derivative is wanted.
 
@@ -209,6 +190,8 @@ def residual_terms(  # type: ignore[no-untyped-def]
     by_frequency : (c size + n_rigid,) ndarray
         Its derivative by the angular frequency; zero unless asked for.
     """
+    eigenvalues, rigid, damping, Psi, PsiT = linear
+    loads, u0, rigid_load = acting
     c, size = W.shape
     m, o, n = len(eigenvalues), int(static), c * size
     residual, by_frequency = np.zeros(n + len(a)), np.zeros(n + len(a))
@@ -269,9 +252,7 @@ def receptances(w, eigenvalues, damping, Psi, PsiT):  # type: ignore[no-untyped-
 
 
 @compiled
-def bordered(  # type: ignore[no-untyped-def]
-    real, imag, G0, R, below, DF, static, D, D_rigid, normal, q, column, last
-):
+def bordered(compliance, DF, static, D, D_rigid, border):  # type: ignore[no-untyped-def]
     """Transpose of [[I + G df/dw, -R, r_p], [R'df_0/dw, below, r_p], [border]], scaled.
 
     Unknowns and equations are ordered by coefficient first, then by row of the contacts. The
@@ -279,14 +260,10 @@ def bordered(  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    real, imag : (n_k, c, c) ndarray
-        Receptance, symmetric [mm/N].
-    G0 : (c, c) ndarray
-        Static compliance.
-    R : (c, n_rigid) ndarray
-        Rigid modes at the rows.
-    below : (n_rigid, n_rigid) ndarray
-        Stiffness of the rigid modes against points not among the rows [N/mm].
+    compliance : tuple of ndarray
+        Receptance (n_k, c, c), symmetric, real and imaginary part [mm/N]; static compliance (c, c);
+        rigid modes at the rows (c, n_rigid); stiffness (n_rigid, n_rigid) of the rigid modes
+        against points not among the rows [N/mm].
     DF : (n_point, d1, size, d1, size) ndarray
         Derivative of the contact forces, n_point d1 = c [N/mm].
     static : bool
@@ -295,14 +272,9 @@ def bordered(  # type: ignore[no-untyped-def]
         Sizes of the unknowns.
     D_rigid : (n_rigid,) ndarray
         Sizes of the rigid amplitudes.
-    normal : (size c + n_rigid,) ndarray
-        Border, of the scaled unknowns.
-    q : (size, c) ndarray
-        Derivative of the border by the contact forces.
-    column : (size c + n_rigid,) ndarray
-        Derivative by the parameter, scaled.
-    last : float
-        Last entry of the border.
+    border : tuple
+        Border of the scaled unknowns (size c + n_rigid,), its derivative by the contact forces
+        (size, c), derivative by the parameter (size c + n_rigid,), scaled, and the last entry.
 
     Returns
     -------
@@ -310,6 +282,8 @@ def bordered(  # type: ignore[no-untyped-def]
     rows : (n - 1,) ndarray
         What the equations were divided by.
     """
+    real, imag, G0, R, below = compliance
+    normal, q, column, last = border
     n_point, d1, size = DF.shape[0], DF.shape[1], DF.shape[2]
     c, o, rigid = n_point * d1, int(static), len(D_rigid)
     m = c * size
@@ -320,13 +294,13 @@ def bordered(  # type: ignore[no-untyped-def]
             for l in range(size):
                 j = p * d1 + b
                 col, d = l * c + j, D[l, j]
-                border = 0.0
+                across = 0.0
                 for e in range(d1):
                     i0 = p * d1 + e
                     if static:
                         f = DF[p, e, 0, b, l]
                         if f != 0.0:
-                            border += q[0, i0] * f
+                            across += q[0, i0] * f
                             for i in range(c):
                                 A[col, i] += G0[i0, i] * f
                             for i in range(rigid):
@@ -335,7 +309,7 @@ def bordered(  # type: ignore[no-untyped-def]
                         x = o + 2 * h
                         f, s = DF[p, e, x, b, l], DF[p, e, x + 1, b, l]
                         if f != 0.0 or s != 0.0:
-                            border += q[x, i0] * f + q[x + 1, i0] * s
+                            across += q[x, i0] * f + q[x + 1, i0] * s
                             cos, sin = x * c, (x + 1) * c
                             for i in range(c):
                                 A[col, cos + i] += real[h, i0, i] * f + imag[h, i0, i] * s
@@ -344,7 +318,7 @@ def bordered(  # type: ignore[no-untyped-def]
                 A[col, col] += 1.0
                 for i in range(n):
                     A[col, i] *= d
-                A[col, n - 1] = normal[col] + d * border
+                A[col, n - 1] = normal[col] + d * across
     for e in range(rigid):
         for i in range(c):
             A[m + e, i] = -R[i, e] * D_rigid[e]

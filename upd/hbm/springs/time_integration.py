@@ -81,11 +81,12 @@ class SteadyState(Shown):
 
 
 @compiled
-def _law(w, previous, T, k_n, k_t, mu, preload, gap, f, D, T_new):  # type: ignore[no-untyped-def]
+def _law(w, previous, T, law, f, D, T_new):  # type: ignore[no-untyped-def]
     """Forces f (c,) and tangents D (n_point, d1, d1) at the displacements w (c,).
 
     From the tractions T before the step.
     """
+    k_n, k_t, mu, preload, gap = law
     n_point, d1 = D.shape[0], D.shape[1]
     D[:] = 0.0
     trial = np.zeros(2)
@@ -112,33 +113,12 @@ def _law(w, previous, T, k_n, k_t, mu, preload, gap, f, D, T_new):  # type: igno
 
 
 @compiled
-def _period(  # type: ignore[no-untyped-def]
-    x,
-    v,
-    a,
-    w,
-    f,
-    T,
-    load,
-    dt,
-    alpha,
-    damping,
-    eigenvalues,
-    S,
-    Psi,
-    Gamma,
-    k_n,
-    k_t,
-    mu,
-    preload,
-    gap,
-    d1,
-    tolerance,
-    W,
-    F,
-    X,
-):
+def _period(state, load, scheme, linear, law, d1, tolerance, out):  # type: ignore[no-untyped-def]
     """March one period in place; load (n + 1, m). Returns whether every step converged."""
+    x, v, a, w, f, T = state
+    dt, alpha = scheme
+    damping, eigenvalues, S, Psi, Gamma = linear
+    W, F, X = out
     n, c = load.shape[0] - 1, len(w)
     n_point = c // d1
     beta, gamma = (1 - alpha) ** 2 / 4, 0.5 - alpha
@@ -158,7 +138,7 @@ def _period(  # type: ignore[no-untyped-def]
         w_free = np.dot(Psi, x0 + beta * dt * dt * a_free)
         new, good = w.copy(), False
         for _ in range(MOST_NEWTON):
-            _law(new, w, T, k_n, k_t, mu, preload, gap, f_new, D, T_new)
+            _law(new, w, T, law, f_new, D, T_new)
             r = new - w_free + np.dot(Gamma, f_new)
             if np.abs(r).max() <= tolerance * max(np.abs(w_free).max(), np.abs(new).max()):
                 good = True
@@ -248,30 +228,13 @@ def steady_state(
     Gamma = np.ascontiguousarray((1 + alpha) * beta * dt**2 * b.Psi @ S @ b.Psi.T)
     c, law = len(b.Psi), b.contacts.law
     W, F, X = np.zeros((c, steps)), np.zeros((c, steps)), np.zeros((m, steps))
+    linear = (np.ascontiguousarray(damping), b.modal.eigenvalues, S, b.Psi, Gamma)
+    tolerated = 1e4 * EPS * (1 + float(_stiff(b, law, Gamma)))
+    d1, out = 1 + b.contacts.tangents, (W, F, X)
     change, status, period, before = np.inf, "period limit", 0, np.zeros_like(X)
     while period < most_periods:
         period += 1
-        good = _period(
-            *state,
-            load,
-            dt,
-            alpha,
-            np.ascontiguousarray(damping),
-            b.modal.eigenvalues,
-            S,
-            b.Psi,
-            Gamma,
-            law.k_n,
-            law.k_t,
-            law.mu,
-            law.preload,
-            law.gap,
-            1 + b.contacts.tangents,
-            1e4 * EPS * (1 + float(_stiff(b, law, Gamma))),
-            W,
-            F,
-            X,
-        )
+        good = _period(state, load, (dt, float(alpha)), linear, law.arrays, d1, tolerated, out)
         if not good:
             status = "no convergence"
             break
@@ -281,7 +244,7 @@ def steady_state(
             status = "periodic"
             break
         before = X.copy()
-    shape = (b.contacts.n_point, 1 + b.contacts.tangents, steps)
+    shape = (b.contacts.n_point, d1, steps)
     message = (
         f"{status} after {period} periods of {steps} steps at {frequency:.6g} Hz, last change "
         f"{change:.1e}"

@@ -1,0 +1,543 @@
+"""The Jacobian of the balance in parts, and Newton's equations condensed to what moves.
+
+The Jacobian I + G df/dw couples the harmonics through the forces of points that move, where df/dw
+is full. Where df/dw is a constant stiffness K_s, at points that
+stick or are open over the whole cycle, its columns couple the coefficients of one harmonic only:
+their unknowns are eliminated harmonic by harmonic, exactly, with A = I + G_ss K_s,
+
+    G' = G_mm - G_ms K_s A^-1 G_sm,   R' = R_m - G_ms K_s A^-1 R_s,
+
+and the factors are those of the points that move. Where the rows Psi of the contacts have a lower
+rank than there are rows, w = U y + rest and the factors are those of I + U'G U U'(df/dw)U, so that
+they do not grow with the number of points.
+
+Both are the same Newton correction, in the same order, as that of the whole matrix: det A > 0, for
+K_s is not negative and every harmonic above 0 gives a conjugate pair, so that the sign of the
+determinant is kept too.
+
+References
+----------
+F. Zhang (ed.), The Schur Complement and Its Applications (2005), ch. 1; W. W. Hager, Updating the
+inverse of a matrix, SIAM Review 31 (1989), for the low rank.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+from upd.hbm.core.kept_factors import WORTH_KEEPING, KeptFactors
+from upd.hbm.core.newton import BorderedFactors
+from upd.hbm.springs.modal import Modal
+from upd.hbm.springs.terms import MOVES, STICKS, bordered, by_harmonic, residual_terms
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+EPS = float(np.finfo(float).eps)
+#: operations of the factors that points held must save before they are eliminated: about what the
+#: calls of the elimination take
+WORTH = 2e6
+
+
+class LinearPart(NamedTuple):
+    """The linear system as the contacts see it: what never changes on a curve.
+
+    Attributes
+    ----------
+    modal : Modal
+        The linear system.
+    Psi : (c, m) ndarray
+        Rows of the contacts on its modes.
+    transposed : (m, c) ndarray
+    damping : (1, m) or (m, m) ndarray
+        Modal damping, one row where it is diagonal.
+    basis : (c, r) ndarray or None
+        Orthonormal basis U of the columns of Psi where r < c.
+    G0 : (c, c) ndarray
+        Static compliance [mm/N].
+    R : (c, n_rigid) ndarray
+        Rigid modes at the rows, none without harmonic 0.
+    k : (n_k,) ndarray of float
+        Harmonics above 0.
+    offset : int
+        Coefficients before theirs, 1 with harmonic 0.
+    kept : KeptFactors
+        The newest large factors of equations with these rows.
+    """
+
+    modal: Modal
+    Psi: FloatArray
+    transposed: FloatArray
+    damping: FloatArray
+    basis: FloatArray | None
+    G0: FloatArray
+    R: FloatArray
+    k: FloatArray
+    offset: int
+    kept: KeptFactors
+
+    @property
+    def size(self) -> int:
+        """Coefficients per signal."""
+        return self.offset + 2 * len(self.k)
+
+    @property
+    def arrays(self) -> tuple[NDArray[np.generic], ...]:
+        """As compiled code takes them, see `upd.hbm.springs.terms.residual_terms`."""
+        m = self.modal
+        return m.eigenvalues, m.rigid, self.damping, self.Psi, self.transposed
+
+
+def linear_part(
+    modal: Modal, Psi: FloatArray, G0: FloatArray, k: NDArray[np.int64], offset: int
+) -> LinearPart:
+    """The linear part of a balance.
+
+    Parameters
+    ----------
+    modal, Psi, G0
+        As in `LinearPart`.
+    k : (n_k,) ndarray of int
+        Harmonics above 0.
+    offset : int
+        Coefficients before theirs.
+
+    Returns
+    -------
+    LinearPart
+    """
+    U, size, _ = np.linalg.svd(Psi, full_matrices=False)
+    rank = int(np.count_nonzero(size > max(Psi.shape) * EPS * size.max(initial=0.0)))
+    return LinearPart(
+        modal,
+        Psi,
+        np.ascontiguousarray(Psi.T),
+        np.ascontiguousarray(np.atleast_2d(modal.damping)),
+        np.ascontiguousarray(U[:, :rank]) if 0 < rank < len(Psi) else None,
+        G0,
+        np.ascontiguousarray(Psi[:, modal.rigid] if offset else Psi[:, :0]),
+        k.astype(float),
+        offset,
+        KeptFactors(),
+    )
+
+
+class BalanceJacobian(NamedTuple):
+    """Jacobian of the balance at one answer, as its parts.
+
+    Attributes
+    ----------
+    of : LinearPart
+        The linear system.
+    w : (n_k,) ndarray
+        Angular frequencies of the harmonics above 0 [rad/s].
+    state : (n_point,) ndarray of int8
+        Which points move, stick or are open over the whole cycle.
+    stiffness : (n_point, 1 + d) ndarray
+        Stiffness of sticking points [N/mm].
+    DF : (n_moving, 1 + d, size, 1 + d, size) ndarray
+        Derivative of the force of points that move [N/mm].
+    """
+
+    of: LinearPart
+    w: FloatArray
+    state: NDArray[np.int8]
+    stiffness: FloatArray
+    DF: FloatArray
+
+    @property
+    def finite(self) -> bool:
+        """Whether the derivatives are."""
+        return bool(np.isfinite(self.DF).all())
+
+    @property
+    def held(self) -> FloatArray:
+        """Stiffness (n_point, 1 + d) of points that stick, 0 of the others [N/mm]."""
+        return np.where(self.state[:, None] == STICKS, self.stiffness, 0.0)
+
+    def bordered(
+        self, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray
+    ) -> BorderedFactors:
+        """Factors of [[J, r_p], [normal]] in scaled unknowns and equations, the cheapest way.
+
+        Large ones, of an earlier point, serve for later ones (`upd.hbm.core.kept_factors`).
+
+        Parameters
+        ----------
+        dp : (n,) ndarray
+            Derivative of the residual by the parameter.
+        D : (n,) ndarray
+            Sizes of the unknowns.
+        p_scale : float
+            Size of the parameter.
+        normal : (n + 1,) ndarray
+            Border, of the scaled unknowns.
+
+        Returns
+        -------
+        BorderedFactors
+        """
+        matrix = _Matrix(self, dp, D, p_scale, normal)
+        unknowns = matrix.unknowns
+        if unknowns < WORTH_KEEPING:
+            return matrix.factored()
+        return self.of.kept.near(matrix, unknowns)
+
+    def product(self, X: FloatArray, a: FloatArray) -> FloatArray:
+        """J x of a change (c, size) of the motion and one (n_rigid,) of the rigid amplitudes.
+
+        The residual is linear in motion and forces: J x is that of the motion and of its forces
+        without loads.
+        """
+        of = self.of
+        none = (np.zeros((len(self.w), len(of.transposed)), complex), np.zeros(len(X)), 0.0 * a)
+        return np.asarray(
+            residual_terms(
+                X, a, self.force(X), self.w, 1.0, of.offset == 1, of.arrays, none, False
+            )[0]
+        )
+
+    def force(self, X: FloatArray) -> FloatArray:
+        """Change of the contact forces (c, size) with a motion (c, size) of the rows [N]."""
+        d1, size, DF, moves = self.stiffness.shape[1], X.shape[1], self.DF, self.state == MOVES
+        motion = X.reshape(-1, d1, size)
+        out = self.held[..., None] * motion
+        out[moves] = np.matmul(
+            DF.reshape(len(DF), d1 * size, d1 * size), motion[moves].reshape(-1, d1 * size, 1)
+        ).reshape(-1, d1, size)
+        return np.asarray(out.reshape(-1, size))
+
+    def every_derivative(self) -> FloatArray:
+        """Derivatives of the force of all points, (n_point, 1 + d, size, 1 + d, size) [N/mm]."""
+        size, d1 = self.of.size, self.stiffness.shape[1]
+        out = np.zeros((len(self.state), d1 * size, d1 * size))
+        out[self.state == MOVES] = self.DF.reshape(-1, d1 * size, d1 * size)
+        place, held = np.arange(d1 * size), self.state == STICKS
+        out[np.flatnonzero(held)[:, None], place, place] = np.repeat(
+            self.stiffness[held], size, axis=1
+        )
+        return out.reshape(-1, d1, size, d1, size)
+
+    def matrix(self) -> FloatArray:
+        """The whole matrix (n, n)."""
+        D, of, o = self.every_derivative(), self.of, self.of.offset
+        n_point, d1, size = D.shape[:3]
+        c, m, D = len(of.Psi), len(of.Psi) * size, D.reshape(n_point, d1, size, -1)
+        real, imag = of.modal.receptance_parts(of.Psi, self.w)
+        G = (real + 1j * imag).reshape(-1, c, n_point, d1)
+        force = D[:, :, o::2] - 1j * D[:, :, o + 1 :: 2]
+        # (harmonic, point, row, column of the point)
+        motion = G.transpose(0, 2, 1, 3) @ force.transpose(2, 0, 1, 3)
+        top = np.zeros((c, size, n_point, d1 * size))
+        top[:, o::2] = motion.real.transpose(2, 0, 1, 3)
+        top[:, o + 1 :: 2] = -motion.imag.transpose(2, 0, 1, 3)
+        J = np.zeros((m + of.R.shape[1],) * 2)
+        if o:
+            G0 = of.G0.reshape(c, n_point, d1).transpose(1, 0, 2)
+            top[:, 0] = (G0 @ D[:, :, 0]).transpose(1, 0, 2)
+            J[:m:size, m:] = -of.R
+            R = of.R.reshape(n_point, d1, -1)
+            J[m:, :m] = np.einsum("pdr,pdl->rpl", R, D[:, :, 0]).reshape(-1, m)
+        J[:m, :m] = top.reshape(m, m) + np.eye(m)
+        return J
+
+
+def _complex_part(X: FloatArray, o: int) -> ComplexArray:
+    """Amplitudes a - i b (n_k, c) of coefficients (c, size), the first at column o."""
+    return np.asarray((X[:, o::2] - 1j * X[:, o + 1 :: 2]).T)
+
+
+def _real_part(X: ComplexArray, static: FloatArray, o: int) -> FloatArray:
+    """Coefficients (c, size) of amplitudes (n_k, c) and a mean (c,)."""
+    out = np.empty((X.shape[1], o + 2 * len(X)))
+    out[:, o::2], out[:, o + 1 :: 2] = X.real.T, -X.imag.T
+    if o:
+        out[:, 0] = static
+    return out
+
+
+class _Matrix(NamedTuple):
+    """[[J, r_p], [normal]] in scaled unknowns, not factored yet."""
+
+    J: BalanceJacobian
+    dp: FloatArray
+    D: FloatArray
+    p_scale: float
+    normal: FloatArray
+
+    @property
+    def sizes(self) -> FloatArray:
+        return np.append(self.D, self.p_scale)
+
+    @property
+    def kind(self) -> type[Factors]:
+        """The factors with the fewest unknowns."""
+        J = self.J
+        basis, d1, moving = J.of.basis, J.stiffness.shape[1], len(J.DF)
+        if basis is not None and basis.shape[1] < moving * d1:
+            return LowRank
+        n = len(self.D)
+        left = n - (len(J.state) - moving) * d1 * J.of.size
+        return Eliminated if 2 * (n**3 - left**3) / 3 > WORTH else EveryPoint
+
+    @property
+    def unknowns(self) -> int:
+        """Rows of its factors, without the border."""
+        J, kind, basis = self.J, self.kind, self.J.of.basis
+        if kind is EveryPoint:
+            return len(self.D)
+        rank = 0 if basis is None else basis.shape[1]
+        wide = rank if kind is LowRank else len(J.DF) * J.stiffness.shape[1]
+        return int(wide * J.of.size + J.of.R.shape[1])
+
+    def factored(self) -> Factors:
+        """Its factors."""
+        return self.kind(self.J, self.dp, self.D, self.p_scale, self.normal)
+
+    def product(self, z: FloatArray) -> FloatArray:
+        """What scaled unknowns z (n + 1,) give: the equations (n,) and the border."""
+        x, p, c = z[:-1] * self.D, float(z[-1]) * self.p_scale, len(self.J.of.Psi)
+        n = c * self.J.of.size
+        out = np.empty(len(z))
+        out[:-1] = self.J.product(x[:n].reshape(c, -1), x[n:]) + self.dp * p
+        out[-1] = self.normal @ z
+        return out
+
+
+class Factors:
+    """LU of the condensed [[J, r_p], [normal]] in scaled unknowns and equations.
+
+    Attributes
+    ----------
+    singular : bool
+        Whether a pivot is zero.
+    sign : float
+        Sign of the determinant, up to a factor that never changes on a path.
+    ratio : float
+        Smallest over largest pivot.
+    """
+
+    singular: bool
+    sign: float
+    ratio: float
+
+    def __init__(
+        self, J: BalanceJacobian, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray
+    ) -> None:
+        self.J, self.p_scale, self.D, self.normal = J, p_scale, D, normal
+        c = len(J.of.Psi)
+        self.c, self.size, self.static = c, J.of.size, J.of.offset == 1
+        self.n = c * self.size
+        self.dp, self.dp_rigid = dp[: self.n].reshape(c, self.size), dp[self.n :]
+
+    def _factorise(
+        self,
+        compliance: tuple[FloatArray, ...],
+        DF: FloatArray,
+        D: FloatArray,
+        border: tuple[FloatArray, FloatArray, FloatArray, float],
+    ) -> None:
+        """Parameters as of `upd.hbm.springs.terms.bordered`."""
+        A, self.rows = bordered(compliance, DF, self.static, D, self.D[self.n :], border)
+        self.lu, self.piv, info = lapack.dgetrf(A.T, overwrite_a=True)
+        diagonal = np.diagonal(self.lu)
+        size = np.abs(diagonal)
+        self.singular = info != 0 or not np.isfinite(size).all()
+        if self.singular:
+            self.sign, self.ratio = 0.0, EPS
+            return
+        swaps = int(np.count_nonzero(self.piv != np.arange(len(size))))
+        negative = int(np.count_nonzero(diagonal < 0.0))
+        self.sign = 1.0 if (swaps + negative) % 2 == 0 else -1.0
+        self.ratio = max(float(size.min() / size.max()), EPS)
+
+    def _condensed(self, r: FloatArray, last: float) -> FloatArray:
+        """Scaled unknowns of the condensed equations."""
+        right = np.empty(len(self.rows) + 1)
+        np.divide(r, self.rows, out=right[:-1])
+        right[-1] = last
+        return np.asarray(lapack.dgetrs(self.lu, self.piv, right, overwrite_b=True)[0])
+
+    def solve(self, r: FloatArray, last: float) -> FloatArray:
+        """Scaled correction for the residual r (n,) and the right-hand side of the border."""
+        raise NotImplementedError
+
+    def tangent(self) -> FloatArray:
+        """Unit vector along the path, on the side the border points to."""
+        t = self.solve(np.zeros(len(self.D)), 1.0)
+        return np.asarray(t / np.linalg.norm(t))
+
+
+class EveryPoint(Factors):
+    """Every point has its unknowns."""
+
+    def __init__(
+        self, J: BalanceJacobian, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray
+    ) -> None:
+        super().__init__(J, dp, D, p_scale, normal)
+        c, size, n, of = self.c, self.size, self.n, J.of
+        rigid = len(D) - n
+        across, column = self._by_coefficient(normal[:-1]), self._by_coefficient(dp) * p_scale
+        self._factorise(
+            (*of.modal.receptance_parts(of.Psi, J.w), of.G0, of.R, np.zeros((rigid, rigid))),
+            J.DF if len(J.DF) == len(J.state) else J.every_derivative(),
+            np.ascontiguousarray(D[:n].reshape(c, size).T),
+            (across, np.zeros((size, c)), column, float(normal[-1])),
+        )
+
+    def _by_coefficient(self, x: FloatArray) -> FloatArray:
+        out = x.copy()
+        out[: self.n].reshape(self.size, self.c)[:] = x[: self.n].reshape(self.c, self.size).T
+        return out
+
+    def solve(self, r: FloatArray, last: float) -> FloatArray:
+        """Scaled correction for the residual r (n,) and the right-hand side of the border."""
+        found = self._condensed(self._by_coefficient(r), last)
+        out = found.copy()
+        out[: self.n].reshape(self.c, self.size)[:] = found[: self.n].reshape(self.size, self.c).T
+        return out
+
+
+class Eliminated(Factors):
+    """Points that stick or are open over the whole cycle are eliminated first."""
+
+    def __init__(
+        self, J: BalanceJacobian, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray
+    ) -> None:
+        super().__init__(J, dp, D, p_scale, normal)
+        c, size, n, of = self.c, self.size, self.n, J.of
+        held = np.repeat(J.state != MOVES, J.stiffness.shape[1])
+        s, m = np.flatnonzero(held), np.flatnonzero(~held)
+        self.s, self.m = s, m
+        K = J.held.ravel()[s]
+        real, imag = of.modal.receptance_parts(of.Psi, J.w)
+        G = real + 1j * imag
+        one, down, own = np.eye(len(s)), s[:, None], m[:, None]
+        # (I + G_ss K)^-1 and with it G_sm
+        self.inverse = np.linalg.inv(one + G[:, down, s] * K)
+        self.across = self.inverse @ G[:, down, m]
+        self.back = np.ascontiguousarray(np.swapaxes(self.across, 1, 2) * K)
+        G = G[:, own, m] - self.back @ G[:, down, m]
+        # without harmonic 0 none of these is read
+        rigid_s = of.R[s]
+        self.inverse0 = np.asarray(np.linalg.inv(one + of.G0[down, s] * K))
+        self.across0 = self.inverse0 @ of.G0[down, m]
+        self.back0 = np.ascontiguousarray(self.across0.T * K)
+        self.pull = (rigid_s.T * K) @ self.inverse0
+        G0 = of.G0[own, m] - self.back0 @ of.G0[down, m]
+        R, below = of.R[m] - self.back0 @ rigid_s, self.pull @ rigid_s
+        self.by_rigid = self.inverse0 @ rigid_s
+        scaled = normal[:n].reshape(c, size)
+        self.V = scaled[s] / D[:n].reshape(c, size)[s]
+        # the border on the held points is one on the forces of the others
+        q = np.einsum("ks,ksm->km", _complex_part(self.V, of.offset).conj(), self.across)
+        by_force = _real_part(-q.conj(), -(self.V[:, 0] @ self.across0), of.offset)
+        column, share, self.moved_by_p = self._reduced(self.dp, self.dp_rigid)
+        border_rigid = normal[n:-1] + D[n:] * (self.V[:, 0] @ self.by_rigid)
+        across = np.concatenate([scaled[m].T.ravel(), border_rigid])
+        last = float(normal[-1]) - p_scale * share
+        self._factorise(
+            (np.ascontiguousarray(G.real), np.ascontiguousarray(G.imag), G0, R, below),
+            J.DF,
+            np.ascontiguousarray(D[:n].reshape(c, size)[m].T),
+            (across, np.ascontiguousarray(by_force.T), column * p_scale, last),
+        )
+
+    def _reduced(self, b: FloatArray, b_rigid: FloatArray) -> tuple[FloatArray, float, FloatArray]:
+        """Right-hand side of the condensed equations, and what the held points do to it.
+
+        Their share in the border, and their motion with the others at rest.
+        """
+        own, static = np.ascontiguousarray(b[self.s]), self.static
+        inside = by_harmonic(self.inverse, self.inverse0, static, own)
+        top = b[self.m] - by_harmonic(self.back, self.back0, static, own)
+        below = b_rigid - self.pull @ own[:, 0]
+        return np.concatenate([top.T.ravel(), below]), float((self.V * inside).sum()), inside
+
+    def solve(self, r: FloatArray, last: float) -> FloatArray:
+        """Scaled correction for the residual r (n,) and the right-hand side of the border."""
+        n, c, size, static = self.n, self.c, self.size, self.static
+        right, share, inside = self._reduced(r[:n].reshape(c, size), r[n:])
+        found = self._condensed(right, last - share)
+        k, D = size * len(self.m), self.D[:n].reshape(c, size)
+        out, p = np.empty(len(r) + 1), float(found[-1])
+        w = found[:k].reshape(size, len(self.m)).T
+        DF, block = self.J.DF, self.J.stiffness.shape[1] * size
+        force = np.matmul(
+            DF.reshape(len(DF), block, block), (w * D[self.m]).reshape(len(DF), block, 1)
+        ).reshape(len(self.m), size)
+        held = inside - p * self.p_scale * self.moved_by_p
+        held -= by_harmonic(self.across, self.across0, static, force)
+        held[:, 0] += self.by_rigid @ (found[k:-1] * self.D[n:])
+        whole = out[:n].reshape(c, size)
+        whole[self.m] = w
+        whole[self.s] = held / D[self.s]
+        out[n:] = found[k:]
+        return out
+
+
+class LowRank(Factors):
+    """The motion of the rows in a basis of fewer, and what no mode moves beside it."""
+
+    def __init__(
+        self,
+        J: BalanceJacobian,
+        dp: FloatArray,
+        D: FloatArray,
+        p_scale: float,
+        normal: FloatArray,
+    ) -> None:
+        super().__init__(J, dp, D, p_scale, normal)
+        basis, of = J.of.basis, J.of
+        assert basis is not None
+        c, size, n, r = self.c, self.size, self.n, basis.shape[1]
+        self.U, d1 = basis, J.stiffness.shape[1]
+        moves = J.state == MOVES
+        U = basis.reshape(len(moves), d1, r)
+        part = J.DF.transpose(0, 2, 4, 1, 3).reshape(-1, size * size, d1, d1)
+        Um = U[moves]
+        half = np.matmul(part, Um[:, None])
+        # (r, points d1) times (points d1, size size r)
+        H = Um.reshape(-1, r).T @ half.transpose(0, 2, 1, 3).reshape(-1, size * size * r)
+        H = H.reshape(r, size, size, r)
+        held = (basis.T * J.held.ravel()) @ basis
+        place = np.arange(size)
+        H[:, place, place, :] += held[:, None, :]
+        DF = np.ascontiguousarray(H.transpose(0, 1, 3, 2))[None]
+        real, imag = of.modal.receptance_parts(basis.T @ of.Psi, J.w)
+        # one size for all coordinates of a coefficient
+        unit = D[:n].reshape(c, size).max(axis=0)
+        self.unit = np.repeat(unit, r)
+        self.border = (normal[:n] / D[:n]).reshape(c, size)
+        self.G, self.G0, self.R = real + 1j * imag, basis.T @ of.G0 @ basis, basis.T @ of.R
+        rigid = len(D) - n
+        column = np.concatenate([(basis.T @ self.dp).T.ravel(), self.dp_rigid])
+        across = np.concatenate([(basis.T @ self.border).T.ravel() * self.unit, normal[n:-1]])
+        self._factorise(
+            (real, imag, self.G0, self.R, np.zeros((rigid, rigid))),
+            DF,
+            np.repeat(unit[:, None], r, axis=1),
+            (across, np.zeros((size, r)), column * p_scale, float(normal[-1])),
+        )
+
+    def solve(self, r: FloatArray, last: float) -> FloatArray:
+        """Scaled correction for the residual r (n,) and the right-hand side of the border."""
+        n, c, size, U = self.n, self.c, self.size, self.U
+        b = r[:n].reshape(c, size)
+        inside = U.T @ b
+        # no mode moves the rest: it goes at once, and its forces move the rest
+        left = b - U @ inside
+        f = U.T @ self.J.force(left)
+        moved = by_harmonic(self.G, self.G0, self.static, f)
+        below = r[n:] - self.R.T @ f[:, 0]
+        right = np.concatenate([(inside - moved).T.ravel(), below])
+        found = self._condensed(right, last - float((self.border * left).sum()))
+        k = size * U.shape[1]
+        y = (found[:k] * self.unit).reshape(size, -1).T
+        out = np.empty(len(r) + 1)
+        out[:n] = (U @ y + left).ravel() / self.D[:n]
+        out[n:] = found[k:]
+        return out
