@@ -16,18 +16,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.forced.input_uncertainty import DataChange
 from upd.analyses.forced.linear_limits import linear_peaks
-from upd.analyses.forced.linear_sensitivity import (
-    limit_peak,
-    linear_system,
-    stuck_frequencies,
-)
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.mode_peaks import CANDIDATES, tell_stuck_peaks, unmoved
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.paths import balance_of
 from upd.analyses.forced.plan import ForcedPlan, grid
+from upd.analyses.forced.sensitivity import (
+    DataChange,
+    limit_peak,
+    linear_system,
+    stuck_frequencies,
+)
 from upd.cache.journal import Journal
 from upd.errors import ConvergenceError
 from upd.fitting.friction import CurveWithFriction, PeakKey

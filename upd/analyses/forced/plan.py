@@ -223,11 +223,6 @@ def _points(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
     return sum(_point_count(scene, size[side]["contact"], side) for side in ("left", "right"))
 
 
-def newton_seconds(plan: ForcedPlan) -> float:
-    """Of a Newton step of the run, with its factors."""
-    return _step_seconds(plan.scene, plan.size)
-
-
 def _point_count(scene: ForcedScene, nodes: int, side: Any) -> float:
     """Contact points of a face, roughly: a few rows of many columns, and one for itself and its
     mirror image.
