@@ -10,9 +10,9 @@ from rigs import LINES
 from scipy.linalg import eigh
 
 from upd.analyses import make_plan
+from upd.analyses.forced.inputs import nearer
 from upd.analyses.forced.measures import stuck_modes
 from upd.analyses.forced.model import Model, make_model, preloaded
-from upd.analyses.forced.other_points import nearer
 from upd.analyses.forced.points import FacePoints, GaussRule, fewer_points, gauss_points
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import make_bodies

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 from upd.analyses.base import chosen_by_accuracy, refuse_oversize
 from upd.analyses.forced.estimates import estimate
@@ -20,6 +21,7 @@ from upd.analyses.forced.levels import (
     SAMPLES,
     graded,
     lines_named,
+    of_geometry,
     with_gauss,
 )
 from upd.analyses.forced.plan import ForcedPlan, make_plan, time_steps
@@ -31,7 +33,8 @@ from upd.progress import Stages
 from upd.results import Estimates, Result
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import GAUSS
-from upd.vary.variation import SolvedVariation
+from upd.vary.solve import changed
+from upd.vary.variation import Overrides, SolvedVariation
 from upd.vary.wanted import LevelChoice, Wanted, plan_wanted, solve_wanted
 
 #: names of accuracies -> numbers they are asked of
@@ -40,8 +43,9 @@ ASKED = {"peak_frequency": "peak_?_frequency", "peak": "peak_?_accelerance"}
 _FINER = (1, 1.5, 2, 2.5, 3)
 #: times the samples
 _MORE_SAMPLES = (1, 2, 4, 8)
-#: Gauss points up the slope in place of the scene's lines, and those along the damper
-_GAUSS, _COLUMNS = (3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 2
+#: Gauss points up the slope in place of the scene's lines, which are the first level, and those
+#: along the damper
+_GAUSS, _COLUMNS = (0, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 2
 _MODES = (5, 10, 20, 40)
 _HARMONICS = (1, 3, 5, 7, 9, 11, 13)
 
@@ -54,29 +58,38 @@ def choices(scene: ForcedScene) -> list[LevelChoice]:
     stand for a face whatever its mesh, so that both errors fall, each by its own choice.
     """
     found = [
-        _choice(MODES, "modes kept", _MODES, _with_modes, "{} a blade"),
-        _choice(HARMONICS, "harmonics", _HARMONICS, _with_harmonics, "to {}"),
-        _choice(SAMPLES, "samples", _MORE_SAMPLES, _with_samples, "x {}"),
+        _choice(MODES, "modes kept", _MODES, _modes, "{} a blade"),
+        _choice(HARMONICS, "harmonics", _HARMONICS, _highest, "to {}"),
+        _choice(SAMPLES, "samples", _MORE_SAMPLES, _samples, "x {}"),
     ]
     if scene.recipe == RECIPE:
-        labels = ("of the scene", *(f"graded x {n:g}" for n in _FINER[1:]))
-        found.insert(0, LevelChoice(MESH, "mesh", labels, _with_mesh))
+        found.insert(0, _choice(MESH, "mesh", _FINER, _mesh, "graded x {:g}", own=True))
     if _raisable(scene):
         # before the mesh, which it decides the counts of
-        labels = ("of the scene", *(f"{n} Gauss points up the slope" for n in _GAUSS))
-        found.insert(0, LevelChoice(POINTS, "contact points", labels, _with_points))
+        words = "{} Gauss points up the slope"
+        found.insert(0, _choice(POINTS, "contact points", _GAUSS, _points, words, own=True))
     return found
 
 
 def _choice(
     source: str,
     name: str,
-    levels: tuple[int, ...],
-    made: Callable[[ForcedScene, int], ForcedScene],
+    levels: Sequence[float],
+    overrides: Callable[[ForcedScene, Any], Overrides],
     words: str,
+    *,
+    own: bool = False,
 ) -> LevelChoice:
+    """Levels as overrides of the scene; ``own``: the first is the scene's."""
     labels = [words.format(n) for n in levels]
-    return LevelChoice(source, name, labels, lambda one, k: made(one, levels[k]))
+    if own:
+        labels[0] = "of the scene"
+
+    def at(scene: ForcedScene, k: int) -> ForcedScene:
+        given: ForcedScene = changed(scene, overrides(scene, levels[k]))
+        return scene if own and k == 0 else given
+
+    return LevelChoice(source, name, labels, at)
 
 
 def _raisable(scene: ForcedScene) -> bool:
@@ -88,32 +101,30 @@ def _raisable(scene: ForcedScene) -> bool:
     )
 
 
-def _with_mesh(scene: ForcedScene, level: int) -> ForcedScene:
-    if level == 0:
-        return scene
-    return replace(scene, geometry={**scene.geometry, **graded(scene, _FINER[level])})
+def _mesh(scene: ForcedScene, factor: float) -> Overrides:
+    return of_geometry(graded(scene, factor))
 
 
-def _with_points(scene: ForcedScene, level: int) -> ForcedScene:
-    if level == 0:
-        return scene
-    return replace(scene, contact=with_gauss(scene.contact, _GAUSS[level - 1], _COLUMNS))
+def _points(scene: ForcedScene, rows: int) -> Overrides:
+    del scene
+    return with_gauss(rows, _COLUMNS)
 
 
-def _with_modes(scene: ForcedScene, count: int) -> ForcedScene:
-    return replace(scene, reduction=replace(scene.reduction, modes=count))
+def _modes(scene: ForcedScene, count: int) -> Overrides:
+    del scene
+    return (("reduction.modes", count),)
 
 
-def _with_harmonics(scene: ForcedScene, highest: int) -> ForcedScene:
-    return replace(scene, balance=replace(scene.balance, harmonics=highest))
+def _highest(scene: ForcedScene, harmonic: int) -> Overrides:
+    del scene
+    return (("balance.harmonics", harmonic),)
 
 
-def _with_samples(scene: ForcedScene, factor: int) -> ForcedScene:
+def _samples(scene: ForcedScene, factor: int) -> Overrides:
     if factor == 1:
-        return scene
-    needed = sample_count(harmonics(range(int(scene.balance.harmonics) + 1)))
-    count = factor * max(needed, time_steps(scene))
-    return replace(scene, balance=replace(scene.balance, samples=count))
+        return ()
+    needed = sample_count(harmonics(scene.harmonic_numbers))
+    return (("balance.samples", factor * max(needed, time_steps(scene))),)
 
 
 def _trial(scene: ForcedScene) -> ForcedScene:

@@ -14,8 +14,9 @@ from functools import partial
 
 import numpy as np
 
-from upd.analyses.forced.model import Model, preloaded
-from upd.analyses.forced.other_points import nearer
+from upd.analyses.base import Resolved
+from upd.analyses.forced.levels import Laws, make_variant
+from upd.analyses.forced.model import Array, Model, preloaded
 from upd.analyses.forced.paths import balance_of
 from upd.analyses.forced.peaks_again import (
     NOT_FOUND,
@@ -23,8 +24,12 @@ from upd.analyses.forced.peaks_again import (
     PeaksAgain,
     Variant,
     found_again,
+    places_up,
+    straight,
 )
+from upd.analyses.forced.plan import ALONG
 from upd.analyses.forced.statics import StaticState, state_of_ratio
+from upd.analyses.seated.bodies import Bodies
 from upd.errors import InputError, one_line
 from upd.linalg.parallel import threads_for
 from upd.results import Case
@@ -197,3 +202,91 @@ def few_harmonics(peaks: FoundPeaks) -> FoundPeaks | None:
             top = top._replace(frequency=found.frequency, height=found.height, x=x)
             out.append(one._replace(balance=b, top=top, check=None, other=None))
     return peaks._replace(peaks=tuple(out)) if out else None
+
+
+def nearer(model: Model, factor: float) -> Model | None:
+    """The model with its points nearer to the middle of each face, up the slope.
+
+    The motion of a point between others is theirs by straight lines: that of a face under a rigid
+    damper is nearly one. Stiffness and static forces stay with the points.
+
+    Parameters
+    ----------
+    factor
+        On the places up the slope from the middle of a face, at most 1.
+
+    Returns
+    -------
+    Model or None
+        None where the points are in one row.
+    """
+    n = model.contacts.n_point
+    at = np.zeros((n, n))
+    faces = {}
+    for k, side in enumerate(SIDES):
+        face, on = model.faces[side], np.flatnonzero(model.face == k)
+        up = places_up(model)[on]
+        rows = np.unique(np.round(up, 6))
+        if len(rows) < 2:
+            return None
+        weight = straight(rows, factor * rows)
+        row = np.abs(up[:, None] - rows).argmin(axis=1)
+        column = face.position @ face.frame[1]
+        mine = np.zeros((len(on), len(on)))
+        for i in range(len(on)):
+            # the points of every row nearest along the damper
+            for j in range(len(rows)):
+                there = np.flatnonzero(row == j)
+                near = there[np.abs(column[there] - column[i]).argmin()]
+                mine[i, near] += weight[row[i], j]
+        at[np.ix_(on, on)] = mine
+        faces[side] = replace(face, position=mine @ face.position, values=mine @ face.values)
+
+    def rows_of(of: Array) -> Array:
+        return np.ascontiguousarray(np.einsum("gp,pdn->gdn", at, of))
+
+    contacts = replace(model.contacts, rows=rows_of(model.contacts.rows))
+    return replace(model, contacts=contacts, damper_rows=rows_of(model.damper_rows), faces=faces)
+
+
+# -- an effect left out ----------------------------------------------------------------------------
+
+
+def along_variant(peaks: FoundPeaks, bodies: Bodies, laws: Laws) -> Variant | None:
+    """The model in which friction resists sliding along the damper too; None where the run has it
+    or nothing rubs.
+    """
+    if peaks.model.contacts.tangents == 2 or not peaks.plan.scene.contact.friction:
+        return None
+    of = Variation(ALONG, "both sliding directions", (("contact.directions", "two"),))
+    return make_variant(peaks.plan, peaks.model, bodies, laws, of)._replace(any_height=True)
+
+
+def highest_slipping(few: FoundPeaks) -> FoundPeaks | None:
+    """The highest peak on which a point slips alone; None without one."""
+    slipping = [one for one in few.peaks if one.top.slips]
+    if not slipping:
+        return None
+    return few._replace(peaks=(max(slipping, key=lambda one: one.top.height),))
+
+
+def along_changes(few: FoundPeaks, found: PeaksAgain) -> list[Resolved]:
+    """Change of a peak by friction along the damper, with few harmonics.
+
+    Parameters
+    ----------
+    few
+        Of `highest_slipping`.
+    found
+        The peak with `along_variant`.
+    """
+    (one,) = few.peaks
+    top, again = one.top, found.peaks.get((one.ratio, one.blade, one.number), NOT_FOUND)
+    case, remedy = replace(one.case, mode=one.mode), 'set contact.directions = "two"'
+    return [
+        Resolved(ALONG, f"peak_{one.number}_{kind}", case, before, after, unit, remedy)
+        for kind, unit, before, after in (
+            ("accelerance", "(m/s2)/N", top.height, again.height),
+            ("frequency", "Hz", top.frequency, again.frequency),
+        )
+    ]

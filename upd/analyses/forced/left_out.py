@@ -5,8 +5,6 @@ the damper's own elasticity.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import eigh, qr
@@ -16,16 +14,9 @@ from upd.analyses.base import Resolved
 from upd.analyses.forced.blade_parts import MIRROR_SIGNS
 from upd.analyses.forced.linear_limits import stuck_frequency
 from upd.analyses.forced.measures import StuckMode, tell_modes
-from upd.analyses.forced.model import Array, Model, make_model
-from upd.analyses.forced.peaks_again import (
-    NOT_FOUND,
-    FoundPeaks,
-    PeaksAgain,
-    Variant,
-)
-from upd.analyses.forced.plan import ALONG, ELASTIC, ForcedPlan
+from upd.analyses.forced.model import Array, Model
+from upd.analyses.forced.plan import ELASTIC, ForcedPlan
 from upd.analyses.forced.solution import ForcedSolution
-from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies
 from upd.fem import Material, mass, rigid_body_modes, stiffness
 from upd.hbm.springs.points import stuck_stiffness
@@ -33,55 +24,7 @@ from upd.linalg import factorise
 from upd.linalg.symmetric import Symmetric
 from upd.mesh import IntArray
 from upd.results import Case
-from upd.scene.forced_contact import SIDES, Side
-from upd.vary.variation import Variation
-
-
-def along_variant(
-    solution: ForcedSolution, name: str, laws: Mapping[Side, FaceLaw]
-) -> Variant | None:
-    """The model in which friction resists sliding along the damper too; None where the run has it
-    or nothing rubs.
-    """
-    plan, model = solution.plan, solution.models[name]
-    scene = plan.scene
-    if model.contacts.tangents == 2 or not scene.contact.friction:
-        return None
-    contact = replace(scene.contact, directions="two")
-    plan = replace(plan, scene=replace(scene, contact=contact), workers=1)
-    assert solution.bodies is not None
-    made = make_model(plan, solution.bodies, laws, model.state)
-    return Variant(Variation(ALONG, "both sliding directions"), made, any_height=True)
-
-
-def highest_slipping(few: FoundPeaks) -> FoundPeaks | None:
-    """The highest peak on which a point slips alone; None without one."""
-    slipping = [one for one in few.peaks if one.top.slips]
-    if not slipping:
-        return None
-    return few._replace(peaks=(max(slipping, key=lambda one: one.top.height),))
-
-
-def along_changes(few: FoundPeaks, found: PeaksAgain) -> list[Resolved]:
-    """Change of a peak by friction along the damper, with few harmonics.
-
-    Parameters
-    ----------
-    few
-        Of `highest_slipping`.
-    found
-        The peak with `along_variant`.
-    """
-    (one,) = few.peaks
-    top, again = one.top, found.peaks.get((one.ratio, one.blade, one.number), NOT_FOUND)
-    case, remedy = replace(one.case, mode=one.mode), 'set contact.directions = "two"'
-    return [
-        Resolved(ALONG, f"peak_{one.number}_{kind}", case, before, after, unit, remedy)
-        for kind, unit, before, after in (
-            ("accelerance", "(m/s2)/N", top.height, again.height),
-            ("frequency", "Hz", top.frequency, again.frequency),
-        )
-    ]
+from upd.scene.forced_contact import SIDES
 
 
 def elastic_changes(solution: ForcedSolution, name: str) -> list[Resolved]:

@@ -74,7 +74,7 @@ class ForcedPlan(Plan[ForcedScene]):
 
 def make_plan(scene: ForcedScene) -> ForcedPlan:
     """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
-    parameters = _parameters(scene)
+    parameters = parameters_of(scene)
     whole = scene.contact.model == "interface"
     if not whole:
         check_sources(scene)
@@ -130,7 +130,8 @@ def _files_seconds(scene: ForcedScene) -> float:
     return _FILES_S + _CURVE_S * curves * (not whole)
 
 
-def _parameters(scene: ForcedScene) -> dict[str, Any]:
+def parameters_of(scene: ForcedScene) -> dict[str, Any]:
+    """Of the recipe."""
     # points on lattice lines pair themselves
     apart = scene.contact.rule == GAUSS
     half = (scene.contact.model == "interface" or apart) and scene.mesh.symmetry != "full"

@@ -9,15 +9,17 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
-from upd.analyses.forced.inputs import effects_of, few_harmonics, input_variants
-from upd.analyses.forced.interface_model import INTERFACE, make_whole_faces
-from upd.analyses.forced.left_out import (
+from upd.analyses.forced.inputs import (
     along_changes,
     along_variant,
-    elastic_changes,
+    effects_of,
+    few_harmonics,
     highest_slipping,
+    input_variants,
 )
-from upd.analyses.forced.levels import COARSER, Laws, coarse_model, other_levels
+from upd.analyses.forced.interface_model import INTERFACE, make_whole_faces
+from upd.analyses.forced.left_out import elastic_changes
+from upd.analyses.forced.levels import MESH, Laws, level_variations, make_variant
 from upd.analyses.forced.linear_limits import linear_of, linear_of_faces
 from upd.analyses.forced.model import Model, make_model, preloaded
 from upd.analyses.forced.paths import quiet
@@ -177,10 +179,12 @@ def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: St
     work: list[_Work] = []
     for name in laws if scene.estimates else ():
         model = solution.models[name]
-        variants[name] += other_levels(plan, model, bodies, laws[name])
-        for factor in COARSER:
-            given = plan, model, laws[name], factor
-            work.append(_Work(variants[name].append, coarse_model, given, needed=True))
+        for of in level_variations(plan):
+            if of.source != MESH:
+                variants[name].append(make_variant(plan, model, bodies, laws[name], of))
+            else:
+                given = plan, model, None, laws[name], of
+                work.append(_Work(variants[name].append, make_variant, given, needed=True))
     order = list(scene.excitation.centrifugal_to_force)
     for name, model in solution.models.items():
         # those with most slip first
@@ -247,9 +251,12 @@ def _at_few_harmonics(
             yield _Work(
                 lambda one: effects.extend(effects_of(few, one)), solve_again, (few, variant)
             )
-    along = along_variant(solution, name, laws) if scene.left_out.solves else None
     highest = highest_slipping(few)
-    if along is not None and highest is not None:
+    if highest is None or not scene.left_out.solves:
+        return
+    assert solution.bodies is not None
+    along = along_variant(few, solution.bodies, laws)
+    if along is not None:
         yield _Work(
             lambda one: solution.omissions.extend(along_changes(highest, one)),
             solve_again,
