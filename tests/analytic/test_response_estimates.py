@@ -15,8 +15,8 @@ from rigs import LINES
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import peaks_again
 from upd.analyses.forced import solve as solving
+from upd.analyses.forced.accuracy import bound, estimate
 from upd.analyses.forced.curves import PointCurve, Top
-from upd.analyses.forced.estimates import bound, estimate
 from upd.analyses.forced.levels import HARMONICS, MESH, MODES, POINTS, SAMPLES
 from upd.analyses.forced.model import make_model
 from upd.analyses.forced.peaks import climbed

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.linear_limits import fine_grid
-from upd.analyses.forced.mode_peaks import numbered_peaks
-from upd.analyses.forced.model import Model
-from upd.analyses.forced.paths import balance_of, quiet, respond
+from upd.analyses.forced.measures import numbered_peaks
+from upd.analyses.forced.model import Model, balance_of, quiet, respond
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.sensitivity import DataChange
 from upd.errors import ConvergenceError

@@ -17,10 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.forced.linear_limits import linear_peaks
-from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.mode_peaks import CANDIDATES, tell_stuck_peaks, unmoved
-from upd.analyses.forced.model import Model
-from upd.analyses.forced.paths import balance_of
+from upd.analyses.forced.measures import CANDIDATES, CurvePeak, tell_stuck_peaks, unmoved
+from upd.analyses.forced.model import Model, balance_of
 from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.analyses.forced.sensitivity import (
     DataChange,

@@ -14,9 +14,8 @@ import numpy as np
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
 from upd.analyses.forced.linear_limits import linear_peaks
-from upd.analyses.forced.mode_peaks import numbered_peaks, tell_stuck_peaks
-from upd.analyses.forced.model import Model, make_model
-from upd.analyses.forced.paths import balance_of, path_settings, respond
+from upd.analyses.forced.measures import numbered_peaks, tell_stuck_peaks
+from upd.analyses.forced.model import Model, balance_of, make_model, path_settings, respond
 from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.analyses.forced.sensitivity import data_change, is_known
 from upd.analyses.forced.statics import static_state

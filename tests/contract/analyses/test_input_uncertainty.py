@@ -17,7 +17,8 @@ from rigs import LINES
 
 import upd
 from upd.analyses import analysis_of
-from upd.analyses.forced import paths, peaks
+from upd.analyses.forced import model as paths
+from upd.analyses.forced import peaks
 from upd.analyses.forced.sensitivity import (
     data_change,
     is_known,

@@ -16,7 +16,6 @@ from upd.analyses.forced import (
     arrays,
     charts,
     checks,
-    estimates,
     plan,
     results,
 )
@@ -62,7 +61,7 @@ ANALYSIS = Analysis(
     answer=answer.answer,
     verdict_names=("best_peak", "reduction_of_free_peak"),
     coarsened=lambda plan: coarsened_rig(plan, ("response",), ("balance.method", "balance")),
-    estimate=estimates.estimate,
+    estimate=accuracy.estimate,
 )
 
 __all__ = ["ANALYSIS"]

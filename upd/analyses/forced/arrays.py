@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.curve_results import measured_peaks
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, PointCurve, SweptCurve
-from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.performance import performance_arrays
+from upd.analyses.forced.plan import excitation_of
+from upd.analyses.forced.results import measured_peaks
 from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
 from upd.analyses.forced.sweeps import face_shares, faces_places, marched_damper, marched_loops
 from upd.analyses.measured import accelerance_array, measured_arrays

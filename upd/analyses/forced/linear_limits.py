@@ -17,25 +17,21 @@ from scipy.optimize import minimize_scalar
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import LinearCurves
-from upd.analyses.forced.excitation import Excitation, excitation_of
 from upd.analyses.forced.measures import (
+    CANDIDATES,
     Array,
     ComplexArray,
     CurvePeak,
+    ModeShapes,
     StuckMode,
     chosen_peaks,
-)
-from upd.analyses.forced.mode_peaks import (
-    CANDIDATES,
-    ModeShapes,
     numbered,
     shapes_along_x,
     tell_stuck_peaks,
     unmoved,
 )
-from upd.analyses.forced.model import Model
-from upd.analyses.forced.paths import balance_of
-from upd.analyses.forced.plan import ForcedPlan, grid
+from upd.analyses.forced.model import Model, balance_of
+from upd.analyses.forced.plan import Excitation, ForcedPlan, excitation_of, grid
 from upd.hbm.faces.state import InterfaceModel
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.points import stuck_stiffness

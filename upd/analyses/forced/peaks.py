@@ -32,14 +32,11 @@ from upd.analyses.forced.curves import (
     Top,
     rising,
 )
-from upd.analyses.forced.interface_model import by_coulomb
+from upd.analyses.forced.interface_model import SpringMarch, by_coulomb, make_springs, state_at
 from upd.analyses.forced.linear_limits import fine_grid
-from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.mode_peaks import numbered_peaks
-from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.paths import respond
+from upd.analyses.forced.measures import CurvePeak, numbered_peaks
+from upd.analyses.forced.model import Array, Model, respond
 from upd.analyses.forced.plan import ForcedPlan, time_steps
-from upd.analyses.forced.spring_march import SpringMarch, make_springs, state_at
 from upd.errors import ConvergenceError, one_line
 from upd.hbm import climb
 from upd.hbm.core.fourier import to_complex

@@ -19,14 +19,20 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import ForcedCurve, LinearCurves, PointCurve, TimeCheck, Top
 from upd.analyses.forced.linear_limits import limit_peaks, linear_of, stuck_frequency
-from upd.analyses.forced.measures import CurvePeak, StuckMode, stuck_modes
-from upd.analyses.forced.mode_peaks import CANDIDATES, numbered_peaks
-from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.paths import (
+from upd.analyses.forced.measures import (
+    CANDIDATES,
+    CurvePeak,
+    StuckMode,
+    numbered_peaks,
+    stuck_modes,
+)
+from upd.analyses.forced.model import (
     BAND,
     BAND_POINTS,
     LONG_STEPS,
     SWEEP_POINTS,
+    Array,
+    Model,
     balance_of,
     respond,
 )

@@ -17,10 +17,8 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import LinearCurves, PointCurve
 from upd.analyses.forced.linear_limits import fine_grid
-from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.mode_peaks import numbered_peaks
-from upd.analyses.forced.model import Model
-from upd.analyses.forced.paths import LONG_STEPS, SWEEP_POINTS, respond
+from upd.analyses.forced.measures import CurvePeak, numbered_peaks
+from upd.analyses.forced.model import LONG_STEPS, SWEEP_POINTS, Model, respond
 from upd.analyses.forced.plan import ForcedPlan
 from upd.linalg.parallel import threads_for
 from upd.linalg.processes import Job

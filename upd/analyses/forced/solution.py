@@ -10,15 +10,13 @@ import numpy as np
 
 from upd.analyses.base import Resolved
 from upd.analyses.forced.curves import ForcedCurve, LinearCurves, SweptCurve, WholeFaces
-from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.inputs import InputEffect
 from upd.analyses.forced.linear_limits import stuck_peaks_of
-from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.mode_peaks import CANDIDATES, tell_stuck_peaks
+from upd.analyses.forced.measures import CANDIDATES, CurvePeak, tell_stuck_peaks
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.peaks_again import PeaksAgain
 from upd.analyses.forced.performance import Performance, RatioPoint
-from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.plan import ForcedPlan, excitation_of
 from upd.analyses.seated.bodies import Bodies
 from upd.hbm.faces.record import RecordedPeriod
 from upd.mesh import IntArray

@@ -13,16 +13,15 @@ from upd.analyses.forced.inputs import (
     along_changes,
     along_variant,
     effects_of,
+    elastic_changes,
     few_harmonics,
     highest_slipping,
     input_variants,
 )
-from upd.analyses.forced.interface_model import INTERFACE, make_whole_faces
-from upd.analyses.forced.left_out import elastic_changes
+from upd.analyses.forced.interface_model import INTERFACE, make_springs, make_whole_faces
 from upd.analyses.forced.levels import MESH, Laws, level_variations, make_variant
 from upd.analyses.forced.linear_limits import linear_of, linear_of_faces
-from upd.analyses.forced.model import Model, make_model, preloaded
-from upd.analyses.forced.paths import quiet
+from upd.analyses.forced.model import Model, make_model, preloaded, quiet
 from upd.analyses.forced.peaks import solve_curve
 from upd.analyses.forced.peaks_again import (
     FoundPeaks,
@@ -41,7 +40,6 @@ from upd.analyses.forced.performance import (
 )
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.forced.solution import BandPoint, ForcedSolution
-from upd.analyses.forced.spring_march import make_springs
 from upd.analyses.forced.statics import StaticState, admissible, same, static_state
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.forced.sweeps import balance_curve, both_ways, march_peaks
@@ -221,7 +219,8 @@ def _around(
         levels = solution.levels.setdefault(name, []) if variants[name] else []
         work += [_Work(levels.append, solve_again, (peaks, one)) for one in variants[name]]
         if scene.left_out.solves:
-            solution.omissions += elastic_changes(solution, name)
+            assert solution.bodies is not None
+            solution.omissions += elastic_changes(peaks, solution.bodies, name)
         if name == first:
             if scene.wants("performance"):
                 jobs = further_points(plan, model, with_curves(points, mine), points)

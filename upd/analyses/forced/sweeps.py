@@ -19,10 +19,10 @@ from functools import partial
 import numpy as np
 
 from upd.analyses.forced.curves import Answer, FacesCurve, ForcedCurve, SweptCurve, Way, WholeFaces
-from upd.analyses.forced.excitation import ComplexArray, excitation_of
 from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.linear_limits import stuck_modes_of
 from upd.analyses.forced.measures import (
+    CANDIDATES,
     MOTIONS,
     PEAKS_ABOVE,
     CurvePeak,
@@ -31,12 +31,20 @@ from upd.analyses.forced.measures import (
     in_faces,
     loop_along_main,
     losing_most,
+    numbered,
     path_maxima,
     place,
 )
-from upd.analyses.forced.mode_peaks import CANDIDATES, numbered
 from upd.analyses.forced.model import Array
-from upd.analyses.forced.plan import SAMPLES, ForcedPlan, blade_harmonics, grid, time_steps
+from upd.analyses.forced.plan import (
+    SAMPLES,
+    ComplexArray,
+    ForcedPlan,
+    blade_harmonics,
+    excitation_of,
+    grid,
+    time_steps,
+)
 from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
 from upd.hbm.faces.balance import interface_response
 from upd.hbm.faces.record import period_of_sweep
