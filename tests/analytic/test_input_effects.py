@@ -103,7 +103,8 @@ def test_stiffness_moves_stuck_peaks_to_those_of_a_run_with_it(
     for number in (1, 2):
         effect = found[f"x {factor:g}", number]
         was, now = (
-            next(p for p in s.stuck_peaks("thesis") if p.number == number) for s in (run, changed)
+            next(p for p in s.linear["thesis"].stuck_peaks["right"] if p.number == number)
+            for s in (run, changed)
         )
         assert 1.0 + effect.frequency == pytest.approx(now.frequency / was.frequency, rel=1e-5)
         assert 1.0 + effect.height == pytest.approx(now.height / was.height, rel=1e-4)

@@ -65,14 +65,14 @@ def test_where_all_sticks_the_peaks_are_the_stuck_ones() -> None:
     solution, found = solved(1e5), at(1e6)
     assert found.arrived
     for side in ("left", "right"):
-        wanted = {p.number: p for p in solution.stuck_peaks("thesis", side)}  # type: ignore[arg-type]
+        wanted = {p.number: p for p in solution.linear["thesis"].stuck_peaks[side]}  # type: ignore[index]
         mine = {p.number: p for p in found.peaks if p.blade == side}
         assert set(mine) == set(wanted) == {2}
         for number, one in mine.items():
             assert one.frequency == pytest.approx(wanted[number].frequency, rel=2e-4)
             assert one.height == pytest.approx(wanted[number].height, rel=5e-3)
     worst = max(
-        p.height for side in ("left", "right") for p in solution.stuck_peaks("thesis", side)
+        p.height for side in ("left", "right") for p in solution.linear["thesis"].stuck_peaks[side]
     )  # type: ignore[arg-type]
     assert found.worst is not None
     assert found.worst.height == pytest.approx(worst, rel=5e-3)

@@ -290,7 +290,7 @@ def test_where_a_top_leaves_levels_are_taken_to_the_border(
 
 def test_where_all_sticks_the_peak_is_that_of_the_linear_answer(sticking: Found) -> None:
     solution = sticking[0]
-    exact = next(p for p in solution.stuck_peaks("thesis") if p.number == 2)
+    exact = next(p for p in solution.linear["thesis"].stuck_peaks["right"] if p.number == 2)
     assert (top_of(sticking).frequency, top_of(sticking).height) == (exact.frequency, exact.height)
     assert not top_of(sticking).slips
     # nothing slips: neither harmonics nor samples leave anything

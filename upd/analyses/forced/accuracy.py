@@ -36,7 +36,6 @@ from upd.analyses.forced.levels import (
     of_geometry,
     with_gauss,
 )
-from upd.analyses.forced.linear_limits import limit_peaks
 from upd.analyses.forced.peaks_again import (
     STUCK_MODE,
     PeaksAgain,
@@ -242,10 +241,9 @@ def _own(
     """Place, case, frequency and height of every peak that levels are compared with, and what time
     integration makes of it.
     """
-    limits = solution.plan, solution.models[name], solution.linear[name]
     for kind in ("free", "stuck"):
         for side in SIDES:
-            for peak in limit_peaks(*limits, kind, side):
+            for peak in getattr(solution.linear[name], f"{kind}_peaks")[side]:
                 case = Case(stiffness=name, kind=kind, mode=peak.mode)
                 yield (kind, side, peak.number), case, (peak.frequency, peak.height), None
     for curve in (c for c in solution.curves if c.stiffness == name):

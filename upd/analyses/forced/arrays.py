@@ -231,7 +231,8 @@ def _linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:
     ):
         for side in SIDES:
             out |= {f"accelerance_{kind}_{side}": accelerance_array(curves[side])}
-            out |= peak_arrays(f"{kind}_{side}", peaks[side])
+            rising = sorted(peaks[side], key=lambda p: p.frequency)
+            out |= peak_arrays(f"{kind}_{side}", rising)
     x = [m for m in linear.modes if m.axis == "x"]
     damping = variable("", solution.plan.scene.excitation.damping, "1", "modal damping ratio")
     return out | {

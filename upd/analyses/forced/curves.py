@@ -36,7 +36,8 @@ class LinearCurves:
     modes
         Stuck natural frequencies.
     free_peaks, stuck_peaks
-        Side -> peaks of the curves within the sweep, between its points and whatever these are.
+        Side -> numbered peaks of the curves within the sweep, between its points and whatever these
+        are: free ones by frequency, stuck ones by their modes.
     """
 
     frequency: Array

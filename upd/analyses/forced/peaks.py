@@ -128,7 +128,7 @@ def _top(
     model: Model, linear: LinearCurves, curve: PointCurve, side: Side, peak: CurvePeak
 ) -> Top | None:
     a, i = curve.answer, peak.sample
-    if a.linear[max(i - 1, 0) : i + 2].all():
+    if a.linear[max(i - 1, 0) : i + 2].all() and linear.stuck_peaks[side]:
         near = min(linear.stuck_peaks[side], key=lambda p: abs(p.frequency - peak.frequency))
         return Top(near.frequency, near.height, a.x[i], False)
     return climbed(model, a.balance, a.x[i], float(a.frequency[i]), side, curve.force, peak)

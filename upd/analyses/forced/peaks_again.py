@@ -18,7 +18,7 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import ForcedCurve, LinearCurves, PointCurve, TimeCheck, Top
-from upd.analyses.forced.linear_limits import limit_peaks, linear_of, stuck_frequency
+from upd.analyses.forced.linear_limits import linear_of, stuck_frequency
 from upd.analyses.forced.measures import (
     CANDIDATES,
     CurvePeak,
@@ -256,11 +256,12 @@ def _limits_again(peaks: FoundPeaks, linear: LinearCurves) -> Iterator[tuple[Pla
     """Peaks of other limits by rising frequency, with the numbers they have in the run."""
     for kind in ("free", "stuck"):
         for side in SIDES:
-            own = getattr(peaks.linear, f"{kind}_peaks")[side]
-            other = sorted(getattr(linear, f"{kind}_peaks")[side], key=lambda p: p.frequency)
-            for one, peak in zip(limit_peaks(*peaks[:3], kind, side), other, strict=False):
-                if len(own) == len(other):
-                    yield (kind, side, one.number), Found(peak.frequency, peak.height)
+            own, other = (
+                sorted(getattr(of, f"{kind}_peaks")[side], key=lambda p: p.frequency)
+                for of in (peaks.linear, linear)
+            )
+            for one, peak in zip(own, other, strict=True) if len(own) == len(other) else ():
+                yield (kind, side, one.number), Found(peak.frequency, peak.height)
 
 
 def expected(own: LinearCurves, modes: Sequence[StuckMode], free: float, one: RunPeak) -> float:

@@ -13,7 +13,7 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.curves import ForcedCurve, LinearCurves, PointCurve, WholeFaces
 from upd.analyses.forced.inputs import InputEffect
 from upd.analyses.forced.linear_limits import linear_curves
-from upd.analyses.forced.measures import CurvePeak, unmoved
+from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array, ComplexArray, Model, balance_of
 from upd.analyses.forced.performance import performance_results
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
@@ -127,11 +127,8 @@ def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -
             results.append(quantity.of(found.frequency, case))
     # Without a damper a blade that is not excited, on a base of its own, stays at rest.
     for blade in SIDES[::-1]:
-        for kind, peaks in (
-            ("free", unmoved(linear.free_peaks[blade])),
-            ("stuck", solution.stuck_peaks(name, blade)),
-        ):
-            results += peak_results(solution, replace(case, kind=kind), peaks, blade)
+        for kind, peaks in (("free", linear.free_peaks), ("stuck", linear.stuck_peaks)):
+            results += peak_results(solution, replace(case, kind=kind), peaks[blade], blade)
     return results
 
 
@@ -183,7 +180,7 @@ def _computed(solution: ForcedSolution, choice: MeasuredChoice) -> Iterator[Comp
         if not stuck and side not in excitation_of(scene.excitation).free_blades:
             return
         for name, linear in solution.linear.items():
-            told = solution.stuck_peaks(name, side) if stuck else unmoved(linear.free_peaks[side])
+            told = (linear.stuck_peaks if stuck else linear.free_peaks)[side]
             case = Case(stiffness=name, kind=choice.state, blade=side)
             band = (scene.excitation.start, scene.excitation.stop)
             yield Computed(case, band, _linear_at(solution, name, side, stuck), told)
@@ -306,7 +303,8 @@ def _folds(curve: ForcedCurve[Any]) -> Iterator[Result]:
 
 def _not_reached(solution: ForcedSolution, curve: ForcedCurve[Any]) -> list[Result]:
     """Peaks of the stuck curve that the curve lacks, where it ended early or has none."""
-    e, wanted = solution.plan.scene.excitation, solution.stuck_peaks(curve.stiffness)
+    e, linear = solution.plan.scene.excitation, solution.linear.get(curve.stiffness)
+    wanted = linear.stuck_peaks["right"] if linear else []
     found = {peak.number for peak in curve.peaks.get("right", ())}
     modes = {peak.number: peak.mode for peak in wanted} or {1: ""}
     reason = curve.stopped

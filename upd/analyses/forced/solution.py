@@ -11,17 +11,15 @@ import numpy as np
 from upd.analyses.base import Resolved
 from upd.analyses.forced.curves import ForcedCurve, LinearCurves, SweptCurve, WholeFaces
 from upd.analyses.forced.inputs import InputEffect
-from upd.analyses.forced.linear_limits import stuck_peaks_of
-from upd.analyses.forced.measures import CANDIDATES, CurvePeak, tell_stuck_peaks
+from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.peaks_again import PeaksAgain
 from upd.analyses.forced.performance import Performance, RatioPoint
-from upd.analyses.forced.plan import ForcedPlan, excitation_of
+from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.seated.bodies import Bodies
 from upd.hbm.faces.record import RecordedPeriod
 from upd.mesh import IntArray
 from upd.results import Case
-from upd.scene.forced_contact import Side
 
 _TINY = float(np.finfo(float).tiny)
 
@@ -115,18 +113,6 @@ class ForcedSolution:
         """Largest order of a matrix that the curves are read with."""
         reduced = [len(one.M) for one in self.models.values()]
         return max([*reduced, *(3 * one.of.n for one in self.faces.values())], default=0)
-
-    def stuck_peaks(self, stiffness: str, blade: Side = "right") -> list[CurvePeak]:
-        """Peaks of the stuck curve within the sweep: what a whole curve is asked for."""
-        linear = self.linear.get(stiffness)
-        if linear is None:
-            return []
-        stop = self.plan.scene.excitation.stop
-        if stiffness in self.faces:
-            excitation = excitation_of(self.plan.scene.excitation)
-            march, peaks = self.faces[stiffness].march, linear.stuck_peaks[blade]
-            return stuck_peaks_of(march, peaks, CANDIDATES * stop, excitation)
-        return tell_stuck_peaks(self.models[stiffness], linear.stuck_peaks[blade], stop)
 
     def marked_points(self, curve: ForcedCurve[Any]) -> list[tuple[int, str, int]]:
         """Number, mode and point of the path of the right blade's peaks.
