@@ -12,7 +12,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -44,7 +44,8 @@ from upd.linalg import factorise
 from upd.linalg.parallel import threads_for
 from upd.linalg.symmetric import Symmetric
 from upd.mesh import IntArray
-from upd.results import Case
+from upd.results import Case, Result
+from upd.results import quantities as q
 from upd.scene.forced_contact import SIDES, Side
 from upd.vary.variation import Variation
 
@@ -59,28 +60,6 @@ FEW_HARMONICS = 3
 
 #: value of an input in words, and the model with it
 Changed = tuple[str, Model]
-
-
-@dataclass(frozen=True)
-class InputEffect:
-    """What one end of an input does to a peak: relative changes, nan where it was not found.
-
-    Attributes
-    ----------
-    name, label
-        Of the input; its value.
-    case, number
-        Of the right blade's peak.
-    frequency, height
-        Relative changes.
-    """
-
-    name: str
-    label: str
-    case: Case
-    number: int
-    frequency: float
-    height: float
 
 
 def _stiffness(side: Side | None, of: str, peaks: FoundPeaks) -> Iterator[Changed]:
@@ -176,8 +155,9 @@ def input_variants(few: FoundPeaks) -> list[Variant]:
     ]
 
 
-def effects_of(few: FoundPeaks, found: PeaksAgain) -> list[InputEffect]:
-    """What one end of an input does to the right blade's peaks.
+def effects_of(few: FoundPeaks, found: PeaksAgain) -> list[Result]:
+    """Relative changes of the right blade's peaks by one end of an input; none of a peak that was
+    not found.
 
     Parameters
     ----------
@@ -189,9 +169,14 @@ def effects_of(few: FoundPeaks, found: PeaksAgain) -> list[InputEffect]:
     out = []
     for one in few.peaks:
         again = found.peaks.get((one.ratio, one.blade, one.number), NOT_FOUND)
-        change = (new / old - 1.0 for new, old in zip(again, one.top[:2], strict=True))
-        case = replace(one.case, mode=one.mode)
-        out.append(InputEffect(found.of.source, found.of.label, case, one.number, *change))
+        choice = f"{found.of.source}: {found.of.label}"
+        case = replace(one.case, mode=one.mode, choice=choice)
+        for quantity, new, old in (
+            (q.FREQUENCY_CHANGE, again.frequency, one.top.frequency),
+            (q.ACCELERANCE_CHANGE, again.height, one.top.height),
+        ):
+            if math.isfinite(new):
+                out.append(quantity.of(new / old - 1.0, case, n=one.number))
     return out
 
 

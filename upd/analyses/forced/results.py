@@ -11,7 +11,6 @@ import numpy as np
 from upd.analyses import measured, printed
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import ForcedCurve, LinearCurves, PointCurve, WholeFaces
-from upd.analyses.forced.inputs import InputEffect
 from upd.analyses.forced.linear_limits import linear_curves
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array, ComplexArray, Model, balance_of
@@ -45,12 +44,10 @@ def make_results(solution: ForcedSolution) -> list[Result]:
         results += _linear_results(solution, name, linear)
     for curve in solution.curves:
         results += curve_results(solution, curve)
-    results += _band_results(solution)
+    results += solution.band
     for name, performance in solution.performances.items():
         results += performance_results(name, performance)
-    for effects in solution.effects.values():
-        results += _input_results(effects)
-    return results + measured_results(solution)
+    return results + solution.effects + measured_results(solution)
 
 
 def _model_results(name: str, model: Model) -> list[Result]:
@@ -100,25 +97,6 @@ def _static_forces(case: Case, state: StaticState, N: Array, T: Array) -> list[R
     return results
 
 
-def _band_results(solution: ForcedSolution) -> list[Result]:
-    """Peaks of the right blade from other static states and slider starts."""
-    return [
-        quantity.of(value, case, n=p.number)
-        for one in solution.band
-        for p in one.point.peaks
-        if p.blade == "right"
-        for case in (
-            Case(
-                stiffness=one.stiffness,
-                force_ratio=one.point.ratio,
-                mode=p.mode,
-                choice=one.choice,
-            ),
-        )
-        for quantity, value in ((q.BAND_FREQUENCY, p.frequency), (q.BAND_ACCELERANCE, p.height))
-    ]
-
-
 def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -> list[Result]:
     results, case = [], Case(stiffness=name)
     for in_phase, quantity in ((True, q.STUCK_IN_PHASE), (False, q.STUCK_OUT_OF_PHASE)):
@@ -130,20 +108,6 @@ def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -
         for kind, peaks in (("free", linear.free_peaks), ("stuck", linear.stuck_peaks)):
             results += peak_results(solution, replace(case, kind=kind), peaks[blade], blade)
     return results
-
-
-def _input_results(effects: Sequence[InputEffect]) -> list[Result]:
-    """Change of a peak by each end of each input."""
-    # without such a peak near there is no change to report
-    return [
-        quantity.of(value, replace(one.case, choice=f"{one.name}: {one.label}"), n=one.number)
-        for one in effects
-        for quantity, value in (
-            (q.FREQUENCY_CHANGE, one.frequency),
-            (q.ACCELERANCE_CHANGE, one.height),
-        )
-        if np.isfinite(value)
-    ]
 
 
 def measured_results(solution: ForcedSolution) -> list[Result]:

@@ -10,16 +10,15 @@ import numpy as np
 
 from upd.analyses.base import Resolved
 from upd.analyses.forced.curves import ForcedCurve, LinearCurves, SweptCurve, WholeFaces
-from upd.analyses.forced.inputs import InputEffect
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.peaks_again import PeaksAgain
-from upd.analyses.forced.performance import Performance, RatioPoint
+from upd.analyses.forced.performance import Performance
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.seated.bodies import Bodies
 from upd.hbm.faces.record import RecordedPeriod
 from upd.mesh import IntArray
-from upd.results import Case
+from upd.results import Case, Result
 
 _TINY = float(np.finfo(float).tiny)
 
@@ -79,20 +78,12 @@ class MarchedPeak:
         return abs(self.period.energy - float(own[2])) / max(float(np.abs(own).sum()), _TINY)
 
 
-@dataclass(frozen=True)
-class BandPoint:
-    """The peaks of a curve from another static state or start of the sliders, in words."""
-
-    stiffness: str
-    choice: str
-    point: RatioPoint
-
-
 @dataclass
 class ForcedSolution:
     """All that was solved, for results, checks and arrays.
 
-    Dictionaries by the name of the contact stiffness.
+    Dictionaries by the name of the contact stiffness; ``band`` and ``effects`` are numbers of peaks
+    from other static states and starts of the sliders, and of their changes by inputs.
     """
 
     plan: ForcedPlan
@@ -102,11 +93,11 @@ class ForcedSolution:
     curves: list[ForcedCurve[Any]] = field(default_factory=list)
     faces: dict[str, WholeFaces] = field(default_factory=dict)
     marched: list[MarchedPeak] = field(default_factory=list)
-    band: list[BandPoint] = field(default_factory=list)
+    band: list[Result] = field(default_factory=list)
     performances: dict[str, Performance] = field(default_factory=dict)
     omissions: list[Resolved] = field(default_factory=list)
     levels: dict[str, list[PeaksAgain]] = field(default_factory=dict)
-    effects: dict[str, list[InputEffect]] = field(default_factory=dict)
+    effects: list[Result] = field(default_factory=list)
 
     @property
     def order(self) -> int:

@@ -39,7 +39,7 @@ from upd.analyses.forced.performance import (
     with_curves,
 )
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import BandPoint, ForcedSolution
+from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import StaticState, admissible, same, static_state
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.forced.sweeps import balance_curve, both_ways, march_peaks
@@ -49,6 +49,8 @@ from upd.hbm.faces.state import InterfaceModel, InterfaceState
 from upd.linalg.parallel import threads_for
 from upd.linalg.processes import SideProcesses
 from upd.progress import Stages
+from upd.results import Case
+from upd.results import quantities as q
 
 log = logging.getLogger(__name__)
 #: what a process beside this one imports at once
@@ -245,10 +247,11 @@ def _at_few_harmonics(
     if few is None:
         return
     if scene.wants("inputs"):
-        effects = solution.effects.setdefault(name, [])
         for variant in input_variants(few):
             yield _Work(
-                lambda one: effects.extend(effects_of(few, one)), solve_again, (few, variant)
+                lambda one: solution.effects.extend(effects_of(few, one)),
+                solve_again,
+                (few, variant),
             )
     highest = highest_slipping(few)
     if highest is None or not scene.left_out.solves:
@@ -284,4 +287,9 @@ def _band(solution: ForcedSolution, name: str) -> Iterator[_Work]:
 
 
 def _into_band(solution: ForcedSolution, name: str, choice: str, point: RatioPoint) -> None:
-    solution.band.append(BandPoint(name, choice, point))
+    for peak in (one for one in point.peaks if one.blade == "right"):
+        case = Case(stiffness=name, force_ratio=point.ratio, mode=peak.mode, choice=choice)
+        solution.band += [
+            q.BAND_FREQUENCY.of(peak.frequency, case, n=peak.number),
+            q.BAND_ACCELERANCE.of(peak.height, case, n=peak.number),
+        ]
