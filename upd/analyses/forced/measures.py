@@ -308,11 +308,6 @@ def loop_along_main(point: int, motion: Array, traction: Array, limit: Array, lo
     return Loop(point, main @ motion, main @ traction, limit, loss)
 
 
-def place(model: Model) -> tuple[Array, Array]:
-    """Contact points in the frames of their faces, as `in_faces`."""
-    return in_faces(model.position, model.face, [model.faces[side].frame for side in SIDES])
-
-
 def in_faces(position: Array, face: IntArray, frames: Iterable[Array]) -> tuple[Array, Array]:
     """Points in the frames of their faces.
 
@@ -411,21 +406,26 @@ def static_normal(answer: FrequencyResponse, model: Model, i: int) -> dict[Side,
     return {side: float(N[model.face == k].sum()) for k, side in enumerate(SIDES)}
 
 
-def shares(answer: FrequencyResponse, model: Model) -> dict[Side, Array]:
-    """Shares of the cycle in every contact state, averaged over the points of each face by their
-    normal stiffness.
+def face_shares(state: Array, face: IntArray, weight: Array) -> Array:
+    """Shares of the cycle that each face sticks, slips and is open.
+
+    Parameters
+    ----------
+    state
+        (..., n_point, 3) of its points or nodes.
+    face, weight
+        (n_point,) index into SIDES; stiffness or area.
 
     Returns
     -------
-    dict
-        Side -> (n, 3) stick, slip and lift-off along the path.
+    Array
+        (..., 2, 3).
     """
-    w = model.contacts.law.k_n
-    out: dict[Side, Array] = {}
-    for k, side in enumerate(SIDES):
-        on = model.face == k
-        out[side] = np.einsum("npc,p->nc", answer.state[:, on], w[on] / w[on].sum())
-    return out
+    share = [
+        np.einsum("...pc,p->...c", state[..., on, :], weight[on] / weight[on].sum())
+        for on in (face == k for k in range(len(SIDES)))
+    ]
+    return np.stack(share, axis=-2)
 
 
 # -- peaks by their modes --------------------------------------------------------------------------

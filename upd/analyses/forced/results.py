@@ -16,9 +16,9 @@ from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array, ComplexArray, Model, balance_of
 from upd.analyses.forced.performance import performance_results
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
-from upd.analyses.forced.solution import ForcedSolution, MarchedPeak
+from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
 from upd.analyses.forced.statics import StaticState
-from upd.analyses.forced.sweeps import marched_damper, marched_shares
+from upd.analyses.forced.sweeps import marched_damper
 from upd.analyses.measured import FREE, STUCK, Computed
 from upd.analyses.seated.results import RIGID
 from upd.hbm import FrequencyResponse
@@ -317,7 +317,7 @@ def _at_point(
             q.STATIC_NORMAL.of(N, replace(at, side=side))
             for side, N in measures.static_normal(answer, model, i).items()
         ),
-        *_shares(at, {side: one[i] for side, one in measures.shares(answer, model).items()}),
+        *_shares(at, answer.state[i], solution.places(curve.stiffness)),
         q.CONTACT_SLIP.of(mean[1], at),
         q.CONTACT_LIFT.of(mean[2], at),
         *_losses(
@@ -338,15 +338,17 @@ def _at_marched(solution: ForcedSolution, one: MarchedPeak) -> list[Result]:
     scene, at, energy = solution.plan.scene, one.case, one.period.energy
     results = list(_losses(scene, at, one.period.share, energy, energy * one.frequency))
     if scene.wants("contact_state"):
-        results += _shares(at, dict(zip(SIDES, marched_shares(one), strict=True)))
+        results += _shares(at, one.period.share, one.places)
     if scene.wants("damper_motion"):
         results += motion_results(at, *marched_damper(solution, one))
     return results
 
 
-def _shares(at: Case, shares: Mapping[Side, Array]) -> Iterator[Result]:
-    """Shares (3,) of the cycle of each face."""
-    for side, share in shares.items():
+def _shares(at: Case, state: Array, places: ContactPlaces) -> Iterator[Result]:
+    """Shares of the cycle of each face, from those (n_point, 3) of its points."""
+    for side, share in zip(
+        SIDES, measures.face_shares(state, places.face, places.weight), strict=True
+    ):
         for quantity, value in zip(q.SHARES, share, strict=True):
             yield quantity.of(value, replace(at, side=side))
 

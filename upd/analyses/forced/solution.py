@@ -10,7 +10,7 @@ import numpy as np
 
 from upd.analyses.base import Resolved
 from upd.analyses.forced.curves import ForcedCurve, LinearCurves, SweptCurve, WholeFaces
-from upd.analyses.forced.measures import CurvePeak
+from upd.analyses.forced.measures import CurvePeak, in_faces
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.peaks_again import PeaksAgain
 from upd.analyses.forced.performance import Performance
@@ -19,6 +19,7 @@ from upd.analyses.seated.bodies import Bodies
 from upd.hbm.faces.record import RecordedPeriod
 from upd.mesh import IntArray
 from upd.results import Case, Result
+from upd.scene.forced_contact import SIDES
 
 _TINY = float(np.finfo(float).tiny)
 
@@ -104,6 +105,18 @@ class ForcedSolution:
         """Largest order of a matrix that the curves are read with."""
         reduced = [len(one.M) for one in self.models.values()]
         return max([*reduced, *(3 * one.of.n for one in self.faces.values())], default=0)
+
+    def places(self, stiffness: str) -> ContactPlaces:
+        """Of the contact points, or of the nodes of whole faces."""
+        if stiffness in self.faces:
+            of = self.faces[stiffness].of
+            along, up = in_faces(of.position, of.face, of.frame)
+            return ContactPlaces(of.face, along, up, of.area, np.zeros(of.n))
+        model, law = self.models[stiffness], self.models[stiffness].contacts.law
+        frames = [model.faces[side].frame for side in SIDES]
+        along, up = in_faces(model.position, model.face, frames)
+        springs = np.divide(1.0, law.k_t, out=np.zeros_like(law.k_t), where=law.k_t > 0.0)
+        return ContactPlaces(model.face, along, up, law.k_n, springs)
 
     def marked_points(self, curve: ForcedCurve[Any]) -> list[tuple[int, str, int]]:
         """Number, mode and point of the path of the right blade's peaks.
