@@ -93,8 +93,6 @@ class TimeCheck:
     step, apart
         Relative change of height and of frequency between it and the next motion towards the top,
         which leaves or is lower; 0 at the top.
-    starts
-        Time integrations.
     way, share
         Direction along the path from the top to it, 1 or -1; its height over that of the top, by
         harmonic balance. 0 and 1 at the top.
@@ -109,7 +107,6 @@ class TimeCheck:
     sample: int
     step: float = 0.0
     apart: float = 0.0
-    starts: int = 0
     way: int = 0
     share: float = 1.0
 

@@ -98,7 +98,7 @@ def accelerance(
     k = read_harmonic(answer.balance) if harmonic is None else harmonic
     j = answer.harmonics.place(k)
     u = to_complex(np.einsum("i,nis->ns", row, answer.coefficients), answer.harmonics)[:, j]
-    return np.asarray(-((2 * np.pi * k * answer.frequency) ** 2) * u * _M / force)
+    return accelerance_of(u, answer.frequency, k, force)
 
 
 def accelerance_of(
@@ -134,9 +134,8 @@ def linear_accelerance(
         (n,) in (m/s2)/N.
     """
     k = read_harmonic(b)
-    omega = 2 * np.pi * frequency
-    moved = b.linear_displacement(omega, stuck, k) @ row
-    return np.asarray(-((k * omega) ** 2) * moved * _M / force)
+    moved = b.linear_displacement(2.0 * np.pi * frequency, stuck, k) @ row
+    return accelerance_of(moved, frequency, k, force)
 
 
 class CurvePeak(NamedTuple):

@@ -69,15 +69,7 @@ MARCH_SAMPLES = 128
 
 @dataclass(frozen=True)
 class ForcedPlan(Plan[ForcedScene]):
-    """Plan of a forced response.
-
-    Attributes
-    ----------
-    asked
-        The scene as asked for, where that leaves the levels to an accuracy.
-    """
-
-    asked: ForcedScene | None = None
+    """Plan of a forced response."""
 
 
 def make_plan(scene: ForcedScene) -> ForcedPlan:
@@ -151,10 +143,16 @@ def _cost(
 ) -> tuple[CostModel, float, int]:
     """Seconds and solvers, bytes, and blades reduced side by side."""
     cost = CostModel(scene)
-    for body in ("left", "right"):
-        hexes, nodes = size[body]["hexes"], size[body]["nodes"]
+    modes = scene.reduction.modes
+    for side in SIDES:
+        hexes, nodes, contact = (size[side][of] for of in ("hexes", "nodes", "contact"))
         cost.dynamic_body(hexes, nodes)
-        reduced(cost, scene, body, f"{body}, reduction", (hexes, nodes, size[body]["contact"]))
+        task = f"{side}, reduction"
+        if scene.contact.rule == GAUSS:
+            rows, columns = scene.contact.lines(side)
+            cost.attached(task, hexes, nodes, 3 * rows * columns + 2, modes)
+        else:
+            cost.reduction(task, hexes, nodes, 3 * (contact + 2), modes)
     if scene.left_out.solves:
         # K and M of the elastic damper, once per stiffness
         damper = size["damper"]
@@ -165,25 +163,6 @@ def _cost(
     cost.seconds += _files_seconds(scene)
     memory, workers = cost.side_by_side(min(2, cost.threads), 2)
     return cost, max([memory, *(plan.memory_bytes for plan in sources)]), workers
-
-
-def reduced(
-    cost: CostModel, scene: ForcedScene, body: str, task: str, size: tuple[int, int, int]
-) -> None:
-    """A blade reduced to its contact points, 2 probes and some modes.
-
-    Parameters
-    ----------
-    size
-        Hexahedra, nodes, and contact nodes.
-    """
-    hexes, nodes, contact = size
-    modes = scene.reduction.modes
-    if scene.contact.rule == GAUSS:
-        rows, columns = scene.contact.lines("left" if body == "left" else "right")
-        cost.attached(task, hexes, nodes, 3 * rows * columns + 2, modes)
-    else:
-        cost.reduction(task, hexes, nodes, 3 * (contact + 2), modes)
 
 
 def _curves_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
@@ -201,11 +180,6 @@ def _curves_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -
     return steps * _step_seconds(scene, size)
 
 
-def blade_harmonics(scene: ForcedScene) -> int:
-    """The highest of the balance."""
-    return int(scene.balance.harmonics)
-
-
 def time_steps(scene: ForcedScene) -> int:
     """Steps in a period of every march."""
     given = scene.balance.samples
@@ -215,7 +189,7 @@ def time_steps(scene: ForcedScene) -> int:
 def _step_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
     """Seconds of a Newton step with its factors."""
     across = 3 if scene.contact.directions == "two" or scene.mesh.symmetry == "full" else 2
-    highest, given = blade_harmonics(scene), scene.balance.samples
+    highest, given = int(scene.balance.harmonics), scene.balance.samples
     points = _points(scene, size)
     # coefficients of the motion of the contact points
     n = across * points * (2 * highest + 1)
@@ -306,7 +280,9 @@ def effects_of_points(scene: ForcedScene) -> list[Effect]:
 def effects_of_faces(scene: ForcedScene) -> list[Effect]:
     """Of contact by all nodes of both faces."""
     mu, c = scene.contact.friction, scene.contact
-    harmonics_of_blades = f"0 to {blade_harmonics(scene)} of the blades; contact and damper in time"
+    harmonics_of_blades = (
+        f"0 to {scene.balance.harmonics} of the blades; contact and damper in time"
+    )
     return [
         _friction(mu, f"Coulomb, mu = {mu:g}, both directions, every node of both faces"),
         Effect("normal and tangential coupling", True, "solved together at every step in time"),

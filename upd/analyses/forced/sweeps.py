@@ -38,7 +38,6 @@ from upd.analyses.forced.plan import (
     SAMPLES,
     ComplexArray,
     ForcedPlan,
-    blade_harmonics,
     excitation_of,
     grid,
     time_steps,
@@ -164,7 +163,7 @@ def balance_curve(plan: ForcedPlan, name: str, faces: WholeFaces, ratio: float) 
         grid(plan),
         force * excitation.drive,
         faces.start,
-        harmonics=blade_harmonics(plan.scene),
+        harmonics=plan.scene.balance.harmonics,
         samples=SAMPLES if b.samples == "auto" else b.samples,
         fallback=by_coulomb,
     )
