@@ -64,7 +64,7 @@ def response(forced_scene: list[str]) -> ForcedSolution:
     curve = solution.curves[0]
     i = int(np.abs(curve.accelerance["right"]).argmax())
     _add_sweeps(solution, float(curve.answer.frequency[i]))
-    solution.performances = {"thesis": Performance((of_curve(curve),), 300.0, 190.0, 3)}
+    solution.performances = {"thesis": Performance((of_curve(curve),), 300.0, 190.0)}
     return solution
 
 

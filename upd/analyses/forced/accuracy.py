@@ -76,7 +76,7 @@ def choices(scene: ForcedScene) -> list[LevelChoice]:
     """What may be chosen of a scene, by source.
 
     The scene's own mesh and contact points are the lowest levels, finer meshes are graded
-    (`mesh_counts.graded`); numbers of modes and harmonics may fall below its own. Gauss points
+    (`graded`); numbers of modes and harmonics may fall below its own. Gauss points
     stand for a face whatever its mesh, so that both errors fall, each by its own choice.
     """
     found = [

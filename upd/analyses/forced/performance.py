@@ -53,8 +53,6 @@ class Performance:
         The curves, F_C/F_E rising.
     free, stuck
         Highest peaks of both limits, (m/s2)/N.
-    harmonics
-        The highest of the balance.
     again
         A point near the best one, and the same with the harmonics of the run; None where these are
         no more.
@@ -63,7 +61,6 @@ class Performance:
     points: tuple[RatioPoint, ...]
     free: float
     stuck: float
-    harmonics: int
     again: tuple[RatioPoint, RatioPoint] | None = None
 
     @property
@@ -204,7 +201,6 @@ def further_points(
 
 
 def performance_of(
-    plan: ForcedPlan,
     linear: LinearCurves,
     points: Iterable[RatioPoint],
     further: Iterable[RatioPoint],
@@ -230,7 +226,7 @@ def performance_of(
         for peaks in (linear.free_peaks, linear.stuck_peaks)
     )
     ordered = tuple(sorted(found, key=lambda one: one.ratio))
-    return Performance(ordered, free, stuck, harmonics_of(plan), again)
+    return Performance(ordered, free, stuck, again)
 
 
 def _known(points: Iterable[RatioPoint]) -> list[RatioPoint]:

@@ -235,7 +235,7 @@ def _around(
     if scene.wants("performance"):
         mine = tuple(c for c in solution.curves if c.stiffness == first)
         solution.performances[first] = performance_of(
-            plan, solution.linear[first], with_curves(points, mine), further
+            solution.linear[first], with_curves(points, mine), further
         )
 
 
