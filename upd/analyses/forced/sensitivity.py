@@ -219,39 +219,6 @@ def linear_system(model: Model, stuck: bool) -> LinearSystem:
     return LinearSystem(*model.linear(stuck), stuck)
 
 
-def linear_peak(
-    system: LinearSystem,
-    force: ComplexArray,
-    row: Array,
-    frequency: float,
-    harmonic: int,
-    changes: Sequence[tuple[Array, Array, Array]],
-) -> PeakDerivative:
-    """Derivatives of a peak of w^2 |row @ q| by parameters.
-
-    Parameters
-    ----------
-    force
-        (n,) amplitude.
-    row
-        (n,) output.
-    frequency
-        Hz, of the peak; of the sweep, the harmonic being answered.
-    harmonic
-        Its number.
-    changes
-        Derivatives of M, C and K by every parameter.
-    """
-    low, here, high = (
-        _slopes(system, force, row, 2.0 * np.pi * harmonic * f, changes)
-        for f in frequency * np.array([1.0 - STEP, 1.0, 1.0 + STEP])
-    )
-    fall = low[1] - high[1]
-    more = high[2] - low[2]
-    by_frequency = more / fall / (2.0 * np.pi * harmonic)
-    return PeakDerivative(frequency, here[0], low[2] + low[1] / fall * more, by_frequency)
-
-
 def stuck_frequencies(
     model: Model, below: float, changes: Sequence[ParameterChange]
 ) -> dict[str, tuple[float, Array]]:
@@ -292,7 +259,7 @@ def stuck_frequencies(
 def limit_peak(
     model: Model, side: Side, stuck: bool, frequency: float, changes: Sequence[ParameterChange]
 ) -> PeakDerivative:
-    """Derivatives of a peak of a blade's free or stuck accelerance.
+    """Derivatives of a peak of w^2 |row @ q|, a blade's free or stuck accelerance.
 
     Parameters
     ----------
@@ -301,11 +268,17 @@ def limit_peak(
     changes
         Of the whole model by every parameter.
     """
-    system = linear_system(model, stuck)
+    system, row, k = linear_system(model, stuck), model.row(side), model.excitation.lowest
     made = [system.changed(one, model.contacts.tangents) for one in changes]
     force = np.concatenate([model.force, np.zeros(model.damper.n_dof)])
-    k = model.excitation.lowest
-    return linear_peak(system, force, model.row(side), frequency, k, made)
+    low, here, high = (
+        _slopes(system, force, row, 2.0 * np.pi * k * f, made)
+        for f in frequency * np.array([1.0 - STEP, 1.0, 1.0 + STEP])
+    )
+    fall = low[1] - high[1]
+    more = high[2] - low[2]
+    by_frequency = more / fall / (2.0 * np.pi * k)
+    return PeakDerivative(frequency, here[0], low[2] + low[1] / fall * more, by_frequency)
 
 
 def _slopes(
