@@ -295,7 +295,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 14482,
+    "analyses": 14092,
     "hbm": 7590,
     "contact": 4195,
     "linalg": 3387,
@@ -306,7 +306,7 @@ ROOM_LINES = {
     "sizing": 1751,
     "batch": 1647,
     "mesh": 1516,
-    "vary": 1429,
+    "vary": 1406,
     "reference": 1181,
     "cli": 1013,
     "measured": 949,
