@@ -16,8 +16,8 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from upd.analyses.forced.interface_model import SpringMarch
 from upd.analyses.forced.model import Model
-from upd.analyses.forced.spring_march import SpringMarch
 from upd.hbm.faces.state import InterfaceState
 
 Array = NDArray[np.float64]

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.forced.model import Model, make_model
-from upd.analyses.forced.paths import respond
+from upd.analyses.forced.model import Model, make_model, respond
 from upd.analyses.forced.plan import ForcedPlan, grid, make_plan
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import Bodies, make_bodies

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from upd.analyses.forced.interface_model import SpringMarch
     from upd.analyses.forced.model import Model
-    from upd.analyses.forced.spring_march import SpringMarch
     from upd.hbm import FrequencyResponse
     from upd.hbm.faces.state import InterfaceState
     from upd.results import Result
@@ -34,7 +34,7 @@ def state_of(
     springs: SpringMarch, model: Model, answer: FrequencyResponse, i: int, force: float
 ) -> InterfaceState:
     """Where the motion at a point of a path stands at t = 0."""
-    from upd.analyses.forced.spring_march import state_at
+    from upd.analyses.forced.interface_model import state_at
 
     f = float(answer.frequency[i])
     return state_at(springs, model, answer.balance, answer.x[i], f, force)

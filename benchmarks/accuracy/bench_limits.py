@@ -23,13 +23,16 @@ from rig_response import Rig, accelerance, rig
 
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
-from upd.analyses.forced.interface_model import by_coulomb, make_interface_model, worn_start
+from upd.analyses.forced.interface_model import (
+    by_coulomb,
+    make_interface_model,
+    make_springs,
+    worn_start,
+)
 from upd.analyses.forced.linear_limits import stuck_modes_of
 from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.model import preloaded
-from upd.analyses.forced.paths import respond
+from upd.analyses.forced.model import preloaded, respond
 from upd.analyses.forced.plan import MARCH_SAMPLES
-from upd.analyses.forced.spring_march import make_springs
 from upd.analyses.forced.statics import static_state
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface

@@ -25,15 +25,15 @@ sys.path.append(str(Path(__file__).parents[1]))
 from explicit_march import STEP, ExplicitMarch, explicit_march
 from rig_response import Rig, rig
 
-from upd.analyses.forced.interface_model import by_coulomb
-from upd.analyses.forced.paths import respond
-from upd.analyses.forced.plan import MARCH_SAMPLES
-from upd.analyses.forced.spring_march import (
+from upd.analyses.forced.interface_model import (
     SpringMarch,
+    by_coulomb,
     make_springs,
     spring_march,
     state_at,
 )
+from upd.analyses.forced.model import respond
+from upd.analyses.forced.plan import MARCH_SAMPLES
 from upd.hbm.faces.march import InterfaceMarch
 from upd.hbm.faces.settle import SteadyPoint, settle
 from upd.hbm.faces.state import InterfaceState

@@ -19,7 +19,7 @@ from typing import Any
 import upd
 from upd.analyses.base import CHOSEN_BY_ACCURACY
 from upd.analyses.forced import accuracy as forced
-from upd.analyses.forced.estimates import estimate
+from upd.analyses.forced.accuracy import estimate
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solve import solve
 from upd.errors import ConvergenceError, InputError, UpdError

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from rigs import LINES
@@ -11,7 +11,6 @@ from rigs import LINES
 from upd.analyses import forced, make_plan
 from upd.analyses.forced.inputs import (
     INPUTS,
-    InputEffect,
     effects_of,
     few_harmonics,
     input_variants,
@@ -52,8 +51,16 @@ def solved(ratio: float, **more: Any) -> ForcedSolution:
     return found  # type: ignore[no-any-return]
 
 
+class Effect(NamedTuple):
+    """Relative changes of a peak by one end of an input."""
+
+    label: str
+    frequency: float
+    height: float
+
+
 @cache
-def effects(ratio: float, name: str, **more: Any) -> dict[tuple[str, int], InputEffect]:
+def effects(ratio: float, name: str, **more: Any) -> dict[tuple[str, int], Effect]:
     """End and number of the mode -> what it does."""
     s = solved(ratio, **more)
     found = tuple(peak for curve in s.curves for peak in run_peaks(curve))
@@ -61,8 +68,13 @@ def effects(ratio: float, name: str, **more: Any) -> dict[tuple[str, int], Input
     few = few_harmonics(peaks)
     assert few is not None
     mine = [one for one in input_variants(few) if one.of.source == name]
-    ends = [one for variant in mine for one in effects_of(few, solve_again(few, variant))]
-    return {(one.label, one.number): one for one in ends}
+    found_again = {v.of.label: effects_of(few, solve_again(few, v)) for v in mine}
+    changes: dict[tuple[str, int], list[float]] = {}
+    for label, results in found_again.items():
+        for one in results:
+            assert one.case.choice == f"{name}: {label}"
+            changes.setdefault((label, int(one.name.split("_")[1])), []).append(one.value / 100.0)
+    return {key: Effect(key[0], *both) for key, both in changes.items()}
 
 
 def test_damping_divides_the_heights_of_stuck_peaks() -> None:
@@ -103,7 +115,8 @@ def test_stiffness_moves_stuck_peaks_to_those_of_a_run_with_it(
     for number in (1, 2):
         effect = found[f"x {factor:g}", number]
         was, now = (
-            next(p for p in s.stuck_peaks("thesis") if p.number == number) for s in (run, changed)
+            next(p for p in s.linear["thesis"].stuck_peaks["right"] if p.number == number)
+            for s in (run, changed)
         )
         assert 1.0 + effect.frequency == pytest.approx(now.frequency / was.frequency, rel=1e-5)
         assert 1.0 + effect.height == pytest.approx(now.height / was.height, rel=1e-4)
@@ -156,7 +169,7 @@ def test_without_friction_what_is_of_friction_does_not_apply() -> None:
 
 def test_a_run_tells_every_input_that_applies() -> None:
     found = solved(SLIPS, want=("response", "inputs"))
-    told = {one.name for one in found.effects["thesis"]}
+    told = {one.case.choice.partition(":")[0] for one in found.effects}
     assert told == set(NAMES)
     results = [r for r in forced.ANALYSIS.make_results(found) if r.name.endswith("_change")]
     assert {r.case.choice.partition(":")[0] for r in results} <= told

@@ -15,15 +15,13 @@ from rigs import state_of
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import measures
 from upd.analyses.forced.arrays import arrays
-from upd.analyses.forced.interface_model import by_coulomb
-from upd.analyses.forced.paths import respond
+from upd.analyses.forced.interface_model import by_coulomb, make_springs
+from upd.analyses.forced.model import respond
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution, MarchedPeak
-from upd.analyses.forced.spring_march import make_springs
 from upd.analyses.forced.sweeps import (
     marched_damper,
     marched_loops,
-    marched_shares,
 )
 from upd.hbm.faces.march import InterfaceMarch
 from upd.hbm.faces.record import period_of_sweep, recorded_period
@@ -44,6 +42,11 @@ SCENE = [
     'want=["response", "contact_state", "hysteresis", "damper_motion"]',
     "left_out.solve=no",
 ]
+
+
+def shares_of(one: MarchedPeak) -> np.ndarray:
+    """(2, 3) of the cycle that each face sticks, slips, is open."""
+    return measures.face_shares(one.period.share, one.places.face, one.places.weight)
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +75,7 @@ def test_every_sweep_tells_the_contact(solution: ForcedSolution, one: MarchedPea
     assert one.period.share.mean(axis=0) == pytest.approx([stick, slip, lift])
     assert slip > 0.0 < lift
     # every face has as many points, and springs alike
-    assert marched_shares(one).mean(axis=0) == pytest.approx([stick, slip, lift])
+    assert shares_of(one).mean(axis=0) == pytest.approx([stick, slip, lift])
 
 
 def test_loops_are_closed_and_obey_coulomb(solution: ForcedSolution, one: MarchedPeak) -> None:
@@ -174,7 +177,7 @@ def test_charts_are_of_the_march(solution: ForcedSolution, one: MarchedPeak) -> 
 def test_results_tell_each_face(solution: ForcedSolution, one: MarchedPeak) -> None:
     of = [r for r in make_results(solution) if (r.case.peak, r.case.choice) == (2, one.case.choice)]
     told = {(r.name, r.case.side): r.value for r in of}
-    shares = marched_shares(one)
+    shares = shares_of(one)
     for k, side in enumerate(("left", "right")):
         assert told["share_slip", side] == pytest.approx(100.0 * shares[k, 1])
     power = told["friction_power", ""]

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from upd.analyses.forced.measures import CurvePeak, path_maxima
-from upd.analyses.forced.mode_peaks import (
+from upd.analyses.forced.measures import (
+    CurvePeak,
     ModeShapes,
     in_quadrature,
     motion_shares,
     numbered,
+    path_maxima,
     tell_apart,
 )
 

@@ -65,14 +65,14 @@ def test_where_all_sticks_the_peaks_are_the_stuck_ones() -> None:
     solution, found = solved(1e5), at(1e6)
     assert found.arrived
     for side in ("left", "right"):
-        wanted = {p.number: p for p in solution.stuck_peaks("thesis", side)}  # type: ignore[arg-type]
+        wanted = {p.number: p for p in solution.linear["thesis"].stuck_peaks[side]}  # type: ignore[index]
         mine = {p.number: p for p in found.peaks if p.blade == side}
         assert set(mine) == set(wanted) == {2}
         for number, one in mine.items():
             assert one.frequency == pytest.approx(wanted[number].frequency, rel=2e-4)
             assert one.height == pytest.approx(wanted[number].height, rel=5e-3)
     worst = max(
-        p.height for side in ("left", "right") for p in solution.stuck_peaks("thesis", side)
+        p.height for side in ("left", "right") for p in solution.linear["thesis"].stuck_peaks[side]
     )  # type: ignore[arg-type]
     assert found.worst is not None
     assert found.worst.height == pytest.approx(worst, rel=5e-3)
@@ -141,7 +141,7 @@ V_SHAPE = tuple(point(r, h) for r, h in ((1.0, 9.0), (10.0, 4.0), (100.0, 1.0), 
 
 def test_the_best_is_where_the_highest_of_all_peaks_is_lowest() -> None:
     two = [point(1.0, 5.0, 2.0), point(2.0, 3.0, 4.0), point(4.0, 1.0, 6.0)]
-    found = Performance(tuple(two), 300.0, 190.0, 3)
+    found = Performance(tuple(two), 300.0, 190.0)
     assert found.best is two[1] and found.inside
     assert found.best.worst is not None and found.best.worst.height == 4.0
     left = point(3.0, 1.0)._replace(peaks=(peak(1.0), peak(7.0, "left")))
@@ -149,28 +149,28 @@ def test_the_best_is_where_the_highest_of_all_peaks_is_lowest() -> None:
 
 
 def test_a_best_at_an_end_is_not_inside() -> None:
-    falls = Performance(tuple(point(r, 10.0 / r) for r in (1.0, 2.0, 4.0)), 300.0, 190.0, 3)
+    falls = Performance(tuple(point(r, 10.0 / r) for r in (1.0, 2.0, 4.0)), 300.0, 190.0)
     assert falls.best is falls.points[-1] and not falls.inside
 
 
 def test_lost_curves_and_curves_without_a_peak_are_left_out() -> None:
     lost = point(30.0, 0.1, arrived=False)
-    found = Performance((*V_SHAPE, lost, point(50.0)), 300.0, 190.0, 3)
+    found = Performance((*V_SHAPE, lost, point(50.0)), 300.0, 190.0)
     assert lost not in found.known and len(found.known) == 4
     assert found.best is V_SHAPE[2]
-    assert Performance((lost,), 300.0, 190.0, 3).best is None
-    assert Performance((lost,), 300.0, 190.0, 3).factor_two() is None
+    assert Performance((lost,), 300.0, 190.0).best is None
+    assert Performance((lost,), 300.0, 190.0).factor_two() is None
 
 
 def test_a_factor_of_two_is_read_on_logarithmic_axes() -> None:
     """From 1 at 100: to 4 at 10 and to 8 at 1000, by straight lines."""
-    found = Performance(V_SHAPE, 300.0, 190.0, 3)
+    found = Performance(V_SHAPE, 300.0, 190.0)
     half, twice = found.factor_two() or (math.nan, math.nan)
     assert half == pytest.approx(4.0 ** math.log10(2.0))
     assert twice == pytest.approx(8.0 ** math.log10(2.0))
     assert found.worst_at(10.0) == pytest.approx(4.0)
     assert math.isnan(found.worst_at(0.5)) and math.isnan(found.worst_at(2000.0))
-    alone = Performance((point(100.0, 1.0),), 300.0, 190.0, 3).factor_two()
+    alone = Performance((point(100.0, 1.0),), 300.0, 190.0).factor_two()
     assert alone is not None and all(map(math.isnan, alone))
 
 
@@ -198,7 +198,7 @@ def test_the_curve_has_the_runs_own_points_once_and_two_beside_the_best() -> Non
     middle = math.sqrt(25.0 * 250.0)
     assert asked == pytest.approx([middle, math.sqrt(250.0 * 2500.0), 250.0])
     further = [point(middle, 99.0), point(250.0, 1.01)]
-    found = performance_of(plan, solution.linear["thesis"], first, further)
+    found = performance_of(solution.linear["thesis"], first, further)
     assert found.again == (first[-1], further[1])
     ratios = [one.ratio for one in found.points]
     assert ratios == pytest.approx([25.0, middle, 250.0, 2500.0])

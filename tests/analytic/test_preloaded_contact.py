@@ -13,10 +13,8 @@ from rigs import LINES
 
 from upd.analyses.forced import checks
 from upd.analyses.forced.linear_limits import linear_of
-from upd.analyses.forced.measures import accelerance
-from upd.analyses.forced.mode_peaks import stuck_motion
-from upd.analyses.forced.model import Model, make_model, preloaded
-from upd.analyses.forced.paths import respond
+from upd.analyses.forced.measures import accelerance, stuck_motion
+from upd.analyses.forced.model import Model, make_model, preloaded, respond
 from upd.analyses.forced.plan import ForcedPlan, make_plan
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import static_state

@@ -15,15 +15,16 @@ from rigs import LINES
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import peaks_again
 from upd.analyses.forced import solve as solving
+from upd.analyses.forced.accuracy import bound, estimate
 from upd.analyses.forced.curves import PointCurve, Top
-from upd.analyses.forced.estimates import bound, estimate
 from upd.analyses.forced.levels import HARMONICS, MESH, MODES, POINTS, SAMPLES
 from upd.analyses.forced.model import make_model
-from upd.analyses.forced.other_points import carried, moved_points
 from upd.analyses.forced.peaks import climbed
 from upd.analyses.forced.peaks_again import (
     FoundPeaks,
     Variant,
+    carried,
+    moved_points,
     peak_on,
     run_peaks,
     solve_again,
@@ -289,7 +290,7 @@ def test_where_a_top_leaves_levels_are_taken_to_the_border(
 
 def test_where_all_sticks_the_peak_is_that_of_the_linear_answer(sticking: Found) -> None:
     solution = sticking[0]
-    exact = next(p for p in solution.stuck_peaks("thesis") if p.number == 2)
+    exact = next(p for p in solution.linear["thesis"].stuck_peaks["right"] if p.number == 2)
     assert (top_of(sticking).frequency, top_of(sticking).height) == (exact.frequency, exact.height)
     assert not top_of(sticking).slips
     # nothing slips: neither harmonics nor samples leave anything
@@ -309,7 +310,7 @@ def test_a_level_that_fails_leaves_only_its_part(
     for function in ("found_again", "peak_on"):
         monkeypatch.setattr(peaks_again, function, fails)
     variants = (
-        Variant(Variation(HARMONICS, "2 harmonics more"), more=2),
+        Variant(Variation(HARMONICS, "2 harmonics more"), plan=peaks.plan),
         Variant(Variation(MODES, "2 modes a blade", size=2.0), peaks.model),
     )
     failed = {one.of.source: solve_again(peaks, one) for one in variants}
@@ -330,7 +331,7 @@ def test_a_wanted_accuracy_unknown_solves_no_level(monkeypatch: pytest.MonkeyPat
     def never(*args: Any) -> Any:
         raise AssertionError("solved")
 
-    for name in ("coarse_model", "other_levels", "solve_again"):
+    for name in ("level_variations", "make_variant", "solve_again"):
         monkeypatch.setattr(solving, name, never)
     plan = make_plan(load_scene("symmetric-response", RIG))
     assert plan.estimate_seconds > 0.0

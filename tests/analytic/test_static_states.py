@@ -13,8 +13,7 @@ from scipy.optimize import minimize
 
 from upd.analyses.forced import statics
 from upd.analyses.forced.measures import static_error
-from upd.analyses.forced.model import Model, make_model, preloaded
-from upd.analyses.forced.paths import respond
+from upd.analyses.forced.model import Model, make_model, preloaded, respond
 from upd.analyses.forced.plan import ForcedPlan, make_plan
 from upd.analyses.forced.statics import (
     BALANCE,

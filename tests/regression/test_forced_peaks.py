@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from rigs import LINES
 
-from upd.analyses.forced.model import Model, make_model
-from upd.analyses.forced.paths import respond
+from upd.analyses.forced.model import Model, make_model, respond
 from upd.analyses.forced.plan import ForcedPlan, make_plan
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import make_bodies

@@ -13,7 +13,7 @@ from rigs import LINES
 
 import upd
 from upd.analyses import forced
-from upd.analyses.forced import paths
+from upd.analyses.forced import model as paths
 from upd.batch.studies import plan_study
 from upd.errors import ConvergenceError, InputError
 from upd.report.folder import read_arrays

@@ -23,7 +23,6 @@ from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_label
 from upd.scene import AnyScene
 from upd.scene.base import LeftOut
-from upd.vary.inputs import InputDerivatives
 from upd.vary.variation import Overrides
 
 __all__ = [
@@ -262,8 +261,6 @@ class Analysis:
     estimate
         solution, its numbers, stages -> the parts of their errors, from cheaper companions; None
         where none are known.
-    derivatives
-        Of its numbers by inputs known within limits; None where it knows none.
     coarsened
         plan as run -> what makes a scene into its cheap level: the numbers that inputs change are
         solved on it again. None where the scene itself is.
@@ -285,7 +282,6 @@ class Analysis:
     answer: Callable[[Sequence[Entry]], list[AnswerTable]] | None = None
     verdict_names: tuple[str, ...] = ()
     estimate: Callable[[Any, Sequence[Result], Stages], Estimates] | None = None
-    derivatives: InputDerivatives | None = None
     coarsened: Callable[[Any], Overrides] | None = None
 
 

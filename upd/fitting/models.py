@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses import make_plan
-from upd.analyses.forced.input_uncertainty import DataChange, data_change, is_known
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.sensitivity import DataChange, data_change, is_known
 from upd.analyses.forced.stiffness import FaceLaw, face_laws
 from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
 from upd.cache.arrays import cache_folder

@@ -22,18 +22,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.input_uncertainty import DataChange
 from upd.analyses.forced.linear_limits import fine_grid, linear_peaks
-from upd.analyses.forced.linear_sensitivity import (
+from upd.analyses.forced.measures import (
+    CANDIDATES,
+    CurvePeak,
+    numbered_peaks,
+    tell_stuck_peaks,
+    unmoved,
+)
+from upd.analyses.forced.model import Model, balance_of, quiet, respond
+from upd.analyses.forced.plan import ForcedPlan, grid
+from upd.analyses.forced.sensitivity import (
+    DataChange,
     limit_peak,
     linear_system,
     stuck_frequencies,
 )
-from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.mode_peaks import CANDIDATES, numbered_peaks, tell_stuck_peaks, unmoved
-from upd.analyses.forced.model import Model
-from upd.analyses.forced.paths import balance_of, quiet, respond
-from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.cache.arrays import Journal
 from upd.errors import ConvergenceError
 from upd.fitting.models import STEP, FittedModel, ModelSource

@@ -75,7 +75,7 @@ class InputPart:
         dq/dp times the half-width, relative to the number q, with its sign; NaN where it was not
         found.
     basis
-        How the derivative was found, or why it was not.
+        How it was found, or why it was not.
     """
 
     path: str

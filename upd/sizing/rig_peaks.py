@@ -13,12 +13,11 @@ import numpy as np
 
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
-from upd.analyses.forced.input_uncertainty import data_change, is_known
 from upd.analyses.forced.linear_limits import linear_peaks
-from upd.analyses.forced.mode_peaks import numbered_peaks, tell_stuck_peaks
-from upd.analyses.forced.model import Model, make_model
-from upd.analyses.forced.paths import balance_of, path_settings, respond
+from upd.analyses.forced.measures import numbered_peaks, tell_stuck_peaks
+from upd.analyses.forced.model import Model, balance_of, make_model, path_settings, respond
 from upd.analyses.forced.plan import ForcedPlan, grid
+from upd.analyses.forced.sensitivity import data_change, is_known
 from upd.analyses.forced.statics import static_state
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies

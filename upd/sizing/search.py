@@ -25,7 +25,7 @@ from typing import Any, get_args, overload
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from upd.analyses.forced.paths import quiet
+from upd.analyses.forced.model import quiet
 from upd.analyses.seated.bodies import Bodies
 from upd.errors import ConvergenceError, InputError, one_line
 from upd.hbm.peaks.over import AGREES, SCAN_STEP

@@ -1,7 +1,7 @@
 """What inputs known within limits do to the numbers of a run, to first order.
 
-An analysis that knows derivatives gives them. Otherwise the scene is solved at both ends of the
-interval on a cheap companion: half of the relative change there is that of the run,
+The scene is solved at both ends of the interval on a cheap companion: half of the relative change
+there is that of the run,
 
     delta q / q = [q(p + delta p) - q(p - delta p)] / [q(p + delta p) + q(p - delta p)].
 """
@@ -12,10 +12,10 @@ import logging
 import math
 import tomllib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from typing import Any, NamedTuple
+from typing import Any
 
 from upd.errors import UpdError, one_line
 from upd.mesh import recipes
@@ -46,35 +46,6 @@ class InputEnds:
     high: Any
 
 
-@dataclass(frozen=True)
-class InputChange:
-    """Relative change of a number by an input's half-width, with its sign, and how it was found."""
-
-    change: float
-    basis: str
-
-
-#: path of an input -> name and case of a number -> what its half-width does to it
-InputChanges = Mapping[str, Mapping[Key, InputChange]]
-
-
-class InputDerivatives(NamedTuple):
-    """What an analysis knows of its numbers' derivatives by inputs.
-
-    Attributes
-    ----------
-    changes
-        solution, its numbers, the ends of the inputs known within limits -> what half an interval
-        does to the numbers, of those inputs whose derivatives the analysis knows.
-    known
-        plan, the ends of the inputs known within limits -> paths of those whose derivatives the
-        analysis knows, and seconds that they take.
-    """
-
-    changes: Callable[[Any, Sequence[Result], Sequence[InputEnds]], InputChanges]
-    known: Callable[[Any, Sequence[InputEnds]], tuple[set[str], float]]
-
-
 def input_parts(
     analysis: Any, solution: Any, numbers: Sequence[Result], stages: Stages
 ) -> InputParts:
@@ -102,24 +73,18 @@ def input_parts(
         return {}
     ends = input_ends(plan.scene)
     main = [one for one in numbers if is_main(analysis, one)]
-    found: dict[str, dict[Key, InputChange]] = {one.of.path: {} for one in ends}
-    if analysis.derivatives is not None:
-        with stages("input uncertainty", "derivatives"):
-            for path, changes in analysis.derivatives.changes(solution, numbers, ends).items():
-                found[path] |= changes
-    faults: dict[str, str] = {}
+    found: dict[str, tuple[dict[Key, float], str]] = {}
     for one in ends:
         path = one.of.path
-        if not found[path]:
-            try:
-                with stages("input uncertainty", f"{path}: both ends"):
-                    found[path] = _solved_at_ends(analysis, plan, main, one)
-            except UpdError as error:
-                log.info("%s: not solved at both ends: %s", path, error)
-                faults[path] = f"not solved at both ends ({one_line(error)})"
+        try:
+            with stages("input uncertainty", f"{path}: both ends"):
+                found[path] = _solved_at_ends(analysis, plan, main, one)
+        except UpdError as error:
+            log.info("%s: not solved at both ends: %s", path, error)
+            found[path] = {}, f"not solved at both ends ({one_line(error)})"
     return {
         (number.name, number.case): tuple(
-            _part(one, found[one.of.path].get((number.name, number.case)), faults) for one in ends
+            _part(one, (number.name, number.case), *found[one.of.path]) for one in ends
         )
         for number in main
     }
@@ -148,12 +113,7 @@ def with_input_cost(analysis: Any, plan: Any) -> Any:
     if not plan.scene.uncertain:
         return plan
     ends = input_ends(plan.scene)
-    known, seconds = (set[str](), 0.0)
-    if analysis.derivatives is not None:
-        known, seconds = analysis.derivatives.known(plan, ends)
-    others = [one for one in ends if one.of.path not in known]
-    if others:
-        seconds += 2.0 * len(others) * _companion_seconds(analysis, plan, others[0])
+    seconds = 2.0 * len(ends) * _companion_seconds(analysis, plan, ends[0])
     return replace(plan, seconds=plan.seconds + seconds, input_seconds=seconds)
 
 
@@ -201,18 +161,16 @@ def coarsened_rig(plan: Any, wanted: tuple[str, ...], *more: tuple[str, Any]) ->
     return alone
 
 
-def _part(one: InputEnds, found: InputChange | None, faults: dict[str, str]) -> InputPart:
-    path, half = one.of.path, one.of.relative
-    if found is None:
-        why = faults.get(path, "this number's derivative is not known")
-        return InputPart(path, half, math.nan, why)
-    return InputPart(path, half, found.change, found.basis)
+def _part(one: InputEnds, key: Key, found: Mapping[Key, float], basis: str) -> InputPart:
+    if found and key not in found:
+        basis = "this number was not found at both ends"
+    return InputPart(one.of.path, one.of.relative, found.get(key, math.nan), basis)
 
 
 def _solved_at_ends(
     analysis: Any, plan: Any, numbers: Sequence[Result], one: InputEnds
-) -> dict[Key, InputChange]:
-    """Half of the change between both ends of an interval, each solved again."""
+) -> tuple[dict[Key, float], str]:
+    """Half of the relative change between both ends of an interval, each solved again, and how."""
     coarser = _coarser(analysis, plan)
     plans = [analysis.make_plan(changed(scene, coarser)) for scene in (one.low, one.high)]
     sides = [
@@ -224,14 +182,12 @@ def _solved_at_ends(
         for name, value in plans[0].parameters.items()
         if name in _LEVELS and value != plan.parameters.get(name)
     )
-    basis = f"solved again at both ends{f', on {level}' if level else ''}"
     out = {}
     for number in numbers:
         low, high = (_same(number, numbers, side) for side in sides)
         if low is not None and high is not None and low + high != 0.0:
-            change = (high - low) / (low + high)
-            out[number.name, number.case] = InputChange(change, basis)
-    return out
+            out[number.name, number.case] = (high - low) / (low + high)
+    return out, f"solved again at both ends{f', on {level}' if level else ''}"
 
 
 def _same(number: Result, numbers: Sequence[Result], others: Sequence[Result]) -> float | None:

@@ -12,11 +12,11 @@ import pytest
 
 from upd.analyses import forced, make_plan, modal
 from upd.analyses.base import Resolved
+from upd.analyses.forced.interface_model import make_springs
 from upd.analyses.forced.levels import HARMONICS, SAMPLES
 from upd.analyses.forced.measures import accelerance, residual_error
 from upd.analyses.forced.performance import Performance, RatioPoint, of_curve
 from upd.analyses.forced.solution import ForcedSolution
-from upd.analyses.forced.spring_march import make_springs
 from upd.analyses.forced.statics import StaticState
 from upd.analyses.forced.sweeps import both_ways, marched_peak
 from upd.analyses.modal.solve import ModalSolution, modal_error
@@ -64,7 +64,7 @@ def response(forced_scene: list[str]) -> ForcedSolution:
     curve = solution.curves[0]
     i = int(np.abs(curve.accelerance["right"]).argmax())
     _add_sweeps(solution, float(curve.answer.frequency[i]))
-    solution.performances = {"thesis": Performance((of_curve(curve),), 300.0, 190.0, 3)}
+    solution.performances = {"thesis": Performance((of_curve(curve),), 300.0, 190.0)}
     return solution
 
 

@@ -17,10 +17,18 @@ from rigs import LINES
 
 import upd
 from upd.analyses import analysis_of
-from upd.analyses.forced import paths, peaks
-from upd.analyses.forced.input_uncertainty import input_changes
+from upd.analyses.forced import model as paths
+from upd.analyses.forced import peaks
+from upd.analyses.forced.sensitivity import (
+    data_change,
+    is_known,
+    limit_peak,
+    stuck_frequencies,
+)
 from upd.analyses.forced.solution import ForcedSolution
 from upd.hbm import Settings, climb
+from upd.hbm.peaks.parameter_change import ParameterChange
+from upd.hbm.peaks.sensitivity import PeakDerivative, peak_derivatives
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.starts import newton
 from upd.progress import Stages
@@ -131,11 +139,44 @@ def wedge() -> ForcedSolution:
 
 
 def relative_changes(solution: ForcedSolution) -> Changes:
-    """Relative changes by a relative change of 1 of every input."""
-    numbers = analysis_of(solution.plan.scene).make_results(solution)
-    found = input_changes(solution, numbers, input_ends(solution.plan.scene))
+    """Relative changes by a relative change of 1 of every input: peaks of the right blade with
+    friction and stuck, stuck frequencies.
+    """
+    (model,), (linear,) = solution.models.values(), solution.linear.values()
+    plan, row, bodies = solution.plan, model.row("right"), solution.bodies
+    assert bodies is not None
+    ends, out = input_ends(plan.scene), {}
+    for end in ends:
+        assert is_known(end)
+        change = data_change(plan, bodies, "thesis", model, end, Stages())
+        mine: dict[tuple[str, Case], float] = {}
+        whole = [change.whole(model)]
+        for name, (_, by) in stuck_frequencies(model, 1e3, whole).items():
+            mine[name, Case(stiffness="thesis")] = by[0]
+        for peak in linear.stuck_peaks["right"]:
+            found = limit_peak(model, "right", True, peak.frequency, whole)
+            mine |= _of_peak(found, 0.0, 2, Case(stiffness="thesis", kind="stuck"))
+        for curve in solution.curves:
+            (force,) = change.forces
+            b = curve.answer.balance
+            for (side, number), top in curve.tops.items():
+                x = newton(b, top.x, top.frequency)
+                assert x is not None
+                if (side, number) == ("right", 2):
+                    both = whole[0] + ParameterChange(dynamic=force * b.dynamic)
+                    found = peak_derivatives(b, row, x, top.frequency, [both], power=2.0)
+                    mine |= _of_peak(found, force, number, curve.case)
+        out[end.of.path] = {key: 100.0 * one for key, one in mine.items()}
+    return out
+
+
+def _of_peak(
+    found: PeakDerivative, force: float, number: int, case: Case
+) -> dict[tuple[str, Case], float]:
+    """Relative changes of frequency and height of a peak, per newton of F_E."""
     return {
-        path: {key: 100.0 * one.change for key, one in mine.items()} for path, mine in found.items()
+        (f"peak_{number}_frequency", case): float(found.by_frequency[0] / found.frequency),
+        (f"peak_{number}_accelerance", case): float(found.by_height[0] / found.height - force),
     }
 
 
@@ -238,8 +279,8 @@ def test_peak_of_a_changed_balance(
         return np.log([found.frequency, found.frequency**2 * found.amplitude / force])
 
     coarse, fine = ((top(1.0 + h) - top(1.0 - h)) / (2.0 * h) for h in (0.005, 0.0025))
-    case = replace(curve.case, mode=peak.mode)
-    keys = [(f"peak_2_{kind}", case) for kind in ("frequency", "accelerance")]
+    assert peak.number == 2
+    keys = [(f"peak_2_{kind}", curve.case) for kind in ("frequency", "accelerance")]
     told = np.array([[sampled[n][path][key] for key in keys] for n in SAMPLES])
     bound = np.ptp(told, axis=0) + np.abs(fine - coarse)
     # not so vague that it proves nothing: of the friction's derivatives a fourth and a thousandth
@@ -256,17 +297,28 @@ def _with_law(b: Balance, **values: Any) -> Balance:
     return _balance(b, contacts=replace(b.contacts, law=replace(b.contacts.law, **values)))
 
 
-def test_main_numbers_have_a_part_for_every_input(wedge: ForcedSolution) -> None:
-    """Those whose derivative is not known say so."""
-    analysis = analysis_of(wedge.plan.scene)
-    numbers = analysis.make_results(wedge)
-    found = input_parts(analysis, wedge, numbers, Stages())
-    of_peaks = [parts for (name, _), parts in found.items() if name.startswith("peak_2")]
+def test_main_numbers_have_a_part_for_every_input() -> None:
+    """By solves at both ends, which agree with the exact derivatives; those of numbers that the
+    cheap companion does not have say so.
+    """
+    few = {"excitation.damping": INPUTS["excitation.damping"], "material.nu": "0.3 +- 0.003"}
+    scene = load_scene("symmetric-response", WEDGE | few)
+    analysis = analysis_of(scene)
+    run: ForcedSolution = analysis.solve(analysis.make_plan(scene), Stages())
+    numbers = analysis.make_results(run)
+    found = input_parts(analysis, run, numbers, Stages())
+    of_peaks = {key: parts for key, parts in found.items() if key[0].startswith("peak_2")}
     assert of_peaks
     for parts in found.values():
-        assert {part.path for part in parts} == set(wedge.plan.scene.uncertain)
+        assert {part.path for part in parts} == set(scene.uncertain)
         assert all(part.known or "not" in part.basis for part in parts)
-    assert all(part.known for parts in of_peaks for part in parts)
-    certain = replace(wedge.plan, scene=replace(wedge.plan.scene, uncertain={}))
-    wedge_without = replace(wedge, plan=certain)
-    assert input_parts(analysis, wedge_without, numbers, Stages()) == {}
+    assert all(part.known for parts in of_peaks.values() for part in parts)
+    by_damping = {
+        name: next(p.change for p in parts if p.path == "excitation.damping")
+        for (name, case), parts in of_peaks.items()
+        if case.kind == "stuck"
+    }
+    assert by_damping["peak_2_frequency"] == pytest.approx(0.0, abs=1e-4)
+    assert by_damping["peak_2_accelerance"] == pytest.approx(-0.01, rel=0.05)
+    certain = replace(run.plan, scene=replace(scene, uncertain={}))
+    assert input_parts(analysis, replace(run, plan=certain), numbers, Stages()) == {}

@@ -181,23 +181,6 @@ def test_plan_counts_runs_of_uncertain_inputs(capsys: pytest.CaptureFixture[str]
     assert "error estimates" not in told
 
 
-def test_plan_counts_derivatives_of_responses_once_for_all_inputs() -> None:
-    """What has a derivative costs a few Newton steps a peak; a dimension two more runs."""
-    small = {"accuracy": "unknown", "left_out.solve": "no"}
-    given = [
-        {"contact.friction": "0.6 +- 0.1"},
-        {"contact.friction": "0.6 +- 0.1", "material.E": "200 GPa +- 5 %"},
-        {"contact.friction": "0.6 +- 0.1", "material.nu": "0.3 +- 0.01"},
-    ]
-    exact = make_plan(load_scene("symmetric-response", small))
-    plans = [make_plan(load_scene("symmetric-response", small | more)) for more in given]
-    assert exact.input_seconds == 0.0
-    assert 0.0 < plans[0].input_seconds < 0.05 * plans[0].seconds
-    assert plans[1].input_seconds == plans[0].input_seconds
-    assert plans[2].input_seconds > 5.0 * plans[0].input_seconds
-    assert exact.files_seconds > 0.0
-
-
 @pytest.mark.parametrize("recipe", ["sphere_block", "wedge_platform", "pads_platform"])
 def test_declared_sets_with_weights_are_those_of_the_mesh(recipe: str) -> None:
     scene = {"sphere_block": "hertz", "wedge_platform": "symmetric", "pads_platform": "asymmetric"}

@@ -16,14 +16,12 @@ from upd.analyses.forced import (
     arrays,
     charts,
     checks,
-    estimates,
-    input_uncertainty,
     plan,
     results,
 )
 from upd.analyses.forced.solution import ForcedSolution
 from upd.linalg.parallel import threads_for
-from upd.vary.inputs import InputDerivatives, coarsened_rig
+from upd.vary.inputs import coarsened_rig
 
 Made = TypeVar("Made")
 
@@ -62,9 +60,8 @@ ANALYSIS = Analysis(
     headline=answer.headline,
     answer=answer.answer,
     verdict_names=("best_peak", "reduction_of_free_peak"),
-    derivatives=InputDerivatives(input_uncertainty.input_changes, input_uncertainty.known_inputs),
     coarsened=lambda plan: coarsened_rig(plan, ("response",), ("balance.method", "balance")),
-    estimate=estimates.estimate,
+    estimate=accuracy.estimate,
 )
 
 __all__ = ["ANALYSIS"]

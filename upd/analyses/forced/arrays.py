@@ -12,18 +12,17 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.curve_results import measured_peaks
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, PointCurve, SweptCurve
-from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.model import Array, Model
+from upd.analyses.forced.model import Array
 from upd.analyses.forced.performance import performance_arrays
+from upd.analyses.forced.plan import excitation_of
+from upd.analyses.forced.results import measured_peaks
 from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
-from upd.analyses.forced.sweeps import face_shares, faces_places, marched_damper, marched_loops
+from upd.analyses.forced.sweeps import marched_damper, marched_loops
 from upd.analyses.measured import accelerance_array, measured_arrays
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.balance import InterfaceResponse
-from upd.mesh import IntArray
 from upd.results import ArrayGroup, Case, variable
 from upd.scene.forced_contact import SIDES
 
@@ -54,10 +53,8 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
         mine = case if isinstance(case, Case) else Case(stiffness=case)
         out[f"{content} {case}"] = ArrayGroup(variables, content=content, case=mine)
 
-    for name, model in solution.models.items():
-        add(POINTS, name, _points(model))
-    for name in solution.faces if scene.wants("contact_state") else ():
-        add(POINTS, name, _nodes(solution, name))
+    for name in (*solution.models, *(solution.faces if scene.wants("contact_state") else ())):
+        add(POINTS, name, _points(solution, name))
     for name, linear in solution.linear.items():
         add(LINEAR, name, _linear_arrays(solution, linear))
     for curve in (c for c in solution.curves if not c.empty):
@@ -75,9 +72,23 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
     return out
 
 
-def _points(model: Model) -> Variables:
-    law, at = model.contacts.law, "contact_point"
-    return _places(model.position, model.face, *measures.place(model)) | {
+def _points(solution: ForcedSolution, name: str) -> Variables:
+    """Where contact points or nodes of whole faces lie, in space and in the frames of their faces;
+    their stiffness and forces at rest, or areas.
+    """
+    at, low = "contact_point", "place up the slope, from the lowest point of the face"
+    places, model = solution.places(name), solution.models.get(name)
+    position = solution.faces[name].of.position if model is None else model.position
+    out: Variables = {
+        "position": variable(f"{at} component", position, "mm"),
+        "face": variable(at, places.face, flag_meanings="left right"),
+        "along": variable(at, places.along, "mm", "place along the damper"),
+        "up": variable(at, places.up, "mm", low),
+    }
+    if model is None:
+        return out | {"area": variable(at, places.weight, "mm2")}
+    law = model.contacts.law
+    return out | {
         "k_n": variable(at, law.k_n, "N/mm"),
         "k_t": variable(at, law.k_t, "N/mm"),
         "static_force": variable(
@@ -86,24 +97,6 @@ def _points(model: Model) -> Variables:
             "N",
             "before vibration: normal force, then tractions",
         ),
-    }
-
-
-def _nodes(solution: ForcedSolution, name: str) -> Variables:
-    """Nodes of whole faces, in the variables of contact points without springs."""
-    of, places = solution.faces[name].of, faces_places(solution, name)
-    area = {"area": variable("contact_point", places.weight, "mm2")}
-    return _places(of.position, places.face, places.along, places.up) | area
-
-
-def _places(position: Array, face: IntArray, along: Array, up: Array) -> Variables:
-    """Where contact points lie: in space, and in the frames of their faces."""
-    at, low = "contact_point", "place up the slope, from the lowest point of the face"
-    return {
-        "position": variable(f"{at} component", position, "mm"),
-        "face": variable(at, face, flag_meanings="left right"),
-        "along": variable(at, along, "mm", "place along the damper"),
-        "up": variable(at, up, "mm", low),
     }
 
 
@@ -167,16 +160,13 @@ def marked_peaks(at: Sequence[tuple[int, str, int]]) -> Variables:
     }
 
 
-def share_array(values: Any, mean: str = "stiffness") -> tuple[Any, ...]:
-    """(frequency, side, state) of the cycle."""
-    words = f"stick slip lift, mean over the face by {mean}"
-    return variable("frequency side state", values, "1", side=" ".join(SIDES), state=words)
-
-
-def shares_by_face(state: Array, places: ContactPlaces) -> tuple[Any, ...]:
+def share_array(
+    state: Array, places: ContactPlaces, mean: str = "stiffness, or area without springs"
+) -> tuple[Any, ...]:
     """Shares of the cycle of each face from those of its points, (frequency, points, state)."""
-    share = np.stack([face_shares(one, places) for one in state])
-    return share_array(share, "stiffness, or area without springs")
+    share = measures.face_shares(state, places.face, places.weight)
+    words = f"stick slip lift, mean over the face by {mean}"
+    return variable("frequency side state", share, "1", side=" ".join(SIDES), state=words)
 
 
 def damper_array(solution: ForcedSolution, amplitude: Any) -> tuple[Any, ...]:
@@ -187,7 +177,7 @@ def damper_array(solution: ForcedSolution, amplitude: Any) -> tuple[Any, ...]:
 
 
 def loop_arrays(
-    found: Sequence[tuple[int, float, measures.Loop]], face: Any, along: Array, up: Array
+    found: Sequence[tuple[int, float, measures.Loop]], places: ContactPlaces
 ) -> Variables:
     """Hysteresis loops at every peak, with what tells them apart.
 
@@ -197,8 +187,8 @@ def loop_arrays(
     ----------
     found
         Number and frequency of the peak, and a loop.
-    face, along, up
-        (n_point,) of all points.
+    places
+        Of all points.
     """
     if not found:
         return {}
@@ -213,9 +203,9 @@ def loop_arrays(
         "loop_traction": variable("loop sample", [one.traction for one in loops], "N"),
         "loop_limit": variable("loop sample", [one.limit for one in loops], "N"),
         "loop_peak": variable("loop", [number for number, *_ in found], "", "number of the peak"),
-        "loop_side": variable("loop", face[point], flag_meanings="left right"),
-        "loop_along": variable("loop", along[point], "mm", "place along the damper"),
-        "loop_up": variable("loop", up[point], "mm", "place up the slope"),
+        "loop_side": variable("loop", places.face[point], flag_meanings="left right"),
+        "loop_along": variable("loop", places.along[point], "mm", "place along the damper"),
+        "loop_up": variable("loop", places.up[point], "mm", "place up the slope"),
         "loop_energy": variable("loop", [one.energy for one in loops], "N mm", "loss per cycle"),
     }
 
@@ -231,7 +221,8 @@ def _linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:
     ):
         for side in SIDES:
             out |= {f"accelerance_{kind}_{side}": accelerance_array(curves[side])}
-            out |= peak_arrays(f"{kind}_{side}", peaks[side])
+            rising = sorted(peaks[side], key=lambda p: p.frequency)
+            out |= peak_arrays(f"{kind}_{side}", rising)
     x = [m for m in linear.modes if m.axis == "x"]
     damping = variable("", solution.plan.scene.excitation.damping, "1", "modal damping ratio")
     return out | {
@@ -243,7 +234,7 @@ def _linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:
 def _point_arrays(solution: ForcedSolution, curve: PointCurve) -> Variables:
     """Along a path of points: states, losses, motion of the damper, loops."""
     answer, model, scene = curve.answer, solution.models[curve.stiffness], solution.plan.scene
-    at = solution.marked_points(curve)
+    at, places = solution.marked_points(curve), solution.places(curve.stiffness)
     out: Variables = {
         "stable": variable(
             "frequency",
@@ -271,8 +262,7 @@ def _point_arrays(solution: ForcedSolution, curve: PointCurve) -> Variables:
         **marked_peaks(at),
     }
     if scene.wants("contact_state"):
-        share = measures.shares(answer, model)
-        out["share"] = share_array(np.stack([share[side] for side in SIDES], axis=1))
+        out["share"] = share_array(answer.state, places, "stiffness")
     if scene.wants("damper_motion"):
         out["damper_amplitude"] = damper_array(solution, measures.damper_amplitude(answer, model))
     if not scene.wants("hysteresis"):
@@ -282,7 +272,7 @@ def _point_arrays(solution: ForcedSolution, curve: PointCurve) -> Variables:
         for number, _, i in at
         for one in measures.loops(answer, i, N_LOOPS)
     ]
-    return out | loop_arrays(loops, model.face, *measures.place(model))
+    return out | loop_arrays(loops, places)
 
 
 def _fold_arrays(curve: PointCurve) -> Variables:
@@ -320,8 +310,7 @@ def _faces_arrays(solution: ForcedSolution, curve: FacesCurve) -> Variables:
         **marked_peaks(solution.marked_points(curve)),
     }
     if solution.plan.scene.wants("contact_state"):
-        places = faces_places(solution, curve.stiffness)
-        out["share"] = shares_by_face(out["state"][1], places)
+        out["share"] = share_array(out["state"][1], solution.places(curve.stiffness))
     return out
 
 
@@ -370,7 +359,7 @@ def marched_arrays(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Va
         **marked_peaks([(one.peak.number, one.peak.mode, i) for i, one in enumerate(found)]),
     }
     if scene.wants("contact_state"):
-        out["share"] = shares_by_face(out["state"][1], found[0].places)
+        out["share"] = share_array(out["state"][1], found[0].places)
     if scene.wants("damper_motion"):
         both = [marched_damper(solution, one) for one in found]
         motion = [one.motion.T for one in found]
@@ -389,5 +378,4 @@ def marched_arrays(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Va
         for one in found
         for loop in marched_loops(one, N_LOOPS)
     ]
-    places = found[0].places
-    return out | loop_arrays(loops, places.face, places.along, places.up)
+    return out | loop_arrays(loops, found[0].places)

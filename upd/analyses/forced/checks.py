@@ -14,11 +14,11 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, PointCurve, SweptCurve, WholeFaces
-from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.levels import HARMONICS, SAMPLES
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.peaks_again import PeaksAgain
 from upd.analyses.forced.performance import Performance
+from upd.analyses.forced.plan import excitation_of
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import BALANCE, StaticState
 from upd.analyses.forced.sweeps import TOLERANCE

@@ -36,7 +36,8 @@ class LinearCurves:
     modes
         Stuck natural frequencies.
     free_peaks, stuck_peaks
-        Side -> peaks of the curves within the sweep, between its points and whatever these are.
+        Side -> numbered peaks of the curves within the sweep, between its points and whatever these
+        are: free ones by frequency, stuck ones by their modes.
     """
 
     frequency: Array
@@ -92,8 +93,6 @@ class TimeCheck:
     step, apart
         Relative change of height and of frequency between it and the next motion towards the top,
         which leaves or is lower; 0 at the top.
-    starts
-        Time integrations.
     way, share
         Direction along the path from the top to it, 1 or -1; its height over that of the top, by
         harmonic balance. 0 and 1 at the top.
@@ -108,7 +107,6 @@ class TimeCheck:
     sample: int
     step: float = 0.0
     apart: float = 0.0
-    starts: int = 0
     way: int = 0
     share: float = 1.0
 

@@ -2,6 +2,9 @@
 
 Each input is a row of a table: what it is, and the models that stand for its ends. The
 peaks of the curve with the lowest F_C/F_E are found again with each, on the run's own mesh.
+
+Effects that a run leaves out are solved again with them: sliding along the damper, and the damper's
+own elasticity.
 """
 
 from __future__ import annotations
@@ -9,25 +12,40 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from scipy.linalg import eigh, qr
+from scipy.spatial import cKDTree
 
-from upd.analyses.forced.model import Model, preloaded
-from upd.analyses.forced.other_points import nearer
-from upd.analyses.forced.paths import balance_of
+from upd.analyses.base import Resolved
+from upd.analyses.forced.blade_parts import MIRROR_SIGNS
+from upd.analyses.forced.levels import Laws, make_variant
+from upd.analyses.forced.linear_limits import stuck_frequency
+from upd.analyses.forced.measures import StuckMode, tell_modes
+from upd.analyses.forced.model import Array, Model, balance_of, preloaded
 from upd.analyses.forced.peaks_again import (
     NOT_FOUND,
     FoundPeaks,
     PeaksAgain,
     Variant,
     found_again,
+    places_up,
+    straight,
 )
+from upd.analyses.forced.plan import ALONG, ELASTIC, ForcedPlan
 from upd.analyses.forced.statics import StaticState, state_of_ratio
+from upd.analyses.seated.bodies import Bodies
 from upd.errors import InputError, one_line
+from upd.fem import Material, mass, rigid_body_modes, stiffness
+from upd.hbm.springs.points import stuck_stiffness
+from upd.linalg import factorise
 from upd.linalg.parallel import threads_for
-from upd.results import Case
+from upd.linalg.symmetric import Symmetric
+from upd.mesh import IntArray
+from upd.results import Case, Result
+from upd.results import quantities as q
 from upd.scene.forced_contact import SIDES, Side
 from upd.vary.variation import Variation
 
@@ -42,28 +60,6 @@ FEW_HARMONICS = 3
 
 #: value of an input in words, and the model with it
 Changed = tuple[str, Model]
-
-
-@dataclass(frozen=True)
-class InputEffect:
-    """What one end of an input does to a peak: relative changes, nan where it was not found.
-
-    Attributes
-    ----------
-    name, label
-        Of the input; its value.
-    case, number
-        Of the right blade's peak.
-    frequency, height
-        Relative changes.
-    """
-
-    name: str
-    label: str
-    case: Case
-    number: int
-    frequency: float
-    height: float
 
 
 def _stiffness(side: Side | None, of: str, peaks: FoundPeaks) -> Iterator[Changed]:
@@ -159,8 +155,9 @@ def input_variants(few: FoundPeaks) -> list[Variant]:
     ]
 
 
-def effects_of(few: FoundPeaks, found: PeaksAgain) -> list[InputEffect]:
-    """What one end of an input does to the right blade's peaks.
+def effects_of(few: FoundPeaks, found: PeaksAgain) -> list[Result]:
+    """Relative changes of the right blade's peaks by one end of an input; none of a peak that was
+    not found.
 
     Parameters
     ----------
@@ -172,9 +169,14 @@ def effects_of(few: FoundPeaks, found: PeaksAgain) -> list[InputEffect]:
     out = []
     for one in few.peaks:
         again = found.peaks.get((one.ratio, one.blade, one.number), NOT_FOUND)
-        change = (new / old - 1.0 for new, old in zip(again, one.top[:2], strict=True))
-        case = replace(one.case, mode=one.mode)
-        out.append(InputEffect(found.of.source, found.of.label, case, one.number, *change))
+        choice = f"{found.of.source}: {found.of.label}"
+        case = replace(one.case, mode=one.mode, choice=choice)
+        for quantity, new, old in (
+            (q.FREQUENCY_CHANGE, again.frequency, one.top.frequency),
+            (q.ACCELERANCE_CHANGE, again.height, one.top.height),
+        ):
+            if math.isfinite(new):
+                out.append(quantity.of(new / old - 1.0, case, n=one.number))
     return out
 
 
@@ -197,3 +199,204 @@ def few_harmonics(peaks: FoundPeaks) -> FoundPeaks | None:
             top = top._replace(frequency=found.frequency, height=found.height, x=x)
             out.append(one._replace(balance=b, top=top, check=None, other=None))
     return peaks._replace(peaks=tuple(out)) if out else None
+
+
+def nearer(model: Model, factor: float) -> Model | None:
+    """The model with its points nearer to the middle of each face, up the slope.
+
+    The motion of a point between others is theirs by straight lines: that of a face under a rigid
+    damper is nearly one. Stiffness and static forces stay with the points.
+
+    Parameters
+    ----------
+    factor
+        On the places up the slope from the middle of a face, at most 1.
+
+    Returns
+    -------
+    Model or None
+        None where the points are in one row.
+    """
+    n = model.contacts.n_point
+    at = np.zeros((n, n))
+    faces = {}
+    for k, side in enumerate(SIDES):
+        face, on = model.faces[side], np.flatnonzero(model.face == k)
+        up = places_up(model)[on]
+        rows = np.unique(np.round(up, 6))
+        if len(rows) < 2:
+            return None
+        weight = straight(rows, factor * rows)
+        row = np.abs(up[:, None] - rows).argmin(axis=1)
+        column = face.position @ face.frame[1]
+        mine = np.zeros((len(on), len(on)))
+        for i in range(len(on)):
+            # the points of every row nearest along the damper
+            for j in range(len(rows)):
+                there = np.flatnonzero(row == j)
+                near = there[np.abs(column[there] - column[i]).argmin()]
+                mine[i, near] += weight[row[i], j]
+        at[np.ix_(on, on)] = mine
+        faces[side] = replace(face, position=mine @ face.position, values=mine @ face.values)
+
+    def rows_of(of: Array) -> Array:
+        return np.ascontiguousarray(np.einsum("gp,pdn->gdn", at, of))
+
+    contacts = replace(model.contacts, rows=rows_of(model.contacts.rows))
+    return replace(model, contacts=contacts, damper_rows=rows_of(model.damper_rows), faces=faces)
+
+
+# -- an effect left out ----------------------------------------------------------------------------
+
+
+def along_variant(peaks: FoundPeaks, bodies: Bodies, laws: Laws) -> Variant | None:
+    """The model in which friction resists sliding along the damper too; None where the run has it
+    or nothing rubs.
+    """
+    if peaks.model.contacts.tangents == 2 or not peaks.plan.scene.contact.friction:
+        return None
+    of = Variation(ALONG, "both sliding directions", (("contact.directions", "two"),))
+    return make_variant(peaks.plan, peaks.model, bodies, laws, of)._replace(any_height=True)
+
+
+def highest_slipping(few: FoundPeaks) -> FoundPeaks | None:
+    """The highest peak on which a point slips alone; None without one."""
+    slipping = [one for one in few.peaks if one.top.slips]
+    if not slipping:
+        return None
+    return few._replace(peaks=(max(slipping, key=lambda one: one.top.height),))
+
+
+def along_changes(few: FoundPeaks, found: PeaksAgain) -> list[Resolved]:
+    """Change of a peak by friction along the damper, with few harmonics.
+
+    Parameters
+    ----------
+    few
+        Of `highest_slipping`.
+    found
+        The peak with `along_variant`.
+    """
+    (one,) = few.peaks
+    top, again = one.top, found.peaks.get((one.ratio, one.blade, one.number), NOT_FOUND)
+    case, remedy = replace(one.case, mode=one.mode), 'set contact.directions = "two"'
+    return [
+        Resolved(ALONG, f"peak_{one.number}_{kind}", case, before, after, unit, remedy)
+        for kind, unit, before, after in (
+            ("accelerance", "(m/s2)/N", top.height, again.height),
+            ("frequency", "Hz", top.frequency, again.frequency),
+        )
+    ]
+
+
+# -- the elastic damper ----------------------------------------------------------------------------
+
+
+def elastic_changes(peaks: FoundPeaks, bodies: Bodies, name: str) -> list[Resolved]:
+    """Stuck frequencies with the damper's elasticity in series with the contact springs.
+
+    Parameters
+    ----------
+    name
+        Of the contact stiffness.
+    """
+    out, rigid = [], peaks.linear.modes
+    elastic = elastic_stuck(peaks.plan, bodies, peaks.model)
+    for in_phase, quantity in ((True, "stuck_in_phase"), (False, "stuck_out_of_phase")):
+        before, after = (stuck_frequency(modes, in_phase) for modes in (rigid, elastic))
+        if math.isfinite(before):
+            remedy = (
+                "the rigid damper is too stiff for these springs, unless they hold its elasticity "
+                "already: compare with a contact analysis of the damper"
+            )
+            case = Case(stiffness=name)
+            out.append(Resolved(ELASTIC, quantity, case, before, after, "Hz", remedy))
+    return out
+
+
+def elastic_stuck(plan: ForcedPlan, bodies: Bodies, model: Model) -> list[StuckMode]:
+    """Stuck modes with the damper's elastic compliance in series with the contact springs.
+
+    The damper floats: its rigid motion keeps its inertia, and its deformation follows
+    quasi-statically from self-equilibrated contact forces (inertia relief), G = B P' K^+ P B' with
+    P = I - M R (R' M R)^-1 R'. The force of stuck points per rigid relative displacement is then
+    (k^-1 + G)^-1 in place of k.
+
+    Returns
+    -------
+    list of StuckMode
+        Up to twice the end of the sweep.
+
+    References
+    ----------
+    .. [1] R. R. Craig, A. J. Kurdila, Fundamentals of Structural Dynamics, 2nd ed., 17.5 (inertia
+           relief).
+    """
+    M, _, K, B = model.linear(stuck=False)
+    k = stuck_stiffness(model.contacts).ravel()
+    G = elastic_compliance(plan, bodies, model)
+    # (k^-1 + G)^-1, also where k = 0
+    joint = np.linalg.solve(np.eye(len(k)) + k[:, None] * G, np.diag(k))
+    values, shapes = eigh(K + B.T @ joint @ B, M)
+    return tell_modes(model, values, shapes, 2.0 * plan.scene.excitation.stop)
+
+
+def elastic_compliance(plan: ForcedPlan, bodies: Bodies, model: Model) -> Array:
+    """Elastic compliance of the free damper at its contact rows, mm/N.
+
+    Returns
+    -------
+    Array
+        (n, n), n = n_point (1 + tangents), point by point; symmetric, positive semidefinite.
+    """
+    mesh, m = bodies.damper_mesh, plan.scene.material
+    material = Material(m.E, m.nu, plan.scene.damper.density or m.density)
+    K = stiffness(mesh, material, plan.scene.mesh.element)
+    M = mass(mesh, material)
+    B = _rows(bodies, model, mesh.n_node)
+    R = rigid_body_modes(mesh.points)
+    MR = M @ R
+    inertia = np.linalg.inv(R.T @ MR)
+    loads = B.T - MR @ (inertia @ (R.T @ B.T))
+    # six dofs that hold it: the ones its rigid motions move most independently
+    held = qr(R.T, mode="r", pivoting=True)[1][:6]
+    free = np.setdiff1d(np.arange(3 * mesh.n_node), held)
+    u = np.zeros_like(loads)
+    factor = factorise(
+        Symmetric.of(K).submatrix(free.astype(np.int64)), solver=plan.scene.solver.name
+    )
+    u[free] = factor.solve(loads[free])
+    u -= R @ (inertia @ (MR.T @ u))
+    G = B @ u
+    return np.asarray(0.5 * (G + G.T))
+
+
+def _rows(bodies: Bodies, model: Model, n_node: int) -> Array:
+    """Displacement of the damper's contact points along their normals and tangents.
+
+    (n, 3 n_node) of its nodal displacements; a point that stands for a pair moves as the even part
+    of both.
+    """
+    mesh, out = bodies.damper_mesh, []
+    tree = cKDTree(mesh.points)
+    components = [0, 1, 2] if model.contacts.tangents == 2 else [0, 2]
+    for side in SIDES:
+        face, blade = model.faces[side], bodies.blades[side].mesh
+        # the k-th nodes of both patches lie on each other
+        own = dict(zip(blade.nodes["patch"], mesh.nodes[f"{side}_patch"], strict=True))
+        nodes = np.array([own[node] for node in face.nodes])
+        rows = _at(face.values, face.frame, nodes, n_node)
+        if model.halved:
+            image = tree.query(mesh.points[nodes] * np.array([1.0, -1.0, 1.0]))[1]
+            mirrored = _at(face.values, face.frame, np.asarray(image), n_node)
+            rows = 0.5 * (rows + MIRROR_SIGNS[:, None] * mirrored)
+        out.append(rows[:, components])
+    joined = np.concatenate(out)
+    return np.asarray(joined.reshape(-1, joined.shape[-1]))
+
+
+def _at(values: Array, frame: Array, nodes: IntArray, n_node: int) -> Array:
+    """(m, 3, 3 n_node) rows of points with shape functions ``values`` (m, k) at ``nodes``."""
+    rows = np.zeros((len(values), 3, n_node, 3))
+    rows[:, :, nodes] = np.einsum("mk,fc->mfkc", values, frame)
+    return np.asarray(rows.reshape(len(values), 3, -1))

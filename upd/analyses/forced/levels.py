@@ -1,6 +1,6 @@
 """Levels of a response: coarser and finer in one source of error each.
 
-Every level is a model of its own or another choice of harmonics and samples.
+Every level is the scene with one thing changed: a model of its own, or other harmonics or samples.
 """
 
 from __future__ import annotations
@@ -9,20 +9,22 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any
 
 from upd.analyses.cost import NODES
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.peaks_again import Variant
-from upd.analyses.forced.plan import ForcedPlan
+from upd.analyses.forced.plan import ForcedPlan, parameters_of
 from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import UpdError, one_line
+from upd.hbm.core.fourier import harmonics, sample_count
 from upd.mesh import recipes
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import GAUSS, SIDES, FaceLines, FrictionChoice, Side
 from upd.scene.quantities import UNKNOWN
-from upd.vary.variation import Variation
+from upd.vary.solve import changed
+from upd.vary.variation import Overrides, Variation
 
 RECIPE = "blade_rig"
 #: off the contact, see `geometry.blade_rig_params`
@@ -77,83 +79,91 @@ OTHER_ROWS = (1.5, 0.7)
 #: the same of a run on lattice lines, and what stands for their number
 _GAUSS_ROWS, _LATTICE = (4, 8), 3
 #: harmonics that a finer level has more than the run
-MORE_HARMONICS = (2,)
+MORE_HARMONICS = 2
 #: times the samples of the run
 _MORE_SAMPLES = 2
 Laws = Mapping[Side, FaceLaw]
 
 
-def coarse_model(plan: ForcedPlan, base: Model, laws: Laws, factor: float) -> Variant:
-    """The blades on a coarser mesh with the same contact points.
+def level_variations(plan: ForcedPlan) -> list[Variation]:
+    """Half of the modes, more contact points; more harmonics, more samples; coarser meshes."""
+    scene = plan.scene
+    modes, highest = scene.reduction.modes, int(scene.balance.harmonics)
+    out = []
+    if modes > 1:
+        few = modes // 2
+        half = (("reduction.modes", few),)
+        out.append(Variation(MODES, f"{few} modes a blade", half, size=modes / few))
+    out += _contact_levels(scene.contact)
+    more = highest + MORE_HARMONICS
+    finer = (("balance.harmonics", more), ("balance.samples", samples(scene, 1, more)))
+    out.append(Variation(HARMONICS, f"{MORE_HARMONICS} harmonics more", finer))
+    twice = (("balance.samples", samples(scene, _MORE_SAMPLES, highest)),)
+    label = f"{_MORE_SAMPLES} times the samples"
+    out.append(Variation(SAMPLES, label, twice, size=1.0 / _MORE_SAMPLES))
+    return [*out, *(_coarser(plan, factor) for factor in COARSER)]
+
+
+def samples(scene: ForcedScene, factor: int, highest: int) -> int:
+    """So many times those of the scene's balance, and as many as the rule gives a harmonic."""
+    given, rule = scene.balance.samples, sample_count(harmonics(range(highest + 1)))
+    own = sample_count(harmonics(scene.harmonic_numbers)) if given == "auto" else int(given)
+    return max(factor * own, rule)
+
+
+def _coarser(plan: ForcedPlan, factor: float) -> Variation:
+    """The blades on a coarser mesh with the same contact points; without overrides where the mesh
+    has no such level.
+
+    Where the recipe does not tell the elements, or the contact points are nodes, quadratic elements
+    become linear ones with incompatible modes at the last.
+    """
+    scene, size = plan.scene, 1.0 / factor
+    label = f"{factor:g} times the elements along every edge"
+    gauss = scene.contact.rule == GAUSS
+    counts = (*OFF_CONTACT, *on_contact(scene)) if scene.recipe == RECIPE and gauss else ()
+    fewer, changes = times(scene, counts, factor), Overrides()
+    if fewer != times(scene, counts, 1.0):
+        changes = of_geometry(fewer)
+    elif gauss and "refine" in plan.parameters and scene.recipe != RECIPE:
+        changes = of_geometry({"refine": factor * plan.parameters["refine"]})
+    elif NODES[scene.mesh.element] > 8 and factor == min(COARSER):
+        changes = (("mesh.element", "hex8i"),)
+        label, size = "hex8i elements on the same lattice", _LINEAR
+    # it has no levels of its own
+    alone = (*changes, ("accuracy", UNKNOWN)) if changes else ()
+    return Variation(MESH, label, alone, size=size)
+
+
+def of_geometry(parameters: Mapping[str, Any]) -> Overrides:
+    """Parameters of a recipe as overrides."""
+    return tuple((f"geometry.{name}", value) for name, value in parameters.items())
+
+
+def make_variant(
+    plan: ForcedPlan, base: Model, bodies: Bodies | None, laws: Laws, of: Variation
+) -> Variant:
+    """The model of a variation with the sliding directions and the static state of the run's.
 
     Parameters
     ----------
     base
         Of the run.
-    factor
-        On the elements along every edge.
+    bodies
+        Of the run; None: they are meshed again.
     """
-    begin = time.perf_counter()
-    other, label, size = _coarser(plan, factor)
-    of = Variation(MESH, label, size=size)
-    if other is None:
+    begin, fixed = time.perf_counter(), "one" if base.contacts.tangents < 2 else "two"
+    if of.source == MESH and not of.overrides:
         return Variant(of, why="the mesh has no such level")
+    scene = changed(plan.scene, (("contact.directions", fixed), *of.overrides))
+    other = replace(plan, scene=scene, parameters=parameters_of(scene), workers=1)
+    if of.source in (HARMONICS, SAMPLES):
+        return Variant(of, plan=other)
     try:
-        model = make_model(_alike(other, base), make_bodies(other), laws, base.state)
+        model = make_model(other, bodies or make_bodies(other), laws, base.state)
     except UpdError as error:
         return Variant(of, why=one_line(error))
-    return Variant(of, model, seconds=time.perf_counter() - begin)
-
-
-def _coarser(plan: ForcedPlan, factor: float) -> tuple[ForcedPlan | None, str, float]:
-    """The plan of a coarser mesh, its label and size.
-
-    Where the recipe does not tell the elements, or the contact points are nodes, quadratic elements
-    become linear ones with incompatible modes at the last.
-    """
-    scene, parameters, size = plan.scene, dict(plan.parameters), 1.0 / factor
-    label = f"{factor:g} times the elements along every edge"
-    gauss = scene.contact.rule == GAUSS
-    counts = (*OFF_CONTACT, *on_contact(scene)) if scene.recipe == RECIPE and gauss else ()
-    fewer = times(scene, counts, factor)
-    if fewer != times(scene, counts, 1.0):
-        parameters |= fewer
-    elif gauss and "refine" in parameters and scene.recipe != RECIPE:
-        parameters["refine"] = factor * parameters["refine"]
-    elif NODES[scene.mesh.element] > 8 and factor == min(COARSER):
-        scene = replace(scene, mesh=replace(scene.mesh, element="hex8i"))
-        parameters["element_nodes"] = NODES["hex8i"]
-        label, size = "hex8i elements on the same lattice", _LINEAR
-    else:
-        return None, label, size
-    # it has no levels of its own
-    scene = replace(scene, accuracy=UNKNOWN)
-    return replace(plan, scene=scene, parameters=parameters, workers=1), label, size
-
-
-def other_levels(plan: ForcedPlan, base: Model, bodies: Bodies, laws: Laws) -> list[Variant]:
-    """Half of the modes, more contact points; more harmonics, twice the samples."""
-    scene, count = plan.scene, plan.scene.reduction.modes
-    wanted = []
-    if count > 1:
-        fewer = replace(scene.reduction, modes=count // 2)
-        of = Variation(MODES, f"{count // 2} modes a blade", size=count / (count // 2))
-        wanted.append((of, replace(scene, reduction=fewer)))
-    for label, size, contact in _contact_levels(scene.contact):
-        of = Variation(POINTS, label, size=size)
-        wanted.append((of, replace(scene, contact=contact)))
-    out = []
-    for of, other in wanted:
-        try:
-            model = make_model(_alike(replace(plan, scene=other), base), bodies, laws, base.state)
-        except UpdError as error:
-            out.append(Variant(of, why=one_line(error)))
-        else:
-            out.append(Variant(of, model))
-    for more in MORE_HARMONICS:
-        out.append(Variant(Variation(HARMONICS, f"{more} harmonics more"), more=more))
-    twice = Variation(SAMPLES, f"{_MORE_SAMPLES} times the samples", size=1.0 / _MORE_SAMPLES)
-    return [*out, Variant(twice, finer=_MORE_SAMPLES)]
+    return Variant(of, model=model, seconds=time.perf_counter() - begin)
 
 
 def lines_named(contact: FrictionChoice) -> bool:
@@ -162,13 +172,18 @@ def lines_named(contact: FrictionChoice) -> bool:
     return any(one != "all" and not isinstance(one, int) for one in lines)
 
 
-def with_gauss(contact: FrictionChoice, rows: int, columns: int) -> FrictionChoice:
-    """The contact with so many Gauss points on each face."""
-    given: dict[str, Any] = {side: FaceLines() for side in SIDES}
-    return replace(contact, rule=GAUSS, rows=rows, columns=columns, share="area", **given)
+def with_gauss(rows: int, columns: int) -> Overrides:
+    """So many Gauss points on each face."""
+    return (
+        ("contact.rule", GAUSS),
+        ("contact.rows", rows),
+        ("contact.columns", columns),
+        ("contact.share", "area"),
+        *((f"contact.{side}", FaceLines()) for side in SIDES),
+    )
 
 
-def _contact_levels(contact: FrictionChoice) -> list[tuple[str, float, FrictionChoice]]:
+def _contact_levels(contact: FrictionChoice) -> list[Variation]:
     """More and fewer Gauss points than the run has; Gauss points where it has lattice lines of
     whole faces.
 
@@ -183,20 +198,9 @@ def _contact_levels(contact: FrictionChoice) -> list[tuple[str, float, FrictionC
             return []
         row, counts = _LATTICE, [(rows, 2) for rows in _GAUSS_ROWS]
     return [
-        (
-            f"{rows} x {columns} Gauss points",
-            row / rows,
-            with_gauss(contact, rows, columns),
-        )
-        for rows, columns in counts
+        Variation(POINTS, f"{m} x {n} Gauss points", with_gauss(m, n), size=row / m)
+        for m, n in counts
     ]
-
-
-def _alike(plan: ForcedPlan, model: Model) -> ForcedPlan:
-    """The plan with the sliding directions of a model, one blade after the other."""
-    directions: Literal["one", "two"] = "one" if model.contacts.tangents < 2 else "two"
-    contact = replace(plan.scene.contact, directions=directions)
-    return replace(plan, scene=replace(plan.scene, contact=contact), workers=1)
 
 
 # -- numbers of elements ---------------------------------------------------------------------------

@@ -6,7 +6,7 @@ Peaks are sought around their own modes: they do not depend on the frequencies a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -17,25 +17,21 @@ from scipy.optimize import minimize_scalar
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import LinearCurves
-from upd.analyses.forced.excitation import Excitation, excitation_of
 from upd.analyses.forced.measures import (
+    CANDIDATES,
     Array,
     ComplexArray,
     CurvePeak,
+    ModeShapes,
     StuckMode,
     chosen_peaks,
-)
-from upd.analyses.forced.mode_peaks import (
-    CANDIDATES,
-    ModeShapes,
     numbered,
     shapes_along_x,
     tell_stuck_peaks,
     unmoved,
 )
-from upd.analyses.forced.model import Model
-from upd.analyses.forced.paths import balance_of
-from upd.analyses.forced.plan import ForcedPlan, grid
+from upd.analyses.forced.model import Model, balance_of
+from upd.analyses.forced.plan import Excitation, ForcedPlan, excitation_of, grid
 from upd.hbm.faces.state import InterfaceModel
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.points import stuck_stiffness
@@ -44,6 +40,7 @@ from upd.scene.forced_contact import SIDES, Side
 #: half-power widths on each side of a mode in which its peak is sought, and of a width between two
 #: points there
 _WIDTHS, QUARTER = 3, 0.25
+Peaks = list[CurvePeak]
 
 
 def linear_modes(balance: Balance, stuck: bool) -> tuple[Array, Array]:
@@ -213,58 +210,6 @@ def stuck_modes_of(march: InterfaceModel, below: float) -> tuple[list[StuckMode]
     return modes, replace(found, shape=rows @ found.shape)
 
 
-def stuck_peaks_of(
-    march: InterfaceModel, peaks: Sequence[CurvePeak], below: float, excitation: Excitation
-) -> list[CurvePeak]:
-    """Peaks of a stuck curve by the numbers of their modes.
-
-    Parameters
-    ----------
-    below
-        Hz; modes above have no number.
-    excitation
-        Of the curve.
-    """
-    if not peaks:
-        return []
-    f = excitation.lowest * np.array([one.frequency for one in peaks])
-    motion = march.linear_response(f, excitation.read, stuck=True)[:, len(SIDES) :]
-    return numbered(stuck_modes_of(march, below)[1], peaks, motion)
-
-
-def _limit(
-    f: Array,
-    harmonic: int,
-    modes: tuple[Array, Array],
-    blades: Sequence[Side],
-    read: Callable[[Side, Array], ComplexArray],
-) -> tuple[dict[Side, ComplexArray], dict[Side, list[CurvePeak]]]:
-    """Accelerance of both blades at frequencies, rising, and its peaks.
-
-    Parameters
-    ----------
-    harmonic
-        That is read: a mode answers where it meets it.
-    modes
-        Their frequencies and half-power widths, Hz.
-    blades
-        Those that move.
-    read
-        Blade and frequencies -> accelerance.
-    """
-    at, width = modes
-    fine = around_modes(at / harmonic, width / harmonic, float(f[0]), float(f[-1]))
-    H = {side: read(side, f) if side in blades else np.zeros(len(f), complex) for side in SIDES}
-    peaks: dict[Side, list[CurvePeak]] = {side: [] for side in SIDES}
-    for side in blades:
-        peaks[side] = exact_peaks(partial(_size, read, side), fine, f)
-    return H, peaks
-
-
-def _size(read: Callable[[Side, Array], ComplexArray], side: Side, f: Array) -> Array:
-    return np.asarray(np.abs(read(side, f)))
-
-
 def linear_curves(
     march: InterfaceModel, frequency: Array, excitation: Excitation, *, stuck: bool
 ) -> tuple[Mapping[Side, ComplexArray], Mapping[Side, list[CurvePeak]]]:
@@ -279,16 +224,27 @@ def linear_curves(
     stuck
         Every node closed and sticking; else none touches.
     """
+    k, H, peaks = excitation.lowest, _at_rest(frequency), dict[Side, list[CurvePeak]]()
     at = stuck_system(march)[0] if stuck else np.sort(march.frequency)
-    modes = at, 2.0 * float(march.damping.max()) * at
+    width = 2.0 * float(march.damping.max()) * at
+    fine = around_modes(at / k, width / k, float(frequency[0]), float(frequency[-1]))
 
     def read(side: Side, f: Array) -> ComplexArray:
-        f = excitation.lowest * f
-        moved = march.linear_response(f, excitation.read, stuck=stuck)[:, SIDES.index(side)]
-        return np.asarray(-((2.0 * np.pi * f) ** 2) * 1e-3 * moved)
+        moved = march.linear_response(k * f, excitation.read, stuck=stuck)[:, SIDES.index(side)]
+        return measures.accelerance_of(moved, f, k, 1.0)
 
-    blades = SIDES if stuck else excitation.free_blades
-    return _limit(frequency, excitation.lowest, modes, blades, read)
+    for side in SIDES if stuck else excitation.free_blades:
+        H[side] = read(side, frequency)
+        peaks[side] = exact_peaks(partial(_size, read, side), fine, frequency)
+    return H, {side: peaks.get(side, []) for side in SIDES}
+
+
+def _at_rest(frequency: Array) -> dict[Side, ComplexArray]:
+    return {side: np.zeros(len(frequency), complex) for side in SIDES}
+
+
+def _size(read: Callable[[Side, Array], ComplexArray], side: Side, f: Array) -> Array:
+    return np.asarray(np.abs(read(side, f)))
 
 
 def linear_of_faces(plan: ForcedPlan, march: InterfaceModel) -> LinearCurves:
@@ -296,47 +252,41 @@ def linear_of_faces(plan: ForcedPlan, march: InterfaceModel) -> LinearCurves:
     frequency, excitation = grid(plan), excitation_of(plan.scene.excitation)
     free, free_peaks = linear_curves(march, frequency, excitation, stuck=False)
     stuck, stuck_peaks = linear_curves(march, frequency, excitation, stuck=True)
-    modes, _ = stuck_modes_of(march, CANDIDATES * plan.scene.excitation.stop)
-    return LinearCurves(frequency, free, stuck, modes, free_peaks, stuck_peaks)
+    modes, shapes = stuck_modes_of(march, CANDIDATES * plan.scene.excitation.stop)
+    named = {}
+    for side, peaks in stuck_peaks.items():
+        f = excitation.lowest * np.array([one.frequency for one in peaks])
+        motion = march.linear_response(f, excitation.read, stuck=True)[:, len(SIDES) :]
+        named[side] = numbered(shapes, peaks, motion)
+    free_peaks = {side: unmoved(peaks) for side, peaks in free_peaks.items()}
+    return LinearCurves(frequency, free, stuck, modes, free_peaks, named)
 
 
 def linear_of(plan: ForcedPlan, model: Model) -> LinearCurves:
     """Free and stuck curves of a model, their peaks and modes."""
-    force = plan.scene.damper.centrifugal
+    force, stop = plan.scene.damper.centrifugal, plan.scene.excitation.stop
     b = balance_of(plan, model, force, (0, *model.excitation.harmonics))
     f, k = grid(plan), model.excitation.lowest
-    modes = {stuck: linear_modes(b, stuck) for stuck in (False, True)}
     # finer around every mode: a drawn curve has its tops
-    for at, width in modes.values():
+    for stuck in (False, True):
+        at, width = linear_modes(b, stuck)
         f = finer(f, at / k, width / k)
-
-    def curves(stuck: bool) -> tuple[dict[Side, ComplexArray], dict[Side, list[CurvePeak]]]:
-        def read(side: Side, f: Array) -> ComplexArray:
-            return measures.linear_accelerance(b, model.row(side), force, f, stuck)
-
-        return _limit(f, k, modes[stuck], SIDES if stuck else model.excitation.free_blades, read)
-
-    free, free_peaks = curves(False)
-    stuck, stuck_peaks = curves(True)
-    below = CANDIDATES * plan.scene.excitation.stop
-    return LinearCurves(f, free, stuck, measures.stuck_modes(model, below), free_peaks, stuck_peaks)
+    curves, peaks = (_at_rest(f), _at_rest(f)), (dict[Side, Peaks](), dict[Side, Peaks]())
+    for side in SIDES:
+        row = model.row(side)
+        for stuck in (False, True):
+            found: Peaks = []
+            if stuck or side in model.excitation.free_blades:
+                curves[stuck][side] = measures.linear_accelerance(b, row, force, f, stuck)
+                found = linear_peaks(b, row, force, f, stuck)
+            peaks[stuck][side] = tell_stuck_peaks(model, found, stop) if stuck else unmoved(found)
+    return LinearCurves(f, *curves, measures.stuck_modes(model, CANDIDATES * stop), *peaks)
 
 
 def stuck_frequency(modes: Iterable[StuckMode], in_phase: bool) -> float:
     """The lowest in Hz along x, in or out of phase; nan without."""
     found = (m.frequency for m in modes if m.axis == "x" and m.in_phase == in_phase)
     return next(found, math.nan)
-
-
-def limit_peaks(
-    plan: ForcedPlan, model: Model, linear: LinearCurves, kind: str, side: Side
-) -> list[CurvePeak]:
-    """Numbered peaks of a limit, "free" or "stuck", by rising frequency."""
-    own = sorted(getattr(linear, f"{kind}_peaks")[side], key=lambda p: p.frequency)
-    if kind == "free":
-        return unmoved(own)
-    named = tell_stuck_peaks(model, own, plan.scene.excitation.stop)
-    return sorted(named, key=lambda p: p.frequency)
 
 
 def fine_grid(

@@ -1,4 +1,10 @@
-"""What is read from an answer: accelerance, peaks, states, loops, damper motion."""
+"""What is read from an answer: accelerance, peaks, states, loops, damper motion.
+
+Peaks are told apart by the mode that moves, not by their order in frequency. The number of a peak
+is that of a stuck mode of both blades with the damper: 1 is the lowest in which the tips move in
+phase, 2 the lowest out of phase, 3 and 4 the next of each. It stays the mode's own where two peaks
+cross as a parameter changes.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +15,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
+from scipy.optimize import linear_sum_assignment
 
 from upd.analyses.forced.model import Model
 from upd.dynamics.peaks import find_peaks
@@ -91,7 +98,7 @@ def accelerance(
     k = read_harmonic(answer.balance) if harmonic is None else harmonic
     j = answer.harmonics.place(k)
     u = to_complex(np.einsum("i,nis->ns", row, answer.coefficients), answer.harmonics)[:, j]
-    return np.asarray(-((2 * np.pi * k * answer.frequency) ** 2) * u * _M / force)
+    return accelerance_of(u, answer.frequency, k, force)
 
 
 def accelerance_of(
@@ -127,9 +134,8 @@ def linear_accelerance(
         (n,) in (m/s2)/N.
     """
     k = read_harmonic(b)
-    omega = 2 * np.pi * frequency
-    moved = b.linear_displacement(omega, stuck, k) @ row
-    return np.asarray(-((k * omega) ** 2) * moved * _M / force)
+    moved = b.linear_displacement(2.0 * np.pi * frequency, stuck, k) @ row
+    return accelerance_of(moved, frequency, k, force)
 
 
 class CurvePeak(NamedTuple):
@@ -301,11 +307,6 @@ def loop_along_main(point: int, motion: Array, traction: Array, limit: Array, lo
     return Loop(point, main @ motion, main @ traction, limit, loss)
 
 
-def place(model: Model) -> tuple[Array, Array]:
-    """Contact points in the frames of their faces, as `in_faces`."""
-    return in_faces(model.position, model.face, [model.faces[side].frame for side in SIDES])
-
-
 def in_faces(position: Array, face: IntArray, frames: Iterable[Array]) -> tuple[Array, Array]:
     """Points in the frames of their faces.
 
@@ -404,18 +405,244 @@ def static_normal(answer: FrequencyResponse, model: Model, i: int) -> dict[Side,
     return {side: float(N[model.face == k].sum()) for k, side in enumerate(SIDES)}
 
 
-def shares(answer: FrequencyResponse, model: Model) -> dict[Side, Array]:
-    """Shares of the cycle in every contact state, averaged over the points of each face by their
-    normal stiffness.
+def face_shares(state: Array, face: IntArray, weight: Array) -> Array:
+    """Shares of the cycle that each face sticks, slips and is open.
+
+    Parameters
+    ----------
+    state
+        (..., n_point, 3) of its points or nodes.
+    face, weight
+        (n_point,) index into SIDES; stiffness or area.
+
+    Returns
+    -------
+    Array
+        (..., 2, 3).
+    """
+    share = [
+        np.einsum("...pc,p->...c", state[..., on, :], weight[on] / weight[on].sum())
+        for on in (face == k for k in range(len(SIDES)))
+    ]
+    return np.stack(share, axis=-2)
+
+
+# -- peaks by their modes --------------------------------------------------------------------------
+
+
+#: share of the motion above which a mode has more than all others together
+MAJORITY = 0.5
+#: modes up to so many times the highest frequency of a sweep are found in it
+CANDIDATES = 2.0
+
+
+@dataclass(frozen=True)
+class ModeShapes:
+    """Stuck modes that move the tips along x.
+
+    Attributes
+    ----------
+    M
+        (n, n) of both blades and the damper, t.
+    shape
+        (n, m) orthonormal in M.
+    number, words
+        (m,) of each mode.
+    """
+
+    M: Array
+    shape: Array
+    number: tuple[int, ...]
+    words: tuple[str, ...]
+
+
+def mode_shapes(model: Model, below: float) -> ModeShapes:
+    """The stuck modes along x below ``below`` Hz, numbered by the phase of the tips."""
+    M, values, shapes = stuck_shapes(model)
+    return shapes_along_x(M, shapes, tell_modes(model, values, shapes, below))
+
+
+def shapes_along_x(M: Array, shapes: Array, modes: Sequence[StuckMode]) -> ModeShapes:
+    """Of shapes (n, k), the first of which are these modes, those along x, numbered."""
+    count, column, number, words = {True: 0, False: 0}, [], [], []
+    for j, mode in enumerate(modes):
+        if mode.axis == "x":
+            count[mode.in_phase] += 1
+            k = count[mode.in_phase]
+            column.append(j)
+            number.append(2 * k - mode.in_phase)
+            kind = "in phase" if mode.in_phase else "out of phase"
+            words.append(kind + (f" {k}" if k > 1 else ""))
+    return ModeShapes(M, shapes[:, column], tuple(number), tuple(words))
+
+
+def motion_shares(M: Array, motion: ComplexArray, shape: Array) -> Array:
+    """Modal assurance criterion, mass-weighted, of motions and modes.
+
+    MAC = |phi^T M z|^2 / ((phi^T M phi) (z^H M z)). With modes orthonormal in M it is the share of
+    the mode in the kinetic energy of the harmonic z, and the shares of all modes sum to 1.
+
+    Parameters
+    ----------
+    M
+        (n, n) mass.
+    motion
+        (n_peak, n) complex amplitudes z.
+    shape
+        (n, n_mode) modes phi.
+
+    Returns
+    -------
+    Array
+        (n_peak, n_mode), 0 to 1.
+
+    References
+    ----------
+    R. J. Allemang, The modal assurance criterion - twenty years of use and abuse, Sound and
+    Vibration 37 (2003), eq. 1, with M as weight.
+    """
+    MZ = motion @ M
+    energy = np.einsum("pi,pi->p", motion.conj(), MZ).real
+    modal = np.einsum("ij,ik,kj->j", shape, M, shape)
+    return np.asarray(np.abs(MZ @ shape) ** 2 / (energy[:, None] * modal))
+
+
+def tell_apart(share: Array, height: Array) -> dict[int, int]:
+    """Which maximum of a curve is the peak of which mode.
+
+    A mode that has more than half of the motion at a maximum has more than all others together:
+    the maximum is its own, and the highest of its own is its peak. Maxima in which no mode has so
+    much go to the modes left over, by the assignment with the largest sum of MAC.
+
+    Parameters
+    ----------
+    share
+        (n_maximum, n_mode) MAC.
+    height
+        (n_maximum,).
 
     Returns
     -------
     dict
-        Side -> (n, 3) stick, slip and lift-off along the path.
+        Mode -> maximum, each at most once.
     """
-    w = model.contacts.law.k_n
-    out: dict[Side, Array] = {}
-    for k, side in enumerate(SIDES):
-        on = model.face == k
-        out[side] = np.einsum("npc,p->nc", answer.state[:, on], w[on] / w[on].sum())
-    return out
+    own = share > MAJORITY
+    found = {
+        int(mode): int(max(np.flatnonzero(own[:, mode]), key=lambda k: height[k]))
+        for mode in np.flatnonzero(own.any(axis=0))
+    }
+    unclear = np.flatnonzero(~own.any(axis=1))
+    left = np.array([mode for mode in range(share.shape[1]) if mode not in found], int)
+    rows, columns = linear_sum_assignment(share[np.ix_(unclear, left)], maximize=True)
+    return found | {int(left[j]): int(unclear[i]) for i, j in zip(rows, columns, strict=True)}
+
+
+def numbered_peaks(
+    model: Model, answer: FrequencyResponse, height: Array, stop: float
+) -> list[CurvePeak]:
+    """Peaks of a path by the numbers of their modes.
+
+    Parameters
+    ----------
+    model
+        Of the rig.
+    answer
+        The path.
+    height
+        (n,) what has peaks along it.
+    stop
+        End of the sweep, Hz.
+    """
+    maxima = path_maxima(answer.frequency, height)
+    if not maxima:
+        return []
+    motion = first_harmonic(answer, np.array([one.sample for one in maxima]))
+    if not answer.arrived:
+        # where a path turns round it has a maximum that is no resonance
+        on = in_quadrature(model, motion)
+        maxima, motion = [one for one, keep in zip(maxima, on, strict=True) if keep], motion[on]
+    return numbered(mode_shapes(model, CANDIDATES * stop), maxima, motion)
+
+
+def numbered(
+    modes: ModeShapes, maxima: Sequence[CurvePeak], motion: ComplexArray
+) -> list[CurvePeak]:
+    """Peaks by the number of their mode.
+
+    Parameters
+    ----------
+    maxima
+        Of a curve.
+    motion
+        (n_maximum, n) complex amplitude of all dofs at each.
+    """
+    if not maxima:
+        return []
+    share = motion_shares(modes.M, motion, modes.shape)
+    found = tell_apart(share, np.array([one.height for one in maxima]))
+    named = [
+        maxima[i]._replace(number=modes.number[j], mode=modes.words[j], mac=float(share[i, j]))
+        for j, i in found.items()
+    ]
+    return sorted(named, key=lambda peak: peak.number)
+
+
+def first_harmonic(answer: FrequencyResponse, points: NDArray[np.int64]) -> ComplexArray:
+    """Amplitudes (m, n_dof) of all dofs at some points of a path, lowest harmonic excited, mm."""
+    j = read_place(answer.balance)
+    found = [to_complex(answer.coefficients[i], answer.harmonics)[:, j] for i in points]
+    return np.asarray(found)
+
+
+def in_quadrature(model: Model, motion: ComplexArray) -> NDArray[np.bool_]:
+    """Whether motions lie within the half-power band of a resonance.
+
+    The displacement that the forces do work on, f^H z. Of one mode it is
+    |phi^T f|^2 / (w_r^2 - w^2 + 2 i zeta w_r w): out of phase with the force by 90 degrees at the
+    resonance, and by 45 and 135, where real and imaginary part are equal, at half its power.
+
+    Parameters
+    ----------
+    motion
+        (m, n) amplitudes of all dofs.
+
+    Returns
+    -------
+    NDArray
+        (m,) of bool.
+
+    References
+    ----------
+    D. J. Ewins, Modal Testing: Theory, Practice and Application, 2nd ed. (2000), 4.2.
+    """
+    driven = motion[:, : len(model.force)] @ model.force.conj()
+    return np.asarray(np.abs(driven.imag) >= np.abs(driven.real))
+
+
+def stuck_motion(model: Model, frequency: Array) -> ComplexArray:
+    """Amplitudes (m, n_dof) of all dofs with every point stuck, mm per newton of F_E, in the lowest
+    harmonic that is excited.
+    """
+    M, C, K, _ = model.linear(stuck=True)
+    force = np.concatenate([model.force, np.zeros(len(M) - len(model.force))])
+    omega = 2.0 * np.pi * model.excitation.lowest * np.asarray(frequency)
+    return np.array([np.linalg.solve(K + 1j * w * C - w**2 * M, force) for w in omega])
+
+
+def unmoved(peaks: Sequence[CurvePeak]) -> list[CurvePeak]:
+    """Peaks of a curve of no stuck mode, numbered by frequency."""
+    return [peak._replace(number=k) for k, peak in enumerate(peaks, 1)]
+
+
+def tell_stuck_peaks(model: Model, peaks: Sequence[CurvePeak], stop: float) -> list[CurvePeak]:
+    """Peaks of a stuck curve by the numbers of their modes.
+
+    Parameters
+    ----------
+    stop
+        End of the sweep, Hz.
+    """
+    if not peaks:
+        return []
+    motion = stuck_motion(model, np.array([one.frequency for one in peaks]))
+    return numbered(mode_shapes(model, CANDIDATES * stop), peaks, motion)

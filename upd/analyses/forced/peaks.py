@@ -32,14 +32,11 @@ from upd.analyses.forced.curves import (
     Top,
     rising,
 )
-from upd.analyses.forced.interface_model import by_coulomb
+from upd.analyses.forced.interface_model import SpringMarch, by_coulomb, make_springs, state_at
 from upd.analyses.forced.linear_limits import fine_grid
-from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.mode_peaks import numbered_peaks
-from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.paths import respond
+from upd.analyses.forced.measures import CurvePeak, numbered_peaks
+from upd.analyses.forced.model import Array, Model, respond
 from upd.analyses.forced.plan import ForcedPlan, time_steps
-from upd.analyses.forced.spring_march import SpringMarch, make_springs, state_at
 from upd.errors import ConvergenceError, one_line
 from upd.hbm import climb
 from upd.hbm.core.fourier import to_complex
@@ -131,7 +128,7 @@ def _top(
     model: Model, linear: LinearCurves, curve: PointCurve, side: Side, peak: CurvePeak
 ) -> Top | None:
     a, i = curve.answer, peak.sample
-    if a.linear[max(i - 1, 0) : i + 2].all():
+    if a.linear[max(i - 1, 0) : i + 2].all() and linear.stuck_peaks[side]:
         near = min(linear.stuck_peaks[side], key=lambda p: abs(p.frequency - peak.frequency))
         return Top(near.frequency, near.height, a.x[i], False)
     return climbed(model, a.balance, a.x[i], float(a.frequency[i]), side, curve.force, peak)
@@ -278,23 +275,18 @@ def _confirmed(
         Number of a peak -> those that stay beside its top, once they are looked for: one motion
         has the heights of both blades.
     """
-    starts, k = 0, SIDES.index(side)
+    k = SIDES.index(side)
     best = TimeCheck(side, peak.number, peak.mode, top.frequency, top.height, math.nan, peak.sample)
 
-    def stays(x: Array, f: float, before: _Steady | None = None) -> _Steady | None:
-        nonlocal starts
-        starts += 1
-        return integrate(x, f, before)
-
-    if like is None and (both := stays(top.x, top.frequency)) is not None:
+    if like is None and (both := integrate(top.x, top.frequency, None)) is not None:
         balance, integrated = (float(one) for one in both.heights[:, k])
-        return replace(best, balance=balance, integrated=integrated, sample=AT_TOP, starts=starts)
+        return replace(best, balance=balance, integrated=integrated, sample=AT_TOP)
     size, f = np.abs(curve.accelerance[side]), curve.frequency
     if peak.number not in motions:
         ways = _downhill(curve, size, peak.sample)
         if like is not None and like.stays:
             ways = [way for way in ways if way[1] - way[0] == like.way] or ways
-        found = (_highest(stays, curve, size, way, like) for way in ways)
+        found = (_highest(integrate, curve, size, way, like) for way in ways)
         motions[peak.number] = [one for one in found if one is not None]
     for one in motions[peak.number]:
         balance, integrated = (float(height) for height in one.heights[:, k])
@@ -311,11 +303,11 @@ def _confirmed(
                 way=one.way,
                 share=float(size[i] / size[peak.sample]),
             )
-    return replace(best, starts=starts)
+    return best
 
 
 def _highest(
-    stays: Callable[..., _Steady | None],
+    integrate: Callable[..., _Steady | None],
     curve: PointCurve,
     size: Array,
     way: list[int],
@@ -330,7 +322,7 @@ def _highest(
     if like is not None and like.stays:
         at, step = int(np.abs(size[way] - like.share * size[way[0]]).argmin()), 1
     while high - low > 1:
-        both = stays(x[way[at]], float(f[way[at]]))
+        both = integrate(x[way[at]], float(f[way[at]]), None)
         if both is None:
             low = at
         else:
@@ -341,7 +333,7 @@ def _highest(
         return None
     # up again from its own motion, as long as that grows
     for k in range(high - 1, -1, -1):
-        further = stays(x[way[k]], float(f[way[k]]), kept)
+        further = integrate(x[way[k]], float(f[way[k]]), kept)
         if further is None or np.linalg.norm(further.heights[1]) < np.linalg.norm(kept.heights[1]):
             break
         high, kept = k, further

@@ -18,16 +18,21 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import ForcedCurve, LinearCurves, PointCurve, TimeCheck, Top
-from upd.analyses.forced.linear_limits import limit_peaks, linear_of, stuck_frequency
-from upd.analyses.forced.measures import CurvePeak, StuckMode, stuck_modes
-from upd.analyses.forced.mode_peaks import CANDIDATES, numbered_peaks
-from upd.analyses.forced.model import Array, Model
-from upd.analyses.forced.other_points import carried, moved_points
-from upd.analyses.forced.paths import (
+from upd.analyses.forced.linear_limits import linear_of, stuck_frequency
+from upd.analyses.forced.measures import (
+    CANDIDATES,
+    CurvePeak,
+    StuckMode,
+    numbered_peaks,
+    stuck_modes,
+)
+from upd.analyses.forced.model import (
     BAND,
     BAND_POINTS,
     LONG_STEPS,
     SWEEP_POINTS,
+    Array,
+    Model,
     balance_of,
     respond,
 )
@@ -35,7 +40,6 @@ from upd.analyses.forced.peaks import climbed, confirmed, with_tops
 from upd.analyses.forced.plan import ForcedPlan
 from upd.errors import ConvergenceError, UpdError, one_line
 from upd.hbm import FrequencyResponse
-from upd.hbm.core.fourier import harmonics, sample_count
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.peak import FIRST_REACH, is_near
 from upd.hbm.springs.starts import newton
@@ -148,9 +152,9 @@ class Variant(NamedTuple):
     of
         The change, and its size where it is a level.
     model
-        The changed model; None where the run's own is solved with more harmonics or samples.
-    more, finer
-        Harmonics more than the run has; factor on its samples.
+        The changed model; None where the run's own is solved with other harmonics or samples.
+    plan
+        With these.
     any_height
         Whether peaks may move far: they are always solved with friction, and the highest of their
         mode is taken, wherever in the sweep and however high.
@@ -162,8 +166,7 @@ class Variant(NamedTuple):
 
     of: Variation
     model: Model | None = None
-    more: int = 0
-    finer: int = 1
+    plan: ForcedPlan | None = None
     any_height: bool = False
     seconds: float = 0.0
     why: str = ""
@@ -253,11 +256,12 @@ def _limits_again(peaks: FoundPeaks, linear: LinearCurves) -> Iterator[tuple[Pla
     """Peaks of other limits by rising frequency, with the numbers they have in the run."""
     for kind in ("free", "stuck"):
         for side in SIDES:
-            own = getattr(peaks.linear, f"{kind}_peaks")[side]
-            other = sorted(getattr(linear, f"{kind}_peaks")[side], key=lambda p: p.frequency)
-            for one, peak in zip(limit_peaks(*peaks[:3], kind, side), other, strict=False):
-                if len(own) == len(other):
-                    yield (kind, side, one.number), Found(peak.frequency, peak.height)
+            own, other = (
+                sorted(getattr(of, f"{kind}_peaks")[side], key=lambda p: p.frequency)
+                for of in (peaks.linear, linear)
+            )
+            for one, peak in zip(own, other, strict=True) if len(own) == len(other) else ():
+                yield (kind, side, one.number), Found(peak.frequency, peak.height)
 
 
 def expected(own: LinearCurves, modes: Sequence[StuckMode], free: float, one: RunPeak) -> float:
@@ -290,11 +294,9 @@ def _other_balance(peaks: FoundPeaks, variant: Variant, one: RunPeak) -> Found |
     is that of a time integration.
     """
     top, old = one.top, one.balance
-    if not top.slips or one.check is not None:
+    if variant.plan is None or not top.slips or one.check is not None:
         return None
-    numbers = range(old.harmonics.highest + variant.more + 1)
-    samples = max(variant.finer * old.samples, sample_count(harmonics(numbers)))
-    b = balance_of(peaks.plan, peaks.model, one.force, numbers, samples)
+    b = balance_of(variant.plan, peaks.model, one.force, variant.plan.scene.harmonic_numbers)
     if old.start == "static":
         # from the static state of the run
         b = b.with_sliders("static", old.slider)
@@ -437,3 +439,82 @@ def _on_a_path(
             if peak.number == one.number and near:
                 return Found(peak.frequency, peak.height)
     return NOT_FOUND
+
+
+# -- on other contact points -----------------------------------------------------------------------
+
+
+def moved_points(base: Model, other: Model) -> Array | None:
+    """(n, n_base) displacements of a model's points from those of the run's, on the same faces, by
+    straight lines up the slope; None where the points are the same.
+    """
+    here, there = places_up(base), places_up(other)
+    if here.shape == there.shape and np.allclose(
+        here, there, atol=1e-6 * float(np.ptp(here) or 1.0)
+    ):
+        return None
+    out = np.zeros((other.contacts.n_point, base.contacts.n_point))
+    for k in range(len(SIDES)):
+        mine, new = np.flatnonzero(base.face == k), np.flatnonzero(other.face == k)
+        x, s = here[mine], there[new]
+        rows = np.unique(np.round(x, 9))
+        weight = straight(rows, s)
+        for j, row in enumerate(rows):
+            on = mine[np.isclose(x, row, atol=1e-8 * max(np.ptp(x), 1.0))]
+            # along the damper the motion hardly changes: the mean of the row's points
+            out[np.ix_(new, on)] = weight[:, j : j + 1] / len(on)
+    return out
+
+
+def places_up(model: Model) -> Array:
+    """(n,) places up the slope from the middle of each face, mm."""
+    out = np.zeros(len(model.face))
+    for k, side in enumerate(SIDES):
+        on, face = model.face == k, model.faces[side]
+        local = face.position @ face.frame[2]
+        out[on] = local - face.weight @ local
+    return out
+
+
+def carried(b: Balance, old: Balance, x: Array, move: Array | None) -> Array:
+    """Unknowns of a motion on another model: the same motion of its points, and the rigid motion
+    that goes with it.
+
+    Parameters
+    ----------
+    move
+        As of `moved_points`. A model with both sliding directions does not move along the damper.
+    """
+    W, rest = old.split(x)
+    if b.contacts.tangents > old.contacts.tangents:
+        W = np.insert(W, 1, 0.0, axis=1)
+    if move is None:
+        return np.concatenate([W.ravel(), rest])
+    moved = np.einsum("pq,qdk->pdk", move, W)
+    flat = np.concatenate([moved.ravel(), np.zeros(b.rigid)])
+    if not b.rigid:
+        return flat
+    F = b.force(flat, False).force.reshape(len(b.Psi), -1)
+    rows = b.Psi[:, b.modal.rigid]
+    mean = moved.reshape(len(b.Psi), -1)[:, 0] + b.G0 @ F[:, 0] - b.u0
+    a = np.linalg.lstsq(rows, mean, rcond=None)[0]
+    return np.concatenate([moved.ravel(), a])
+
+
+def straight(rows: Array, s: Array) -> Array:
+    """(m, n) values at s by straight lines between rows, and beyond their ends.
+
+    Parameters
+    ----------
+    rows
+        (n,) rising.
+    s
+        (m,).
+    """
+    if len(rows) == 1:
+        return np.ones((len(s), 1))
+    k = np.clip(np.searchsorted(rows, s) - 1, 0, len(rows) - 2)
+    share = (s - rows[k]) / (rows[k + 1] - rows[k])
+    out = np.zeros((len(s), len(rows)))
+    out[np.arange(len(s)), k], out[np.arange(len(s)), k + 1] = 1.0 - share, share
+    return out

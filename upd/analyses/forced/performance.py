@@ -17,10 +17,8 @@ import numpy as np
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import LinearCurves, PointCurve
 from upd.analyses.forced.linear_limits import fine_grid
-from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.mode_peaks import numbered_peaks
-from upd.analyses.forced.model import Model
-from upd.analyses.forced.paths import LONG_STEPS, SWEEP_POINTS, respond
+from upd.analyses.forced.measures import CurvePeak, numbered_peaks
+from upd.analyses.forced.model import LONG_STEPS, SWEEP_POINTS, Model, respond
 from upd.analyses.forced.plan import ForcedPlan
 from upd.linalg.parallel import threads_for
 from upd.linalg.processes import Job
@@ -55,8 +53,6 @@ class Performance:
         The curves, F_C/F_E rising.
     free, stuck
         Highest peaks of both limits, (m/s2)/N.
-    harmonics
-        The highest of the balance.
     again
         A point near the best one, and the same with the harmonics of the run; None where these are
         no more.
@@ -65,7 +61,6 @@ class Performance:
     points: tuple[RatioPoint, ...]
     free: float
     stuck: float
-    harmonics: int
     again: tuple[RatioPoint, RatioPoint] | None = None
 
     @property
@@ -206,7 +201,6 @@ def further_points(
 
 
 def performance_of(
-    plan: ForcedPlan,
     linear: LinearCurves,
     points: Iterable[RatioPoint],
     further: Iterable[RatioPoint],
@@ -232,7 +226,7 @@ def performance_of(
         for peaks in (linear.free_peaks, linear.stuck_peaks)
     )
     ordered = tuple(sorted(found, key=lambda one: one.ratio))
-    return Performance(ordered, free, stuck, harmonics_of(plan), again)
+    return Performance(ordered, free, stuck, again)
 
 
 def _known(points: Iterable[RatioPoint]) -> list[RatioPoint]:

@@ -1,10 +1,18 @@
 """Plan of a forced response.
 
 What is simulated and left out, how that is checked afterwards, size and cost.
+
+Every force acts along x at mid-core of its blade,
+
+    F(t) = F_E Re( sum_k a_k exp(i k omega t) ),
+
+with the amplitudes a_k relative to F_E. What is read from an answer, its accelerance, is the
+acceleration in the lowest harmonic that is excited, per newton of F_E.
 """
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +23,6 @@ from numpy.typing import NDArray
 
 from upd.analyses.base import Effect, Needs, Plan
 from upd.analyses.cost import NODES, CostModel, dense_s
-from upd.analyses.forced.excitation import excitation_of
 from upd.analyses.forced.stiffness import check_sources, plans_to_solve
 from upd.analyses.seated.plan import centrifugal_effects
 from upd.cache.sources import key_of
@@ -24,7 +31,8 @@ from upd.hbm.core.kept_factors import SOLUTIONS, WORTH_KEEPING
 from upd.mesh import recipes
 from upd.scene import ForcedScene
 from upd.scene.base import rig_parameters
-from upd.scene.forced_contact import GAUSS
+from upd.scene.forced import ExcitationChoice, combined_forces
+from upd.scene.forced_contact import GAUSS, SIDES, Side
 
 Array = NDArray[np.float64]
 #: harmonics of the blades and samples in a period where the scene leaves them to the rule: two
@@ -61,20 +69,12 @@ MARCH_SAMPLES = 128
 
 @dataclass(frozen=True)
 class ForcedPlan(Plan[ForcedScene]):
-    """Plan of a forced response.
-
-    Attributes
-    ----------
-    asked
-        The scene as asked for, where that leaves the levels to an accuracy.
-    """
-
-    asked: ForcedScene | None = None
+    """Plan of a forced response."""
 
 
 def make_plan(scene: ForcedScene) -> ForcedPlan:
     """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
-    parameters = _parameters(scene)
+    parameters = parameters_of(scene)
     whole = scene.contact.model == "interface"
     if not whole:
         check_sources(scene)
@@ -130,7 +130,8 @@ def _files_seconds(scene: ForcedScene) -> float:
     return _FILES_S + _CURVE_S * curves * (not whole)
 
 
-def _parameters(scene: ForcedScene) -> dict[str, Any]:
+def parameters_of(scene: ForcedScene) -> dict[str, Any]:
+    """Of the recipe."""
     # points on lattice lines pair themselves
     apart = scene.contact.rule == GAUSS
     half = (scene.contact.model == "interface" or apart) and scene.mesh.symmetry != "full"
@@ -142,10 +143,16 @@ def _cost(
 ) -> tuple[CostModel, float, int]:
     """Seconds and solvers, bytes, and blades reduced side by side."""
     cost = CostModel(scene)
-    for body in ("left", "right"):
-        hexes, nodes = size[body]["hexes"], size[body]["nodes"]
+    modes = scene.reduction.modes
+    for side in SIDES:
+        hexes, nodes, contact = (size[side][of] for of in ("hexes", "nodes", "contact"))
         cost.dynamic_body(hexes, nodes)
-        reduced(cost, scene, body, f"{body}, reduction", (hexes, nodes, size[body]["contact"]))
+        task = f"{side}, reduction"
+        if scene.contact.rule == GAUSS:
+            rows, columns = scene.contact.lines(side)
+            cost.attached(task, hexes, nodes, 3 * rows * columns + 2, modes)
+        else:
+            cost.reduction(task, hexes, nodes, 3 * (contact + 2), modes)
     if scene.left_out.solves:
         # K and M of the elastic damper, once per stiffness
         damper = size["damper"]
@@ -156,25 +163,6 @@ def _cost(
     cost.seconds += _files_seconds(scene)
     memory, workers = cost.side_by_side(min(2, cost.threads), 2)
     return cost, max([memory, *(plan.memory_bytes for plan in sources)]), workers
-
-
-def reduced(
-    cost: CostModel, scene: ForcedScene, body: str, task: str, size: tuple[int, int, int]
-) -> None:
-    """A blade reduced to its contact points, 2 probes and some modes.
-
-    Parameters
-    ----------
-    size
-        Hexahedra, nodes, and contact nodes.
-    """
-    hexes, nodes, contact = size
-    modes = scene.reduction.modes
-    if scene.contact.rule == GAUSS:
-        rows, columns = scene.contact.lines("left" if body == "left" else "right")
-        cost.attached(task, hexes, nodes, 3 * rows * columns + 2, modes)
-    else:
-        cost.reduction(task, hexes, nodes, 3 * (contact + 2), modes)
 
 
 def _curves_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
@@ -192,11 +180,6 @@ def _curves_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -
     return steps * _step_seconds(scene, size)
 
 
-def blade_harmonics(scene: ForcedScene) -> int:
-    """The highest of the balance."""
-    return int(scene.balance.harmonics)
-
-
 def time_steps(scene: ForcedScene) -> int:
     """Steps in a period of every march."""
     given = scene.balance.samples
@@ -206,7 +189,7 @@ def time_steps(scene: ForcedScene) -> int:
 def _step_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
     """Seconds of a Newton step with its factors."""
     across = 3 if scene.contact.directions == "two" or scene.mesh.symmetry == "full" else 2
-    highest, given = blade_harmonics(scene), scene.balance.samples
+    highest, given = int(scene.balance.harmonics), scene.balance.samples
     points = _points(scene, size)
     # coefficients of the motion of the contact points
     n = across * points * (2 * highest + 1)
@@ -221,11 +204,6 @@ def _step_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> 
 def _points(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
     """Contact points of both faces."""
     return sum(_point_count(scene, size[side]["contact"], side) for side in ("left", "right"))
-
-
-def newton_seconds(plan: ForcedPlan) -> float:
-    """Of a Newton step of the run, with its factors."""
-    return _step_seconds(plan.scene, plan.size)
 
 
 def _point_count(scene: ForcedScene, nodes: int, side: Any) -> float:
@@ -302,7 +280,9 @@ def effects_of_points(scene: ForcedScene) -> list[Effect]:
 def effects_of_faces(scene: ForcedScene) -> list[Effect]:
     """Of contact by all nodes of both faces."""
     mu, c = scene.contact.friction, scene.contact
-    harmonics_of_blades = f"0 to {blade_harmonics(scene)} of the blades; contact and damper in time"
+    harmonics_of_blades = (
+        f"0 to {scene.balance.harmonics} of the blades; contact and damper in time"
+    )
     return [
         _friction(mu, f"Coulomb, mu = {mu:g}, both directions, every node of both faces"),
         Effect("normal and tangential coupling", True, "solved together at every step in time"),
@@ -369,3 +349,81 @@ def _along(scene: ForcedScene) -> Effect:
     )
     check = ALONG if scene.left_out.solves and scene.balance.method == "balance" else ""
     return Effect(name, False, why, check, ("contact.directions=two",), applies=c.friction > 0.0)
+
+
+# -- excitation ------------------------------------------------------------------------------------
+
+
+ComplexArray = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """Forces relative to F_E, H harmonics at L blades.
+
+    Attributes
+    ----------
+    blades
+        (L,) those excited, the left one first.
+    drive
+        (L, H) complex amplitudes of harmonics 1 to H over F_E.
+    """
+
+    blades: tuple[Side, ...]
+    drive: ComplexArray
+
+    @property
+    def harmonics(self) -> tuple[int, ...]:
+        """Those excited, rising."""
+        return tuple(int(k) + 1 for k in np.flatnonzero(np.any(self.drive != 0.0, axis=0)))
+
+    @property
+    def lowest(self) -> int:
+        """The harmonic that is read from an answer."""
+        return self.harmonics[0]
+
+    @property
+    def read(self) -> ComplexArray:
+        """(L,) amplitudes of the lowest harmonic over F_E."""
+        return np.asarray(self.drive[:, self.lowest - 1])
+
+    @property
+    def at_start(self) -> NDArray[np.float64]:
+        """(L,) forces at t = 0 over F_E."""
+        return np.asarray(self.drive.real.sum(axis=1))
+
+    @property
+    def free_blades(self) -> tuple[Side, ...]:
+        """Those that move without a damper, in the harmonic that is read."""
+        return tuple(side for side, a in zip(self.blades, self.read, strict=True) if a != 0.0)
+
+    @property
+    def usual(self) -> bool:
+        """Whether F_E on the right blade is all of it."""
+        return self.blades == ("right",) and self.drive.tolist() == [[1.0]]
+
+    @property
+    def words(self) -> str:
+        """The forces along x at mid-core: "F_E on the right blade, 0.5 F_E at 180 deg on the left
+        blade".
+        """
+        parts = []
+        for k in self.harmonics:
+            for side, a in zip(reversed(self.blades), self.drive[::-1, k - 1], strict=True):
+                size, phase = abs(a), round(math.degrees(cmath.phase(a)), 6)
+                if size:
+                    times = "" if math.isclose(size, 1.0) else f"{size:.4g} "
+                    at = f" at {phase + 0.0:g} deg" if phase else ""
+                    of = f" in harmonic {k}" if self.harmonics != (1,) else ""
+                    parts.append(f"{times}F_E{at} on the {side} blade{of}")
+        return ", ".join(parts)
+
+
+def excitation_of(choice: ExcitationChoice) -> Excitation:
+    """The forces of a scene, those of one blade and harmonic added up."""
+    found = combined_forces(choice)
+    blades = tuple(side for side in SIDES if any(blade == side for blade, _ in found))
+    drive = np.zeros((len(blades), max(harmonic for _, harmonic in found)), complex)
+    for (blade, harmonic), amplitude in found.items():
+        drive[blades.index(blade), harmonic - 1] = amplitude
+    return Excitation(blades, drive)

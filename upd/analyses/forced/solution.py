@@ -10,20 +10,16 @@ import numpy as np
 
 from upd.analyses.base import Resolved
 from upd.analyses.forced.curves import ForcedCurve, LinearCurves, SweptCurve, WholeFaces
-from upd.analyses.forced.excitation import excitation_of
-from upd.analyses.forced.inputs import InputEffect
-from upd.analyses.forced.linear_limits import stuck_peaks_of
-from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.mode_peaks import CANDIDATES, tell_stuck_peaks
+from upd.analyses.forced.measures import CurvePeak, in_faces
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.peaks_again import PeaksAgain
-from upd.analyses.forced.performance import Performance, RatioPoint
+from upd.analyses.forced.performance import Performance
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.seated.bodies import Bodies
 from upd.hbm.faces.record import RecordedPeriod
 from upd.mesh import IntArray
-from upd.results import Case
-from upd.scene.forced_contact import Side
+from upd.results import Case, Result
+from upd.scene.forced_contact import SIDES
 
 _TINY = float(np.finfo(float).tiny)
 
@@ -83,20 +79,12 @@ class MarchedPeak:
         return abs(self.period.energy - float(own[2])) / max(float(np.abs(own).sum()), _TINY)
 
 
-@dataclass(frozen=True)
-class BandPoint:
-    """The peaks of a curve from another static state or start of the sliders, in words."""
-
-    stiffness: str
-    choice: str
-    point: RatioPoint
-
-
 @dataclass
 class ForcedSolution:
     """All that was solved, for results, checks and arrays.
 
-    Dictionaries by the name of the contact stiffness.
+    Dictionaries by the name of the contact stiffness; ``band`` and ``effects`` are numbers of peaks
+    from other static states and starts of the sliders, and of their changes by inputs.
     """
 
     plan: ForcedPlan
@@ -106,11 +94,11 @@ class ForcedSolution:
     curves: list[ForcedCurve[Any]] = field(default_factory=list)
     faces: dict[str, WholeFaces] = field(default_factory=dict)
     marched: list[MarchedPeak] = field(default_factory=list)
-    band: list[BandPoint] = field(default_factory=list)
+    band: list[Result] = field(default_factory=list)
     performances: dict[str, Performance] = field(default_factory=dict)
     omissions: list[Resolved] = field(default_factory=list)
     levels: dict[str, list[PeaksAgain]] = field(default_factory=dict)
-    effects: dict[str, list[InputEffect]] = field(default_factory=dict)
+    effects: list[Result] = field(default_factory=list)
 
     @property
     def order(self) -> int:
@@ -118,17 +106,17 @@ class ForcedSolution:
         reduced = [len(one.M) for one in self.models.values()]
         return max([*reduced, *(3 * one.of.n for one in self.faces.values())], default=0)
 
-    def stuck_peaks(self, stiffness: str, blade: Side = "right") -> list[CurvePeak]:
-        """Peaks of the stuck curve within the sweep: what a whole curve is asked for."""
-        linear = self.linear.get(stiffness)
-        if linear is None:
-            return []
-        stop = self.plan.scene.excitation.stop
+    def places(self, stiffness: str) -> ContactPlaces:
+        """Of the contact points, or of the nodes of whole faces."""
         if stiffness in self.faces:
-            excitation = excitation_of(self.plan.scene.excitation)
-            march, peaks = self.faces[stiffness].march, linear.stuck_peaks[blade]
-            return stuck_peaks_of(march, peaks, CANDIDATES * stop, excitation)
-        return tell_stuck_peaks(self.models[stiffness], linear.stuck_peaks[blade], stop)
+            of = self.faces[stiffness].of
+            along, up = in_faces(of.position, of.face, of.frame)
+            return ContactPlaces(of.face, along, up, of.area, np.zeros(of.n))
+        model, law = self.models[stiffness], self.models[stiffness].contacts.law
+        frames = [model.faces[side].frame for side in SIDES]
+        along, up = in_faces(model.position, model.face, frames)
+        springs = np.divide(1.0, law.k_t, out=np.zeros_like(law.k_t), where=law.k_t > 0.0)
+        return ContactPlaces(model.face, along, up, law.k_n, springs)
 
     def marked_points(self, curve: ForcedCurve[Any]) -> list[tuple[int, str, int]]:
         """Number, mode and point of the path of the right blade's peaks.

@@ -9,18 +9,19 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
-from upd.analyses.forced.inputs import effects_of, few_harmonics, input_variants
-from upd.analyses.forced.interface_model import INTERFACE, make_whole_faces
-from upd.analyses.forced.left_out import (
+from upd.analyses.forced.inputs import (
     along_changes,
     along_variant,
+    effects_of,
     elastic_changes,
+    few_harmonics,
     highest_slipping,
+    input_variants,
 )
-from upd.analyses.forced.levels import COARSER, Laws, coarse_model, other_levels
+from upd.analyses.forced.interface_model import INTERFACE, make_springs, make_whole_faces
+from upd.analyses.forced.levels import MESH, Laws, level_variations, make_variant
 from upd.analyses.forced.linear_limits import linear_of, linear_of_faces
-from upd.analyses.forced.model import Model, make_model, preloaded
-from upd.analyses.forced.paths import quiet
+from upd.analyses.forced.model import Model, make_model, preloaded, quiet
 from upd.analyses.forced.peaks import solve_curve
 from upd.analyses.forced.peaks_again import (
     FoundPeaks,
@@ -38,8 +39,7 @@ from upd.analyses.forced.performance import (
     with_curves,
 )
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import BandPoint, ForcedSolution
-from upd.analyses.forced.spring_march import make_springs
+from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import StaticState, admissible, same, static_state
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.forced.sweeps import balance_curve, both_ways, march_peaks
@@ -49,6 +49,8 @@ from upd.hbm.faces.state import InterfaceModel, InterfaceState
 from upd.linalg.parallel import threads_for
 from upd.linalg.processes import SideProcesses
 from upd.progress import Stages
+from upd.results import Case
+from upd.results import quantities as q
 
 log = logging.getLogger(__name__)
 #: what a process beside this one imports at once
@@ -177,10 +179,12 @@ def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: St
     work: list[_Work] = []
     for name in laws if scene.estimates else ():
         model = solution.models[name]
-        variants[name] += other_levels(plan, model, bodies, laws[name])
-        for factor in COARSER:
-            given = plan, model, laws[name], factor
-            work.append(_Work(variants[name].append, coarse_model, given, needed=True))
+        for of in level_variations(plan):
+            if of.source != MESH:
+                variants[name].append(make_variant(plan, model, bodies, laws[name], of))
+            else:
+                given = plan, model, None, laws[name], of
+                work.append(_Work(variants[name].append, make_variant, given, needed=True))
     order = list(scene.excitation.centrifugal_to_force)
     for name, model in solution.models.items():
         # those with most slip first
@@ -217,7 +221,8 @@ def _around(
         levels = solution.levels.setdefault(name, []) if variants[name] else []
         work += [_Work(levels.append, solve_again, (peaks, one)) for one in variants[name]]
         if scene.left_out.solves:
-            solution.omissions += elastic_changes(solution, name)
+            assert solution.bodies is not None
+            solution.omissions += elastic_changes(peaks, solution.bodies, name)
         if name == first:
             if scene.wants("performance"):
                 jobs = further_points(plan, model, with_curves(points, mine), points)
@@ -230,7 +235,7 @@ def _around(
     if scene.wants("performance"):
         mine = tuple(c for c in solution.curves if c.stiffness == first)
         solution.performances[first] = performance_of(
-            plan, solution.linear[first], with_curves(points, mine), further
+            solution.linear[first], with_curves(points, mine), further
         )
 
 
@@ -242,14 +247,18 @@ def _at_few_harmonics(
     if few is None:
         return
     if scene.wants("inputs"):
-        effects = solution.effects.setdefault(name, [])
         for variant in input_variants(few):
             yield _Work(
-                lambda one: effects.extend(effects_of(few, one)), solve_again, (few, variant)
+                lambda one: solution.effects.extend(effects_of(few, one)),
+                solve_again,
+                (few, variant),
             )
-    along = along_variant(solution, name, laws) if scene.left_out.solves else None
     highest = highest_slipping(few)
-    if along is not None and highest is not None:
+    if highest is None or not scene.left_out.solves:
+        return
+    assert solution.bodies is not None
+    along = along_variant(few, solution.bodies, laws)
+    if along is not None:
         yield _Work(
             lambda one: solution.omissions.extend(along_changes(highest, one)),
             solve_again,
@@ -278,4 +287,9 @@ def _band(solution: ForcedSolution, name: str) -> Iterator[_Work]:
 
 
 def _into_band(solution: ForcedSolution, name: str, choice: str, point: RatioPoint) -> None:
-    solution.band.append(BandPoint(name, choice, point))
+    for peak in (one for one in point.peaks if one.blade == "right"):
+        case = Case(stiffness=name, force_ratio=point.ratio, mode=peak.mode, choice=choice)
+        solution.band += [
+            q.BAND_FREQUENCY.of(peak.frequency, case, n=peak.number),
+            q.BAND_ACCELERANCE.of(peak.height, case, n=peak.number),
+        ]

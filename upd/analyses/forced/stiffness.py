@@ -38,13 +38,10 @@ class FaceLaw:
     ----------
     K_N, K_T
         Totals, N/mm.
-    source
-        Where the totals come from.
     """
 
     K_N: float
     K_T: float
-    source: str = "given"
 
 
 def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceLaw]:
@@ -52,7 +49,7 @@ def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceLaw]:
 
     A contact analysis stands for the right one and, mirrored, for the symmetric rig's left.
     """
-    law, source = _law(choice, stages) if choice.from_contact else (None, "")
+    law = _law(choice, stages) if choice.from_contact else None
     out: dict[Side, FaceLaw] = {}
     for side in SIDES:
         given = choice.face(side)
@@ -61,7 +58,7 @@ def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceLaw]:
         else:
             assert law is not None
             K_T = float(law.k_t.sum(axis=0).mean())
-            out[side] = FaceLaw(float(law.k_n.sum()), K_T, source)
+            out[side] = FaceLaw(float(law.k_n.sum()), K_T)
     return out
 
 
@@ -143,8 +140,8 @@ def _kept_law(scene: Scene) -> Path:
     return cache_folder() / f"law-{key[:32]}.npz"
 
 
-def _law(choice: StiffnessChoice, stages: Stages) -> tuple[ContactLaw, str]:
-    """The law of a finished run, or of a contact scene's first load, kept on disk; its source."""
+def _law(choice: StiffnessChoice, stages: Stages) -> ContactLaw:
+    """The law of a finished run, or of a contact scene's first load, kept on disk."""
     if choice.run is not None:
         path = Path(choice.run) / "result.nc"
         try:
@@ -154,7 +151,7 @@ def _law(choice: StiffnessChoice, stages: Stages) -> tuple[ContactLaw, str]:
                 f"stiffness: no contact law in {path} ({error}); give the folder of a "
                 "finished contact run"
             ) from None
-        return ContactLaw.from_arrays(_first(groups, str(path))), f"run {choice.run}"
+        return ContactLaw.from_arrays(_first(groups, str(path)))
     scene = _contact_scene(choice)
     kept = _kept_law(scene)
     with stages("contact stiffness", f"{scene.name}, {choice.bodies} bodies"):
@@ -162,7 +159,7 @@ def _law(choice: StiffnessChoice, stages: Stages) -> tuple[ContactLaw, str]:
         if arrays is None:
             arrays = {name: variable[1] for name, variable in _run(scene).items()}
             save_arrays(kept, arrays)
-    return ContactLaw.from_arrays(arrays), f"scene {Path(choice.scene or '').stem}"
+    return ContactLaw.from_arrays(arrays)
 
 
 def _first(groups: Mapping[str, ArrayGroup], where: str) -> ArrayGroup:

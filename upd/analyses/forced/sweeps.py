@@ -19,25 +19,30 @@ from functools import partial
 import numpy as np
 
 from upd.analyses.forced.curves import Answer, FacesCurve, ForcedCurve, SweptCurve, Way, WholeFaces
-from upd.analyses.forced.excitation import ComplexArray, excitation_of
 from upd.analyses.forced.interface_model import by_coulomb
 from upd.analyses.forced.linear_limits import stuck_modes_of
 from upd.analyses.forced.measures import (
+    CANDIDATES,
     MOTIONS,
     PEAKS_ABOVE,
     CurvePeak,
     Loop,
     accelerance_of,
-    in_faces,
     loop_along_main,
     losing_most,
+    numbered,
     path_maxima,
-    place,
 )
-from upd.analyses.forced.mode_peaks import CANDIDATES, numbered
 from upd.analyses.forced.model import Array
-from upd.analyses.forced.plan import SAMPLES, ForcedPlan, blade_harmonics, grid, time_steps
-from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
+from upd.analyses.forced.plan import (
+    SAMPLES,
+    ComplexArray,
+    ForcedPlan,
+    excitation_of,
+    grid,
+    time_steps,
+)
+from upd.analyses.forced.solution import ForcedSolution, MarchedPeak
 from upd.hbm.faces.balance import interface_response
 from upd.hbm.faces.record import period_of_sweep
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
@@ -158,7 +163,7 @@ def balance_curve(plan: ForcedPlan, name: str, faces: WholeFaces, ratio: float) 
         grid(plan),
         force * excitation.drive,
         faces.start,
-        harmonics=blade_harmonics(plan.scene),
+        harmonics=plan.scene.balance.harmonics,
         samples=SAMPLES if b.samples == "auto" else b.samples,
         fallback=by_coulomb,
     )
@@ -198,32 +203,18 @@ def march_peaks(solution: ForcedSolution, name: str, stages: Stages) -> None:
 
 def marched_peak(solution: ForcedSolution, sweep: SweptCurve, peak: CurvePeak) -> MarchedPeak:
     """The last period of a sweep at one of its peaks, integrated again and kept."""
-    places, rest, kept = _contact(solution, sweep.stiffness)
+    name = sweep.stiffness
+    if name in solution.faces:
+        faces = solution.faces[name]
+        rest, kept = faces.start.s, list(faces.of.kept)
+    else:
+        # springs count from the static state
+        damper = solution.models[name].damper
+        rest, kept = np.zeros(damper.n_dof), list(damper.kept)
     period = period_of_sweep(sweep.answer, peak.sample, by_coulomb)
     motion = np.zeros((len(period.motion), MOTIONS))
     motion[:, kept] = period.motion - rest
-    return MarchedPeak(sweep, peak, period, places, motion)
-
-
-def _contact(solution: ForcedSolution, name: str) -> tuple[ContactPlaces, Array, list[int]]:
-    """Places of the nodes; the damper's motion at rest, and which of the six motions it is."""
-    if name in solution.faces:
-        faces = solution.faces[name]
-        places = faces_places(solution, name)
-        return places, faces.start.s, list(faces.of.kept)
-    model = solution.models[name]
-    along, up = place(model)
-    law = model.contacts.law
-    places = ContactPlaces(model.face, along, up, law.k_n, 1.0 / law.k_t)
-    # springs count from the static state
-    return places, np.zeros(model.damper.n_dof), list(model.damper.kept)
-
-
-def faces_places(solution: ForcedSolution, name: str) -> ContactPlaces:
-    """Nodes of whole faces in the frames of their faces."""
-    of = solution.faces[name].of
-    along, up = in_faces(of.position, of.face, of.frame)
-    return ContactPlaces(of.face, along, up, of.area, np.zeros(of.n))
+    return MarchedPeak(sweep, peak, period, solution.places(name), motion)
 
 
 def marched_loops(one: MarchedPeak, count: int) -> list[Loop]:
@@ -248,34 +239,6 @@ def marched_loops(one: MarchedPeak, count: int) -> list[Loop]:
         limit = friction[p] * period.force[:, 0, p]
         out.append(loop_along_main(int(p), motion, traction, limit, float(period.loss[p])))
     return out
-
-
-def face_shares(state: Array, places: ContactPlaces) -> Array:
-    """Of the cycle that each face sticks, slips, is open, by stiffness or area.
-
-    Parameters
-    ----------
-    state
-        (n, 3) of the points or nodes.
-    places
-        Of these.
-
-    Returns
-    -------
-    Array
-        (2, 3).
-    """
-    out = np.zeros((len(SIDES), 3))
-    for k in range(len(SIDES)):
-        on = places.face == k
-        weight = places.weight[on]
-        out[k] = weight @ state[on] / weight.sum()
-    return out
-
-
-def marched_shares(one: MarchedPeak) -> Array:
-    """(2, 3) of the cycle that each face sticks, slips, is open at a peak."""
-    return face_shares(one.period.share, one.places)
 
 
 def marched_damper(solution: ForcedSolution, one: MarchedPeak) -> tuple[Array, Array]:
