@@ -12,7 +12,7 @@ from typing import Any
 from upd.plot.chart import Chart
 from upd.plot.matplotlib import chart_png
 from upd.plot.plotly import figure
-from upd.plot.png import png_size, png_uri, small_png
+from upd.plot.png import image_uri, png_size
 from upd.plot.surface import Surface, n_bytes, with_fields
 
 #: PNG file -> heading, for those that have no chart
@@ -21,8 +21,6 @@ _HEADINGS = {
     "modes_glued": "Mode shapes, damper glued",
     "dimensions": "Geometry and its dimensions",
 }
-#: pixels of the width of a picture at most
-_WIDTH = 1600
 #: a picture wider than this has drawings side by side
 _SHEET_PIXELS = 1300
 
@@ -53,7 +51,7 @@ def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Pa
     groups: dict[str, list[Chart]] = {}
     for chart in charts:
         groups.setdefault(chart.figure or chart.title, []).append(chart)
-    images = {name: small_png(path, _WIDTH) for name, path in figures.items()}
+    images = {name: path.read_bytes() for name, path in figures.items()}
     panels = [
         _panel(name, group[0].heading or group[0].title, images.get(name) or _drawn(group), group)
         for name, group in groups.items()
@@ -67,7 +65,7 @@ def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Pa
 
 def _panel(name: str, heading: str, png: bytes, group: list[Chart]) -> Panel:
     width, _ = png_size(png)
-    return Panel(name, heading, png_uri(png), width > _SHEET_PIXELS, tuple(group))
+    return Panel(name, heading, image_uri(png), width > _SHEET_PIXELS, tuple(group))
 
 
 def _heading(name: str) -> str:

@@ -112,7 +112,7 @@ def test_what_is_told(found: BestDamper, tmp_path: Path) -> None:
     wide, tall = png_size((tmp_path / "out" / "choice.png").read_bytes())
     assert wide > tall > 400
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "worst peak" in page and "data:image/png" in page
+    assert "worst peak" in page and "data:image/webp" in page
     text = str(found)
     assert text.startswith(f"{found.found.ranges.scene.name}: worst peak")
     sentences = " ".join(text.split())
