@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Literal
 
 from upd.cache.files import whole_file
 from upd.plot.chart import Array, Axis, Chart
-from upd.plot.labels import with_room
 from upd.plot.style import (
     coordinates,
     is_log,
@@ -25,6 +24,7 @@ from upd.plot.style import (
     proportion,
     tick_text,
     title_of,
+    with_room,
 )
 
 if TYPE_CHECKING:

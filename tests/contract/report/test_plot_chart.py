@@ -36,7 +36,6 @@ from upd.plot.chart import (
     Style,
     Trace,
 )
-from upd.plot.labels import labelled, sides, with_room
 from upd.plot.matplotlib import draw, write_sheet, write_sheets
 from upd.plot.plotly import figure
 from upd.plot.png import png_size
@@ -48,8 +47,11 @@ from upd.plot.style import (
     OUTLINE,
     SHARE_COLOURS,
     even_levels,
+    labelled,
     legend_names,
     log_ticks,
+    sides,
+    with_room,
 )
 from upd.plot.work_precision import work_precision_charts
 from upd.report.compare import overlaid
