@@ -6,7 +6,6 @@ import logging
 import tomllib
 from pathlib import Path
 
-from upd.cache.files import whole_file
 from upd.errors import UpdError
 from upd.mesh import recipes
 from upd.plot.matplotlib import write_sheets
@@ -62,7 +61,6 @@ def write_dimensions(result: RunResult, path: Path) -> list[Path]:
         return []
     # matplotlib takes a while to import
     from upd.plot.drawing import draw_sections
+    from upd.plot.sheet import write_png
 
-    with whole_file(path) as temporary:
-        draw_sections(meshes, views).savefig(temporary, format="png")
-    return [path]
+    return write_png(draw_sections(meshes, views), path)

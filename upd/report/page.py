@@ -18,7 +18,6 @@ from upd.cache.files import write_text
 from upd.errors import InputError
 from upd.plot.png import image_uri
 from upd.plot.surface import Surface, packed
-from upd.plot.surface_picture import picture
 from upd.report.notes import MOST_NOTES
 from upd.report.panels import Panel, data, fitting
 from upd.results.answer_table import AnswerTable
@@ -134,13 +133,20 @@ def page_text(
             most_notes=MOST_NOTES,
             surfaces=shown,
             surfaces_left_out=left_out,
-            surface_image=image_uri(picture(shown[0])) if shown else "",
+            surface_image=_picture(shown[0]) if shown else "",
             style=(_PARTS / "page.css").read_text("utf-8"),
             plotly=script,
             script=(_PARTS / "page.js").read_text("utf-8"),
             page_data=_packed(_json({"panels": charts, "surfaces": [packed(s) for s in shown]})),
         )
     )
+
+
+def _picture(surface: Surface) -> str:
+    # matplotlib is slow to import
+    from upd.plot.pictures import picture
+
+    return image_uri(picture(surface))
 
 
 @cache
