@@ -15,7 +15,7 @@ from upd.mesh import Mesh, recipes
 from upd.mesh.boundary import boundary_faces, boundary_quads
 from upd.mesh.export import write_mesh
 from upd.mesh.pairing import check_pairs
-from upd.report.notes import warnings
+from upd.report.tables import warnings
 
 EXAMPLES = Path(upd.__file__).parent / "scenes" / "examples"
 PARAMS = {"crown": 300.0, "divisions": 6}

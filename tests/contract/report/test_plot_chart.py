@@ -38,7 +38,6 @@ from upd.plot.chart import (
 )
 from upd.plot.matplotlib import draw, write_sheet, write_sheets
 from upd.plot.plotly import figure
-from upd.plot.png import png_size
 from upd.plot.style import (
     CLOSED,
     COLOURS,
@@ -55,6 +54,7 @@ from upd.plot.style import (
 )
 from upd.plot.work_precision import work_precision_charts
 from upd.report.compare import overlaid
+from upd.report.page import png_size
 
 X, Y = Axis("x", "mm"), Axis("y", "N")
 T = np.array([0.0, 1.0, 2.0])

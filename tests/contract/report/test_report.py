@@ -27,13 +27,10 @@ from upd.plot.surface import n_bytes, packed, with_fields
 from upd.reference import mindlin
 from upd.report import write_comparison, write_report
 from upd.report.compare import differences, meanings, numbers, overlaid, run_names
-from upd.report.error_budget import analysis_charts
 from upd.report.folder import RunFolder, read_run
-from upd.report.notes import warnings
-from upd.report.page import LIMIT_BYTES
-from upd.report.panels import fitting
+from upd.report.page import LIMIT_BYTES, fitting
 from upd.report.run_page import lead, run_surfaces
-from upd.report.tables import all_numbers, filled, main_numbers
+from upd.report.tables import all_numbers, analysis_charts, filled, main_numbers, warnings
 from upd.results import Case, worst_checks
 from upd.results.quantities import number_label
 

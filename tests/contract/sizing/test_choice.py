@@ -23,7 +23,7 @@ from upd import cli
 from upd.analyses.forced import peaks
 from upd.analyses.forced.linear_limits import linear_modes
 from upd.errors import InputError
-from upd.plot.png import png_size
+from upd.report.page import png_size
 from upd.scene import load_scene
 from upd.sizing import BestDamper, search
 from upd.sizing.choice import Tried, is_along

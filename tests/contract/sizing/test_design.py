@@ -15,7 +15,7 @@ from upd import cli
 from upd.contact.damper_section import DamperSection, FaceSection, eccentricity
 from upd.contact.rigid_damper import SLIDINGS
 from upd.errors import InputError
-from upd.plot.png import png_size
+from upd.report.page import png_size
 from upd.scene import load_scene
 from upd.sizing import damper_statics
 from upd.sizing.statics import (
