@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from upd.batch import study, sweep
     from upd.fitting import fit
     from upd.measured import fit_damping, read_measured
-    from upd.report.folder import load
+    from upd.report.load import load
     from upd.report.notebook import RunResult
     from upd.runner import run
     from upd.scene import Scene, load_scene
@@ -75,7 +75,7 @@ _HOME = {
     "Scene": "upd.scene",
     "run": "upd.runner",
     "RunResult": "upd.report.notebook",
-    "load": "upd.report.folder",
+    "load": "upd.report.load",
     "read_measured": "upd.measured",
     "fit_damping": "upd.measured",
     "sweep": "upd.batch",
