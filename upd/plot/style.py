@@ -160,13 +160,11 @@ def even_levels(low: float, high: float, most: int = 12) -> list[float]:
     """Multiples of one step, which is 1, 2, 2.5 or 5 units, from ``low`` or just below to ``high``
     or just above: ``most`` steps within.
     """
-    span = high - low
-    unit = 10.0 ** math.floor(math.log10(span / most))
-    step = next(
-        m * unit for m in (1.0, 2.0, 2.5, 5.0, 10.0) if m * unit >= span / most * (1.0 - 1e-9)
-    )
-    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
-    return [float(f"{k * step:.12g}") for k in range(first, last + 1)]
+    # matplotlib is slow to import
+    from matplotlib.ticker import MaxNLocator
+
+    ticks = MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
+    return [float(f"{tick:.12g}") for tick in ticks]
 
 
 def tick_text(value: float) -> str:

@@ -8,7 +8,7 @@ import io
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -22,7 +22,7 @@ from upd.errors import InputError
 from upd.plot.chart import Chart
 from upd.plot.matplotlib import chart_png
 from upd.plot.plotly import figure
-from upd.plot.surface import Surface, n_bytes, packed, with_fields
+from upd.plot.surface import Surface, n_bytes, packed
 from upd.report.tables import MOST_NOTES
 from upd.results.answer_table import AnswerTable
 
@@ -293,14 +293,15 @@ def fitting(surfaces: Iterable[Surface], room: int) -> tuple[list[Surface], list
     """
     shown, left_out = [], []
     for surface in surfaces:
-        n = len(surface.fields)
-        while n > 0 and n_bytes(with_fields(surface, n)) > room:
-            n -= 1
-        part = with_fields(surface, n)
-        if n_bytes(part) > room:
+        parts = (
+            replace(surface, fields=surface.fields[:n]) for n in range(len(surface.fields), -1, -1)
+        )
+        part = next((part for part in parts if n_bytes(part) <= room), None)
+        if part is None:
             left_out.append(f"{surface.label}: too large for this page")
             continue
-        left_out += [f"{f.label}: too large for this page" for f in surface.fields[n:]]
+        lost = surface.fields[len(part.fields) :]
+        left_out += [f"{f.label}: too large for this page" for f in lost]
         room -= n_bytes(part)
         shown.append(part)
     return shown, left_out
