@@ -116,6 +116,7 @@ def _made(path: Path, axes: dict[str, list[Any]], reasons: dict[int, str] | None
 
 
 def test_page_fetches_nothing_and_escapes_everything(html: str) -> None:
+    assert len(html.encode()) < 2_000_000, "a page without a view in three dimensions"
     page = _Page(html)
     assert page.addresses and all(address.startswith("data:") for address in page.addresses)
     # Data, plotly, the page's own: nothing of the scene runs.
