@@ -21,8 +21,7 @@ from upd.errors import ConvergenceError, InputError, UpdError, disk_fault, one_l
 from upd.labels import check_words
 from upd.progress import Listener, Stages, silent
 from upd.report import write_report
-from upd.report.curves import write_curves
-from upd.report.figures import write_figures
+from upd.report.files import write_curves, write_figures
 from upd.report.folder import check_replaceable, is_run_file
 from upd.report.notebook import RunResult, chart_arrays
 from upd.results import (

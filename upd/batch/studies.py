@@ -88,7 +88,7 @@ class Study:
         charts = report.charts(curves)
         figures = write_sheets(charts, folder)
         # slow to import: only where a page is made
-        from upd.report.study_page import write_study_report
+        from upd.report.sweep_page import write_study_report
 
         failed = sum(bool(one.outcome.failure) for one in solved)
         page = write_study_report(

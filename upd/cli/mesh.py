@@ -95,7 +95,7 @@ def _parts(
 
 def _draw(request: MeshRequest, meshes: Mapping[str, Mesh], path: Path) -> None:
     # matplotlib takes a while to import
-    from upd.plot.mesh_picture import draw_meshes
+    from upd.plot.pictures import draw_meshes
 
     with placed_file(path) as temporary:
         draw_meshes(meshes, request.name).savefig(temporary, format="png")

@@ -5,16 +5,13 @@ On axes, on the PNG sheets of a run folder, and as pictures for pages read witho
 
 from __future__ import annotations
 
-import io
 import textwrap
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from upd.cache.files import whole_file
 from upd.plot.chart import Array, Axis, Chart
-from upd.plot.labels import with_room
 from upd.plot.style import (
     coordinates,
     is_log,
@@ -25,6 +22,7 @@ from upd.plot.style import (
     proportion,
     tick_text,
     title_of,
+    with_room,
 )
 
 if TYPE_CHECKING:
@@ -99,9 +97,9 @@ def draw_all(charts: Sequence[Chart]) -> list[Axes]:
 
 def chart_png(charts: Sequence[Chart]) -> bytes:
     """A sheet of ``charts`` as PNG for a page, at most `MOST_PANELS`."""
-    out = io.BytesIO()
-    _sheet(charts, _PAGE_DPI).savefig(out, format="png")
-    return out.getvalue()
+    from upd.plot.sheet import png
+
+    return png(_sheet(charts, _PAGE_DPI))
 
 
 def write_sheet(charts: Sequence[Chart], path: Path) -> list[Path]:
@@ -120,13 +118,10 @@ def write_sheet(charts: Sequence[Chart], path: Path) -> list[Path]:
     list of Path
         ``path``, or nothing when no chart belongs to a sheet.
     """
+    from upd.plot.sheet import write_png
+
     shown = [chart for chart in charts if chart.sheet]
-    if not shown:
-        return []
-    figure = _sheet(shown, _DPI)
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, format="png")
-    return [path]
+    return write_png(_sheet(shown, _DPI), path) if shown else []
 
 
 def write_sheets(charts: Iterable[Chart], folder: Path, *, keep: bool = False) -> list[Path]:

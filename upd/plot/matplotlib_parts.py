@@ -17,7 +17,6 @@ from matplotlib.path import Path as Outline
 from matplotlib.transforms import IdentityTransform
 
 from upd.plot.chart import Area, Axis, Band, Chart, Map, Mark, Pies, Trace
-from upd.plot.labels import labelled, sides
 from upd.plot.style import (
     CROSS,
     PART_COLOURS,
@@ -28,10 +27,12 @@ from upd.plot.style import (
     colour_range,
     even_levels,
     is_wide,
+    labelled,
     legend_names,
     marker_area,
     plain,
     sector,
+    sides,
     state_colours,
 )
 

@@ -5,32 +5,55 @@ The Python package of plotly is not imported: its figure is plain data.
 
 from __future__ import annotations
 
+import base64
 import math
-import textwrap
+from collections.abc import Iterator
 from html import escape
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from upd.plot import plotly_parts as parts
-from upd.plot.chart import Array, Axis, Chart
-from upd.plot.labels import with_room
-from upd.plot.plotly_parts import pack
+from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Mark, Pies, Scatter, Trace
 from upd.plot.style import (
+    CROSS,
+    PART_COLOURS,
+    SHARE_COLOURS,
+    area_colour,
+    band_colour,
+    colour_of,
+    colour_range,
     coordinates,
+    even_levels,
     is_log,
+    labelled,
     legend_names,
     log_ticks,
     log_view,
+    marker_area,
     proportion,
+    sector,
+    sides,
+    state_colours,
     tick_text,
+    with_room,
 )
 
-__all__ = ["figure", "pack"]
-
+_DASH = {"dashed": "dash", "dotted": "dot", "dashdot": "dashdot"}
+_MODE = {"line": "lines", "both": "lines+markers"} | dict.fromkeys(_DASH, "lines")
+_MARKER: dict[str, dict[str, Any]] = {
+    "open points": {"symbol": "circle-open", "size": 7, "line": {"width": 1.5}},
+    "crosses": {"symbol": "x-thin", "size": 7, "line": {"width": 1.5}},
+    "star": {"symbol": "star", "size": 15},
+}
+#: letters of a line beside a bar
+_WORDS = 26
+#: pixels of the letters beside a mark, and of a screen per point of a page
+_LETTERS, _PIXELS = 11, 4.0 / 3.0
 _GRID = "#e6e6e6"
 #: letters of an upright axis' name that have room, and pixels of a bar with its words
-_LETTERS, _ROW = 42, 54
+_LINE, _ROW = 42, 54
 #: width over height of a chart
 _WIDE = 1.5
 #: part of an axis beyond the data, as plotly leaves it
@@ -53,24 +76,24 @@ def figure(chart: Chart) -> dict[str, Any]:
     """
     chart = with_room(chart)
     names = {escape(name) for name in legend_names(chart)}
-    data = list(parts.traces(chart))
+    data = list(_traces(chart))
     for trace in data:
         # Curves of one name, as of the contact faces of one load, have one entry.
         trace["showlegend"] = trace["name"] in names
         names.discard(trace["name"])
     layout: dict[str, Any] = {
         "xaxis": _axis(chart, chart.x, coordinates(chart, "x")),
-        "yaxis": _axis(chart, chart.y, coordinates(chart, "y"), _LETTERS),
+        "yaxis": _axis(chart, chart.y, coordinates(chart, "y"), _LINE),
         "hovermode": "closest",
         "showlegend": any(trace["showlegend"] for trace in data),
-        "shapes": parts.shapes(chart),
+        "shapes": _shapes(chart),
     }
     if chart.equal:
         layout["yaxis"] |= {"scaleanchor": "x", "scaleratio": 1, "constrain": "domain"}
         layout["xaxis"] |= {"constrain": "domain"}
     if chart.bars:
         layout |= {"barmode": "stack"}
-        layout["yaxis"] |= parts.cases_axis(chart)
+        layout["yaxis"] |= _cases_axis(chart)
     # maps keep their own shape
     wide = 1.0 / (chart.equal * proportion(chart) or 1.0 / _WIDE)
     least = _ROW * sum(len(bars.cases) for bars in chart.bars)
@@ -81,7 +104,7 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
     """One axis; its name is broken into lines of so many ``letters``."""
     grid = not (chart.maps or chart.bars)
     out: dict[str, Any] = {
-        "title": {"text": "<br>".join(escape(line) for line in textwrap.wrap(axis.label, letters))},
+        "title": {"text": "<br>".join(escape(line) for line in wrap(axis.label, letters))},
         "showgrid": grid,
         "gridcolor": _GRID,
         "zeroline": False,
@@ -126,3 +149,330 @@ def _range(axis: Axis, values: Array, log: bool) -> list[float]:
     low, high = (d if end is None else end for end, d in zip(given, data, strict=True))
     air = _AIR * (high - low)
     return [low - air * (given[0] is None), high + air * (given[1] is None)]
+
+
+def pack(values: NDArray[Any]) -> dict[str, str]:
+    """An array as plotly reads it from base64: single precision, integers of two bytes as they are,
+    or the smallest integers.
+    """
+    kind = "i2" if values.dtype == np.int16 else "f4"
+    if values.dtype.kind in "iu" and kind == "f4":
+        most = values.max(initial=0)
+        kind = "u1" if most < 256 else "u2" if most < 65536 else "u4"
+    data = np.ascontiguousarray(values.astype(f"<{kind}")).tobytes()
+    out = {"dtype": kind, "bdata": base64.b64encode(data).decode("ascii")}
+    return out | ({"shape": ",".join(map(str, values.shape))} if values.ndim > 1 else {})
+
+
+def _numbers(values: Any) -> dict[str, str]:
+    return pack(np.asarray(values, float))
+
+
+def _scatter(x: Any, y: Any, mode: str, **more: Any) -> dict[str, Any]:
+    """A trace of points or lines, without a name."""
+    out = {"type": "scatter", "mode": mode, "name": "", "x": _numbers(x), "y": _numbers(y)}
+    return out | more
+
+
+def _template(text: str) -> str:
+    """Text inside a template, where % and braces have a meaning."""
+    return escape(text).replace("%", "&#37;").replace("{", "&#123;")
+
+
+def _value(axis: Axis, place: str) -> str:
+    """A line of the pointer's text: a name with its value and unit."""
+    unit = f" {_template(axis.unit)}" if axis.unit else ""
+    return f"{_template(axis.name.partition(',')[0])}: %{{{place}:.4g}}{unit}"
+
+
+def _hover(chart: Chart, *more: str, name: str = "") -> str:
+    """Template of the text at the pointer: both coordinates, further lines, a name."""
+    x = f"{_template(chart.x.name)}: %{{x}}" if chart.x.ticks else _value(chart.x, "x")
+    lines = "<br>".join((x, _value(chart.y, "y"), *more))
+    return f"{lines}<extra>{_template(name)}</extra>"
+
+
+def _traces(chart: Chart) -> Iterator[dict[str, Any]]:
+    """All of a chart, what lies below first."""
+    low, high = colour_range(chart.maps)
+    for k, m in enumerate(chart.maps):
+        yield _map(chart, m, low, high) | {"showscale": k == 0 and (bool(m.states) or low < high)}
+        yield from _points(m) if m.contours else ()
+    for area in chart.areas:
+        yield from _area(chart, area)
+    yield from _bars(chart)
+    for trace in chart.traces:
+        yield _curve(chart, trace)
+    for pies in chart.pies:
+        yield from _pies(chart, pies)
+    for k, points in enumerate(chart.scatters):
+        yield _coloured(chart, points, first=k == 0)
+    yield from _marks(chart)
+    for band in chart.bands:
+        yield _band_entry(band)
+
+
+def _shapes(chart: Chart) -> list[dict[str, Any]]:
+    """What is drawn beside the traces: bands, and the sectors of pies."""
+    bands = [shape for band in chart.bands for shape in _band(band)]
+    return bands + [shape for pies in chart.pies for shape in _sectors(pies)]
+
+
+def _curve(chart: Chart, t: Trace) -> dict[str, Any]:
+    colour, name = colour_of(t), escape(t.entry or t.label)
+    marker: dict[str, Any] = {"color": colour, "size": 6} | _MARKER.get(t.style, {})
+    if "line" in marker:
+        marker["line"] = {"color": colour, **marker["line"]}
+    # A circle over a map would catch the hover meant for the map; closed forms lie over the curves
+    # that follow them.
+    hover = {"hoverinfo": "skip"} if t.outline else {"hovertemplate": _hover(chart, name=t.label)}
+    return _scatter(
+        t.x,
+        t.y,
+        _MODE.get(t.style, "markers"),
+        name=name,
+        legendgroup=name,
+        line={"color": colour, "width": 1.4, "dash": _DASH.get(t.style, "solid")},
+        marker=marker,
+        zorder=int(t.closed),
+        **hover,
+    )
+
+
+def _marks(chart: Chart) -> Iterator[dict[str, Any]]:
+    """Dots, one trace per colour, with their words at the pointer and, where there is room, above.
+
+    Plotly itself omits a mark without a place on its axes.
+    """
+    groups: dict[str, list[tuple[Mark, bool, str]]] = {}
+    for mark, shown, side in zip(chart.marks, labelled(chart), sides(chart), strict=True):
+        groups.setdefault(colour_of(mark), []).append((mark, bool(shown), side))
+    for colour, found in groups.items():
+        words = [escape(m.text).replace("\n", "<br>") for m, *_ in found]
+        yield _scatter(
+            [m.x for m, *_ in found],
+            [m.y for m, *_ in found],
+            "markers+text",
+            customdata=words,
+            text=[text if shown else "" for text, (_, shown, _) in zip(words, found, strict=True)],
+            textposition=[f"top {side}" for *_, side in found],
+            textfont={"color": colour, "size": _LETTERS},
+            hovertemplate=_hover(chart, "%{customdata}"),
+            marker={"color": colour, "size": 6},
+            zorder=2,
+        )
+
+
+def _band(b: Band) -> list[dict[str, Any]]:
+    """Dashed lines at its ends, a wide pale line, or a pale span."""
+    other, colour = "y" if b.axis == "x" else "x", band_colour(b)
+    shared: dict[str, Any] = {"layer": "below", f"{b.axis}ref": b.axis, f"{other}ref": "paper"}
+    shared |= {f"{other}0": 0, f"{other}1": 1}
+    if b.low != b.high and not b.dashed:
+        look: dict[str, Any] = {"type": "rect", "fillcolor": colour, "line": {"width": 0}}
+        return [shared | look | {"opacity": 0.2, f"{b.axis}0": b.low, f"{b.axis}1": b.high}]
+    line = {"width": 1.2, "dash": "dash"} if b.dashed else {"width": 5}
+    look = {"type": "line", "line": {"color": colour} | line, "opacity": 1.0 if b.dashed else 0.3}
+    return [
+        shared | look | {f"{b.axis}0": at, f"{b.axis}1": at}
+        for at in dict.fromkeys((b.low, b.high))
+    ]
+
+
+def _band_entry(b: Band) -> dict[str, Any]:
+    """The legend entry of a band, which also makes the axis reach to it."""
+    colour = band_colour(b)
+    line = {"color": colour, "width": 1.2, "dash": "dash"}
+    if not b.dashed:
+        line = {"color": _pale(colour, 0.35), "width": 8}
+    places = {"x": [None, None], "y": [None, None], b.axis: [b.low, b.high]}
+    shared = {"type": "scatter", "mode": "lines", "hoverinfo": "skip"}
+    return shared | {"name": escape(b.label), "line": line, **places}
+
+
+def _pale(colour: str, alpha: float) -> str:
+    return f"rgba({','.join(str(int(colour[k : k + 2], 16)) for k in (1, 3, 5))},{alpha:g})"
+
+
+def _area(chart: Chart, a: Area) -> Iterator[dict[str, Any]]:
+    """The lower curve, unseen, and the upper one filled down to it, its width at the pointer."""
+    colour, name = area_colour(a), escape(a.label)
+    width = _value(Axis(a.label or "width", chart.y.unit), "customdata")
+    x = _hover(chart).partition("<br>")[0]
+    yield _scatter(a.x, a.low, "lines", line={"width": 0}, hoverinfo="skip")
+    yield _scatter(
+        a.x,
+        a.high,
+        "lines",
+        name=name,
+        legendgroup=name,
+        customdata=_numbers(np.asarray(a.high) - np.asarray(a.low)),
+        line={"width": 0, "color": colour},
+        fill="tonexty",
+        fillcolor=colour if a.state else _pale(colour, 0.22),
+        hovertemplate=f"{x}<br>{width}<extra></extra>",
+    )
+
+
+def _bars(chart: Chart) -> Iterator[dict[str, Any]]:
+    """Stacked horizontal bars: one trace per part."""
+    labels = list(dict.fromkeys(label for b in chart.bars for label in b.parts))
+    begin = 0
+    for b in chart.bars:
+        for label, values in b.parts.items():
+            colour = PART_COLOURS[labels.index(label) % len(PART_COLOURS)]
+            look: dict[str, Any] = {"color": colour}
+            if label in b.hatched:
+                look["line"] = {"color": colour, "width": 1}
+                look["pattern"] = {"shape": "/", "fgcolor": colour, "bgcolor": "#fff", "size": 6}
+            value = _value(Axis(label, chart.x.unit), "x")
+            yield {
+                "type": "bar",
+                "orientation": "h",
+                "name": escape(label),
+                "legendgroup": escape(label),
+                "x": _numbers(values),
+                "y": list(range(begin, begin + len(b.cases))),
+                "width": 0.6,
+                "text": [escape(text) for text in b.texts.get(label, ())],
+                "customdata": [escape(case) for case in b.cases],
+                "textposition": "inside",
+                "insidetextanchor": "middle",
+                "textfont": {"color": "#ffffff"},
+                "marker": look,
+                "hovertemplate": f"%{{customdata}}<br>{value}<br>%{{text}}<extra></extra>",
+            }
+        begin += len(b.cases)
+
+
+def _cases_axis(chart: Chart) -> dict[str, Any]:
+    """The upright axis of bars: the cases, the first on top."""
+    cases = [
+        "<br>".join(wrap(escape(case), _WORDS)) if b.above else escape(case)
+        for b in chart.bars
+        for case in b.cases
+    ]
+    ticks = {"tickmode": "array", "tickvals": list(range(len(cases))), "ticktext": cases}
+    return ticks | {"range": [len(cases) - 0.5, -0.5]}
+
+
+def _pies(chart: Chart, p: Pies) -> Iterator[dict[str, Any]]:
+    """Unseen markers with the shares at the pointer below the sectors; an entry per state."""
+    shares = [
+        "<br>".join(f"{escape(s)}: {100.0 * v:.3g} %" for s, v in zip(p.states, row, strict=True))
+        for row in p.shares
+    ]
+    size = f"{_template(p.what)}: %{{marker.color:.3g}} of the largest"
+    lines = ("%{customdata}", size) if p.what else ("%{customdata}",)
+    # The colour carries the size to the pointer.
+    marker = {"size": _numbers(_diameter(p.size)), "color": _numbers(p.size), "opacity": 0}
+    template = _hover(chart, *lines)
+    yield _scatter(p.x, p.y, "markers", customdata=shares, marker=marker, hovertemplate=template)
+    for state in p.states:
+        look = {"size": 10, "color": SHARE_COLOURS.get(state)}
+        yield _scatter([np.nan], [np.nan], "markers", name=escape(state), marker=look)
+
+
+def _diameter(size: Array, part: float = 1.0) -> Array:
+    """Pixels of markers of a size."""
+    return np.asarray(_PIXELS * np.sqrt(part * marker_area(size)))
+
+
+def _sectors(p: Pies) -> Iterator[dict[str, Any]]:
+    """Shapes in pixels about the points, so that they stay round on any axes."""
+    ends = np.cumsum(p.shares, axis=1)
+    for k, diameter in enumerate(_diameter(p.size)):
+        for state, share, end in zip(p.states, p.shares[k], ends[k], strict=True):
+            if share > 0.0:
+                corners = diameter * sector(float(end - share), float(end))
+                yield {
+                    "type": "path",
+                    "path": "M" + "L".join(f"{x:.2f},{y:.2f}" for x, y in corners) + "Z",
+                    "xsizemode": "pixel",
+                    "ysizemode": "pixel",
+                    "xanchor": float(p.x[k]),
+                    "yanchor": float(p.y[k]),
+                    "fillcolor": SHARE_COLOURS.get(state),
+                    "line": {"width": 0},
+                }
+
+
+def _scale(axis: Axis, low: float, high: float) -> dict[str, Any]:
+    """Colours of values; a horizontal bar under the drawing leaves a phone its width."""
+    title = {"text": escape(axis.label), "side": "bottom"}
+    return {
+        "colorscale": "Viridis",
+        "colorbar": {"orientation": "h", "thickness": 12, "title": title},
+        "cmin": low,
+        "cmax": high if high > low else low + 1.0,
+    }
+
+
+def _coloured(chart: Chart, s: Scatter, *, first: bool) -> dict[str, Any]:
+    """Coloured points; the first of a chart have the colour bar that all share."""
+    marker = _scale(s.axis, *colour_range(chart.scatters)) | {
+        "size": _numbers(_diameter(s.size, 0.7)),
+        "color": _numbers(s.value),
+        "opacity": 1,
+        "line": {"color": "#ffffff", "width": 0.5},
+        "showscale": first,
+    }
+    if not first:
+        del marker["colorbar"]
+    template = _hover(chart, _value(s.axis, "marker.color"))
+    return _scatter(s.x, s.y, "markers", marker=marker, hovertemplate=template)
+
+
+def _map(chart: Chart, m: Map, low: float, high: float) -> dict[str, Any]:
+    """Cells, a shaded field, filled contours, or states."""
+    out: dict[str, Any] = {"type": "heatmap", "name": "", "hoverongaps": False}
+    out |= {"x": _numbers(m.x), "y": _numbers(m.y), "z": _numbers(m.z.T)}
+    if m.states:
+        return out | _states(chart, m)
+    scale = _scale(m.value, low, high)
+    out |= {"zmin": scale.pop("cmin"), "zmax": scale.pop("cmax"), **scale}
+    out["hovertemplate"] = _hover(chart, _value(m.value, "z"))
+    whole = bool(np.isfinite(m.z).all()) and min(m.z.shape) > 1
+    if not (m.contours and whole and low < high):
+        return out | ({"zsmooth": "best"} if m.smooth and whole else {})
+    levels = even_levels(low, high)
+    steps = {"start": levels[0], "end": levels[-1], "size": levels[1] - levels[0]}
+    # The colours of matplotlib's levels: each that of its middle.
+    return out | {
+        "type": "contour",
+        "zmin": levels[0],
+        "zmax": levels[-1],
+        "contours": steps | {"coloring": "fill"},
+        "line": {"width": 0, "smoothing": 0},
+    }
+
+
+def _points(m: Map) -> Iterator[dict[str, Any]]:
+    """Dots at the points of a map, crosses where there is no value."""
+    x, y = np.meshgrid(m.x, m.y, indexing="ij")
+    known = np.isfinite(m.z)
+    dot = {"size": 5, "color": "#ffffff", "line": {"color": "#333333", "width": 0.7}}
+    cross = {"symbol": "x-thin", "size": 8, "color": CROSS, "line": {"color": CROSS, "width": 2}}
+    # Over a dot the map gives its value; over a cross there is none.
+    looks = ((known, dot, {"hoverinfo": "skip"}), (~known, cross, {"hovertemplate": "no value"}))
+    for where, marker, hover in looks:
+        if where.any():
+            more = {"marker": marker, "cliponaxis": False, **hover}
+            yield _scatter(x[where], y[where], "markers", **more)
+
+
+def _states(chart: Chart, m: Map) -> dict[str, Any]:
+    n, colours, known = len(m.states), state_colours(m), np.isfinite(m.z.T)
+    names = np.array([escape(state) for state in m.states], object)
+    steps = [[(k + end) / n, colour] for k, colour in enumerate(colours) for end in (0, 1)]
+    bar = {"orientation": "h", "thickness": 12, "tickvals": list(range(n))}
+    return {
+        "zmin": -0.5,
+        "zmax": n - 0.5,
+        "colorscale": steps,
+        "colorbar": bar | {"ticktext": names.tolist()},
+        "xgap": 0.5,
+        "ygap": 0.5,
+        "text": np.where(known, names[np.where(known, m.z.T, 0.0).astype(int)], "").tolist(),
+        "hovertemplate": _hover(chart, "%{text}"),
+    }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,8 @@ from upd.cache.files import whole_file
 
 Drawing = Callable[[Axes], Any]
 
-_DPI = 130
+#: inches of one drawing, dots per inch
+_SIZE, _DPI = (5.6, 4.4), 130
 
 
 def own_axes(ax: Axes | None) -> Axes:
@@ -30,7 +32,7 @@ def own_axes(ax: Axes | None) -> Axes:
 def draw_sheet(
     drawings: Sequence[Drawing],
     columns: int,
-    size: tuple[float, float] = (5.6, 4.4),
+    size: tuple[float, float] = _SIZE,
     dpi: int = _DPI,
 ) -> Figure:
     """A figure of ``dpi`` dots per inch with each of ``drawings`` on axes of ``size`` inches,
@@ -50,16 +52,25 @@ def draw_sheet(
     return figure
 
 
+def png(figure: Figure) -> bytes:
+    """A figure as PNG."""
+    out = io.BytesIO()
+    figure.savefig(out, format="png")
+    return out.getvalue()
+
+
+def write_png(figure: Figure, path: Path) -> list[Path]:
+    """Write a figure as PNG, whole or not at all; returns its path."""
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, format="png")
+    return [path]
+
+
 def write_sheet(
-    path: Path, drawings: Sequence[Drawing], columns: int, size: tuple[float, float] = (5.6, 4.4)
+    path: Path, drawings: Sequence[Drawing], columns: int, size: tuple[float, float] = _SIZE
 ) -> list[Path]:
     """Write the sheet of ``drawings`` as PNG, whole or not at all.
 
     Returns its path, or nothing when there is nothing to draw.
     """
-    if not drawings:
-        return []
-    figure = draw_sheet(drawings, columns, size)
-    with whole_file(path) as temporary:
-        figure.savefig(temporary, format="png")
-    return [path]
+    return write_png(draw_sheet(drawings, columns, size), path) if drawings else []

@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -204,48 +203,38 @@ def n_bytes(surface: Surface) -> int:
     return int(4 / 3 * (12 * n + 12 * m + 4 * n * len(surface.fields) + 6 * n * moving))
 
 
-def with_fields(surface: Surface, n_fields: int) -> Surface:
-    """The surface with its first fields only."""
-    return Surface(surface.label, surface.bodies, surface.fields[:n_fields], surface.shape)
-
-
 def offsets(surface: Surface) -> FloatArray:
     """How far each body is shifted along z when bodies that lie on each other are drawn apart,
     (n_body, 3) in mm.
     """
     used = [b.points[b.triangles.ravel()] for b in surface.bodies]
-    if not all(len(points) for points in used):
-        return np.zeros((len(used), 3))
+    out = np.zeros((len(used), 3))
+    if len(used) != 2 or not all(len(points) for points in used):
+        return out
     low, high = np.array([p.min(axis=0) for p in used]), np.array([p.max(axis=0) for p in used])
-    out = np.zeros((len(surface.bodies), 3))
-    step = _APART * surface.size
-    order = np.argsort(0.5 * (low + high)[:, 2], kind="stable")
-    for k, (below, above) in enumerate(pairwise(order)):
-        # Only bodies that lie over each other: blades side by side stay where they are.
-        over = ((low[below] < high[above]) & (low[above] < high[below]))[:2].all()
-        out[order[k + 1 :], 2] += step if over and len(order) == 2 else 0.0
+    # Only bodies that lie over each other: blades side by side stay where they are.
+    if (low[:, :2] < high[::-1, :2]).all():
+        out[np.argsort((low + high)[:, 2], kind="stable")[1], 2] = _APART * surface.size
     return out
 
 
 def packed(surface: Surface) -> dict[str, Any]:
     """The surface for the page's script."""
-    motions: dict[int, int] = {}
-    packed_motions: list[list[dict[str, str]]] = []
-    fields = []
-    for f in surface.fields:
-        if f.motion is not None and id(f.motion) not in motions:
-            motions[id(f.motion)] = len(packed_motions)
-            packed_motions.append([_integers(u) for u in f.motion])
-        entry = {
+    # a pressure moves as the displacement of its load
+    motions = {id(f.motion): f.motion for f in surface.fields if f.motion is not None}
+    places = {key: k for k, key in enumerate(motions)}
+    fields = [
+        {
             "label": f.label,
             "quantity": f.quantity,
             "unit": f.unit,
             "largest_mm": f.largest_mm,
+            "values": [None if np.isnan(v).all() else pack(v) for v in f.values],
+            "top": f.top,
+            "motion": places.get(id(f.motion)),
         }
-        entry["values"] = [None if np.isnan(v).all() else pack(v) for v in f.values]
-        entry["top"] = f.top
-        entry["motion"] = None if f.motion is None else motions[id(f.motion)]
-        fields.append(entry)
+        for f in surface.fields
+    ]
     bodies = [
         {
             "name": b.name,
@@ -259,19 +248,12 @@ def packed(surface: Surface) -> dict[str, Any]:
         "label": surface.label,
         "bodies": bodies,
         "fields": fields,
-        "motions": packed_motions,
+        "motions": [
+            [pack(np.round(_LEVELS * u.T.ravel()).astype(np.int16)) for u in motion]
+            for motion in motions.values()
+        ],
         "apart": offsets(surface).tolist(),
         "reach": SCALE * surface.size,
         "span": surface.size,
         "levels": _LEVELS,
-    }
-
-
-def _integers(u: FloatArray) -> dict[str, str]:
-    import base64
-
-    whole = np.round(_LEVELS * u.T).astype("<i2")
-    return {
-        "dtype": "i2",
-        "bdata": base64.b64encode(np.ascontiguousarray(whole).tobytes()).decode("ascii"),
     }

@@ -48,7 +48,7 @@ def work_precision_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
     # Seconds and memory of both cases side by side, where every number has two.
     columns = 4 if len(shown) == 2 * len({name for name, _ in shown}) else 2
     return [
-        _error_chart(group, cost, axis, key in shown, columns)
+        _chart(group, cost, axis, sheet=key in shown, columns=columns)
         for key, group in groups.items()
         for cost, axis in _COSTS
     ]
@@ -71,7 +71,7 @@ def change_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
     """
     ways = list(dict.fromkeys(str(c["curve"]) for c in curves))
     return [
-        _change_chart(group, ways, cost, axis)
+        _chart(group, cost, axis, ways)
         for group in _groups(curves).values()
         for cost, axis in _COSTS
     ]
@@ -89,13 +89,6 @@ def _groups(curves: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], list[M
     }
 
 
-def _chart(first: Mapping[str, Any], heading: str, x: Axis, y: Axis, **more: Any) -> Chart:
-    """A chart of a number and case on the sheet of all of them."""
-    case = f"{number_label(str(first['name']))}, {first['case']}"
-    shared: dict[str, Any] = {"case": case, "heading": heading, "figure": "work_precision"}
-    return Chart(f"{heading}: {x.name}", x, y, size=(4.6, 3.5), **shared, **more)
-
-
 def _around(axis: Axis, values: Sequence[Array], room: float = 0.0) -> Axis:
     """The axis over whole decades, so that few points do not look far apart; ``room`` decades at
     least above the highest, for words.
@@ -103,36 +96,6 @@ def _around(axis: Axis, values: Sequence[Array], room: float = 0.0) -> Axis:
     logs = np.log10(np.concatenate(values))
     low, high = np.floor(logs.min()), np.ceil(logs.max() + room)
     return replace(axis, low=10.0**low, high=10.0 ** max(high, low + 1.0))
-
-
-def _change_chart(
-    group: Sequence[Mapping[str, Any]], ways: Sequence[str], cost: str, axis: Axis
-) -> Chart:
-    traces, marks, lines = [], [], []
-    for c in (_by_cost(one, cost) for one in group):
-        colour = ways.index(str(c["curve"]))
-        size, spent = 100.0 * np.abs(np.array(c["error"], float)), np.array(c[cost], float)
-        at = size > 0.0
-        if at.any():
-            traces.append(Trace(str(c["curve"]), spent[at], size[at], "both", colour))
-        if len(size) > 1:
-            marks += [
-                Mark(x, y, str(label), colour)
-                for x, y, label in zip(spent[at], size[at], np.array(c["labels"])[at], strict=True)
-            ]
-        # of the finest level
-        lines += [
-            Band(str(c["against"]), "x", x, x, colour, dashed=True) for x in map(float, spent[~at])
-        ]
-    return _chart(
-        group[0],
-        f"Change from {group[0]['against']}",
-        _around(axis, [np.array(c[cost], float) for c in group]),
-        _around(Axis("|change|", "%", log=True), [t.y for t in traces], _WORDS),
-        traces=tuple(traces),
-        marks=tuple(marks),
-        bands=tuple(lines),
-    )
 
 
 def _shown(keys: Sequence[tuple[str, str]]) -> set[tuple[str, str]]:
@@ -146,37 +109,54 @@ def _shown(keys: Sequence[tuple[str, str]]) -> set[tuple[str, str]]:
     return out
 
 
-def _error_chart(
-    group: Sequence[Mapping[str, Any]], cost: str, axis: Axis, sheet: bool, columns: int
+def _chart(
+    group: Sequence[Mapping[str, Any]],
+    cost: str,
+    axis: Axis,
+    ways: Sequence[str] = (),
+    *,
+    sheet: bool = True,
+    columns: int = 2,
 ) -> Chart:
+    """Errors of a number and case over a cost; changes from the finest level where there are
+    ``ways`` to it, which have a colour each.
+    """
     first, alone = group[0], len(group) == 1
-    traces, marks = [], []
+    heading = f"Change from {first['against']}" if ways else "What accuracy costs"
+    traces, marks, bands = [], [], []
     for k, c in enumerate(_by_cost(one, cost) for one in group):
+        colour = ways.index(str(c["curve"])) if ways else k
         spent, size = np.array(c[cost], float), 100.0 * np.abs(np.array(c["error"], float))
-        label = _label(c) + f", against {c['against']}" * (alone and bool(c["against"]))
-        traces.append(Trace(label, spent, size, "both", k))
-        if alone and "labels" in c:
-            marks += [
-                Mark(x, y, str(label), k)
-                for x, y, label in zip(spent, size, c["labels"], strict=True)
-                if y > 0.0
-            ]
-        traces += _estimated(c, spent, k)
-    printed = first.get("thesis_error")
-    percent = 100.0 * abs(printed) if printed else 0.0
-    heights = [t.y[t.y > 0.0] for t in traces] + [np.array([percent])] * (percent > 0.0)
-    line = Band(f"thesis ({percent:.1f} %)", "y", percent, percent, dashed=True)
-    return _chart(
-        first,
-        "What accuracy costs",
-        _around(axis, [t.x for t in traces]),
-        _around(Axis("|error|", "%", log=True), heights, _WORDS),
-        traces=tuple(traces),
+        at = size > 0.0
+        label = str(c["curve"]) if ways else _label(c, alone=alone)
+        traces.append(Trace(label, spent[at], size[at], "both", colour))
+        if "labels" in c and (len(size) > 1 if ways else alone):
+            named = zip(spent[at], size[at], np.array(c["labels"])[at], strict=True)
+            marks += [Mark(x, y, str(text), colour) for x, y, text in named]
+        if ways:
+            # of the finest level
+            places = map(float, spent[~at])
+            bands += [Band(str(c["against"]), "x", x, x, colour, dashed=True) for x in places]
+        else:
+            traces += _estimated(c, spent, k)
+    printed = 0.0 if ways else 100.0 * abs(first.get("thesis_error") or 0.0)
+    if printed:
+        bands.append(Band(f"thesis ({printed:.1f} %)", "y", printed, printed, dashed=True))
+    heights = [t.y for t in traces] + [np.array([printed])] * (printed > 0.0)
+    return Chart(
+        f"{heading}: {axis.name}",
+        _around(axis, [np.array(c[cost], float) for c in group]),
+        _around(Axis("|change|" if ways else "|error|", "%", log=True), heights, _WORDS),
+        tuple(trace for trace in traces if len(trace.x)),
+        case=f"{number_label(str(first['name']))}, {first['case']}",
+        figure="work_precision",
         marks=tuple(marks),
-        bands=(line,) if percent else (),
-        detail="" if alone else _reference(group),
+        bands=tuple(bands),
+        detail="" if alone or ways else _reference(group),
         sheet=sheet,
         columns=columns,
+        size=(4.6, 3.5),
+        heading=heading,
     )
 
 
@@ -206,11 +186,11 @@ def _estimated(curve: Mapping[str, Any], spent: Array, colour: int) -> list[Trac
     return [Trace(words, spent[at : at + 1], y, "open points", colour, entry=words)]
 
 
-def _label(curve: Mapping[str, Any]) -> str:
-    """The curve with its fitted order, when it has one."""
-    order = curve.get("order")
-    return (
-        f"{curve['curve']} (order {order:.1f})"
-        if order is not None and np.isfinite(order)
-        else str(curve["curve"])
-    )
+def _label(curve: Mapping[str, Any], *, alone: bool) -> str:
+    """The curve with its fitted order, when it has one, and what a curve that is alone is taken
+    against.
+    """
+    order, text = curve.get("order"), str(curve["curve"])
+    if order is not None and np.isfinite(order):
+        text += f" (order {order:.1f})"
+    return text + f", against {curve['against']}" * (alone and bool(curve["against"]))

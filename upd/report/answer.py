@@ -15,9 +15,9 @@ from upd.analyses.base import CHOSEN_BY_ACCURACY
 from upd.labels import check_number, number, percent, percent_of, plus_minus, shown
 from upd.plot.chart import Entry
 from upd.report.columns import whole_table
-from upd.report.notes import MOST_NOTES, warnings
 from upd.report.tables import (
     MAIN,
+    MOST_NOTES,
     all_numbers,
     answer_tables,
     budget_table,
@@ -29,6 +29,7 @@ from upd.report.tables import (
     number_table,
     reached_numbers,
     stage_table,
+    warnings,
 )
 from upd.results import FAILED, WARNED, outcome_of, worst_check
 from upd.results.answer_table import AnswerTable

@@ -18,10 +18,8 @@ from upd.cache.sources import versions
 from upd.errors import InputError, one_line
 from upd.plot.chart import Chart
 from upd.plot.matplotlib import chart_png, write_sheet
-from upd.plot.png import png_uri
 from upd.report.columns import whole_table
-from upd.report.page import Section, Verdict, page_text, versions_text
-from upd.report.panels import make_panels
+from upd.report.page import Section, Verdict, image_uri, make_panels, page_text, versions_text
 from upd.results.answer_table import AnswerTable
 from upd.scene import AnyScene
 from upd.scene.keys import scene_as_run
@@ -182,5 +180,5 @@ class FigureAnswer(ABC):
 
     def _repr_html_(self) -> str:
         """As a notebook shows it: its text and its figure."""
-        uri = png_uri(chart_png(self.charts))
+        uri = image_uri(chart_png(self.charts))
         return f'<pre>{escape(str(self))}</pre><img src="{uri}">'

@@ -13,12 +13,10 @@ from upd.errors import InputError
 from upd.labels import number, percent, shown, unit_label
 from upd.plot.chart import Axis, Chart, Entry
 from upd.plot.style import colour_range
-from upd.report.error_budget import analysis_charts
 from upd.report.folder import RunFolder, read_run
-from upd.report.page import Section, page_text, write_page
-from upd.report.panels import make_panels
+from upd.report.page import Section, make_panels, page_text, write_page
 from upd.report.run_page import verdict
-from upd.report.tables import filled, main_numbers
+from upd.report.tables import analysis_charts, filled, main_numbers
 from upd.results import Case, shared_label
 from upd.results.answer_table import AnswerTable
 from upd.results.quantities import F_N, number_label

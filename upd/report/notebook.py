@@ -6,9 +6,8 @@ Text, table, figure of the main curves, xarray.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from html import escape
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,10 +17,8 @@ import numpy as np
 from upd.errors import ConvergenceError, InputError, did_you_mean
 from upd.report.answer import AnswerLine, Written, answer
 from upd.report.columns import text_width
-from upd.report.error_budget import run_charts
-from upd.report.tables import answer_tables, main_numbers
+from upd.report.tables import answer_tables, main_numbers, run_charts
 from upd.results import FAILED, OK, Case, Check, Result, outcome_of
-from upd.results.answer_table import AnswerTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -136,7 +133,17 @@ class RunResult:
         InputError
             For a title or case there is not; the message lists those there are.
         """
-        return plot(self, title, case, ax)
+        from upd.plot.matplotlib import draw, draw_all
+
+        chosen = _chosen(charts(self), title, case)
+        if ax is None:
+            return draw_all(chosen)
+        if len(chosen) > 1:
+            meant = "; ".join(f"{c.title}, {c.case}" if c.case else c.title for c in chosen)
+            raise InputError(
+                f"plot: ax takes one chart, {len(chosen)} are meant ({meant}); give title and case"
+            )
+        return [draw(chosen[0], ax)]
 
     def table(self) -> str:
         """All its numbers as text, a line each: name, case, value, unit, bound of the error."""
@@ -147,7 +154,20 @@ class RunResult:
 
         Raises InputError when xarray is not installed.
         """
-        return to_xarray(self)
+        try:
+            xarray = import_module("xarray")
+        except ImportError:
+            raise InputError(
+                "to_xarray needs the package xarray: pip install xarray; without it, .arrays "
+                "has the same numbers"
+            ) from None
+        return {
+            case: xarray.Dataset(
+                {name: (dims, data, dict(more)) for name, dims, data, more in _variables(group)},
+                attrs={"case": case},
+            )
+            for case, group in self.arrays.items()
+        }
 
     def answer(self, width: int, *, full: bool = False) -> list[AnswerLine]:
         """Its answer as the terminal prints it, in lines of ``width`` characters; with all numbers,
@@ -161,40 +181,17 @@ class RunResult:
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
-        return as_html(self)
+        """As a notebook shows it: the tables of its answer."""
+        # templates are slow to import
+        from upd.report.page import rendered
 
-
-def as_html(result: RunResult) -> str:
-    """The same as tables; every text is escaped."""
-    colour = {OK: "#1a7f37", FAILED: "#b42318"}.get(result.outcome, "#9a6700")
-    tables = answer_tables(result.size, [r.as_dict() for r in result.results])
-    good = sum(check.passed for check in result.checks)
-    folder = "" if result.folder is None else f"; run folder {result.folder}"
-    return (
-        f"<div><b>{escape(result.title or result.scene)}</b><br><span "
-        f"style='color:{colour}'>{escape(result.status)}; {good} of {len(result.checks)} "
-        f"self-checks passed</span>{''.join(map(_table_html, tables))}"
-        f"<small>{len(result.results)} numbers, {len(result.arrays)} groups of "
-        f"arrays{escape(folder)}</small></div>"
-    )
-
-
-def _table_html(table: AnswerTable) -> str:
-    """A table of the answer with its heading and its note."""
-    sides = ["right" if head.startswith("#") else "left" for head in table.columns]
-
-    def row(kind: str, cells: Sequence[str]) -> str:
-        found = zip(sides, cells, strict=True)
-        made = (f"<{kind} style='text-align:{side}'>{escape(c)}</{kind}>" for side, c in found)
-        return f"<tr>{''.join(made)}</tr>"
-
-    head = row("th", [head.lstrip("# ") for head in table.columns])
-    rows = "".join(row("td", cells) for cells in table.rows)
-    note = f"<small>{escape(table.note)}</small><br>" if table.note else ""
-    return (
-        f"<p><b>{escape(table.heading)}</b></p><table><thead>{head}</thead>"
-        f"<tbody>{rows}</tbody></table>{note}"
-    )
+        return rendered(
+            "notebook.html.j2",
+            result=self,
+            tables=answer_tables(self.size, [r.as_dict() for r in self.results]),
+            colour={OK: "#1a7f37", FAILED: "#b42318"}.get(self.outcome, "#9a6700"),
+            passed=sum(check.passed for check in self.checks),
+        )
 
 
 def headline(result: RunResult) -> list[Entry]:
@@ -206,21 +203,6 @@ def charts(result: RunResult) -> list[Chart]:
     """All charts of the run, the most important first."""
     summary = result.summary() | {"scene_file": tomllib.loads(result.scene_text)}
     return run_charts(chart_arrays(result), summary)
-
-
-def plot(result: RunResult, title: str | None, case: str | None, ax: Axes | None) -> list[Axes]:
-    """Draw charts with matplotlib; see `RunResult.plot`."""
-    from upd.plot.matplotlib import draw, draw_all
-
-    chosen = _chosen(charts(result), title, case)
-    if ax is not None:
-        if len(chosen) > 1:
-            meant = "; ".join(f"{c.title}, {c.case}" if c.case else c.title for c in chosen)
-            raise InputError(
-                f"plot: ax takes one chart, {len(chosen)} are meant ({meant}); give title and case"
-            )
-        return [draw(chosen[0], ax)]
-    return draw_all(chosen)
 
 
 def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Chart]:
@@ -240,25 +222,6 @@ def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Cha
         known = ", ".join(dict.fromkeys(c.case for c in mine if c.case))
         raise InputError(f"plot: no chart of the case {case!r}; there are {known or 'none'}")
     return cases[:_MOST_CHARTS] if case is None else cases
-
-
-def to_xarray(result: RunResult) -> dict[str, Any]:
-    """Case -> xarray.Dataset; see `RunResult.to_xarray`."""
-    try:
-        xarray = import_module("xarray")
-    except ImportError:
-        raise InputError(
-            "to_xarray needs the package xarray: pip install xarray; without it, .arrays "
-            "has the same numbers"
-        ) from None
-    out = {}
-    for case, group in result.arrays.items():
-        variables = {
-            name: (dims, data, dict(attributes))
-            for name, dims, data, attributes in _variables(group)
-        }
-        out[case] = xarray.Dataset(variables, attrs={"case": case})
-    return out
 
 
 def _variables(

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import base64
 import gzip
+import io
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+import numpy as np
 from markupsafe import Markup, escape
 
 from upd.cache.files import write_text
 from upd.errors import InputError
-from upd.plot.png import png_uri
-from upd.plot.surface import Surface, packed
-from upd.plot.surface_picture import picture
-from upd.report.notes import MOST_NOTES
-from upd.report.panels import Panel, data, fitting
+from upd.plot.chart import Chart
+from upd.plot.matplotlib import chart_png
+from upd.plot.plotly import figure
+from upd.plot.surface import Surface, n_bytes, packed
+from upd.report.tables import MOST_NOTES
 from upd.results.answer_table import AnswerTable
 
 if TYPE_CHECKING:
@@ -33,6 +36,18 @@ _MARGIN_BYTES = 150_000
 _MU = re.compile(r"\bmu(?=N?\b)")
 _INDEX = re.compile(r"\b([KFTkh])_([A-Za-z]{1,2})\b")
 _PARTS = Path(__file__).parent / "parts"
+#: what a script element would change or end at, moved by 256: its last seven bits stay
+_SAFE = {code: code + 256 for code in (0, ord("\r"), 27, ord("<"))}
+#: pixels of the width of a picture on a page at most
+_WIDTH = 1600
+#: PNG file -> heading, for those that have no chart
+_HEADINGS = {
+    "modes_free": "Mode shapes, free",
+    "modes_glued": "Mode shapes, damper glued",
+    "dimensions": "Geometry and its dimensions",
+}
+#: a picture wider than this has drawings side by side
+_SHEET_PIXELS = 1300
 
 
 class Verdict(NamedTuple):
@@ -41,6 +56,27 @@ class Verdict(NamedTuple):
     kind: str
     word: str
     text: str
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One figure of the page.
+
+    Attributes
+    ----------
+    image
+        Data URI of the picture that needs no script.
+    sheet
+        Whether that picture has drawings side by side, which need the width of the page.
+    charts
+        In the order of the page; those of one title share a place.
+    """
+
+    name: str
+    heading: str
+    image: str
+    sheet: bool
+    charts: tuple[Chart, ...]
 
 
 class Section(NamedTuple):
@@ -112,33 +148,42 @@ def page_text(
         if not section.is_empty
     ]
     panels = [panel for section in found for panel in section.panels]
-    script, charts = _packed_plotly(), data(panels)
+    script, charts = _packed_plotly(), _data(panels)
     used = (
-        len(script)
-        + len(_packed(_json({"panels": charts})))
+        len(script.encode())
+        + len(_packed(_json({"panels": charts})).encode())
         + sum(len(p.image) for p in panels)
         + _MARGIN_BYTES
     )
     shown, left_out = fitting(surfaces, LIMIT_BYTES - used)
-    return (
-        _environment()
-        .get_template("page.html.j2")
-        .render(
-            title=title,
-            verdict=verdict,
-            lead=lead,
-            sections=found,
-            footer=footer,
-            most_notes=MOST_NOTES,
-            surfaces=shown,
-            surfaces_left_out=left_out,
-            surface_image=png_uri(picture(shown[0])) if shown else "",
-            style=(_PARTS / "page.css").read_text("utf-8"),
-            plotly=script,
-            script=(_PARTS / "page.js").read_text("utf-8"),
-            page_data=_packed(_json({"panels": charts, "surfaces": [packed(s) for s in shown]})),
-        )
+    return rendered(
+        "page.html.j2",
+        title=title,
+        verdict=verdict,
+        lead=lead,
+        sections=found,
+        footer=footer,
+        most_notes=MOST_NOTES,
+        surfaces=shown,
+        surfaces_left_out=left_out,
+        surface_image=_picture(shown[0]) if shown else "",
+        style=(_PARTS / "page.css").read_text("utf-8"),
+        plotly=script,
+        script=(_PARTS / "page.js").read_text("utf-8"),
+        page_data=_packed(_json({"panels": charts, "surfaces": [packed(s) for s in shown]})),
     )
+
+
+def _picture(surface: Surface) -> str:
+    # matplotlib is slow to import
+    from upd.plot.pictures import picture
+
+    return image_uri(picture(surface))
+
+
+def rendered(template: str, **content: Any) -> str:
+    """A template of the folder parts with its content; every text is escaped."""
+    return _environment().get_template(template).render(**content)
 
 
 @cache
@@ -158,8 +203,9 @@ def _environment() -> Environment:
 
 @cache
 def _packed_plotly() -> str:
-    """The script of the installed package as every page holds it: 2 MB of base64 instead of
-    5 MB. The package itself is slow to import and not needed.
+    """The script of the installed package as every page holds it: 1.7 MB instead of 5 MB.
+
+    The package itself is slow to import and not needed.
     """
     spec = find_spec("plotly")
     for place in (spec.submodule_search_locations or ()) if spec else ():
@@ -172,8 +218,13 @@ def _packed_plotly() -> str:
 
 
 def _packed(text: str) -> str:
-    """Text as the page's script unpacks it: gzip in base64, the same bytes each time."""
-    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")
+    """Text as the page's script unpacks it: gzip, seven bits a letter, the same each time.
+
+    Base64 holds six. The letters cannot end the element they stand in.
+    """
+    bits = np.unpackbits(np.frombuffer(gzip.compress(text.encode(), mtime=0), np.uint8))
+    letters = np.packbits(np.pad(bits, (0, -bits.size % 7)).reshape(-1, 7), axis=1) >> 1
+    return letters.tobytes().decode("ascii").translate(_SAFE)
 
 
 def symbols(text: str) -> Markup:
@@ -192,3 +243,98 @@ def _json(content: Any) -> str:
 def versions_text(versions: Mapping[str, str]) -> str:
     """Packages with their versions, as a page ends."""
     return f"Versions: {', '.join(f'{k} {v}' for k, v in versions.items())}." if versions else ""
+
+
+# ---------------------------------------------------------------- figures
+
+
+def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Panel]:
+    """Charts with the PNG files that show the same, then the other PNG files."""
+    groups: dict[str, list[Chart]] = {}
+    for chart in charts:
+        groups.setdefault(chart.figure or chart.title, []).append(chart)
+    panels = []
+    for name in dict.fromkeys([*groups, *figures]):
+        group = groups.get(name, [])
+        heading = _HEADINGS.get(name, name.replace("_", " ").capitalize())
+        if group:
+            heading = group[0].heading or group[0].title
+        # at most six charts: a sheet of more is not read
+        drawn = [chart for chart in group if chart.sheet][:6] or group[:6]
+        png = figures[name].read_bytes() if name in figures else chart_png(drawn)
+        is_sheet = png_size(png)[0] > _SHEET_PIXELS
+        panels.append(Panel(name, heading, image_uri(png), is_sheet, tuple(group)))
+    return panels
+
+
+def _note(chart: Chart) -> str:
+    """What stands under a chart: its detail as a sentence, and what to see."""
+    detail = f"{chart.detail[:1].upper()}{chart.detail[1:]}." if chart.detail else ""
+    return " ".join(part for part in (detail, chart.note) if part)
+
+
+def _data(panels: Iterable[Panel]) -> dict[str, Any]:
+    """What the page's script draws: panel -> list of {title, note, charts}."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    for panel in panels:
+        for title in dict.fromkeys(chart.title for chart in panel.charts):
+            charts = [
+                {"case": c.case.replace("muN", "µN"), "note": _note(c), "figure": figure(c)}
+                for c in panel.charts
+                if c.title == title
+            ]
+            found.setdefault(panel.name, []).append({"title": title, "charts": charts})
+    return found
+
+
+def fitting(surfaces: Iterable[Surface], room: int) -> tuple[list[Surface], list[str]]:
+    """Surfaces that fit into ``room`` bytes, with as many of their fields as fit, and what had to
+    be left out, in words.
+    """
+    shown, left_out = [], []
+    for surface in surfaces:
+        parts = (
+            replace(surface, fields=surface.fields[:n]) for n in range(len(surface.fields), -1, -1)
+        )
+        part = next((part for part in parts if n_bytes(part) <= room), None)
+        if part is None:
+            left_out.append(f"{surface.label}: too large for this page")
+            continue
+        lost = surface.fields[len(part.fields) :]
+        left_out += [f"{f.label}: too large for this page" for f in lost]
+        room -= n_bytes(part)
+        shown.append(part)
+    return shown, left_out
+
+
+def png_size(png: bytes) -> tuple[int, int]:
+    """Width and height in pixels, from the header every PNG begins with."""
+    return int.from_bytes(png[16:20], "big"), int.from_bytes(png[20:24], "big")
+
+
+def image_uri(png: bytes) -> str:
+    """A PNG as the data URI of a picture with a palette of 256 colours.
+
+    WebP without loss: a fifth of the bytes, as good for a figure.
+    """
+    from PIL import Image
+
+    out = io.BytesIO()
+    try:
+        with Image.open(io.BytesIO(png)) as image:
+            flat = Image.new("RGB", image.size, "white")
+            flat.paste(image, mask=image.getchannel("A") if image.mode == "RGBA" else None)
+    except (OSError, SyntaxError):
+        # Damaged: the browser shows what there is of it.
+        return _uri("png", png)
+    if flat.width > _WIDTH:
+        size = _WIDTH, round(flat.height * _WIDTH / flat.width)
+        flat = flat.resize(size, Image.Resampling.LANCZOS)
+    # An octree: a fifth of the time of cuts at medians, and smaller.
+    few = flat.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    few.convert("RGB").save(out, "WEBP", lossless=True)
+    return _uri("webp", out.getvalue())
+
+
+def _uri(kind: str, data: bytes) -> str:
+    return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"

@@ -9,11 +9,8 @@ from typing import Any
 
 from upd.analyses import analysis_named
 from upd.plot.surface import Surface, read_surface
-from upd.report.error_budget import run_charts
 from upd.report.folder import RunFolder, read_run
-from upd.report.notes import warnings
-from upd.report.page import Section, Verdict, page_text, versions_text, write_page
-from upd.report.panels import make_panels
+from upd.report.page import Section, Verdict, make_panels, page_text, versions_text, write_page
 from upd.report.tables import (
     all_numbers,
     answer_tables,
@@ -22,7 +19,9 @@ from upd.report.tables import (
     effects_table,
     filled,
     main_numbers,
+    run_charts,
     stage_table,
+    warnings,
 )
 from upd.results import FAILED, outcome_of
 from upd.results.answer_table import AnswerTable

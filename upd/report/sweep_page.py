@@ -1,4 +1,5 @@
-"""One sweep folder -> report.html: the grid, figures, failures, the table, cost and the scene.
+"""The page of a sweep, from its folder: the grid, figures, failures, the table, cost and the scene;
+and that of a study: which level is enough, what accuracy costs, the tables.
 
 Nothing of the folder is trusted to be whole.
 """
@@ -14,17 +15,24 @@ from typing import Any
 import numpy as np
 
 from upd.labels import number, unit_label
-from upd.plot.chart import Array
+from upd.plot.chart import Array, Chart
 from upd.plot.sample_charts import sample_charts
 from upd.plot.sweep_charts import Followed, figure_names, sheet_name, sweep_charts
-from upd.report.folder import is_png
-from upd.report.page import Section, Verdict, page_text, versions_text, write_page
-from upd.report.panels import Panel, make_panels
-from upd.report.schema import damaged_file, read_json
+from upd.report.folder import damaged_file, is_png, read_json
+from upd.report.page import (
+    Panel,
+    Section,
+    Verdict,
+    make_panels,
+    page_text,
+    versions_text,
+    write_page,
+)
 from upd.report.tables import SAMPLE_HEADING, filled, sample_table, stage_table, with_unit
 from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_title
 from upd.results.sampled import SampledNumber, sample_sentence
+from upd.vary.tables import TextTable
 
 #: values of a parameter written one by one
 _FEW = 8
@@ -381,3 +389,51 @@ def _costs(data: Mapping[str, Any]) -> list[str]:
         text += f". Last call: {call:.1f} s; {where}; threads of each: {plan.get('threads', 1)}"
         text += f"; points kept from earlier calls: {kept}" if kept else ""
     return [f"{text}.", *(f"{note[:1].upper()}{note[1:]}." for note in plan.get("notes", []))]
+
+
+# ---------------------------------------------------------------- a study
+
+
+def write_study_report(
+    folder: Path,
+    title: str,
+    failed: int,
+    notes: Sequence[str],
+    tables: Iterable[TextTable],
+    charts: Iterable[Chart],
+    figures: Iterable[Path],
+) -> Path:
+    """Write report.html into a study folder; returns its path.
+
+    Parameters
+    ----------
+    failed
+        Points without an answer.
+    notes
+        Sentences the page opens with, as which level is enough.
+    charts, figures
+        What is drawn, and the PNG files that show the same.
+
+    Raises
+    ------
+    InputError
+        When it cannot be written.
+    """
+    text = " ".join([*([f"{failed} point{'s' * (failed != 1)} failed."] if failed else []), *notes])
+    verdict = Verdict(*("warning", "Done in part") if failed else ("passed", "Done"), text)
+    panels = make_panels(charts, {path.stem: path for path in figures})
+    found = [_table(one) for one in tables]
+    sections = [Section(one.heading, [one], kind="tall") for one in found]
+    sections.insert(1, Section("Figures", panels=panels))
+    return write_page(folder / "report.html", page_text(title, sections, verdict=verdict))
+
+
+def _table(table: TextTable) -> AnswerTable:
+    """Its columns but those of many words, which study.md has."""
+    cells = list(zip(*table.rows, strict=True)) or [()] * len(table.columns)
+    columns = {
+        ("# " if letter == "r" else "") + head.replace("\n", " "): mine
+        for head, letter, mine in zip(table.columns, table.align, cells, strict=True)
+        if head not in table.spare
+    }
+    return filled(table.title, columns)

@@ -15,8 +15,7 @@ from upd.errors import InputError
 from upd.plot.chart import Entry
 from upd.plot.matplotlib import draw
 from upd.plot.plotly import figure as plotly_figure
-from upd.report.error_budget import budget_charts
-from upd.report.tables import budget_table, error_parts
+from upd.report.tables import budget_charts, budget_table, error_parts
 from upd.results import Case, ErrorPart, InputPart, Result, with_parts
 from upd.scene import as_scene, load_scene
 

@@ -20,7 +20,7 @@ from upd.cli.tables import print_result, print_table
 from upd.report.answer import LINES
 from upd.report.columns import TextColumn, fitted, folded_head, text_lines
 from upd.report.notebook import RunResult, headline
-from upd.report.notes import MOST_NOTES, warnings
+from upd.report.tables import MOST_NOTES, warnings
 from upd.results import (
     NO_CASE,
     Case,

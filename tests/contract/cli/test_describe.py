@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from upd import cli
-from upd.plot.png import png_size
+from upd.report.page import png_size
 from upd.scene import load_scene
 
 

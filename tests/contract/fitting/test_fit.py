@@ -17,7 +17,7 @@ from upd import cli
 from upd.errors import InputError
 from upd.fitting import FitResponses, Residuals, knowledge, read_parameters, read_targets
 from upd.fitting.targets import KNOWN
-from upd.plot.png import png_size
+from upd.report.page import png_size
 from upd.scene import ForcedScene, load_scene
 
 RIGHT, LEFT = "stiffness.thesis.right.K_T", "stiffness.thesis.left.K_T"

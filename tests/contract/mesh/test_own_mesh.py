@@ -15,7 +15,7 @@ from upd.mesh import Mesh, recipes
 from upd.mesh.checks import check_pairs
 from upd.mesh.export import write_mesh
 from upd.mesh.hexmesh import boundary_faces, boundary_quads
-from upd.report.notes import warnings
+from upd.report.tables import warnings
 
 EXAMPLES = Path(upd.__file__).parent / "scenes" / "examples"
 PARAMS = {"crown": 300.0, "divisions": 6}

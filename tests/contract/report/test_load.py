@@ -15,7 +15,7 @@ import upd
 from upd.errors import InputError
 from upd.labels import file_name
 from upd.report import notebook
-from upd.report.curves import write_curves
+from upd.report.files import write_curves
 from upd.report.folder import read_run
 from upd.report.notebook import RunResult
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,11 +13,10 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 
-from upd.errors import InputError
 from upd.fem import box_mesh
 from upd.mesh import FloatArray, Mesh
 from upd.mesh.hexmesh import boundary_quads
-from upd.plot.modes import draw_mode
+from upd.plot.pictures import draw_mode
 from upd.plot.sheet import write_sheet
 
 SIDES = (2.0, 3.0, 4.0)
@@ -147,29 +145,6 @@ def test_rest_and_zero_shapes_are_drawn_at_rest() -> None:
     rest, _ = collections(draw_mode({"box": mesh}, {}))
     for a, b in zip(zero.get_paths(), rest.get_paths(), strict=True):
         assert np.array_equal(a.vertices, b.vertices)
-
-
-def test_all_faults_of_a_shape_at_once() -> None:
-    mesh = box()
-    n = mesh.n_node
-    shapes: dict[str, Any] = {
-        "a": np.zeros(3 * n),
-        "b": np.full((n, 3), np.nan),
-        "c": np.zeros((n, 3), dtype=complex),
-        "d": np.zeros((n, 3)),
-    }
-    with pytest.raises(InputError) as fault:
-        draw_mode({"a": mesh, "b": mesh, "c": mesh}, shapes)
-    for part in (
-        f"a: the shape is ({3 * n},)",
-        f"({n}, 3)",
-        "b: the shape has entries that are not finite",
-        "c: the shape is complex128",
-    ):
-        assert part in str(fault.value)
-    assert "no body 'd': the bodies are a, b, c" in str(fault.value)
-    with pytest.raises(InputError, match="at least one mesh"):
-        draw_mode({}, {})
 
 
 def test_two_blades_are_drawn_at_once(tmp_path: Path) -> None:

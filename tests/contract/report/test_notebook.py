@@ -19,9 +19,9 @@ import pytest
 
 from upd.errors import InputError
 from upd.report import notebook
-from upd.report.error_budget import run_charts
 from upd.report.folder import read_run
 from upd.report.notebook import RunResult
+from upd.report.tables import run_charts
 from upd.results import status_of
 from upd.results.quantities import number_label
 

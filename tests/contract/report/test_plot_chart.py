@@ -36,10 +36,8 @@ from upd.plot.chart import (
     Style,
     Trace,
 )
-from upd.plot.labels import labelled, sides, with_room
 from upd.plot.matplotlib import draw, write_sheet, write_sheets
 from upd.plot.plotly import figure
-from upd.plot.png import png_size
 from upd.plot.style import (
     CLOSED,
     COLOURS,
@@ -48,11 +46,15 @@ from upd.plot.style import (
     OUTLINE,
     SHARE_COLOURS,
     even_levels,
+    labelled,
     legend_names,
     log_ticks,
+    sides,
+    with_room,
 )
 from upd.plot.work_precision import work_precision_charts
 from upd.report.compare import overlaid
+from upd.report.page import png_size
 
 X, Y = Axis("x", "mm"), Axis("y", "N")
 T = np.array([0.0, 1.0, 2.0])

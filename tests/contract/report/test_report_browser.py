@@ -25,8 +25,7 @@ from upd import run
 from upd.analyses import contact
 from upd.plot.chart import Axis, Chart, Mark, Trace
 from upd.report import write_report
-from upd.report.page import Section, page_text, write_page
-from upd.report.panels import make_panels
+from upd.report.page import Section, make_panels, page_text, write_page
 from upd.results.answer_table import AnswerTable
 
 PHONE, DESK, SCREEN = 390, 1280, 800

@@ -23,7 +23,7 @@ from upd import cli
 from upd.analyses.forced import peaks
 from upd.analyses.forced.linear_limits import linear_modes
 from upd.errors import InputError
-from upd.plot.png import png_size
+from upd.report.page import png_size
 from upd.scene import load_scene
 from upd.sizing import BestDamper, search
 from upd.sizing.choice import Tried, is_along, sensitivities
@@ -111,7 +111,7 @@ def test_what_is_told(found: BestDamper, tmp_path: Path) -> None:
     wide, tall = png_size((tmp_path / "out" / "choice.png").read_bytes())
     assert wide > tall > 400
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "worst peak" in page and "data:image/png" in page
+    assert "worst peak" in page and "data:image/webp" in page
     text = str(found)
     assert text.startswith(f"{found.found.ranges.scene.name}: worst peak")
     sentences = " ".join(text.split())

@@ -15,7 +15,7 @@ from upd import cli
 from upd.contact.damper_section import DamperSection, FaceSection, eccentricity
 from upd.contact.rigid_damper import SLIDINGS
 from upd.errors import InputError
-from upd.plot.png import png_size
+from upd.report.page import png_size
 from upd.scene import load_scene
 from upd.sizing import damper_statics
 from upd.sizing.statics import (
@@ -189,7 +189,7 @@ def test_command_tells_first_and_draws(
     assert bounds["rows"][0][1:3] == [0.0, None]
     assert motions["rows"][0][3] == pytest.approx(F_C * math.cos(math.pi / 6.0))
     page = (folder / "report.html").read_text()
-    assert "<h2>Friction</h2>" in page and "data:image/png" in page
+    assert "<h2>Friction</h2>" in page and "data:image/webp" in page
     # again into the same folder
     assert call("design", "asymmetric-response") == 0
 
@@ -234,4 +234,4 @@ def test_in_a_notebook() -> None:
     assert "F_C 3769.1 N = m r w^2: damper 71.604 g, 300 mm, 4000 rpm" in str(found)
     page = found._repr_html_()
     assert "tilts" in page
-    assert 'src="data:image/png;base64,' in page
+    assert 'src="data:image/webp;base64,' in page

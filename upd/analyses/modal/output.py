@@ -20,7 +20,7 @@ from upd.analyses.modal.solve import Array, ModalSolution, ModeSet, RigMode, Rig
 from upd.errors import MeshError
 from upd.matrices import DofMap, Matrices, write_dof_map, write_matrices
 from upd.mesh import IntArray, Mesh, recipes
-from upd.plot.modes import draw_mode
+from upd.plot.pictures import draw_mode
 from upd.plot.sheet import Drawing, write_sheet
 from upd.results import ArrayGroup, Case, variable
 

@@ -4,7 +4,13 @@
   if (!window.DecompressionStream) return;
 
   async function textOf(id) {
-    const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
+    // Seven bits a letter.
+    const text = document.getElementById(id).textContent, bytes = new Uint8Array((text.length * 7) >> 3);
+    for (let k = 0, n = 0, held = 0, bits = 0; k < text.length; k++) {
+      held = (held << 7) | (text.charCodeAt(k) & 127);
+      bits += 7;
+      if (bits >= 8) { bits -= 8; bytes[n++] = held >> bits; }
+    }
     return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
   }
 

@@ -1,8 +1,10 @@
-"""The curves of a run as CSV files, for spreadsheets and other programs."""
+"""Files of a run folder: PNG figures of its charts, and its curves as CSV for other programs."""
 
 from __future__ import annotations
 
 import csv
+import logging
+import tomllib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -10,9 +12,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.cache.files import whole_file
+from upd.errors import UpdError
 from upd.labels import file_name
+from upd.mesh import recipes
 from upd.plot.chart import Arrays, Group, Variable
+from upd.plot.matplotlib import write_sheets
+from upd.report.notebook import RunResult, charts
 
+log = logging.getLogger(__name__)
+
+#: names of the figures a run may leave, without their ending
+FIGURES = (
+    "pressure",
+    "pressure_sections",
+    "force_approach",
+    "over_load",
+    "stick_slip",
+    "traction",
+    "hysteresis",
+    "contact_open",
+    "surface",
+    "force_displacement",
+    "contact_law",
+    "response",
+    "response_harmonics",
+    "damping",
+    "contact_state",
+    "contact_map",
+    "damper_motion",
+    "damper_period",
+    "seating",
+    "performance",
+    "modes_free",
+    "modes_glued",
+    "dimensions",
+    "error_budget",
+)
 #: folder of the files in a run folder
 FOLDER = "curves"
 #: dimension of a pair of real and imaginary part
@@ -25,6 +60,30 @@ _PLACES = ("x", "y")
 _SAMPLE = "sample"
 
 Column = tuple[str, NDArray[np.generic]]
+
+
+def write_figures(result: RunResult, folder: Path) -> list[Path]:
+    """Draw the charts of a run as PNG, those of one figure on one sheet.
+
+    Figures that lie there already stay. Returns what was written.
+    """
+    written = write_sheets(charts(result), folder, keep=True)
+    return written + write_dimensions(result, folder / "dimensions.png")
+
+
+def write_dimensions(result: RunResult, path: Path) -> list[Path]:
+    """Draw the recipe's sections with their dimensions, unless its meshes cannot be made."""
+    recipe = str(tomllib.loads(result.scene_text)["geometry"]["recipe"])
+    try:
+        meshes, views = recipes.drawing(recipe, result.size["mesh"])
+    except UpdError as problem:
+        log.info("no drawing of the geometry: %s", problem)
+        return []
+    # matplotlib takes a while to import
+    from upd.plot.drawing import draw_sections
+    from upd.plot.sheet import write_png
+
+    return write_png(draw_sections(meshes, views), path)
 
 
 def write_curves(arrays: Arrays, folder: Path) -> list[Path]:
