@@ -13,7 +13,7 @@ from upd.analyses import make_plan
 from upd.analyses.forced.inputs import nearer
 from upd.analyses.forced.measures import stuck_modes
 from upd.analyses.forced.model import Model, make_model, preloaded
-from upd.analyses.forced.points import FacePoints, GaussRule, gauss_points
+from upd.analyses.forced.points import FacePoints, GaussRule, fewer_points, gauss_points
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import make_bodies
 from upd.errors import InputError
@@ -81,14 +81,16 @@ def test_a_mesh_does_not_change_what_points_are() -> None:
     assert errors[1] < errors[0] / 3.5
 
 
-def test_fewer_points_are_sums_of_more(meshes: dict[str, Mesh]) -> None:
+def test_fewer_points_are_those_of_their_own_rule(meshes: dict[str, Mesh]) -> None:
     mesh = meshes["right"]
     whole = gauss_points(mesh, 5, 4, "right")
-    for other in ((3, 4), (5, 2), (3, 2)):
+    for axis, m, other in ((0, 3, (3, 4)), (1, 1, (5, 2))):
         own = gauss_points(mesh, *other, "right")
-        at = np.linalg.lstsq(whole.values.T, own.values.T, rcond=None)[0].T
-        assert at @ whole.values == pytest.approx(own.values, abs=1e-12)
-        assert at @ whole.position == pytest.approx(own.position)
+        fewer = fewer_points(whole, axis, m)
+        assert np.array_equal(fewer.line, own.line)
+        assert fewer.at @ whole.values == pytest.approx(own.values, abs=1e-12)
+        assert fewer.share @ whole.weight == pytest.approx(own.weight)
+        assert fewer.at @ whole.position == pytest.approx(own.position)
 
 
 def test_columns_that_the_parts_cannot_share_are_refused(meshes: dict[str, Mesh]) -> None:

@@ -9,14 +9,14 @@ among them, are left out; friction in gross slip would not hold such a drift at 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.spatial import cKDTree
 
-from upd.analyses.forced.points import FacePoints, gauss_points
+from upd.analyses.forced.points import FacePoints, fewer_points, gauss_points
 from upd.analyses.seated.bodies import Blade, Bodies
 from upd.reduction import attachment_modes, craig_bampton
 from upd.scene.forced_contact import Side
@@ -67,6 +67,8 @@ class MirrorPairs:
             self.total(face.weight),
             face.nodes,
             face.values[self.point],
+            face.line[self.point],
+            face.per_part,
         )
 
 
@@ -200,7 +202,8 @@ def attached_part(
 
     A half blade has half of the energy, and its points stand for themselves and their mirror
     images: K and M of the whole are twice its own. Fewer points are a part of those that a body was
-    reduced to before: where models with more points follow, to twice the rows at once.
+    reduced to before (`gauss_points.fewer_points`): where models with more points follow, to twice
+    the rows at once.
 
     Parameters
     ----------
@@ -225,11 +228,21 @@ def attached_part(
     twice = 2.0 if bodies.half else 1.0
     seen, probes = np.split(known.rows, [3 * face.n_point])
     seen = seen.reshape(face.n_point, 3, -1)
-    if (rows, columns) != key[1:]:
-        # polynomials of fewer points are sums of those of more
-        fewer = gauss_points(blade.mesh, rows, columns, side)
-        at = np.linalg.lstsq(face.values.T, fewer.values.T, rcond=None)[0]
-        seen = np.einsum("nm,ncr->mcr", at, seen)
+    for axis, wanted, now in (
+        (0, rows, key[1]),
+        (1, face.per_part * columns // key[2], face.per_part),
+    ):
+        if wanted < now:
+            fewer = fewer_points(face, axis, wanted)
+            seen = np.einsum("mn,ncr->mcr", fewer.at, seen)
+            face = replace(
+                face,
+                position=fewer.at @ face.position,
+                weight=fewer.share @ face.weight,
+                values=fewer.at @ face.values,
+                line=fewer.line,
+                per_part=fewer.per_part,
+            )
     return BladePart(twice * known.K, twice * known.M, seen, probes, most)
 
 

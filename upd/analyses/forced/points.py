@@ -29,7 +29,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -58,6 +58,11 @@ class FacePoints:
         (k,) of the mesh that carry the points.
     values
         (m, k) of their shape functions.
+    line
+        (m, 2) row and column of points on the lattice, or of Gauss points, -1 for others.
+    per_part
+        Gauss points along the damper in each part of the face: part k has columns
+        k per_part ... (k + 1) per_part - 1; 0 for points of another rule.
     """
 
     position: FloatArray
@@ -65,6 +70,8 @@ class FacePoints:
     weight: FloatArray
     nodes: IntArray
     values: FloatArray
+    line: IntArray
+    per_part: int = 0
 
     @property
     def n_point(self) -> int:
@@ -155,7 +162,12 @@ def lattice_points(
     if len(used) == len(share) and np.count_nonzero(share) == len(share):
         # every point is a node: in the order of the points
         nodes, values = found.nodes[share.argmax(axis=1)], np.eye(len(share))
-    return FacePoints(values @ mesh.points[nodes], found.frame, total / total.sum(), nodes, values)
+    lines = np.column_stack(
+        [np.repeat(np.arange(len(up)), len(along)), np.tile(np.arange(len(along)), len(up))]
+    )
+    return FacePoints(
+        values @ mesh.points[nodes], found.frame, total / total.sum(), nodes, values, lines
+    )
 
 
 _HALF = float(np.finfo(float).eps) ** 0.5
@@ -187,6 +199,67 @@ class GaussRule:
                 if j != k:
                     out[k] *= (x - other) / (own - other)
         return out
+
+
+class FewerPoints(NamedTuple):
+    """Fewer Gauss points of a face from all of them.
+
+    Attributes
+    ----------
+    at
+        (m, n) displacements of the fewer from those of all.
+    share
+        (m, n) forces and stiffnesses.
+    line
+        (m, 2) row and column.
+    per_part
+        As of `FacePoints`.
+    """
+
+    at: FloatArray
+    share: FloatArray
+    line: IntArray
+    per_part: int
+
+
+def fewer_points(face: FacePoints, axis: int, m: int) -> FewerPoints:
+    """m of the n Gauss points up the slope, or along the damper in each part, exactly.
+
+    l_i of m < n points has a degree below n, so l_i = sum_j l_i(x_j) l_j of n points, and
+
+        u_i = sum_j l_i(x_j) (w_j / w_i) u_j,    f_i = sum_j l_i(x_j) f_j;
+
+    weights go as forces, whose resultant and first moments stay.
+
+    Parameters
+    ----------
+    face
+        Gauss points.
+    axis
+        0 up the slope, 1 along the damper.
+    m
+        Points there, fewer than now.
+    """
+    per_part = face.per_part if axis == 0 else m
+    row, (part, column) = face.line[:, 0], np.divmod(face.line[:, 1], face.per_part)
+    mine, other = (row, face.line[:, 1]) if axis == 0 else (column, np.stack([row, part], 1))
+    n = int(mine.max()) + 1
+    fine, coarse = GaussRule.of(n), GaussRule.of(m)
+    share = coarse.values(fine.at)
+    at = share * fine.weight / coarse.weight[:, None]
+    groups = np.unique(other, axis=0)
+    out = np.zeros((2, len(groups) * m, face.n_point))
+    line = np.zeros((len(groups) * m, 2), np.int64)
+    for g, group in enumerate(groups):
+        on = np.flatnonzero((other == group) if axis == 0 else (other == group).all(axis=1))
+        on, new = on[np.argsort(mine[on])], slice(g * m, (g + 1) * m)
+        out[0, new, on], out[1, new, on] = at.T, share.T
+        numbers = np.arange(m)
+        line[new, 0] = numbers if axis == 0 else group[0]
+        line[new, 1] = group if axis == 0 else group[1] * m + numbers
+    # as `gauss_points` has them: by part, row, column
+    order = np.lexsort((line[:, 1] % per_part, line[:, 0], line[:, 1] // per_part))
+    return FewerPoints(out[0, order], out[1, order], line[order], per_part)
 
 
 def gauss_points(mesh: Mesh, rows: int, columns: int, side: str) -> FacePoints:
@@ -226,8 +299,21 @@ def gauss_points(mesh: Mesh, rows: int, columns: int, side: str) -> FacePoints:
     found = [_rectangle(mesh.points, faces[part], frame, rows, count, side) for part in parts]
     weight = np.concatenate([w for w, _ in found])
     values = np.vstack([v for _, v in found])[:, nodes] / weight[:, None]
-    position = values @ mesh.points[nodes]
-    return FacePoints(position, frame, weight / weight.sum(), nodes, values)
+    line = [
+        np.column_stack(
+            [np.repeat(np.arange(rows), count), np.tile(np.arange(count), rows) + k * count]
+        )
+        for k in range(len(parts))
+    ]
+    return FacePoints(
+        values @ mesh.points[nodes],
+        frame,
+        weight / weight.sum(),
+        nodes,
+        values,
+        np.vstack(line),
+        count,
+    )
 
 
 def _parts(points: FloatArray, faces: IntArray) -> list[IntArray]:
