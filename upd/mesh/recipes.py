@@ -86,6 +86,11 @@ log = logging.getLogger(__name__)
 LEAST_JACOBIAN = 0.1
 
 
+# Meshes of users' recipes that no folder keeps, so that a plan does not run these once more for
+# each question: that of the plan and that of its coarser companion.
+_not_kept: dict[str, dict[str, Mesh]] = {}
+_MOST_NOT_KEPT = 2
+
 def build_mesh(
     recipe: str,
     params: Mapping[str, Any],
@@ -105,6 +110,8 @@ def build_mesh(
     say = progress or log.info
     folder = cache_folder(cache_dir)
     key = _key(recipe, module, chosen)
+    if key in _not_kept:
+        return _not_kept[key], True
     cached = load_meshes(folder, key)
     if cached is not None:
         say(f"{recipe}: meshes taken from {folder}")
@@ -118,6 +125,10 @@ def build_mesh(
             raise
         raise OwnMeshError(f"recipe {recipe!r}: {problem}") from None
     save_meshes(folder, key, meshes)
+    if is_file(recipe) and load_meshes(folder, key) is None:
+        while len(_not_kept) >= _MOST_NOT_KEPT:
+            del _not_kept[next(iter(_not_kept))]
+        _not_kept[key] = meshes
     return meshes, False
 
 

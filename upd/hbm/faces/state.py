@@ -115,7 +115,7 @@ class InterfaceModel:
                 )
             q = H * (self.shapes.T @ force + self.places @ F)
             out.append(self.seen_modes @ q + self.seen_contact @ force + self.seen_drive @ F)
-        return np.array(out)
+        return np.array(out).reshape(len(out), len(self.seen_modes))
 
 
 @dataclass
