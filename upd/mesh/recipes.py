@@ -91,6 +91,7 @@ LEAST_JACOBIAN = 0.1
 _not_kept: dict[str, dict[str, Mesh]] = {}
 _MOST_NOT_KEPT = 2
 
+
 def build_mesh(
     recipe: str,
     params: Mapping[str, Any],

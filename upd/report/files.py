@@ -43,6 +43,7 @@ FIGURES = (
     "damper_period",
     "seating",
     "performance",
+    "nonlinear_modes",
     "modes_free",
     "modes_glued",
     "dimensions",

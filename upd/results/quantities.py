@@ -298,6 +298,16 @@ TWICE_THE_BEST = Quantity("twice_the_best_ratio", "%", "worst peak at twice the 
 #: of the performance curve
 BEST = (BEST_RATIO, BEST_PEAK, BEST_FREQUENCY, BEST_REDUCTION, HALF_OF_BEST, TWICE_THE_BEST)
 
+LARGEST_DAMPING = Quantity("largest_damping", "%", "largest damping ratio over the amplitude")
+DAMPING_ACCELERATION = Quantity(
+    "damping_acceleration", "m/s2", "amplitude of the largest damping, right accelerometer"
+)
+DAMPING_FREQUENCY = Quantity("damping_frequency", "Hz", "frequency at the largest damping")
+DAMPING_SHIFT = Quantity("damping_shift", "%", "its change from the stuck mode")
+FORCE_FOR_DAMPING = Quantity(
+    "force_for_damping", "N/(m/s2)", "F_C per amplitude that is damped most"
+)
+
 # -- beside measured curves ------------------------------------------------------------------------
 
 FRAC = Quantity("frac", words="FRAC with the measured curve")

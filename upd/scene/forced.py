@@ -42,6 +42,7 @@ FORCED_WANTS = (
     "hysteresis",
     "damper_motion",
     "performance",
+    "nonlinear_modes",
     "inputs",
     "band",
 )
@@ -215,10 +216,11 @@ class ForcedScene(RigBase):
         "contact_state", which points stick, slip or lift off, over frequency and at the peak;
         "hysteresis", loops of the points that dissipate most, energy and power of every point;
         "damper_motion", the damper's translations and rotations at the peak, static part included;
-        "performance", peaks of both blades against F_C/F_E, the best one marked; "inputs", what the
-        peaks depend on most: stiffness, patch, friction, static state, fit; "band", every peak over
-        the static states and the start positions of the sliders. Cost: upd plan shows what each
-        brings with it.
+        "performance", peaks of both blades against F_C/F_E, the best one marked; "nonlinear_modes",
+        frequency and damping of the modes in phase and out of phase over their amplitude; "inputs",
+        what the peaks depend on most: stiffness, patch, friction, static state, fit; "band", every
+        peak over the static states and the start positions of the sliders. Cost: upd plan shows
+        what each brings with it.
     analysis
         What distinguishes this scene from one of the rig's modes.
     stiffness

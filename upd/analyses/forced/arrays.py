@@ -15,6 +15,7 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, PointCurve, SweptCurve
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array
+from upd.analyses.forced.nonlinear_modes import mode_arrays
 from upd.analyses.forced.performance import performance_arrays
 from upd.analyses.forced.plan import excitation_of
 from upd.analyses.forced.results import measured_peaks
@@ -30,6 +31,7 @@ Variables = dict[str, Any]
 #: what the groups of result.nc hold, their attribute ``content``
 POINTS, LINEAR, FRICTION, MEASURED = "points", "linear", "friction", "measured"
 PERFORMANCE, SWEEP, MARCHED = "performance", "sweep", "marched peaks"
+MODES = "nonlinear mode"
 #: loops kept of a peak
 N_LOOPS = 4
 
@@ -42,8 +44,8 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
     dict
         Group -> variable -> (dimensions, array, attributes). Contents: "points" and "linear" of
         every stiffness, "friction" of every curve, "sweep" and "marched peaks" of every sweep (the
-        latter what the contact does at its peaks), "performance", the "measured" peaks, and every
-        "measured curve".
+        latter what the contact does at its peaks), "performance", every "nonlinear mode", the
+        "measured" peaks, and every "measured curve".
     """
     out: dict[str, ArrayGroup] = {}
     scene = solution.plan.scene
@@ -63,6 +65,8 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
         add(MARCHED, case, marched_arrays(solution, list(marched)))
     for name, performance in solution.performances.items():
         add(PERFORMANCE, name, performance_arrays(performance))
+    for mode in solution.nonlinear_modes:
+        add(MODES, mode.case, mode_arrays(mode))
     out |= measured_arrays(scene.measured) if out else {}
     measured = measured_peaks(solution.plan)
     if measured and out:

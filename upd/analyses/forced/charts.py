@@ -14,6 +14,7 @@ from upd.analyses.forced.arrays import (
     LINEAR,
     MARCHED,
     MEASURED,
+    MODES,
     PERFORMANCE,
     POINTS,
     SWEEP,
@@ -265,6 +266,31 @@ def _chart(group: Group) -> Chart:
     return _sheet("performance", "Performance", axes, traces=tuple(traces), case=case)
 
 
+def mode_charts(arrays: Arrays) -> Iterator[Chart]:
+    """Damping and frequency over the amplitude, the modes of a stiffness on one chart each."""
+    groups = list(with_content(arrays, MODES))
+    x = Axis("acceleration, right accelerometer", "m/s²", log=True)
+    for name in dict.fromkeys(str(g.attributes["stiffness"]) for g in groups):
+        mine = [g for g in groups if g.attributes["stiffness"] == name]
+        for quantity, axis, scale in (
+            ("damping", Axis("damping ratio", "%"), 100.0),
+            ("frequency", HZ_AXIS, 1.0),
+        ):
+            traces = tuple(
+                Trace(
+                    str(g.attributes["mode"]),
+                    np.asarray(g["acceleration_right"].data, float),
+                    scale * np.asarray(g[quantity].data, float),
+                    "line",
+                    k,
+                )
+                for k, g in enumerate(mine)
+            )
+            title = f"{axis.name.capitalize()} over the amplitude"
+            case = f"stiffness {name}"
+            yield _sheet("nonlinear_modes", title, (x, axis), traces=traces, case=case)
+
+
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     """Responses free, stuck and with friction, and the peaks over F_C/F_E; what was asked for of
     the contact and the damper behind them.
@@ -291,6 +317,7 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     return [
         *_responses(arrays, curves, {r: k for k, r in enumerate(ratios)}),
         *performance_charts(arrays),
+        *mode_charts(arrays),
         *damping_charts(arrays),
         *_more_harmonics(arrays, curves),
         *(shares_chart(c, k) for c in moving if "share" in c.group for k in range(len(SIDES))),

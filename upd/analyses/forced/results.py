@@ -14,6 +14,7 @@ from upd.analyses.forced.curves import ForcedCurve, LinearCurves, PointCurve, Wh
 from upd.analyses.forced.linear_limits import linear_curves
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array, ComplexArray, Model, balance_of
+from upd.analyses.forced.nonlinear_modes import mode_results
 from upd.analyses.forced.performance import performance_results
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
 from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
@@ -47,6 +48,8 @@ def make_results(solution: ForcedSolution) -> list[Result]:
     results += solution.band
     for name, performance in solution.performances.items():
         results += performance_results(name, performance)
+    for curve_of_mode in solution.nonlinear_modes:
+        results += mode_results(curve_of_mode)
     return results + solution.effects + measured_results(solution)
 
 

@@ -12,6 +12,7 @@ from upd.analyses.base import Resolved
 from upd.analyses.forced.curves import ForcedCurve, LinearCurves, SweptCurve, WholeFaces
 from upd.analyses.forced.measures import CurvePeak, in_faces
 from upd.analyses.forced.model import Array, Model
+from upd.analyses.forced.nonlinear_modes import ModeCurve
 from upd.analyses.forced.peaks_again import PeaksAgain
 from upd.analyses.forced.performance import Performance
 from upd.analyses.forced.plan import ForcedPlan
@@ -96,6 +97,7 @@ class ForcedSolution:
     marched: list[MarchedPeak] = field(default_factory=list)
     band: list[Result] = field(default_factory=list)
     performances: dict[str, Performance] = field(default_factory=dict)
+    nonlinear_modes: list[ModeCurve] = field(default_factory=list)
     omissions: list[Resolved] = field(default_factory=list)
     levels: dict[str, list[PeaksAgain]] = field(default_factory=dict)
     effects: list[Result] = field(default_factory=list)

@@ -22,6 +22,7 @@ from upd.analyses.forced.interface_model import INTERFACE, make_springs, make_wh
 from upd.analyses.forced.levels import MESH, Laws, level_variations, make_variant
 from upd.analyses.forced.linear_limits import linear_of, linear_of_faces
 from upd.analyses.forced.model import Model, make_model, preloaded, quiet
+from upd.analyses.forced.nonlinear_modes import mode_over_amplitude
 from upd.analyses.forced.peaks import solve_curve
 from upd.analyses.forced.peaks_again import (
     FoundPeaks,
@@ -196,6 +197,12 @@ def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: St
         for ratio in ratios_of(plan):
             point = plan, solution.models[first], ratio, highest
             work.append(_Work(points.append, peaks_at, point))
+    if scene.wants("nonlinear_modes"):
+        for name, model in solution.models.items():
+            for in_phase in (True, False):
+                mode = plan, model, solution.linear[name], name, in_phase
+                into = solution.nonlinear_modes.append
+                work.append(_Work(into, mode_over_amplitude, mode, needed=True))
     with stages("friction", f"{len(laws) * len(order)} curves, {len(work)} pieces"), quiet():
         _done(beside, work)
     solution.curves.sort(key=lambda c: (list(laws).index(c.stiffness), order.index(c.ratio)))
