@@ -295,7 +295,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 13648,
+    "analyses": 13650,
     "hbm": 6947,
     "contact": 4195,
     "linalg": 3387,
@@ -321,7 +321,7 @@ ROOM_LINES = {
     "manual": 203,
 }
 #: totals of upd/; pages of the manual's gallery are no modules
-MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 50691, 345, 3859, 484
+MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 50693, 345, 3859, 484
 #: parameters of a function and fields of a class, outside the solver rooms
 MOST_PARAMETERS, MOST_FIELDS, SOLVER_ROOMS = 11, 20, ("hbm", "contact", "linalg")
 

@@ -279,7 +279,8 @@ def _modes(results: Sequence[Entry]) -> AnswerTable | None:
         cells = (
             _DAMPED[one].format(found["value"]) if found else "" for one, found in rest.items()
         )
-        rows.append((str(_fields(e)["mode"]), f"{e['value']:.2f} %", *cells))
+        mode = ", ".join(filter(None, (_fields(e)["mode"], _fields(e).get("choice"))))
+        rows.append((mode, f"{e['value']:.2f} %", *cells))
     if not rows:
         return None
     heads = ("mode", "#largest damping", "#at m/s²", "#Hz", "#against stuck", "#F_C per m/s², N")

@@ -40,7 +40,7 @@ class ModeCurve:
     Attributes
     ----------
     case
-        Contact stiffness and mode.
+        Contact stiffness and mode; its choice says where the path ended early.
     acceleration, displacement
         Side -> (n,) amplitude along x at the accelerometer, m/s2 and um.
     frequency, damping
@@ -107,8 +107,9 @@ def mode_over_amplitude(
     moved = {side: found.motion(model.row(side)) for side in SIDES}
     square = (2.0 * np.pi * found.frequency) ** 2
     shares = found.state.mean(axis=1)
+    ended = "" if found.status == "complete" else f"path ended after {len(square)} points"
     return ModeCurve(
-        Case(stiffness=stiffness, mode=mode),
+        Case(stiffness=stiffness, mode=mode, choice=ended),
         {side: _M * one * square for side, one in moved.items()},
         {side: one / _M for side, one in moved.items()},
         found.frequency,
