@@ -30,6 +30,7 @@ from upd.scene.forced_contact import SIDES, Side
 SPAN = (0.5, 100.0)
 #: of the path, at least and at most
 POINTS, MOST_POINTS = 40, 400
+#: metres in a millimetre
 _M = 1e-3
 
 
@@ -41,8 +42,8 @@ class ModeCurve:
     ----------
     case
         Contact stiffness and mode; its choice says where the path ended early.
-    acceleration, displacement
-        Side -> (n,) amplitude along x at the accelerometer, m/s2 and um.
+    acceleration
+        Side -> (n,) amplitude along x at the accelerometer, m/s2.
     frequency, damping
         (n,) Hz, and damping ratio.
     slip, lift
@@ -57,7 +58,6 @@ class ModeCurve:
 
     case: Case
     acceleration: Mapping[Side, Array]
-    displacement: Mapping[Side, Array]
     frequency: Array
     damping: Array
     slip: Array
@@ -104,14 +104,12 @@ def mode_over_amplitude(
         slider=model.slider,
         settings=replace(LONG_STEPS, most_points=MOST_POINTS),
     )
-    moved = {side: found.motion(model.row(side)) for side in SIDES}
     square = (2.0 * np.pi * found.frequency) ** 2
     shares = found.state.mean(axis=1)
     ended = "" if found.status == "complete" else f"path ended after {len(square)} points"
     return ModeCurve(
         Case(stiffness=stiffness, mode=mode, choice=ended),
-        {side: _M * one * square for side, one in moved.items()},
-        {side: one / _M for side, one in moved.items()},
+        {side: _M * found.motion(model.row(side)) * square for side in SIDES},
         found.frequency,
         found.damping,
         shares[:, 1],
@@ -138,7 +136,7 @@ def first_slip(b: Balance, shape: Array, omega: float) -> float:
     Raises
     ------
     InputError
-        Where a point slips or is open at rest, or none has friction.
+        Where no point sticks at rest, or none ever slips.
     """
     stiffness = stuck_stiffness(b.contacts)
     rest = b.split(b.stuck(omega))[0][..., 0] * stiffness + b.stuck_constant
@@ -146,11 +144,6 @@ def first_slip(b: Balance, shape: Array, omega: float) -> float:
     mu = b.contacts.law.mu
     limit, slope = mu * rest[:, 0], mu * moved[:, 0]
     C = np.sum(rest[:, 1:] ** 2, axis=1) - limit**2
-    if not (C < 0.0).any():
-        raise InputError(
-            "nonlinear modes: no point sticks at rest, so nothing slips more with the amplitude; "
-            'give contact.friction, or contact.static = "frictionless"'
-        )
     A = np.sum(moved[:, 1:] ** 2, axis=1) - slope**2
     found = [np.inf]
     for sign in (1.0, -1.0):
@@ -159,7 +152,12 @@ def first_slip(b: Balance, shape: Array, omega: float) -> float:
         below = B + np.sqrt(np.maximum(inside, 0.0))
         good = (C < 0.0) & (inside >= 0.0) & (below > 0.0)
         found += list(-2.0 * C[good] / below[good])
-    return float(min(found))
+    if not np.isfinite(least := float(min(found))):
+        raise InputError(
+            "nonlinear modes: no point sticks at rest and slips as the amplitude grows; give "
+            'contact.friction, or contact.static = "frictionless"'
+        )
+    return least
 
 
 # -- numbers and arrays ----------------------------------------------------------------------------
@@ -171,8 +169,10 @@ def mode_results(curve: ModeCurve) -> list[Result]:
     """
     case = curve.case
     a = curve.acceleration["right"]
-    at, zeta = parabola(np.log(a), curve.damping)
-    frequency = float(np.interp(at, *_rising(np.log(a), curve.frequency)))
+    log_a = np.log(a)
+    at, zeta = parabola(log_a, curve.damping)
+    near = np.argsort(log_a)
+    frequency = float(np.interp(at, log_a[near], curve.frequency[near]))
     acceleration = float(np.exp(at))
     values = {
         q.DAMPING_ACCELERATION: acceleration,
@@ -185,11 +185,6 @@ def mode_results(curve: ModeCurve) -> list[Result]:
         # it still rises
         return [largest]
     return [largest, *(quantity.of(value, case) for quantity, value in values.items())]
-
-
-def _rising(x: Array, y: Array) -> tuple[Array, Array]:
-    order = np.argsort(x)
-    return x[order], y[order]
 
 
 def mode_arrays(curve: ModeCurve) -> dict[str, Any]:
@@ -205,5 +200,4 @@ def mode_arrays(curve: ModeCurve) -> dict[str, Any]:
     }
     for side in SIDES:
         out[f"acceleration_{side}"] = variable(at, curve.acceleration[side], "m/s2")
-        out[f"displacement_{side}"] = variable(at, curve.displacement[side], "um")
     return out

@@ -75,6 +75,9 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
             for name, model in solution.models.items():
                 springs = make_springs(plan, model)
                 _sweep(solution, name, springs.march, springs.at_rest(), stages)
+            for work in _mode_work(solution):
+                with stages("nonlinear modes", "damping over amplitude"):
+                    work.into(work.function(*work.arguments))
         else:
             with SideProcesses(*_MODULES) as beside:
                 _balanced_points(solution, beside, stages)
@@ -197,17 +200,22 @@ def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: St
         for ratio in ratios_of(plan):
             point = plan, solution.models[first], ratio, highest
             work.append(_Work(points.append, peaks_at, point))
-    if scene.wants("nonlinear_modes"):
-        for name, model in solution.models.items():
-            for in_phase in (True, False):
-                mode = plan, model, solution.linear[name], name, in_phase
-                into = solution.nonlinear_modes.append
-                work.append(_Work(into, mode_over_amplitude, mode, needed=True))
+    work += _mode_work(solution)
     with stages("friction", f"{len(laws) * len(order)} curves, {len(work)} pieces"), quiet():
         _done(beside, work)
     solution.curves.sort(key=lambda c: (list(laws).index(c.stiffness), order.index(c.ratio)))
     with stages("around the peaks", "levels, inputs, effects left out"), quiet():
         _around(solution, laws, variants, points, beside)
+
+
+def _mode_work(solution: ForcedSolution) -> Iterator[_Work]:
+    """Nonlinear modes of every stiffness, where they are wanted."""
+    for name, model in (
+        solution.models.items() if solution.plan.scene.wants("nonlinear_modes") else ()
+    ):
+        for in_phase in (True, False):
+            mode = solution.plan, model, solution.linear[name], name, in_phase
+            yield _Work(solution.nonlinear_modes.append, mode_over_amplitude, mode, needed=True)
 
 
 def _around(
