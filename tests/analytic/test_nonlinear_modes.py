@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from upd.errors import InputError
 from upd.hbm import NonlinearMode, contacts, frequency_response, nonlinear_mode
 from upd.hbm.core.fourier import harmonics
 from upd.hbm.springs.balance import assembled
 from upd.hbm.springs.nonlinear_mode import ExtendedBalance, stuck_modes
+from upd.reference.friction import jenkins_peak
 
 FloatArray = NDArray[np.float64]
 JENKINS: dict[str, Any] = {"k_n": 0.0, "k_t": 0.25, "mu": 1.0, "preload": 1.0}
@@ -138,6 +140,14 @@ def test_forced_peaks_from_the_mode_and_the_linear_rest() -> None:
         benchmark(3, [1e-6, 1e-5]).peak(FORCE, Y2)
 
 
+def test_best_preload_of_the_benchmark_is_that_of_curves() -> None:
+    """Peaks of whole curves at .3 to 1 times the static load: least at .41, 3.98e-5 m."""
+    mode = benchmark(3, np.geomspace(1e-6, 10**-3.4, 40))
+    factor, worst = mode.best_preload(FORCE, Y2)
+    assert factor == pytest.approx(0.41, rel=0.05)
+    assert worst == pytest.approx(3.98e-5, rel=0.05)
+
+
 def test_amplitude_turns_back_under_lift_off() -> None:
     """Past 10^-3.203 the contacts open and the amplitude falls: arc length passes the turn."""
     mode = benchmark(3, [1e-4, 10**-3.2])
@@ -202,6 +212,37 @@ def test_peak_of_one_degree_of_freedom_is_that_of_harmonic_balance() -> None:
     )  # fmt: skip
     # the mode's damping force grows with the frequency, that of friction does not
     assert mode.peak([force], [1.0])[1] == pytest.approx(answer.peak([1.0])[1], rel=5e-3)
+
+
+def test_best_preload_is_the_closed_form() -> None:
+    """Jenkins, one harmonic: A = (mu N/k_t) / (1 - pi F/(4 mu N)), least at mu N = pi F/2 with
+    A = pi F/k_t; over a range of loads where the peaks of its ends are alike.
+    """
+    k_t, loads = 0.3, (0.6, 1.1)
+    slider = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=k_t, mu=1.0, preload=1.0)
+    mode = nonlinear_mode(
+        [[1.0]],
+        [[0.0]],
+        [[1.0]],
+        slider,
+        mode=1,
+        amplitudes=np.geomspace(1.0, 80.0, 60),
+        harmonics=(1,),
+        samples=2048,
+    )
+    factor, worst = mode.best_preload([0.7], [1.0])
+    assert worst == pytest.approx(0.7 * np.pi / k_t, rel=1e-3)
+    # flat there
+    assert factor == pytest.approx(0.35 * np.pi, rel=2e-2)
+    exact = minimize_scalar(
+        lambda N: max(jenkins_peak(N, F, k_t) / F for F in loads), bounds=(1, 4), method="bounded"
+    )
+    factor, worst = mode.best_preload([1.0], [1.0], loads)
+    assert (factor, worst) == pytest.approx((exact.x, exact.fun), rel=1e-2)
+    with pytest.raises(InputError, match="must be above 0 and rising"):
+        mode.best_preload([1.0], [1.0], (1.1, 0.6))
+    with pytest.raises(InputError, match="give more amplitudes"):
+        mode.best_preload([1.0], [1.0], (0.01, 100.0))
 
 
 @pytest.mark.parametrize(

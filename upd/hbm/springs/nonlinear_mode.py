@@ -44,6 +44,8 @@ ComplexArray = NDArray[np.complex128]
 HALVINGS = 40
 #: points of a forced response for each of the path
 FINE = 50
+#: peaks from which the best preload is read, and places at which it is sought
+SEEN = 200
 
 
 @dataclass(frozen=True, repr=False)
@@ -165,16 +167,68 @@ class NonlinearMode(Shown):
         Raises InputError where the amplitudes of the mode do not reach the peak.
         """
         f, motion = self.response(force, row)
-        pushed = np.abs(self.fundamental.conj() @ (np.asarray(force) @ self.balance.modal.Phi))
-        w0 = 2.0 * np.pi * self.frequency
-        least = 2.0 * self.damping * w0**2 * self.amplitude**2
-        if not len(motion) or (pushed > least).all():
+        if not len(motion) or (self._force_at_peak(force) < 1.0).all():
             raise InputError(
                 "nonlinear mode: the forced peak lies beyond its amplitudes, "
                 f"{self.amplitude[0]:.3g} to {self.amplitude[-1]:.3g}; give others"
             )
         k = int(np.argmax(motion))
         return float(f[k]), float(motion[k])
+
+    def best_preload(
+        self, force: ArrayLike, row: ArrayLike, loads: tuple[float, float] = (1.0, 1.0)
+    ) -> tuple[float, float]:
+        """Factor on all static loads and preloads at which the worst peak is lowest.
+
+        Where every gap is closed at rest, static and dynamic loads scaled by c scale the motion by
+        c: the peaks h(f) per unit of load at the preload of this mode tell those at any other,
+        h(f/c). Valid as `peak` is; a curve by harmonic balance at the factor confirms it.
+
+        Parameters
+        ----------
+        force, row : array_like
+            As of `response`.
+        loads : (float, float)
+            Least and largest factor on `force`: the worst of all between counts.
+
+        Returns
+        -------
+        factor, worst : float
+            On static loads and preloads; peak of row @ q per unit of load [mm].
+
+        Raises
+        ------
+        InputError
+            For loads that are not positive and rising, and where the amplitudes of the mode do not
+            reach over such a range.
+        """
+        low, high = loads
+        if not 0.0 < low <= high < np.inf:
+            raise InputError(f"best_preload: loads {loads} must be above 0 and rising")
+        known = self._force_at_peak(force)
+        # without damping there is no peak before the first slip
+        known = known[known > float(np.finfo(float).eps) * known.max()]
+        begin, end = float(known[0]), float(known.max()) * (1.0 - FREQUENCY_SHARE)
+        span = np.log(high / low)
+        if not 0.0 < begin < end or np.log(end / begin) <= span:
+            raise InputError(
+                f"best_preload: the mode tells peaks of {begin:.3g} to {end:.3g} times the force, "
+                f"a smaller range than that of the loads, {high / low:.3g}; give more amplitudes"
+            )
+        f = np.geomspace(begin, end, SEEN)
+        base = np.asarray(force)
+        h = np.log([self.peak(one * base, row)[1] / one for one in f])
+        scale = np.geomspace(high / end, low / begin, SEEN)
+        window = np.log(low / scale)[:, None] + np.linspace(0.0, span, SEEN)
+        worst = np.interp(window, np.log(f), h).max(axis=1)
+        k = int(worst.argmin())
+        return float(scale[k]), float(np.exp(worst[k]))
+
+    def _force_at_peak(self, force: ArrayLike) -> FloatArray:
+        """(n,) factor on the force at which each amplitude is that of the peak."""
+        pushed = np.abs(self.fundamental.conj() @ (np.asarray(force) @ self.balance.modal.Phi))
+        w0 = 2.0 * np.pi * self.frequency
+        return np.asarray(2.0 * self.damping * w0**2 * self.amplitude**2 / pushed)
 
     def _rest(self, W: FloatArray, f: ComplexArray, weights: FloatArray) -> ComplexArray:
         """The other stuck modes under the force, linear, at W rad/s."""
