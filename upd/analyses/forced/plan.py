@@ -49,6 +49,8 @@ _STEPS_KEPT, _SOLVED = 10.0, 19.0
 # Newton steps of a curve over F_C/F_E (points that begin or end to slip are kinks of its path), and
 # for each frequency asked for.
 _KINKS = {"symmetric": 1.2e5, "asymmetric": 1.1e5}
+# Newton steps of a mode over its amplitude.
+_MODE = 600.0
 # What is solved again around the peaks, and the coarser meshes, over the run.
 _AROUND = 0.4
 # Lines of contact points up the slope of a patch whose rows are all taken, at refine 1.
@@ -177,6 +179,8 @@ def _curves_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -
     if scene.wants("performance"):
         c = scene.performance
         steps += c.points * (kinks / math.sqrt(c.lowest * c.highest) + e.points)
+    if scene.wants("nonlinear_modes"):
+        steps += 2 * _MODE * len(scene.stiffnesses)
     return steps * _step_seconds(scene, size)
 
 

@@ -55,13 +55,13 @@ for f, known in printed.items():
 mode = nonlinear_mode(
     M, C, K, faces, mode=3, amplitudes=np.geomspace(1e-6, 10**-3.4, 40), static_force=static
 )
-known = {-4.0: (222.9916, 2.1716), -3.8: (212.9318, 4.6632), -3.6: (207.1169, 4.1153)}
+shooting = {-4.0: (222.9916, 2.1716), -3.8: (212.9318, 4.6632), -3.6: (207.1169, 4.1153)}
 fig, axes = plt.subplots(2, sharex=True)
 shown = {"frequency, Hz": mode.frequency, "damping ratio, %": 100 * mode.damping}
 for k, (name, values) in enumerate(shown.items()):
     axes[k].semilogx(mode.amplitude, values, label="nonlinear mode")
-    points = [one[k] for one in known.values()]
-    axes[k].semilogx([10**a for a in known], points, "o", c="k", mfc="none", label="shooting")
+    points = [one[k] for one in shooting.values()]
+    axes[k].semilogx([10**a for a in shooting], points, "o", c="k", mfc="none", label="shooting")
     axes[k].set_ylabel(name)
 axes[1].set_xlabel("modal amplitude")
 axes[0].legend()
