@@ -423,8 +423,10 @@ def write_study_report(
     verdict = Verdict(*("warning", "Done in part") if failed else ("passed", "Done"), text)
     panels = make_panels(charts, {path.stem: path for path in figures})
     found = [_table(one) for one in tables]
-    sections = [Section(one.heading, [one], kind="tall") for one in found]
-    sections.insert(1, Section("Figures", panels=panels))
+    sections = [
+        Section(one.heading, [one], kind="tall", folded=k > 0) for k, one in enumerate(found)
+    ]
+    sections.insert(0, Section("Figures", panels=panels))
     return write_page(folder / "report.html", page_text(title, sections, verdict=verdict))
 
 
