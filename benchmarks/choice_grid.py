@@ -15,7 +15,6 @@ from upd.batch.engine import Watcher
 from upd.batch.plan import plan_sweep
 from upd.batch.sweeps import run_sweep
 from upd.errors import InputError
-from upd.hbm.peaks.over import SAME
 from upd.scene import ForcedScene
 from upd.scene.quantities import FROM_FORCE, UNKNOWN
 from upd.scene.ranges import with_values
@@ -25,6 +24,8 @@ from upd.sizing.rig_peaks import RigPeaks
 from upd.vary.outcome import Outcome
 
 Array = NDArray[np.float64]
+#: relative difference of F_C/F_E of two loads that are one
+SAME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ def grid_scene(found: ChosenDamper) -> ForcedScene:
         With the ranges.
     """
     c = found.best.best.log_centrifugal
-    deciding = [math.exp(c - p.s) for p in found.best.best.deciding if p.share > 0.0]
+    deciding = [math.exp(c - p.s) for p in found.best.best.deciding]
     low, high = found.ranges.forces
     shapes = zip(found.ranges.shapes, found.best.values, strict=True)
     forces = [low, high, *(f for f in deciding if low * 1.001 < f < high / 1.001)]

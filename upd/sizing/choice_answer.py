@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.peaks.over import SAME
 from upd.plot.chart import Axis, Band, Chart, Mark, Trace
 from upd.report.answer_folder import FigureAnswer
 from upd.results.answer_table import AnswerTable, Rounded
@@ -65,8 +64,8 @@ class BestDamper(FigureAnswer):
         robust = ("over the ranges", found.centrifugal, found.best.values)
         nominal = ("the scene's values", found.nominal_centrifugal, found.plain.values)
         heights = (
-            (_height(found.worst), _height(found.robust_at_nominal, found.settled[0])),
-            (_height(found.nominal_at_worst, found.settled[1]), _height(found.nominal_peak)),
+            (_height(found.worst), _height(found.robust_at_nominal)),
+            (_height(found.nominal_at_worst), _height(found.nominal_peak)),
         )
         optima = tuple(
             (name, Rounded(F), *(of.cell(v) for of, v in zip(shapes, values, strict=True)), *both)
@@ -81,7 +80,6 @@ class BestDamper(FigureAnswer):
                 Rounded(math.exp(p.y)),
             )
             for p in best.deciding
-            if p.share > 0.0
         )
         moved = tuple(
             (
@@ -108,8 +106,8 @@ class BestDamper(FigureAnswer):
                 ("parameter", "#value", "#slope", *within),
                 moved,
                 "Slope: d ln(peak) / d ln(parameter), below and above the optimum where both "
-                "differ. Within: the worst peak stays below so many per cent more, by whole "
-                "curves.",
+                "differ, all else as it is. Within: the worst peak stays below so many per cent "
+                "more, by whole curves.",
             ),
         )
 
@@ -117,7 +115,7 @@ class BestDamper(FigureAnswer):
     def notes(self) -> tuple[str, ...]:
         """What was asked, what limits the answer, and the cost."""
         found = self.found
-        e, best = found.ranges.scene.excitation, found.best.best
+        e = found.ranges.scene.excitation
         counted = ", ".join(
             f"{one.path} {one.shown(one.low)} to {one.shown(one.high)}"
             for one in found.ranges.during
@@ -128,7 +126,6 @@ class BestDamper(FigureAnswer):
             f"Right blade, {UNITS_OF['acceleration']}{per}, {e.start:g} to {e.stop:g} Hz, "
             f"stiffness {found.stiffness}{', over ' * bool(counted)}{counted}; {_mass(found)}.",
             *warnings(found),
-            *(["The curve between solved points did not agree."] * (best.status == "bracketed")),
             f"{found.curves} whole curves by harmonic balance{kept}: {found.seconds:.1f} s.",
         )
 
@@ -149,10 +146,8 @@ def _chosen(found: ChosenDamper) -> list[Sensitivity]:
     return [one for one in sensitivities(found) if one.path in paths]
 
 
-def _height(value: float, exact: bool = True) -> str:
-    if not math.isfinite(value):
-        return "not known"
-    return Rounded(value, text="{}" if exact else "at least {}")
+def _height(value: float) -> str:
+    return Rounded(value) if math.isfinite(value) else "not known"
 
 
 def _slopes(one: Sensitivity) -> str:
@@ -189,20 +184,8 @@ def _mass(found: ChosenDamper) -> str:
 def warnings(found: ChosenDamper) -> list[str]:
     """What limits the answer."""
     out = [f"Not solved: {why}." for why in found.refused]
-    for one in sensitivities(found):
-        out += [f"How far {one.path} may move is withheld: {why}." for why in one.withheld]
-    for low, high in found.gaps:
-        between = f"between F_C/F_E {low:.4g} and {high:.4g}"
-        out.append(f"Not known {between}: no whole curve reaches its end there.")
-    if found.best.best.at_jump and found.best.ends[0] < found.best.ends[1]:
-        out.append("At a jump of the worst peak over F_C: beyond it another peak decides, higher.")
-    low = math.exp(found.best.best.reached[0])
-    if low > found.best.ends[0] * (1.0 + ALIKE):
-        lost = sorted({math.exp(s) for one in found.best.worst.peaks for s in one.failed})
-        out.append(
-            f"Not known for F_C below {low:.4g} N: no whole curve reaches its end at F_C/F_E "
-            f"{', '.join(f'{r:.4g}' for r in lost)}."
-        )
+    if lost := found.best.worst.missed:
+        out.append(f"Not known beside F_C/F_E {lost}: no whole curve reaches its end there.")
     return out
 
 
@@ -213,9 +196,7 @@ def _curve(worst: WorstPeak, low: float, high: float) -> tuple[Array, Array]:
     """F_C [N] from end to end and heights, nan where they are not known."""
     c, y = worst.over(math.log(low), math.log(high))
     every = slice(None, None, max(1, len(c) // _CURVE))
-    c, y = c[every], y[every]
-    known = (c >= worst.known_from() - SAME) & np.isfinite(y)
-    return np.exp(c), np.where(known, np.exp(y), math.nan)
+    return np.exp(c[every]), np.exp(y[every])
 
 
 def _over_centrifugal(found: ChosenDamper) -> Chart:
@@ -242,7 +223,7 @@ def _over_centrifugal(found: ChosenDamper) -> Chart:
             Trace("robust optimum", at[:1], np.array([found.worst]), "star", 0, outline=True),
             Trace("nominal optimum", at[1:], np.array([found.nominal_peak]), "star", 1),
         ),
-        note="Between whole curves the cubic of their peaks and exact slopes.",
+        note="Between whole curves splines of their peaks.",
     )
 
 
@@ -252,16 +233,15 @@ def _over_ratio(found: ChosenDamper) -> Chart:
     traces: list[Trace] = []
     for w, rig in best.rigs:
         word = "".join(f", {of.shown(v)}" for of, v in zip(found.ranges.unsure, w, strict=True))
-        points = rig.peaks.points
-        for name in rig.peaks.curves():
-            solved = sorted((s, p[name].log_height) for s, p in points.items() if name in p)
+        points = {s: peaks for s, peaks in rig.peaks.points.items() if peaks}
+        for name in dict.fromkeys(name for peaks in points.values() for name in peaks):
+            solved = sorted((s, p[name][1]) for s, p in points.items() if name in p)
             x, y = np.exp(np.array(solved)).T
             traces.append(Trace(f"{name}{word}", x, y, "both", len(traces)))
     c, f = best.best.log_centrifugal, best.worst.f
     marks = tuple(
         Mark(math.exp(p.s), math.exp(p.y), f"F_E {math.exp(c - p.s):.3g} N", 0)
         for p in best.best.deciding
-        if p.share > 0.0
     )
     return Chart(
         "Peaks over F_C/F_E",

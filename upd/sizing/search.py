@@ -16,8 +16,7 @@ import itertools
 import logging
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args, overload
@@ -28,45 +27,36 @@ from scipy.optimize import minimize_scalar
 from upd.analyses.forced.model import quiet
 from upd.analyses.seated.bodies import Bodies
 from upd.errors import ConvergenceError, InputError, one_line
-from upd.hbm.peaks.over import AGREES, SCAN_STEP
-from upd.linalg.parallel import threads_for
 from upd.progress import Listener, Stages, silent
 from upd.scene import AnyScene, ForcedScene
 from upd.scene.ranges import stiffness_of, with_values
 from upd.scene.read import as_scene
 from upd.sizing.choice import (
-    GROWTHS,
     ChosenDamper,
     Objective,
-    Reach,
     Tried,
     best_of,
-    how_far,
-    how_far_force,
     is_along,
     nominal_of,
+    reaches_of,
 )
 from upd.sizing.choice_answer import BestDamper
-from upd.sizing.ranges import FORCE, InputRange, Ranges, read_ranges
+from upd.sizing.ranges import InputRange, Ranges, read_ranges
 from upd.sizing.rig_peaks import RigPeaks, bare
 from upd.sizing.statics import damper_statics
 from upd.sizing.statics_answer import DamperDesign
-from upd.sizing.worst_peak import COMPARED_STEP, WorstPeak, has_moved, lowest_worst
+from upd.sizing.worst_peak import WorstPeak, lowest_worst
 
 log = logging.getLogger(__name__)
 #: values of what is chosen beside F_C on the first grid; more between the neighbours of the best,
 #: and how closely, as a share of the range
 GRID, MORE, CLOSE = 5, 8, 0.01
-#: turns of several inputs chosen beside F_C at most
-_TURNS = 4
-#: looks at whole curves around the optimum
+#: turns of several inputs chosen beside F_C at most, and ln of what one has to gain
+_TURNS, _GAIN = 4, 2e-3
+#: looks at the optimum at most, each with the whole curves that the one before has asked for
 _LOOKS = 4
 #: inputs with their values, in the units inside
 Inputs = tuple[tuple[InputRange, float], ...]
-#: of the range of F_E, as ln F_E: steps between the first whole curves
-_SHARE = 0.5
-#: beyond a range of F_E up to which its ends are sought, as ln F_E
-_REACH = 3.0
 
 
 @overload
@@ -174,19 +164,17 @@ def choose_damper(ranges: Ranges, objective: Objective, progress: Listener) -> C
         search.at(())
     if not search.tried:
         raise ConvergenceError("; ".join(search.refused))
-    tried = tuple(sorted(search.tried, key=lambda one: one.values))
     for _ in range(_LOOKS):
-        both = best_of(tried), nominal_of(tried)
-        reaches, (here, there, settled) = search.reaches(both[0]), search.compared(*both)
-        if not any(any(_moved(one)) for one in both):
+        # whole curves on the way may show another optimum
+        tried = tuple(map(search.again, sorted(search.tried, key=lambda one: one.values)))
+        solved = search.curves
+        best, plain = best_of(tried), nominal_of(tried)
+        with search.stages("search", "how far the optimum reaches"):
+            reaches = reaches_of(best, ranges)
+            here = best.plain.solved(best.best.log_centrifugal)
+            there = plain.worst.solved(plain.nominal.log_centrifugal)
+        if search.curves == solved:
             break
-        # whole curves on the way have shown another optimum
-        tried = tuple(map(_again, tried))
-    else:
-        why = f"the optimum has moved with each of {_LOOKS} looks at whole curves"
-        lost = Reach(math.nan, why), Reach(math.nan, why)
-        reaches = {name: tuple(lost for _ in GROWTHS) for name in reaches}
-        here, there, settled = search.compared(best_of(tried), nominal_of(tried))
     return ChosenDamper(
         ranges,
         objective,
@@ -195,24 +183,9 @@ def choose_damper(ranges: Ranges, objective: Objective, progress: Listener) -> C
         tuple(search.refused),
         time.perf_counter() - begin,
         reaches,
-        here,
-        there,
-        settled,
+        math.exp(here),
+        math.exp(there),
     )
-
-
-def _moved(one: Tried) -> tuple[bool, bool]:
-    """Whether whole curves solved since show another robust or another nominal optimum."""
-    return has_moved(one.worst, one.best, *one.ends), has_moved(one.plain, one.nominal, *one.ends)
-
-
-def _again(one: Tried) -> Tried:
-    """The optima of a place on all whole curves that are known by now."""
-    if _moved(one)[0]:
-        one = replace(one, best=lowest_worst(one.worst, *one.ends))
-    if _moved(one)[1]:
-        one = replace(one, nominal=lowest_worst(one.plain, *one.ends, jump=COMPARED_STEP))
-    return one
 
 
 def _with(place: tuple[float, ...], k: int, value: float) -> tuple[float, ...]:
@@ -290,7 +263,7 @@ class _Search:
                 way = zip(shapes, place, before.values, strict=True)
                 self.at(tuple(min(max(2.0 * b - a, of.low), of.high) for of, b, a in way))
                 place = self._best.values
-            if before.best.log_worst - self._best.best.log_worst <= AGREES:
+            if before.best.log_worst - self._best.best.log_worst <= _GAIN:
                 break
 
     def _closer(self, k: int) -> None:
@@ -335,63 +308,20 @@ class _Search:
             if all(of.low <= v <= of.high for of, v in zip(r.unsure, w, strict=True))
         ]
         worst = WorstPeak(counted, r.forces, self.weight)
-        with self._searching(self._words(chosen), list(rigs.items())):
-            best = lowest_worst(worst, *ends)
         plain = WorstPeak([rigs[own].peaks], r.nominal_forces, self.weight)
-        words = f"{self._words(chosen)}, the scene's own values"
-        with self._searching(words, list(rigs.items())):
-            nominal = lowest_worst(plain, *ends, jump=COMPARED_STEP)
+        with self.stages("search", self._words(chosen)):
+            best, nominal = (lowest_worst(one, *ends) for one in (worst, plain))
         return Tried(place, tuple(rigs.items()), worst, best, plain, nominal, ends)
 
-    def reaches(self, one: Tried) -> dict[str, tuple[tuple[Reach, Reach], ...]]:
-        """How far F_C and the ends of the range of F_E may move from the robust optimum.
+    def again(self, one: Tried) -> Tried:
+        """The optima of a place on all whole curves that are known by now."""
+        best, nominal = (lowest_worst(worst, *one.ends) for worst in (one.worst, one.plain))
+        return replace(one, best=best, nominal=nominal)
 
-        Parameters
-        ----------
-        one
-            The optimum.
-        """
-        found, none, press = {}, Reach(math.nan), self.ranges.pressing
-        with self._searching("how far the optimum reaches", one.rigs):
-            if press is not None:
-                found[press.path] = tuple(
-                    (
-                        how_far(one.worst, one.best, growth, one.ends[0]),
-                        how_far(one.worst, one.best, growth, one.ends[1]),
-                    )
-                    for growth in GROWTHS
-                )
-            for of in self.ranges.during:
-                if of.path == FORCE:
-                    for word, end, way in of.force_ends:
-                        bound = end * math.exp(way * _REACH)
-                        each = (
-                            how_far_force(one.worst, one.best, growth, way, bound)
-                            for growth in GROWTHS
-                        )
-                        found[word] = tuple((r, none) if way < 0.0 else (none, r) for r in each)
-        return found
-
-    def compared(self, best: Tried, plain: Tried) -> tuple[float, float, tuple[bool, bool]]:
-        """Peak of the robust optimum with the scene's own values, worst peak of the nominal one,
-        and whether each is known to the step of a jump.
-
-        Parameters
-        ----------
-        best, plain
-            The robust and the nominal optimum.
-        """
-        with self._searching("the optima compared", best.rigs):
-            c, d = best.best.log_centrifugal, plain.nominal.log_centrifugal
-            here, there = best.plain.solved_worst(c), plain.worst.solved_worst(d)
-            settled = best.plain.is_settled(c, here), plain.worst.is_settled(d, there)
-        return math.exp(here), math.exp(there), settled
-
-    @contextmanager
-    def _searching(self, detail: str, rigs: Sequence[tuple[Any, RigPeaks]]) -> Iterator[None]:
-        """A stage of the search, with as many threads as matrices of these rigs take."""
-        with self.stages("search", detail), threads_for(len(rigs[0][1].model.M)):
-            yield
+    @property
+    def curves(self) -> int:
+        """Whole curves solved so far."""
+        return sum(rig.curves for one in self.tried for _, rig in one.rigs)
 
     def _rig(self, given: Inputs, window: tuple[float, float]) -> RigPeaks:
         words, scene = self._words(given), self._with(given)
@@ -399,11 +329,8 @@ class _Search:
         def report(text: str) -> None:
             self.progress("peaks", f"{words}: {text}", None)
 
-        # one curve in its window rules an F_C out: two curves in each are enough
-        low, high = self.ranges.forces
-        step = max(SCAN_STEP, _SHARE * math.log(high / low))
         with self.stages("peaks", words):
-            return RigPeaks(scene, window, step, given, self.bodies, self.stages, report)
+            return RigPeaks(scene, window, self.bodies, self.stages, report)
 
     def _with(self, given: Inputs) -> ForcedScene:
         if not given:

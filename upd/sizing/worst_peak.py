@@ -1,69 +1,158 @@
 r"""The worst peak over a range of F_E, as a function of F_C, and the F_C at which it is lowest.
 
-Peaks h per unit of F_E depend on s = ln r = c - f alone, with c = ln F_C and f = ln F_E (see
-`upd.hbm.peaks.over`). The worst over f_1 <= f <= f_2,
+With every gap closed at rest, static and dynamic loads scaled by c scale the answer by c: peaks h
+per newton of F_E depend on s = ln(F_C/F_E) alone, and a whole curve at one s serves every pair of
+forces. The worst over f_1 <= f = ln F_E <= f_2 at c = ln F_C,
 
     W(c) = max over s in [c - f_2, c - f_1] of y(s) + k (c - s),   y = ln h,
 
 k = 0 for peaks per newton, 1 for accelerations, is the largest value of one curve in a window that
-slides with c: every whole response curve serves all pairs of forces. Between whole curves y is the
-cubic of their values and slopes. The worst of a window comes from whole curves that stand closely
-there, and more so where neighbours are not of one branch and may hide a higher peak.
+slides with c. Between whole curves every peak is read from a spline. Whole curves are solved on a
+first grid, and then where the optimum is decided, until none is new: at the ends of its window of
+F_C/F_E, at the maximum within, and between neighbours too far apart there.
 
-Its least is sought on all that is read between whole curves, the points that decide (ends of the
-window of F_C/F_E, and maxima within) are solved, and that again until they agree with what was
-read; then whole curves in the window until none may hide a higher peak.
-
-By c = ln F_C a worst peak at an end of the window changes by g = dy/ds, one within by g = k. At the
-optimum the deciding points meet 0 = sum_i l_i g_i, l_i >= 0, sum_i l_i = 1, unless F_C is at its
-bound; by any parameter p then dW/dp = sum_i l_i dy_i/dp.
+A peak that is followed from one s to the next may leave the curve that runs from the lowest to the
+highest frequency. Peaks are therefore taken from the whole curve at every s.
 
 References
 ----------
-J. M. Danskin, The Theory of Max-Min (1967); V. F. Demyanov, V. N. Malozemov, Introduction to
-Minimax (1974), ch. III.
+J. M. Danskin, The Theory of Max-Min (1967).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby, pairwise
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
+from scipy.interpolate import Akima1DInterpolator
 
+from upd.cache.arrays import Journal
 from upd.errors import ConvergenceError
-from upd.hbm.peaks.over import (
-    AGREES,
-    ANSWER_STEP,
-    BESIDE,
-    JUMP_STEP,
-    SAME,
-    Deciding,
-    PeaksOver,
-)
-from upd.hbm.springs.peak import JUMP_HEIGHT
 
 Array = NDArray[np.float64]
-#: how closely jumps are located, as ln(F_C/F_E), where an optimum is compared with another one
-COMPARED_STEP = 0.2
-#: below the worst within which a point may decide, as a logarithm
-_NEAR = 0.02
-#: ln F_C between points of the curve between solved ones
+#: ln(F_C/F_E) between the whole curves of the first grid, between those of an optimum, beside what
+#: decides it, and so near that they are one: a peak changes by no more than that
+FIRST_STEP, ANSWER_STEP, BRANCH_STEP, CLOSE = 0.5, 0.25, 0.05, 0.01
+#: ln F_C and ln(F_C/F_E) between places that are read
 FINE = 2e-3
-#: ln(F_C/F_E) from the ends of the window beyond which a maximum is within it
-_INNER = 1e-6
-#: how closely F_C is found, as its logarithm
-STILL = 5e-4
-#: rounds of the search
+#: below the worst within which a place may decide, as a logarithm
+NEAR = 0.02
+#: rounds of curves that are asked for at most
 ROUNDS = 25
-#: slope of the one deciding point of an optimum beyond which it is none by itself
-JUMPS = 0.05
-#: slope of a deciding point that counts as none
-_FLAT = 1e-6
+#: slopes d ln W / d ln F_C are differences over such a step
+SLOPE_STEP = 0.02
+
+#: name -> frequency [Hz] and ln of the height per unit of F_E, of the peaks of one whole curve
+Peaks = Mapping[str, tuple[float, float]]
+
+
+class PeaksOver:
+    """Peaks of whole curves over s = ln(F_C/F_E), and what is read between them.
+
+    Parameters
+    ----------
+    curve_at
+        s -> the peaks of the whole curve there; None where it was not followed through.
+    low, high
+        s that may be asked for.
+    step
+        s between the first curves.
+    kept
+        Keeps them, for a search that is begun again.
+
+    Attributes
+    ----------
+    points : dict
+        s -> its peaks; None where the curve was not followed through.
+    resumed : int
+        Curves of an earlier call.
+    """
+
+    def __init__(
+        self,
+        curve_at: Callable[[float], Peaks | None],
+        low: float,
+        high: float,
+        step: float = FIRST_STEP,
+        kept: Journal | None = None,
+    ) -> None:
+        self._curve_at, self._kept = curve_at, kept
+        self.points: dict[float, Peaks | None] = dict(kept.lines if kept else [])
+        self.resumed = len(self.points)
+        for s in np.linspace(high, low, math.ceil((high - low) / step) + 1):
+            self.look(float(s))
+
+    def look(self, s: float) -> bool:
+        """Solve the whole curve at s unless one so near is known; whether that is new."""
+        if any(abs(t - s) <= CLOSE for t in self.points):
+            return False
+        self.points[s] = found = self._curve_at(s)
+        if self._kept is not None:
+            self._kept.keep([s, found])
+        return True
+
+    @property
+    def missed(self) -> list[tuple[float, float]]:
+        """Between which s nothing is known, for a curve between was not followed through."""
+        s = sorted(self.points)
+        around = zip([-math.inf, *s], s, [*s[1:], math.inf], strict=False)
+        return [(a, c) for a, b, c in around if not self.points[b]]
+
+    def near(self, s: float) -> tuple[str, float]:
+        """Name and frequency [Hz] of the highest peak of the nearest whole curve."""
+        told = [t for t, peaks in self.points.items() if peaks]
+        peaks = self.points[min(told, key=lambda t: abs(t - s))] or {}
+        name = max(peaks, key=lambda one: peaks[one][1])
+        return name, peaks[name][0]
+
+    def read(self, s: Array) -> Array:
+        """ln of the highest peak at places (n,); nan where it is not known."""
+        nodes = sorted(t for t, peaks in self.points.items() if peaks)
+        tops = np.array([max(y for _, y in (self.points[t] or {}).values()) for t in nodes])
+        if not nodes:
+            return np.full(len(s), math.nan)
+        out = np.interp(s, nodes, tops, left=math.nan, right=math.nan)
+        splines = [spline(s) for _, spline in self.curves()]
+        highest = np.fmax.reduce(splines) if splines else np.full(len(s), math.nan)
+        out = np.where(np.isnan(highest), out, highest)
+        for a, b in self.missed:
+            out[(s > a) & (s < b)] = math.nan
+        return np.asarray(out)
+
+    def curves(self) -> list[tuple[str, Akima1DInterpolator]]:
+        """Name and spline over s of every peak, along neighbouring whole curves that have it."""
+        nodes = sorted((s, peaks or {}) for s, peaks in self.points.items())
+        out = []
+        for name in dict.fromkeys(name for _, peaks in nodes for name in peaks):
+            heights = [(s, peaks[name][1]) if name in peaks else None for s, peaks in nodes]
+            for known, run in groupby(heights, bool):
+                x, y = np.array([*run] if known else [(0.0, 0.0)], float).T
+                if len(x) > 1:
+                    out.append((name, Akima1DInterpolator(x, y, method="makima")))
+        return out
+
+
+@dataclass(frozen=True)
+class Deciding:
+    """A place that decides a worst peak.
+
+    Attributes
+    ----------
+    s, y : float
+        ln(F_C/F_E), ln of the height per unit of F_E.
+    name, frequency : str, float
+        Of the peak [Hz].
+    """
+
+    s: float
+    y: float
+    name: str
+    frequency: float
 
 
 class WorstPeak:
@@ -86,245 +175,79 @@ class WorstPeak:
         self.f = (math.log(forces[0]), math.log(forces[1]))
 
     @property
-    def _known(self) -> int:
-        """Whole curves and sweeps."""
-        return sum(len(one.nodes) for one in self.peaks)
+    def missed(self) -> str:
+        """F_C/F_E at which no whole curve with peaks was found, rising; "" without."""
+        lost = {s for one in self.peaks for s, peaks in one.points.items() if not peaks}
+        return ", ".join(f"{math.exp(s):.4g}" for s in sorted(lost))
 
-    def known_from(self) -> float:
-        """ln F_C from which the worst peak is known."""
-        return max(one.known_from for one in self.peaks) + self.f[1]
-
-    def at(self, c: Array) -> Array:
-        """ln of the worst peak at ln F_C (n,), on the curves between solved points."""
-        return np.array([self.read(float(one)) for one in np.atleast_1d(c)])
-
-    def read(self, c: float) -> float:
-        """The same at one ln F_C."""
-        return float(self.single(c, self._forces()).max())
+    def with_forces(self, low: float, high: float) -> WorstPeak:
+        """The same over another range of ln F_E."""
+        return WorstPeak(self.peaks, (math.exp(low), math.exp(high)), self.weight)
 
     def over(self, low: float, high: float) -> tuple[Array, Array]:
-        """ln F_C from end to end, evenly, and ln of the worst peaks there, all at once: the largest
-        in a window that slides, to its steps.
+        """ln F_C from end to end, evenly, and ln of the worst peaks there, the largest in a window
+        that slides; nan where they are not known.
         """
-        if high - low <= FINE:
-            ends = np.array([low, high])
-            return ends, self.at(ends)
-        step = FINE / 2.0
-        c = low + step * np.arange(math.ceil((high - low) / step) + 1)
-        n = round((self.f[1] - self.f[0]) / step)
-        s = c[0] - self.f[1] + step * np.arange(len(c) + n)
-        out = np.full(len(c), -math.inf)
+        c = np.linspace(low, high, math.ceil((high - low) / FINE) + 1)
+        step = (high - low) / (len(c) - 1) if len(c) > 1 else FINE
+        # places within windows lie anywhere, their ends are exact
+        n = math.floor((self.f[1] - self.f[0]) / step)
+        inside = self._counted(c[0] - self.f[1] + step * np.arange(len(c) + n))
+        y = sliding_window_view(inside, n + 1).max(axis=1)
+        for f in self.f:
+            y = np.maximum(y, self._counted(c - f))
+        return np.asarray(c), np.asarray(y + self.weight * c)
+
+    def _counted(self, s: Array) -> Array:
+        """y - k s of the highest peak of all."""
+        return np.asarray(np.max([one.read(s) for one in self.peaks], axis=0) - self.weight * s)
+
+    def read(self, c: float) -> float:
+        """ln of the worst peak at ln F_C; nan where it is not known."""
+        return float(self._counted(self._window(c)).max()) + self.weight * c
+
+    def _window(self, c: float) -> Array:
+        """ln(F_C/F_E) at ln F_C, closely."""
+        n = math.ceil((self.f[1] - self.f[0]) / FINE) + 1
+        return np.linspace(c - self.f[1], c - self.f[0], n)
+
+    def deciding(self, c: float) -> list[tuple[PeaksOver, Deciding]]:
+        """What may decide at ln F_C, worst first: the ends of the window near the worst, and the
+        highest within.
+        """
+        s = self._window(c)
+        worst, found = self.read(c) - self.weight * c, []
         for one in self.peaks:
-            y = one.read(s) - self.weight * s
-            window = sliding_window_view(y, n + 1).max(axis=1) if n else y
-            out = np.maximum(out, window + self.weight * c)
-        inside = c <= high + SAME
-        return np.asarray(c[inside], float), np.asarray(out[inside], float)
+            y = one.read(s)
+            counted = y - self.weight * s
+            for k in {0, len(s) - 1, int(np.nanargmax(counted))}:
+                if counted[k] >= worst - NEAR:
+                    at = Deciding(float(s[k]), float(y[k]), *one.near(float(s[k])))
+                    found.append((float(counted[k]), one, at))
+        return [pair for _, *pair in sorted(found, key=lambda p: -p[0])]  # type: ignore[misc]
 
-    def single(self, c: float, f: Array) -> Array:
-        """ln of the highest peak at ln F_C and every ln F_E (n,), on the curves."""
-        return np.asarray(np.max([one.read(c - f) for one in self.peaks], axis=0) + self.weight * f)
-
-    def _forces(self) -> Array:
-        """ln F_E of the range, closely."""
-        return np.linspace(*self.f, max(2, math.ceil((self.f[1] - self.f[0]) / FINE) + 1))
-
-    def places(self, c: float) -> list[tuple[int, float]]:
-        """Which peaks may decide at ln F_C: number of the set, and ln r; the ends of the window
-        near the worst, and the highest within it where it is higher than both.
+    def solve(self, c: float) -> bool:
+        """Solve the whole curves that decide at ln F_C, and between those of its window that are
+        too far apart, the more so beside what decides: a branch may end there. Whether any was new.
         """
-        f = self._forces()
-        worst = self.read(c)
-        found = []
-        for k, one in enumerate(self.peaks):
-            y = one.read(c - f) + self.weight * f
-            ends = [0, len(f) - 1] if f[-1] > f[0] else [0]
-            found += [(k, float(c - f[i])) for i in ends if y[i] >= worst - _NEAR]
-            top = int(y.argmax())
-            if y[top] >= worst - _NEAR and y[top] > max(y[0], y[-1]) + 0.5 * AGREES:
-                # a maximum at a jump is its node
-                found.append((k, one.node(float(c - f[top]), FINE)))
-        return found
-
-    def solved(self, c: float) -> tuple[Deciding, ...]:
-        """The deciding points at ln F_C, solved, worst first."""
-        out = []
-        for k, s in self.places(c):
-            point = self.peaks[k].solve(s)
-            # a maximum within the window stays where it is
-            within = min(abs(c - f - s) for f in self.f) > _INNER
-            out.append(point._replace(slope=self.weight) if within else point)
-        return tuple(sorted(out, key=lambda p: -self.value(c, p)))
-
-    def look(self, c: float, near: float) -> bool:
-        """Solve whole curves at the deciding places unless so near ones are known, or neighbours
-        tell the peaks there; whether any is new.
-        """
-        solved = [self.peaks[k].look_unless_known(s, near) for k, s in self.places(c)]
-        return any(solved)
-
-    def solved_worst(self, c: float) -> float:
-        """ln of the worst peak at ln F_C, on whole curves; nan where it is not known."""
-        if c < self.known_from() - SAME:
-            return math.nan
-        y, known = -math.inf, -1
-        try:
-            # a curve that has no higher peak where one was read leaves it elsewhere
-            while known < (known := self._known) or self.settle((c, c), y, jump=COMPARED_STEP):
-                y = max(y, self.value(c, self.solved(c)[0]))
-        except ConvergenceError:
-            return math.nan
-        return y
-
-    def settle(
-        self,
-        ends: tuple[float, float],
-        limit: float,
-        most: float | None = None,
-        jump: float = JUMP_STEP,
-    ) -> bool:
-        """Solve the whole curve that is wanted most where neighbours are too far apart for the
-        worst peaks between two ln F_C.
-
-        Neighbours are too far apart with more than `ANSWER_STEP` between them, unless tangents of
-        both stay below a limit by the factor that makes another peak (`upd.hbm.springs.peak`); and
-        with more than a jump where tangents may reach the limit, if the neighbours are not of one
-        branch or their tangents meet above it.
-
-        Parameters
-        ----------
-        ends
-            ln F_C.
-        limit
-            ln of the worst peak that matters.
-        most
-            ln of the largest F_E; that of the range when None.
-        jump
-            How closely jumps are located, as ln(F_C/F_E).
-
-        Returns
-        -------
-        bool
-            Whether one was.
-        """
-        # where a curve fails it has no nearer neighbours
-        return any(one.look(s) for _, s, one in self._wanted(ends, limit, most, jump))
-
-    def clear(self, ends: tuple[float, float], limit: float, most: float | None = None) -> bool:
-        """Solve the whole curve that is wanted most for telling whether worst peaks between two
-        ln F_C pass a limit: where the tangent of a neighbour passes it, between neighbours that do
-        not tell that none does. There the peak is above the limit, or it is lost and below it up to
-        there: one curve shows which.
-
-        Parameters
-        ----------
-        ends, limit, most
-            As of `settle`.
-
-        Returns
-        -------
-        bool
-            Whether one was.
-        """
-        low, high = ends[0] - self.f[1], ends[1] - self.f[0]
-        found: list[tuple[float, float, PeaksOver]] = []
+        deciding = self.deciding(c)
+        new = [one.look(at.s) for one, at in deciding]
+        low, high = c - self.f[1], c - self.f[0]
         for one in self.peaks:
-            for a, b in one.intervals(low, high):
-                more = self._more(a, ends, most)
-                at = one.passes(a, b, limit + AGREES - more)
-                if low + BESIDE < at < high - BESIDE:
-                    found.append((one.may_reach(a, b) + more, at, one))
-        return any(one.look(at) for _, at, one in sorted(found, key=lambda p: -p[0]))
+            places = [at.s for of, at in deciding if of is one]
+            for a, b in pairwise(sorted(one.points)):
+                beside = any(a - CLOSE <= s <= b + CLOSE for s in places)
+                step = BRANCH_STEP if beside else ANSWER_STEP
+                if b - a > step * (1.0 + CLOSE) and a < high - CLOSE and b > low + CLOSE:
+                    new.append(one.look(0.5 * (a + b)))
+        return any(new)
 
-    def _more(self, a: float, ends: tuple[float, float], most: float | None) -> float:
-        """What a peak counts at most between two ln F_C, beside its height, from a node on."""
-        return self.weight * min(self.f[1] if most is None else most, ends[1] - a)
-
-    def is_settled(self, c: float, limit: float) -> bool:
-        """Whether whole curves stand as closely as `settle` asks for at ln F_C."""
-        return not self._wanted((c, c), limit, None, JUMP_STEP)
-
-    def _wanted(
-        self, ends: tuple[float, float], limit: float, most: float | None, jump: float
-    ) -> list[tuple[float, float, PeaksOver]]:
-        """Heights that may be reached, places and of which peaks whole curves are wanted, the
-        highest first; see `settle`. What is asked for has more of an interval than the step of
-        a jump, else the neighbour shows it.
-        """
-        low, high = ends[0] - self.f[1], ends[1] - self.f[0]
-        over, far = limit + AGREES, limit - math.log(JUMP_HEIGHT)
-        found: list[tuple[float, float, PeaksOver]] = []
-        for one in self.peaks:
-            for a, b in one.intervals(low, high):
-                if min(b, high) - max(a, low) <= JUMP_STEP:
-                    continue
-                more = self._more(a, ends, most)
-                top = one.may_reach(a, b) + more
-                hidden = max(one.top(a), one.top(b)) + more <= over < one.kink(a, b) + more
-                jumps = b - a > jump and top > over and (hidden or not one.agree(a, b))
-                if jumps or (b - a > ANSWER_STEP + SAME and top > far):
-                    found.append((top, _between(one, a, b, (low, high)), one))
-        return sorted(found, key=lambda p: -p[0])
-
-    def explore(self, ends: tuple[float, float], limit: float) -> bool:
-        """Solve a whole curve where a worst peak below a limit may be hidden between two ln F_C:
-        between neighbours that are not of one branch, for an F_C whose window has no curve with a
-        peak above the limit.
-
-        Parameters
-        ----------
-        ends
-            ln F_C.
-        limit
-            ln of the least worst peak so far.
-
-        Returns
-        -------
-        bool
-            Whether one was.
-        """
-        c = np.linspace(*ends, max(2, math.ceil((ends[1] - ends[0]) / JUMP_STEP) + 1))
-        low, high = ends[0] - self.f[1], ends[1] - self.f[0]
-        below = np.ones(len(c), bool)
-        for one in self.peaks:
-            for s in one.nodes:
-                inside = (s >= c - self.f[1]) & (s <= c - self.f[0])
-                below &= ~(inside & (one.top(s) + self.weight * (c - s) > limit))
-        return any(
-            one.look(_between(one, a, b, (low, high)))
-            for one in self.peaks
-            for a, b in one.intervals(low, high)
-            if b - a > ANSWER_STEP + SAME
-            and not one.agree(a, b)
-            and (
-                below
-                & (c - self.f[1] < b)
-                & (c - self.f[0] > a)
-                # else what is read there hides nothing
-                & (one.highest(a, b) + self.weight * (c - a) > limit)
-            ).any()
-        )
-
-    def is_whole(self, ends: tuple[float, float]) -> bool:
-        """Whether nothing is unknown for the worst peaks between two ln F_C."""
-        low, high = ends[0] - self.f[1], ends[1] - self.f[0]
-        return not any(
-            a < high - SAME and b > low + SAME for one in self.peaks for a, b in one.holes
-        )
-
-    def value(self, c: float, point: Deciding) -> float:
-        """What a point counts at ln F_C."""
-        return point.y + self.weight * (c - point.s)
-
-
-def _between(one: PeaksOver, a: float, b: float, ends: tuple[float, float]) -> float:
-    """ln(F_C/F_E) of the next whole curve between neighbours: of the places that divide them into
-    the fewest parts of `ANSWER_STEP` one in the middle, next to the higher peak; within what is
-    asked for.
-    """
-    n = max(2, math.ceil((b - a) / ANSWER_STEP - SAME))
-    k = n // 2 if one.top(a) > one.top(b) else (n + 1) // 2
-    return min(max(a + (b - a) * k / n, ends[0]), ends[1])
+    def solved(self, c: float) -> float:
+        """ln of the worst peak at ln F_C, whole curves solved for it; nan where it is not known."""
+        for _ in range(ROUNDS):
+            if math.isnan(self.read(c)) or not self.solve(c):
+                break
+        return self.read(c)
 
 
 # -- the lowest worst peak -------------------------------------------------------------------------
@@ -336,35 +259,22 @@ class LowestWorst:
 
     Attributes
     ----------
-    log_centrifugal : float
-        ln F_C.
-    log_worst : float
-        ln of the worst peak there.
+    log_centrifugal, log_worst : float
+        ln F_C, and ln of the worst peak there.
     deciding : tuple of Deciding
         What it is the worst of.
     status : str
-        "found", "at the lower bound", "at the upper bound"; "at the end of what is known": peaks
-        are lost for lower F_C; "bracketed": deciding points and curve did not agree, the lowest
-        solved point.
-    reached : (float, float)
-        ln F_C between which the worst peak is known.
+        "found", "at the lower bound", "at the upper bound"; "beside what is not known": a curve
+        there was not followed through.
     """
 
     log_centrifugal: float
     log_worst: float
     deciding: tuple[Deciding, ...]
     status: str
-    reached: tuple[float, float]
-
-    @property
-    def at_jump(self) -> bool:
-        """Whether one peak alone decides that is no optimum by itself: beyond, the worst jumps."""
-        alone = [p for p in self.deciding if p.share > 0.0]
-        inside = self.status == "found" and len(alone) == 1
-        return inside and abs(alone[0].slope) > JUMPS
 
 
-def lowest_worst(worst: WorstPeak, low: float, high: float, jump: float = JUMP_STEP) -> LowestWorst:
+def lowest_worst(worst: WorstPeak, low: float, high: float) -> LowestWorst:
     """F_C between bounds whose worst peak is lowest.
 
     Parameters
@@ -373,105 +283,64 @@ def lowest_worst(worst: WorstPeak, low: float, high: float, jump: float = JUMP_S
         Of the peaks.
     low, high
         F_C [N]; the same when it is fixed.
-    jump
-        How closely jumps are located, as ln(F_C/F_E).
 
     Raises
     ------
     ConvergenceError
         Where the worst peak is known at no F_C between the bounds.
     """
-    ends = math.log(low), math.log(high)
-    before, solved, rounds = math.nan, list[tuple[float, float]](), 0
-    while rounds < ROUNDS:
-        known = max(ends[0], worst.known_from())
-        if known > ends[1] + SAME:
-            lost = sorted({math.exp(s) for one in worst.peaks for s in one.failed})
+    for _ in range(ROUNDS):
+        grid, values = worst.over(math.log(low), math.log(high))
+        if not np.isfinite(values).any():
             raise ConvergenceError(
                 f"the worst peak is known at no F_C between {low:g} and {high:g} N: whole curves "
-                f"were not followed through at F_C/F_E {', '.join(f'{r:.4g}' for r in lost)}; to "
-                "fix it: larger F_C, or smaller F_E"
+                f"were not followed through at F_C/F_E {worst.missed}; to fix it: larger F_C, or "
+                "smaller F_E"
             )
-        c = _least(worst, known, ends[1])
-        rounds += 1
-        guessed, deciding = worst.read(c), worst.solved(c)
-        y = worst.value(c, deciding[0])
-        off = max(abs(y - worst.read(c)), abs(y - guessed))
-        near = abs(c - before) <= STILL or c in (known, ends[1])
-        if off <= AGREES and near:
-            # whole curves between may have higher peaks, and others hide lower ones
-            if worst.settle((c, c), y, jump=jump) or worst.explore((known, ends[1]), y):
-                rounds -= 1
-                continue
-            status = _status(c, ends, known)
-            return LowestWorst(c, y, _shared(worst, c, deciding), status, (known, ends[1]))
-        solved.append((y, c))
-        before = c
-    # later whole curves may have shown higher peaks at F_C that were solved before
-    read = worst.at(np.array([c for _, c in solved]))
-    _, c = min((max(y, float(now)), c) for (y, c), now in zip(solved, read, strict=True))
-    deciding = worst.solved(c)
-    y = max(worst.value(c, deciding[0]), worst.read(c))
-    return LowestWorst(c, y, _shared(worst, c, deciding), "bracketed", (known, ends[1]))
+        i = int(np.nanargmin(values))
+        c = float(grid[i])
+        if not worst.solve(c):
+            break
+    deciding = tuple(at for _, at in worst.deciding(c))
+    return LowestWorst(c, worst.read(c), deciding, _status(values, i))
 
 
-def has_moved(worst: WorstPeak, found: LowestWorst, low: float, high: float) -> bool:
-    """Whether what is read between whole curves solved since has another optimum: the worst peak
-    higher there, or lower elsewhere.
+def _status(values: Array, i: int) -> str:
+    """Of the lowest of worst peaks over F_C."""
+    last = len(values) - 1
+    if last == 0:
+        return "found"
+    if np.isnan(values[max(i - 1, 0) : i + 2]).any():
+        return "beside what is not known"
+    return {0: "at the lower bound", last: "at the upper bound"}.get(i, "found")
+
+
+def reached(
+    at: Callable[[float], tuple[WorstPeak, float]], begin: float, end: float, limit: float
+) -> float:
+    """The first place from an optimum on at which the worst peak passes a limit, whole curves
+    solved there; nan where it does not, and where it is not known.
 
     Parameters
     ----------
-    worst, found
-        The worst peaks, and where they were least.
-    low, high
-        F_C [N] between which it was sought.
+    at
+        Place -> the worst peaks and ln F_C there.
+    begin, end
+        Places between which it is sought.
+    limit
+        ln of the worst peak.
     """
-    here = worst.read(found.log_centrifugal)
-    c = _least(worst, max(math.log(low), worst.known_from()), math.log(high))
-    least = worst.read(c)
-    off = 2.0 * AGREES
-    return here > found.log_worst + off or least < found.log_worst - off
-
-
-def _status(c: float, ends: tuple[float, float], known: float) -> str:
-    if ends[1] - ends[0] <= SAME:
-        return "found"
-    if known > ends[0] + STILL and c - known <= STILL:
-        return "at the end of what is known"
-    if c - ends[0] <= STILL:
-        return "at the lower bound"
-    return "at the upper bound" if ends[1] - c <= STILL else "found"
-
-
-def _least(worst: WorstPeak, low: float, high: float) -> float:
-    """ln F_C of the least worst peak on the curves: on a grid, then between its neighbours."""
-    if high - low <= SAME:
-        return high
-    grid, values = worst.over(low, high)
-    i = int(values.argmin())
-    a, b = grid[max(i - 1, 0)], min(grid[i] + (grid[1] - grid[0]), high)
-    found = minimize_scalar(
-        worst.read,
-        bounds=(a, b),
-        method="bounded",
-        options={"xatol": 0.1 * STILL},
-    )
-    candidates = [(float(found.fun), float(found.x))]
-    candidates += [(worst.read(c), float(c)) for c in (grid[i], low, high)]
-    return min(candidates)[1]
-
-
-def _shared(worst: WorstPeak, c: float, deciding: Sequence[Deciding]) -> tuple[Deciding, ...]:
-    """The deciding points with their shares: of the worst alone, or of the worst rising one and the
-    worst falling one whose slopes cancel.
-    """
-    top = worst.value(c, deciding[0])
-    # as near as heights are known
-    near = [p for p in deciding if top - worst.value(c, p) <= 10.0 * AGREES]
-    rising = [p for p in near if p.slope > _FLAT]
-    falling = [p for p in near if p.slope < -_FLAT]
-    if not (rising and falling):
-        return tuple(p._replace(share=float(i == 0)) for i, p in enumerate(near))
-    up, down = rising[0], falling[0]
-    share = -down.slope / (up.slope - down.slope)
-    return up._replace(share=share), down._replace(share=1.0 - share)
+    places = np.linspace(begin, end, max(2, math.ceil(abs(end - begin) / CLOSE) + 1))
+    for _ in range(ROUNDS):
+        values = np.array([worst.read(c) for worst, c in map(at, places)])
+        beyond = np.flatnonzero(~(values <= limit))
+        if not len(beyond) or math.isnan(values[beyond[0]]):
+            return math.nan
+        k = beyond[0]
+        if k == 0:
+            return begin
+        place = float(np.interp(limit, values[k - 1 : k + 1], places[k - 1 : k + 1]))
+        worst, c = at(place)
+        if not worst.solve(c):
+            break
+    return place
