@@ -120,7 +120,7 @@ class FigureAnswer(ABC):
         """
         word, kind = self.outcome
         sections = [
-            *(Section(table.heading, [table], kind="grid") for table in self.tables),
+            Section("Answer", self.tables),
             Section("Notes", texts=self.notes),
             Section("Figures", panels=make_panels(charts, {})),
             Section("Scene file", file=self._scene_file),
