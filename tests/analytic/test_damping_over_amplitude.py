@@ -11,6 +11,8 @@ from rigs import LINES
 
 import upd
 from upd.analyses import forced, make_plan
+from upd.analyses.forced import checks
+from upd.analyses.forced.checks import check_solution
 from upd.analyses.forced.nonlinear_modes import ModeCurve, first_slip, mode_results
 from upd.analyses.forced.solution import ForcedSolution
 from upd.errors import InputError
@@ -118,3 +120,18 @@ def test_a_run_leaves_curves_chart_and_table(tmp_path: Any) -> None:
     assert any((tmp_path / "run" / "curves").glob("*nonlinear*"))
     assert "Damping over amplitude" in "\n".join(map(str, result.answer(100)))
     assert result.value("largest_damping", "thesis, in phase") > 0.4
+
+
+def test_a_reported_peak_that_oscillates_warns(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = solved()
+
+    def of_oscillation() -> list[Any]:
+        return [one for one in check_solution(found) if one.name == "oscillating motion"]
+
+    assert [(one.value, one.passed) for one in of_oscillation()] == [(0.0, True)]
+    monkeypatch.setattr(
+        checks, "motion_stability", lambda *_: ("oscillating", np.array([1.2 + 0.3j, 0.5]))
+    )
+    (told,) = of_oscillation()
+    assert not told.passed and told.value >= 1.0
+    assert "oscillates about its period (multiplier 1.237)" in told.remedy

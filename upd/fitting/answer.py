@@ -107,8 +107,6 @@ class Fit(FigureAnswer):
         Where every start ended, the best first.
     directions : str
         contact.directions that the fitted scene has to name; "" where its own word does.
-    exact : tuple of bool
-        Which parameters have exact derivatives.
     evaluations : int
         Solved models.
     seconds : float
@@ -129,7 +127,6 @@ class Fit(FigureAnswer):
     further: tuple[FurtherMeasurement, ...]
     starts: list[Start]
     directions: str
-    exact: tuple[bool, ...]
     evaluations: int
     seconds: float
 
@@ -218,10 +215,9 @@ class Fit(FigureAnswer):
             if not one.noise.white
         ]
         ended = sum(math.isfinite(one.misfit) for one in self.starts)
-        slopes = "exact" if all(self.exact) else "partly" * any(self.exact) + " by differences"
         out.append(
             f"{ended} of {len(self.starts)} starts ended; {self.evaluations} models in "
-            f"{self.seconds:.1f} s; derivatives {slopes.strip()}."
+            f"{self.seconds:.1f} s."
         )
         return tuple(out)
 

@@ -1,8 +1,6 @@
 """Models of a forced response as a fit moves its inputs: what an input leaves alone is kept.
 
-What changes contact springs, friction, damping or loads re-uses the reduced blades. Data that are
-known in closed form (stiffness, Young's modulus, density, damping, friction, F_C) have exact
-derivatives.
+What changes contact springs, friction, damping or loads re-uses the reduced blades.
 """
 
 from __future__ import annotations
@@ -19,7 +17,6 @@ from numpy.typing import NDArray
 from upd.analyses import make_plan
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.sensitivity import DataChange, data_change, is_known
 from upd.analyses.forced.stiffness import FaceLaw, face_laws
 from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
 from upd.cache.arrays import cache_folder
@@ -31,15 +28,13 @@ from upd.mesh import recipes
 from upd.progress import Stages
 from upd.scene import ForcedScene, load_scene
 from upd.scene.forced_contact import SIDES, Side
-from upd.scene.quantities import Uncertainty
 from upd.scene.ranges import one_model, stiffness_of
 from upd.scene.toml import toml_key, toml_value
-from upd.vary.inputs import InputEnds
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
-#: of central differences of ln(factor): their error is of its square
-STEP = 1e-3
+#: of differences of ln(factor)
+STEP = 2e-3
 #: the same where a contact analysis is solved again: its set of nodes moves from node to node
 CONTACT_STEP = 0.02
 #: sets of bodies that are kept
@@ -51,12 +46,11 @@ _FRICTIONLESS = "frictionless"
 
 @dataclass(frozen=True)
 class FittedModel:
-    """One model: what it was made of, and what known inputs change of it."""
+    """One model and what it was made of."""
 
     plan: ForcedPlan
     bodies: Bodies
     model: Model
-    changes: tuple[DataChange, ...] = ()
 
 
 class ModelSource:
@@ -99,8 +93,6 @@ class ModelSource:
         self._bodies: dict[str, Bodies] = {} if like is None else like._bodies
         self._models: dict[str, Model] = {}
         self._tangents: int | None = None
-        none = np.zeros(len(self.parameters))
-        self.exact = [is_known(self._ends(none, k)) for k in range(len(self.parameters))]
         seated = bool(ratios) and is_seated(scene)
         #: inputs that make new blades, or a new static state, with every evaluation
         self.dear = [
@@ -108,7 +100,7 @@ class ModelSource:
         ]
         contact = scene.stiffness[self.stiffness].scene
         self._contact = contact if any(p.startswith("geometry.") for p in paths) else None
-        #: of central differences of every parameter
+        #: of the differences of every parameter
         self.steps = [
             CONTACT_STEP
             if self._contact and any(p.startswith("geometry.") for p in one.paths)
@@ -127,32 +119,20 @@ class ModelSource:
         why = "every value makes new blades or a new static state"
         return f"{', '.join(self.dear)}: {why}" if self.dear else ""
 
-    def at(self, z: Array, *, changes: bool = False) -> FittedModel:
+    def at(self, z: Array) -> FittedModel:
         """The model with moved inputs.
 
         Parameters
         ----------
         z
             (n,) logarithms of the parameters' factors.
-        changes
-            Whether what the known inputs change is wanted: half of an interval of STEP each way.
 
         Raises
         ------
         InputError
             Where the scene refuses the parameters.
         """
-        made = self._model(self.bare(fitted_scene(self.scene, self.parameters, z)))
-        if not changes:
-            return made
-        found = tuple(
-            data_change(
-                made.plan, made.bodies, self.stiffness, made.model, self._ends(z, k), self._stages
-            )
-            for k, exact in enumerate(self.exact)
-            if exact
-        )
-        return replace(made, changes=found)
+        return self._model(self.bare(fitted_scene(self.scene, self.parameters, z)))
 
     def totals(self, z: Array) -> dict[Side, FaceLaw]:
         """Contact stiffness of both faces."""
@@ -174,9 +154,9 @@ class ModelSource:
         self._models.clear()
         return "" if used == chosen else _DIRECTIONS[used]
 
-    def bare(self, scene: ForcedScene, *, contact_moves: bool = True) -> ForcedScene:
+    def bare(self, scene: ForcedScene) -> ForcedScene:
         """What is needed alone: one stiffness, the F_C/F_E that are followed, nothing estimated or
-        solved again; a contact scene with the rig's geometry, unless its numbers do not count.
+        solved again; a contact scene with the rig's geometry.
         """
         one = one_model(scene, self.stiffness, "a fit")
         contact, excitation, stiffness = one.contact, one.excitation, dict(one.stiffness)
@@ -186,24 +166,11 @@ class ModelSource:
             excitation = replace(excitation, centrifugal_to_force=self.ratios, force=())
         else:
             contact = replace(contact, fit="unloaded")
-        if contact_moves and self._contact:
+        if self._contact:
             stiffness[self.stiffness] = replace(
                 stiffness[self.stiffness], scene=contact_scene(scene, self._contact)
             )
         return replace(one, contact=contact, excitation=excitation, stiffness=stiffness)
-
-    def _ends(self, z: Array, k: int) -> InputEnds:
-        """One parameter a step down and up from its place."""
-        scenes = []
-        for shift in (0.0, -STEP, STEP):
-            moved = np.array(z, float)
-            moved[k] += shift
-            there = fitted_scene(self.scene, self.parameters, moved)
-            scenes.append(self.bare(there, contact_moves=False))
-        one = self.parameters[k]
-        value = one.value(float(z[k]))
-        known = Uncertainty(one.paths[0], value, STEP * value, "", one.kind, ())
-        return InputEnds(known, *scenes)
 
     def _model(self, scene: ForcedScene) -> FittedModel:
         self.made += 1

@@ -30,6 +30,7 @@ from scipy.stats import qmc
 from scipy.stats import t as student
 
 from upd.errors import ConvergenceError, UpdError, one_line
+from upd.fitting.models import STEP
 from upd.fitting.responses import FitResponses
 from upd.fitting.targets import CurveTarget
 from upd.measured.damping import noise_of
@@ -147,14 +148,10 @@ class Residuals:
 
     @property
     def rounding(self) -> float:
-        """What a residual without half-width may be off: of differences and of peaks that are
-        climbed, their own error.
+        """What a residual without half-width may be off: where contacts are solved again or peaks
+        are climbed, their own error.
         """
-        steps = [
-            step**2
-            for step, exact in zip(self.responses.source.steps, self.responses.exact, strict=True)
-            if not exact
-        ]
+        steps = [step**2 for step in self.responses.source.steps if step > STEP]
         followed = [CLIMBED] if self.responses.targets.ratios else []
         return max([ROUNDING, *steps, *followed])
 

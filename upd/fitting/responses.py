@@ -1,22 +1,15 @@
 """What a fit aims at as functions of what it varies, with derivatives.
 
-Derivatives by data that are known in closed form are exact; others are central differences of the
-logarithm of the factor.
-
-Of the linear limits, free and with every point stuck, they are exact. Of a curve q = D^-1 F,
-D = K + i w C - w^2 M, with the adjoint z = D^-1 r of the output r'q
-
-    d(r'q)/dp = -z' dD/dp q.
-
-With friction every evaluation solves the whole curve over frequency, from its lowest end upwards,
-so that a fit does not depend on the way it came. Values are those of the harmonic balance alone;
-derivatives by implicit differentiation.
+Derivatives are differences forward, of the logarithm of each factor. With friction every evaluation
+solves the whole curve over frequency, from its lowest end upwards, so that a fit does not depend on
+the way it came. Values are those of the harmonic balance alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import nullcontext
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,37 +19,26 @@ from upd.analyses.forced.linear_limits import fine_grid, linear_peaks
 from upd.analyses.forced.measures import (
     CANDIDATES,
     CurvePeak,
+    StuckMode,
     numbered_peaks,
     tell_stuck_peaks,
     unmoved,
 )
 from upd.analyses.forced.model import Model, balance_of, quiet, respond
 from upd.analyses.forced.plan import ForcedPlan, grid
-from upd.analyses.forced.sensitivity import (
-    DataChange,
-    limit_peak,
-    linear_system,
-    stuck_frequencies,
-)
 from upd.cache.arrays import Journal
 from upd.errors import ConvergenceError
-from upd.fitting.models import STEP, FittedModel, ModelSource
+from upd.fitting.models import FittedModel, ModelSource
 from upd.fitting.parameters import VariedInput
 from upd.fitting.targets import (
     CONTACT_TOTALS,
     PEAK_NUMBERS,
     STUCK_MODES,
     CurveTarget,
-    FitTarget,
     Targets,
 )
 from upd.hbm import FrequencyResponse, climb
-from upd.hbm.peaks.parameter_change import ParameterChange
-from upd.hbm.peaks.sensitivity import (
-    PeakDerivative,
-    displacement_derivatives,
-    peak_derivatives,
-)
+from upd.hbm.core.fourier import to_complex
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.starts import first_point, newton, place_sliders
 from upd.linalg.parallel import threads_for
@@ -67,19 +49,24 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 #: which peak: the blade and the number of its mode
 PeakKey = tuple[Side, int]
-#: both blades' curves: values and changes
-Curves = dict[Side, tuple[ComplexArray, ComplexArray]]
 #: mm to m
 _M = 1e-3
+#: difference of both one-sided slopes, over the larger, beyond which a number has none
+JUMPS = 0.5
 #: relative distance of a frequency asked for from a point of a path that is it
 _SAME = 1e-9
 
 
-def number_of(peak: PeakDerivative, what: str) -> tuple[float, Array]:
-    """Frequency or height of a peak, and its changes."""
-    if what == "frequency":
-        return peak.frequency, peak.by_frequency
-    return peak.height, peak.by_height
+class PeakTop(NamedTuple):
+    """A peak: Hz, and accelerance in (m/s2)/N."""
+
+    frequency: float
+    height: float
+
+
+def _told(peak: PeakTop | CurvePeak, what: str) -> float:
+    """Frequency or height of a peak."""
+    return float(peak.frequency if what == "frequency" else peak.height)
 
 
 class LimitNumbers:
@@ -89,17 +76,15 @@ class LimitNumbers:
     ----------
     plan, model
         Of the rig.
-    changes
-        What every known parameter changes.
     """
 
-    def __init__(self, plan: ForcedPlan, model: Model, changes: Sequence[ParameterChange]) -> None:
-        self.plan, self.model, self.changes = plan, model, changes
-        self._modes: dict[str, tuple[float, Array]] | None = None
+    def __init__(self, plan: ForcedPlan, model: Model) -> None:
+        self.plan, self.model = plan, model
+        self._modes: list[StuckMode] | None = None
         self._peaks: dict[tuple[str, Side], list[CurvePeak]] = {}
 
-    def __call__(self, of: str) -> tuple[float, Array]:
-        """A number and its changes.
+    def __call__(self, of: str) -> float:
+        """A number.
 
         Raises
         ------
@@ -117,62 +102,25 @@ class LimitNumbers:
             raise ConvergenceError(
                 f"{of}: no such peak between {e.start:g} and {e.stop:g} Hz, the ends of the sweep"
             )
-        found = limit_peak(self.model, side, kind == "stuck", peak.frequency, self.changes)
-        by = peak.height * found.by_height / found.height
-        return number_of(PeakDerivative(peak.frequency, peak.height, by, found.by_frequency), what)
+        return _told(peak, what)
 
-    def _mode(self, of: str) -> tuple[float, Array]:
+    def curve(self, side: Side, stuck: bool, frequency: Array) -> ComplexArray:
+        """Accelerance (k,) of a blade, (m/s2)/N at (k,) Hz."""
+        force = self.plan.scene.damper.centrifugal
+        b = balance_of(self.plan, self.model, force, (0, *self.model.excitation.harmonics))
+        return measures.linear_accelerance(b, self.model.row(side), force, frequency, stuck)
+
+    def _mode(self, of: str) -> float:
         below = CANDIDATES * self.plan.scene.excitation.stop
         if self._modes is None:
-            self._modes = stuck_frequencies(self.model, below, self.changes)
-        if of not in self._modes:
-            raise ConvergenceError(
-                f"{of}: no such mode below {below:g} Hz, {CANDIDATES:g} times excitation.stop"
-            )
-        f, change = self._modes[of]
-        return f, f * change
-
-
-def limit_curve(
-    model: Model, side: Side, stuck: bool, frequency: Array, changes: Sequence[ParameterChange]
-) -> tuple[ComplexArray, ComplexArray]:
-    """Accelerance of a blade in a linear limit and its changes.
-
-    Parameters
-    ----------
-    side
-        Of the accelerometer.
-    stuck
-        With every point stuck; else without the damper.
-    frequency
-        (k,) Hz.
-    changes
-        What every known parameter changes.
-
-    Returns
-    -------
-    value, by_parameter
-        (k,) and (k, n), (m/s2)/N.
-    """
-    system = linear_system(model, stuck)
-    made = [system.changed(one, model.contacts.tangents) for one in changes]
-    force = np.concatenate([model.force, np.zeros(model.damper.n_dof)])
-    both = np.column_stack([force, model.row(side)])
-    if not stuck:
-        # without contacts the damper is not held: it does not move, and is omitted
-        n = model.n
-        both, M, C, K = both[:n], model.M, model.C, model.K
-        made = [(m[:n, :n], c[:n, :n], k[:n, :n]) for m, c, k in made]
-    else:
-        M, C, K = system.M, system.C, system.K
-    value, slope = [], []
-    for f in frequency:
-        w = 2.0 * np.pi * model.excitation.lowest * f
-        q, z = np.linalg.solve(K + 1j * w * C - w**2 * M, both).T
-        scale = -(w**2) * _M
-        value.append(scale * (q @ both[:, 1]))
-        slope.append([-scale * (z @ (dK + 1j * w * dC - w**2 * dM) @ q) for dM, dC, dK in made])
-    return np.array(value), np.array(slope, complex).reshape(len(frequency), len(changes))
+            _, values, shapes = measures.stuck_shapes(self.model)
+            self._modes = measures.tell_modes(self.model, values, shapes, below)
+        for one in self._modes:
+            if one.axis == "x" and one.in_phase == (of == "stuck_in_phase"):
+                return float(one.frequency)
+        raise ConvergenceError(
+            f"{of}: no such mode below {below:g} Hz, {CANDIDATES:g} times excitation.stop"
+        )
 
 
 def _peaks(plan: ForcedPlan, model: Model, stuck: bool, side: Side) -> list[CurvePeak]:
@@ -204,16 +152,9 @@ class CurveWithFriction:
         self.solved = 0
 
     def at(
-        self, plan: ForcedPlan, model: Model, changes: Sequence[DataChange]
-    ) -> tuple[dict[PeakKey, PeakDerivative | ConvergenceError], Curves]:
-        """Peaks, or why they were not found, and the curves of both blades with their changes.
-
-        Parameters
-        ----------
-        plan, model
-            Of the rig.
-        changes
-            What every known parameter changes.
+        self, plan: ForcedPlan, model: Model
+    ) -> tuple[dict[PeakKey, PeakTop | ConvergenceError], dict[Side, ComplexArray]]:
+        """Peaks, or why they were not found, and the curves of both blades.
 
         Raises
         ------
@@ -229,27 +170,14 @@ class CurveWithFriction:
                 f"F_C/F_E {self.ratio:g}: the static loads alone have no solution; to fix it: "
                 'balance.slider = "zero"'
             )
-        place = plan.scene.excitation.centrifugal_to_force.index(self.ratio)
-        forces = np.array([one.forces[place] for one in changes])
-        whole = [
-            one.whole(model) + ParameterChange(dynamic=each * b.dynamic)
-            for one, each in zip(changes, forces, strict=True)
-        ]
         answer = self._solve(plan, model, force)
-        points = [self._point(b, answer, float(f)) for f in self.frequencies]
-        tops: dict[PeakKey, PeakDerivative | ConvergenceError] = {}
+        tops: dict[PeakKey, PeakTop | ConvergenceError] = {}
         for key in self.peaks:
             try:
-                x, f = self._top(plan, model, b, answer, key)
-                row, k = model.row(key[0]), model.excitation.lowest
-                one = peak_derivatives(b, row, x, f, whole, harmonic=k, power=2.0)
+                tops[key] = self._top(plan, model, b, answer, key)
             except ConvergenceError as error:
                 tops[key] = error
-                continue
-            height = one.height * _M / force
-            by = height * (one.by_height / one.height - forces)
-            tops[key] = PeakDerivative(f, height, by, one.by_frequency)
-        return tops, self._curves(b, model, force, points, whole, forces)
+        return tops, self._curves(b, model, force, answer)
 
     def _solve(self, plan: ForcedPlan, model: Model, force: float) -> FrequencyResponse:
         """The curve over frequency, as fine as its peaks need."""
@@ -272,8 +200,8 @@ class CurveWithFriction:
 
     def _top(
         self, plan: ForcedPlan, model: Model, b: Balance, answer: FrequencyResponse, key: PeakKey
-    ) -> tuple[Array, float]:
-        """Unknowns and Hz of a peak."""
+    ) -> PeakTop:
+        """A peak between the points of the curve."""
         side, number = key
         row, k = model.row(side), model.excitation.lowest
         name = f"{'left_' * (side == 'left')}peak_{number}@{self.ratio:g}"
@@ -288,26 +216,24 @@ class CurveWithFriction:
         top = None if x is None else climb(b, row, x, f, harmonic=k, power=2.0)
         if top is None or not top.found:
             raise ConvergenceError(f"{name}: the peak at {peak.frequency:.6g} Hz was not climbed")
-        return top.x, top.frequency
+        scale = _M * (2.0 * np.pi * k * top.frequency) ** 2 / force
+        return PeakTop(top.frequency, float(scale * top.amplitude))
 
     def _curves(
-        self,
-        b: Balance,
-        model: Model,
-        force: float,
-        points: Sequence[Array],
-        whole: Sequence[ParameterChange],
-        forces: Array,
-    ) -> Curves:
-        rows, k = [model.row(side) for side in SIDES], model.excitation.lowest
-        value = np.zeros((2, len(points)), complex)
-        slope = np.zeros((2, len(points), len(whole)), complex)
-        for i, (f, x) in enumerate(zip(self.frequencies, points, strict=True)):
-            moved, by = displacement_derivatives(b, rows, x, float(f), whole, harmonic=k)
-            scale = -((2.0 * np.pi * k * f) ** 2) * _M / force
-            value[:, i] = scale * moved
-            slope[:, i] = scale * (by - moved[:, None] * forces)
-        return {side: (value[j], slope[j]) for j, side in enumerate(SIDES)}
+        self, b: Balance, model: Model, force: float, answer: FrequencyResponse
+    ) -> dict[Side, ComplexArray]:
+        """Accelerance of both blades at the frequencies."""
+        f, k = self.frequencies, model.excitation.lowest
+        if not len(f):
+            return {side: np.zeros(0, complex) for side in SIDES}
+        x = np.array([self._point(b, answer, float(one)) for one in f])
+        forces = np.array([b.force(one, False).force for one in x]).reshape(len(f), len(b.Psi), -1)
+        rigid = np.array([b.split(one)[1] for one in x])
+        q = b.displacement(2.0 * np.pi * f, forces, rigid)
+        moving = to_complex(q, b.harmonics)[..., b.harmonics.place(k)]
+        return {
+            side: measures.accelerance_of(moving @ model.row(side), f, k, force) for side in SIDES
+        }
 
 
 class FitResponses:
@@ -346,7 +272,7 @@ class FitResponses:
         self.source: ModelSource = ModelSource(
             scene, parameters, targets.ratios, None if like is None else like.source
         )
-        self.exact, self.cheap = self.source.exact, self.source.cheap
+        self.cheap = self.source.cheap
         self.stiffness = self.source.stiffness
         self._journal, self._needed = journal, needed
         self._found: dict[bytes, tuple[Array, Array]] = {}
@@ -392,80 +318,62 @@ class FitResponses:
     def value(self, z: Array) -> Array:
         """(m,) without derivatives."""
         z = np.asarray(z, float)
-        return self._evaluate(z, self.source.at(z))[0]
+        return self._evaluate(z, self.source.at(z))
 
     def _solved(self, z: Array) -> tuple[Array, Array]:
-        made = self.source.at(z, changes=True)
-        known = [k for k, exact in enumerate(self.exact) if exact]
-        value, some = self._evaluate(z, made)
+        value = self.value(z)
         slope = np.zeros((len(value), len(self.parameters)))
-        # of half an interval of STEP each way
-        slope[:, known] = some / np.sinh(STEP)
-        for k in (k for k, exact in enumerate(self.exact) if not exact):
-            step = self.source.steps[k]
-            low, high = (self._shifted(z, k, side * step) for side in (-1.0, 1.0))
-            slope[:, k] = (high - low) / (2.0 * step)
+        for k, step in enumerate(self.source.steps):
+            slope[:, k] = (self._moved(z, k, step) - value) / step
+            if not self._needed:
+                below = (value - self._moved(z, k, -step)) / step
+                # a number that jumps has no slope
+                largest = np.fmax(np.abs(slope[:, k]), np.abs(below))
+                jumps = np.abs(slope[:, k] - below) > JUMPS * largest
+                slope[jumps, k] = np.nan
         return value, slope
 
-    def _shifted(self, z: Array, k: int, shift: float) -> Array:
-        moved = z.copy()
-        moved[k] += shift
-        return self.value(moved)
+    def _moved(self, z: Array, k: int, step: float) -> Array:
+        there = z.copy()
+        there[k] += step
+        return self.value(there)
 
-    def _evaluate(self, z: Array, made: FittedModel) -> tuple[Array, Array]:
-        """Values, and what the changes do to them."""
-        plan, model, data = made.plan, made.model, made.changes
-        changes = [one.whole(model) for one in data]
-        parts: list[tuple[Array, Array]] = []
+    def _evaluate(self, z: Array, made: FittedModel) -> Array:
+        plan, model = made.plan, made.model
+        parts: list[Array] = []
         with threads_for(len(model.M)):
-            friction = {one.ratio: one.at(plan, model, data) for one in self.friction}
-            limits = LimitNumbers(plan, model, changes)
+            friction = {one.ratio: one.at(plan, model) for one in self.friction}
+            limits = LimitNumbers(plan, model)
             for one in self.targets.numbers:
                 try:
                     if one.of in CONTACT_TOTALS:
-                        v, s = self._total(z, one, data)
+                        side, which = CONTACT_TOTALS[one.of]
+                        v = float(getattr(self.source.totals(z)[side], which))
                     elif one.ratio is None:
-                        v, s = limits(one.of)
+                        v = limits(one.of)
                     else:
                         _, side, number, what = PEAK_NUMBERS[one.of]
                         peak = friction[one.ratio][0][side, number]
                         if isinstance(peak, ConvergenceError):
                             raise peak
-                        v, s = number_of(peak, what)
+                        v = _told(peak, what)
                 except ConvergenceError:
                     if self._needed:
                         raise
-                    v, s = np.nan, np.full(len(changes), np.nan)
-                parts.append((np.array([v]), np.asarray(s)[None, :]))
+                    v = np.nan
+                parts.append(np.array([v]))
             for curve in self.targets.curves:
                 of = curve.curve
                 if of.force_ratio is None:
-                    H, dH = limit_curve(model, of.blade, of.state == "stuck", of.frequency, changes)
+                    H = limits.curve(of.blade, of.state == "stuck", of.frequency)
                 else:
-                    H, dH = friction[of.force_ratio][1][of.blade]
                     at = np.searchsorted(self._frequencies(of.force_ratio), of.frequency)
-                    H, dH = H[at], dH[at]
-                parts.append(_in_parts(curve, H, dH))
-        value, slope = zip(*parts, strict=True)
-        return np.concatenate(value), np.concatenate(slope)
+                    H = friction[of.force_ratio][1][of.blade][at]
+                parts.append(_in_parts(curve, H))
+        return np.concatenate(parts)
 
     def _frequencies(self, ratio: float) -> Array:
         return next(one.frequencies for one in self.friction if one.ratio == ratio)
-
-    def _total(self, z: Array, one: FitTarget, data: Sequence[DataChange]) -> tuple[float, Array]:
-        """A total of the right face, and its changes by known parameters."""
-        side, which = CONTACT_TOTALS[one.of]
-
-        def total(place: Array) -> float:
-            return float(getattr(self.source.totals(place)[side], which))
-
-        change = []
-        known = [k for k, exact in enumerate(self.exact) if exact][: len(data)]
-        for k in known:
-            step = np.zeros(len(z))
-            step[k] = STEP
-            change.append(0.5 * (total(z + step) - total(z - step)))
-        return total(z), np.array(change)
 
 
 def _curve_at(ratio: float, targets: Targets) -> CurveWithFriction:
@@ -480,9 +388,8 @@ def _curve_at(ratio: float, targets: Targets) -> CurveWithFriction:
     return CurveWithFriction(ratio, list(peaks), frequencies)
 
 
-def _in_parts(target: CurveTarget, H: ComplexArray, dH: ComplexArray) -> tuple[Array, Array]:
-    """Real and imaginary parts, or magnitudes, with their derivatives."""
+def _in_parts(target: CurveTarget, H: ComplexArray) -> Array:
+    """Real and imaginary parts, or magnitudes."""
     if target.curve.is_complex:
-        return np.concatenate([H.real, H.imag]), np.concatenate([dH.real, dH.imag])
-    size = np.maximum(np.abs(H), np.finfo(float).tiny)
-    return size, np.asarray((H.conj()[:, None] * dH).real / size[:, None])
+        return np.concatenate([H.real, H.imag])
+    return np.maximum(np.abs(H), np.finfo(float).tiny)

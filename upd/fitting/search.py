@@ -167,7 +167,6 @@ def _found(responses: FitResponses, starts: int | None, progress: Listener) -> F
         further,
         done,
         responses.source.directions(best),
-        tuple(responses.exact),
         responses.source.made,
         math.nan,
     )

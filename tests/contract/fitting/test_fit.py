@@ -76,31 +76,29 @@ def test_answers_apart_from_each_other_are_all_told(scene: ForcedScene) -> None:
     assert any(np.exp(z) == pytest.approx([0.4, 0.07], rel=1e-6) for z in found.answers)
 
 
-def test_exact_derivatives_are_those_of_differences(scene: ForcedScene) -> None:
+def test_slopes_are_those_of_finer_central_differences(scene: ForcedScene) -> None:
     """Of every number, by stiffnesses, Young's modulus, density and damping."""
     vary = [RIGHT, f"{LEFT}+{NORMAL}", "material.E", "material.density", "excitation.damping"]
     parts = [name for name in KNOWN if name.startswith(("free_peak_1", "stuck"))]
     targets = read_targets([f"{name}=1 {unit_of(name)}" for name in parts])
     responses = FitResponses(scene, targets, read_parameters(scene, vary))
-    assert all(responses.exact)
     slope = responses.at(np.zeros(5))[1]
     for k in range(5):
         step = np.zeros(5)
-        step[k] = 1e-3
-        change = (responses.at(step)[0] - responses.at(-step)[0]) / 2e-3
-        assert slope[:, k] == pytest.approx(change, rel=1e-4, abs=2e-3)
+        step[k] = 1e-4
+        change = (responses.value(step) - responses.value(-step)) / 2e-4
+        assert slope[:, k] == pytest.approx(change, rel=1e-2, abs=2e-2)
 
 
 def test_a_dimension_is_fitted_by_differences(scene: ForcedScene) -> None:
     vary = ["geometry.core_length=x0.98:x1.02"]
     made = numbers(scene, "free_peak_1_frequency", vary, [1.01])
     found = upd.fit(scene, f"free_peak_1_frequency={made[0]:.12g} Hz", vary, starts=1)
-    assert found.exact == (False,)
     assert found.value("geometry.core_length") == pytest.approx(
         1.01 * scene.geometry["core_length"], rel=1e-6
     )
     ends = [numbers(scene, "free_peak_1_frequency", vary, [x])[0] for x in (1.005, 1.015)]
-    assert found.slopes[0, 0] == pytest.approx(np.ptp(ends) / np.log(1.005 / 1.015), rel=1e-3)
+    assert found.slopes[0, 0] == pytest.approx(np.ptp(ends) / np.log(1.005 / 1.015), rel=1e-2)
     assert found.scene.geometry["core_length"] == pytest.approx(
         found.value("geometry.core_length"), rel=1e-12
     )
@@ -118,7 +116,7 @@ def test_more_parameters_than_targets_are_told_as_a_family(scene: ForcedScene) -
     residuals = Residuals(FitResponses(scene, targets, read_parameters(scene, vary)))
     # along the direction nothing moves to first order, across it something does
     along, across = (residuals.jacobian(found.answers[0]) @ v for v in (row, [1.0, 1.0, 1.0]))
-    assert np.abs(along).max() < 1e-12 < 1e-4 < np.abs(across).max()
+    assert np.abs(along).max() < 1e-9 < 1e-4 < np.abs(across).max()
     # every member meets the targets, and the family is long
     assert all(residuals.met(z) for z in found.answers)
     assert max(np.exp(np.ptp(found.ends, axis=1))) > 10.0

@@ -26,6 +26,7 @@ from upd.analyses.measured import fit_checks
 from upd.hbm.faces.balance import InterfaceResponse
 from upd.hbm.faces.sweep import SteppedSine
 from upd.hbm.springs.response import TRUNCATION
+from upd.hbm.springs.stability import OSCILLATING, motion_stability
 from upd.results import Case, Check
 from upd.scene.forced_contact import SIDES
 
@@ -126,6 +127,12 @@ _RULES = {
         "peak {number} of the {blade} blade at {frequency:.5g} Hz is not confirmed (no motion near "
         "it is stable), so that a test may not show it: take more balance.harmonics, or sweep as a "
         'test does: balance.method = "march"',
+    ),
+    "oscillating motion": _Rule(
+        0,
+        "of the {count} reported peaks that oscillate about their period",
+        "peak {number} at {frequency:.5g} Hz oscillates about its period (multiplier {size:.3f}): "
+        'its height varies with time; sweep as a test does: balance.method = "march"',
     ),
     "performance complete": _Rule(
         0,
@@ -284,6 +291,29 @@ def _integrated(curve: PointCurve) -> Iterator[Check]:
         worst = max(curve.checked, key=lambda one: one.difference)
         rule = "confirmed" if worst.stays else "none stable"
         yield _check(rule, replace(curve.case, mode=worst.mode), worst.difference, **vars(worst))
+    yield from _oscillating(curve)
+
+
+def _oscillating(curve: PointCurve) -> Iterator[Check]:
+    """Reported peaks whose motion is unstable other than at a fold, by the multipliers of the
+    period map: one of each resonance, where a point slips or opens.
+    """
+    answer, lost = curve.answer, 0
+    words = {"number": 0, "frequency": 0.0, "size": 0.0}
+    motions: dict[int, tuple[float, Any]] = {}
+    for (side, number), top in curve.tops.items():
+        if top.slips and number not in motions:
+            below = curve.stayed(side, number)
+            sample = None if below is None else below.sample
+            f = top.frequency if sample is None else float(answer.frequency[sample])
+            motions[number] = f, top.x if sample is None else answer.x[sample]
+    for number, (f, x) in motions.items():
+        label, multipliers = motion_stability(answer.balance, x, f)
+        if label == OSCILLATING:
+            lost += 1
+            words = {"number": number, "frequency": f, "size": abs(multipliers[0])}
+    if motions:
+        yield _check("oscillating motion", curve.case, lost, count=len(motions), **words)
 
 
 def _complete(name: str, found: Performance) -> Check:

@@ -33,6 +33,7 @@ from upd.hbm.springs.points import stuck_stiffness
 from upd.hbm.springs.response import FrequencyResponse
 from upd.labels import Shown
 from upd.linalg.compiled import compiled
+from upd.linalg.parallel import threads_for
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -114,9 +115,7 @@ def stability(
         problems.append(f"{steps} steps cannot carry harmonic {b.harmonics.highest}")
     if problems:
         raise InputError(f"stability: {'; '.join(problems)}")
-    # one sample of the motion a step
-    E = synthesis(b.harmonics, steps)
-    found = [_at(b, answer.x[k], float(answer.frequency[k]), E) for k in chosen]
+    found = [motion_stability(b, answer.x[k], float(answer.frequency[k]), steps) for k in chosen]
     return Stability(
         chosen % max(n, 1),
         answer.frequency[chosen],
@@ -126,8 +125,28 @@ def stability(
     )
 
 
-def _at(b: Balance, x: FloatArray, frequency: float, E: FloatArray) -> tuple[str, ComplexArray]:
-    """Label and multipliers of one motion."""
+def motion_stability(
+    b: Balance, x: FloatArray, frequency: float, steps: int = STEPS
+) -> tuple[str, ComplexArray]:
+    """Label and multipliers of one motion, as `Stability` has them.
+
+    Parameters
+    ----------
+    b : Balance
+    x : (n_unknown,) ndarray
+        Unknowns of the balance.
+    frequency : float
+        [Hz]
+    steps : int
+        Time steps of a period.
+
+    Returns
+    -------
+    label : str
+    multipliers : ndarray of complex
+    """
+    # one sample of the motion a step
+    E = synthesis(b.harmonics, steps)
     W, d, law = b.split(x)[0], b.contacts.tangents, b.contacts.law
     march = b.marched(W[None], E)
     w, force, state = W @ E.T, march.force[0], march.state[0]
@@ -271,11 +290,21 @@ def period_map(
     (2 m + s, 2 m + s) ndarray
         Of modal displacements, velocities and sliders.
     """
-    C = np.asarray(damping, dtype=float)
-    C = np.ascontiguousarray(np.diag(C) if C.ndim == 1 else C)
-    L = np.diag(eigenvalues)
-    S = np.linalg.inv(np.eye(len(L)) + 0.5 * dt * C + 0.25 * dt**2 * L)
-    return np.asarray(_map(np.ascontiguousarray(Psi), L, C, S, *of, dt))
+    C, L = np.asarray(damping, dtype=np.float64), eigenvalues[:, None]
+    # a column where nothing couples the modes
+    if C.ndim == 1:
+        C = C[:, None]
+        S = np.reciprocal(1.0 + 0.5 * dt * C + 0.25 * dt**2 * L)
+    else:
+        S = np.linalg.inv(np.eye(len(L)) + 0.5 * dt * C + 0.25 * dt**2 * np.diagflat(L))
+    with threads_for(len(Psi)):
+        return np.asarray(_map(np.ascontiguousarray(Psi), L, np.ascontiguousarray(C), S, *of, dt))
+
+
+@compiled
+def _times(A, x):  # type: ignore[no-untyped-def]
+    """A x of a matrix, or of a diagonal one as its column."""
+    return A * x if A.shape[1] == 1 else np.dot(A, x)
 
 
 @compiled
@@ -286,17 +315,17 @@ def _map(Psi, L, C, S, A, B, X, Y, dt):  # type: ignore[no-untyped-def]
     D = np.eye(2 * m + s)
     x, v, z = D[:m].copy(), D[m : 2 * m].copy(), D[2 * m :].copy()
     Pt = np.ascontiguousarray(Psi.T)
-    Gamma = 0.25 * dt * dt * np.dot(Psi, np.dot(S, Pt))
-    a = -(np.dot(C, v) + np.dot(L, x) + np.dot(Pt, np.dot(A[0], np.dot(Psi, x)) + np.dot(B[0], z)))
+    Gamma = 0.25 * dt * dt * np.dot(Psi, _times(S, Pt))
+    a = -(_times(C, v) + L * x + np.dot(Pt, np.dot(A[0], np.dot(Psi, x)) + np.dot(B[0], z)))
     for i in range(n):
         j = (i + 1) % n
         x0 = x + dt * v + 0.25 * dt * dt * a
         v0 = v + 0.5 * dt * a
-        free = -np.dot(S, np.dot(C, v0) + np.dot(L, x0))
+        free = -_times(S, _times(C, v0) + L * x0)
         held = np.dot(B[j], z)
         right = np.dot(Psi, x0 + 0.25 * dt * dt * free) - np.dot(Gamma, held)
         w = np.linalg.solve(np.eye(c) + np.dot(Gamma, A[j]), right)
-        a = free - np.dot(S, np.dot(Pt, np.dot(A[j], w) + held))
+        a = free - _times(S, np.dot(Pt, np.dot(A[j], w) + held))
         x, v = x0 + 0.25 * dt * dt * a, v0 + 0.5 * dt * a
         z = np.dot(X[j], w) + np.dot(Y[j], z)
     D[:m], D[m : 2 * m], D[2 * m :] = x, v, z
