@@ -115,4 +115,4 @@ def test_the_level_that_is_enough_is_the_cheapest_that_stays_within() -> None:
     assert "cheap level 1 is enough for 1 %: 0.9 % in 0.2 s; fine level 3 is enough" in sentence
     (sentence,) = enough([only(ladder("fine", {"p": [3.3, 3.2, 3.1, 3.06]}, 100, p=3.0), "p")])
     assert "no level stays within 1 %, the finest has 2 %" in sentence
-    assert enough([]) == []
+    assert enough([]) == ()

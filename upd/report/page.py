@@ -152,9 +152,9 @@ def page_text(
     ]
     panels = [panel for section in found for panel in section.panels]
     if found and found[0].tables:
-        first, *others = found
         shown = panels[:_OPENED]
-        found = [first._replace(panels=shown, opening=True), *(_folded(s, shown) for s in others)]
+        first = found[0]._replace(panels=shown, opening=True)
+        found = [first, *(_folded(s, shown) for s in found[1:])]
         found = [section for section in found if not section.is_empty]
     script, charts = _packed_plotly(), _data(panels)
     used = (
@@ -185,15 +185,9 @@ def page_text(
 def _folded(section: Section, shown: Sequence[Panel]) -> Section:
     """A section, or each of its figures, that opens when asked; without figures shown before."""
     panels = [panel for panel in section.panels if panel not in shown]
-    alone = bool(panels or section.surfaces)
-    gone = bool(section.panels) and not alone
-    return section._replace(
-        heading=f"More {section.heading.lower()}" if alone and shown else section.heading,
-        panels=panels,
-        texts=() if gone else section.texts,
-        folded=not (alone or section.notes),
-        each_folded=alone or section.each_folded,
-    )
+    each = bool(panels or section.surfaces)
+    folded = not (each or section.notes)
+    return section._replace(panels=panels, folded=folded, each_folded=each or section.each_folded)
 
 
 def _picture(surface: Surface) -> str:

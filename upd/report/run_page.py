@@ -80,7 +80,6 @@ def run_sections(run: RunFolder, surfaces: Sequence[Surface]) -> list[Section]:
         else 'No errors were estimated: leave accuracy = "unknown" out to see them.',
         "A number without a unit is a ratio or a count.",
     ]
-    nothing = Section("Main numbers", texts=["The run left no numbers."])
     figures = Section(
         "Figures",
         panels=panels,
@@ -89,7 +88,7 @@ def run_sections(run: RunFolder, surfaces: Sequence[Surface]) -> list[Section]:
     )
     total = f"{cost['total_s']:.1f} s in all, {cost['peak_rss_mb']:.0f} MB of memory at most."
     return [
-        Section("Main numbers", tables, texts=about) if tables else nothing,
+        Section("Main numbers", tables, texts=about if tables else ["The run left no numbers."]),
         Section("Warnings", notes=page_warnings(run)),
         figures,
         Section("Error budget", [budget_table(main_numbers(size, entries))]),

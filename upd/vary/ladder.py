@@ -79,9 +79,8 @@ def _convergence(
     solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve], *before: TextTable
 ) -> StudyReport:
     levels, errors = convergence_tables(solved, curves)
-    return StudyReport(
-        (*before, levels), bool(curves), tuple(enough(curves)), tuple(curves), details=(errors,)
-    )
+    notes = enough(curves)
+    return StudyReport((*before, levels), bool(curves), notes, tuple(curves), details=(errors,))
 
 
 def accuracy_report(

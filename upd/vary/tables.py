@@ -98,9 +98,8 @@ def points_table(
 def _head(name: str, case: str) -> str:
     """Label of a number, its case and unit, one below the other."""
     unit = quantity_of(name)[0].unit
-    return "\n".join(
-        filter(None, (number_label(name), case, f"[{unit_label(unit)}]" if unit else ""))
-    )
+    parts = number_label(name), case, f"[{unit_label(unit)}]" if unit else ""
+    return "\n".join(filter(None, parts))
 
 
 def convergence_tables(
@@ -145,14 +144,14 @@ def _main(curves: Sequence[ConvergenceCurve]) -> list[ConvergenceCurve]:
     return [c for c in mine if c.case == mine[-1].case]
 
 
-def enough(curves: Sequence[ConvergenceCurve]) -> list[str]:
+def enough(curves: Sequence[ConvergenceCurve]) -> tuple[str, ...]:
     """The cheapest levels of all curves with which the first number stays within 1 % and 0.1 %, and
     its order of convergence.
 
     A level within the limit by chance, before finer ones beyond it, is not enough.
     """
     if not curves:
-        return []
+        return ()
     mine, at = _main(curves), dict[str, float]()
     for limit in _WANTED:
         levels = [
@@ -163,20 +162,18 @@ def enough(curves: Sequence[ConvergenceCurve]) -> list[str]:
         for seconds, level, error in sorted(levels)[:1]:
             at[f"{level} is enough for {{}}: {100 * abs(error):.2g} % in {seconds:.2g} s"] = limit
     found = [text.format(f"{100 * limit:g} %") for text, limit in at.items()]
-    least = 100 * min(abs(c.error[-1]) for c in mine)
-    none = f"no level stays within {100 * _WANTED[0]:g} %, the finest has {least:.2g} %"
+    least = min(abs(c.error[-1]) for c in mine)
+    none = f"no level stays within 1 %, the finest has {100 * least:.2g} %"
     what = f"{number_label(mine[0].name)} {mine[0].case}".strip()
     orders = [f"{c.curve} {c.order:.1f}" for c in mine if np.isfinite(c.order)]
-    return [
-        f"{what[:1].upper()}{what[1:]} against {mine[0].against}: {'; '.join(found) or none}. "
-        f"Order of convergence: {', '.join(orders) or 'none is clear'}."
-    ]
+    text = f"{what} against {mine[0].against}: {'; '.join(found) or none}. Order of convergence: "
+    return (f"{text[:1].upper()}{text[1:]}{', '.join(orders) or 'none is clear'}.",)
 
 
 def _first_within(curve: ConvergenceCurve, limit: float) -> int:
     """The first level from which on all stay within the limit; their number where none does."""
-    size = np.abs(curve.error)
-    return len(size) - int(np.argmin(np.append(size[::-1] <= limit, False)))
+    within = np.abs(curve.error[::-1]) <= limit
+    return len(within) - int(np.argmin(np.append(within, False)))
 
 
 def level_table(

@@ -144,7 +144,7 @@ def test_every_number_has_its_unit(folder: Path, html: str) -> None:
     "heading",
     [
         "Main numbers",
-        "More figures",
+        "Figures",
         "What was simulated, what was left out",
         "Self-checks",
         "Cost and mesh",
