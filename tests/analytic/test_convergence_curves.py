@@ -1,5 +1,7 @@
 """Convergence curves of made-up ladders: what an error is taken against, and what scatter says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -106,6 +108,11 @@ def test_the_level_that_is_enough_is_the_cheapest_that_stays_within() -> None:
     (sentence,) = enough([curve])
     words = "Maximum pressure F=200 N against reference: level 3 is enough for 0.1 %: 0.05 %"
     assert sentence.startswith(words)
+    assert sentence.endswith("Order of convergence: none is clear.")
+    slow = replace(curve, seconds=(1.0,) * 4)
+    cheap = replace(slow, curve="cheap", error=(0.02, 0.009, 0.008, 0.007), seconds=(0.2,) * 4)
+    (sentence,) = enough([slow, cheap])
+    assert "cheap level 1 is enough for 1 %: 0.9 % in 0.2 s; fine level 3 is enough" in sentence
     (sentence,) = enough([only(ladder("fine", {"p": [3.3, 3.2, 3.1, 3.06]}, 100, p=3.0), "p")])
     assert "no level stays within 1 %, the finest has 2 %" in sentence
-    assert enough([]) == []
+    assert enough([]) == ()

@@ -73,7 +73,8 @@ class Study:
         curves = [asdict(one) for one in report.curves]
         table, data = folder / "study.md", folder / "study.json"
         lines = [f"# {self.title}", ""]
-        for part in report.tables:
+        tables = (*report.tables, *report.details)
+        for part in tables:
             lines += [f"## {part.title}", "", *markdown_table(part), ""]
         write_text(table, "\n".join([*lines, *(f"- {note}" for note in report.notes)]) + "\n")
         if not self.points:
@@ -91,9 +92,7 @@ class Study:
         from upd.report.sweep_page import write_study_report
 
         failed = sum(bool(one.outcome.failure) for one in solved)
-        page = write_study_report(
-            folder, self.title, failed, report.notes, report.tables, charts, figures
-        )
+        page = write_study_report(folder, self.title, failed, report.notes, tables, charts, figures)
         return [table, data, *figures, page]
 
 
@@ -197,8 +196,9 @@ def plan_study(scene: AnyScene, vary: str, asked: Asked = None) -> Study:
     if vary not in offered:
         raise InputError(f"--vary {vary}: choose one of {', '.join(offered)}")
     ladder = offered[vary]
-    headline = analysis_of(scene).headline_names
-    names = [n for n in dict.fromkeys((*headline, *ladder.follow)) if n not in _OF_LOADS]
+    analysis = analysis_of(scene)
+    wanted = dict.fromkeys((*analysis.verdict_names, *analysis.headline_names, *ladder.follow))
+    names = [n for n in wanted if n not in _OF_LOADS]
 
     def present(solved: Sequence[SolvedPoint]) -> StudyReport:
         report = ladder.report(scene, solved, names)

@@ -26,7 +26,7 @@ from upd.cache.sources import versions
 from upd.errors import InputError, one_line
 from upd.plot.matplotlib import draw_all, write_sheets
 from upd.plot.sample_charts import sample_charts
-from upd.plot.sweep_charts import figure_names, sweep_charts
+from upd.plot.sweep_charts import figure_names, is_constant, sweep_charts
 from upd.results import write_netcdf
 from upd.results.sampled import SampledNumber, sampled_number
 from upd.scene import load_scene
@@ -57,13 +57,13 @@ class SweepResult:
     def __repr__(self) -> str:
         points = len(self.outcomes)
         head = f"Sweep: {points - len(self.failed)} of {points} points solved; {self.folder}"
+        moved = [c for c in self.columns if not is_constant(c.values)]
         ranges = [
             f"  {c.title}: {np.nanmin(c.values):.5g} to {np.nanmax(c.values):.5g} {c.unit}".rstrip()
-            for c in self.columns
-            if np.isfinite(c.values).any()
+            for c in moved[:8]
         ]
-        more = [f"  and {len(ranges) - 7} more numbers"] * (len(ranges) > 8)
-        return "\n".join([head, *ranges[: 7 if more else 8], *more])
+        other = len(self.columns) - len(ranges)
+        return "\n".join([head, *ranges, f"  and {other} more in table.csv"])
 
     def plot(self) -> list[Axes]:
         """Draw the followed numbers with matplotlib, and return the axes."""

@@ -498,9 +498,11 @@ def new(scene: str, file: Path) -> None:
     Parameters
     ----------
     scene
-        Ready name or .toml file.
+        Ready name or .toml file; or an example, which is copied as it is: own_damper.toml,
+        own_damper.py, own_wedge.toml, own_pads.toml, own_sphere.toml, damped_response.toml,
+        own_matrices.py.
     file
-        The new .toml file; its name becomes the scene's.
+        The new file; the name of a .toml file becomes the scene's.
     """
     from upd.cli.describe import write_new
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import textwrap
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,8 +37,6 @@ _KINDS = {
     ".png": "Figure",
     ".html": "Page",
 }
-#: rows of a study's table on a terminal
-_STUDY_ROWS = 12
 
 
 def print_sweep_plan(console: Console, plan: SweepPlan) -> None:
@@ -160,10 +157,7 @@ def print_study(console: Console, result: StudyResult) -> None:
     if result.kept:
         console.print(f"{counted(len(result.kept), 'point')} kept from an earlier call")
     for table in result.report.tables:
-        shown = replace(table, rows=table.rows[:_STUDY_ROWS])
-        print_table(console, study_columns(shown), title=table.title)
-        if more := len(table.rows) - len(shown.rows):
-            console.print(f"{counted(more, 'more row')} in study.md")
+        print_table(console, study_columns(table), title=table.title)
     files = [f"{_KINDS.get(path.suffix, 'File')}: {path}" for path in result.files]
     fine = sum(not one.outcome.failure for one in result.solved)
     many = f"{fine} of {counted(len(result.solved), 'point')} ok, " if result.solved else ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from importlib import resources
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,8 @@ from upd.scene.quantities import is_name
 
 #: what an input may carry beside its value
 UNCERTAINTY = '"VALUE +- HALF-WIDTH" or "VALUE +- 10 %"'
+
+_EXAMPLES = Path(str(resources.files("upd"))) / "scenes" / "examples"
 
 
 @dataclass(frozen=True)
@@ -137,19 +140,22 @@ def write_drawing(found: Described, path: Path) -> Path:
 
 
 def write_new(source: str, file: Path) -> Path:
-    """Write a commented copy of a scene under the name of its file.
+    """Write a commented copy of a scene under the name of its file, or an example as it is.
 
     Raises InputError for a file that is there already, or whose name is no name of a scene.
     """
-    if file.suffix.lower() != ".toml":
-        raise InputError(f"{file}: a scene is a .toml file; to fix it: name it {file.stem}.toml")
+    if file.exists():
+        raise InputError(f"{file}: is there already; to fix it: give another name")
+    example = _EXAMPLES / source
+    known = example.is_file() and not Path(source).exists()
+    ending = example.suffix if known else ".toml"
+    if file.suffix.lower() != ending:
+        raise InputError(f"{file}: its ending must be {ending}: name it {file.stem}{ending}")
     if not is_name(file.stem):
         raise InputError(
             f"{file}: its name becomes the scene's: use letters, digits, '-', '_' and '.'"
         )
-    if file.exists():
-        raise InputError(f"{file}: is there already; to fix it: give another name")
-    text = scene_to_start_from(load_scene(source), file.stem)
+    text = example.read_text("utf-8") if known else None
     with placed_file(file) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(text or scene_to_start_from(load_scene(source), file.stem), "utf-8")
     return file

@@ -290,7 +290,7 @@ def _targets(found: Fit) -> AnswerTable:
     for i, one in enumerate(found.targets):
         none = one.half_width is None
         size, text = (100.0, "{} %") if none else (1.0, "{} half-widths")
-        off = Rounded(size * _off(found, i), "+.2g", text)
+        off = Rounded(size * _off(found, i), "+.3f", text)
         half = "" if one.half_width is None else Rounded(one.half_width, ".3g")
         wanted, fitted = Rounded(one.value, ".8g"), Rounded(found.numbers[i], ".7g")
         rows.append((one.name, one.unit, wanted, fitted, off, half))
@@ -324,13 +324,13 @@ def _measurements(found: Fit) -> AnswerTable:
         if one.then < one.widest**_GAIN
     )[:_FURTHER]
     widest = f"{found.further[0].widest:.3g}" if found.further else ""
-    return AnswerTable(
-        "Next measurement",
-        ("number", "unit", "#half-width", "#from", "#to", "#then x/"),
-        rows,
-        f"The least known direction of the inputs is known within x/ {widest} today. Half-widths "
-        "are assumed; from and to are what the fit predicts.",
+    heads = ("number", "unit", "#half-width", "#from", "#to", "#factor then")
+    note = (
+        f"The least known direction of the inputs is known within a factor of {widest} today, and "
+        "of the last column after the measurement. Half-widths are assumed; the fit predicts "
+        "from and to."
     )
+    return AnswerTable("Next measurement", heads, rows, note)
 
 
 def _directions(found: Fit) -> AnswerTable:
@@ -341,8 +341,9 @@ def _directions(found: Fit) -> AnswerTable:
         for row, s, unknown in zip(known.directions, known.singular, known.unknown, strict=True)
     )
     heads = ("direction", "#times less known than the best")
-    shown = len(rows) > 1 or bool(known.unknown.any())
-    return AnswerTable("Directions of the inputs", heads, rows[::-1] if shown else ())
+    shown = rows[::-1] if len(rows) > 1 or known.unknown.any() else ()
+    note = "Inputs changed by the factors of the first direction move the targets least."
+    return AnswerTable("Directions of the inputs", heads, shown, note)
 
 
 def _direction(found: Fit, row: Array) -> str:
@@ -417,7 +418,7 @@ def _moves(found: Fit, k: int) -> Chart:
     return Chart(
         f"What {one.name} does",
         Axis(name, one.unit, log=True),
-        Axis("number over its target, less 1", "%"),
+        Axis("difference from the target", "%"),
         traces=tuple(
             Trace(target.name, x, 100.0 * (numbers[:, i] / target.value - 1.0), "line", i)
             for i, target in enumerate(found.targets)

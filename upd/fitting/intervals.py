@@ -35,6 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from upd.analyses.forced.model import quiet
 from upd.errors import UpdError, one_line
 from upd.fitting.models import is_seated
 from upd.fitting.residuals import Residuals
@@ -309,7 +310,8 @@ def rank_measurements(residuals: Residuals, best: Array) -> tuple[FurtherMeasure
     asked = candidates(scene, targets, friction=friction)
     responses = FitResponses(scene, asked, made.parameters, needed=False, like=made)
     try:
-        value, slope = responses.at(best)
+        with quiet():
+            value, slope = responses.at(best)
     except UpdError as error:
         log.info("further measurements: %s", one_line(error))
         return ()

@@ -28,6 +28,7 @@ myst_heading_anchors = 3
 html_theme = "furo"
 html_math_renderer = "mathml"
 html_show_sourcelink = False
+html_show_copyright = False
 suppress_warnings = ["config.cache"]
 
 autodoc_typehints = "none"
@@ -46,6 +47,7 @@ sphinx_gallery_conf: dict[str, Any] = {
     "reset_modules": ("matplotlib",),
     "parallel": 2,
     "image_scrapers": ("matplotlib",),
+    "capture_repr": (),
     "min_reported_time": 3600,
 }
 

@@ -14,7 +14,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.path import Path as Outline
-from matplotlib.transforms import IdentityTransform
+from matplotlib.transforms import IdentityTransform, ScaledTranslation
 
 from upd.plot.chart import Area, Axis, Band, Chart, Map, Mark, Pies, Trace
 from upd.plot.style import (
@@ -51,6 +51,8 @@ _BAR_HEIGHT, _LETTER = 0.6, 8
 #: points of the letters of a legend and of the words beside a mark, of what stands before an entry
 #: of a legend, and rows of it at most
 _SMALL, _HANDLE, _ROWS = 7.0, 32.0, 6
+#: inches from the axes to their legend: room for the numbers and words of the axis
+_BELOW = 0.42
 #: cells of a map of states along one side that have lines between them
 _FEW_CELLS = 32
 #: room below and above pies, as a part of their height
@@ -316,7 +318,9 @@ def draw_legend(chart: Chart, ax: Axes) -> None:
         list(shown.values()),
         [plain(name) for name in shown],
         loc="upper center",
-        bbox_to_anchor=(0.5, -0.15),
+        bbox_to_anchor=(0.5, 0.0),
+        # below the axis' own words, however high the axes are
+        bbox_transform=ax.transAxes + ScaledTranslation(0.0, -_BELOW, figure.dpi_scale_trans),
         ncols=min(columns, len(shown)),
         frameon=False,
         fontsize=_SMALL,

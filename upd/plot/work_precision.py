@@ -15,8 +15,8 @@ _COSTS = (
     ("seconds", Axis("seconds", log=True)),
     ("memory_mb", Axis("peak memory", "MB", log=True)),
 )
-#: numbers on the sheet, each with its first and its last case
-_NUMBERS = 4
+#: numbers on the sheet, each with its last case
+_NUMBERS = 3
 #: decades that the name of a level takes above its point
 _WORDS = 0.3
 #: what cases of curves with friction have in their label
@@ -40,15 +40,13 @@ def work_precision_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
     -------
     list of Chart
         For each number and case that has an error: the errors in per cent over seconds and over
-        memory. The first four numbers, with their first and last case (smallest and largest load),
-        are on the sheet ``work_precision``; of a forced response, those with friction.
+        memory. The first three numbers over seconds, with their last case (the largest load), are
+        on the sheet ``work_precision``; of a forced response, those with friction.
     """
     groups = _groups(curves)
     shown = _shown(list(groups))
-    # Seconds and memory of both cases side by side, where every number has two.
-    columns = 4 if len(shown) == 2 * len({name for name, _ in shown}) else 2
     return [
-        _chart(group, cost, axis, sheet=key in shown, columns=columns)
+        _chart(group, cost, axis, sheet=key in shown and cost == "seconds", columns=_NUMBERS)
         for key, group in groups.items()
         for cost, axis in _COSTS
     ]
@@ -102,11 +100,8 @@ def _shown(keys: Sequence[tuple[str, str]]) -> set[tuple[str, str]]:
     """Numbers and cases on the sheet."""
     # of a forced response the curves with friction are what is studied
     friction = [key for key in keys if _FRICTION in key[1]]
-    chosen, out = friction or list(keys), set()
-    for name in list(dict.fromkeys(name for name, _ in chosen))[:_NUMBERS]:
-        mine = [key for key in chosen if key[0] == name]
-        out |= {mine[0], mine[-1]}
-    return out
+    last = {name: (name, case) for name, case in friction or keys}
+    return set(list(last.values())[:_NUMBERS])
 
 
 def _chart(

@@ -17,7 +17,7 @@ from upd.cache.files import whole_files
 from upd.cache.sources import versions
 from upd.errors import InputError, one_line
 from upd.plot.chart import Chart
-from upd.plot.matplotlib import chart_png, write_sheet
+from upd.plot.matplotlib import chart_png, draw_all, write_sheet
 from upd.report.columns import whole_table
 from upd.report.page import Section, Verdict, image_uri, make_panels, page_text, versions_text
 from upd.results.answer_table import AnswerTable
@@ -119,13 +119,11 @@ class FigureAnswer(ABC):
             Those of its figure.
         """
         word, kind = self.outcome
-        new = self.scene is not self.source
-        text = "The scene with the values that were found." if new else "The scene of the question."
         sections = [
-            *(Section(table.heading, [table], kind="grid") for table in self.tables),
+            Section("Answer", self.tables),
             Section("Notes", texts=self.notes),
             Section("Figures", panels=make_panels(charts, {})),
-            Section("Scene file", texts=[text], file=self._scene_file),
+            Section("Scene file", file=self._scene_file),
         ]
         title = self.source.title or self.source.name
         verdict = Verdict(kind, word, f"{self.verdict}.")
@@ -165,6 +163,10 @@ class FigureAnswer(ABC):
                 f"{folder}: cannot be written ({one_line(error)}); choose another with --out"
             ) from None
         return replace(self, folder=folder)
+
+    def plot(self) -> list[Any]:
+        """Draw the charts of its figure with matplotlib, and return the axes."""
+        return draw_all(self.charts)
 
     def __str__(self) -> str:
         lines = wrapped(self.verdict, "")

@@ -73,6 +73,12 @@ def comparison_sections(runs: Sequence[RunFolder], names: Sequence[str]) -> list
     first, others = numbers(results, names, main)
     about = "Every run has one colour; points and lines are those of its own page."
     return [
+        Section(
+            "Main numbers",
+            [first],
+            texts=["A number without a unit is a ratio or a count."],
+            kind="grid",
+        ),
         Section("Runs", [_runs_table(runs, names)]),
         Section(
             "In what the scenes differ",
@@ -80,17 +86,11 @@ def comparison_sections(runs: Sequence[RunFolder], names: Sequence[str]) -> list
             texts=[] if differ else ["In nothing."],
             kind="grid",
         ),
-        Section(
-            "Main numbers",
-            [first],
-            texts=["A number without a unit is a ratio or a count."],
-            kind="grid",
-        ),
         Section("Figures", panels=make_panels(charts, {}), texts=[about]),
         Section("Cost", [_costs([run.summary["cost"] for run in runs], names)], kind="grid"),
-        Section("All other numbers", [others], folded=True, kind="grid"),
+        Section("All other numbers", [others], kind="grid"),
         *(
-            Section(f"Scene file of {name}", file=run.scene, folded=True)
+            Section(f"Scene file of {name}", file=run.scene)
             for name, run in zip(names, runs, strict=True)
         ),
     ]

@@ -46,6 +46,8 @@ _HEADINGS = {
     "modes_glued": "Mode shapes, damper glued",
     "dimensions": "Geometry and its dimensions",
 }
+#: figures beside the first tables
+_OPENED = 2
 #: a picture wider than this has drawings side by side
 _SHEET_PIXELS = 1300
 
@@ -139,7 +141,8 @@ def page_text(
     footer: str = "",
     surfaces: Sequence[Surface] = (),
 ) -> str:
-    """The page as HTML: figures first, and as much of the surfaces as the limit leaves room for.
+    """The page as HTML, and as much of the surfaces as the limit leaves room for. Where its first
+    section has tables, it opens on them beside the first figures, and all else but notes is folded.
     Sections without content are omitted.
     """
     found = [
@@ -148,6 +151,11 @@ def page_text(
         if not section.is_empty
     ]
     panels = [panel for section in found for panel in section.panels]
+    if found and found[0].tables:
+        shown = panels[:_OPENED]
+        first = found[0]._replace(panels=shown, opening=True)
+        found = [first, *(_folded(s, shown) for s in found[1:])]
+        found = [section for section in found if not section.is_empty]
     script, charts = _packed_plotly(), _data(panels)
     used = (
         len(script.encode())
@@ -155,7 +163,7 @@ def page_text(
         + sum(len(p.image) for p in panels)
         + _MARGIN_BYTES
     )
-    shown, left_out = fitting(surfaces, LIMIT_BYTES - used)
+    bodies, left_out = fitting(surfaces, LIMIT_BYTES - used)
     return rendered(
         "page.html.j2",
         title=title,
@@ -164,14 +172,22 @@ def page_text(
         sections=found,
         footer=footer,
         most_notes=MOST_NOTES,
-        surfaces=shown,
+        surfaces=bodies,
         surfaces_left_out=left_out,
-        surface_image=_picture(shown[0]) if shown else "",
+        surface_image=_picture(bodies[0]) if bodies else "",
         style=(_PARTS / "page.css").read_text("utf-8"),
         plotly=script,
         script=(_PARTS / "page.js").read_text("utf-8"),
-        page_data=_packed(_json({"panels": charts, "surfaces": [packed(s) for s in shown]})),
+        page_data=_packed(_json({"panels": charts, "surfaces": [packed(s) for s in bodies]})),
     )
+
+
+def _folded(section: Section, shown: Sequence[Panel]) -> Section:
+    """A section, or each of its figures, that opens when asked; without figures shown before."""
+    panels = [panel for panel in section.panels if panel not in shown]
+    each = bool(panels or section.surfaces)
+    folded = not (each or section.notes)
+    return section._replace(panels=panels, folded=folded, each_folded=each or section.each_folded)
 
 
 def _picture(surface: Surface) -> str:

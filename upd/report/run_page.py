@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from upd.analyses import analysis_named
 from upd.plot.surface import Surface, read_surface
 from upd.report.folder import RunFolder, read_run
 from upd.report.page import Section, Verdict, make_panels, page_text, versions_text, write_page
@@ -28,8 +27,6 @@ from upd.results.answer_table import AnswerTable
 
 log = logging.getLogger("upd.report")
 
-#: figures beside the tables of an answer; the others are folded
-_OPENED = 2
 #: records of the solvers, whose faults are among the checks, and of all modules of this package
 _SOLVER, _OURS = "upd.hbm", "upd."
 #: entries of a scene that its page begins with, in this order: words -> path
@@ -70,15 +67,10 @@ def write_run_report(folder: Path) -> Path:
 
 
 def run_sections(run: RunFolder, surfaces: Sequence[Surface]) -> list[Section]:
-    """The page of one run: where its analysis gives tables of an answer, it opens on them and all
-    else is folded.
-    """
+    """The page of one run."""
     summary, entries = run.summary, run.summary["results"]
     size, cost = summary["size"], summary["cost"]
-    analysis = analysis_named(str(size.get("analysis", "")))
-    own = bool(analysis and analysis.answer and analysis.answer(entries))
     panels = make_panels(run_charts(run.arrays, summary), run.figures)
-    opened = _OPENED if own else 0
     tables = answer_tables(size, entries)
     known = any(entry.get("estimated_error") is not None for entry in entries)
     about = [
@@ -88,39 +80,33 @@ def run_sections(run: RunFolder, surfaces: Sequence[Surface]) -> list[Section]:
         else 'No errors were estimated: leave accuracy = "unknown" out to see them.',
         "A number without a unit is a ratio or a count.",
     ]
-    nothing = Section("Main numbers", texts=["The run left no numbers."])
-    first = Section("Main numbers", tables, panels=panels[:opened], texts=about, opening=own)
     figures = Section(
-        "More figures" if own else "Figures",
-        panels=panels[opened:],
+        "Figures",
+        panels=panels,
         texts=[] if panels or surfaces else ["The run left no figures."],
         surfaces=bool(surfaces),
-        each_folded=own,
     )
     total = f"{cost['total_s']:.1f} s in all, {cost['peak_rss_mb']:.0f} MB of memory at most."
     return [
-        first if tables else nothing,
+        Section("Main numbers", tables, texts=about if tables else ["The run left no numbers."]),
         Section("Warnings", notes=page_warnings(run)),
         figures,
-        Section("Error budget", [budget_table(main_numbers(size, entries))], folded=own),
+        Section("Error budget", [budget_table(main_numbers(size, entries))]),
         Section(
             "What was simulated, what was left out",
             [effects_table(summary["effects"]), checks_table(summary["checks"])],
-            folded=own,
         ),
         Section(
             "Cost and mesh",
             [stage_table(cost.get("stages", {})), *_mesh_tables(surfaces)],
             texts=[total],
             kind="grid",
-            folded=own,
         ),
-        Section("All numbers", all_numbers(entries), folded=own, each_folded=True, kind="grid"),
+        Section("All numbers", all_numbers(entries), each_folded=True, kind="grid"),
         Section(
             "Scene file",
-            texts=[lead(summary)] * own + ["Save as scene.toml and run upd run scene.toml."],
+            texts=[lead(summary), "Save as scene.toml and run upd run scene.toml."],
             file=run.scene,
-            folded=own,
         ),
     ]
 

@@ -422,9 +422,9 @@ def write_study_report(
     text = " ".join([*([f"{failed} point{'s' * (failed != 1)} failed."] if failed else []), *notes])
     verdict = Verdict(*("warning", "Done in part") if failed else ("passed", "Done"), text)
     panels = make_panels(charts, {path.stem: path for path in figures})
-    found = [_table(one) for one in tables]
-    sections = [Section(one.heading, [one], kind="tall") for one in found]
-    sections.insert(1, Section("Figures", panels=panels))
+    sections = [Section("Figures", panels=panels)]
+    for one in map(_table, tables):
+        sections.append(Section(one.heading, [one], kind="tall", folded=len(sections) > 1))
     return write_page(folder / "report.html", page_text(title, sections, verdict=verdict))
 
 

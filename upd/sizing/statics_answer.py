@@ -115,7 +115,8 @@ class DamperDesign(FigureAnswer):
 
 
 def _does(problems: Sequence[str]) -> str:
-    return ", ".join(problems) or "both faces carry in every motion"
+    named = (f"the {'' if 'face' in one else 'damper '}{one}" for one in problems)
+    return ", ".join(named) or "both faces carry in every motion"
 
 
 def _number(value: float, infinite: str, digits: str = ".5g") -> str:

@@ -38,6 +38,8 @@ class StudyReport:
         For study.json and the figures.
     charts
         Makes the figures from the curves as study.json holds them.
+    details
+        Further tables, of study.md and the page.
     """
 
     tables: tuple[TextTable, ...]
@@ -45,6 +47,7 @@ class StudyReport:
     notes: tuple[str, ...] = ()
     curves: tuple[ConvergenceCurve, ...] = ()
     charts: Callable[[Sequence[Mapping[str, Any]]], list[Chart]] = work_precision_charts
+    details: tuple[TextTable, ...] = ()
 
 
 #: scene, solved points, names of the numbers to follow -> the report
@@ -75,8 +78,9 @@ def finest_report(
 def _convergence(
     solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve], *before: TextTable
 ) -> StudyReport:
-    tables = (*before, *convergence_tables(solved, curves))
-    return StudyReport(tables, bool(curves), tuple(enough(curves)), tuple(curves))
+    levels, errors = convergence_tables(solved, curves)
+    notes = enough(curves)
+    return StudyReport((*before, levels), bool(curves), notes, tuple(curves), details=(errors,))
 
 
 def accuracy_report(

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -44,20 +43,6 @@ def make_table(
     return TextTable(title, heads, "".join(letters), made, spare)
 
 
-def cost_columns(digits: int = 2) -> tuple[TableColumn, ...]:
-    """What a solved point costs, and why it failed."""
-
-    def seconds(one: SolvedPoint) -> str:
-        return f"{one.outcome.seconds:.{digits}f}"
-
-    return (
-        ("dofs", "r", lambda one: f"{one.outcome.n_dof}"),
-        ("seconds", "r", seconds),
-        ("peak MB", "r", lambda one: f"{one.outcome.memory_mb:.0f}"),
-        ("note", "l", lambda one: str(one.outcome.failure)),
-    )
-
-
 def markdown_table(table: TextTable) -> list[str]:
     """Lines of a table in Markdown, its columns as wide as their widest cell."""
     rows = [tuple(head.replace("\n", " ") for head in table.columns), *table.rows]
@@ -71,34 +56,50 @@ def markdown_table(table: TextTable) -> list[str]:
 #: numbers beside the cost of a level, and errors for which one is sought
 _MAIN, _WANTED = 3, (0.01, 0.001)
 
+#: of a solved point: its place, its cost, and why it failed
 _POINTS: tuple[TableColumn, ...] = (
     ("curve", "l", lambda one: str(one.point.source)),
     ("level", "l", lambda one: str(one.point.label)),
-    *cost_columns(),
+    ("seconds", "r", lambda one: f"{one.outcome.seconds:.2f}"),
+    ("dofs", "r", lambda one: f"{one.outcome.n_dof}"),
+    ("peak MB", "r", lambda one: f"{one.outcome.memory_mb:.0f}"),
+    ("note", "l", lambda one: str(one.outcome.failure)),
 )
 
 
-def points_table(solved: Sequence[SolvedPoint], keys: Sequence[Key] = ()) -> TextTable:
-    """The points, what they have of the numbers `keys`, and what they cost."""
+def points_table(
+    solved: Sequence[SolvedPoint],
+    keys: Sequence[Key] = (),
+    errors: Mapping[tuple[str, str], float] | None = None,
+) -> TextTable:
+    """The points, what they have of the numbers `keys`, and what they cost.
+
+    Parameters
+    ----------
+    errors
+        Curve and level -> error of the first number there.
+    """
 
     def text(key: Key, one: SolvedPoint) -> str:
         return f"{one.values[key]:.5g}" if key in one.values else ""
 
+    def difference(one: SolvedPoint) -> str:
+        return percent((errors or {}).get((one.point.source, one.point.label)))
+
     numbers: list[TableColumn] = [
         (_head(name, case.label), "r", partial(text, (name, case))) for name, case in keys
     ]
+    more = [("difference", "r", difference)] if errors else []
     # what a narrow terminal leaves out first stands last
-    curve, level, dofs, seconds, memory, note = _POINTS
-    columns = (curve, level, *numbers[:1], seconds, *numbers[1:], dofs, memory, note)
-    return make_table("Points", columns, solved)
+    columns = (*_POINTS[:2], *numbers[:1], *more, *_POINTS[2:5], *numbers[1:], _POINTS[5])
+    return make_table("Levels", columns, solved)
 
 
 def _head(name: str, case: str) -> str:
     """Label of a number, its case and unit, one below the other."""
     unit = quantity_of(name)[0].unit
-    return "\n".join(
-        filter(None, (number_label(name), case, f"[{unit_label(unit)}]" if unit else ""))
-    )
+    parts = number_label(name), case, f"[{unit_label(unit)}]" if unit else ""
+    return "\n".join(filter(None, parts))
 
 
 def convergence_tables(
@@ -107,11 +108,10 @@ def convergence_tables(
     """The points with their main numbers and cost, then the curves: the error of every followed
     number on its finest level, its rate, the error estimated there, and those of the other levels.
     """
-    main = dict.fromkeys(c.name for c in curves)
     last = {c.name: c.case for c in curves}
     keys = [
-        next(k for one in solved for k in one.values if k[0] == name and k[1].label == last[name])
-        for name in list(main)[:_MAIN]
+        next(k for one in solved for k in one.values if (k[0], k[1].label) == main)
+        for main in list(last.items())[:_MAIN]
     ]
     errors = make_table(
         "Error",
@@ -120,10 +120,8 @@ def convergence_tables(
             ("case", "l", lambda c: str(c.case)),
             ("curve", "l", lambda c: str(c.curve)),
             ("finest", "r", lambda c: percent(c.error[-1])),
-            ("order", "r", lambda c: _rate_text(c.order)),
+            ("order", "r", lambda c: f"{c.order:.1f}" if np.isfinite(c.order) else ""),
             ("estimated", "r", _estimated),
-            # what a narrow terminal leaves out first stands last
-            ("coarsest", "r", lambda c: percent(c.error[0])),
             ("thesis", "r", lambda c: percent(c.thesis_error)),
             ("against", "l", lambda c: str(c.against)),
             ("verdict", "l", lambda c: str(c.verdict)),
@@ -132,33 +130,50 @@ def convergence_tables(
         curves,
         spare=("against", "verdict", "error on each level"),
     )
-    return points_table(solved, keys), errors
+    at = {
+        (c.curve, label): error
+        for c in _main(curves)
+        for label, error in zip(c.labels, c.error, strict=True)
+    }
+    return points_table(solved, keys, at), errors
 
 
-def enough(curves: Sequence[ConvergenceCurve]) -> list[str]:
-    """The cheapest levels with which the first number stays within 1 % and 0.1 %, in a sentence.
+def _main(curves: Sequence[ConvergenceCurve]) -> list[ConvergenceCurve]:
+    """Of the first number, in its last case."""
+    mine = [c for c in curves if c.name == curves[0].name]
+    return [c for c in mine if c.case == mine[-1].case]
+
+
+def enough(curves: Sequence[ConvergenceCurve]) -> tuple[str, ...]:
+    """The cheapest levels of all curves with which the first number stays within 1 % and 0.1 %, and
+    its order of convergence.
 
     A level within the limit by chance, before finer ones beyond it, is not enough.
     """
     if not curves:
-        return []
-    last = [c for c in curves if c.name == curves[0].name][-1]
-    size, at = np.abs(last.error), {}
+        return ()
+    mine, at = _main(curves), dict[str, float]()
     for limit in _WANTED:
-        at[len(size) - int(np.argmin(np.append(size[::-1] <= limit, False)))] = limit
-    found = [
-        f"{last.labels[k]} is enough for {100 * limit:g} %: {100 * size[k]:.2g} % in "
-        f"{last.seconds[k]:.2g} s"
-        for k, limit in at.items()
-        if k < len(size)
-    ]
-    if not found:
-        found = [
-            f"no level stays within {100 * _WANTED[0]:g} %, the finest has {100 * size[-1]:.2g} %"
+        levels = [
+            (c.seconds[k], f"{c.curve} " * (len(mine) > 1) + c.labels[k], c.error[k])
+            for c in mine
+            if (k := _first_within(c, limit)) < len(c.error)
         ]
-    what = f"{number_label(last.name)} {last.case}".strip()
-    what = what[:1].upper() + what[1:]
-    return [f"{what} against {last.against}: {'; '.join(found)}."]
+        for seconds, level, error in sorted(levels)[:1]:
+            at[f"{level} is enough for {{}}: {100 * abs(error):.2g} % in {seconds:.2g} s"] = limit
+    found = [text.format(f"{100 * limit:g} %") for text, limit in at.items()]
+    least = min(abs(c.error[-1]) for c in mine)
+    none = f"no level stays within 1 %, the finest has {100 * least:.2g} %"
+    what = f"{number_label(mine[0].name)} {mine[0].case}".strip()
+    orders = [f"{c.curve} {c.order:.1f}" for c in mine if np.isfinite(c.order)]
+    text = f"{what} against {mine[0].against}: {'; '.join(found) or none}. Order of convergence: "
+    return (f"{text[:1].upper()}{text[1:]}{', '.join(orders) or 'none is clear'}.",)
+
+
+def _first_within(curve: ConvergenceCurve, limit: float) -> int:
+    """The first level from which on all stay within the limit; their number where none does."""
+    within = np.abs(curve.error[::-1]) <= limit
+    return len(within) - int(np.argmin(np.append(within, False)))
 
 
 def level_table(
@@ -180,22 +195,8 @@ def level_table(
     )
 
 
-def _rate_text(order: float) -> str:
-    """The fitted order, empty where there is none."""
-    return f"{order:.1f}" if np.isfinite(order) else ""
-
-
 def _levels_text(c: ConvergenceCurve) -> str:
-    return ", ".join(
-        f"{label}: {percent(e)}" for label, e in zip(_short(c.labels), c.error, strict=True)
-    )
-
-
-def _short(labels: Sequence[str]) -> list[str]:
-    """The first number of every level's label, where it differs on every level; else the labels."""
-    numbers = [re.findall(r"(?<!\S)\d[\d.]*(?!\S)", label)[:1] for label in labels]
-    firsts = [found[0] for found in numbers if found]
-    return firsts if len(set(firsts)) == len(labels) else list(labels)
+    return ", ".join(f"{label}: {percent(e)}" for label, e in zip(c.labels, c.error, strict=True))
 
 
 def _estimated(curve: ConvergenceCurve) -> str:

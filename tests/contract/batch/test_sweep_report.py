@@ -137,7 +137,7 @@ def test_page_tells_grid_verdict_reason_table_cost_versions_scene(folder: Path, 
     assert data["text"] in text
     for package, version in data["versions"].items():
         assert f"{package} {version}" in text
-    assert _Page(html[html.index('class="grid"') : html.index("<h2>Cost")]).elements["tr"] == 4
+    assert _Page(html[html.index("<h2>Table") : html.index("<h2>Cost")]).elements["tr"] == 4
 
 
 def test_hover_curves_are_the_numbers_of_the_table(folder: Path, html: str) -> None:
@@ -184,10 +184,10 @@ def test_long_table_is_cut_and_says_so(tmp_path: Path) -> None:
     text = write_report(_made(tmp_path / "long", {"a.b": list(range(MOST_ROWS + 7))})).read_text(
         "utf-8"
     )
-    page = _Page(text[text.index('class="grid"') : text.index("<h2>Cost")])
+    page = _Page(text[text.index("<h2>Table") : text.index("<h2>Cost")])
     assert page.elements["tr"] == MOST_ROWS + 1
     assert f"The first {MOST_ROWS} of {MOST_ROWS + 7} points" in page.text
-    assert "tall" in text[text.index("<h2>Table") : text.index('class="grid"')]
+    assert "tall" in text[text.index("<h2>Table") : text.index("<h2>Cost")]
 
 
 def test_two_parameters_give_one_curve_per_value_of_the_shorter(tmp_path: Path) -> None:
@@ -380,7 +380,7 @@ def test_a_number_without_a_value_at_any_point_has_no_column(tmp_path: Path) -> 
         point["values"].append(None)
     (folder / "sweep.json").write_text(json.dumps(data))
     html = write_report(folder).read_text("utf-8")
-    head = html[html.index('class="grid"') :].partition("</thead>")[0]
+    head = html[html.index("<h2>Table") :].partition("</thead>")[0]
     assert "approach" in head and "maximum pressure" not in head
     assert "reason or warnings" not in head, "no point failed or warned"
     assert "Without a value at every point: maximum pressure." in html

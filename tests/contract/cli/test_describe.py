@@ -94,3 +94,8 @@ def test_a_new_scene_is_the_old_one_with_every_key_explained(
     assert "name it mine.toml" in capsys.readouterr().err
     assert call("new", "hertz", "no/folder.toml") in (0, 2)
     assert call("new", "hertz", "what is this.toml") == 2
+    assert call("new", "own_damper.py", "wedge.toml") == 2
+    assert "name it wedge.py" in capsys.readouterr().err
+    for example in ("own_damper.toml", "own_damper.py"):
+        assert call("new", example, example) == 0
+    assert load_scene("own_damper.toml").recipe == str(tmp_path / "own_damper.py")

@@ -318,7 +318,7 @@ ROOM_LINES = {
     "cache": 472,
     "dynamics": 363,
     "scenes": 212,
-    "manual": 203,
+    "manual": 113,
 }
 #: totals of upd/; pages of the manual's gallery are no modules
 MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 50693, 345, 3859, 484
@@ -345,6 +345,9 @@ def test_rooms_stay_within_their_sizes() -> None:
     sizes: dict[str, int] = defaultdict(int)
     for path in modules("upd"):
         parts = path.relative_to(ROOT / "upd").parts
+        # pages of the manual's gallery are text
+        if "gallery" in parts:
+            continue
         sizes[parts[0] if len(parts) > 1 else "root"] += code_lines(path)
     none_of(
         f"upd/{room}: {size} lines of code, {ROOM_LINES.get(room, 0)} are allowed"

@@ -963,7 +963,7 @@ def test_levels_are_drawn_from_the_cheapest_on() -> None:
     assert memory.traces[0].x.tolist() == [1.0, 2.0, 3.0]
 
 
-def test_a_study_shows_its_first_numbers_with_first_and_last_case() -> None:
+def test_a_study_shows_its_first_numbers_over_seconds() -> None:
     curves = [
         {
             "curve": "c",
@@ -980,7 +980,7 @@ def test_a_study_shows_its_first_numbers_with_first_and_last_case() -> None:
     ]
     charts = work_precision_charts(curves)
     assert len(charts) == 36
-    assert [c.case for c in charts if c.sheet][::2] == [
-        f"n{k}, F={F} N" for k in range(4) for F in (1, 3)
+    assert [(c.x.name, c.case) for c in charts if c.sheet] == [
+        ("seconds", f"n{k}, F=3 N") for k in range(3)
     ]
-    assert {c.columns for c in charts} == {4}
+    assert {c.columns for c in charts} == {3}

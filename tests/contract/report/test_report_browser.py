@@ -361,6 +361,8 @@ async def _turned(tab: Tab) -> bool:
 
 async def _looked_at(tab: Tab, page: Path, width: int) -> dict[str, Any]:
     await tab.open(page, width)
+    await tab.value(_UNFOLD)
+    await tab.until(_ALL_DRAWN)
     found = {
         "figures": await tab.value(_FIGURES),
         "page_width": await tab.value("document.documentElement.scrollWidth"),

@@ -173,8 +173,8 @@ def test_command_tells_first_and_draws(
     told = capsys.readouterr().out
     first = " ".join(told.partition("\n\n")[0].split())
     assert first == (
-        "asymmetric-response: at mu = 0.6 jams, left face lifts off; both faces always carry "
-        "below mu = 0.5774"
+        "asymmetric-response: at mu = 0.6 the damper jams, the left face lifts off; both faces "
+        "always carry below mu = 0.5774"
     )
     assert "350 N, damper 46.996 g" in told
     folder = tmp_path / "runs" / "design-asymmetric-response"
@@ -215,7 +215,9 @@ def test_folder_that_cannot_be_written(tmp_path: Path) -> None:
 def test_friction_known_within_limits() -> None:
     found = upd.design("asymmetric-response", overrides=["contact.friction=0.6 +- 0.1"])
     assert [mu for mu, _ in found.statics.known_within] == pytest.approx([0.5, 0.7])
-    told = "at 0.5 both faces carry in every motion; at 0.7 jams, left face lifts off"
+    told = (
+        "at 0.5 both faces carry in every motion; at 0.7 the damper jams, the left face lifts off"
+    )
     assert told in " ".join(str(found).split())
     ends = [(b.low, b.high) for c in found.charts for b in c.bands if "known within" in b.label]
     assert ends == [pytest.approx((0.5, 0.7))] * 2

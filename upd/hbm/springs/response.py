@@ -393,7 +393,7 @@ def _answer(b: Balance, curve: Curve) -> FrequencyResponse:
     if worst > TRUNCATION:
         notes.append(
             f"the omitted harmonics ({_omitted(b.harmonics)}) would move the contacts by up to "
-            f"{worst:.1%}: take more"
+            f"{100.0 * worst:.3g} %: take more harmonics"
         )
     if astray:
         at = int(np.argmin(found.periodic))

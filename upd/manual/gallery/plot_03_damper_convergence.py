@@ -3,7 +3,7 @@ Convergence of a damper's contact stiffness
 ===========================================
 
 A flat punch has no closed form on finite bodies, and the pressure at its edges grows with every
-mesh. Its stiffness converges: the study fits the order and the limit.
+mesh. Its stiffness converges, but slowly: the study fits the order and the limit.
 """
 
 import upd
@@ -12,7 +12,7 @@ study = upd.study(
     "symmetric",
     "mesh",
     levels=[4, 6, 8, 12],
-    overrides=['want=["normal"]'],
+    overrides=['want=["normal","stiffness"]'],
     out="runs/study-symmetric",
     workers=0,
 )

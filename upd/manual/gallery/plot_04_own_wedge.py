@@ -15,6 +15,7 @@ scene = {
     "geometry": {"recipe": "wedge_platform", "divisions": 8},
     "materials": {"damper": {"E": "200 GPa", "nu": 0.3}, "platform": {"E": "200 GPa", "nu": 0.3}},
     "loads": {"normal": ["100 N"]},
+    "contact": {"tilt": "free"},
 }
 result = upd.run(scene)
 print(result)

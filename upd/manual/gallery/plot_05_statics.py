@@ -9,3 +9,7 @@ import upd
 
 design = upd.design("symmetric-response")
 print(design)
+
+# %%
+# The same over the angles of the faces and over friction; the star is this damper:
+design.plot()

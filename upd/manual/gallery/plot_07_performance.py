@@ -10,7 +10,7 @@ from pathlib import Path
 import upd
 
 scene = Path(upd.__file__).parent / "scenes" / "examples" / "damped_response.toml"
-more = ['want=["response", "performance"]', "performance.points=6"]
+more = ['want=["response", "performance"]', "performance.points=6", "performance.lowest=10"]
 result = upd.run(scene, overrides=more)
 print(result)
 

@@ -2,9 +2,9 @@
 From measured frequencies to a model
 ====================================
 
-Two contact stiffnesses are fitted to two stuck frequencies that were measured. Heights with
-friction are then predictions of the fitted model; the answer prints what the targets leave open,
-and what to measure next.
+Contact stiffnesses are fitted to two stuck frequencies that were measured. Heights with friction
+are then predictions of the fitted model. The answer prints how well each input is known, and what
+to measure next.
 """
 
 import upd
@@ -17,3 +17,7 @@ found = upd.fit(
     starts=2,
 )
 print(found)
+
+# %%
+# What each input does to the targets, to first order:
+found.plot()
