@@ -16,9 +16,9 @@ from upd.errors import InputError
 from upd.labels import number
 from upd.linalg import select
 from upd.linalg.routes import Route
-from upd.plot.chart import Arrays, Chart, Entry
+from upd.plot.chart import Chart, Entry
 from upd.progress import Stages
-from upd.results import ArrayGroup, Case, Check, Estimates, Result
+from upd.results import Arrays, Case, Check, Estimates, Group, Result
 from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_label
 from upd.scene import AnyScene
@@ -274,7 +274,7 @@ class Analysis:
     solve: Callable[[Any, Stages], Any]
     make_results: Callable[[Any], list[Result]]
     check_solution: Callable[[Any], list[Check]]
-    arrays: Callable[[Any], dict[str, ArrayGroup]]
+    arrays: Callable[[Any], dict[str, Group]]
     sizes: Callable[[Any], dict[str, int]]
     write_files: Callable[[Any, Path], None]
     charts: Callable[[Arrays, Mapping[str, Any]], list[Chart]]

@@ -27,7 +27,7 @@ from upd.errors import InputError, one_line
 from upd.plot.matplotlib import draw_all, write_sheets
 from upd.plot.sample_charts import sample_charts
 from upd.plot.sweep_charts import figure_names, sweep_charts
-from upd.results import write_netcdf
+from upd.results import Group, write_netcdf
 from upd.results.sampled import SampledNumber, sampled_number
 from upd.scene import load_scene
 from upd.vary.outcome import Outcome
@@ -251,7 +251,7 @@ def write_outputs(store: PointStore, result: SweepResult) -> list[Path]:
     earlier = _earlier(folder)
     table, arrays, data = (folder / f"{name}" for name in ("table.csv", "sweep.nc", "sweep.json"))
     write_text(table, csv_text(plan.axes, plan.places, result.outcomes, result.columns))
-    write_netcdf(arrays, {"": _arrays(result)})
+    write_netcdf(arrays, {"": Group(_arrays(result))})
     write_text(data, json_text(_summary(store, result)))
     _remove_figures(folder, earlier)
     if plan.sample is None:

@@ -23,33 +23,6 @@ Entry = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Variable:
-    """A variable of result.nc.
-
-    Data with the names of its dimensions, its unit ("" when it has none) and its other attributes.
-    """
-
-    data: NDArray[Any]
-    dims: tuple[str, ...]
-    units: str
-    attributes: Mapping[str, Any]
-
-
-class Group(dict[str, Variable]):
-    """Variables of one group of result.nc by name, and the group's own attributes.
-
-    What it holds (``content``) and of which case.
-    """
-
-    def __init__(self, attributes: Mapping[str, Any] | None = None) -> None:
-        super().__init__()
-        self.attributes: dict[str, Any] = dict(attributes or {})
-
-
-Arrays = Mapping[str, Group]
-
-
-@dataclass(frozen=True)
 class Axis:
     """What an axis shows.
 

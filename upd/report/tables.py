@@ -23,8 +23,8 @@ from upd.labels import (
     shown,
     unit_label,
 )
-from upd.plot.chart import Arrays, Axis, Bars, Chart, Entry
-from upd.results import read_part, worst_check, worst_checks
+from upd.plot.chart import Axis, Bars, Chart, Entry
+from upd.results import Arrays, read_part, worst_check, worst_checks
 from upd.results.answer_table import AnswerTable
 from upd.results.quantities import CLOSED_FORM_ERROR, number_label, number_title
 from upd.results.sampled import SampledNumber

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.plot.chart import Array, Arrays, Axis, Band, Bars, Chart, Group, Map, Scatter, Style, Trace
+from upd.plot.chart import Array, Axis, Band, Bars, Chart, Map, Scatter, Style, Trace
 from upd.plot.common import UM, case_of, circle, cut, pressure_map, scalar, state_map, with_content
-from upd.results import Case
+from upd.results import Arrays, Case, Group
 
 #: axes and size of flat faces
 FACE: dict[str, Any] = {
