@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from upd.errors import InputError
-from upd.plot.chart import Chart
-from upd.plot.work_precision import work_precision_charts
 from upd.vary.curves import (
     ConvergenceCurve,
     accuracy_curves,
@@ -36,15 +34,12 @@ class StudyReport:
         Sentences below the tables.
     curves
         For study.json and the figures.
-    charts
-        Makes the figures from the curves as study.json holds them.
     """
 
     tables: tuple[TextTable, ...]
     found: bool
     notes: tuple[str, ...] = ()
     curves: tuple[ConvergenceCurve, ...] = ()
-    charts: Callable[[Sequence[Mapping[str, Any]]], list[Chart]] = work_precision_charts
 
 
 #: scene, solved points, names of the numbers to follow -> the report

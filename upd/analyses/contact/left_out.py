@@ -46,10 +46,8 @@ _COUPLED = (
     "K_Ty_initial_raw",
     "contact_area",
     "stick_area",
-    "K_T_secant_raw",
-    "cycle_energy",
 )
-_WITHOUT_STIFFNESS = ("approach",)
+_WITHOUT_STIFFNESS = ("approach", "K_T_secant_raw", "cycle_energy")
 #: of a damper that tips over when its tilt is free
 _TIPS = (
     "the load line runs beside the contact, so that a damper free to tilt tips over: give a "
@@ -193,7 +191,7 @@ def _coupled_changes(
     scene: Scene, uncoupled: Iterable[Result], solve: Callable[[], Iterable[Result]]
 ) -> Iterator[Resolved]:
     """What normal and tangential contact at once change of the stiffnesses and of the areas in
-    contact and in stick; of the approach where no stiffness is asked for.
+    contact and in stick; of the approach, the secant and the loss where no stiffness is asked for.
 
     Parameters
     ----------
