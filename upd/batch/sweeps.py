@@ -4,11 +4,10 @@ and figures.
 
 from __future__ import annotations
 
-import json
 import logging
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from hashlib import sha256
 from pathlib import Path
@@ -26,7 +25,7 @@ from upd.cache.sources import versions
 from upd.errors import InputError, one_line
 from upd.plot.matplotlib import draw_all, write_sheets
 from upd.plot.sample_charts import sample_charts
-from upd.plot.sweep_charts import figure_names, sweep_charts
+from upd.plot.sweep_charts import FIGURES, sweep_charts
 from upd.results import Group, write_netcdf
 from upd.results.sampled import SampledNumber, sampled_number
 from upd.scene import load_scene
@@ -248,12 +247,11 @@ def write_outputs(store: PointStore, result: SweepResult) -> list[Path]:
     Raises OSError when the disk does not take it.
     """
     folder, plan = store.folder, result.plan
-    earlier = _earlier(folder)
     table, arrays, data = (folder / f"{name}" for name in ("table.csv", "sweep.nc", "sweep.json"))
     write_text(table, csv_text(plan.axes, plan.places, result.outcomes, result.columns))
     write_netcdf(arrays, {"": Group(_arrays(result))})
     write_text(data, json_text(_summary(store, result)))
-    _remove_figures(folder, earlier)
+    _remove_figures(folder)
     if plan.sample is None:
         return [table, arrays, data]
     compared = folder / "sample.csv"
@@ -272,26 +270,17 @@ def draw(
 
     Returns their paths.
     """
-    _remove_figures(folder, ((column.name, column.case) for column in columns))
+    _remove_figures(folder)
     if sampled:
         values = [column.values for column in columns]
         return write_sheets(sample_charts(sampled, values), folder)
     return write_sheets(sweep_charts(axes, columns), folder)
 
 
-def _remove_figures(folder: Path, followed: Iterable[tuple[str, str]]) -> None:
-    """Remove the figures a sweep of these numbers has; other pictures there are the user's."""
-    for name in figure_names(followed):
+def _remove_figures(folder: Path) -> None:
+    """Remove the figures of a sweep; other pictures there are the user's."""
+    for name in FIGURES:
         (folder / f"{name}.png").unlink(missing_ok=True)
-
-
-def _earlier(folder: Path) -> list[tuple[str, str]]:
-    """Name and case of the numbers that an earlier call followed."""
-    try:
-        followed = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))["followed"]
-        return [(str(one["name"]), str(one["case"])) for one in followed]
-    except (OSError, ValueError, TypeError, KeyError):
-        return []
 
 
 def dimension(axis: GridAxis, axes: Sequence[GridAxis]) -> str:

@@ -8,7 +8,8 @@ import numpy as np
 
 from upd.labels import unit_label
 from upd.plot.chart import Area, Array, Axis, Band, Chart, Trace
-from upd.plot.sweep_charts import MOST_PANELS, SAMPLE_FIGURE
+from upd.plot.matplotlib import MOST_PANELS
+from upd.plot.sweep_charts import SAMPLE_FIGURE
 from upd.results.quantities import number_label
 from upd.results.sampled import SampledNumber
 

@@ -17,7 +17,7 @@ import numpy as np
 from upd.labels import number, unit_label
 from upd.plot.chart import Array, Chart
 from upd.plot.sample_charts import sample_charts
-from upd.plot.sweep_charts import Followed, figure_names, sheet_name, sweep_charts
+from upd.plot.sweep_charts import FIGURES, Followed, sweep_charts
 from upd.report.folder import damaged_file, is_png, read_json
 from upd.report.page import (
     Panel,
@@ -175,8 +175,7 @@ def read_sweep(folder: Path) -> SweepFolder:
         raise damaged_file(path, damaged, "sweep")
     parameters = tuple(_parameter(axis) for axis in data["axes"])
     table = np.array([point["values"] for point in data["points"]], float).reshape(n, m)
-    names = figure_names((one["name"], one["case"]) for one in data["followed"])
-    files = {name: folder / f"{name}.png" for name in sorted(names)}
+    files = {name: folder / f"{name}.png" for name in FIGURES}
     figures = {name: file for name, file in files.items() if is_png(file)}
     return SweepFolder(folder, data, parameters, table, figures)
 
@@ -283,9 +282,8 @@ def sweep_panels(sweep: SweepFolder) -> list[Panel]:
     numbers = followed(sweep)
     varied = [p.short for p in sweep.parameters if len(p.values) > 1]
     over = f"Followed numbers over {' and '.join(varied)}"
-    headings = {sheet_name(n.name, n.case): number_title(n.name, n.case) for n in numbers}
     panels = make_panels(sweep_charts(sweep.parameters, numbers), sweep.figures)
-    return [replace(panel, heading=headings.get(panel.name, over)) for panel in panels]
+    return [replace(panel, heading=over) for panel in panels]
 
 
 def followed(sweep: SweepFolder) -> list[Followed]:
