@@ -6,12 +6,14 @@ Its plan (effects, size, cost), its solution, its numbers, checks, arrays, chart
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from upd.analyses.cost import NODES
+from upd.cache.sources import key_of
 from upd.errors import InputError
 from upd.labels import number
 from upd.linalg import select
@@ -135,6 +137,16 @@ def conditions(case: Case, remedy: str, *rows: tuple[str, float, float, str]) ->
     ]
 
 
+@contextmanager
+def keeping(solution: object) -> Iterator[None]:
+    """What converged so far is the ``partial`` of an error."""
+    try:
+        yield
+    except BaseException as error:
+        error.partial = solution  # type: ignore[attr-defined]
+        raise
+
+
 S = TypeVar("S", bound=AnyScene)
 
 
@@ -214,6 +226,15 @@ class Needs:
     mesh: str
     condensations: frozenset[str] = frozenset()
     factors: bool = False
+
+
+def rig_needs(choice: str, plan: Plan[Any], threads: int) -> Needs:
+    """What a point of a sweep of rigs needs, and may share; its model has a choice of the scene."""
+    del threads
+    scene = plan.scene
+    mesh = {"recipe": scene.recipe, "parameters": dict(plan.parameters)}
+    model = {"mesh": scene.mesh, "material": scene.material, choice: getattr(scene, choice)}
+    return Needs(key_of(mesh | model), key_of(mesh))
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.base import Resolved
+from upd.analyses.base import Resolved, keeping
 from upd.analyses.contact import plan as planned
 from upd.analyses.contact.bodies import prepare
 from upd.analyses.contact.loading import LOAD_STEP, slope_loads
@@ -66,20 +66,19 @@ def solve(wanted: Wanted, plan: ContactPlan, stages: Stages) -> ContactSolution:
     cases = [one for one in solution.normal if one.force]
     if not shown:
         return solution
-    try:
-        with stages("effects left out", "the tilt; the others on a coarser whole model"):
-            if planned.TILT in shown:
-                solution.left_out += [_tilted(solution, case) for case in cases]
-            if companion is not None:
-                try:
-                    model = prepare(companion, Stages(), "companion")
-                    with few_threads(model.gap):
-                        solution.left_out += list(_on_companion(solution, model))
-                except UpdError:
-                    solution.left_out += _not_solved(solution.plan, [one.case for one in cases])
-    except BaseException as error:
-        error.partial = solution  # type: ignore[attr-defined]
-        raise
+    with (
+        keeping(solution),
+        stages("effects left out", "the tilt; the others on a coarser whole model"),
+    ):
+        if planned.TILT in shown:
+            solution.left_out += [_tilted(solution, case) for case in cases]
+        if companion is not None:
+            try:
+                model = prepare(companion, Stages(), "companion")
+                with few_threads(model.gap):
+                    solution.left_out += list(_on_companion(solution, model))
+            except UpdError:
+                solution.left_out += _not_solved(solution.plan, [one.case for one in cases])
     return solution
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from upd.analyses.base import keeping
 from upd.analyses.contact import loading
 from upd.analyses.contact import plan as planned
 from upd.analyses.contact.bodies import learns, prepare, show_normal, solve_inside
@@ -68,16 +69,13 @@ def solve_plan(
         Whether it is one: its march to the tangential loads takes few steps.
     """
     solution = ContactSolution(plan, prepare(plan, stages) if model is None else model)
-    try:
+    with keeping(solution):
         solve_normal(solution, stages)
         if plan.effect("friction"):
             solve_tangential(solution, stages, companion=companion)
         if plan.effect("internal displacement"):
             with stages("internal displacement", "back-substitution"):
                 solve_inside(solution)
-    except BaseException as error:
-        error.partial = solution  # type: ignore[attr-defined]
-        raise
     return solution
 
 
