@@ -184,8 +184,7 @@ def test_cases_are_data_and_come_back_from_the_file(weak: RunResult) -> None:
 def test_charts_need_no_more_than_the_file(weak: RunResult) -> None:
     assert weak.folder is not None
     again = forced.ANALYSIS.charts(read_netcdf(weak.folder / "result.nc"), {})
-    # the error budget is that of every run's numbers
-    mine = [c for c in charts(weak) if c.figure != "error_budget"]
+    mine = charts(weak)
     assert [(c.title, c.case) for c in mine] == [(c.title, c.case) for c in again]
     assert list(dict.fromkeys(c.title for c in again)) == [
         "Frequency response",

@@ -130,27 +130,6 @@ class Area:
 
 
 @dataclass(frozen=True)
-class Bars:
-    """Horizontal bars, one per case, of parts that lie behind each other.
-
-    ``parts`` label -> values (n_case,), ``texts`` likewise.
-
-    Attributes
-    ----------
-    above
-        The cases stand above their bars: long words.
-    hatched
-        Labels of parts of another kind than the others.
-    """
-
-    cases: tuple[str, ...]
-    parts: Mapping[str, Array]
-    texts: Mapping[str, tuple[str, ...]]
-    above: bool = False
-    hatched: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
 class Pies:
     """A pie at each point ``x``, ``y`` (n,): ``shares`` (n, n_state) of ``states``.
 
@@ -250,7 +229,6 @@ class Chart:
     marks: tuple[Mark, ...] = ()
     bands: tuple[Band, ...] = ()
     areas: tuple[Area, ...] = ()
-    bars: tuple[Bars, ...] = ()
     pies: tuple[Pies, ...] = ()
     scatters: tuple[Scatter, ...] = ()
     sheet: bool = True

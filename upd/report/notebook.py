@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from upd.errors import ConvergenceError, InputError, did_you_mean
 from upd.report.answer import AnswerLine, Written, answer
 from upd.report.columns import text_width
-from upd.report.tables import answer_tables, main_numbers, run_charts
+from upd.report.tables import analysis_charts, answer_tables, main_numbers
 from upd.results import FAILED, OK, Case, Check, Result, outcome_of
 
 if TYPE_CHECKING:
@@ -201,7 +201,7 @@ def headline(result: RunResult) -> list[Entry]:
 def charts(result: RunResult) -> list[Chart]:
     """All charts of the run, the most important first."""
     summary = result.summary() | {"scene_file": tomllib.loads(result.scene_text)}
-    return run_charts(result.arrays, summary)
+    return analysis_charts(result.arrays, summary)
 
 
 def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Chart]:

@@ -13,13 +13,13 @@ from upd.report.folder import RunFolder, read_run
 from upd.report.page import Section, Verdict, make_panels, page_text, versions_text, write_page
 from upd.report.tables import (
     all_numbers,
+    analysis_charts,
     answer_tables,
     budget_table,
     checks_table,
     effects_table,
     filled,
     main_numbers,
-    run_charts,
     stage_table,
     warnings,
 )
@@ -77,7 +77,7 @@ def run_sections(run: RunFolder, surfaces: Sequence[Surface]) -> list[Section]:
     size, cost = summary["size"], summary["cost"]
     analysis = analysis_named(str(size.get("analysis", "")))
     own = bool(analysis and analysis.answer and analysis.answer(entries))
-    panels = make_panels(run_charts(run.arrays, summary), run.figures)
+    panels = make_panels(analysis_charts(run.arrays, summary), run.figures)
     opened = _OPENED if own else 0
     tables = answer_tables(size, entries)
     known = any(entry.get("estimated_error") is not None for entry in entries)
