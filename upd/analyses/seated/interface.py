@@ -309,7 +309,9 @@ def make_interface(
     for k, part in enumerate(found):
         on = np.flatnonzero(face == k)
         C[:, on[:, None], :, on[None, :]] += part.transpose(1, 3, 0, 2)
-    own, columns = _damper(plan, bodies, nodes) if like is None else (like.damper, like.columns)
+    own, columns = (
+        damper_compliance(plan, bodies, nodes) if like is None else (like.damper, like.columns)
+    )
     total = C.reshape(3 * n, 3 * n) + own
     position = np.vstack([b.mesh.points[one] for b, one in zip(blades, nodes, strict=True)])
     half = is_half(bodies.damper_mesh)
@@ -353,7 +355,9 @@ def _blade_compliance(blade: Blade, nodes: IntArray, solver: str, held: str) -> 
     return np.asarray(np.einsum("fc,icjd,gd->figj", frame, C.reshape(m, 3, m, 3), frame))
 
 
-def _damper(plan: Plan[Any], bodies: Bodies, nodes: Sequence[IntArray]) -> tuple[Array, Array]:
+def damper_compliance(
+    plan: Plan[Any], bodies: Bodies, nodes: Sequence[IntArray]
+) -> tuple[Array, Array]:
     """Elastic compliance (3 n, 3 n) of the free damper at its nodes, its rigid columns (3 n, r).
 
     G = B P' K^+ P B' with P = 1 - M R (R'M R)^-1 R': contact forces are held by the mass's inertia
