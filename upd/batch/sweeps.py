@@ -24,8 +24,7 @@ from upd.cache.files import json_text, write_text
 from upd.cache.sources import versions
 from upd.errors import InputError, one_line
 from upd.plot.matplotlib import draw_all, write_sheets
-from upd.plot.sample_charts import sample_charts
-from upd.plot.sweep_charts import FIGURES, sweep_charts
+from upd.plot.sweep_charts import FIGURES, sample_charts, sweep_charts
 from upd.results import Group, write_netcdf
 from upd.results.sampled import SampledNumber, sampled_number
 from upd.scene import load_scene

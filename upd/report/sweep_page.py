@@ -16,8 +16,7 @@ import numpy as np
 
 from upd.labels import number, unit_label
 from upd.plot.chart import Array, Chart
-from upd.plot.sample_charts import sample_charts
-from upd.plot.sweep_charts import FIGURES, Followed, sweep_charts
+from upd.plot.sweep_charts import FIGURES, Followed, sample_charts, sweep_charts
 from upd.report.folder import damaged_file, is_png, read_json
 from upd.report.page import (
     Panel,

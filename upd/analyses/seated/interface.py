@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, qr
 
 from upd.analyses.base import Plan
-from upd.analyses.seated.bodies import Blade, Bodies, free_dofs, is_half
-from upd.analyses.seated.lattice import lattice, patch_frame
+from upd.analyses.seated.bodies import Blade, Bodies, free_dofs, is_half, lattice, patch_frame
 from upd.contact import CoupledContact, coupled_contact
 from upd.errors import InputError
 from upd.fem import Material, mass, stiffness
