@@ -75,7 +75,7 @@ class Study:
         table, data = folder / "study.md", folder / "study.json"
         lines = [f"# {self.title}", ""]
         for part in report.tables:
-            lines += [f"## {part.title}", "", *markdown_table(part), ""]
+            lines += [f"## {part.heading}", "", *markdown_table(part), ""]
         write_text(table, "\n".join([*lines, *(f"- {note}" for note in report.notes)]) + "\n")
         if not self.points:
             return [table]

@@ -8,7 +8,7 @@ import logging
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -255,7 +255,7 @@ def write_outputs(store: PointStore, result: SweepResult) -> list[Path]:
         return [table, arrays, data]
     compared = folder / "sample.csv"
     heads = [field.name for field in fields(SampledNumber)]
-    write_text(compared, as_csv([heads, *(one.as_dict().values() for one in result.sampled)]))
+    write_text(compared, as_csv([heads, *(asdict(one).values() for one in result.sampled)]))
     return [compared, table, arrays, data]
 
 
@@ -341,7 +341,7 @@ def _free(name: str, taken: dict[str, Any]) -> str:
 def _summary(store: PointStore, result: SweepResult) -> dict[str, Any]:
     plan, sample = result.plan, result.plan.sample
     why = reasons(result.outcomes, result.columns)
-    numbers = [one.as_dict() for one in result.sampled]
+    numbers = [asdict(one) for one in result.sampled]
     drawn = {} if sample is None else {"sample": sample.as_dict() | {"numbers": numbers}}
     return drawn | {
         "scene": plan.scene.name,

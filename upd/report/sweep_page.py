@@ -31,7 +31,6 @@ from upd.report.tables import SAMPLE_HEADING, filled, sample_table, stage_table,
 from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_title
 from upd.results.sampled import SampledNumber, sample_sentence
-from upd.vary.tables import TextTable
 
 #: values of a parameter written one by one
 _FEW = 8
@@ -396,7 +395,7 @@ def write_study_report(
     title: str,
     failed: int,
     notes: Sequence[str],
-    tables: Iterable[TextTable],
+    tables: Iterable[AnswerTable],
     charts: Iterable[Chart],
     figures: Iterable[Path],
 ) -> Path:
@@ -419,18 +418,18 @@ def write_study_report(
     text = " ".join([*([f"{failed} point{'s' * (failed != 1)} failed."] if failed else []), *notes])
     verdict = Verdict(*("warning", "Done in part") if failed else ("passed", "Done"), text)
     panels = make_panels(charts, {path.stem: path for path in figures})
-    found = [_table(one) for one in tables]
+    found = [_shown(one) for one in tables]
     sections = [Section(one.heading, [one], kind="tall") for one in found]
     sections.insert(1, Section("Figures", panels=panels))
     return write_page(folder / "report.html", page_text(title, sections, verdict=verdict))
 
 
-def _table(table: TextTable) -> AnswerTable:
+def _shown(table: AnswerTable) -> AnswerTable:
     """Its columns but those of many words, which study.md has."""
     cells = list(zip(*table.rows, strict=True)) or [()] * len(table.columns)
     columns = {
-        ("# " if letter == "r" else "") + head.replace("\n", " "): mine
-        for head, letter, mine in zip(table.columns, table.align, cells, strict=True)
+        head.replace("\n", " "): mine
+        for head, mine in zip(table.columns, cells, strict=True)
         if head not in table.spare
     }
-    return filled(table.title, columns)
+    return filled(table.heading, columns)

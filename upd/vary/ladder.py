@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from upd.errors import InputError
+from upd.results.answer_table import AnswerTable
 from upd.vary.curves import (
     ConvergenceCurve,
     accuracy_curves,
@@ -17,7 +18,7 @@ from upd.vary.curves import (
     with_friction,
 )
 from upd.vary.outcome import SolvedPoint, matching
-from upd.vary.tables import TextTable, convergence_tables, enough, level_table, points_table
+from upd.vary.tables import convergence_tables, enough, level_table, points_table
 from upd.vary.variation import Key, Overrides, Variation
 
 #: divisions, refinements, numbers of modes ...: the levels a user asks for; None: the usual ones
@@ -36,7 +37,7 @@ class StudyReport:
         For study.json and the figures.
     """
 
-    tables: tuple[TextTable, ...]
+    tables: tuple[AnswerTable, ...]
     found: bool
     notes: tuple[str, ...] = ()
     curves: tuple[ConvergenceCurve, ...] = ()
@@ -68,7 +69,7 @@ def finest_report(
 
 
 def _convergence(
-    solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve], *before: TextTable
+    solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve], *before: AnswerTable
 ) -> StudyReport:
     tables = (*before, *convergence_tables(solved, curves))
     return StudyReport(tables, bool(curves), tuple(enough(curves)), tuple(curves))

@@ -4,65 +4,36 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from upd.labels import percent, unit_label
+from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_label, quantity_of
 from upd.vary.curves import ConvergenceCurve
 from upd.vary.outcome import SolvedPoint
 from upd.vary.variation import Key
 
-#: head, "l" or "r", and what makes the cell of a row
-TableColumn = tuple[str, str, Callable[[Any], str]]
-
-
-@dataclass(frozen=True)
-class TextTable:
-    """A table for a terminal.
-
-    Cells as text, ``align`` a letter per column ("l", "r"). Columns of words named in ``spare`` are
-    left out first where the terminal is narrow.
-    """
-
-    title: str
-    columns: tuple[str, ...]
-    align: str
-    rows: tuple[tuple[str, ...], ...]
-    spare: tuple[str, ...] = ()
+#: head, with # before that of numbers, and what makes the cell of a row
+TableColumn = tuple[str, Callable[[Any], str]]
 
 
 def make_table(
     title: str, columns: Sequence[TableColumn], rows: Iterable[Any], spare: tuple[str, ...] = ()
-) -> TextTable:
+) -> AnswerTable:
     """A table of rows of any kind."""
-    heads, letters, cells = zip(*columns, strict=True)
+    heads, cells = zip(*columns, strict=True)
     made = tuple(tuple(cell(row) for cell in cells) for row in rows)
-    return TextTable(title, heads, "".join(letters), made, spare)
+    return AnswerTable(title, heads, made, spare=spare)
 
 
-def cost_columns(digits: int = 2) -> tuple[TableColumn, ...]:
-    """What a solved point costs, and why it failed."""
-
-    def seconds(one: SolvedPoint) -> str:
-        return f"{one.outcome.seconds:.{digits}f}"
-
-    return (
-        ("dofs", "r", lambda one: f"{one.outcome.n_dof}"),
-        ("seconds", "r", seconds),
-        ("peak MB", "r", lambda one: f"{one.outcome.memory_mb:.0f}"),
-        ("note", "l", lambda one: str(one.outcome.failure)),
-    )
-
-
-def markdown_table(table: TextTable) -> list[str]:
+def markdown_table(table: AnswerTable) -> list[str]:
     """Lines of a table in Markdown, its columns as wide as their widest cell."""
-    rows = [tuple(head.replace("\n", " ") for head in table.columns), *table.rows]
+    rows = [tuple(head.lstrip("# ").replace("\n", " ") for head in table.columns), *table.rows]
     widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
-    signs = [">" if letter == "r" else "<" for letter in table.align]
+    signs = [">" if head.startswith("#") else "<" for head in table.columns]
     marks = ("-" * (n + 1) + "-:"[sign == ">"] for n, sign in zip(widths, signs, strict=True))
     lines = [f"| {' | '.join(map('{:{}{}}'.format, row, signs, widths))} |" for row in rows]
     return [lines[0], f"|{'|'.join(marks)}|", *lines[1:]]
@@ -72,20 +43,23 @@ def markdown_table(table: TextTable) -> list[str]:
 _MAIN, _WANTED = 3, (0.01, 0.001)
 
 _POINTS: tuple[TableColumn, ...] = (
-    ("curve", "l", lambda one: str(one.point.source)),
-    ("level", "l", lambda one: str(one.point.label)),
-    *cost_columns(),
+    ("curve", lambda one: str(one.point.source)),
+    ("level", lambda one: str(one.point.label)),
+    ("# dofs", lambda one: f"{one.outcome.n_dof}"),
+    ("# seconds", lambda one: f"{one.outcome.seconds:.2f}"),
+    ("# peak MB", lambda one: f"{one.outcome.memory_mb:.0f}"),
+    ("note", lambda one: str(one.outcome.failure)),
 )
 
 
-def points_table(solved: Sequence[SolvedPoint], keys: Sequence[Key] = ()) -> TextTable:
+def points_table(solved: Sequence[SolvedPoint], keys: Sequence[Key] = ()) -> AnswerTable:
     """The points, what they have of the numbers `keys`, and what they cost."""
 
     def text(key: Key, one: SolvedPoint) -> str:
         return f"{one.values[key]:.5g}" if key in one.values else ""
 
     numbers: list[TableColumn] = [
-        (_head(name, case.label), "r", partial(text, (name, case))) for name, case in keys
+        (f"# {_head(name, case.label)}", partial(text, (name, case))) for name, case in keys
     ]
     # what a narrow terminal leaves out first stands last
     curve, level, dofs, seconds, memory, note = _POINTS
@@ -103,7 +77,7 @@ def _head(name: str, case: str) -> str:
 
 def convergence_tables(
     solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve]
-) -> tuple[TextTable, TextTable]:
+) -> tuple[AnswerTable, AnswerTable]:
     """The points with their main numbers and cost, then the curves: the error of every followed
     number on its finest level, its rate, the error estimated there, and those of the other levels.
     """
@@ -116,18 +90,18 @@ def convergence_tables(
     errors = make_table(
         "Error",
         (
-            ("number", "l", lambda c: number_label(c.name)),
-            ("case", "l", lambda c: str(c.case)),
-            ("curve", "l", lambda c: str(c.curve)),
-            ("finest", "r", lambda c: percent(c.error[-1])),
-            ("order", "r", lambda c: _rate_text(c.order)),
-            ("estimated", "r", _estimated),
+            ("number", lambda c: number_label(c.name)),
+            ("case", lambda c: str(c.case)),
+            ("curve", lambda c: str(c.curve)),
+            ("# finest", lambda c: percent(c.error[-1])),
+            ("# order", lambda c: _rate_text(c.order)),
+            ("# estimated", _estimated),
             # what a narrow terminal leaves out first stands last
-            ("coarsest", "r", lambda c: percent(c.error[0])),
-            ("thesis", "r", lambda c: percent(c.thesis_error)),
-            ("against", "l", lambda c: str(c.against)),
-            ("verdict", "l", lambda c: str(c.verdict)),
-            ("error on each level", "l", _levels_text),
+            ("# coarsest", lambda c: percent(c.error[0])),
+            ("# thesis", lambda c: percent(c.thesis_error)),
+            ("against", lambda c: str(c.against)),
+            ("verdict", lambda c: str(c.verdict)),
+            ("error on each level", _levels_text),
         ),
         curves,
         spare=("against", "verdict", "error on each level"),
@@ -166,14 +140,14 @@ def level_table(
     keys: Sequence[Key],
     solved: Sequence[SolvedPoint],
     text: Callable[[SolvedPoint, Key], str],
-) -> TextTable:
+) -> AnswerTable:
     """A row for every number, with what each level has of it."""
-    levels = ((one.point.label, "r", partial(text, one)) for one in solved)
+    levels = ((f"# {one.point.label}", partial(text, one)) for one in solved)
     return make_table(
         title,
         (
-            ("number", "l", lambda key: number_label(key[0])),
-            ("case", "l", lambda key: str(key[1].label)),
+            ("number", lambda key: number_label(key[0])),
+            ("case", lambda key: str(key[1].label)),
             *levels,
         ),
         keys,
