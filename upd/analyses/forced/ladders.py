@@ -217,8 +217,7 @@ _MESHES: Mapping[str, Mapping[int, tuple[int, ...]]] = {
     "symmetric": {4: (10,), 8: (20,), 12: (34,)},
     "asymmetric": {3: (6, 3), 6: (12, 6), 9: (20, 9)},
 }
-#: the levels run unless others are asked for: 60 and 126 nodes, 60 and 95, minutes each where the
-#: finer ones take half an hour to hours
+#: the levels run unless others are asked for: 60 and 126 nodes, 60 and 95
 _USUAL = {"symmetric": (4, 6), "asymmetric": (3, 4)}
 #: elements whose faces of four nodes carry a contact node by node; the first stands in for others
 NODE_BY_NODE = ("hex8i", "hex8")
