@@ -23,7 +23,7 @@ from upd.progress import Listener, Stages, silent
 from upd.report import write_report
 from upd.report.files import write_curves, write_figures
 from upd.report.folder import check_replaceable, is_run_file
-from upd.report.notebook import RunResult, chart_arrays
+from upd.report.notebook import RunResult
 from upd.results import (
     DIGEST,
     FAILED,
@@ -269,7 +269,7 @@ def _leave(run: _Run, result: RunResult, solution: Any) -> tuple[RunResult, str]
         if solution is not None:
             with stages("files", str(place)):
                 write_netcdf(folder / "result.nc", result.arrays)
-                write_curves(chart_arrays(result), folder)
+                write_curves(result.arrays, folder)
                 run.analysis.write_files(solution, folder)
     except (OSError, UpdError) as error:
         if disk_fault(error) is None:

@@ -46,9 +46,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses import make_plan
-from upd.analyses.seated.bodies import Bodies, make_bodies
+from upd.analyses.seated.bodies import Bodies, lattice, make_bodies, patch_frame
 from upd.analyses.seated.interface import Interface, make_interface
-from upd.analyses.seated.lattice import lattice, patch_frame
 from upd.contact import CoupledContact
 from upd.fem import Material, mass
 from upd.mesh import IntArray, Mesh

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from upd.contact.law import ContactLaw, Weight, contact_points
 from upd.errors import InputError
-from upd.results import read_netcdf, write_netcdf
+from upd.results import Group, read_netcdf, write_netcdf
 
 FloatArray = NDArray[np.float64]
 
@@ -219,7 +219,7 @@ def test_through_result_nc(tmp_path: Path) -> None:
     X, area = grid(9, 7)
     law = contact_points(X, area, *random_fields(63), 2, 3).placed([1.0, 2.0, 3.0], np.eye(3))
     lattice = {"x": (("x",), np.arange(3.0), {"units": "mm"})}
-    write_netcdf(tmp_path / "result.nc", {"F_N 150 N": lattice | law.to_arrays()})
+    write_netcdf(tmp_path / "result.nc", {"F_N 150 N": Group(lattice | law.to_arrays())})
     read = ContactLaw.from_arrays(read_netcdf(tmp_path / "result.nc")["F_N 150 N"])
     for name in law.__dataclass_fields__:
         assert np.array_equal(getattr(read, name), getattr(law, name)), name

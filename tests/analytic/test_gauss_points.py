@@ -10,7 +10,7 @@ from rigs import LINES
 from scipy.linalg import eigh
 
 from upd.analyses import make_plan
-from upd.analyses.forced.inputs import nearer
+from upd.analyses.forced.inputs import elastic_stuck, nearer
 from upd.analyses.forced.measures import stuck_modes
 from upd.analyses.forced.model import Model, make_model, preloaded
 from upd.analyses.forced.points import FacePoints, GaussRule, fewer_points, gauss_points
@@ -180,6 +180,20 @@ def test_half_a_rig_is_the_even_part_of_the_whole(arrangement: str) -> None:
     assert mine == pytest.approx(other, rel=1e-7)
     full, _ = _model(arrangement, **{"mesh.symmetry": "full"})
     assert full.contacts.n_point == 2 * half.contacts.n_point
+
+
+def test_an_elastic_damper_is_the_same_on_half_a_rig() -> None:
+    """In series with its springs it lowers the stuck frequencies of the half as of the whole."""
+    found = []
+    for symmetry in ("auto", "full"):
+        scene = load_scene("symmetric-response", SMALL | {"mesh.symmetry": symmetry})
+        plan = make_plan(scene)
+        bodies = make_bodies(plan)
+        assert bodies.half == (symmetry == "auto")
+        model = make_model(plan, bodies, face_laws(scene.stiffnesses["thesis"], Stages()))
+        along_x = (m.frequency for m in elastic_stuck(plan, bodies, model) if m.axis == "x")
+        found.append([next(along_x), next(along_x)])
+    assert found[0] == pytest.approx(found[1], rel=1e-4)
 
 
 def test_points_on_half_of_each_face_are_the_model_of_a_smaller_patch() -> None:

@@ -19,9 +19,8 @@ from upd.analyses.forced.interface_model import (
     seated_start,
     worn_start,
 )
-from upd.analyses.seated.bodies import Bodies, make_bodies
+from upd.analyses.seated.bodies import Bodies, lattice, make_bodies
 from upd.analyses.seated.interface import Interface, make_interface
-from upd.analyses.seated.lattice import lattice
 from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, mass, stiffness
 from upd.hbm.faces.march import InterfaceMarch, modal_step, resolved

@@ -26,7 +26,6 @@ from upd.analyses.forced.sweeps import (
 from upd.hbm.faces.march import InterfaceMarch
 from upd.hbm.faces.record import period_of_sweep, recorded_period
 from upd.hbm.faces.step import OPEN, SLIP, STICK
-from upd.plot.chart import Group, Variable
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 
@@ -151,18 +150,9 @@ def test_a_period_from_the_balances_motion_is_the_balances(
     assert marched_loops(mine, 1)[0].point == measures.loops(answer, i, 1)[0].point
 
 
-def _as_read(solution: ForcedSolution) -> dict[str, Group]:
-    groups = {}
-    for name, group in arrays(solution).items():
-        groups[name] = Group(group.attributes)
-        for key, (dims, data, attributes) in group.items():
-            groups[name][key] = Variable(np.asarray(data), dims, "", attributes)
-    return groups
-
-
 def test_charts_are_of_the_march(solution: ForcedSolution, one: MarchedPeak) -> None:
     """Drawn from the arrays alone, titled with the sweep, none from the balance's one point."""
-    drawn = forced.ANALYSIS.charts(_as_read(solution), {})
+    drawn = forced.ANALYSIS.charts(arrays(solution), {})
     at = {f"time integration, sweep {m.sweep.way}, {m.frequency:.1f} Hz" for m in solution.marched}
     figures = {"contact_map", "hysteresis", "damper_period"}
     mine = [chart for chart in drawn if chart.figure in figures]

@@ -14,9 +14,8 @@ from scipy.sparse.linalg import spsolve
 
 from upd.analyses import make_plan
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.seated.bodies import Bodies, make_bodies
+from upd.analyses.seated.bodies import Bodies, lattice, make_bodies, patch_frame
 from upd.analyses.seated.interface import Interface, make_interface
-from upd.analyses.seated.lattice import lattice, patch_frame
 from upd.contact.equilibrium import equilibrium
 from upd.errors import InputError
 from upd.fem import Material, mass, stiffness

@@ -6,19 +6,21 @@ Its plan (effects, size, cost), its solution, its numbers, checks, arrays, chart
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from upd.analyses.cost import NODES
+from upd.cache.sources import key_of
 from upd.errors import InputError
 from upd.labels import number
 from upd.linalg import select
 from upd.linalg.routes import Route
-from upd.plot.chart import Arrays, Chart, Entry
+from upd.plot.chart import Chart, Entry
 from upd.progress import Stages
-from upd.results import ArrayGroup, Case, Check, Estimates, Result
+from upd.results import Arrays, Case, Check, Estimates, Group, Result
 from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_label
 from upd.scene import AnyScene
@@ -135,6 +137,16 @@ def conditions(case: Case, remedy: str, *rows: tuple[str, float, float, str]) ->
     ]
 
 
+@contextmanager
+def keeping(solution: object) -> Iterator[None]:
+    """What converged so far is the ``partial`` of an error."""
+    try:
+        yield
+    except BaseException as error:
+        error.partial = solution  # type: ignore[attr-defined]
+        raise
+
+
 S = TypeVar("S", bound=AnyScene)
 
 
@@ -216,6 +228,15 @@ class Needs:
     factors: bool = False
 
 
+def rig_needs(choice: str, plan: Plan[Any], threads: int) -> Needs:
+    """What a point of a sweep of rigs needs, and may share; its model has a choice of the scene."""
+    del threads
+    scene = plan.scene
+    mesh = {"recipe": scene.recipe, "parameters": dict(plan.parameters)}
+    model = {"mesh": scene.mesh, "material": scene.material, choice: getattr(scene, choice)}
+    return Needs(key_of(mesh | model), key_of(mesh))
+
+
 @dataclass(frozen=True)
 class Analysis:
     """What one kind of scene is answered with; ``solution`` is whatever its own ``solve`` returns.
@@ -274,7 +295,7 @@ class Analysis:
     solve: Callable[[Any, Stages], Any]
     make_results: Callable[[Any], list[Result]]
     check_solution: Callable[[Any], list[Check]]
-    arrays: Callable[[Any], dict[str, ArrayGroup]]
+    arrays: Callable[[Any], dict[str, Group]]
     sizes: Callable[[Any], dict[str, int]]
     write_files: Callable[[Any, Path], None]
     charts: Callable[[Arrays, Mapping[str, Any]], list[Chart]]

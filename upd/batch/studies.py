@@ -28,6 +28,7 @@ from upd.cache.sources import source_digest
 from upd.errors import InputError
 from upd.linalg import select
 from upd.plot.matplotlib import draw_all, write_sheets
+from upd.plot.work_precision import work_precision_charts
 from upd.scene import AnyScene, load_scene
 from upd.scene.quantities import UNKNOWN
 from upd.scene.ranges import bare_quantity
@@ -75,7 +76,7 @@ class Study:
         lines = [f"# {self.title}", ""]
         tables = (*report.tables, *report.details)
         for part in tables:
-            lines += [f"## {part.title}", "", *markdown_table(part), ""]
+            lines += [f"## {part.heading}", "", *markdown_table(part), ""]
         write_text(table, "\n".join([*lines, *(f"- {note}" for note in report.notes)]) + "\n")
         if not self.points:
             return [table]
@@ -86,7 +87,7 @@ class Study:
             "notes": list(report.notes),
         }
         write_text(data, json.dumps(content, indent=1) + "\n")
-        charts = report.charts(curves)
+        charts = work_precision_charts(curves)
         figures = write_sheets(charts, folder)
         # slow to import: only where a page is made
         from upd.report.sweep_page import write_study_report
@@ -128,7 +129,7 @@ class StudyResult:
 
     def plot(self) -> list[Axes]:
         """Draw error against seconds with matplotlib, and return the axes."""
-        charts = self.report.charts([asdict(one) for one in self.report.curves])
+        charts = work_precision_charts([asdict(one) for one in self.report.curves])
         return draw_all([one for one in charts if one.x.name == charts[0].x.name][:6])
 
 

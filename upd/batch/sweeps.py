@@ -4,12 +4,11 @@ and figures.
 
 from __future__ import annotations
 
-import json
 import logging
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,9 +24,8 @@ from upd.cache.files import json_text, write_text
 from upd.cache.sources import versions
 from upd.errors import InputError, one_line
 from upd.plot.matplotlib import draw_all, write_sheets
-from upd.plot.sample_charts import sample_charts
-from upd.plot.sweep_charts import figure_names, is_constant, sweep_charts
-from upd.results import write_netcdf
+from upd.plot.sweep_charts import FIGURES, is_constant, sample_charts, sweep_charts
+from upd.results import Group, write_netcdf
 from upd.results.sampled import SampledNumber, sampled_number
 from upd.scene import load_scene
 from upd.vary.outcome import Outcome
@@ -248,17 +246,16 @@ def write_outputs(store: PointStore, result: SweepResult) -> list[Path]:
     Raises OSError when the disk does not take it.
     """
     folder, plan = store.folder, result.plan
-    earlier = _earlier(folder)
     table, arrays, data = (folder / f"{name}" for name in ("table.csv", "sweep.nc", "sweep.json"))
     write_text(table, csv_text(plan.axes, plan.places, result.outcomes, result.columns))
-    write_netcdf(arrays, {"": _arrays(result)})
+    write_netcdf(arrays, {"": Group(_arrays(result))})
     write_text(data, json_text(_summary(store, result)))
-    _remove_figures(folder, earlier)
+    _remove_figures(folder)
     if plan.sample is None:
         return [table, arrays, data]
     compared = folder / "sample.csv"
     heads = [field.name for field in fields(SampledNumber)]
-    write_text(compared, as_csv([heads, *(one.as_dict().values() for one in result.sampled)]))
+    write_text(compared, as_csv([heads, *(asdict(one).values() for one in result.sampled)]))
     return [compared, table, arrays, data]
 
 
@@ -272,26 +269,17 @@ def draw(
 
     Returns their paths.
     """
-    _remove_figures(folder, ((column.name, column.case) for column in columns))
+    _remove_figures(folder)
     if sampled:
         values = [column.values for column in columns]
         return write_sheets(sample_charts(sampled, values), folder)
     return write_sheets(sweep_charts(axes, columns), folder)
 
 
-def _remove_figures(folder: Path, followed: Iterable[tuple[str, str]]) -> None:
-    """Remove the figures a sweep of these numbers has; other pictures there are the user's."""
-    for name in figure_names(followed):
+def _remove_figures(folder: Path) -> None:
+    """Remove the figures of a sweep; other pictures there are the user's."""
+    for name in FIGURES:
         (folder / f"{name}.png").unlink(missing_ok=True)
-
-
-def _earlier(folder: Path) -> list[tuple[str, str]]:
-    """Name and case of the numbers that an earlier call followed."""
-    try:
-        followed = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))["followed"]
-        return [(str(one["name"]), str(one["case"])) for one in followed]
-    except (OSError, ValueError, TypeError, KeyError):
-        return []
 
 
 def dimension(axis: GridAxis, axes: Sequence[GridAxis]) -> str:
@@ -353,7 +341,7 @@ def _free(name: str, taken: dict[str, Any]) -> str:
 def _summary(store: PointStore, result: SweepResult) -> dict[str, Any]:
     plan, sample = result.plan, result.plan.sample
     why = reasons(result.outcomes, result.columns)
-    numbers = [one.as_dict() for one in result.sampled]
+    numbers = [asdict(one) for one in result.sampled]
     drawn = {} if sample is None else {"sample": sample.as_dict() | {"numbers": numbers}}
     return drawn | {
         "scene": plan.scene.name,

@@ -20,8 +20,8 @@ from upd.cli.terminal import counted, duration
 from upd.plot.sweep_charts import is_constant
 from upd.report.columns import TextColumn, whole_table
 from upd.report.tables import sample_table
+from upd.results.answer_table import AnswerTable
 from upd.results.sampled import sample_sentence
-from upd.vary.tables import TextTable
 
 #: rows shown, and characters of a line of a head; the files hold all
 _ROWS, _WIDTH = 30, 14
@@ -157,7 +157,7 @@ def print_study(console: Console, result: StudyResult) -> None:
     if result.kept:
         console.print(f"{counted(len(result.kept), 'point')} kept from an earlier call")
     for table in result.report.tables:
-        print_table(console, study_columns(table), title=table.title)
+        print_table(console, study_columns(table), title=table.heading)
     files = [f"{_KINDS.get(path.suffix, 'File')}: {path}" for path in result.files]
     fine = sum(not one.outcome.failure for one in result.solved)
     many = f"{fine} of {counted(len(result.solved), 'point')} ok, " if result.solved else ""
@@ -165,18 +165,17 @@ def print_study(console: Console, result: StudyResult) -> None:
         console.print(line)
 
 
-def study_columns(table: TextTable) -> list[TextColumn]:
+def study_columns(table: AnswerTable) -> list[TextColumn]:
     """The columns of a study's table; the last numbers are left out where it is too wide."""
     cells = list(zip(*table.rows, strict=True)) or [()] * len(table.columns)
-    words = "r" in table.align
-    heads = zip(table.columns, table.align, cells, strict=True)
+    numbers = [head.startswith("#") for head in table.columns]
     return [
         TextColumn(
-            head,
+            head.lstrip("# "),
             tuple(mine),
-            right=letter == "r",
-            rank=0 if words and letter == "l" and head not in table.spare else k,
-            folds=_WORDS if letter == "l" else 0,
+            right=number,
+            rank=0 if any(numbers) and not number and head not in table.spare else k,
+            folds=0 if number else _WORDS,
         )
-        for k, (head, letter, mine) in enumerate(heads)
+        for k, (head, number, mine) in enumerate(zip(table.columns, numbers, cells, strict=True))
     ]

@@ -23,33 +23,6 @@ Entry = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Variable:
-    """A variable of result.nc.
-
-    Data with the names of its dimensions, its unit ("" when it has none) and its other attributes.
-    """
-
-    data: NDArray[Any]
-    dims: tuple[str, ...]
-    units: str
-    attributes: Mapping[str, Any]
-
-
-class Group(dict[str, Variable]):
-    """Variables of one group of result.nc by name, and the group's own attributes.
-
-    What it holds (``content``) and of which case.
-    """
-
-    def __init__(self, attributes: Mapping[str, Any] | None = None) -> None:
-        super().__init__()
-        self.attributes: dict[str, Any] = dict(attributes or {})
-
-
-Arrays = Mapping[str, Group]
-
-
-@dataclass(frozen=True)
 class Axis:
     """What an axis shows.
 
@@ -157,27 +130,6 @@ class Area:
 
 
 @dataclass(frozen=True)
-class Bars:
-    """Horizontal bars, one per case, of parts that lie behind each other.
-
-    ``parts`` label -> values (n_case,), ``texts`` likewise.
-
-    Attributes
-    ----------
-    above
-        The cases stand above their bars: long words.
-    hatched
-        Labels of parts of another kind than the others.
-    """
-
-    cases: tuple[str, ...]
-    parts: Mapping[str, Array]
-    texts: Mapping[str, tuple[str, ...]]
-    above: bool = False
-    hatched: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
 class Pies:
     """A pie at each point ``x``, ``y`` (n,): ``shares`` (n, n_state) of ``states``.
 
@@ -277,7 +229,6 @@ class Chart:
     marks: tuple[Mark, ...] = ()
     bands: tuple[Band, ...] = ()
     areas: tuple[Area, ...] = ()
-    bars: tuple[Bars, ...] = ()
     pies: tuple[Pies, ...] = ()
     scatters: tuple[Scatter, ...] = ()
     sheet: bool = True

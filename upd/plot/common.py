@@ -10,8 +10,8 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.plot.chart import STATES, Array, Arrays, Axis, Group, Map, Trace, Variable
-from upd.results import Case
+from upd.plot.chart import STATES, Array, Axis, Map, Trace
+from upd.results import Arrays, Case, Group, Variable
 
 UM = 1e3
 _CASE = frozenset(f.name for f in fields(Case))

@@ -69,13 +69,11 @@ def draw(chart: Chart, ax: Axes | None = None) -> Axes:
         parts.draw_band(band, ax)
     for trace in chart.traces:
         parts.draw_trace(trace, ax)
-    parts.draw_bars(chart, ax)
     for pies in chart.pies:
         parts.draw_pies(pies, ax)
     parts.draw_scatters(chart, ax)
     _axis(chart, chart.x, "x", ax)
     _axis(chart, chart.y, "y", ax)
-    parts.fit_bar_texts(chart, ax)
     parts.draw_marks(chart.marks, ax)
     if chart.equal:
         ax.set_aspect("equal")
@@ -166,7 +164,7 @@ def _sheet(charts: Sequence[Chart], dpi: int) -> Figure:
 
 def _grid(chart: Chart, ax: Axes) -> None:
     ax.tick_params(labelsize=_LETTERS)
-    if not (chart.maps or chart.bars):
+    if not chart.maps:
         ax.grid(visible=True, which="major", color="#dddddd", lw=0.6)
         ax.set_axisbelow(True)
 

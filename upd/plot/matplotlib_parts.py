@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,7 +18,6 @@ from matplotlib.transforms import IdentityTransform, ScaledTranslation
 from upd.plot.chart import Area, Axis, Band, Chart, Map, Mark, Pies, Trace
 from upd.plot.style import (
     CROSS,
-    PART_COLOURS,
     SHARE_COLOURS,
     area_colour,
     band_colour,
@@ -47,7 +45,6 @@ _STYLE: dict[str, dict[str, Any]] = {
     "crosses": {"ls": "", "marker": "x", "ms": 5},
     "star": {"ls": "", "marker": "*", "ms": 13},
 }
-_BAR_HEIGHT, _LETTER = 0.6, 8
 #: points of the letters of a legend and of the words beside a mark, of what stands before an entry
 #: of a legend, and rows of it at most
 _SMALL, _HANDLE, _ROWS = 7.0, 32.0, 6
@@ -57,8 +54,6 @@ _BELOW = 0.42
 _FEW_CELLS = 32
 #: room below and above pies, as a part of their height
 _AROUND_PIES = 0.25
-#: letters of a case beside its bar on one line
-_WORDS = 12
 
 
 def draw_trace(t: Trace, ax: Axes) -> None:
@@ -110,53 +105,6 @@ def draw_area(area: Area, ax: Axes) -> None:
         label=plain(area.label) or None,
         **style,
     )
-
-
-def draw_bars(chart: Chart, ax: Axes) -> None:
-    """Horizontal bars, the first case on top."""
-    cases = [case for bars in chart.bars for case in bars.cases]
-    if not cases:
-        return
-    labels = list(dict.fromkeys(label for bars in chart.bars for label in bars.parts))
-    begin = 0
-    for bars in chart.bars:
-        at, left = begin + np.arange(len(bars.cases)), np.zeros(len(bars.cases))
-        for label, values in bars.parts.items():
-            colour = PART_COLOURS[labels.index(label) % len(PART_COLOURS)]
-            style: dict[str, Any] = {"color": colour}
-            if label in bars.hatched:
-                # hatches take the colour of the edge
-                style = {"facecolor": "white", "edgecolor": colour, "hatch": "////"}
-                style["linewidth"] = np.where(values > 0.0, 0.8, 0.0)
-            drawn = ax.barh(at, values, left=left, height=_BAR_HEIGHT, label=plain(label), **style)
-            texts = [plain(t) for t in bars.texts.get(label, ())]
-            ax.bar_label(drawn, texts, label_type="center", color="white", fontsize=_LETTER)
-            left = left + values
-        begin += len(bars.cases)
-    if any(bars.above for bars in chart.bars):
-        ax.set_yticks([])
-        for k, case in enumerate(cases):
-            ax.annotate(
-                plain(case),
-                (0.0, k - 0.5 * _BAR_HEIGHT),
-                (2.0, 1.0),
-                textcoords="offset points",
-                va="bottom",
-                fontsize=_LETTER,
-            )
-    else:
-        words = [plain(textwrap.fill(case, _WORDS)) for case in cases]
-        ax.set_yticks(range(len(cases)), words, fontsize=_LETTER)
-    ax.set_ylim(len(cases) - 0.5, -0.5 - 0.2 * any(bars.above for bars in chart.bars))
-    ax.margins(x=0.0)
-
-
-def fit_bar_texts(chart: Chart, ax: Axes) -> None:
-    """Turn the texts that are wider than their part of a bar."""
-    if chart.bars:
-        for text, part in zip(ax.texts, ax.patches, strict=False):
-            if text.get_window_extent().width > part.get_window_extent().width:
-                text.set_rotation(90.0)
 
 
 def draw_pies(pies: Pies, ax: Axes) -> None:

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Mark, Pies, Scatter, Trace
 from upd.plot.style import (
     CROSS,
-    PART_COLOURS,
     SHARE_COLOURS,
     area_colour,
     band_colour,
@@ -47,13 +46,11 @@ _MARKER: dict[str, dict[str, Any]] = {
     "crosses": {"symbol": "x-thin", "size": 7, "line": {"width": 1.5}},
     "star": {"symbol": "star", "size": 15},
 }
-#: letters of a line beside a bar
-_WORDS = 26
 #: pixels of the letters beside a mark, and of a screen per point of a page
 _LETTERS, _PIXELS = 11, 4.0 / 3.0
 _GRID = "#e6e6e6"
-#: letters of an upright axis' name that have room, and pixels of a bar with its words
-_LINE, _ROW = 42, 54
+#: letters of an upright axis' name that have room,
+_LINE = 42
 #: width over height of a chart
 _WIDE = 1.5
 #: part of an axis beyond the data, as plotly leaves it
@@ -71,8 +68,7 @@ def figure(chart: Chart) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``data`` and ``layout`` of a plotly figure; ``wide``, width over height of the drawing, and
-        ``least``, pixels that its height has at least.
+        ``data`` and ``layout`` of a plotly figure; ``wide``, width over height of the drawing.
     """
     chart = with_room(chart)
     names = {escape(name) for name in legend_names(chart)}
@@ -91,18 +87,14 @@ def figure(chart: Chart) -> dict[str, Any]:
     if chart.equal:
         layout["yaxis"] |= {"scaleanchor": "x", "scaleratio": 1, "constrain": "domain"}
         layout["xaxis"] |= {"constrain": "domain"}
-    if chart.bars:
-        layout |= {"barmode": "stack"}
-        layout["yaxis"] |= _cases_axis(chart)
     # maps keep their own shape
     wide = 1.0 / (chart.equal * proportion(chart) or 1.0 / _WIDE)
-    least = _ROW * sum(len(bars.cases) for bars in chart.bars)
-    return {"data": data, "layout": layout, "wide": wide, "least": least}
+    return {"data": data, "layout": layout, "wide": wide}
 
 
 def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[str, Any]:
     """One axis; its name is broken into lines of so many ``letters``."""
-    grid = not (chart.maps or chart.bars)
+    grid = not chart.maps
     out: dict[str, Any] = {
         "title": {"text": "<br>".join(escape(line) for line in wrap(axis.label, letters))},
         "showgrid": grid,
@@ -200,7 +192,6 @@ def _traces(chart: Chart) -> Iterator[dict[str, Any]]:
         yield from _points(m) if m.contours else ()
     for area in chart.areas:
         yield from _area(chart, area)
-    yield from _bars(chart)
     for trace in chart.traces:
         yield _curve(chart, trace)
     for pies in chart.pies:
@@ -312,48 +303,6 @@ def _area(chart: Chart, a: Area) -> Iterator[dict[str, Any]]:
         fillcolor=colour if a.state else _pale(colour, 0.22),
         hovertemplate=f"{x}<br>{width}<extra></extra>",
     )
-
-
-def _bars(chart: Chart) -> Iterator[dict[str, Any]]:
-    """Stacked horizontal bars: one trace per part."""
-    labels = list(dict.fromkeys(label for b in chart.bars for label in b.parts))
-    begin = 0
-    for b in chart.bars:
-        for label, values in b.parts.items():
-            colour = PART_COLOURS[labels.index(label) % len(PART_COLOURS)]
-            look: dict[str, Any] = {"color": colour}
-            if label in b.hatched:
-                look["line"] = {"color": colour, "width": 1}
-                look["pattern"] = {"shape": "/", "fgcolor": colour, "bgcolor": "#fff", "size": 6}
-            value = _value(Axis(label, chart.x.unit), "x")
-            yield {
-                "type": "bar",
-                "orientation": "h",
-                "name": escape(label),
-                "legendgroup": escape(label),
-                "x": _numbers(values),
-                "y": list(range(begin, begin + len(b.cases))),
-                "width": 0.6,
-                "text": [escape(text) for text in b.texts.get(label, ())],
-                "customdata": [escape(case) for case in b.cases],
-                "textposition": "inside",
-                "insidetextanchor": "middle",
-                "textfont": {"color": "#ffffff"},
-                "marker": look,
-                "hovertemplate": f"%{{customdata}}<br>{value}<br>%{{text}}<extra></extra>",
-            }
-        begin += len(b.cases)
-
-
-def _cases_axis(chart: Chart) -> dict[str, Any]:
-    """The upright axis of bars: the cases, the first on top."""
-    cases = [
-        "<br>".join(wrap(escape(case), _WORDS)) if b.above else escape(case)
-        for b in chart.bars
-        for case in b.cases
-    ]
-    ticks = {"tickmode": "array", "tickvals": list(range(len(cases))), "ticktext": cases}
-    return ticks | {"range": [len(cases) - 0.5, -0.5]}
 
 
 def _pies(chart: Chart, p: Pies) -> Iterator[dict[str, Any]]:

@@ -21,8 +21,6 @@ COLOURS = ("#1f5fa8", "#c1561a", "#2a8a68", "#a24b8f", "#6b6b6b", "#b38600", "#3
 STATE_COLOURS = ("#f4f4f4", "#f0a35e", "#2b6cb0", "#8cc3a8", "#c9a0bd", "#c0695f")
 #: shares of a cycle by state; lift-off is darker than an open point, which lies on white
 SHARE_COLOURS = {"stick": "#2b6cb0", "slip": "#f0a35e", "lift-off": "#b9b9b9", "open": "#f4f4f4"}
-#: parts of bars, with white text on them
-PART_COLOURS = ("#2b6cb0", "#d98032", "#5a8f4a", "#a24b8f", "#6b6b6b")
 OUTLINE, CLOSED, CROSS = "#222222", "#555555", "#c0392b"
 MEASURED, LIMIT = "#d98200", "#333333"
 #: up to here a logarithmic axis has ticks between its decades
@@ -214,9 +212,7 @@ def legend_names(chart: Chart) -> list[str]:
     names = [t.entry or t.label for t in chart.traces] + [
         part.label for kind in (chart.areas, chart.bands) for part in kind
     ]
-    names += [label for bars in chart.bars for label in bars.parts] + [
-        state for pies in chart.pies for state in pies.states
-    ]
+    names += [state for pies in chart.pies for state in pies.states]
     found = [name for name in dict.fromkeys(names) if name]
     shown = " ".join((chart.title, chart.case, chart.y.name)).casefold()
     return [] if len(found) == 1 and found[0].casefold() in shown else found

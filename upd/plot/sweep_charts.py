@@ -1,27 +1,27 @@
-"""Charts of a sweep: curves over one parameter, filled maps over two, small multiples over more."""
+"""Charts of a sweep: curves over a parameter, one for each value of the others; maps over two.
+
+Of a sample: how often every number came out where, beside its first-order band.
+"""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from upd.labels import file_name, unit_label
-from upd.plot.chart import Array, Axis, Chart, Map, Trace
+from upd.labels import unit_label
+from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Trace
+from upd.plot.matplotlib import MOST_PANELS
 from upd.results.quantities import number_label, number_title
+from upd.results.sampled import SampledNumber
 
-#: charts on one sheet, and sheets, at most: more is no figure any more
-MOST_PANELS, MOST_SHEETS = 24, 24
-#: curves in one chart beside a map: of more one loses track
-_CURVES = 8
+#: curves in one chart beside a map: of more one loses track; and at most
+_CURVES, _MOST = 8, 24
 _SIZE = (5.0, 3.9)
-#: figure of all numbers over up to two parameters
-_FIGURE = "sweep"
-#: figure of what a sample makes of all numbers
-SAMPLE_FIGURE = "sample"
+#: figure of all numbers, and of what a sample makes of them
+FIGURE, SAMPLE_FIGURE = FIGURES = ("sweep", "sample")
 #: relative spread up to which a number is the same everywhere
 _SAME = 1e-9
 
@@ -80,21 +80,13 @@ class Followed:
 def sweep_charts(parameters: Sequence[Varied], numbers: Sequence[FollowedNumber]) -> list[Chart]:
     """Charts of all followed numbers over what varies.
 
-    Parameters
-    ----------
-    parameters
-        All parameters of the grid.
-    numbers
-        What is followed; those that nothing changes come last, those without any value are left
-        out.
-
     Returns
     -------
     list of Chart
-        Over one parameter a curve per number. Over two with numbers a filled map, and curves beside
-        it for the page; with words a curve per word. Over more, for each number a sheet
-        ``sweep-<number>`` of maps or curves on one scale, one for each combination of the others.
-        Failed points are gaps in curves and crosses on maps.
+        What varies first. Over one parameter a curve each, over more a curve for each combination
+        of the others, the first 24; over two with numbers a filled map before it. Parameters with
+        one value are no dimension; no charts when nothing varies. A number without any value is
+        left out.
     """
     shape = tuple(len(p.values) for p in parameters)
     varied = [p for p in parameters if len(p.values) > 1]
@@ -105,13 +97,18 @@ def sweep_charts(parameters: Sequence[Varied], numbers: Sequence[FollowedNumber]
     ]
     if not varied:
         return []
-    if len(varied) > 2:
-        return [
-            chart
-            for number, grid in grids[:MOST_SHEETS]
-            for chart in _multiples(varied, number, grid)
-        ]
-    return _plain_charts(varied, grids)
+    # Along x what has numbers, and more of them.
+    x = max(reversed(varied), key=lambda p: (p.numbers is not None, len(p.values)))
+    others = [p for p in varied if p is not x]
+    maps: list[Chart] = []
+    if len(varied) == 2 and all(p.numbers is not None for p in varied):
+        maps = [_map(varied[0], varied[1], number, grid) for number, grid in grids]
+        if len(others[0].values) > _CURVES:
+            return maps
+    return maps + [
+        _curves(x, others, number, np.moveaxis(grid, varied.index(x), -1), sheet=not maps)
+        for number, grid in grids
+    ]
 
 
 def is_constant(values: Array) -> bool:
@@ -120,143 +117,54 @@ def is_constant(values: Array) -> bool:
     return not known.size or float(np.ptp(known)) <= _SAME * float(np.abs(known).max())
 
 
-def _plain_charts(
-    varied: Sequence[Varied], grids: Sequence[tuple[FollowedNumber, Array]]
-) -> list[Chart]:
-    """Charts over one or two parameters."""
-    if len(varied) == 1:
-        return [_curves(varied[0], None, number, grid) for number, grid in grids]
-    maps: list[Chart] = []
-    if all(p.numbers is not None for p in varied):
-        maps = [_map(varied[0], varied[1], number, grid) for number, grid in grids]
-    # Along x what has numbers, and more of them.
-    x = max(reversed(varied), key=lambda p: (p.numbers is not None, len(p.values)))
-    other = varied[1] if x is varied[0] else varied[0]
-    if maps and len(other.values) > _CURVES:
-        return maps
-    curves = [
-        _curves(x, other, number, np.moveaxis(grid, varied.index(x), -1), sheet=not maps)
-        for number, grid in grids
-    ]
-    return maps + curves
-
-
-def _multiples(varied: Sequence[Varied], number: FollowedNumber, grid: Array) -> list[Chart]:
-    """One chart per combination of what is not drawn along x and y, all on one scale of values."""
-    longest = sorted((p for p in varied if p.numbers is not None), key=lambda p: -len(p.values))
-    inside = (
-        longest[:2]
-        if len(longest) > 1
-        else [*longest[:1], *(p for p in varied if p not in longest)][:1]
-    )
-    outside = [p for p in varied if p not in inside]
-    moved = np.moveaxis(grid, [varied.index(p) for p in [*outside, *inside]], range(grid.ndim))
-    limits = float(np.nanmin(grid)), float(np.nanmax(grid))
-    every = itertools.product(*(range(len(p.values)) for p in outside))
-    charts = []
-    for index in itertools.islice(every, MOST_PANELS):
-        values = ", ".join(
-            f"{short(p)} = {p.values[k]}" for p, k in zip(outside, index, strict=True)
-        )
-        place = _Place(values, limits, sheet_name(number.name, number.case), 3)
-        if len(inside) == 2:
-            charts.append(_map(inside[0], inside[1], number, moved[index], place))
-        else:
-            charts.append(_curves(inside[0], None, number, moved[index], place))
-    return charts
-
-
-def figure_names(followed: Iterable[tuple[str, str]]) -> set[str]:
-    """Names, without ending, that the figures of a sweep may have.
-
-    Parameters
-    ----------
-    followed
-        Name and case of every followed number.
-    """
-    return {_FIGURE, SAMPLE_FIGURE, *(sheet_name(name, case) for name, case in followed)}
-
-
-def sheet_name(name: str, case: str) -> str:
-    """Name of the sheet of a number over more than two parameters, without ending."""
-    return f"{_FIGURE}-" + file_name(f"{name} ({case})" if case else name)
-
-
-class _Place(NamedTuple):
-    """Where a chart stands: the values of what is not drawn in it, the ends of its numbers that it
-    shares with others, its sheet, and charts side by side there.
-    """
-
-    values: str = ""
-    limits: tuple[float, float] | None = None
-    figure: str = _FIGURE
-    columns: int = 2
-
-    def chart(self, number: FollowedNumber, x: Axis, y: Axis, **more: Any) -> Chart:
-        """A chart there. Small multiples of one number share its title and are chosen by what
-        differs.
-        """
-        title, case = number_label(number.name), number.case
-        if self.values:
-            title, case = number_title(number.name, number.case), self.values
-        shared: dict[str, Any] = {"figure": self.figure, "columns": self.columns, "size": _SIZE}
-        return Chart(title, x, y, case=case, **shared, **more)
-
-
-_ALONE = _Place()
+def _chart(number: FollowedNumber, x: Axis, y: Axis, **more: Any) -> Chart:
+    """A chart of a number on the sheet of the sweep."""
+    shared: dict[str, Any] = {"case": number.case, "figure": FIGURE, "size": _SIZE}
+    return Chart(number_label(number.name), x, y, **shared, **more)
 
 
 def _curves(
-    x: Varied,
-    other: Varied | None,
-    number: FollowedNumber,
-    values: Array,
-    place: _Place = _ALONE,
-    *,
-    sheet: bool = True,
+    x: Varied, others: Sequence[Varied], number: FollowedNumber, values: Array, *, sheet: bool
 ) -> Chart:
-    """Values over one parameter, one curve per value of ``other``."""
+    """Values over one parameter, one curve per combination of the ``others``."""
     along = (
         np.arange(len(x.values), dtype=float) if x.numbers is None else np.array(x.numbers, float)
     )
     order = np.argsort(along, kind="stable")
-    curves = np.atleast_2d(values)[:, order]
+    curves = values.reshape(-1, len(along))[:, order]
     # Ends without a value would only stretch the axis; gaps between values stay.
     solved = np.flatnonzero(np.isfinite(curves).any(axis=0))
     span = (
         slice(solved[0], solved[-1] + 1) if x.numbers is not None and solved.size else slice(None)
     )
-    labels = (
-        [number_title(number.name, number.case)]
-        if other is None
-        else [f"{short(other)} {_value(other, k)}" for k in range(len(other.values))]
-    )
-    style: Any = "points" if x.numbers is None else "both"
-    drawn = [
-        (k, label, y[span])
-        for k, (label, y) in enumerate(zip(labels, curves, strict=True))
-        if np.isfinite(y).any()
+    labels = [
+        ", ".join(f"{short(p)} {_value(p, k)}" for p, k in zip(others, places, strict=True))
+        or number_title(number.name, number.case)
+        for places in np.ndindex(*(len(p.values) for p in others))
     ]
-    traces = tuple(Trace(label, along[order][span], y, style, k) for k, label, y in drawn)
-    y_axis = _ordinate(number, place.limits)
-    chart = place.chart(number, _abscissa(x), y_axis, traces=traces, sheet=sheet)
+    style: Any = "points" if x.numbers is None else "both"
+    traces = tuple(
+        Trace(label, along[order][span], y[span], style, k)
+        for k, (label, y) in enumerate(zip(labels[:_MOST], curves, strict=False))
+        if np.isfinite(y).any()
+    )
+    y_axis = Axis(number_label(number.name), unit_label(number.unit))
+    chart = _chart(number, _abscissa(x), y_axis, traces=traces, sheet=sheet)
     # The map of the same number has the title itself.
     return chart if sheet else replace(chart, title=f"{chart.title} over {short(x)}")
 
 
-def _map(
-    x: Varied, y: Varied, number: FollowedNumber, values: Array, place: _Place = _ALONE
-) -> Chart:
+def _map(x: Varied, y: Varied, number: FollowedNumber, values: Array) -> Chart:
     """Filled map over two parameters: values (n_x, n_y)."""
     X, Y = np.array(x.numbers, float), np.array(y.numbers, float)
     i, j = np.argsort(X, kind="stable"), np.argsort(Y, kind="stable")
-    low, high = place.limits or (float(np.nanmin(values)), float(np.nanmax(values)))
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
     same = high - low <= _SAME * max(abs(low), abs(high))
     scale = Axis(number_label(number.name), unit_label(number.unit))
     m = Map(
         X[i], Y[j], values[np.ix_(i, j)], scale, low=low, top=low if same else high, contours=True
     )
-    chart = place.chart(number, _abscissa(x), _abscissa(y), maps=(m,))
+    chart = _chart(number, _abscissa(x), _abscissa(y), maps=(m,))
     if not same:
         return chart
     everywhere = f"{low:.5g} {unit_label(number.unit)}".rstrip() + " everywhere"
@@ -286,9 +194,51 @@ def _abscissa(parameter: Varied) -> Axis:
     )
 
 
-def _ordinate(number: FollowedNumber, limits: tuple[float, float] | None) -> Axis:
-    """The number with its unit, between the same ends in all charts that share ``limits``."""
-    low, high = limits or (0.0, 0.0)
-    room = 0.05 * (high - low)
-    ends = (low - room, high + room) if room > 0.0 else (None, None)
-    return Axis(number_label(number.name), unit_label(number.unit), low=ends[0], high=ends[1])
+# -- samples ---------------------------------------------------------------------------------------
+
+
+def sample_charts(numbers: Sequence[SampledNumber], values: Sequence[Array]) -> list[Chart]:
+    """A histogram of every number that the inputs move.
+
+    Parameters
+    ----------
+    numbers
+        What the sample makes of them.
+    values
+        (1 + n,) of each in its unit, the first with every input at its value; NaN where there is
+        none.
+    """
+    drawn = [(one, v[1:][np.isfinite(v[1:])]) for one, v in zip(numbers, values, strict=True)]
+    return [_histogram(one, mine) for one, mine in drawn if len(mine) and np.ptp(mine)][
+        :MOST_PANELS
+    ]
+
+
+def _histogram(one: SampledNumber, drawn: Array) -> Chart:
+    """Points in bins as wide as Freedman and Diaconis or Sturges have them."""
+    counts, edges = np.histogram(drawn, bins="auto")
+    x, y = np.repeat(edges, 2), np.concatenate([[0], np.repeat(counts, 2), [0]]).astype(float)
+    bands: list[Band] = []
+    if one.nominal is not None and one.first_order is not None:
+        half = abs(one.nominal) * one.first_order
+        bands.append(Band("first order", "x", one.nominal - half, one.nominal + half, colour=1))
+    if one.nominal is not None and one.band is not None and one.mean is not None:
+        half = abs(one.nominal) * one.band
+        bands.append(Band("band of the sample", "x", one.mean - half, one.mean + half, -1, True))
+    nominal = []
+    if one.nominal is not None:
+        line = np.array([one.nominal, one.nominal]), np.array([0.0, float(counts.max())])
+        nominal.append(Trace("inputs as given", *line, outline=True))
+    return Chart(
+        number_label(one.name),
+        Axis(number_label(one.name), unit_label(one.unit)),
+        Axis("points", low=0.0),
+        (Trace("sampled", x, y), *nominal),
+        areas=(Area("", x, np.zeros(len(x)), y),),
+        bands=tuple(bands),
+        case=one.case,
+        figure=SAMPLE_FIGURE,
+        note=one.verdict,
+        size=(5.2, 3.9),
+        heading="What the sample makes of every number",
+    )

@@ -52,29 +52,6 @@ def work_precision_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
     ]
 
 
-def change_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
-    """Change of every number from the finest level over seconds and over memory: a curve for each
-    way to it, every level with its name, the cost of the finest level as a line.
-
-    Parameters
-    ----------
-    curves
-        As for `work_precision_charts`; ``labels`` (n,) names the levels and ``against`` the finest
-        one, whose change is 0 on the curve that has it.
-
-    Returns
-    -------
-    list of Chart
-        Two for each number that a level changes, all on the sheet ``work_precision``.
-    """
-    ways = list(dict.fromkeys(str(c["curve"]) for c in curves))
-    return [
-        _chart(group, cost, axis, ways)
-        for group in _groups(curves).values()
-        for cost, axis in _COSTS
-    ]
-
-
 def _groups(curves: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], list[Mapping[str, Any]]]:
     """Curves of every number and case; a number that no level moves has no error to show."""
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
@@ -108,46 +85,35 @@ def _chart(
     group: Sequence[Mapping[str, Any]],
     cost: str,
     axis: Axis,
-    ways: Sequence[str] = (),
     *,
-    sheet: bool = True,
-    columns: int = 2,
+    sheet: bool,
+    columns: int,
 ) -> Chart:
-    """Errors of a number and case over a cost; changes from the finest level where there are
-    ``ways`` to it, which have a colour each.
-    """
+    """Errors of a number and case over a cost."""
     first, alone = group[0], len(group) == 1
-    heading = f"Change from {first['against']}" if ways else "What accuracy costs"
-    traces, marks, bands = [], [], []
+    heading, traces, marks, bands = "What accuracy costs", [], [], []
     for k, c in enumerate(_by_cost(one, cost) for one in group):
-        colour = ways.index(str(c["curve"])) if ways else k
         spent, size = np.array(c[cost], float), 100.0 * np.abs(np.array(c["error"], float))
         at = size > 0.0
-        label = str(c["curve"]) if ways else _label(c, alone=alone)
-        traces.append(Trace(label, spent[at], size[at], "both", colour))
-        if "labels" in c and (len(size) > 1 if ways else alone):
+        traces.append(Trace(_label(c, alone=alone), spent[at], size[at], "both", k))
+        if "labels" in c and alone:
             named = zip(spent[at], size[at], np.array(c["labels"])[at], strict=True)
-            marks += [Mark(x, y, str(text), colour) for x, y, text in named]
-        if ways:
-            # of the finest level
-            places = map(float, spent[~at])
-            bands += [Band(str(c["against"]), "x", x, x, colour, dashed=True) for x in places]
-        else:
-            traces += _estimated(c, spent, k)
-    printed = 0.0 if ways else 100.0 * abs(first.get("thesis_error") or 0.0)
+            marks += [Mark(x, y, str(text), k) for x, y, text in named]
+        traces += _estimated(c, spent, k)
+    printed = 100.0 * abs(first.get("thesis_error") or 0.0)
     if printed:
         bands.append(Band(f"thesis ({printed:.1f} %)", "y", printed, printed, dashed=True))
     heights = [t.y for t in traces] + [np.array([printed])] * (printed > 0.0)
     return Chart(
         f"{heading}: {axis.name}",
         _around(axis, [np.array(c[cost], float) for c in group]),
-        _around(Axis("|change|" if ways else "|error|", "%", log=True), heights, _WORDS),
+        _around(Axis("|error|", "%", log=True), heights, _WORDS),
         tuple(trace for trace in traces if len(trace.x)),
         case=f"{number_label(str(first['name']))}, {first['case']}",
         figure="work_precision",
         marks=tuple(marks),
         bands=tuple(bands),
-        detail="" if alone or ways else _reference(group),
+        detail="" if alone else _reference(group),
         sheet=sheet,
         columns=columns,
         size=(4.6, 3.5),

@@ -242,11 +242,6 @@ def _together(mine: Sequence[tuple[int, Chart]], names: Sequence[str]) -> Chart:
             replace(a, label=f"{names[k]}: {a.label}", colour=k) for k, c in mine for a in c.areas
         ),
         bands=tuple(dict.fromkeys(band for _, c in mine for band in c.bands)),
-        bars=tuple(
-            replace(b, cases=tuple(f"{names[k]}: {case}" for case in b.cases))
-            for k, c in mine
-            for b in c.bars
-        ),
     )
 
 

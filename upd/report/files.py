@@ -15,9 +15,9 @@ from upd.cache.files import whole_file
 from upd.errors import UpdError
 from upd.labels import file_name
 from upd.mesh import recipes
-from upd.plot.chart import Arrays, Group, Variable
 from upd.plot.matplotlib import write_sheets
 from upd.report.notebook import RunResult, charts
+from upd.results import Arrays, Group, Variable
 
 log = logging.getLogger(__name__)
 
@@ -113,9 +113,9 @@ def write_curves(arrays: Arrays, folder: Path) -> list[Path]:
     """
     files: list[Path] = []
     for name, group in arrays.items():
-        tables = dict(_tables(group))
-        for k, (dimension, columns) in enumerate(tables.items()):
-            stem = file_name(name or "run") + (f"-{file_name(dimension)}" if k else "")
+        begin = file_name(name.replace("/", " per ") or "run")
+        for k, (dimension, columns) in enumerate(dict(_tables(group)).items()):
+            stem = begin + (f"-{file_name(dimension)}" if k else "")
             path = folder / FOLDER / f"{stem}.csv"
             path.parent.mkdir(exist_ok=True)
             _write(path, columns)

@@ -16,11 +16,11 @@ from typing import Any, Literal
 
 from upd.cache.folders import plain_name
 from upd.errors import InputError
-from upd.plot.chart import Arrays, Group, Variable
 from upd.report.files import FIGURES
 from upd.results import (
+    Arrays,
     Case,
-    open_netcdf,
+    read_netcdf,
 )
 
 _LOG_LINE = re.compile(r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$")
@@ -171,7 +171,7 @@ def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
     arrays: Arrays = {}
     if (folder / "result.nc").exists():
         try:
-            arrays = read_arrays(folder / "result.nc")
+            arrays = read_netcdf(folder / "result.nc")
         except OSError as problem:
             if whole:
                 raise InputError(f"{folder / 'result.nc'}: cannot be read ({problem})") from None
@@ -190,31 +190,6 @@ def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
         log=_log(_text(folder / "run.log", missing)),
         missing=tuple(missing),
     )
-
-
-def read_arrays(path: Path) -> dict[str, Group]:
-    """Variables of a netCDF file with dimensions and units: group -> name -> Variable.
-
-    Raises OSError when it is none, or damaged.
-    """
-
-    def read(group: Any) -> Group:
-        out = Group(
-            {
-                key: value.item() if hasattr(value, "item") else value
-                for key, value in dict(group.attrs).items()
-            }
-        )
-        for name, v in group.variables.items():
-            attributes = dict(v.attrs)
-            out[name] = Variable(
-                v[...], tuple(v.dimensions), str(attributes.pop("units", "")), attributes
-            )
-        return out
-
-    with open_netcdf(path) as file:
-        root = {"": read(file)} if file.variables else {}
-        return root | {name: read(group) for name, group in file.groups.items()}
 
 
 def _summary(folder: Path) -> dict[str, Any]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 
-from upd.plot.chart import Arrays, Entry
+from upd.plot.chart import Entry
 from upd.report.folder import read_run
 from upd.report.notebook import RunResult
-from upd.results import ArrayGroup, Case, Check, read_result
+from upd.results import Case, Check, read_result
 
 _FIELDS = frozenset(f.name for f in fields(Case))
 
@@ -45,7 +44,8 @@ def load(folder: str | Path) -> RunResult:
         checks=tuple(_check(entry) for entry in summary["checks"]),
         size=summary["size"],
         cost=summary["cost"],
-        arrays=_arrays(run.arrays),
+        # A file has no slash in the name of a group.
+        arrays={name.replace(" per ", "/"): group for name, group in run.arrays.items()},
         folder=run.path,
         scene_text=run.scene,
     )
@@ -76,17 +76,3 @@ def _check(entry: Entry) -> Check:
         entry.get("without"),
         entry.get("included") if entry.get("quantity") is None else _number(entry["included"]),
     )
-
-
-def _arrays(arrays: Arrays) -> Mapping[str, ArrayGroup]:
-    """The arrays as a run holds them, under the names that their cases have."""
-    out = {}
-    for name, group in arrays.items():
-        variables = {
-            key: (v.dims, v.data, dict(v.attributes) | ({"units": v.units} if v.units else {}))
-            for key, v in group.items()
-        }
-        # A file has no slash in the name of a group.
-        mine = out[name.replace(" per ", "/")] = ArrayGroup(variables)
-        mine.attributes.update(group.attributes)
-    return out

@@ -6,24 +6,23 @@ Text, table, figure of the main curves, xarray.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from upd.errors import ConvergenceError, InputError, did_you_mean
 from upd.report.answer import AnswerLine, Written, answer
 from upd.report.columns import text_width
-from upd.report.tables import answer_tables, main_numbers, run_charts
+from upd.report.tables import analysis_charts, answer_tables, main_numbers
 from upd.results import FAILED, OK, Case, Check, Result, outcome_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from upd.plot.chart import Arrays, Chart, Entry
+    from upd.plot.chart import Chart, Entry
+    from upd.results import Arrays
 
 #: charts of the figure nobody chose
 _MOST_CHARTS = 6
@@ -50,7 +49,7 @@ class RunResult:
     checks: tuple[Check, ...]
     size: Mapping[str, Any]
     cost: Mapping[str, Any] = field(default_factory=dict)
-    arrays: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, repr=False)
+    arrays: Arrays = field(default_factory=dict, repr=False)
     folder: Path | None = None
     scene_text: str = field(default="", repr=False)
     faults: tuple[str, ...] = ()
@@ -163,7 +162,7 @@ class RunResult:
             ) from None
         return {
             case: xarray.Dataset(
-                {name: (dims, data, dict(more)) for name, dims, data, more in _variables(group)},
+                {name: (v.dims, v.data, dict(v.attributes)) for name, v in group.items()},
                 attrs={"case": case},
             )
             for case, group in self.arrays.items()
@@ -202,7 +201,7 @@ def headline(result: RunResult) -> list[Entry]:
 def charts(result: RunResult) -> list[Chart]:
     """All charts of the run, the most important first."""
     summary = result.summary() | {"scene_file": tomllib.loads(result.scene_text)}
-    return run_charts(chart_arrays(result), summary)
+    return analysis_charts(result.arrays, summary)
 
 
 def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Chart]:
@@ -222,35 +221,3 @@ def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Cha
         known = ", ".join(dict.fromkeys(c.case for c in mine if c.case))
         raise InputError(f"plot: no chart of the case {case!r}; there are {known or 'none'}")
     return cases[:_MOST_CHARTS] if case is None else cases
-
-
-def _variables(
-    group: Mapping[str, Any],
-) -> Iterator[tuple[str, tuple[str, ...], np.ndarray[Any, Any], Mapping[str, Any]]]:
-    """Name, dimensions, data and attributes of the arrays of one case."""
-    for name, value in group.items():
-        dims, data, attributes = value if isinstance(value, tuple) else (None, value, {})
-        array = np.asarray(data)
-        yield (
-            name,
-            tuple(dims) if dims is not None else tuple(f"{name}_{k}" for k in range(array.ndim)),
-            array,
-            attributes,
-        )
-
-
-def chart_arrays(result: RunResult) -> Arrays:
-    """The arrays of a result as charts and files take them."""
-    from upd.plot.chart import Group, Variable
-
-    out: dict[str, Group] = {}
-    for case, group in result.arrays.items():
-        # As result.nc has them: no slash in a group's name, no truth values.
-        variables = out.setdefault(
-            case.replace("/", " per "), Group(getattr(group, "attributes", {}))
-        )
-        for name, dims, data, attributes in _variables(group):
-            rest = {k: v for k, v in attributes.items() if k != "units"}
-            kept = data.astype(np.int8) if data.dtype == bool else data
-            variables[name] = Variable(kept, dims, str(attributes.get("units", "")), rest)
-    return out

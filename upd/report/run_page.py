@@ -12,13 +12,13 @@ from upd.report.folder import RunFolder, read_run
 from upd.report.page import Section, Verdict, make_panels, page_text, versions_text, write_page
 from upd.report.tables import (
     all_numbers,
+    analysis_charts,
     answer_tables,
     budget_table,
     checks_table,
     effects_table,
     filled,
     main_numbers,
-    run_charts,
     stage_table,
     warnings,
 )
@@ -70,7 +70,7 @@ def run_sections(run: RunFolder, surfaces: Sequence[Surface]) -> list[Section]:
     """The page of one run."""
     summary, entries = run.summary, run.summary["results"]
     size, cost = summary["size"], summary["cost"]
-    panels = make_panels(run_charts(run.arrays, summary), run.figures)
+    panels = make_panels(analysis_charts(run.arrays, summary), run.figures)
     tables = answer_tables(size, entries)
     known = any(entry.get("estimated_error") is not None for entry in entries)
     about = [

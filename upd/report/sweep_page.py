@@ -16,8 +16,7 @@ import numpy as np
 
 from upd.labels import number, unit_label
 from upd.plot.chart import Array, Chart
-from upd.plot.sample_charts import sample_charts
-from upd.plot.sweep_charts import Followed, figure_names, sheet_name, sweep_charts
+from upd.plot.sweep_charts import FIGURES, Followed, sample_charts, sweep_charts
 from upd.report.folder import damaged_file, is_png, read_json
 from upd.report.page import (
     Panel,
@@ -32,7 +31,6 @@ from upd.report.tables import SAMPLE_HEADING, filled, sample_table, stage_table,
 from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_title
 from upd.results.sampled import SampledNumber, sample_sentence
-from upd.vary.tables import TextTable
 
 #: values of a parameter written one by one
 _FEW = 8
@@ -175,8 +173,7 @@ def read_sweep(folder: Path) -> SweepFolder:
         raise damaged_file(path, damaged, "sweep")
     parameters = tuple(_parameter(axis) for axis in data["axes"])
     table = np.array([point["values"] for point in data["points"]], float).reshape(n, m)
-    names = figure_names((one["name"], one["case"]) for one in data["followed"])
-    files = {name: folder / f"{name}.png" for name in sorted(names)}
+    files = {name: folder / f"{name}.png" for name in FIGURES}
     figures = {name: file for name, file in files.items() if is_png(file)}
     return SweepFolder(folder, data, parameters, table, figures)
 
@@ -283,9 +280,8 @@ def sweep_panels(sweep: SweepFolder) -> list[Panel]:
     numbers = followed(sweep)
     varied = [p.short for p in sweep.parameters if len(p.values) > 1]
     over = f"Followed numbers over {' and '.join(varied)}"
-    headings = {sheet_name(n.name, n.case): number_title(n.name, n.case) for n in numbers}
     panels = make_panels(sweep_charts(sweep.parameters, numbers), sweep.figures)
-    return [replace(panel, heading=headings.get(panel.name, over)) for panel in panels]
+    return [replace(panel, heading=over) for panel in panels]
 
 
 def followed(sweep: SweepFolder) -> list[Followed]:
@@ -399,7 +395,7 @@ def write_study_report(
     title: str,
     failed: int,
     notes: Sequence[str],
-    tables: Iterable[TextTable],
+    tables: Iterable[AnswerTable],
     charts: Iterable[Chart],
     figures: Iterable[Path],
 ) -> Path:
@@ -423,17 +419,17 @@ def write_study_report(
     verdict = Verdict(*("warning", "Done in part") if failed else ("passed", "Done"), text)
     panels = make_panels(charts, {path.stem: path for path in figures})
     sections = [Section("Figures", panels=panels)]
-    for one in map(_table, tables):
+    for one in map(_shown, tables):
         sections.append(Section(one.heading, [one], kind="tall", folded=len(sections) > 1))
     return write_page(folder / "report.html", page_text(title, sections, verdict=verdict))
 
 
-def _table(table: TextTable) -> AnswerTable:
+def _shown(table: AnswerTable) -> AnswerTable:
     """Its columns but those of many words, which study.md has."""
     cells = list(zip(*table.rows, strict=True)) or [()] * len(table.columns)
     columns = {
-        ("# " if letter == "r" else "") + head.replace("\n", " "): mine
-        for head, letter, mine in zip(table.columns, table.align, cells, strict=True)
+        head.replace("\n", " "): mine
+        for head, mine in zip(table.columns, cells, strict=True)
         if head not in table.spare
     }
-    return filled(table.title, columns)
+    return filled(table.heading, columns)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5netcdf
 import numpy as np
@@ -20,10 +20,21 @@ from upd.results.case import NO_CASE, Case
 DIGEST = "result_nc_sha256"
 
 
-class ArrayGroup(dict[str, Any]):
-    """Variables of one group of result.nc: name -> (dimension names, array, attributes) or array.
+class Variable(NamedTuple):
+    """A variable of result.nc: names of its dimensions, data, attributes with unit and words."""
 
-    ``attributes`` are the group's own.
+    dims: tuple[str, ...]
+    data: np.ndarray[Any, Any]
+    attributes: Mapping[str, Any]
+
+    @property
+    def units(self) -> str:
+        """Its unit, "" when it has none."""
+        return str(self.attributes.get("units", ""))
+
+
+class Group(dict[str, Variable]):
+    """Variables of one group of result.nc by name, and the group's own ``attributes``.
 
     The attributes say what the group holds (``content``: "normal", "tangential", "cycle", ...) and
     carry the case's.
@@ -31,36 +42,42 @@ class ArrayGroup(dict[str, Any]):
 
     def __init__(
         self,
-        variables: Mapping[str, Any] | None = None,
+        variables: Mapping[str, tuple[Any, ...]] | None = None,
         /,
         *,
         content: str = "",
         case: Case = NO_CASE,
         **attributes: Any,
     ) -> None:
-        super().__init__(variables or {})
+        super().__init__({name: Variable(*one) for name, one in (variables or {}).items()})
         self.attributes: dict[str, Any] = (
             ({"content": content} if content else {}) | case.given() | attributes
         )
 
 
+Arrays = Mapping[str, Group]
+
+
 def variable(
     dims: str, data: Any, units: str = "", long_name: str = "", **attributes: Any
-) -> tuple[tuple[str, ...], np.ndarray[Any, Any], dict[str, Any]]:
-    """A variable of result.nc: its dimensions, with blanks between, its array, unit and words."""
+) -> Variable:
+    """A variable from its dimensions, with blanks between, its array, unit and words."""
     known = {"units": units, "long_name": long_name}
     about = {key: text for key, text in known.items() if text} | attributes
-    return tuple(dims.split()), np.asarray(data), about
+    array = np.asarray(data)
+    if array.dtype == bool:
+        # netCDF has no truth values
+        array = array.astype(np.int8)
+    return Variable(tuple(dims.split()), array, about)
 
 
-def write_netcdf(path: Path, arrays: Mapping[str, Mapping[str, Any]]) -> None:
+def write_netcdf(path: Path, arrays: Arrays) -> None:
     """Write arrays as one netCDF-4 file, whole or not at all.
 
     Parameters
     ----------
     arrays
-        Group -> name -> array or (dimension names, array, attributes); an `ArrayGroup` leaves its
-        attributes on its group.
+        Group -> name -> variable.
 
     Raises
     ------
@@ -69,29 +86,20 @@ def write_netcdf(path: Path, arrays: Mapping[str, Mapping[str, Any]]) -> None:
     """
     with whole_bytes(path) as content, h5netcdf.File(content, "w") as file:
         for name, variables in arrays.items():
+            # A file has no slash in the name of a group.
             group = file.create_group(name.replace("/", " per ")) if name else file
-            for key, value in getattr(variables, "attributes", {}).items():
+            for key, value in variables.attributes.items():
                 group.attrs[key] = np.int8(value) if isinstance(value, bool) else value
-            for key, value in variables.items():
-                dims, data, attributes = value if isinstance(value, tuple) else (None, value, {})
-                _write_variable(group, key, np.asarray(data), dims, attributes)
+            for key, one in variables.items():
+                _write_variable(group, key, one)
 
 
-def _write_variable(
-    group: Any,
-    name: str,
-    data: np.ndarray[Any, Any],
-    dims: Iterable[str] | None,
-    attributes: Mapping[str, Any],
-) -> None:
-    if data.dtype == bool:
-        data = data.astype(np.int8)
-    dims = tuple(dims) if dims is not None else tuple(f"{name}_{i}" for i in range(data.ndim))
-    for dim, length in zip(dims, data.shape, strict=True):
+def _write_variable(group: Any, name: str, one: Variable) -> None:
+    for dim, length in zip(one.dims, one.data.shape, strict=True):
         if dim not in group.dimensions:
             group.dimensions[dim] = length
-    variable = group.create_variable(name, dims, data.dtype, data=data)
-    for key, text in attributes.items():
+    variable = group.create_variable(name, one.dims, one.data.dtype, data=one.data)
+    for key, text in one.attributes.items():
         variable.attrs[key] = text
 
 
@@ -132,15 +140,20 @@ def _check_digest(path: Path) -> None:
         raise OSError("it is not as the run wrote it, its SHA-256 is another; run the scene again")
 
 
-def read_netcdf(path: Path) -> dict[str, ArrayGroup]:
-    """Arrays of a result.nc: group -> variable -> array, with the groups' attributes.
+def read_netcdf(path: Path) -> dict[str, Group]:
+    """Groups of a netCDF file by name, with dimensions, units and attributes.
 
-    Raises OSError as `open_netcdf` does.
+    Raises
+    ------
+    OSError
+        For a file that is missing, damaged or not as its run wrote it.
     """
 
-    def read(group: Any) -> ArrayGroup:
-        found = ArrayGroup({name: variable[...] for name, variable in group.variables.items()})
-        found.attributes.update(group.attrs)
+    def read(group: Any) -> Group:
+        variables = group.variables.items()
+        found = Group({n: (tuple(v.dimensions), v[...], dict(v.attrs)) for n, v in variables})
+        for key, value in group.attrs.items():
+            found.attributes[key] = value.item() if hasattr(value, "item") else value
         return found
 
     with open_netcdf(path) as file:

@@ -161,14 +161,6 @@ class Result:
     inputs: tuple[InputPart, ...] = ()
 
     @property
-    def half_words(self) -> str:
-        """What half of the error adds, by its largest part; "" where that is not known."""
-        if not self.parts:
-            half = self.half_error_cost_s
-            return "" if half is None else f"{half:+.3g} s"
-        return "" if self.estimated_error is None else largest(self.parts).half_words
-
-    @property
     def input_error(self) -> float | None:
         """Relative band by the inputs, as wide as their half-widths are: independent inputs add as
         squares. None without any, and where a part was not found.

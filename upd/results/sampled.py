@@ -25,8 +25,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,10 +102,6 @@ class SampledNumber:
     def resolved(self) -> bool:
         """Whether the ends are those of the middle 95 %."""
         return TAIL * self.count >= 1.0
-
-    def as_dict(self) -> dict[str, Any]:
-        """The comparison for JSON; what is not known is null."""
-        return asdict(self)
 
 
 def sampled_number(

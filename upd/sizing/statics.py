@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from upd.analyses.seated.lattice import face_angles, patch_frame
+from upd.analyses.seated.bodies import face_angles, patch_frame
 from upd.analyses.seated.plan import centrifugal_words
 from upd.contact.damper_section import (
     AdmissibleForces,

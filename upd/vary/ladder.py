@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from upd.errors import InputError
-from upd.plot.chart import Chart
-from upd.plot.work_precision import work_precision_charts
+from upd.results.answer_table import AnswerTable
 from upd.vary.curves import (
     ConvergenceCurve,
     accuracy_curves,
@@ -19,7 +18,7 @@ from upd.vary.curves import (
     with_friction,
 )
 from upd.vary.outcome import SolvedPoint, matching
-from upd.vary.tables import TextTable, convergence_tables, enough, level_table, points_table
+from upd.vary.tables import convergence_tables, enough, level_table, points_table
 from upd.vary.variation import Key, Overrides, Variation
 
 #: divisions, refinements, numbers of modes ...: the levels a user asks for; None: the usual ones
@@ -36,18 +35,15 @@ class StudyReport:
         Sentences below the tables.
     curves
         For study.json and the figures.
-    charts
-        Makes the figures from the curves as study.json holds them.
     details
         Further tables, of study.md and the page.
     """
 
-    tables: tuple[TextTable, ...]
+    tables: tuple[AnswerTable, ...]
     found: bool
     notes: tuple[str, ...] = ()
     curves: tuple[ConvergenceCurve, ...] = ()
-    charts: Callable[[Sequence[Mapping[str, Any]]], list[Chart]] = work_precision_charts
-    details: tuple[TextTable, ...] = ()
+    details: tuple[AnswerTable, ...] = ()
 
 
 #: scene, solved points, names of the numbers to follow -> the report
@@ -76,7 +72,7 @@ def finest_report(
 
 
 def _convergence(
-    solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve], *before: TextTable
+    solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve], *before: AnswerTable
 ) -> StudyReport:
     levels, errors = convergence_tables(solved, curves)
     notes = enough(curves)

@@ -3,51 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from upd.labels import percent, unit_label
+from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_label, quantity_of
 from upd.vary.curves import ConvergenceCurve
 from upd.vary.outcome import SolvedPoint
 from upd.vary.variation import Key
 
-#: head, "l" or "r", and what makes the cell of a row
-TableColumn = tuple[str, str, Callable[[Any], str]]
-
-
-@dataclass(frozen=True)
-class TextTable:
-    """A table for a terminal.
-
-    Cells as text, ``align`` a letter per column ("l", "r"). Columns of words named in ``spare`` are
-    left out first where the terminal is narrow.
-    """
-
-    title: str
-    columns: tuple[str, ...]
-    align: str
-    rows: tuple[tuple[str, ...], ...]
-    spare: tuple[str, ...] = ()
+#: head, with # before that of numbers, and what makes the cell of a row
+TableColumn = tuple[str, Callable[[Any], str]]
 
 
 def make_table(
     title: str, columns: Sequence[TableColumn], rows: Iterable[Any], spare: tuple[str, ...] = ()
-) -> TextTable:
+) -> AnswerTable:
     """A table of rows of any kind."""
-    heads, letters, cells = zip(*columns, strict=True)
+    heads, cells = zip(*columns, strict=True)
     made = tuple(tuple(cell(row) for cell in cells) for row in rows)
-    return TextTable(title, heads, "".join(letters), made, spare)
+    return AnswerTable(title, heads, made, spare=spare)
 
 
-def markdown_table(table: TextTable) -> list[str]:
+def markdown_table(table: AnswerTable) -> list[str]:
     """Lines of a table in Markdown, its columns as wide as their widest cell."""
-    rows = [tuple(head.replace("\n", " ") for head in table.columns), *table.rows]
+    rows = [tuple(head.lstrip("# ").replace("\n", " ") for head in table.columns), *table.rows]
     widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
-    signs = [">" if letter == "r" else "<" for letter in table.align]
+    signs = [">" if head.startswith("#") else "<" for head in table.columns]
     marks = ("-" * (n + 1) + "-:"[sign == ">"] for n, sign in zip(widths, signs, strict=True))
     lines = [f"| {' | '.join(map('{:{}{}}'.format, row, signs, widths))} |" for row in rows]
     return [lines[0], f"|{'|'.join(marks)}|", *lines[1:]]
@@ -58,12 +43,12 @@ _MAIN, _WANTED = 3, (0.01, 0.001)
 
 #: of a solved point: its place, its cost, and why it failed
 _POINTS: tuple[TableColumn, ...] = (
-    ("curve", "l", lambda one: str(one.point.source)),
-    ("level", "l", lambda one: str(one.point.label)),
-    ("seconds", "r", lambda one: f"{one.outcome.seconds:.2f}"),
-    ("dofs", "r", lambda one: f"{one.outcome.n_dof}"),
-    ("peak MB", "r", lambda one: f"{one.outcome.memory_mb:.0f}"),
-    ("note", "l", lambda one: str(one.outcome.failure)),
+    ("curve", lambda one: str(one.point.source)),
+    ("level", lambda one: str(one.point.label)),
+    ("# seconds", lambda one: f"{one.outcome.seconds:.2f}"),
+    ("# dofs", lambda one: f"{one.outcome.n_dof}"),
+    ("# peak MB", lambda one: f"{one.outcome.memory_mb:.0f}"),
+    ("note", lambda one: str(one.outcome.failure)),
 )
 
 
@@ -71,7 +56,7 @@ def points_table(
     solved: Sequence[SolvedPoint],
     keys: Sequence[Key] = (),
     errors: Mapping[tuple[str, str], float] | None = None,
-) -> TextTable:
+) -> AnswerTable:
     """The points, what they have of the numbers `keys`, and what they cost.
 
     Parameters
@@ -87,9 +72,9 @@ def points_table(
         return percent((errors or {}).get((one.point.source, one.point.label)))
 
     numbers: list[TableColumn] = [
-        (_head(name, case.label), "r", partial(text, (name, case))) for name, case in keys
+        (f"# {_head(name, case.label)}", partial(text, (name, case))) for name, case in keys
     ]
-    more = [("difference", "r", difference)] if errors else []
+    more = [("# difference", difference)] if errors else []
     # what a narrow terminal leaves out first stands last
     columns = (*_POINTS[:2], *numbers[:1], *more, *_POINTS[2:5], *numbers[1:], _POINTS[5])
     return make_table("Levels", columns, solved)
@@ -104,7 +89,7 @@ def _head(name: str, case: str) -> str:
 
 def convergence_tables(
     solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve]
-) -> tuple[TextTable, TextTable]:
+) -> tuple[AnswerTable, AnswerTable]:
     """The points with their main numbers and cost, then the curves: the error of every followed
     number on its finest level, its rate, the error estimated there, and those of the other levels.
     """
@@ -116,16 +101,16 @@ def convergence_tables(
     errors = make_table(
         "Error",
         (
-            ("number", "l", lambda c: number_label(c.name)),
-            ("case", "l", lambda c: str(c.case)),
-            ("curve", "l", lambda c: str(c.curve)),
-            ("finest", "r", lambda c: percent(c.error[-1])),
-            ("order", "r", lambda c: f"{c.order:.1f}" if np.isfinite(c.order) else ""),
-            ("estimated", "r", _estimated),
-            ("thesis", "r", lambda c: percent(c.thesis_error)),
-            ("against", "l", lambda c: str(c.against)),
-            ("verdict", "l", lambda c: str(c.verdict)),
-            ("error on each level", "l", _levels_text),
+            ("number", lambda c: number_label(c.name)),
+            ("case", lambda c: str(c.case)),
+            ("curve", lambda c: str(c.curve)),
+            ("# finest", lambda c: percent(c.error[-1])),
+            ("# order", lambda c: f"{c.order:.1f}" if np.isfinite(c.order) else ""),
+            ("# estimated", _estimated),
+            ("# thesis", lambda c: percent(c.thesis_error)),
+            ("against", lambda c: str(c.against)),
+            ("verdict", lambda c: str(c.verdict)),
+            ("error on each level", _levels_text),
         ),
         curves,
         spare=("against", "verdict", "error on each level"),
@@ -181,14 +166,14 @@ def level_table(
     keys: Sequence[Key],
     solved: Sequence[SolvedPoint],
     text: Callable[[SolvedPoint, Key], str],
-) -> TextTable:
+) -> AnswerTable:
     """A row for every number, with what each level has of it."""
-    levels = ((one.point.label, "r", partial(text, one)) for one in solved)
+    levels = ((f"# {one.point.label}", partial(text, one)) for one in solved)
     return make_table(
         title,
         (
-            ("number", "l", lambda key: number_label(key[0])),
-            ("case", "l", lambda key: str(key[1].label)),
+            ("number", lambda key: number_label(key[0])),
+            ("case", lambda key: str(key[1].label)),
             *levels,
         ),
         keys,

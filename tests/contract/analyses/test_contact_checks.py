@@ -259,10 +259,6 @@ def few_lines(s: Any) -> None:
     s.model = replace(s.model, patches=patches)
 
 
-def shear_moves(s: Any) -> None:
-    s.moved = dict.fromkeys(s.moved, 1.0)
-
-
 def careless(s: Any) -> None:
     """Products with K of one body that were solved to a thousandth."""
     condensed = {k: (copy.copy(one), at) for k, (one, at) in s.model.upper.condensed.items()}
@@ -284,7 +280,7 @@ COMMON: dict[str, Callable[[Any], None]] = {
     "onset of yield": yielding,
     **{
         effect: solved_again(effect)
-        for effect in (left_out.DIRECTIONS, left_out.COUPLING, left_out.MATERIALS, left_out.LARGE)
+        for effect in (left_out.DIRECTIONS, left_out.COUPLING, left_out.LARGE)
     },
 }
 
@@ -306,7 +302,6 @@ SPOILERS: dict[tuple[str, str, str], Callable[[Any], None]] = {
     **{("flat", "damper", name): spoil for name, spoil in COMMON.items()},
     ("flat", "damper", "loop area"): loop,
     ("flat", "damper", "resolution"): few_lines,
-    ("flat", "damper", "pressure moved by shear"): shear_moves,
     ("flat", "damper", left_out.TILT): solved_again(left_out.TILT),
     ("flat", "tilting", "no penetration"): penetration,
     ("flat", "tilting", "moment balance"): moment,

@@ -14,7 +14,7 @@ from upd.contact import contact_points
 from upd.errors import InputError
 from upd.fem import Material, mass_properties
 from upd.mesh import recipes
-from upd.results import ArrayGroup, write_netcdf
+from upd.results import Group, write_netcdf
 from upd.scene import load_scene
 
 RIGS = {"symmetric": "wedge_platform", "asymmetric": "pads_platform"}
@@ -110,7 +110,7 @@ def test_a_run_is_compared_by_the_scene_in_its_folder(tmp_path: Path) -> None:
         rows=1,
         columns=2,
     )
-    group = ArrayGroup(law.to_arrays(), content="contact law")
+    group = Group(law.to_arrays(), content="contact law")
     write_netcdf(tmp_path / "result.nc", {"contact law F=5 N": group})
     own = {
         "stiffness.own": {"run": str(tmp_path)},

@@ -20,10 +20,10 @@ from scipy.sparse.linalg import splu
 import upd
 from upd.analyses import make_plan
 from upd.analyses.contact.bodies import prepare
-from upd.analyses.contact.left_out import displaced_gap, pressure_slip
+from upd.analyses.contact.left_out import displaced_gap
 from upd.analyses.contact.loading import raised
 from upd.analyses.contact.plan import NORMAL, ContactPlan
-from upd.contact import normal_contact, tangential_contact
+from upd.contact import normal_contact
 from upd.contact.model import ContactModel
 from upd.fem import rigid_body_modes
 from upd.progress import Stages
@@ -277,18 +277,3 @@ def _misfit(divisions: int) -> float:
     assert inside.sum() > 10
     mine = plain + (displaced_gap(model, f) - model.gap)
     return float(np.abs(mine - g)[inside].max() / np.abs(plain - g)[inside].max())
-
-
-def test_pressure_alone_slides_unlike_faces() -> None:
-    """Full stick: the tractions cancel the mismatch, t = C^-1 (d - o), with their sum zero."""
-    _, model = companion("hertz")
-    f = normal_contact(model.compliance(NORMAL), model.gap, load=200.0).force
-    loaded = np.flatnonzero(f > 0.0)
-    history = pressure_slip(model, (0,), f, loaded)
-    C = model.compliance(0)[np.ix_(loaded, loaded)]
-    o = (model.compliance(0, NORMAL) @ f)[loaded]
-    assert np.abs(o).max() > 0.0
-    answer = tangential_contact(C, np.full(len(loaded), 1e6), load=0.0, history=history)
-    e = np.ones(len(o))
-    d = float(e @ np.linalg.solve(C, o) / (e @ np.linalg.solve(C, e)))
-    assert answer.force == pytest.approx(np.linalg.solve(C, d - o), rel=1e-6, abs=1e-9)

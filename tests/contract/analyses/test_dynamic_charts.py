@@ -11,19 +11,20 @@ import numpy as np
 import pytest
 
 from upd.analyses import forced, modal
-from upd.plot.chart import Chart, Group, Variable
+from upd.plot.chart import Chart
+from upd.results import Group, Variable, variable
 
 CURVE = {"content": "friction", "stiffness": "own", "force_ratio": 194.0}
 
 
 def group(attributes: dict[str, Any], **variables: Variable) -> Group:
-    made = Group(attributes)
-    made.update(variables)
+    made = Group(variables)
+    made.attributes.update(attributes)
     return made
 
 
 def values(data: Any, *dims: str, units: str = "", **attributes: str) -> Variable:
-    return Variable(np.asarray(data), dims, units, attributes)
+    return variable(" ".join(dims), data, units, **attributes)
 
 
 def accelerance(magnitude: Any) -> Variable:

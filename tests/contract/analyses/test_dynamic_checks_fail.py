@@ -13,7 +13,6 @@ import pytest
 from upd.analyses import forced, make_plan, modal
 from upd.analyses.base import Resolved
 from upd.analyses.forced.interface_model import make_springs
-from upd.analyses.forced.levels import HARMONICS, SAMPLES
 from upd.analyses.forced.measures import accelerance, residual_error
 from upd.analyses.forced.performance import Performance, RatioPoint, of_curve
 from upd.analyses.forced.solution import ForcedSolution
@@ -132,23 +131,6 @@ def _checked(s: ForcedSolution, **values: Any) -> ForcedSolution:
     )
 
 
-def _level(source: str, factor: float) -> Callable[[ForcedSolution], ForcedSolution]:
-    """Peaks on a level so many times as high."""
-
-    def spoil(s: ForcedSolution) -> ForcedSolution:
-        levels = [
-            one._replace(
-                peaks={at: p._replace(height=factor * p.height) for at, p in one.peaks.items()}
-            )
-            if one.of.source == source
-            else one
-            for one in s.levels["thesis"]
-        ]
-        return replace(s, levels={"thesis": levels})
-
-    return spoil
-
-
 def _at_rest(s: ForcedSolution, N: Sequence[float], T: Sequence[float]) -> ForcedSolution:
     model = s.models["thesis"]
     state = StaticState("given", np.array(N), np.array(T))
@@ -192,9 +174,6 @@ SPOIL_FORCED: dict[str, Callable[[ForcedSolution], ForcedSolution]] = {
     "static balance": _unbalanced,
     "preloaded contact": lambda s: _at_rest(s, (0.0, 350.0), (0.0, 100.0)),
     "preloaded contact, mobilised": lambda s: _at_rest(s, (200.0, 200.0), (120.0, -120.0)),
-    "more harmonics": _level(HARMONICS, 1.2),
-    "more harmonics, lost": _level(HARMONICS, np.nan),
-    "twice the samples": _level(SAMPLES, 1.03),
     "confirmed by time integration": lambda s: _checked(
         s, integrated=1.06 * s.curves[0].checked[0].balance
     ),
@@ -289,15 +268,6 @@ def test_spoiled_response_fails(response: ForcedSolution, spoiled: str) -> None:
 def test_every_check_of_a_response_is_spoiled(response: ForcedSolution) -> None:
     checks = forced.ANALYSIS.check_solution(response)
     assert {c.name for c in checks} == {name_of(one) for one in SPOIL_FORCED}
-
-
-def test_a_height_of_time_integration_needs_no_more_harmonics(response: ForcedSolution) -> None:
-    """Found by bisection down the path it holds all of them: the level is not asked."""
-    spoiled = _level(HARMONICS, 1.2)(response)
-    curve = spoiled.curves[0]
-    lower = tuple(replace(one, sample=3) for one in curve.checked)
-    found = replace(spoiled, curves=[replace(curve, checked=lower)])
-    assert "more harmonics" not in {c.name for c in forced.ANALYSIS.check_solution(found)}
 
 
 @pytest.mark.parametrize("name", SPOIL_MODAL)

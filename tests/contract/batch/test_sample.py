@@ -19,7 +19,7 @@ from upd.batch.point import point_settings
 from upd.batch.sweeps import SweepResult
 from upd.cli import main
 from upd.errors import InputError
-from upd.plot.sample_charts import sample_charts
+from upd.plot.sweep_charts import sample_charts
 from upd.results.sampled import AGREES, DIFFERS
 from upd.scene import load_scene
 

@@ -23,7 +23,7 @@ from upd.cli.batch import study_columns
 from upd.cli.tables import print_table
 from upd.errors import InputError
 from upd.mesh.recipes import build_mesh
-from upd.plot.work_precision import change_charts, work_precision_charts
+from upd.plot.work_precision import work_precision_charts
 from upd.results import Case, Result
 from upd.vary.curves import ESTIMATED, TRUE, accuracy_curves, finest_curves, make_curves
 from upd.vary.ladder import limit_report
@@ -394,7 +394,3 @@ def test_figures_show_both_costs_and_the_estimate() -> None:
         assert estimate.x == curve.x[-1:]
         # order 2 of three levels: 3 times the difference from the limit, 321 - 320
         assert estimate.y == pytest.approx(100.0 * 3.0 / 321.0, rel=1e-9)
-    changes = change_charts(
-        [{**asdict(c), "error": (0.1, 0.0, 0.0)} for c in make_curves(levels, ["stuck"])]
-    )
-    assert [c.x.name for c in changes] == ["seconds", "peak memory"]

@@ -401,7 +401,7 @@ def test_two_pads_are_compared_one_by_one(tmp_path: Path) -> None:
     values = {name: value for (name, _), value in found.solved[0].values.items()}
     assert values["K_N_per_pad"] == pytest.approx(values["K_N_secant_raw"] / 2.0, rel=1e-12)
     (table,) = found.report.tables
-    assert table.columns[2].startswith("K_N of one pad")
+    assert table.columns[2].startswith("# K_N of one pad")
     assert not any("secant" in head for head in table.columns)
 
 

@@ -232,16 +232,15 @@ def test_words_are_ticks(tmp_path: Path) -> None:
     assert "page-data" in write_report(made.path).read_text("utf-8")
 
 
-def test_more_parameters_give_small_multiples_on_one_scale(tmp_path: Path) -> None:
+def test_more_parameters_give_a_curve_per_combination_of_the_others(tmp_path: Path) -> None:
     made = read_sweep(_made(tmp_path / "many", {"a": [1, 2, 3], "b": [1, 2], "e": ["x", "y"]}))
-    charts = sweep_charts(made.parameters, followed(made))
-    assert [c.case for c in charts] == ["e = x", "e = y"] and {c.figure for c in charts} == {
-        "sweep-approach"
-    }
-    assert {(m.low, m.top) for c in charts for m in c.maps} == {(0.0, 11.0)}
-    np.testing.assert_array_equal(charts[1].maps[0].z, [[1.0, 3.0], [5.0, 7.0], [9.0, 11.0]])
+    (chart,) = sweep_charts(made.parameters, followed(made))
+    assert chart.figure == "sweep" and not chart.maps
+    assert [t.label for t in chart.traces] == ["b 1, e x", "b 1, e y", "b 2, e x", "b 2, e y"]
+    np.testing.assert_array_equal(chart.traces[1].y, [1.0, 5.0, 9.0])
+    np.testing.assert_array_equal(chart.traces[2].y, [2.0, 6.0, 10.0])
     (panel,) = sweep_panels(read_sweep(made.path))
-    assert panel.heading == "approach, raw"
+    assert panel.heading == "Followed numbers over a and b and e"
 
 
 def test_one_value_everywhere_is_told(tmp_path: Path) -> None:

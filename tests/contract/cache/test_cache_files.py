@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from upd.cache.files import locked, whole_file, whole_files, write_text
-from upd.results import read_netcdf, write_netcdf
+from upd.results import Group, read_netcdf, variable, write_netcdf
 
 
 class StopError(Exception):
@@ -38,10 +38,10 @@ def test_a_file_in_writing_is_not_seen_under_its_name(tmp_path: Path) -> None:
 
 def test_arrays_that_cannot_be_written_leave_the_old_ones(tmp_path: Path) -> None:
     path = tmp_path / "result.nc"
-    write_netcdf(path, {"a": {"x": [1.0]}})
+    write_netcdf(path, {"a": Group({"x": variable("n", [1.0])})})
     with pytest.raises(TypeError):
-        write_netcdf(path, {"a": {"x": [2.0]}, "b": {"y": object()}})
-    assert read_netcdf(path)["a"]["x"].tolist() == [1.0]
+        write_netcdf(path, {"a": Group({"x": variable("n", [2.0]), "y": variable("", object())})})
+    assert read_netcdf(path)["a"]["x"].data.tolist() == [1.0]
     assert list(tmp_path.iterdir()) == [path]
 
 

@@ -25,7 +25,7 @@ from upd.errors import InputError
 from upd.matrices import Matrices, read_dof_map, read_matrices, read_matrix, write_matrices
 from upd.matrices.response import Joint, forced_response
 from upd.reduction import ReducedModel, craig_bampton
-from upd.results import ArrayGroup, write_netcdf
+from upd.results import Group, write_netcdf
 from upd.scene import ready_scenes
 
 #: what the whole set must hold
@@ -313,7 +313,7 @@ def law() -> dict[str, Any]:
 def _law_file(path: Path, **changes: Any) -> None:
     arrays = {k: changes.get(k.rpartition("_")[2], v) for k, v in law().items()}
     given = {k: v for k, v in arrays.items() if v is not None}
-    write_netcdf(path, {"contact law F=1 N": ArrayGroup(given, content="contact law")})
+    write_netcdf(path, {"contact law F=1 N": Group(given, content="contact law")})
 
 
 def _cut(path: Path) -> None:

@@ -98,8 +98,8 @@ def test_thesis_errors_stand_beside_the_thesis_scene(folder: Path) -> None:
 def test_arrays_read_back(folder: Path) -> None:
     arrays = read_netcdf(folder / "result.nc")
     case = arrays["F=200 N"]
-    assert case["normal_force"].sum() == pytest.approx(200.0, rel=1e-10)
-    assert case["pressure"].shape == (len(case["x"]), len(case["y"])) == (13, 13)
+    assert case["normal_force"].data.sum() == pytest.approx(200.0, rel=1e-10)
+    assert case["pressure"].data.shape == (len(case["x"].data), len(case["y"].data)) == (13, 13)
     assert "F=200 N T per muN=0.5" in arrays
 
 

@@ -256,10 +256,11 @@ def test_arrays_that_the_disk_does_not_take_end_no_process(tmp_path: Path) -> No
     """HDF5, writing to the file itself, takes the process with it."""
     code = (
         "import resource, signal, sys; from pathlib import Path; import numpy as np\n"
-        "from upd.results import write_netcdf\n"
+        "from upd.results import Group, variable, write_netcdf\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))\n"
-        "try: write_netcdf(Path(sys.argv[1]), {'': {'x': np.arange(1e5)}})\n"
+        "group = Group({'x': variable('n', np.arange(1e5))})\n"
+        "try: write_netcdf(Path(sys.argv[1]), {'': group})\n"
         "except OSError as error: print(error.strerror)"
     )
     done = subprocess.run(

@@ -48,7 +48,8 @@ def test_from_two_files_to_numbers(mine: Path, capsys: pytest.CaptureFixture[str
     summary = json.loads((mine / "run" / "summary.json").read_text(encoding="utf-8"))
     assert summary["status"] == "ok"
     assert summary["size"]["mesh"]["crown"] == 300.0
-    arrays = read_netcdf(mine / "run" / "result.nc")["F=400 N"]
+    read = read_netcdf(mine / "run" / "result.nc")["F=400 N"]
+    arrays = {name: one.data for name, one in read.items()}
     assert arrays["normal_force"].sum() == pytest.approx(400.0, rel=1e-9)
     # The crown is symmetric and the loads are: so is the pressure, to the solver's tolerance.
     np.testing.assert_allclose(

@@ -295,13 +295,13 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 13650,
+    "analyses": 13403,
     "hbm": 6947,
     "contact": 4195,
     "linalg": 3387,
     "scene": 2262,
-    "plot": 2065,
-    "report": 2217,
+    "plot": 1870,
+    "report": 2112,
     "fitting": 1627,
     "sizing": 1630,
     "batch": 1586,
@@ -311,7 +311,7 @@ ROOM_LINES = {
     "cli": 994,
     "measured": 916,
     "reduction": 879,
-    "results": 902,
+    "results": 901,
     "fem": 856,
     "matrices": 690,
     "root": 595,

@@ -50,8 +50,8 @@ def test_arrays_and_charts_are_those_of_the_run(run: RunResult) -> None:
     assert run.folder is not None
     again = upd.load(run.folder)
     assert list(again.arrays) == list(run.arrays)
-    for name, group in notebook.chart_arrays(run).items():
-        theirs = notebook.chart_arrays(again)[name]
+    for name, group in run.arrays.items():
+        theirs = again.arrays[name]
         assert theirs.attributes == group.attributes
         assert list(theirs) == list(group)
         for key, variable in group.items():
@@ -89,12 +89,12 @@ def test_curves_hold_every_digit_and_their_units(run: RunResult) -> None:
     assert files
     if run.scene.startswith("hertz"):
         curve = _read(run.folder / "curves" / "force_approach.csv")
-        group = notebook.chart_arrays(run)["force-approach"]
+        group = run.arrays["force-approach"]
         np.testing.assert_array_equal(curve["approach [mm]"], group["approach"].data)
         np.testing.assert_array_equal(curve["normal_force [N]"], group["normal_force"].data)
         # the computed fields, with their places, beside the closed forms
         label = run.results[0].case.label
-        file, group = file_name(label), notebook.chart_arrays(run)[label]
+        file, group = file_name(label), run.arrays[label]
         places = _read(run.folder / "curves" / f"{file}-map.csv")
         np.testing.assert_array_equal(places["pressure [MPa]"], group["pressure"].data.ravel())
         top = np.argmax(places["pressure [MPa]"])
@@ -103,7 +103,7 @@ def test_curves_hold_every_digit_and_their_units(run: RunResult) -> None:
         assert places["y [mm]"][top] == group["y"].data[j]
     if run.scene.startswith("rig"):
         curve = _read(run.folder / "curves" / "response_free.csv")
-        group = notebook.chart_arrays(run)["response free"]
+        group = run.arrays["response free"]
         value = group["accelerance_right"].data
         unit = "[(m/s2)/N]"
         np.testing.assert_array_equal(curve["frequency [Hz]"], group["frequency"].data)
@@ -121,11 +121,10 @@ def test_every_curve_of_the_arrays_has_a_file(run: RunResult, tmp_path: Path) ->
 
 
 def test_hysteresis_loops_are_columns_of_one_file(tmp_path: Path) -> None:
-    from upd.plot.chart import Group, Variable
+    from upd.results import Group, variable
 
-    group = Group()
     loop = np.arange(6.0).reshape(2, 3)
-    group["loop_displacement"] = Variable(loop, ("loop", "sample"), "mm", {})
+    group = Group({"loop_displacement": variable("loop sample", loop, "mm")})
     (path,) = write_curves({"friction own": group}, tmp_path)
     curve = _read(path)
     assert list(curve) == ["loop_displacement loop 1 [mm]", "loop_displacement loop 2 [mm]"]

@@ -21,7 +21,7 @@ from upd.errors import InputError
 from upd.report import notebook
 from upd.report.folder import read_run
 from upd.report.notebook import RunResult
-from upd.report.tables import run_charts
+from upd.report.tables import analysis_charts
 from upd.results import status_of
 from upd.results.quantities import number_label
 
@@ -132,7 +132,7 @@ def test_charts_are_those_of_the_run_folder(
     result = small_run(scene)
     assert result.folder is not None
     run = read_run(result.folder)
-    mine, theirs = notebook.charts(result), run_charts(run.arrays, run.summary)
+    mine, theirs = notebook.charts(result), analysis_charts(run.arrays, run.summary)
     assert [(c.title, c.case) for c in mine] == [(c.title, c.case) for c in theirs]
     for a, b in zip(mine, theirs, strict=True):
         for ta, tb in zip(a.traces, b.traces, strict=True):

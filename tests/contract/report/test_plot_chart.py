@@ -27,7 +27,6 @@ from upd.plot.chart import (
     Area,
     Axis,
     Band,
-    Bars,
     Chart,
     Map,
     Mark,
@@ -214,7 +213,7 @@ def test_labels_and_legends_of_a_sheet_cover_nothing(log: bool, tmp_path: Path) 
     crowd = replace(_crowd(), y=replace(Y, log=log))
     names = [f"F_C/F_E 2000, static reversed, sweep {k}" for k in range(30)]
     many = tuple(replace(crowd.traces[0], label=name) for name in names)
-    charts = [crowd, replace(crowd, traces=many), _bars(), _pies(), _map(), crowd]
+    charts = [crowd, replace(crowd, traces=many), _pies(), _map(), crowd]
     sheet = written_figure(charts, tmp_path)
     sheet.draw_without_rendering()
     axes = [ax for ax in sheet.axes if ax.get_title()]
@@ -345,59 +344,7 @@ def test_states_have_their_colours() -> None:
         assert named(chart, state)["fillcolor"] == SHARE_COLOURS[state]
 
 
-# ---------------------------------------------------------------- bars, pies, scatter
-
-
-def _bars() -> Chart:
-    parts = {"near": np.array([60.0, 70.0]), "far": np.array([40.0, 30.0])}
-    return Chart(
-        "t",
-        Axis("share", "%", low=0.0, high=100.0),
-        Axis(""),
-        bars=(Bars(("one", "two"), parts, {"near": ("6", "7"), "far": ("4", "3")}),),
-    )
-
-
-def test_bars_are_stacked() -> None:
-    ax = drawn(_bars())
-    boxes = [
-        (p.get_x(), p.get_width(), round(p.get_y() + 0.5 * p.get_height(), 9)) for p in ax.patches
-    ]
-    assert boxes == [(0.0, 60.0, 0.0), (0.0, 70.0, 1.0), (60.0, 40.0, 0.0), (70.0, 30.0, 1.0)]
-    assert [t.get_text() for t in ax.texts] == ["6", "7", "4", "3"] and entries(ax) == [
-        "near",
-        "far",
-    ]
-    assert [t.get_text() for t in ax.get_yticklabels()] == ["one", "two"] and ax.get_ylim()[
-        0
-    ] > ax.get_ylim()[1], "the first on top"
-    assert {t.get_rotation() for t in ax.texts} == {0.0}
-    made = figure(_bars())
-    assert made["layout"]["barmode"] == "stack" and made["layout"]["yaxis"]["ticktext"] == [
-        "one",
-        "two",
-    ]
-    near, far = made["data"]
-    assert (near["type"], near["orientation"], near["y"], near["text"]) == (
-        "bar",
-        "h",
-        [0, 1],
-        ["6", "7"],
-    )
-    assert numbers(far["x"]).tolist() == [40.0, 30.0]
-
-
-def test_texts_wider_than_their_part_are_turned() -> None:
-    parts = {"near": np.array([98.0]), "far": np.array([2.0])}
-    ax = drawn(
-        Chart(
-            "t",
-            X,
-            Axis(""),
-            bars=(Bars(("one",), parts, {"near": ("0.98 mm",), "far": ("0.02 mm",)}),),
-        )
-    )
-    assert [t.get_rotation() for t in ax.texts] == [0.0, 90.0]
+# ---------------------------------------------------------------- pies, scatter
 
 
 def _pies() -> Chart:
@@ -716,7 +663,6 @@ def test_text_is_text() -> None:
         marks=(Mark(1.0, 1.0, evil),),
         bands=(Band(evil, "x", 1.0, 1.0),),
         areas=(Area(evil, T, T, T),),
-        bars=(Bars((evil,), {evil: np.ones(1)}, {evil: (evil,)}),),
         scatters=(Scatter(T, T, T, T, Axis(evil, evil)),),
         pies=(Pies(T[:1], T[:1], np.ones((1, 1)), T[:1], (evil,), evil),),
     )
@@ -749,7 +695,6 @@ def every() -> list[Chart]:
             bands=bands,
             areas=areas,
         ),
-        _bars(),
         _pies(),
         Chart("Points", X, Y, scatters=(points,), equal=True),
         _map(),
@@ -883,20 +828,7 @@ def test_a_comparison_overlays_every_part(every: list[Chart]) -> None:
     assert [b.label for b in both.bands] == ["limit", "range", "more"], (
         "a limit that both have is drawn once"
     )
-    (bars,) = overlaid([one[1:2], one[1:2]], ["left", "right"])
-    assert [case for b in bars.bars for case in b.cases] == [
-        "left: one",
-        "left: two",
-        "right: one",
-        "right: two",
-    ]
-    assert len(drawn(bars).patches) == 8 and [t["y"] for t in figure(bars)["data"]] == [
-        [0, 1],
-        [0, 1],
-        [2, 3],
-        [2, 3],
-    ]
-    for chart in (one[0], *one[2:]):
+    for chart in one:
         pair = overlaid([[chart], [chart]], ["left", "right"])
         assert [c.title for c in pair] == [f"{chart.title}: left", f"{chart.title}: right"], (
             "what fills its place stands beside the other"

@@ -19,7 +19,8 @@ from upd.analyses.contact.varied import (
     coarsened,
     plan_with_estimates,
 )
-from upd.plot.chart import Arrays, Chart
+from upd.plot.chart import Chart
+from upd.results import Arrays
 from upd.vary import errors
 from upd.vary.wanted import Wanted, plan_wanted
 

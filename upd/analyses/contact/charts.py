@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.plot.chart import Array, Arrays, Axis, Band, Bars, Chart, Group, Map, Scatter, Style, Trace
+from upd.plot.chart import Array, Axis, Band, Chart, Map, Scatter, Style, Trace
 from upd.plot.common import UM, case_of, circle, cut, pressure_map, scalar, state_map, with_content
-from upd.results import Case
+from upd.results import Arrays, Case, Group
 
 #: axes and size of flat faces
 FACE: dict[str, Any] = {
@@ -63,7 +63,6 @@ def curved_charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
         ),
         *(_tractions(group, mine) for group in loaded if (mine := _of_load(sheared, group))),
         *_approaches(arrays),
-        *_split(loaded[::-1]),
         *(_over_load(group, *quantity) for group in curves for quantity in _OVER_LOAD),
         *(_compressions(group) for group in curves if _beyond_3a(group)),
         *(_loop(group) for group in reversed(with_content(arrays, "cycle"))),
@@ -325,27 +324,6 @@ def _tractions(normal: Group, tangential: Sequence[Group]) -> Chart:
     ordinate = Axis("traction", "MPa", high=1.45 * float(max(t.y.max() for t in traces)) or None)
     title = "Tangential traction along y = 0"
     return Chart(title, _X_UM, ordinate, traces, case=case, figure="traction")
-
-
-def _split(loaded: Sequence[Group]) -> list[Chart]:
-    """Share of the approach near the contact and in each body beyond depth 3a."""
-    groups = [group for group in loaded if "finite_body" in group]
-    if not groups:
-        return []
-    approach = np.array([float(group["approach"].data) for group in groups])
-    beyond = {
-        f"{body} beyond 3a": np.array([float(g[name].data) for g in groups])
-        for name, body in _beyond_3a(groups[0]).items()
-    }
-    lengths = {"within 3a of the contact": approach - sum(beyond.values())} | beyond
-    bars = Bars(
-        tuple(case_of(group).label for group in groups),
-        {label: 100.0 * v / approach for label, v in lengths.items()},
-        {label: tuple(f"{one * UM:.3g} µm" for one in v) for label, v in lengths.items()},
-    )
-    title = "Approach: near the contact and in the bodies"
-    axes = Axis("share of the approach", "%"), Axis("")
-    return [Chart(title, *axes, bars=(bars,), figure="force_approach")]
 
 
 def _loop(group: Group) -> Chart:

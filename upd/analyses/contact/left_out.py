@@ -5,7 +5,6 @@ companion, a coarser whole model with all three directions, once without the eff
 it:
 
 - normal and tangential contact at once, a run of its own with contact.coupling = "coupled",
-- the shear that pressure alone puts between unlike materials, as a slip already there,
 - the gap taken at the places that the displacement carries the faces to.
 """
 
@@ -19,17 +18,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.base import Resolved
+from upd.analyses.base import Resolved, keeping
 from upd.analyses.contact import plan as planned
 from upd.analyses.contact.bodies import prepare
 from upd.analyses.contact.loading import LOAD_STEP, slope_loads
 from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan
 from upd.analyses.contact.results import make_results
 from upd.analyses.contact.solution import ContactSolution, NormalCase, PressedContact
-from upd.analyses.contact.solve import Frozen, press, solve_plan
+from upd.analyses.contact.solve import press, solve_plan
 from upd.contact.checks import few_threads
 from upd.contact.model import ContactModel
-from upd.contact.tangential_step import TangentialHistory
 from upd.errors import InputError, UpdError
 from upd.progress import Stages
 from upd.results import Case, Result
@@ -49,7 +47,7 @@ _COUPLED = (
     "contact_area",
     "stick_area",
 )
-_WITHOUT_STIFFNESS = ("approach", "K_T_secant_raw")
+_WITHOUT_STIFFNESS = ("approach", "K_T_secant_raw", "cycle_energy")
 #: of a damper that tips over when its tilt is free
 _TIPS = (
     "the load line runs beside the contact, so that a damper free to tilt tips over: give a "
@@ -68,20 +66,19 @@ def solve(wanted: Wanted, plan: ContactPlan, stages: Stages) -> ContactSolution:
     cases = [one for one in solution.normal if one.force]
     if not shown:
         return solution
-    try:
-        with stages("effects left out", "the tilt; the others on a coarser whole model"):
-            if planned.TILT in shown:
-                solution.left_out += [_tilted(solution, case) for case in cases]
-            if companion is not None:
-                try:
-                    model = prepare(companion, Stages(), "companion")
-                    with few_threads(model.gap):
-                        solution.left_out += list(_on_companion(solution, model))
-                except UpdError:
-                    solution.left_out += _not_solved(solution.plan, [one.case for one in cases])
-    except BaseException as error:
-        error.partial = solution  # type: ignore[attr-defined]
-        raise
+    with (
+        keeping(solution),
+        stages("effects left out", "the tilt; the others on a coarser whole model"),
+    ):
+        if planned.TILT in shown:
+            solution.left_out += [_tilted(solution, case) for case in cases]
+        if companion is not None:
+            try:
+                model = prepare(companion, Stages(), "companion")
+                with few_threads(model.gap):
+                    solution.left_out += list(_on_companion(solution, model))
+            except UpdError:
+                solution.left_out += _not_solved(solution.plan, [one.case for one in cases])
     return solution
 
 
@@ -166,49 +163,16 @@ def _displaced(plan: ContactPlan, model: ContactModel, case: Case, load: float) 
 def _sheared(solution: ContactSolution, model: ContactModel) -> Iterator[Resolved]:
     plan, scene = solution.plan, solution.plan.scene
     companion = partial(solve_plan, stages=Stages(), model=model, companion=True)
-    mine = companion(variant(plan, scene.contact.directions))
-    numbers = make_results(mine)
-    for case in () if solution.curved else mine.normal:
-        for direction in scene.loads.directions:
-            way = Frozen(mine, case, direction)
-            solution.moved[mine.sheared_case(case, direction)] = way.moved_pressure()
+    numbers = make_results(companion(variant(plan, scene.contact.directions)))
     if planned.COUPLING in plan.shown:
         coupled = variant(plan, 2, coupling="coupled")
         yield from _coupled_changes(scene, numbers, lambda: make_results(companion(coupled)))
-    directions = scene.loads.directions
     if planned.DIRECTIONS in plan.shown:
         both = make_results(companion(variant(plan, 2)))
         names = ["K_T_initial_raw", "K_T_secant_raw", "cycle_energy"]
-        names += [f"K_T{planned.direction_name(d)}_initial_raw" for d in directions]
+        names += [f"K_T{planned.direction_name(d)}_initial_raw" for d in scene.loads.directions]
         found = list(_changes(planned.DIRECTIONS, names, numbers, both))
         yield from found or _changes(planned.DIRECTIONS, ("K_T_tangent_raw",), numbers, both)
-    if planned.MATERIALS in plan.shown:
-        for case in (one for one in mine.normal if one.force):
-            for direction in directions:
-                own = mine.sheared_case(case, direction)
-                at = [r for r in numbers if replace(r.case, ratio=None) == own]
-                yield from _unlike(mine, case, direction, at)
-
-
-def _unlike(
-    mine: ContactSolution, case: NormalCase, direction: float, numbers: Sequence[Result]
-) -> Iterator[Resolved]:
-    """The tangential loads along a direction with the slip of the pressure alone already there."""
-    way = Frozen(mine, case, direction)
-    before = pressure_slip(mine.model, way.components, case.solution.force, way.loaded)
-    for one in numbers:
-        if one.name == q.K_T_SECANT_RAW.name:
-            assert one.case.ratio is not None
-            try:
-                load, moved, _ = way.march(np.array([0.0, one.case.ratio]), before)
-                included = float(load[2] / (moved[2] - moved[1]))
-            except UpdError:
-                included = float("nan")
-        elif one.name == q.CYCLE_ENERGY.name:
-            included = q.CYCLE_ENERGY.scale * way.cycle(one.case, before).slip_work
-        else:
-            continue
-        yield Resolved(planned.MATERIALS, one.name, one.case, one.value, included, one.unit)
 
 
 def _changes(
@@ -226,7 +190,7 @@ def _coupled_changes(
     scene: Scene, uncoupled: Iterable[Result], solve: Callable[[], Iterable[Result]]
 ) -> Iterator[Resolved]:
     """What normal and tangential contact at once change of the stiffnesses and of the areas in
-    contact and in stick; of the approach and the secant where no stiffness is asked for.
+    contact and in stick; of the approach, the secant and the loss where no stiffness is asked for.
 
     Parameters
     ----------
@@ -252,21 +216,6 @@ def _coupled_changes(
 def _quantity(scene: Scene) -> tuple[str, str]:
     """Name and unit of the normal number that a run has."""
     return ("K_N_tangent_raw", "N/mm") if scene.wants("stiffness") else ("approach", "um")
-
-
-def pressure_slip(
-    model: ContactModel,
-    components: tuple[int, ...],
-    force: Array,
-    loaded: NDArray[np.int64],
-) -> TangentialHistory:
-    """The slip that the normal forces (n,) in N put between the loaded nodes, as the history of
-    the tangential loads that follow.
-
-    w = d - C_tt t - C_tn f: without tangential load the contact starts with the mismatch C_tn f.
-    """
-    slip = np.concatenate([(model.compliance(c, NORMAL) @ force)[loaded] for c in components])
-    return TangentialHistory(slip, np.zeros(len(slip)), np.zeros(len(loaded), dtype=np.int8))
 
 
 def displaced_gap(model: ContactModel, force: Array) -> Array:

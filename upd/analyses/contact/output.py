@@ -20,7 +20,7 @@ from upd.contact.law import ContactLaw
 from upd.labels import file_name
 from upd.mesh import recipes
 from upd.reference import hertz_pressure, mindlin
-from upd.results import ArrayGroup, Case, variable
+from upd.results import Case, Group, variable
 
 Array = NDArray[np.float64]
 Variables = dict[str, Any]
@@ -38,9 +38,9 @@ def sizes(solution: ContactSolution) -> dict[str, int]:
     }
 
 
-def arrays(solution: ContactSolution) -> dict[str, ArrayGroup]:
+def arrays(solution: ContactSolution) -> dict[str, Group]:
     """Fields of every case and patch with their closed forms; curves, paths and contact points."""
-    out: dict[str, ArrayGroup] = {}
+    out: dict[str, Group] = {}
     patches, (x, y) = lattices(solution), corner(solution)
     for k in patches:
         face: dict[str, str] = {"patch": k.name} if len(patches) > 1 else {}
@@ -51,7 +51,7 @@ def arrays(solution: ContactSolution) -> dict[str, ArrayGroup]:
         cases += [("tangential", t.case, _tangential(solution, k, t)) for t in solution.tangential]
         for content, case, fields in cases:
             name = case.label + f" {k.name}" * bool(face)
-            out[name] = ArrayGroup(lines | fields, content=content, case=case, **face)
+            out[name] = Group(lines | fields, content=content, case=case, **face)
     for path in solution.paths:
         content = "cycle" if path.cycle else "path"
         variables = {
@@ -59,9 +59,9 @@ def arrays(solution: ContactSolution) -> dict[str, ArrayGroup]:
             "tangential_force": variable("step", path.load, "N"),
             **(_deresiewicz(solution, path) if solution.curved else _limit(solution, path)),
         }
-        out[f"{content} {path.case.label}"] = ArrayGroup(variables, content=content, case=path.case)
+        out[f"{content} {path.case.label}"] = Group(variables, content=content, case=path.case)
     if solution.curve:
-        out["force-approach"] = ArrayGroup(_curve(solution), content="force-approach")
+        out["force-approach"] = Group(_curve(solution), content="force-approach")
     return out | _laws(solution)
 
 
@@ -280,12 +280,12 @@ def _printed(solution: ContactSolution, name: str, total: str, case: Case) -> Va
     return {}
 
 
-def _laws(solution: ContactSolution) -> dict[str, ArrayGroup]:
+def _laws(solution: ContactSolution) -> dict[str, Group]:
     """The contact law of every normal load, in contact axes and, where the recipe tells the place,
     in the rig's.
     """
     scene = solution.plan.scene
-    out: dict[str, ArrayGroup] = {}
+    out: dict[str, Group] = {}
     for case in solution.normal if scene.wants("contact_law") else ():
         law = faces.contact_law(solution, case)
         if law is not None:
@@ -296,7 +296,7 @@ def _laws(solution: ContactSolution) -> dict[str, ArrayGroup]:
             }
             for content, variables in groups.items():
                 name = f"{content} {case.case.label}"
-                out[name] = ArrayGroup(dict(variables), content=content, case=case.case)
+                out[name] = Group(dict(variables), content=content, case=case.case)
     return out
 
 

@@ -28,11 +28,10 @@ NORMAL, ALONG, ACROSS = 2, 0, 1
 #: all three, in the order of a coupled contact
 COMPONENTS = (NORMAL, ALONG, ACROSS)
 
-TILT, DIRECTIONS, COUPLING, MATERIALS, LARGE = (
+TILT, DIRECTIONS, COUPLING, LARGE = (
     "tilt of the damper",
     "slip in two directions",
     "normal-tangential coupling",
-    "unlike materials",
     "large displacement",
 )
 #: why coupled contact slips in two directions
@@ -43,8 +42,6 @@ REMEDIES = {
     "another contact.distant set",
     DIRECTIONS: "set contact.directions = 2",
     COUPLING: 'set contact.coupling = "coupled", or trust the number to this change only',
-    MATERIALS: 'the pressure shears these materials: set contact.coupling = "coupled", choose '
-    "materials of equal stiffness, or trust the number to this change only",
     LARGE: "the contact is too large for small-displacement theory: lower the load",
 }
 
@@ -276,7 +273,7 @@ def make_effects(scene: Scene, symmetry: str, why: str, loaded: bool) -> tuple[E
 
 def _friction_effects(scene: Scene, loaded: bool) -> list[Effect]:
     curved, mu, coupled = is_curved(scene), scene.contact.friction, scene.coupled
-    coupling, materials = _coupling_effects(scene, loaded)
+    coupling = _coupling_effect(scene, loaded)
     if not friction_on(scene):
         asked = scene.wants(*FRICTION_WANTS)
         why = "mu = 0: no tangential force can be carried" if asked else "no output asks for it"
@@ -295,33 +292,21 @@ def _friction_effects(scene: Scene, loaded: bool) -> list[Effect]:
         _effect("friction", True, f"mu = {mu:g} and the outputs {outputs}"),
         _effect(DIRECTIONS, two, why, "contact.directions=2", shows=shows),
         coupling,
-        materials,
         _effect("load history", stepped, steps),
     ]
 
 
-def _coupling_effects(scene: Scene, loaded: bool) -> tuple[Effect, Effect]:
-    """Normal-tangential coupling, and what of it the difference of the materials makes."""
+def _coupling_effect(scene: Scene, loaded: bool) -> Effect:
+    """Normal-tangential coupling; unlike materials are coupled by their pressure alone."""
     beta, limit, coupled = beta_of(scene), scene.contact.coupling_limit, scene.coupled
-    unlike = beta > 0.0 and (scene.wants("cycle") or largest_ratio(scene) > 0.0)
-    why = (
-        "beta = 0: pressure alone does not shear the contact"
-        if not beta > 0.0
-        else f"|beta| = {beta:.3g}: the shear of the pressure alone is not simulated"
-        if unlike
-        else "no output depends on the shear of the pressure alone"
-    )
     frozen = "normal forces stay frozen under shear: exact for half-spaces of like materials alone"
     if scene.contact.friction > 0.0 and beta > limit:
         frozen += (
             f"; |beta| = {beta:.3g} is above contact.coupling_limit = {limit:.3g}: set "
             "contact.coupling = coupled"
         )
-    how, on = "asked for" if coupled else frozen, coupled and unlike
-    return (
-        _effect(COUPLING, coupled, how, "contact.coupling=coupled", shows=loaded),
-        _effect(MATERIALS, on, _TOGETHER if on else why, shows=unlike and loaded),
-    )
+    how = "asked for" if coupled else frozen
+    return _effect(COUPLING, coupled, how, "contact.coupling=coupled", shows=loaded)
 
 
 def _slip_shows(scene: Scene) -> bool:

@@ -167,8 +167,6 @@ class ContactSolution:
         Loaded points of the force-approach curve.
     paths
         Tangential force over displacement, cycles among them.
-    moved
-        By normal load and direction: share of the normal forces that gross slip would move.
     no_shares
         Why the bodies' shares of the approach are not known.
     left_out
@@ -183,7 +181,6 @@ class ContactSolution:
     curve: list[NormalCase] = field(default_factory=list)
     tangential: list[TangentialCase] = field(default_factory=list)
     paths: list[LoadPath] = field(default_factory=list)
-    moved: dict[Case, float] = field(default_factory=dict)
     no_shares: str = ""
     left_out: list[Resolved] = field(default_factory=list)
     estimates: Estimates | None = None

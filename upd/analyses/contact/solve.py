@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from upd.analyses.base import keeping
 from upd.analyses.contact import loading
 from upd.analyses.contact import plan as planned
 from upd.analyses.contact.bodies import learns, prepare, show_normal, solve_inside
@@ -29,7 +30,7 @@ from upd.contact.model import Body, ContactModel
 from upd.contact.normal import normal_contact, normal_curve
 from upd.contact.products import KNOWN, KNOWN_STIFFNESS, settled
 from upd.contact.tangential import TangentialPath, tangential_contact, tangential_path
-from upd.contact.tangential_step import TangentialContact, TangentialHistory
+from upd.contact.tangential_step import TangentialContact
 from upd.contact.tilt import tilted_contact
 from upd.progress import Stages
 from upd.results import Case
@@ -68,16 +69,13 @@ def solve_plan(
         Whether it is one: its march to the tangential loads takes few steps.
     """
     solution = ContactSolution(plan, prepare(plan, stages) if model is None else model)
-    try:
+    with keeping(solution):
         solve_normal(solution, stages)
         if plan.effect("friction"):
             solve_tangential(solution, stages, companion=companion)
         if plan.effect("internal displacement"):
             with stages("internal displacement", "back-substitution"):
                 solve_inside(solution)
-    except BaseException as error:
-        error.partial = solution  # type: ignore[attr-defined]
-        raise
     return solution
 
 
@@ -326,13 +324,13 @@ class Frozen:
                 of[body.name] = self._moved(C)[1]
         return self._moved(self.compliance)[1], of
 
-    def march(self, ratios: Array, history: TangentialHistory | None = None) -> Marched:
+    def march(self, ratios: Array) -> Marched:
         """Shares of mu N one after the other.
 
         ``history``: before the first; None starts from no slip.
         """
         loads = loading.load_history(ratios * self.total, self.unit)
-        path = tangential_path(self.compliance, self.limit, loads=loads, history=history)
+        path = tangential_path(self.compliance, self.limit, loads=loads)
         return *loading.along(path, self.unit, self.copies), partial(self._at, path)
 
     def _at(self, path: TangentialPath, k: int, ratio: float) -> TangentialCase:
@@ -346,20 +344,20 @@ class Frozen:
         K = np.atleast_2d(path.stiffness[k])
         return self._found(ratio, float(d @ self.unit), K, fields, nodes)
 
-    def cycle(self, case: Case, history: TangentialHistory | None = None) -> loading.LoadPath:
+    def cycle(self, case: Case) -> loading.LoadPath:
         """The full cycle, first loading and the closed loop.
 
         ``history``: before the first step; None starts from no slip.
         """
-        path, quarter = self._cycle_path(history)
+        path, quarter = self._cycle_path()
         T, d = loading.along(path, self.unit, self.copies)
         work = self.copies * float(np.sum(path.slip_work[quarter:]))
         return loading.closed_loop(case, self.case.case, T, d, work, quarter)
 
-    def _cycle_path(self, history: TangentialHistory | None = None) -> tuple[TangentialPath, int]:
+    def _cycle_path(self) -> tuple[TangentialPath, int]:
         shares, quarter = loading.cycle_shares(self.loads.cycle_steps)
         values = loading.load_history(self.loads.cycle_amplitude * self.total * shares, self.unit)
-        path = tangential_path(self.compliance, self.limit, loads=values, history=history)
+        path = tangential_path(self.compliance, self.limit, loads=values)
         return path, quarter
 
     def learn(self) -> None:
@@ -398,28 +396,6 @@ class Frozen:
         if scene.wants("cycle"):
             shown(lambda: self._cycle_path()[0].force.T)
 
-    def moved_pressure(self) -> float:
-        """How far shear with T = mu N would change the normal forces that are frozen.
-
-        Sum |df| / 2 N over the nodes kept in contact.
-
-        The tangential forces t open or close the contact by C_nt t; kept closed at the same load,
-        the normal forces change by df = -C_nn^-1 (C_nt t - d e), e'df = 0.
-        """
-        model, answer = self.solution.model, self.case.solution
-        on, total = np.flatnonzero(answer.contact), float(answer.force.sum())
-        t = self._spread(self._moved(self.compliance)[0]) @ self.unit
-        t = t * (self.friction * total / float(t.sum()))
-        opened = sum(
-            u * (model.compliance(NORMAL, c) @ t)
-            for c, u in zip(self.components, self.unit, strict=True)
-        )
-        factor = cho_factor(model.compliance(NORMAL)[np.ix_(on, on)])
-        e = cho_solve(factor, np.ones(len(on)))
-        df = -cho_solve(factor, opened[on])
-        df -= e * (df.sum() / e.sum())
-        return float(np.abs(df).sum() / (2.0 * answer.force.sum()))
-
     def _spread(self, values: Array) -> Array:
         """(n, 1 or 2) of values at the loaded nodes."""
         out = np.zeros((len(self.solution.model.gap), len(self.unit)))
@@ -446,9 +422,8 @@ class _Coupled(Frozen):
         of = {name: secant(state) for name, state in alone.items() if state is not None}
         return secant(self.state), of
 
-    def march(self, ratios: Array, history: TangentialHistory | None = None) -> Marched:
+    def march(self, ratios: Array) -> Marched:
         """Shares of mu N one after the other; friction remembers the normal load."""
-        del history
         needed = max(self.loads.tangential, default=0.0) * self.total
         states, moved = loading.sheared(self.state, ratios * self.total, self.unit, needed)
         load = np.insert(ratios[: len(states)] * self.total, 0, 0.0)
@@ -464,9 +439,8 @@ class _Coupled(Frozen):
         fields = state.force[:, 1:], slip
         return self._found(ratio, float(moved[k]), state.shear_stiffness, fields, nodes, state)
 
-    def cycle(self, case: Case, history: TangentialHistory | None = None) -> loading.LoadPath:
+    def cycle(self, case: Case) -> loading.LoadPath:
         """The full cycle; friction remembers the normal load."""
-        del history
         peak, steps = self.loads.cycle_amplitude * self.total, self.loads.cycle_steps
         return loading.coupled_loop(
             case, self.case.case, self.state, peak=peak, steps=steps, unit=self.unit

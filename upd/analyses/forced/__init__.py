@@ -6,17 +6,16 @@ Forced response by multi-harmonic balance, free, stuck and nonlinear.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import wraps
+from functools import partial, wraps
 from typing import TypeVar
 
-from upd.analyses.base import Analysis
+from upd.analyses.base import Analysis, rig_needs
 from upd.analyses.forced import (
     accuracy,
     answer,
     arrays,
     charts,
     checks,
-    plan,
     results,
 )
 from upd.analyses.forced.solution import ForcedSolution
@@ -48,7 +47,7 @@ ANALYSIS = Analysis(
     headline_names=answer.MAIN,
     input_checks=(),
     make_plan=accuracy.plan_to_accuracy,
-    needs=plan.needs,
+    needs=partial(rig_needs, "reduction"),
     solve=accuracy.solve_to_accuracy,
     make_results=_on_one_thread(results.make_results),
     check_solution=_on_one_thread(checks.check_solution),

@@ -24,7 +24,7 @@ from upd.analyses.forced.sweeps import marched_damper, marched_loops
 from upd.analyses.measured import accelerance_array, measured_arrays
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.balance import InterfaceResponse
-from upd.results import ArrayGroup, Case, variable
+from upd.results import Case, Group, variable
 from upd.scene.forced_contact import SIDES
 
 Variables = dict[str, Any]
@@ -36,7 +36,7 @@ MODES = "nonlinear mode"
 N_LOOPS = 4
 
 
-def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
+def arrays(solution: ForcedSolution) -> dict[str, Group]:
     """Arrays for result.nc.
 
     Returns
@@ -47,13 +47,13 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
         latter what the contact does at its peaks), "performance", every "nonlinear mode", the
         "measured" peaks, and every "measured curve".
     """
-    out: dict[str, ArrayGroup] = {}
+    out: dict[str, Group] = {}
     scene = solution.plan.scene
 
     def add(content: str, case: Case | str, variables: Variables) -> None:
         """A group of a case, or of a stiffness."""
         mine = case if isinstance(case, Case) else Case(stiffness=case)
-        out[f"{content} {case}"] = ArrayGroup(variables, content=content, case=mine)
+        out[f"{content} {case}"] = Group(variables, content=content, case=mine)
 
     for name in (*solution.models, *(solution.faces if scene.wants("contact_state") else ())):
         add(POINTS, name, _points(solution, name))
@@ -72,7 +72,7 @@ def arrays(solution: ForcedSolution) -> dict[str, ArrayGroup]:
     if measured and out:
         source = ", ".join(dict.fromkeys(one.source for one in measured))
         frequency = variable("peak", [one.value for one in measured], "Hz", source=source)
-        out["measured peaks"] = ArrayGroup({"frequency": frequency}, content=MEASURED)
+        out["measured peaks"] = Group({"frequency": frequency}, content=MEASURED)
     return out
 
 

@@ -20,9 +20,9 @@ from upd.analyses.forced.arrays import (
     SWEEP,
 )
 from upd.analyses.measured.charts import damping_charts, measured_traces
-from upd.plot.chart import Area, Array, Arrays, Axis, Band, Chart, Group, Mark, Pies, Style, Trace
+from upd.plot.chart import Area, Array, Axis, Band, Chart, Mark, Pies, Style, Trace
 from upd.plot.common import UM, case_of, frequency_of, magnitude, scalar, with_content
-from upd.results import Case
+from upd.results import Arrays, Case, Group
 from upd.scene.forced_contact import SIDES
 
 #: the blade that is excited first

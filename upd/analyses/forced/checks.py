@@ -6,7 +6,7 @@ Each recomputes what it checks from unprocessed quantities, so that it can fail.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -14,11 +14,9 @@ import numpy as np
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, PointCurve, SweptCurve, WholeFaces
-from upd.analyses.forced.levels import HARMONICS, SAMPLES
 from upd.analyses.forced.model import Model
-from upd.analyses.forced.peaks_again import PeaksAgain
 from upd.analyses.forced.performance import Performance
-from upd.analyses.forced.plan import excitation_of
+from upd.analyses.forced.plan import CONFIRMED, excitation_of
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.statics import BALANCE, StaticState
 from upd.analyses.forced.sweeps import TOLERANCE
@@ -36,7 +34,6 @@ WIDEST_STEP = 0.5
 #: largest imbalance of work and losses over a cycle, and of static forces on the damper: far above
 #: the solver's tolerance
 _BALANCE = 1e-6
-CONFIRMED = "confirmed by time integration"
 
 
 class _Rule(NamedTuple):
@@ -96,17 +93,6 @@ _RULES = {
         "largest step at a peak over its half-power width",
         "peak {number} at {frequency:.4g} Hz lies between points too far apart for its height; "
         "take more: excitation.points = {more}",
-    ),
-    # a tenth of a height is what an engineer can use
-    "more harmonics": _Rule(
-        0.1,
-        "largest change of a peak's height with {level}",
-        "the peak needs more: balance.harmonics = {harmonics}",
-    ),
-    "twice the samples": _Rule(
-        0.01,
-        "largest change of a peak's height with {level}",
-        "the peak needs more: balance.samples = {samples}",
     ),
     "top not reached": _Rule(
         0.05,
@@ -236,8 +222,7 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve[Any]) -> Iterator
     if isinstance(curve.answer, InterfaceResponse):
         yield from check_faces_curve(curve, e.points, excitation_of(e).lowest)
     else:
-        levels = solution.levels.get(curve.stiffness, [])
-        yield from _point_checks(curve, solution.models[curve.stiffness], levels)
+        yield from _point_checks(curve, solution.models[curve.stiffness])
 
 
 def _path(curve: ForcedCurve[Any]) -> Check:
@@ -247,35 +232,12 @@ def _path(curve: ForcedCurve[Any]) -> Check:
     return _check("path periodic", curve.case, float(astray), count=astray)
 
 
-def _point_checks(curve: PointCurve, model: Model, levels: Sequence[PeaksAgain]) -> Iterator[Check]:
+def _point_checks(curve: PointCurve, model: Model) -> Iterator[Check]:
     answer, case = curve.answer, curve.case
     yield _check("residual of points", case, measures.residual_error(answer))
     yield _check("energy of points", case, float(np.abs(answer.energy_balance).max()))
     yield _check("damper at rest", case, measures.rest_error(answer, model))
-    yield from _by_level(curve, levels)
     yield from _integrated(curve)
-
-
-def _by_level(curve: PointCurve, levels: Sequence[PeaksAgain]) -> Iterator[Check]:
-    """Reported heights with more harmonics and with twice the samples."""
-    more = {
-        "harmonics": curve.answer.harmonics.highest + 4,
-        "samples": 2 * curve.answer.balance.samples,
-    }
-    for source, rule in ((HARMONICS, "more harmonics"), (SAMPLES, "twice the samples")):
-        # the farthest level is the judge
-        last = next((one for one in reversed(levels) if one.of.source == source), None)
-        changes = []
-        for key, top in curve.tops.items():
-            # a height by time integration holds all harmonics
-            if last is None or not top.slips or curve.stayed(*key) is not None:
-                continue
-            found = last.peaks.get((curve.ratio, *key))
-            if found is not None:
-                change = abs(found.height / top.height - 1.0)
-                changes.append(change if math.isfinite(change) else math.inf)
-        if last is not None and changes:
-            yield _check(rule, curve.case, max(changes), level=last.of.label, **more)
 
 
 def _integrated(curve: PointCurve) -> Iterator[Check]:

@@ -16,7 +16,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy.linalg import eigh, qr
+from scipy.linalg import block_diag, eigh
 from scipy.spatial import cKDTree
 
 from upd.analyses.base import Resolved
@@ -37,12 +37,10 @@ from upd.analyses.forced.peaks_again import (
 from upd.analyses.forced.plan import ALONG, ELASTIC, ForcedPlan
 from upd.analyses.forced.statics import StaticState, state_of_ratio
 from upd.analyses.seated.bodies import Bodies
+from upd.analyses.seated.interface import damper_compliance
 from upd.errors import InputError, one_line
-from upd.fem import Material, mass, rigid_body_modes, stiffness
 from upd.hbm.springs.points import stuck_stiffness
-from upd.linalg import factorise
 from upd.linalg.parallel import threads_for
-from upd.linalg.symmetric import Symmetric
 from upd.mesh import IntArray
 from upd.results import Case, Result
 from upd.results import quantities as q
@@ -349,54 +347,29 @@ def elastic_compliance(plan: ForcedPlan, bodies: Bodies, model: Model) -> Array:
     Array
         (n, n), n = n_point (1 + tangents), point by point; symmetric, positive semidefinite.
     """
-    mesh, m = bodies.damper_mesh, plan.scene.material
-    material = Material(m.E, m.nu, plan.scene.damper.density or m.density)
-    K = stiffness(mesh, material, plan.scene.mesh.element)
-    M = mass(mesh, material)
-    B = _rows(bodies, model, mesh.n_node)
-    R = rigid_body_modes(mesh.points)
-    MR = M @ R
-    inertia = np.linalg.inv(R.T @ MR)
-    loads = B.T - MR @ (inertia @ (R.T @ B.T))
-    # six dofs that hold it: the ones its rigid motions move most independently
-    held = qr(R.T, mode="r", pivoting=True)[1][:6]
-    free = np.setdiff1d(np.arange(3 * mesh.n_node), held)
-    u = np.zeros_like(loads)
-    factor = factorise(
-        Symmetric.of(K).submatrix(free.astype(np.int64)), solver=plan.scene.solver.name
-    )
-    u[free] = factor.solve(loads[free])
-    u -= R @ (inertia @ (MR.T @ u))
-    G = B @ u
-    return np.asarray(0.5 * (G + G.T))
-
-
-def _rows(bodies: Bodies, model: Model, n_node: int) -> Array:
-    """Displacement of the damper's contact points along their normals and tangents.
-
-    (n, 3 n_node) of its nodal displacements; a point that stands for a pair moves as the even part
-    of both.
-    """
-    mesh, out = bodies.damper_mesh, []
-    tree = cKDTree(mesh.points)
+    nodes, shares = zip(*(_on_nodes(bodies, model, side) for side in SIDES), strict=True)
+    G = damper_compliance(plan, bodies, nodes)[0]
+    at, n = np.stack([block_diag(*one) for one in zip(*shares, strict=True)]), len(G) // 3
+    G = np.einsum("fmn,fngk,gpk->mfpg", at, G.reshape(3, n, 3, n), at, optimize=True)
     components = [0, 1, 2] if model.contacts.tangents == 2 else [0, 2]
-    for side in SIDES:
-        face, blade = model.faces[side], bodies.blades[side].mesh
-        # the k-th nodes of both patches lie on each other
-        own = dict(zip(blade.nodes["patch"], mesh.nodes[f"{side}_patch"], strict=True))
-        nodes = np.array([own[node] for node in face.nodes])
-        rows = _at(face.values, face.frame, nodes, n_node)
-        if model.halved:
-            image = tree.query(mesh.points[nodes] * np.array([1.0, -1.0, 1.0]))[1]
-            mirrored = _at(face.values, face.frame, np.asarray(image), n_node)
-            rows = 0.5 * (rows + MIRROR_SIGNS[:, None] * mirrored)
-        out.append(rows[:, components])
-    joined = np.concatenate(out)
-    return np.asarray(joined.reshape(-1, joined.shape[-1]))
+    rows = len(at[0]) * len(components)
+    # a half has half of the forces
+    part = 0.5 if bodies.half else 1.0
+    return np.asarray(part * G[:, components][..., components].reshape(rows, rows))
 
 
-def _at(values: Array, frame: Array, nodes: IntArray, n_node: int) -> Array:
-    """(m, 3, 3 n_node) rows of points with shape functions ``values`` (m, k) at ``nodes``."""
-    rows = np.zeros((len(values), 3, n_node, 3))
-    rows[:, :, nodes] = np.einsum("mk,fc->mfkc", values, frame)
-    return np.asarray(rows.reshape(len(values), 3, -1))
+def _on_nodes(bodies: Bodies, model: Model, side: Side) -> tuple[IntArray, Array]:
+    """Nodes (n,) of a face that its points move with, and their shares (3, m, n) in the motion of
+    the points along its frame; a point that stands for a pair moves as the even part of both.
+    """
+    face, mesh = model.faces[side], bodies.blades[side].mesh
+    if bodies.half or not model.halved:
+        return face.nodes, np.stack([face.values] * 3)
+    patch, mirrored = mesh.nodes["patch"], mesh.points[face.nodes] * np.array([1.0, -1.0, 1.0])
+    image = patch[cKDTree(mesh.points[patch]).query(mirrored)[1]]
+    nodes, place = np.unique(np.concatenate([face.nodes, image]), return_inverse=True)
+    own, other = np.split(place, 2)
+    shares = np.zeros((3, face.n_point, len(nodes)))
+    shares[:, :, own] += 0.5 * face.values
+    shares[:, :, other] += 0.5 * MIRROR_SIGNS[:, None, None] * face.values
+    return nodes, shares

@@ -32,9 +32,8 @@ from upd.analyses.forced.curves import WholeFaces
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.plan import ForcedPlan, excitation_of, time_steps
 from upd.analyses.forced.statics import GIVEN, SEATED, StaticState
-from upd.analyses.seated.bodies import Blade, Bodies
+from upd.analyses.seated.bodies import Blade, Bodies, lattice, patch_frame
 from upd.analyses.seated.interface import Interface, make_interface
-from upd.analyses.seated.lattice import lattice, patch_frame
 from upd.contact import CoupledContact
 from upd.contact.coulomb import Coulomb
 from upd.errors import ConvergenceError, InputError

@@ -17,22 +17,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from upd.analyses.cost import NODES
 from upd.analyses.forced.interface_model import INTERFACE
 from upd.analyses.forced.levels import FACES, count_of
 from upd.analyses.seated.varied import PATCH
 from upd.errors import InputError
-from upd.labels import percent
 from upd.mesh import recipes
-from upd.plot.work_precision import change_charts
-from upd.results import Case, Result
-from upd.results.quantities import PEAK_ACCELERANCE, PEAK_FREQUENCY, quantity_of
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import GAUSS, SIDES
-from upd.vary.curves import ConvergenceCurve, make_curve
 from upd.vary.ladder import (
     Asked,
     Ladder,
@@ -44,9 +40,8 @@ from upd.vary.ladder import (
     no_levels,
     refinements,
 )
-from upd.vary.outcome import SolvedPoint, without_failed
-from upd.vary.tables import level_table, points_table
-from upd.vary.variation import Key, Overrides, Variation
+from upd.vary.outcome import SolvedPoint
+from upd.vary.variation import Overrides, Variation
 
 #: numbers a ladder follows beside those the analysis names first: where the model changes, the
 #: stuck frequencies
@@ -222,15 +217,12 @@ _MESHES: Mapping[str, Mapping[int, tuple[int, ...]]] = {
     "symmetric": {4: (10,), 8: (20,), 12: (34,)},
     "asymmetric": {3: (6, 3), 6: (12, 6), 9: (20, 9)},
 }
-#: the levels run unless others are asked for: 60 and 126 nodes, 60 and 95, minutes each where the
-#: finer ones take half an hour to hours
+#: the levels run unless others are asked for: 60 and 126 nodes, 60 and 95
 _USUAL = {"symmetric": (4, 6), "asymmetric": (3, 4)}
 #: elements whose faces of four nodes carry a contact node by node; the first stands in for others
 NODE_BY_NODE = ("hex8i", "hex8")
-#: curve of the levels on springs
+#: source of the levels on springs
 SPRINGS = "springs"
-#: numbers of a peak that are compared
-_KINDS = (PEAK_FREQUENCY, PEAK_ACCELERANCE)
 
 
 def at_ratio(scene: ForcedScene) -> Overrides:
@@ -268,7 +260,7 @@ def whole_faces_points(scene: ForcedScene, asked: Asked = None) -> list[Variatio
         slope, along = list(mesh.values())[:2]
         geometry = ((f"geometry.{k}", n) for k, n in mesh.items())
         overrides = (*base, *_of_faces(scene), *geometry)
-        made.append(Variation(INTERFACE, f"{slope} x {along}", overrides, 1.0 / slope))
+        made.append(Variation(INTERFACE, f"{slope} x {along}", overrides, 1.0))
     return made
 
 
@@ -278,7 +270,7 @@ def _of_faces(scene: ForcedScene) -> Overrides:
     return (
         ("contact.model", INTERFACE),
         ("mesh.element", mine if mine in NODE_BY_NODE else NODE_BY_NODE[0]),
-        ("balance.method", "march"),
+        ("balance.method", "balance"),
     )
 
 
@@ -312,135 +304,20 @@ def _contact_notes(scene: ForcedScene) -> Iterator[str]:
     settings = ", ".join(f'{key} = "{value}"' for key, value in changes)
     yield f"interface, elements up x along a face: {settings}"
     yield "springs: method, points and mesh as in the scene"
-    yield "change of a range over both sweeps: that of its end which is farther off"
-
-
-class LevelNumber(NamedTuple):
-    """Frequency or height of a peak on one level.
-
-    Attributes
-    ----------
-    mode
-        How the blades move there.
-    ends
-        Least and largest value: of the path of the springs, or of the sweeps up and down; None
-        where none was reached.
-    why
-        Why a sweep did not reach it.
-    """
-
-    mode: str
-    ends: tuple[float, float] | None
-    why: str
-
-    @property
-    def text(self) -> str:
-        """The number, both ends, or that one of the sweeps does not have it."""
-        if self.ends is None:
-            return "not reached"
-        low, high = (f"{value:.5g}" for value in self.ends)
-        if low != high:
-            return f"{low} to {high}"
-        return f"{low} or none" if self.why else low
-
-    def change(self, from_: LevelNumber | None) -> float | None:
-        """Relative difference of the end that is farther off; None where one has none."""
-        if self.ends is None or from_ is None or from_.ends is None:
-            return None
-        pairs = zip(self.ends, from_.ends, strict=True)
-        return max((mine / other - 1.0 for mine, other in pairs), key=abs)
-
-
-#: name of a number -> what a level has of it
-Numbers = Mapping[str, LevelNumber]
-
-
-def peak_numbers(one: SolvedPoint) -> Numbers:
-    """Frequencies and heights of the peaks of a level with friction.
-
-    Peaks are numbered by the mode in which the blades move, so that numbers of levels whose
-    contacts have other names belong together.
-    """
-    found: dict[str, list[Result]] = {}
-    for result in one.outcome.results:
-        # curves of linear limits have no F_C/F_E
-        if quantity_of(result.name)[0] in _KINDS and result.case.force_ratio is not None:
-            found.setdefault(result.name, []).append(result)
-    return {name: _level_number(results) for name, results in found.items()}
-
-
-def _level_number(results: Sequence[Result]) -> LevelNumber:
-    """One number of the sweeps of a level."""
-    mode = next((r.case.mode for r in results if r.case.mode), "")
-    values = [r.value for r in results if not r.withheld]
-    why = next((r.withheld for r in results if r.withheld), "")
-    return LevelNumber(mode, (min(values), max(values)) if values else None, why)
-
-
-def finest(solved: Sequence[SolvedPoint]) -> SolvedPoint | None:
-    """The finest mesh of both faces that was solved."""
-    good = [p for p in without_failed(solved) if p.point.source == INTERFACE]
-    return min(good, key=lambda p: p.point.size, default=None)
-
-
-def change_curves(solved: Sequence[SolvedPoint]) -> Iterator[ConvergenceCurve]:
-    """Change of every peak's numbers from the finest mesh over the seconds of a level.
-
-    A curve for the meshes of both faces, one for each stiffness of the springs.
-    """
-    fine = finest(solved)
-    ways: dict[str, list[SolvedPoint]] = {}
-    for one in without_failed(solved):
-        way = one.name if one.point.source == SPRINGS else INTERFACE
-        ways.setdefault(way, []).append(one)
-    for number, reference in peak_numbers(fine).items() if fine else ():
-        if fine is None or reference.ends is None:
-            continue
-        name = (number, Case(mode=reference.mode))
-        for way, points in ways.items():
-            numbers = [(one, peak_numbers(one).get(number)) for one in points]
-            changes = [(one, n.change(reference)) for one, n in numbers if n is not None]
-            known = [(one, change) for one, change in changes if change is not None]
-            if known:
-                mine, errors = zip(*known, strict=True)
-                yield make_curve(way, name, mine, errors, reference.ends[1], fine.name)
 
 
 def _contact_report(
     scene: ForcedScene, solved: Sequence[SolvedPoint], names: Sequence[str]
 ) -> StudyReport:
-    """What every level costs, the peaks on every level, their changes, why sweeps lack one."""
-    del scene, names
-    fine, levels = finest(solved), {one.name: peak_numbers(one) for one in solved}
-    modes: dict[str, str] = {}
-    for name, found in ((name, n) for numbers in levels.values() for name, n in numbers.items()):
-        modes[name] = modes.get(name) or found.mode
-    keys: list[Key] = [(name, Case(mode=mode)) for name, mode in sorted(modes.items())]
+    """Numbers of every level and their changes from the finest faces, whatever the contact is
+    called.
+    """
+    return finest_report(scene, [_without_stiffness(one) for one in solved], names)
 
-    def value(one: SolvedPoint, key: Key) -> str:
-        found = levels[one.name].get(key[0])
-        return "none" if found is None else found.text
 
-    def change(one: SolvedPoint, key: Key) -> str:
-        found = levels[one.name].get(key[0])
-        if found is None or fine is None or one is fine:
-            return ""
-        return percent(found.change(levels[fine.name].get(key[0])))
-
-    tables = [points_table(solved), level_table("Peaks", keys, solved, value)]
-    if fine is not None:
-        tables.append(level_table(f"Change from {fine.name}", keys, solved, change))
-    # frequency and height share one reason
-    reasons = dict.fromkeys(
-        f"{name}, peak {quantity_of(number)[1]}: {found.why}"
-        for name, numbers in levels.items()
-        for number, found in numbers.items()
-        if found.why
-    )
-    curves = tuple(change_curves(solved))
-    return StudyReport(
-        tuple(tables), fine is not None, tuple(reasons), curves, charts=change_charts
-    )
+def _without_stiffness(one: SolvedPoint) -> SolvedPoint:
+    results = (replace(r, case=replace(r.case, stiffness="")) for r in one.outcome.results)
+    return replace(one, outcome=replace(one.outcome, results=tuple(results)))
 
 
 def _contact_title(scene: ForcedScene, vary: str) -> str:
@@ -448,9 +325,6 @@ def _contact_title(scene: ForcedScene, vary: str) -> str:
     return f"springs and whole faces, F_C/F_E {min(scene.excitation.centrifugal_to_force):g}"
 
 
-_contact = Ladder(
-    whole_faces_points, report=_contact_report, notes=_contact_notes, title=_contact_title
-)
 _march = partial(_base, method="march")
 _on_levels = partial(Ladder, follow=_NUMBERS, report=finest_report, title=response_title)
 _on_meshes = partial(Ladder, follow=_NUMBERS, notes=_notes, title=response_title)
@@ -473,5 +347,7 @@ LADDERS: Mapping[str, Ladder] = {
         _counts("modes", "{} modes a blade", "reduction.modes", (0, 2, 5, 10, 20, 40), 0)
     ),
     "contacts": _on_levels(_contact_points),
-    "contact": _contact,
+    "contact": Ladder(
+        whole_faces_points, _NUMBERS, _contact_report, notes=_contact_notes, title=_contact_title
+    ),
 }

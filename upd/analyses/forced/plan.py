@@ -21,11 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.base import Effect, Needs, Plan
+from upd.analyses.base import Effect, Plan
 from upd.analyses.cost import NODES, CostModel, dense_s
 from upd.analyses.forced.stiffness import check_sources, plans_to_solve
 from upd.analyses.seated.plan import centrifugal_effects
-from upd.cache.sources import key_of
 from upd.hbm.core.fourier import harmonics, sample_count
 from upd.hbm.core.kept_factors import SOLUTIONS, WORTH_KEEPING
 from upd.mesh import recipes
@@ -40,6 +39,7 @@ Array = NDArray[np.float64]
 HARMONICS, SAMPLES = 3, 128
 #: checks of omitted effects; each solves a number again with the effect
 ALONG = "sliding along y"
+CONFIRMED = "confirmed by time integration"
 ELASTIC = "elastic damper"
 # Counted and timed on the ready scenes with one thread. A Newton step with new factors: its small
 # calls, each contact point and each of its samples, each entry of the Jacobian, times of its LU. Of
@@ -233,15 +233,6 @@ def grid(plan: ForcedPlan) -> Array:
     return np.linspace(e.start, e.stop, e.points)
 
 
-def needs(plan: ForcedPlan, threads: int) -> Needs:
-    """What a point of a sweep with this plan needs, and may share with others."""
-    del threads
-    scene = plan.scene
-    mesh = {"recipe": scene.recipe, "parameters": dict(plan.parameters)}
-    model = mesh | {"mesh": scene.mesh, "material": scene.material, "reduction": scene.reduction}
-    return Needs(key_of(model), key_of(mesh))
-
-
 # -- what is simulated and left out ----------------------------------------------------------------
 
 
@@ -268,7 +259,7 @@ def effects_of_points(scene: ForcedScene) -> list[Effect]:
             "harmonics",
             True,
             "all: time integration" if swept else f"0 to {b.harmonics}; {samples} samples",
-            "" if swept else "more harmonics",
+            "" if swept else CONFIRMED,
         ),
         Effect(
             "damper elasticity",

@@ -35,8 +35,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from upd.analyses.seated.bodies import is_half
-from upd.analyses.seated.lattice import lattice, patch_frame
+from upd.analyses.seated.bodies import is_half, lattice, patch_frame
 from upd.errors import InputError
 from upd.fem.surface import face_moments
 from upd.mesh import FloatArray, IntArray, Mesh

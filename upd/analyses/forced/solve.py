@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
+from upd.analyses.base import keeping
 from upd.analyses.forced.inputs import (
     along_changes,
     along_variant,
@@ -66,7 +67,7 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
     An error raised on the way carries what converged so far as ``partial``.
     """
     solution = ForcedSolution(plan)
-    try:
+    with keeping(solution):
         scene = plan.scene
         if scene.contact.model == INTERFACE:
             _whole_faces(solution, stages)
@@ -81,9 +82,6 @@ def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
         else:
             with SideProcesses(*_MODULES) as beside:
                 _balanced_points(solution, beside, stages)
-    except BaseException as error:
-        error.partial = solution  # type: ignore[attr-defined]
-        raise
     return solution
 
 

@@ -29,9 +29,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.seated.bodies import Bodies, make_bodies
+from upd.analyses.seated.bodies import Bodies, face_angles, make_bodies, patch_frame, rigid_balance
 from upd.analyses.seated.interface import make_interface
-from upd.analyses.seated.lattice import face_angles, patch_frame, rigid_balance
 from upd.cache.arrays import cache_folder, load_arrays, save_arrays
 from upd.cache.sources import key_of, source_digest
 from upd.contact.equilibrium import FaceForces, equilibrium

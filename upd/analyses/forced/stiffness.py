@@ -21,7 +21,7 @@ from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.fields import DamperSizes
 from upd.progress import Stages
-from upd.results import ArrayGroup, read_netcdf
+from upd.results import Group, read_netcdf
 from upd.scene import Scene, load_scene
 from upd.scene.contact import CONTACT_WANTS
 from upd.scene.forced import ForcedScene
@@ -162,7 +162,7 @@ def _law(choice: StiffnessChoice, stages: Stages) -> ContactLaw:
     return ContactLaw.from_arrays(arrays)
 
 
-def _first(groups: Mapping[str, ArrayGroup], where: str) -> ArrayGroup:
+def _first(groups: Mapping[str, Group], where: str) -> Group:
     for group in groups.values():
         if group.attributes.get("content") == "contact law":
             return group
@@ -186,7 +186,7 @@ def _contact_scene(choice: StiffnessChoice) -> Scene:
     return changed
 
 
-def _run(scene: Scene) -> ArrayGroup:
+def _run(scene: Scene) -> Group:
     flat = analysis_of(scene)
     solution = flat.solve(flat.make_plan(scene), Stages())
     for check in flat.check_solution(solution):

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.measured.compare import MEASURED_CURVE
-from upd.plot.chart import Array, Arrays, Axis, Chart, Group, Trace
+from upd.plot.chart import Array, Axis, Chart, Trace
 from upd.plot.common import case_of, frequency_of, magnitude, with_content
-from upd.results import Case
+from upd.results import Arrays, Case, Group
 
 _BLADES = ("right", "left")
 _PER_N = "(m/s²)/N"

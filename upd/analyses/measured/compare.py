@@ -23,7 +23,7 @@ from upd.measured import (
 )
 from upd.measured.compare import paired
 from upd.measured.curve import LEAST_POINTS
-from upd.results import ArrayGroup, Case, Check, ErrorPart, Result, variable, with_parts
+from upd.results import Case, Check, ErrorPart, Group, Result, variable, with_parts
 from upd.results import quantities as q
 from upd.results.quantities import Quantity
 from upd.scene.measured import MeasuredChoice, fit_of
@@ -288,7 +288,7 @@ def accelerance_array(H: Any) -> tuple[Any, ...]:
     )
 
 
-def measured_arrays(measured: MeasuredChoices) -> dict[str, ArrayGroup]:
+def measured_arrays(measured: MeasuredChoices) -> dict[str, Group]:
     """Every measured curve as it is compared, with the fit to a free one."""
     out = {}
     for name, choice in measured.items():
@@ -304,7 +304,7 @@ def measured_arrays(measured: MeasuredChoices) -> dict[str, ArrayGroup]:
             # where there is none, its number is withheld with the reason
             with suppress(InputError):
                 variables["fitted"] = accelerance_array(fit_of(choice).response(curve.frequency))
-        out[f"measured {name}"] = ArrayGroup(
+        out[f"measured {name}"] = Group(
             variables,
             content=MEASURED_CURVE,
             case=_case(name, choice),

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from upd.analyses.base import Analysis
-from upd.analyses.modal import charts, checks, output, plan, results, varied
+from upd.analyses.base import Analysis, rig_needs
+from upd.analyses.modal import charts, checks, output, results, varied
 from upd.vary import errors
 from upd.vary.inputs import coarsened_rig
 from upd.vary.wanted import plan_wanted
@@ -18,7 +18,7 @@ ANALYSIS = Analysis(
     headline_names=results.HEADLINE,
     input_checks=(),
     make_plan=partial(plan_wanted, varied.WANTED, varied.plan_with_estimates),
-    needs=plan.needs,
+    needs=partial(rig_needs, "reduction"),
     solve=varied.solve_levels,
     make_results=results.make_results,
     check_solution=checks.check_solution,

@@ -13,8 +13,9 @@ import numpy as np
 from upd.analyses.measured import FREE, STUCK
 from upd.analyses.measured.charts import damping_charts, measured_traces
 from upd.analyses.modal.output import MODES, REDUCTION, RESPONSE
-from upd.plot.chart import Arrays, Axis, Chart, Group, Mark, Trace
+from upd.plot.chart import Axis, Chart, Mark, Trace
 from upd.plot.common import case_of, frequency_of, magnitude, scalar, with_content
+from upd.results import Arrays, Group
 
 _F = Axis("frequency", "Hz")
 #: the blade that is excited first

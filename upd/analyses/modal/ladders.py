@@ -35,11 +35,11 @@ from upd.linalg.parallel import in_parallel
 from upd.linalg.select import threads
 from upd.mesh import Mesh, recipes
 from upd.progress import Stages
+from upd.results.answer_table import AnswerTable
 from upd.scene import ModalScene
 from upd.scene.base import LeftOut
 from upd.vary.ladder import Asked, Ladder, StudyReport, counts, no_levels, refinements
 from upd.vary.outcome import SolvedPoint
-from upd.vary.tables import TextTable
 from upd.vary.variation import Overrides, Variation
 
 Array = NDArray[np.float64]
@@ -134,8 +134,8 @@ def _dimension_report(
             for dimension, found in derivatives.items()
         ),
     ]
-    heads = ("dimension", *(name.replace("_", " ") for name in frequencies))
-    table = TextTable("d ln f / d ln p", heads, "l" + "r" * len(frequencies), tuple(rows))
+    heads = ("dimension", *(f"# {name.replace('_', ' ')}" for name in frequencies))
+    table = AnswerTable("d ln f / d ln p", heads, tuple(rows))
     any_found = any(not isinstance(found, str) for found in derivatives.values())
     return StudyReport((table,), any_found)
 

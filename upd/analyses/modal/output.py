@@ -22,7 +22,7 @@ from upd.matrices import DofMap, Matrices, write_dof_map, write_matrices
 from upd.mesh import IntArray, Mesh, recipes
 from upd.plot.pictures import draw_mode
 from upd.plot.sheet import Drawing, write_sheet
-from upd.results import ArrayGroup, Case, variable
+from upd.results import Case, Group, variable
 
 #: modes drawn of each configuration
 _DRAWN = 4
@@ -38,7 +38,7 @@ def sizes(solution: ModalSolution) -> dict[str, int]:
     return {"n_modes": sum(len(s.modes) for s in solution.sets)}
 
 
-def arrays(solution: ModalSolution) -> dict[str, ArrayGroup]:
+def arrays(solution: ModalSolution) -> dict[str, Group]:
     """Frequencies of every configuration, responses, and frequencies of the reduced blades.
 
     Returns
@@ -63,11 +63,11 @@ def arrays(solution: ModalSolution) -> dict[str, ArrayGroup]:
             "frequency": variable("mode", reduced, "Hz"),
             "full": variable("mode", full, "Hz", source="full model"),
         }
-        out["reduction"] = ArrayGroup(variables, content=REDUCTION, case=REDUCED)
+        out["reduction"] = Group(variables, content=REDUCTION, case=REDUCED)
     return out
 
 
-def _modes(solution: ModalSolution, found: ModeSet) -> ArrayGroup:
+def _modes(solution: ModalSolution, found: ModeSet) -> Group:
     variables: dict[str, Any] = {
         "frequency": variable("mode", [m.frequency for m in found.modes], "Hz"),
         "family": variable(
@@ -81,10 +81,10 @@ def _modes(solution: ModalSolution, found: ModeSet) -> ArrayGroup:
         variables["reference"] = variable(
             "mode", references, "Hz", "printed frequency", source=source
         )
-    return ArrayGroup(variables, content=MODES, case=found.case)
+    return Group(variables, content=MODES, case=found.case)
 
 
-def _response(response: RigResponse, kind: str) -> ArrayGroup:
+def _response(response: RigResponse, kind: str) -> Group:
     """Accelerance of both blades, modal damping, and the marked peak of the free right blade."""
     group: dict[str, Any] = {"frequency": variable("frequency", response.frequency, "Hz")}
     for blade, H in response.accelerance[kind].items():
@@ -94,9 +94,7 @@ def _response(response: RigResponse, kind: str) -> ArrayGroup:
         at, height = response.peak
         group["peak_frequency_right"] = variable("peak_right", [at], "Hz")
         group["peak_accelerance_right"] = variable("peak_right", [height], "(m/s2)/N")
-    return ArrayGroup(
-        group, content=RESPONSE, case=Case(kind=kind, arrangement=response.arrangement)
-    )
+    return Group(group, content=RESPONSE, case=Case(kind=kind, arrangement=response.arrangement))
 
 
 def write_files(solution: ModalSolution, folder: Path) -> None:

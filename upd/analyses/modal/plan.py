@@ -7,9 +7,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from upd.analyses.base import Effect, Needs, Plan
+from upd.analyses.base import Effect, Plan
 from upd.analyses.cost import NODES, CostModel
-from upd.cache.sources import key_of
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import RigScene
@@ -108,15 +107,6 @@ def _sizes(
         ).items():
             out[f"{body}, {arrangement}"] = dict(count)
     return out
-
-
-def needs(plan: ModalPlan, threads: int) -> Needs:
-    """What a point of a sweep with this plan needs, and may share with others."""
-    del threads
-    scene = plan.scene
-    mesh = {"recipe": scene.recipe, "parameters": dict(plan.parameters)}
-    model = mesh | {"mesh": scene.mesh, "material": scene.material, "reduction": scene.reduction}
-    return Needs(key_of(model), key_of(mesh))
 
 
 def _effects(scene: RigScene, symmetry: str) -> list[Effect]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 
+from upd.analyses.base import keeping
 from upd.analyses.modal.plan import MORE_MODES, ModalPlan, configurations, parameters
 from upd.dynamics import (
     ModalSystem,
@@ -173,7 +174,7 @@ def solve(plan: ModalPlan, stages: Stages) -> ModalSolution:
     An error raised on the way carries what converged so far as ``partial``.
     """
     solution = ModalSolution(plan)
-    try:
+    with keeping(solution):
         for arrangement, kind in configurations(plan.scene):
             solution.sets.append(_mode_set(plan, arrangement, kind, stages))
         if plan.scene.wants("reduction"):
@@ -185,9 +186,6 @@ def solve(plan: ModalPlan, stages: Stages) -> ModalSolution:
             with stages("effects left out", "each solved again"):
                 solution.more_modes = _peak_with_more_modes(solution)
                 solution.unlocked = _unlocked(solution)
-    except BaseException as error:
-        error.partial = solution  # type: ignore[attr-defined]
-        raise
     return solution
 
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from upd.analyses.base import Analysis
-from upd.analyses.seated import charts, checks, output, plan, results, solve, varied
+from upd.analyses.base import Analysis, rig_needs
+from upd.analyses.seated import charts, checks, output, results, solve, varied
 from upd.vary import errors
 from upd.vary.inputs import coarsened_rig
 
@@ -17,7 +17,7 @@ ANALYSIS = Analysis(
     headline_names=results.HEADLINE,
     input_checks=(),
     make_plan=varied.plan_with_estimates,
-    needs=plan.needs,
+    needs=partial(rig_needs, "blades"),
     solve=solve.solve,
     make_results=results.make_results,
     check_solution=checks.check_solution,

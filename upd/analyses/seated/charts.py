@@ -10,8 +10,9 @@ import numpy as np
 from upd.analyses.contact.charts import TOP_PERCENTILE, face_chart, values
 from upd.analyses.seated.output import FACE, HISTORY, MOVED, SEATING
 from upd.analyses.seated.plan import RAISED, SMOOTH, WAYS
-from upd.plot.chart import STATES, Arrays, Axis, Chart, Group, Map, Style, Trace
+from upd.plot.chart import STATES, Axis, Chart, Map, Style, Trace
 from upd.plot.common import UM, case_of, lattice, pressure_map, with_content
+from upd.results import Arrays, Group
 from upd.scene.forced_contact import SIDES
 
 _STYLES: dict[str, Style] = dict(zip(SEATING, ("line", "dashed", "dotted"), strict=True))

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, qr
 
 from upd.analyses.base import Plan
-from upd.analyses.seated.bodies import Blade, Bodies, free_dofs, is_half
-from upd.analyses.seated.lattice import lattice, patch_frame
+from upd.analyses.seated.bodies import Blade, Bodies, free_dofs, is_half, lattice, patch_frame
 from upd.contact import CoupledContact, coupled_contact
 from upd.errors import InputError
 from upd.fem import Material, mass, stiffness
@@ -309,7 +308,9 @@ def make_interface(
     for k, part in enumerate(found):
         on = np.flatnonzero(face == k)
         C[:, on[:, None], :, on[None, :]] += part.transpose(1, 3, 0, 2)
-    own, columns = _damper(plan, bodies, nodes) if like is None else (like.damper, like.columns)
+    own, columns = (
+        damper_compliance(plan, bodies, nodes) if like is None else (like.damper, like.columns)
+    )
     total = C.reshape(3 * n, 3 * n) + own
     position = np.vstack([b.mesh.points[one] for b, one in zip(blades, nodes, strict=True)])
     half = is_half(bodies.damper_mesh)
@@ -353,7 +354,9 @@ def _blade_compliance(blade: Blade, nodes: IntArray, solver: str, held: str) -> 
     return np.asarray(np.einsum("fc,icjd,gd->figj", frame, C.reshape(m, 3, m, 3), frame))
 
 
-def _damper(plan: Plan[Any], bodies: Bodies, nodes: Sequence[IntArray]) -> tuple[Array, Array]:
+def damper_compliance(
+    plan: Plan[Any], bodies: Bodies, nodes: Sequence[IntArray]
+) -> tuple[Array, Array]:
     """Elastic compliance (3 n, 3 n) of the free damper at its nodes, its rigid columns (3 n, r).
 
     G = B P' K^+ P B' with P = 1 - M R (R'M R)^-1 R': contact forces are held by the mass's inertia

@@ -21,7 +21,7 @@ from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, STICK
 from upd.contact.patch import make_patch
 from upd.mesh import IntArray, Mesh
-from upd.results import ArrayGroup, variable
+from upd.results import Group, variable
 from upd.scene.forced_contact import SIDES, Side
 
 Variables = dict[str, Any]
@@ -46,7 +46,7 @@ def sizes(solution: SeatedSolution) -> dict[str, int]:
     return {"n_pairs": solution.interface.n}
 
 
-def arrays(solution: SeatedSolution) -> dict[str, ArrayGroup]:
+def arrays(solution: SeatedSolution) -> dict[str, Group]:
     """Arrays for result.nc.
 
     Returns
@@ -56,17 +56,17 @@ def arrays(solution: SeatedSolution) -> dict[str, ArrayGroup]:
         F_C), "moved" (over the blade's shift), "face" (fields on a face's lattice after each way of
         loading), "seated faces" and "seated state" (of the nodes of both faces, left ones first).
     """
-    out: dict[str, ArrayGroup] = {}
+    out: dict[str, Group] = {}
     for phase in solution.phases.values():
         content = MOVED if phase.moved.any() else HISTORY
-        out[f"{content} {phase.name}"] = ArrayGroup(
+        out[f"{content} {phase.name}"] = Group(
             _history(solution, phase), content=content, case=phase.case
         )
     faces = _faces(solution)
     for phase in solution.phases.values():
         for side, face in faces:
             name = f"face {side} {face.name} {phase.name}".replace("  ", " ")
-            out[name] = ArrayGroup(
+            out[name] = Group(
                 _face(solution, face, phase),
                 content=FACE,
                 case=replace(phase.case, side=side),
@@ -79,11 +79,11 @@ def arrays(solution: SeatedSolution) -> dict[str, ArrayGroup]:
     return out
 
 
-def _nodes(solution: SeatedSolution) -> ArrayGroup:
+def _nodes(solution: SeatedSolution) -> Group:
     """The nodes of both faces."""
     of, node = solution.interface, "contact_node"
     axes = "normal into the blade, along the damper, up the slope"
-    return ArrayGroup(
+    return Group(
         {
             "position": variable("contact_node axis", of.position, "mm"),
             "face": variable(node, of.face, flag_meanings="left right"),
@@ -96,7 +96,7 @@ def _nodes(solution: SeatedSolution) -> ArrayGroup:
     )
 
 
-def _state(phase: Phase) -> ArrayGroup:
+def _state(phase: Phase) -> Group:
     """Forces, slip, gap and motion after a way of loading, in the layout of `Interface`."""
     found = phase.found
     variables: Variables = {
@@ -106,7 +106,7 @@ def _state(phase: Phase) -> ArrayGroup:
     variables["state"] = variable("contact_node", found.state[-1], flag_meanings=_STATES)
     variables["centrifugal"] = variable("", float(phase.centrifugal[-1]), "N")
     variables["friction"] = variable("", phase.friction, "1")
-    return ArrayGroup(variables, content="seated state", case=phase.case)
+    return Group(variables, content="seated state", case=phase.case)
 
 
 def _history(solution: SeatedSolution, phase: Phase) -> Variables:

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.base import Effect, Needs, Plan
+from upd.analyses.base import Effect, Plan
 from upd.analyses.cost import NODES, CostModel, dense_s
-from upd.cache.sources import key_of
 from upd.labels import number
 from upd.mesh import recipes
 from upd.scene import SeatedScene
@@ -173,15 +172,6 @@ def _cost(
     cost.kept_bytes += _MATRICES * 8.0 * m**2
     memory, workers = cost.side_by_side(min(2, cost.threads), 2)
     return cost, memory, workers
-
-
-def needs(plan: SeatedPlan, threads: int) -> Needs:
-    """What a point of a sweep with this plan needs, and may share with others."""
-    del threads
-    scene = plan.scene
-    mesh: dict[str, Any] = {"recipe": scene.recipe, "parameters": dict(plan.parameters)}
-    model = mesh | {"mesh": scene.mesh, "material": scene.material, "blades": scene.blades}
-    return Needs(key_of(model), key_of(mesh))
 
 
 def _effects(scene: SeatedScene, symmetry: str) -> list[Effect]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from upd.analyses.seated.lattice import rigid_balance
+from upd.analyses.seated.bodies import rigid_balance
 from upd.analyses.seated.plan import AGAIN, LOWERED, RAISED, SHAKEN, SMOOTH, WAYS
 from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, SLIP

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.base import Resolved
+from upd.analyses.base import Resolved, keeping
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.analyses.seated.plan import (
@@ -119,7 +119,7 @@ def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
     (raised,), *others = ways(scene)
     with stages("seating", f"{RAISED}, {scene.seating.steps} load steps"):
         _phase(solution, raised)
-    try:
+    with keeping(solution):
         _go_on(solution, others, stages)
         if scene.wants("stiffness"):
             with stages("stiffness", "platforms held"):
@@ -130,9 +130,6 @@ def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
                 )
         if scene.left_out.solves:
             solution.omissions = list(_solve_again(solution, stages))
-    except BaseException as error:
-        error.partial = solution  # type: ignore[attr-defined]
-        raise
     return solution
 
 

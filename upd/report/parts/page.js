@@ -41,7 +41,7 @@
   function heightOf(figure, width) {
     const inner = Math.max(width - 90, 200) / figure.wide;
     const bar = hasBar(figure) ? 75 : 0, legend = figure.layout.showlegend ? twoLines : 0;
-    return Math.round(Math.max(Math.min(Math.max(inner, bar ? 110 : 230), 440), figure.least) + 90 + bar + legend);
+    return Math.round(Math.min(Math.max(inner, bar ? 110 : 230), 440) + 90 + bar + legend);
   }
 
   function layoutOf(figure, width) {
