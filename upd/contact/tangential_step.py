@@ -10,7 +10,7 @@ from scipy.linalg import blas
 
 from upd.contact.checks import EPS, Problems, compliance_matrix, numbers, unit_response
 from upd.contact.disk import DiskQP
-from upd.contact.qp import FREE, BoxQP, FloatArray, State
+from upd.contact.qp import FREE, BoxQP, FloatArray, Solution, State
 from upd.labels import Shown
 
 BoolArray = NDArray[np.bool_]
@@ -129,8 +129,10 @@ class TangentialSolver:
         self.C = C
         if self.carried.size:
             inner = C if self.carried.size == s.size else C[np.ix_(self.dofs, self.dofs)]
-            self.box = BoxQP(inner) if self.directions == 1 else None
-            self.disk = DiskQP(inner) if self.directions == 2 else None
+            if self.directions == 1:
+                self.box = BoxQP(inner)
+            else:
+                self.disk = DiskQP(inner)
 
     @property
     def n(self) -> int:
@@ -200,160 +202,94 @@ class TangentialSolver:
 
     def step(self, value: FloatArray, by_load: bool, at: TangentialHistory) -> TangentialContact:
         """One checked load step."""
-        if not self.carried.size:
-            return self._frictionless(value, by_load)
-        return (
-            self._one(float(value), by_load, at)
-            if self.directions == 1
-            else self._two(value, by_load, at)
-        )
-
-    def _one(self, value: float, by_load: bool, at: TangentialHistory) -> TangentialContact:
-        assert self.box is not None
-        before = at.slip[self.carried]
-        answer = self.box.solve(
-            before,
-            -self.bound,
-            self.bound,
-            load=value if by_load else None,
-            motion=None if by_load else value,
-            state=at.state[self.carried],
-        )
-        load = value if by_load else float(answer.x.sum())
-        return self._result(
-            at,
-            answer.x,
-            before - answer.residual,
-            answer.state,
-            float(answer.motion[0]),
-            load,
-            float(answer.stiffness[0, 0]),
-            answer.iterations,
-            answer.method,
-            by_load,
-            answer.unclipped,
-            answer.rates,
-        )
-
-    def _two(self, value: FloatArray, by_load: bool, at: TangentialHistory) -> TangentialContact:
-        assert self.disk is not None
         before = at.slip[self.dofs]
-        answer = self.disk.solve(
-            before,
-            self.bound,
-            total=value if by_load else None,
-            shift=None if by_load else value,
-            force=at.force[self.dofs],
-            slipping=at.state[self.carried] != FREE,
-        )
-        load = value if by_load else answer.t.reshape(2, -1).sum(axis=1)
-        state = answer.slipping.astype(np.int8)
-        return self._result(
-            at,
-            answer.t,
-            before + answer.slip,
-            state,
-            answer.shift,
-            load,
-            answer.stiffness,
-            answer.iterations,
-            answer.method,
-            by_load,
-            answer.unclipped,
-            answer.rates,
-        )
+        load, motion = (value, None) if by_load else (None, value)
+        if not self.carried.size:
+            answer = self._frictionless(motion)
+        elif self.directions == 1:
+            answer = self.box.solve(
+                before,
+                -self.bound,
+                self.bound,
+                load=load,
+                motion=motion,
+                state=at.state[self.carried],
+            )
+        else:
+            answer = self.disk.solve(
+                before,
+                self.bound,
+                load=load,
+                motion=motion,
+                force=at.force[self.dofs],
+                slipping=at.state[self.carried] != FREE,
+            )
+        return self._result(at, answer, load)
+
+    def _frictionless(self, motion: FloatArray | None) -> Solution:
+        """No node can carry traction: the bodies slide past each other by the displacement.
+
+        A load can only be zero.
+        """
+        r, none = self.directions, np.zeros(0)
+        d = np.zeros(r) if motion is None else np.atleast_1d(motion)
+        zero, state = np.zeros((r, r)), np.zeros(0, dtype=np.int8)
+        return Solution(none, none, d, state, 0, "active set", zero, none, np.zeros((0, r)))
 
     def _result(
-        self,
-        at: TangentialHistory,
-        t: FloatArray,
-        w: FloatArray,
-        state: State,
-        d: float | FloatArray,
-        load: float | FloatArray,
-        stiffness: float | FloatArray,
-        iterations: int,
-        method: str,
-        by_load: bool,
-        unclipped: FloatArray,
-        rates: FloatArray,
+        self, at: TangentialHistory, answer: Solution, load: FloatArray | None
     ) -> TangentialContact:
         """Spread the answer of the carried nodes over all nodes.
 
         The others slip freely, w = d - C t.
         """
-        size = self.directions * self.n
+        size, some = self.directions * self.n, self.carried.size
         force, slip, full = np.zeros(size), np.zeros(size), np.zeros(self.n, dtype=np.int8)
-        raw, change = np.zeros(size), np.zeros((size, rates.shape[1]))
-        change[self.dofs] = rates
-        force[self.dofs], raw[self.dofs] = t, unclipped
-        if self.carried.size < self.n:
-            slip = np.repeat(np.asarray(d, dtype=float), self.n) - blas.dgemv(1.0, self.C.T, force)
-        slip[self.dofs] = w
-        full[self.carried] = state
+        raw, rates = np.zeros(size), np.zeros((size, self.directions))
+        rates[self.dofs] = answer.rates
+        force[self.dofs], raw[self.dofs] = answer.x, answer.unclipped
+        if some < self.n:
+            slip = np.repeat(answer.motion, self.n)
+        if 0 < some < self.n:
+            slip -= blas.dgemv(1.0, self.C.T, force)
+        slip[self.dofs] = at.slip[self.dofs] - answer.residual
+        full[self.carried] = answer.state
         stick = np.zeros(self.n, dtype=bool)
-        stick[self.carried] = state == FREE
+        stick[self.carried] = answer.state == FREE
         slipping = full != FREE
-        gross = not by_load and not stick.any()
-        if gross:
+        status = "converged"
+        message = (
+            f"{int(stick.sum())} nodes stick, {int(slipping.sum())} slip after "
+            f"{answer.iterations} steps of the {answer.method}."
+        )
+        if not some:
+            status = "no friction"
             message = (
-                f"Gross slip: all {self.carried.size} nodes slip at the friction limit. Lower "
+                "No node has a friction limit above zero: no traction, the slip is the rigid "
+                "displacement (zero under zero load)."
+            )
+        elif load is None and not stick.any():
+            status = "gross slip"
+            message = (
+                f"Gross slip: all {some} nodes slip at the friction limit. Lower "
                 "the displacement or raise mu N."
             )
-        else:
-            message = (
-                f"{int(stick.sum())} nodes stick, {int(slipping.sum())} slip after "
-                f"{iterations} steps of the {method}."
-            )
+        total = answer.x.reshape(self.directions, -1).sum(axis=1) if load is None else load
+        one = self.directions == 1
         return TangentialContact(
             force=force,
             slip=slip,
             stick=stick,
             slipping=slipping,
-            displacement=d,
-            load=load,
-            slip_work=float(t @ (w - at.slip[self.dofs])),
-            stiffness=stiffness,
-            iterations=iterations,
-            method=method,
-            status="gross slip" if gross else "converged",
+            displacement=answer.motion.item() if one else answer.motion,
+            load=total.item() if one else total,
+            slip_work=float(answer.x @ (slip - at.slip)[self.dofs]),
+            stiffness=answer.stiffness.item() if one else answer.stiffness,
+            iterations=answer.iterations,
+            method=answer.method,
+            status=status,
             message=message,
             history=TangentialHistory(slip, force, full),
             unclipped=raw,
-            rates=change,
-        )
-
-    def _frictionless(self, value: FloatArray, by_load: bool) -> TangentialContact:
-        """No node can carry traction: the bodies slide past each other by the displacement.
-
-        A load can only be zero.
-        """
-        size = self.directions * self.n
-        d: float | FloatArray = np.zeros(value.shape) if by_load else value
-        zero: float | FloatArray = np.zeros(value.shape)
-        stiffness: float | FloatArray = np.zeros((2, 2))
-        if self.directions == 1:
-            d, zero, stiffness = float(d), 0.0, 0.0
-        slip = np.repeat(np.asarray(d, dtype=float), self.n)
-        none = np.zeros(self.n, dtype=bool)
-        history = TangentialHistory(slip, np.zeros(size), np.zeros(self.n, dtype=np.int8))
-        message = (
-            "No node has a friction limit above zero: no traction, the slip is the rigid "
-            "displacement (zero under zero load)."
-        )
-        return TangentialContact(
-            np.zeros(size),
-            slip,
-            none,
-            none.copy(),
-            d,
-            zero,
-            0.0,
-            stiffness,
-            0,
-            "active set",
-            "no friction",
-            message,
-            history,
-            np.zeros(size),
+            rates=rates if some else None,
         )
