@@ -29,7 +29,7 @@ from upd.analyses.contact.solution import ContactSolution, NormalCase, PressedCo
 from upd.analyses.contact.solve import Frozen, press, solve_plan
 from upd.contact.checks import few_threads
 from upd.contact.model import ContactModel
-from upd.contact.tangential_step import TangentialHistory
+from upd.contact.tangential import TangentialHistory
 from upd.errors import InputError, UpdError
 from upd.progress import Stages
 from upd.results import Case, Result
