@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from upd.contact.equilibrium import FaceForces, equilibrium
+from upd.contact.rigid_damper import FaceForces, equilibrium
 from upd.errors import InputError
 from upd.mesh import FloatArray, IntArray, Mesh
 
