@@ -29,10 +29,9 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import bsr_array
 
 from upd.errors import ConvergenceError, InputError
-from upd.linalg.block_conjugate import block_conjugate_gradients
 from upd.linalg.blocks import Single
 from upd.linalg.common import FloatArray, checked_vectors, log
-from upd.linalg.conjugate import UNSEEN, conjugate_gradients
+from upd.linalg.conjugate import UNSEEN, block_conjugate_gradients, conjugate_gradients
 from upd.linalg.nodes import padded, places, positions
 from upd.linalg.smoothers import Smoother, block_rows
 from upd.linalg.solvers import Solved
@@ -295,7 +294,7 @@ class MultigridSolver:
             self._lowest = made.lowest
             found += [
                 Solved(x, float(error), made.iterations)
-                for x, error in zip(made.x.T, made.errors, strict=True)
+                for x, error in zip(made.x.T, made.error, strict=True)
             ]
         return found
 
@@ -326,7 +325,7 @@ class MultigridSolver:
             start=start,
         )
         self._lowest = found.lowest
-        return Solved(found.x, found.error, found.iterations)
+        return Solved(found.x, float(found.error), found.iterations)
 
 
 def _symmetric(K: Symmetric, X: FloatArray) -> FloatArray:

@@ -27,7 +27,13 @@ from upd.analyses.contact.plan import (
 from upd.analyses.contact.solution import ContactSolution, NormalCase
 from upd.cache.shared import active
 from upd.cache.sources import key_of, source_digest
-from upd.contact.bulk import finite_body_share, half_space_mean
+from upd.contact.bulk import (
+    BodyShare,
+    axis_half_space,
+    axis_share,
+    finite_body_share,
+    half_space_mean,
+)
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
 from upd.contact.products import (
     ROUGH,
@@ -37,7 +43,6 @@ from upd.contact.products import (
     learning,
     normal_contact_by_products,
 )
-from upd.contact.stiffness import BodyShare, axis_half_space, axis_share
 from upd.errors import MeshError
 from upd.fem import Material, rigid_body_modes, stiffness
 from upd.linalg.multigrid import MultigridSolver
