@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 
-from upd.contact.qp import EPS, FloatArray, Method, Solution
+from upd.contact.qp import EPS, FloatArray, ForceSolution, Method
 from upd.errors import ConvergenceError
 
 log = logging.getLogger(__name__)
@@ -84,7 +84,7 @@ class DiskQP:
         motion: FloatArray | None = None,
         force: FloatArray,
         slipping: BoolArray,
-    ) -> Solution:
+    ) -> ForceSolution:
         """Solve one problem; give either `load` or `motion`.
 
         Parameters
@@ -104,7 +104,7 @@ class DiskQP:
 
         Returns
         -------
-        Solution
+        ForceSolution
 
         Raises
         ------
@@ -121,7 +121,7 @@ class DiskQP:
         )
         answer, used, method = self._answer(disks, force / unit, slipping)
         rates = self._rates(disks, answer) / self._largest
-        return Solution(
+        return ForceSolution(
             x=answer.t * unit,
             residual=-answer.slip * length,
             motion=answer.shift * length,

@@ -42,7 +42,7 @@ _LAST_STEPS = 10
 
 
 @dataclass(frozen=True)
-class Solution:
+class ForceSolution:
     """Answer of one problem of m forces with r rigid motions, whose forces lie in boxes or disks.
 
     Attributes
@@ -140,7 +140,7 @@ class BoxQP:
         load: FloatArray | float | None = None,
         motion: FloatArray | float | None = None,
         state: State,
-    ) -> Solution:
+    ) -> ForceSolution:
         """Solve one box QP; give either `load` or `motion`.
 
         Parameters
@@ -158,7 +158,7 @@ class BoxQP:
 
         Returns
         -------
-        Solution
+        ForceSolution
 
         Raises
         ------
@@ -197,7 +197,7 @@ class BoxQP:
         )
         x, rates = np.clip(step.x, lower, upper), np.zeros(self.B.shape)
         rates[self._index] = self._unit
-        return Solution(
+        return ForceSolution(
             x, residual, step.motion, state, used, method, self._stiffness, step.x, rates
         )
 

@@ -17,7 +17,7 @@ from upd.contact.checks import (
     unit_response,
 )
 from upd.contact.disk import DiskQP
-from upd.contact.qp import FREE, BoxQP, FloatArray, Solution, State
+from upd.contact.qp import FREE, BoxQP, FloatArray, ForceSolution, State
 from upd.labels import Shown
 
 BoolArray = NDArray[np.bool_]
@@ -439,7 +439,7 @@ class _TangentialSolver:
             )
         return self._result(at, answer, load)
 
-    def _frictionless(self, motion: FloatArray | None) -> Solution:
+    def _frictionless(self, motion: FloatArray | None) -> ForceSolution:
         """No node can carry traction: the bodies slide past each other by the displacement.
 
         A load can only be zero.
@@ -447,10 +447,10 @@ class _TangentialSolver:
         r, none = self.directions, np.zeros(0)
         d = np.zeros(r) if motion is None else np.atleast_1d(motion)
         zero, state = np.zeros((r, r)), np.zeros(0, dtype=np.int8)
-        return Solution(none, none, d, state, 0, "active set", zero, none, np.zeros((0, r)))
+        return ForceSolution(none, none, d, state, 0, "active set", zero, none, np.zeros((0, r)))
 
     def _result(
-        self, at: TangentialHistory, answer: Solution, load: FloatArray | None
+        self, at: TangentialHistory, answer: ForceSolution, load: FloatArray | None
     ) -> TangentialContact:
         """Spread the answer of the carried nodes over all nodes.
 
