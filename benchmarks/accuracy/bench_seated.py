@@ -15,7 +15,7 @@ import numpy as np
 from upd.analyses import make_plan
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
-from upd.contact.equilibrium import equilibrium
+from upd.contact.rigid_damper import equilibrium
 from upd.scene import load_scene
 from upd.scene.forced_contact import SIDES
 

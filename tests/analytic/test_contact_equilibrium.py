@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from upd.contact.equilibrium import equilibrium, face_forces
+from upd.contact.rigid_damper import equilibrium, face_forces
 from upd.errors import InputError
 
 

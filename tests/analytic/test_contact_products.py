@@ -26,8 +26,8 @@ from upd.contact.products import (
     unknown,
 )
 from upd.errors import ConvergenceError, InputError
-from upd.linalg.blocks import WIDTH
 from upd.linalg.routes import choose_route, contact_routes
+from upd.linalg.sweeps import WIDTH
 from upd.progress import Stages
 from upd.reduction.learned import LearnedCompliance
 from upd.reference import half_space_compliance

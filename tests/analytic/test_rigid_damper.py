@@ -21,10 +21,11 @@ from upd.contact.damper_section import (
     eccentricity,
     moment_share,
 )
-from upd.contact.equilibrium import equilibrium, face_forces
 from upd.contact.rigid_damper import (
     SLIDINGS,
     Sliding,
+    equilibrium,
+    face_forces,
     force_limits,
     forces,
     friction_limits,

@@ -25,7 +25,7 @@ from upd.analyses.forced.statics import (
 )
 from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import Bodies, make_bodies
-from upd.contact.equilibrium import equilibrium
+from upd.contact.rigid_damper import equilibrium
 from upd.errors import InputError
 from upd.hbm import contacts, frequency_response
 from upd.hbm.springs.time_integration import steady_state

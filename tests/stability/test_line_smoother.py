@@ -10,9 +10,9 @@ from scipy.sparse import bsr_array, csr_array
 
 from upd.fem import Material, box_mesh, rigid_body_modes, stiffness
 from upd.linalg import amg_solve
-from upd.linalg.blocks import WIDTH
 from upd.linalg.lines import find_cross_lines, find_lines, in_line_order
-from upd.linalg.smoothers import BlockSmoother, LineSmoother
+from upd.linalg.smoothers import Smoother
+from upd.linalg.sweeps import WIDTH
 
 
 def plate(
@@ -121,7 +121,7 @@ def lower_of(M: np.ndarray, places: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("sides", [(5.0, 1.0, 0.5), (6.0, 5.0, 1.0)])
 def test_sweeps_are_those_of_the_block_matrix(sides: tuple[float, float, float]) -> None:
     A, *_ = plate(sides, n=4)
-    smoother = LineSmoother(A)
+    smoother = Smoother(A)
     order = smoother.order
     assert order is not None
     M = A.toarray()[np.ix_(order, order)]
@@ -153,7 +153,7 @@ def test_sweeps_node_by_node_are_those_of_the_block_matrix() -> None:
     half = rng.standard_normal((60, 60))
     M = half @ half.T + 60.0 * np.eye(60)
     M[:12, 30:] = M[30:, :12] = 0.0
-    smoother = BlockSmoother(bsr_array(csr_array(M).tobsr(blocksize=(6, 6))))
+    smoother = Smoother(bsr_array(csr_array(M).tobsr(blocksize=(6, 6))))
     lower = lower_of(M, np.repeat(np.arange(10), 6))
     B = rng.standard_normal((60, WIDTH)).astype(np.float32)
     x = np.linalg.solve(lower, B)

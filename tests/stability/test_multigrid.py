@@ -12,8 +12,7 @@ from scipy.sparse import bsr_matrix, csr_array, diags_array, kron
 from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, box_mesh, rigid_body_modes, stiffness
 from upd.linalg import amg_solve, factorise, multigrid
-from upd.linalg.block_conjugate import block_conjugate_gradients
-from upd.linalg.conjugate import conjugate_gradients
+from upd.linalg.conjugate import block_conjugate_gradients, conjugate_gradients
 from upd.linalg.multigrid import MultigridSolver
 from upd.linalg.strength import aggregates, near_neighbours
 

@@ -16,7 +16,7 @@ from upd.analyses import make_plan
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.seated.bodies import Bodies, lattice, make_bodies, patch_frame
 from upd.analyses.seated.interface import Interface, make_interface
-from upd.contact.equilibrium import equilibrium
+from upd.contact.rigid_damper import equilibrium
 from upd.errors import InputError
 from upd.fem import Material, mass, stiffness
 from upd.reference import half_space_compliance

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import blas, lapack
 
-from upd.contact.qp import EPS, FloatArray, Method
+from upd.contact.qp import EPS, FloatArray, ForceSolution, Method
 from upd.errors import ConvergenceError
 
 log = logging.getLogger(__name__)
@@ -31,43 +31,6 @@ BoolArray = NDArray[np.bool_]
 NEWTON_STEPS = 30
 # Guard of the fallback: it ends by proof, but the bound is not known beforehand.
 SEARCH_STEPS = 20000
-
-
-@dataclass(frozen=True)
-class DiskSolution:
-    """Answer of one friction problem with m nodes and two directions.
-
-    Attributes
-    ----------
-    t : (2 m,) ndarray
-        Tractions [N], laid out [x_0 .. x_{m-1}, y_0 .. y_{m-1}].
-    slip : (2 m,) ndarray
-        Slip step [mm], zero where a node sticks.
-    shift : (2,) ndarray
-        Shift d [mm].
-    slipping : (m,) ndarray of bool
-        Nodes at their limit.
-    iterations : int
-        Newton steps and steps of the fallback.
-    method : {"active set", "fallback"}
-        Method that finished.
-    stiffness : (2, 2) ndarray
-        Tangent dT/dd [N/mm].
-    unclipped : (2 m,) ndarray
-        Tractions before they were brought inside their limits [N]: for checks.
-    rates : (2 m, 2) ndarray
-        Change of the tractions with the shift [N/mm], whose sums are the stiffness.
-    """
-
-    t: FloatArray
-    slip: FloatArray
-    shift: FloatArray
-    slipping: BoolArray
-    iterations: int
-    method: Method
-    stiffness: FloatArray
-    unclipped: FloatArray
-    rates: FloatArray
 
 
 @dataclass(frozen=True)
@@ -117,12 +80,12 @@ class DiskQP:
         h: FloatArray,
         s: FloatArray,
         *,
-        total: FloatArray | None = None,
-        shift: FloatArray | None = None,
+        load: FloatArray | None = None,
+        motion: FloatArray | None = None,
         force: FloatArray,
         slipping: BoolArray,
-    ) -> DiskSolution:
-        """Solve one problem; give either `total` or `shift`.
+    ) -> ForceSolution:
+        """Solve one problem; give either `load` or `motion`.
 
         Parameters
         ----------
@@ -130,9 +93,9 @@ class DiskQP:
             Slip before the step [mm].
         s : (m,) ndarray
             Friction limits [N], above zero.
-        total : (2,) ndarray, optional
+        load : (2,) ndarray, optional
             Sum of the tractions [N], shorter than the sum of `s`.
-        shift : (2,) ndarray, optional
+        motion : (2,) ndarray, optional
             Rigid displacement [mm].
         force : (2 m,) ndarray
             Tractions of the state before [N].
@@ -141,7 +104,7 @@ class DiskQP:
 
         Returns
         -------
-        DiskSolution
+        ForceSolution
 
         Raises
         ------
@@ -153,16 +116,16 @@ class DiskQP:
         disks = _Disks(
             h / length,
             s / unit,
-            None if total is None else total / unit,
-            None if shift is None else shift / length,
+            None if load is None else load / unit,
+            None if motion is None else motion / length,
         )
         answer, used, method = self._answer(disks, force / unit, slipping)
         rates = self._rates(disks, answer) / self._largest
-        return DiskSolution(
-            t=answer.t * unit,
-            slip=answer.slip * length,
-            shift=answer.shift * length,
-            slipping=answer.slipping,
+        return ForceSolution(
+            x=answer.t * unit,
+            residual=-answer.slip * length,
+            motion=answer.shift * length,
+            state=answer.slipping.astype(np.int8),
             iterations=used,
             method=method,
             stiffness=rates.reshape(2, self.m, 2).sum(axis=1),

@@ -42,30 +42,29 @@ _LAST_STEPS = 10
 
 
 @dataclass(frozen=True)
-class BoxSolution:
-    """Answer of one box QP with r rigid motions.
+class ForceSolution:
+    """Answer of one problem of m forces with r rigid motions, whose forces lie in boxes or disks.
 
     Attributes
     ----------
-    x : (n,) ndarray
+    x : (m,) ndarray
         Forces [N].
-    residual : (n,) ndarray
-        g = h + C x - B s [mm].
+    residual : (m,) ndarray
+        h + C x - B s [mm], of friction minus the slip step; zero where a node is free.
     motion : (r,) ndarray
         s [mm, rad].
     state : (n,) ndarray of int8
-        0 free, -1 at the lower bound, +1 at the upper bound.
+        Of each node: 0 free, -1 at the lower bound, +1 at the upper bound or on the rim.
     iterations : int
-        Factorisations.
+        Factorisations, and steps of the fallback.
     method : {"active set", "fallback"}
         Method that finished.
     stiffness : (r, r) ndarray
-        Tangent B_A' C_AA^-1 B_A of the free set A [N/mm].
-    unclipped : (n,) ndarray
-        Forces before they were clipped to the bounds [N]: for checks.
-    rates : (n, r) ndarray
-        Change of the forces with the motion [N/mm], C_AA^-1 B_A on A, whose resultants are the
-        stiffness.
+        Resultants of the rates [N/mm].
+    unclipped : (m,) ndarray
+        Forces before they were brought inside their bounds [N]: for checks.
+    rates : (m, r) ndarray
+        Change of the forces with the motion, the set held [N/mm].
     """
 
     x: FloatArray
@@ -141,7 +140,7 @@ class BoxQP:
         load: FloatArray | float | None = None,
         motion: FloatArray | float | None = None,
         state: State,
-    ) -> BoxSolution:
+    ) -> ForceSolution:
         """Solve one box QP; give either `load` or `motion`.
 
         Parameters
@@ -159,7 +158,7 @@ class BoxQP:
 
         Returns
         -------
-        BoxSolution
+        ForceSolution
 
         Raises
         ------
@@ -198,7 +197,7 @@ class BoxQP:
         )
         x, rates = np.clip(step.x, lower, upper), np.zeros(self.B.shape)
         rates[self._index] = self._unit
-        return BoxSolution(
+        return ForceSolution(
             x, residual, step.motion, state, used, method, self._stiffness, step.x, rates
         )
 

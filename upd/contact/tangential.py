@@ -6,13 +6,95 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import blas
 
-from upd.contact.checks import Problems, few_threads
-from upd.contact.qp import FloatArray, State
-from upd.contact.tangential_step import TangentialContact, TangentialHistory, TangentialSolver
+from upd.contact.checks import (
+    EPS,
+    Problems,
+    compliance_matrix,
+    few_threads,
+    numbers,
+    unit_response,
+)
+from upd.contact.disk import DiskQP
+from upd.contact.qp import FREE, BoxQP, FloatArray, ForceSolution, State
 from upd.labels import Shown
 
 BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, repr=False)
+class TangentialHistory(Shown):
+    """What the next load step must know about the one before.
+
+    Attributes
+    ----------
+    slip : (n,) or (2 n,) ndarray
+        Accumulated slip [mm].
+    force : (n,) or (2 n,) ndarray
+        Tractions [N].
+    state : (n,) ndarray of int
+        0 stick, +1 or -1 slip (+1 in two directions).
+    """
+
+    slip: FloatArray
+    force: FloatArray
+    state: State
+
+
+@dataclass(frozen=True, repr=False)
+class TangentialContact(Shown):
+    """Answer of one tangential load step at n nodes.
+
+    Vectors are (n,), or (2 n,) = [x_0 .. x_{n-1}, y_0 .. y_{n-1}] in two directions.
+
+    Attributes
+    ----------
+    force : (n,) or (2 n,) ndarray
+        Tractions [N].
+    slip : (n,) or (2 n,) ndarray
+        Accumulated slip [mm].
+    stick, slipping : (n,) ndarray of bool
+        Both False at nodes without normal force.
+    displacement : float or (2,) ndarray
+        Rigid displacement of the bodies [mm].
+    load : float or (2,) ndarray
+        Sum of the tractions [N].
+    slip_work : float
+        Work dissipated in this step [N mm].
+    stiffness : float or (2, 2) ndarray
+        dT/dd [N/mm].
+    iterations : int
+        Steps of the solver.
+    method : {"active set", "fallback"}
+        Method that finished.
+    status : {"converged", "gross slip", "no friction"}
+    message : str
+        One sentence.
+    history : TangentialHistory
+        For the next step.
+    unclipped : (n,) or (2 n,) ndarray
+        Tractions before they were brought inside their limits [N]: for checks.
+    rates : (n, 1) or (2 n, 2) ndarray or None
+        Change of the tractions with the displacement [N/mm], whose sums are the stiffness; None
+        where another solver found the answer.
+    """
+
+    force: FloatArray
+    slip: FloatArray
+    stick: BoolArray
+    slipping: BoolArray
+    displacement: float | FloatArray
+    load: float | FloatArray
+    slip_work: float
+    stiffness: float | FloatArray
+    iterations: int
+    method: str
+    status: str
+    message: str
+    history: TangentialHistory
+    unclipped: FloatArray
+    rates: FloatArray | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -138,7 +220,7 @@ def tangential_contact(
     """
     with few_threads(compliance):
         problems = Problems("tangential contact")
-        solver = TangentialSolver(problems, compliance, limit)
+        solver = _TangentialSolver(problems, compliance, limit)
         values = solver.targets(problems, load, displacement, steps=False)
         start = solver.start(problems, history)
         problems.raise_any()
@@ -194,7 +276,7 @@ def tangential_path(
     """
     with few_threads(compliance):
         problems = Problems("tangential path")
-        solver = TangentialSolver(problems, compliance, limit)
+        solver = _TangentialSolver(problems, compliance, limit)
         values = solver.targets(problems, loads, displacements, steps=True)
         at = solver.start(problems, history)
         problems.raise_any()
@@ -219,3 +301,208 @@ def tangential_path(
         history=at,
         unclipped=np.array([step.unclipped for step in steps]),
     )
+
+
+class _TangentialSolver:
+    """Checked compliance and limit, ready for many steps.
+
+    Only nodes with a limit above zero enter the problem.
+    """
+
+    def __init__(self, problems: Problems, compliance: ArrayLike, limit: ArrayLike) -> None:
+        C = compliance_matrix(problems, compliance)
+        s = numbers(problems, "limit", limit)
+        self.directions, self.limit = 1, np.zeros(0)
+        if C is not None:
+            unit_response(problems, C)
+        if s is None or problems.add(
+            s.ndim != 1 or s.size == 0,
+            f"limit has shape {s.shape}: it must be (n,), one value per contact node.",
+        ):
+            return
+        self.limit = s
+        negative = np.flatnonzero(s < 0)
+        problems.add(
+            negative.size > 0,
+            f"limit is negative at {negative.size} nodes: it is mu times a normal force >= 0.",
+        )
+        if C is None or problems.add(
+            len(C) not in (s.size, 2 * s.size),
+            f"compliance has {len(C)} rows for {s.size} limits: it needs n rows (one "
+            "direction) or 2n (two directions, x dofs first).",
+        ):
+            return
+        if problems.found:
+            return
+        self.directions = len(C) // s.size
+        self.carried = np.flatnonzero(s > 0)
+        self.dofs = np.concatenate([self.carried + i * s.size for i in range(self.directions)])
+        self.bound = s[self.carried]
+        self.total = float(s.sum())
+        self.C = C
+        if self.carried.size:
+            inner = C if self.carried.size == s.size else C[np.ix_(self.dofs, self.dofs)]
+            if self.directions == 1:
+                self.box = BoxQP(inner)
+            else:
+                self.disk = DiskQP(inner)
+
+    @property
+    def n(self) -> int:
+        return self.limit.size
+
+    def targets(
+        self,
+        problems: Problems,
+        load: ArrayLike | None,
+        displacement: ArrayLike | None,
+        *,
+        steps: bool,
+    ) -> FloatArray:
+        """Loads or displacements as an array () or (2,) per step.
+
+        Problems are noted for a wrong shape and for gross slip.
+        """
+        names = ("loads", "displacements") if steps else ("load", "displacement")
+        if problems.add(
+            (load is None) == (displacement is None),
+            f"give exactly one of {names[0]} and {names[1]}.",
+        ):
+            return np.zeros(0)
+        name, given = (names[0], load) if load is not None else (names[1], displacement)
+        assert given is not None
+        values = numbers(problems, name, given)
+        if values is None:
+            return np.zeros(0)
+        shape: tuple[int, ...] = () if self.directions == 1 else (2,)
+        wanted = f"{'k, ' if steps else ''}{'2' if self.directions == 2 else ''}".rstrip(", ")
+        wrong = values.shape[1:] != shape or values.ndim == 0 if steps else values.shape != shape
+        kind = "directions" if self.directions == 2 else "direction"
+        message = f"{name} has shape {values.shape}: {self.directions} {kind} need ({wanted})."
+        if problems.add(wrong, message) or load is None or problems.found:
+            return values
+        size = np.atleast_1d(
+            np.abs(values) if self.directions == 1 else np.hypot(values[..., 0], values[..., 1])
+        )
+        # A load within rounding of the limit leaves no node to stick; no load on no friction is
+        # fine.
+        gross = np.flatnonzero((size >= self.total * (1 - 4 * self.n * EPS)) & (size > 0))
+        place = f"{name}[{gross[0] if gross.size else 0}]" if steps else name
+        problems.add(
+            gross.size > 0,
+            f"gross slip: {place} is {size[gross[0]] if gross.size else 0:.9g} N and the "
+            "friction limit, the sum of mu N over the nodes, "
+            f"is {self.total:.9g} N: there is no static answer. Lower the load, raise mu "
+            "N, or prescribe the displacement.",
+        )
+        return values
+
+    def start(self, problems: Problems, history: TangentialHistory | None) -> TangentialHistory:
+        """The history, checked; without one, no slip and all nodes stick."""
+        size = self.directions * self.n
+        if history is None:
+            return TangentialHistory(
+                np.zeros(size), np.zeros(size), np.zeros(self.n, dtype=np.int8)
+            )
+        for name, wanted in (("slip", size), ("force", size), ("state", self.n)):
+            array = numbers(problems, f"history.{name}", getattr(history, name))
+            if array is not None:
+                problems.add(
+                    array.shape != (wanted,),
+                    f"history.{name} has shape {array.shape}: this contact needs ({wanted},).",
+                )
+        return history
+
+    def step(self, value: FloatArray, by_load: bool, at: TangentialHistory) -> TangentialContact:
+        """One checked load step."""
+        before = at.slip[self.dofs]
+        load, motion = (value, None) if by_load else (None, value)
+        if not self.carried.size:
+            answer = self._frictionless(motion)
+        elif self.directions == 1:
+            answer = self.box.solve(
+                before,
+                -self.bound,
+                self.bound,
+                load=load,
+                motion=motion,
+                state=at.state[self.carried],
+            )
+        else:
+            answer = self.disk.solve(
+                before,
+                self.bound,
+                load=load,
+                motion=motion,
+                force=at.force[self.dofs],
+                slipping=at.state[self.carried] != FREE,
+            )
+        return self._result(at, answer, load)
+
+    def _frictionless(self, motion: FloatArray | None) -> ForceSolution:
+        """No node can carry traction: the bodies slide past each other by the displacement.
+
+        A load can only be zero.
+        """
+        r, none = self.directions, np.zeros(0)
+        d = np.zeros(r) if motion is None else np.atleast_1d(motion)
+        zero, state = np.zeros((r, r)), np.zeros(0, dtype=np.int8)
+        return ForceSolution(none, none, d, state, 0, "active set", zero, none, np.zeros((0, r)))
+
+    def _result(
+        self, at: TangentialHistory, answer: ForceSolution, load: FloatArray | None
+    ) -> TangentialContact:
+        """Spread the answer of the carried nodes over all nodes.
+
+        The others slip freely, w = d - C t.
+        """
+        size, some = self.directions * self.n, self.carried.size
+        force, slip, full = np.zeros(size), np.zeros(size), np.zeros(self.n, dtype=np.int8)
+        raw, rates = np.zeros(size), np.zeros((size, self.directions))
+        rates[self.dofs] = answer.rates
+        force[self.dofs], raw[self.dofs] = answer.x, answer.unclipped
+        if some < self.n:
+            slip = np.repeat(answer.motion, self.n)
+        if 0 < some < self.n:
+            slip -= blas.dgemv(1.0, self.C.T, force)
+        slip[self.dofs] = at.slip[self.dofs] - answer.residual
+        full[self.carried] = answer.state
+        stick = np.zeros(self.n, dtype=bool)
+        stick[self.carried] = answer.state == FREE
+        slipping = full != FREE
+        status = "converged"
+        message = (
+            f"{int(stick.sum())} nodes stick, {int(slipping.sum())} slip after "
+            f"{answer.iterations} steps of the {answer.method}."
+        )
+        if not some:
+            status = "no friction"
+            message = (
+                "No node has a friction limit above zero: no traction, the slip is the rigid "
+                "displacement (zero under zero load)."
+            )
+        elif load is None and not stick.any():
+            status = "gross slip"
+            message = (
+                f"Gross slip: all {some} nodes slip at the friction limit. Lower "
+                "the displacement or raise mu N."
+            )
+        total = answer.x.reshape(self.directions, -1).sum(axis=1) if load is None else load
+        one = self.directions == 1
+        return TangentialContact(
+            force=force,
+            slip=slip,
+            stick=stick,
+            slipping=slipping,
+            displacement=answer.motion.item() if one else answer.motion,
+            load=total.item() if one else total,
+            slip_work=float(answer.x @ (slip - at.slip)[self.dofs]),
+            stiffness=answer.stiffness.item() if one else answer.stiffness,
+            iterations=answer.iterations,
+            method=answer.method,
+            status=status,
+            message=message,
+            history=TangentialHistory(slip, force, full),
+            unclipped=raw,
+            rates=rates if some else None,
+        )

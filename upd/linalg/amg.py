@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from upd.errors import InputError
 from upd.labels import Shown
-from upd.linalg.blocks import WIDTH
 from upd.linalg.common import FloatArray, checked_dofs, checked_vectors, log
 from upd.linalg.multigrid import MAX_ITERATIONS, MultigridSolver
+from upd.linalg.sweeps import WIDTH
 from upd.linalg.symmetric import checked
 
 RTOL = 1e-10

@@ -1,6 +1,4 @@
-"""Compiled loops that gather a matrix in small dense blocks, and the product with a symmetric
-matrix of which the upper triangle is stored.
-"""
+"""Compiled loops that gather a matrix in small dense blocks."""
 
 from __future__ import annotations
 
@@ -13,36 +11,6 @@ from upd.linalg.compiled import compiled
 
 Single = NDArray[np.float32]
 Index = NDArray[Any]
-
-
-@compiled
-def symmetric_product(
-    indptr: Index, indices: Index, data: NDArray[np.float64], x: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Product of a symmetric matrix and a vector.
-
-    Parameters
-    ----------
-    indptr, indices, data : (n + 1,), (nnz,), (nnz,) ndarray
-        Upper triangle in compressed rows that start with their diagonal.
-    x : (n,) ndarray
-
-    Returns
-    -------
-    (n,) ndarray
-    """
-    n = len(indptr) - 1
-    y = np.zeros(n)
-    for i in range(n):
-        first = indptr[i]
-        xi = x[i]
-        total = data[first] * xi
-        for k in range(first + 1, indptr[i + 1]):
-            j = indices[k]
-            total += data[k] * x[j]
-            y[j] += data[k] * xi
-        y[i] += total
-    return y
 
 
 @compiled
@@ -123,40 +91,3 @@ def fill_blocks(
                     cursor[other] += 1
                 blocks[upper[other], a, b] = data[k]
                 blocks[lower[other], b, a] = data[k]
-
-
-#: right-hand sides that are worked on at once, as many single-precision numbers as a register has
-WIDTH = 8
-
-
-@compiled
-def symmetric_product_many(
-    indptr: Index, indices: Index, data: NDArray[np.float64], x: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """As `symmetric_product` with `WIDTH` vectors.
-
-    Parameters
-    ----------
-    indptr, indices, data : (n + 1,), (nnz,), (nnz,) ndarray
-        As there.
-    x : (n, WIDTH) ndarray
-
-    Returns
-    -------
-    (n, WIDTH) ndarray
-    """
-    n = len(indptr) - 1
-    y = np.zeros((n, WIDTH))
-    total = np.empty(WIDTH)
-    for i in range(n):
-        first = indptr[i]
-        for c in range(WIDTH):
-            total[c] = data[first] * x[i, c]
-        for k in range(first + 1, indptr[i + 1]):
-            j = indices[k]
-            for c in range(WIDTH):
-                total[c] += data[k] * x[j, c]
-                y[j, c] += data[k] * x[i, c]
-        for c in range(WIDTH):
-            y[i, c] += total[c]
-    return y

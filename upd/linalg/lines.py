@@ -32,8 +32,6 @@ from upd.linalg.common import IntArray
 from upd.linalg.compiled import compiled
 from upd.linalg.strength import STRONG
 
-Three = tuple[np.float32, np.float32, np.float32]
-
 
 def find_lines(A: bsr_array) -> tuple[IntArray, IntArray]:
     """Lines of nodes that are coupled strongly by positive blocks.
@@ -183,14 +181,14 @@ def _in_order(beside: Index, indptr: Index, indices: Index) -> tuple[Index, Inde
 def in_line_order(
     indptr: Index, indices: Index, data: Any, order: Index
 ) -> tuple[Index, Index, Single]:
-    """Rows and columns of a symmetric matrix of blocks of 3 in another order, in single precision.
+    """Rows and columns of a symmetric matrix of blocks in another order, in single precision.
 
     Row by row of A in the new order, which is column by column: so the columns of each row come
     in their order, and a column's blocks are those of the row, transposed.
 
     Parameters
     ----------
-    indptr, indices, data : (n + 1,), (m,), (m, 3, 3) ndarray
+    indptr, indices, data : (n + 1,), (m,), (m, b, b) ndarray
         In compressed rows.
     order : (n,) ndarray of int
 
@@ -199,7 +197,7 @@ def in_line_order(
     indptr, indices, data : ndarray
         Columns of a row rise.
     """
-    n = len(order)
+    n, size = len(order), data.shape[1]
     place = np.empty(n, indices.dtype)
     pointers, columns = np.empty_like(indptr), np.empty_like(indices)
     blocks = np.empty(data.shape, np.float32)
@@ -213,179 +211,8 @@ def in_line_order(
         for k in range(indptr[row], indptr[row + 1]):
             to = place[indices[k]]
             columns[free[to]] = at
-            for a in range(3):
-                for b in range(3):
+            for a in range(size):
+                for b in range(size):
                     blocks[free[to], a, b] = data[k, b, a]
             free[to] += 1
     return pointers, columns, blocks
-
-
-@compiled
-def _applied_3(data: Single, k: int, x0: np.float32, x1: np.float32, x2: np.float32) -> Three:
-    """Block k times three numbers."""
-    return (
-        data[k, 0, 0] * x0 + data[k, 0, 1] * x1 + data[k, 0, 2] * x2,
-        data[k, 1, 0] * x0 + data[k, 1, 1] * x1 + data[k, 1, 2] * x2,
-        data[k, 2, 0] * x0 + data[k, 2, 1] * x1 + data[k, 2, 2] * x2,
-    )
-
-
-@compiled
-def _times_3(data: Single, k: int, x: Single, j: int) -> Three:
-    """Block k times the entries of block row j of x."""
-    found: Three = _applied_3(data, k, x[3 * j], x[3 * j + 1], x[3 * j + 2])
-    return found
-
-
-@compiled
-def _solve_line(inverse: Single, down: Single, x: Single, first: int, end: int) -> None:
-    """A line's equations, x its residual before and its answer after.
-
-    With pivots S_i = A_ii - W_i A_(i-1)i and W_i = A_i(i-1) S_(i-1)^-1: y_i = r_i - W_i y_(i-1),
-    then x_i = S_i^-1 y_i - W_(i+1)' x_(i+1).
-    """
-    for i in range(first + 1, end):
-        d0, d1, d2 = _times_3(down, i, x, i - 1)
-        x[3 * i] -= d0
-        x[3 * i + 1] -= d1
-        x[3 * i + 2] -= d2
-    for i in range(end - 1, first - 1, -1):
-        r0, r1, r2 = _times_3(inverse, i, x, i)
-        if i < end - 1:
-            x0, x1, x2 = x[3 * i + 3], x[3 * i + 4], x[3 * i + 5]
-            r0 -= down[i + 1, 0, 0] * x0 + down[i + 1, 1, 0] * x1 + down[i + 1, 2, 0] * x2
-            r1 -= down[i + 1, 0, 1] * x0 + down[i + 1, 1, 1] * x1 + down[i + 1, 2, 1] * x2
-            r2 -= down[i + 1, 0, 2] * x0 + down[i + 1, 1, 2] * x1 + down[i + 1, 2, 2] * x2
-        x[3 * i], x[3 * i + 1], x[3 * i + 2] = r0, r1, r2
-
-
-@compiled
-def first_lines(
-    indptr: Index,
-    indices: Index,
-    data: Single,
-    inverse: Single,
-    down: Single,
-    starts: Index,
-    b: Single,
-) -> Single:
-    """A forward sweep from zero: lines that follow do not count yet."""
-    x = np.empty(len(b), np.float32)
-    for line in range(len(starts) - 1):
-        first, end = starts[line], starts[line + 1]
-        for i in range(first, end):
-            r0, r1, r2 = b[3 * i], b[3 * i + 1], b[3 * i + 2]
-            for k in range(indptr[i], indptr[i + 1]):
-                j = indices[k]
-                if j < first:
-                    d0, d1, d2 = _times_3(data, k, x, j)
-                    r0, r1, r2 = r0 - d0, r1 - d1, r2 - d2
-            x[3 * i], x[3 * i + 1], x[3 * i + 2] = r0, r1, r2
-        _solve_line(inverse, down, x, first, end)
-    return x
-
-
-@compiled
-def residual_lines(indptr: Index, indices: Index, data: Single, starts: Index, x: Single) -> Single:
-    """b - A x after `first_lines`: -U x with the lines that follow, as (D + L) x = b."""
-    r = np.empty(len(x), np.float32)
-    for line in range(len(starts) - 1):
-        end = starts[line + 1]
-        for i in range(starts[line], end):
-            r0, r1, r2 = np.float32(0.0), np.float32(0.0), np.float32(0.0)
-            for k in range(indptr[i], indptr[i + 1]):
-                j = indices[k]
-                if j >= end:
-                    d0, d1, d2 = _times_3(data, k, x, j)
-                    r0, r1, r2 = r0 - d0, r1 - d1, r2 - d2
-            r[3 * i], r[3 * i + 1], r[3 * i + 2] = r0, r1, r2
-    return r
-
-
-@compiled
-def last_lines(
-    indptr: Index,
-    indices: Index,
-    data: Single,
-    inverse: Single,
-    down: Single,
-    starts: Index,
-    b: Single,
-    x: Single,
-) -> None:
-    """A backward sweep."""
-    for line in range(len(starts) - 2, -1, -1):
-        first, end = starts[line], starts[line + 1]
-        for i in range(first, end):
-            r0, r1, r2 = b[3 * i], b[3 * i + 1], b[3 * i + 2]
-            for k in range(indptr[i], indptr[i + 1]):
-                j = indices[k]
-                if j < first or j >= end:
-                    d0, d1, d2 = _times_3(data, k, x, j)
-                    r0, r1, r2 = r0 - d0, r1 - d1, r2 - d2
-            x[3 * i], x[3 * i + 1], x[3 * i + 2] = r0, r1, r2
-        _solve_line(inverse, down, x, first, end)
-
-
-@compiled
-def first_cross(
-    indptr: Index,
-    indices: Index,
-    data: Single,
-    inverse: Single,
-    down: Single,
-    nodes: Index,
-    starts: Index,
-    x: Single,
-    r: Single,
-) -> None:
-    """A forward sweep of x along cross lines; its residual r is kept up by symmetric columns."""
-    y = np.empty(3 * len(nodes), np.float32)
-    for line in range(len(starts) - 1):
-        first, end = starts[line], starts[line + 1]
-        for at in range(first, end):
-            i = nodes[at]
-            y[3 * at], y[3 * at + 1], y[3 * at + 2] = r[3 * i], r[3 * i + 1], r[3 * i + 2]
-        _solve_line(inverse, down, y, first, end)
-        for at in range(first, end):
-            i = nodes[at]
-            y0, y1, y2 = y[3 * at], y[3 * at + 1], y[3 * at + 2]
-            x[3 * i] += y0
-            x[3 * i + 1] += y1
-            x[3 * i + 2] += y2
-            for k in range(indptr[i], indptr[i + 1]):
-                j = indices[k]
-                r[3 * j] -= data[k, 0, 0] * y0 + data[k, 1, 0] * y1 + data[k, 2, 0] * y2
-                r[3 * j + 1] -= data[k, 0, 1] * y0 + data[k, 1, 1] * y1 + data[k, 2, 1] * y2
-                r[3 * j + 2] -= data[k, 0, 2] * y0 + data[k, 1, 2] * y1 + data[k, 2, 2] * y2
-
-
-@compiled
-def last_cross(
-    indptr: Index,
-    indices: Index,
-    data: Single,
-    inverse: Single,
-    down: Single,
-    nodes: Index,
-    starts: Index,
-    b: Single,
-    x: Single,
-) -> None:
-    """A backward sweep along cross lines."""
-    y = np.empty(3 * len(nodes), np.float32)
-    for line in range(len(starts) - 2, -1, -1):
-        first, end = starts[line], starts[line + 1]
-        for at in range(first, end):
-            i = nodes[at]
-            r0, r1, r2 = b[3 * i], b[3 * i + 1], b[3 * i + 2]
-            for k in range(indptr[i], indptr[i + 1]):
-                d0, d1, d2 = _times_3(data, k, x, indices[k])
-                r0, r1, r2 = r0 - d0, r1 - d1, r2 - d2
-            y[3 * at], y[3 * at + 1], y[3 * at + 2] = r0, r1, r2
-        _solve_line(inverse, down, y, first, end)
-        for at in range(first, end):
-            i = nodes[at]
-            x[3 * i] += y[3 * at]
-            x[3 * i + 1] += y[3 * at + 1]
-            x[3 * i + 2] += y[3 * at + 2]

@@ -29,14 +29,14 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import bsr_array
 
 from upd.errors import ConvergenceError, InputError
-from upd.linalg.block_conjugate import block_conjugate_gradients
-from upd.linalg.blocks import WIDTH, Single, symmetric_product, symmetric_product_many
+from upd.linalg.blocks import Single
 from upd.linalg.common import FloatArray, checked_vectors, log
-from upd.linalg.conjugate import UNSEEN, conjugate_gradients
+from upd.linalg.conjugate import UNSEEN, block_conjugate_gradients, conjugate_gradients
 from upd.linalg.nodes import padded, places, positions
-from upd.linalg.smoothers import BlockSmoother, LineSmoother, block_rows
+from upd.linalg.smoothers import Smoother, block_rows
 from upd.linalg.solvers import Solved
 from upd.linalg.strength import STRONG, aggregates, near_neighbours
+from upd.linalg.sweeps import WIDTH, symmetric_product, width_of
 from upd.linalg.symmetric import Matrix, Symmetric
 
 #: the coarsest level is factorised densely: below this many blocks, of 6 dofs each, that is free
@@ -54,12 +54,12 @@ class AggregationLevel:
 
     Attributes
     ----------
-    smoother : LineSmoother or BlockSmoother
+    smoother : Smoother
     P, R : sparse array
         Prolongation from the next level, in the smoother's order, and its transpose.
     """
 
-    smoother: LineSmoother | BlockSmoother
+    smoother: Smoother
     P: Any
     R: Any
 
@@ -197,7 +197,7 @@ def hierarchy(A: Any, modes: FloatArray | None, points: FloatArray | None = None
     levels = []
     for one in fine:
         B = bsr_array(one.A)
-        smoother = (LineSmoother if B.blocksize == (3, 3) else BlockSmoother)(B)
+        smoother = Smoother(B)
         P = one.P.astype(np.float32)
         if smoother.order is not None:
             P = block_rows(bsr_array(P), smoother.order[::3] // 3)
@@ -267,8 +267,7 @@ class MultigridSolver:
     def _product(self, x: FloatArray) -> FloatArray:
         if not isinstance(self._K, Symmetric):
             return np.asarray(self._K @ x)
-        U = self._K.upper
-        return np.asarray(symmetric_product(U.indptr, U.indices, U.data, x))
+        return _symmetric(self._K, x[:, None])[:, 0]
 
     def _precondition(self, residual: FloatArray) -> FloatArray:
         whole = np.zeros(self._n_padded)
@@ -295,17 +294,16 @@ class MultigridSolver:
             self._lowest = made.lowest
             found += [
                 Solved(x, float(error), made.iterations)
-                for x, error in zip(made.x.T, made.errors, strict=True)
+                for x, error in zip(made.x.T, made.error, strict=True)
             ]
         return found
 
     def _products(self, X: FloatArray) -> FloatArray:
         if not isinstance(self._K, Symmetric):
             return np.asarray(self._K @ X)
-        U, k = self._K.upper, X.shape[1]
         wide = np.zeros((len(X), WIDTH))
-        wide[:, :k] = X
-        return np.asarray(symmetric_product_many(U.indptr, U.indices, U.data, wide)[:, :k])
+        wide[:, : X.shape[1]] = X
+        return _symmetric(self._K, wide)[:, : X.shape[1]]
 
     def _precondition_many(self, residuals: FloatArray) -> FloatArray:
         whole = np.zeros((self._n_padded, residuals.shape[1]))
@@ -327,4 +325,10 @@ class MultigridSolver:
             start=start,
         )
         self._lowest = found.lowest
-        return Solved(found.x, found.error, found.iterations)
+        return Solved(found.x, float(found.error), found.iterations)
+
+
+def _symmetric(K: Symmetric, X: FloatArray) -> FloatArray:
+    """K X for one column or `WIDTH`: the compiler knows these widths."""
+    U = K.upper
+    return np.asarray(symmetric_product(U.indptr, U.indices, U.data, X, width_of(X)))

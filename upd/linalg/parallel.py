@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
-from typing import TypeVar
+from contextlib import AbstractContextManager, ExitStack, nullcontext
+from functools import cache
+from typing import TypeVar, cast
 
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from upd.linalg.pardiso import load
 from upd.linalg.select import has_pardiso
@@ -19,20 +20,25 @@ Found = TypeVar("Found")
 SMALL = 1000
 
 
-@contextmanager
-def threads_for(order: int) -> Iterator[None]:
+@cache
+def _controller() -> ThreadpoolController:
+    """Finding the libraries takes a millisecond: once."""
+    return ThreadpoolController()
+
+
+def threads_for(order: int, small: int = SMALL) -> AbstractContextManager[object]:
     """One thread for dense algebra on many small matrices, all there are on large ones.
 
     Parameters
     ----------
     order : int
         Of the matrices.
+    small : int
+        From here on they count as large.
     """
-    if order >= SMALL:
-        yield
-        return
-    with threadpool_limits(limits=1, user_api="blas"):
-        yield
+    if order >= small:
+        return nullcontext()
+    return cast("AbstractContextManager[object]", _controller().limit(limits=1, user_api="blas"))
 
 
 def in_parallel(jobs: Sequence[Callable[[], Found]], workers: int) -> list[Found]:

@@ -106,16 +106,15 @@ def _call(
     matrix: tuple[Any, ...],
     perm: IntArray,
     iparm: IntArray,
-    rhs: FloatArray,
-    x: FloatArray,
+    vectors: tuple[FloatArray, FloatArray],
     kind: int = SPD,
 ) -> int:
-    """One call of PARDISO; returns its error code.
+    """One call of PARDISO with right-hand sides and answers; returns its error code.
 
     Only the solve phases read right-hand sides and their number. The factorisation takes the Schur
     complement's array for x, and one right-hand side that it does not read.
     """
-    error = np.zeros(1, np.int64)
+    error, (rhs, x) = np.zeros(1, np.int64), vectors
     numbers = [np.array([v], np.int64) for v in (1, 1, kind, phase, n)]
     many = phase in (SOLVE, BACKWARD) and x.ndim == 2
     count = np.array([x.shape[1] if many else 1], np.int64)
@@ -128,7 +127,7 @@ def _call(
 def _release(handle: IntArray, n: int, iparm: IntArray, kind: int) -> None:
     """Give the memory back; runs when the owner is collected."""
     none, whole = np.zeros(1), np.zeros(1, np.int64)
-    _call(handle, RELEASE, n, (none, whole, whole), whole, iparm, none, none, kind)
+    _call(handle, RELEASE, n, (none, whole, whole), whole, iparm, (none, none), kind)
 
 
 class _Pardiso:
@@ -176,7 +175,7 @@ class _Pardiso:
         none = np.zeros(1)
         rhs, x = none if rhs is None else rhs, none if x is None else x
         code = _call(
-            self.handle, phase, self.n, self.matrix, self.perm, self.iparm, rhs, x, self.kind
+            self.handle, phase, self.n, self.matrix, self.perm, self.iparm, (rhs, x), self.kind
         )
         if code not in (0, NOT_POSITIVE):
             raise ConvergenceError(

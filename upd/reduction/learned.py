@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.errors import InputError
-from upd.linalg.blocks import WIDTH
 from upd.linalg.common import EPS, FloatArray, IntArray, checked_dofs, checked_vectors, log
 from upd.linalg.solvers import Solved, Solver
+from upd.linalg.sweeps import WIDTH
 
 #: relative error in energy of one product
 ACCURACY = 1e-10

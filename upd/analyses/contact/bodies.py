@@ -27,7 +27,7 @@ from upd.analyses.contact.plan import (
 from upd.analyses.contact.solution import ContactSolution, NormalCase
 from upd.cache.shared import active
 from upd.cache.sources import key_of, source_digest
-from upd.contact.bulk import finite_body_share, half_space_mean
+from upd.contact import bulk
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
 from upd.contact.products import (
     ROUGH,
@@ -37,7 +37,6 @@ from upd.contact.products import (
     learning,
     normal_contact_by_products,
 )
-from upd.contact.stiffness import BodyShare, axis_half_space, axis_share
 from upd.errors import MeshError
 from upd.fem import Material, rigid_body_modes, stiffness
 from upd.linalg.multigrid import MultigridSolver
@@ -395,7 +394,7 @@ def _mesh_error(
         u, share = displacement[body.name], case.shares[body.name]
         data = solution.plan.scene.materials[body.name]
         mean = body.side * float(nodal @ u[body.contact, 2]) / float(nodal.sum())
-        whole += mean - share.finite_body - half_space_mean(patch, force, data.E, data.nu)
+        whole += mean - share.finite_body - bulk.half_space_mean(patch, force, data.E, data.nu)
         far += share.far_mesh
     return whole - far, far
 
@@ -408,7 +407,7 @@ def _share(
     radius: float,
     *,
     tangential: bool,
-) -> BodyShare | None:
+) -> bulk.BodyShare | None:
     along = displacement[:, ALONG] if tangential else body.side * displacement[:, NORMAL]
     axis = body.mesh.nodes["axis"]
     depth = np.abs(body.mesh.points[axis, 2])
@@ -416,7 +415,7 @@ def _share(
     data = solution.plan.scene.materials[body.name]
     inside = depth > 0.5 * radius
     half_space = np.zeros(len(depth))
-    half_space[inside] = axis_half_space(
+    half_space[inside] = bulk.axis_half_space(
         depth[inside],
         patch.points(),
         force.ravel(),
@@ -425,15 +424,15 @@ def _share(
         tangential=tangential,
     )
     try:
-        compression, fitted = axis_share(depth, along[axis], half_space, radius)
-        finite = finite_body_share(
+        compression, fitted = bulk.axis_share(depth, along[axis], half_space, radius)
+        finite = bulk.finite_body_share(
             body, displacement, force, patch, radius, data.E, data.nu, tangential=tangential
         )
     except MeshError as error:
         # The numbers with the bulk compliance removed are left out, the others stand.
         solution.no_shares = f"{body.name}: {error}"
         return None
-    return BodyShare(compression, finite, fitted)
+    return bulk.BodyShare(compression, finite, fitted)
 
 
 def _shear_shares(solution: ContactSolution, case: NormalCase) -> None:

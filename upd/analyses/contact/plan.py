@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from upd.analyses.base import Effect, Plan
 from upd.analyses.cost import NODES
-from upd.contact.equilibrium import FaceForces, equilibrium
+from upd.contact.rigid_damper import FaceForces, equilibrium
 from upd.errors import InputError, OwnMeshError
 from upd.mesh import Mesh, recipes
 from upd.mesh.checks import require_sets

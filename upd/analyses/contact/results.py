@@ -17,8 +17,8 @@ from upd.analyses.contact.faces import lattices
 from upd.analyses.contact.loading import pressed_by
 from upd.analyses.contact.plan import NORMAL, direction_name, normal_loads
 from upd.analyses.contact.solution import ContactSolution, NormalCase, References, TangentialCase
+from upd.contact.bulk import without_body
 from upd.contact.patch import consistent_average
-from upd.contact.stiffness import without_body
 from upd.mesh import recipes
 from upd.plot.chart import Entry
 from upd.reference import hertz_pressure

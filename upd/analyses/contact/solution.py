@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from upd.analyses.base import Resolved
 from upd.analyses.contact.loading import CoupledState, LoadPath, Sheared
 from upd.analyses.contact.plan import ContactPlan, DamperLoad, direction_name, is_curved
+from upd.contact.bulk import BodyShare
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
 from upd.contact.patch import ContactMeasures
-from upd.contact.stiffness import BodyShare
 from upd.reference import (
     HertzPoint,
     contact_modulus,

@@ -33,7 +33,7 @@ from upd.analyses.seated.bodies import Bodies, face_angles, make_bodies, patch_f
 from upd.analyses.seated.interface import make_interface
 from upd.cache.arrays import cache_folder, load_arrays, save_arrays
 from upd.cache.sources import key_of, source_digest
-from upd.contact.equilibrium import FaceForces, equilibrium
+from upd.contact.rigid_damper import FaceForces, equilibrium
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.least_distance import least_positive
 from upd.mesh import IntArray

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.base import Plan
-from upd.contact.equilibrium import FaceForces, equilibrium
+from upd.contact.rigid_damper import FaceForces, equilibrium
 from upd.errors import InputError
 from upd.fem import MassProperties, Material, mass, mass_properties, stiffness
 from upd.linalg.parallel import in_parallel
