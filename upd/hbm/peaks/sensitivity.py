@@ -230,6 +230,7 @@ def _moved(
     changes: Sequence[ParameterChange],
     harmonic: int | None,
 ) -> _Moved:
+    b.require_all_sectors("derivatives of peaks")
     j, k = b.harmonics.place(harmonic), b.harmonics.dynamic
     omega, o, m = 2 * np.pi * frequency, b.harmonics.offset, len(b.modal.eigenvalues)
     _, J, by_omega = b.linearised(x, omega)
