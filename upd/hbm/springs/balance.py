@@ -397,6 +397,18 @@ class Balance:
         given = self.slider if self.start in ("zero", "static") else None
         return stuck_constant(self.contacts, given)
 
+    @property
+    def frictionless_sliders(self) -> FloatArray:
+        """Slider positions (n_point, 2) at which closed points carry the static loads without
+        traction [mm].
+        """
+        law, out = self.contacts.law, np.zeros((self.contacts.n_point, 2))
+        k, constant = np.zeros_like(self._stiffness), np.zeros_like(self._stiffness)
+        k[:, 0], constant[:, 0] = law.k_n, law.preload - law.k_n * law.gap
+        mean = self._linear_rest(k.ravel(), constant.ravel())[0].reshape(k.shape)
+        out[:, : self.contacts.tangents] = mean[:, 1:]
+        return out
+
     def free(self, omega: float) -> FloatArray:
         """Unknowns of the linear answer without contacts, rigid amplitudes zero.
 

@@ -323,9 +323,9 @@ def frequency_response(
         Its dofs and its centrifugal force are appended.
     damper_rows : (n_point, 1 + d, damper.n_dof) ndarray, optional
         The damper's share of the rows, see `contact_rows`; comes together with `damper`.
-    start : {"zero", "static", "mid", "upper", "lower"}
+    start : {"zero", "frictionless", "static", "mid", "upper", "lower"}
         Position of the sliders before the march, which decides the residual traction of points that
-        stick.
+        stick. "frictionless": where the closed contacts carry the static loads without traction.
     slider : (n_point, d) array_like, optional
         Positions [mm] from which the starts "zero" and "static" begin instead of zero: -T_0 / k_t
         carries the traction T_0 [N] where nothing has moved, a preload along the tangents.
@@ -495,7 +495,8 @@ class GivenSystem(NamedTuple):
         self._require_harmonics(what, h, static, force)
         if self.damper is not None and self.damper_rows is not None:
             joined_to = self.damper, self.damper_rows
-        return assembled(
+        free = self.start == "frictionless"
+        b = assembled(
             *A,
             self.contacts,
             force,
@@ -503,10 +504,11 @@ class GivenSystem(NamedTuple):
             h,
             joined_to=joined_to,
             samples=self.samples,
-            start=self.start,
+            start="zero" if free else self.start,
             slider=slider,
             fast_exits=fast_exits,
         )
+        return b.with_sliders("zero", b.frictionless_sliders) if free else b
 
     def _dense(self, what: str) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The matrices as arrays."""
