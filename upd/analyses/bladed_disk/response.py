@@ -58,7 +58,7 @@ class Wedge(NamedTuple):
         return self.mass * self.radius * speed**2
 
 
-class Gap(NamedTuple):
+class WedgeGap(NamedTuple):
     """The wedge of one gap on the coordinates of both sectors beside it, see `upd.hbm`."""
 
     points: Contacts
@@ -66,7 +66,7 @@ class Gap(NamedTuple):
     rows: FloatArray
 
 
-def gap_of(sector: ReducedSector, wedge: Wedge, f_c: float) -> Gap:
+def gap_of(sector: ReducedSector, wedge: Wedge, f_c: float) -> WedgeGap:
     """The contacts of a wedge under a centrifugal force.
 
     Parameters
@@ -79,7 +79,7 @@ def gap_of(sector: ReducedSector, wedge: Wedge, f_c: float) -> Gap:
 
     Returns
     -------
-    Gap
+    WedgeGap
     """
     p, r = len(sector.high), sector.K.shape[0]
     ends = [one.mean(axis=0) for one in (sector.high, sector.low)]
@@ -103,7 +103,7 @@ def gap_of(sector: ReducedSector, wedge: Wedge, f_c: float) -> Gap:
         mu=wedge.mu,
     )
     places = np.vstack([sector.high, sector.low])
-    return Gap(points, damper, contact_rows(damper, places, np.concatenate(frames)))
+    return WedgeGap(points, damper, contact_rows(damper, places, np.concatenate(frames)))
 
 
 def wave_response(
@@ -162,7 +162,7 @@ def on_sector(row: ArrayLike) -> FloatArray:
     return np.append(np.asarray(row, dtype=float), np.zeros(6))
 
 
-class Performance(NamedTuple):
+class WavePerformance(NamedTuple):
     """Highest amplitude over F_C/F_E, n values.
 
     Attributes
@@ -196,7 +196,7 @@ def performance(
     engine_order: int,
     frequencies: ArrayLike,
     harmonics: Iterable[int] = range(4),
-) -> Performance:
+) -> WavePerformance:
     """The peak over F_C/F_E at one centrifugal force, which scales the answer with the load.
 
     Parameters
@@ -212,7 +212,7 @@ def performance(
 
     Returns
     -------
-    Performance
+    WavePerformance
     """
     unit, kept, found = np.asarray(force, dtype=complex), tuple(harmonics), []
     for ratio in np.asarray(ratios, dtype=float):
@@ -228,4 +228,4 @@ def performance(
         )
         f, height = answer.peak(on_sector(row)) if answer.arrived else (np.nan, np.nan)
         found.append((float(ratio), f, height / F_E))
-    return Performance(*np.array(found).T)
+    return WavePerformance(*np.array(found).T)

@@ -236,7 +236,9 @@ class FrequencyResponse:
             raise InputError(f"peak: the path has no point: {self.message}")
         i = int(np.argmax(a))
         if 0 < i < len(a) - 1:
-            top = climb(self.balance, row, self.x[i], float(self.frequency[i]), harmonic=harmonic)
+            at = float(self.frequency[i])
+            with threads_for(self.balance.size):
+                top = climb(self.balance, row, self.x[i], at, harmonic=harmonic)
             if top.found and top.amplitude >= a[i] * (1 - EPS**0.5):
                 return top.frequency, top.amplitude
         return parabola(self.frequency, a)
