@@ -121,7 +121,11 @@ def test_a_mode_travels_with_the_numbers() -> None:
     """The high face of the mode's field is the low face, turned and delayed."""
     model = model_of(bladed_sector(), 12)
     sector = model.sector
-    u = sector.field(model.modes(2, 1).shapes[:, 0], 2).reshape(-1, 3)
+    mode = model.modes(2, 1)
+    u = sector.field(mode.shapes[:, 0], 2).reshape(-1, 3)
+    # K_n is that of this field, not of the one that travels the other way
+    energy = u.ravel().conj() @ (stiffness(sector.mesh, STEEL, "hex20") @ u.ravel())
+    assert energy == pytest.approx((2.0 * np.pi * mode.frequency[0]) ** 2, rel=1e-6)
     expected = u[sector.low] @ turn(np.pi / 6).T * np.exp(2j * np.pi * 2 / 12)
     np.testing.assert_allclose(u[sector.high], expected, atol=1e-12 * np.abs(u).max())
     assert np.abs(u[sector.low]).max() > 1e-6 * np.abs(u).max()

@@ -398,10 +398,8 @@ def _dense(A: CyclicMatrix, n: int) -> Field:
 def _independent(V: FloatArray) -> FloatArray:
     """Orthonormal basis (n, r) of the span of V (n, m) but for directions that are rounding."""
     V = V / np.maximum(np.linalg.norm(V, axis=0), np.finfo(float).tiny)
-    size, Y = np.linalg.eigh(V.T @ V)
-    keep = size > 1e3 * EPS * size[-1]
-    Q, _ = np.linalg.qr(V @ (Y[:, keep] / np.sqrt(size[keep])))
-    return Q
+    U, size, _ = np.linalg.svd(V, full_matrices=False)
+    return np.asarray(U[:, size > 1e4 * EPS * size[0]])
 
 
 def with_coriolis(frequency: FloatArray, U: Field, coriolis: csr_array, speed: float) -> FloatArray:

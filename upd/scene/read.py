@@ -22,6 +22,7 @@ from upd.errors import InputError, did_you_mean
 from upd.mesh import recipes
 from upd.mesh.recipe_modules import is_file
 from upd.scene.base import INSIDE, SceneBase
+from upd.scene.bladed_disk import BladedDiskScene, bladed_disk_problems
 from upd.scene.contact import Scene, contact_problems
 from upd.scene.forced import FORCED, FORCED_ONLY, ForcedScene, forced_problems
 from upd.scene.measured import note_files
@@ -33,7 +34,7 @@ from upd.scene.toml import plain, read_overrides
 from upd.scene.uncertain import taken_out, uncertainties
 from upd.units import parse_quantity
 
-AnyScene = Scene | ModalScene | ForcedScene | SeatedScene
+AnyScene = Scene | ModalScene | ForcedScene | SeatedScene | BladedDiskScene
 
 #: Parameters of a recipe that may be "auto".
 _AUTO = ("patch", "core_depth", "divisions")
@@ -54,12 +55,15 @@ _PROBLEMS: dict[type[AnyScene], Callable[[Any], Iterable[str]]] = {
     ModalScene: modal_problems,
     ForcedScene: forced_problems,
     SeatedScene: seated_problems,
+    BladedDiskScene: bladed_disk_problems,
 }
 #: Analyses that a scene names, its class, and the tables that only it has.
 _NAMED: dict[str, tuple[type[AnyScene], tuple[str, ...]]] = {
     SEATED: (SeatedScene, SEATED_ONLY),
     FORCED: (ForcedScene, FORCED_ONLY),
 }
+#: Analyses that a recipe declares, other than contacts.
+_DECLARED: dict[str, type[AnyScene]] = {"rig": ModalScene, "bladed disk": BladedDiskScene}
 #: pydantic's validator of a class of scenes, compiled once: that takes longer than reading a scene
 _adapter: Callable[..., TypeAdapter[Any]] = cache(TypeAdapter)
 
@@ -314,7 +318,7 @@ def _kind(data: Mapping[str, Any], analyses: Sequence[str]) -> type[AnyScene]:
     if "analysis" in data:
         return ForcedScene
     if analyses:
-        return ModalScene if analyses[0] == "rig" else Scene
+        return _DECLARED.get(analyses[0], Scene)
     # without a recipe the other keys show which scene is meant
     return max((Scene, ModalScene), key=lambda kind: sum(f.name in data for f in fields(kind)))
 

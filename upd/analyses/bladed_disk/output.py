@@ -1,0 +1,151 @@
+"""What the analysis of a bladed disk leaves behind: numbers, checks, arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from upd.analyses.base import Resolved
+from upd.analyses.bladed_disk.plan import CORIOLIS, DISPLACED
+from upd.analyses.bladed_disk.solve import BladedDiskSolution, Proof
+from upd.plot.chart import Entry
+from upd.results import NO_CASE, ArrayGroup, Case, Check, Result, variable
+from upd.results import quantities as q
+
+#: what the groups of result.nc hold, their attribute ``content``
+BY_DIAMETER, CAMPBELL, CROSSINGS = "nodal diameters", "campbell", "crossings"
+HEADLINE = ("crossing_speed", "crossing_frequency", "crossing_margin", "f1_at_speed", "f1")
+#: of each number in the headline
+_FEW = 2
+#: largest error of a frequency in the span of the computed nodal diameters
+PROJECTION_LIMIT = 1e-3
+_RPM = 60.0 / (2.0 * np.pi)
+
+
+def headline(results: Sequence[Entry]) -> list[Entry]:
+    """The crossings nearest to the operating speed, and the first frequencies."""
+    return [
+        entry
+        for name in HEADLINE
+        for entry in [one for one in results if one["name"] == name][:_FEW]
+    ]
+
+
+def make_results(solution: BladedDiskSolution) -> list[Result]:
+    """All numbers of a run."""
+    scene, results = solution.plan.scene, list[Result]()
+    for c in solution.crossings if scene.wants("campbell") else []:
+        case = Case(
+            engine_order=c.engine_order, nodal_diameter=c.nodal_diameter, mode=f"mode {c.mode}"
+        )
+        margin = c.speed / scene.rotation.speed - 1.0
+        results += [
+            q.CROSSING_SPEED.of(c.speed * _RPM, case),
+            q.CROSSING_FREQUENCY.of(c.frequency, case),
+            q.CROSSING_MARGIN.of(margin, case),
+        ]
+    if scene.wants("campbell") and not solution.crossings:
+        reason = "no engine order crosses a mode up to the largest speed; raise rotation.up_to"
+        results.append(q.CROSSING_SPEED.withheld(NO_CASE, reason))
+    wanted = [
+        ("modes", q.F_SECTOR, solution.at_rest),
+        ("interference", q.F_SPINNING, solution.at_speed),
+    ]
+    return results + [
+        quantity.of(f, Case(nodal_diameter=n), n=k, exact=False)
+        for want, quantity, rows in wanted
+        if scene.wants(want)
+        for n, row in enumerate(rows)
+        for k, f in enumerate(row, 1)
+    ]
+
+
+def check_solution(solution: BladedDiskSolution) -> list[Check]:
+    """Frequencies solved by themselves, and with what the model leaves out."""
+    proof = solution.proof
+    if proof is None:
+        return []
+    scene, case = solution.plan.scene, Case(nodal_diameter=proof.nodal_diameter)
+    error = float(np.abs(proof.projected / proof.direct - 1.0).max())
+    changed = {
+        DISPLACED: (proof.displaced, "use another program for the last digits"),
+        CORIOLIS: (_farther(proof), "both travelling waves differ: see each in the check"),
+    }
+    checks = [
+        Check(
+            "nodal diameters in between",
+            case,
+            error,
+            PROJECTION_LIMIT,
+            f"|in the span of others / by itself - 1| at {proof.speed * _RPM:.5g} rpm",
+            "compute more nodal diameters: raise modes.computed",
+        )
+    ]
+    for name, (other, remedy) in changed.items():
+        k = int(np.abs(other / proof.direct - 1.0).argmax())
+        numbers = float(proof.direct[k]), float(other[k])
+        resolved = Resolved(name, q.F_SPINNING.named(k + 1), case, *numbers, "Hz", remedy)
+        checks.append(resolved.check(scene.left_out))
+    return checks
+
+
+def _farther(proof: Proof) -> np.ndarray:
+    """(m,) of both waves, the frequency farther from that without the Coriolis force."""
+    one, other = proof.coriolis
+    farther = np.abs(one - proof.direct) > np.abs(other - proof.direct)
+    return np.asarray(np.where(farther, one, other))
+
+
+def sizes(solution: BladedDiskSolution) -> dict[str, int]:
+    """Nodes of a cyclic face and modes found."""
+    face = 0 if solution.sector is None else len(solution.sector.low)
+    return {"n_face_nodes": face, "n_modes": solution.at_rest.size}
+
+
+def arrays(solution: BladedDiskSolution) -> dict[str, ArrayGroup]:
+    """Frequencies by nodal diameter, at rest and at speed; over the speed; crossings."""
+    scene, out = solution.plan.scene, dict[str, ArrayGroup]()
+    speed = variable("", scene.rotation.speed * _RPM, "rpm")
+    numbers = variable("nodal_diameter", np.arange(len(solution.at_rest)))
+    dims = "nodal_diameter mode"
+    if scene.wants("modes"):
+        rest = {"nodal_diameter": numbers, "frequency": variable(dims, solution.at_rest, "Hz")}
+        out["at rest"] = ArrayGroup(rest, content=BY_DIAMETER, case=Case(name="at rest"))
+    if scene.wants("interference"):
+        at = {"nodal_diameter": numbers, "frequency": variable(dims, solution.at_speed, "Hz")}
+        at |= {"speed": speed, "engine_order": _orders(solution)}
+        out["at speed"] = ArrayGroup(at, content=BY_DIAMETER, case=Case(name="at speed"))
+    if scene.wants("campbell"):
+        over = {
+            "speed": variable("speed", solution.speeds * _RPM, "rpm"),
+            "frequency": variable("nodal_diameter speed mode", solution.campbell, "Hz"),
+            "operating_speed": speed,
+            "engine_order": _orders(solution),
+        }
+        out["campbell"] = ArrayGroup(over, content=CAMPBELL)
+        if solution.crossings:
+            table = np.array(solution.crossings)
+            columns = {
+                name: variable("crossing", table[:, k].astype(int))
+                for k, name in enumerate(("engine_order", "nodal_diameter", "mode"))
+            }
+            columns["speed"] = variable("crossing", table[:, 3] * _RPM, "rpm")
+            columns["frequency"] = variable("crossing", table[:, 4], "Hz")
+            out["crossings"] = ArrayGroup(columns, content=CROSSINGS)
+    return out
+
+
+def _orders(solution: BladedDiskSolution) -> Any:
+    return variable("engine_order", np.array(solution.plan.scene.rotation.engine_orders))
+
+
+def write_files(solution: BladedDiskSolution, folder: Path) -> None:
+    """The mesh of the sector."""
+    if solution.sector is not None:
+        # meshio is slow to import
+        from upd.mesh.export import write_mesh
+
+        write_mesh({"sector": solution.sector.mesh}, folder / "sector.vtu")
