@@ -1,4 +1,6 @@
-"""The scene of a bladed disk: modes by nodal diameter, Campbell and interference diagram."""
+"""The scene of a bladed disk: modes by nodal diameter, Campbell and interference diagram, damped
+response.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from upd.scene import quantities as q
 from upd.scene.base import STRICT, MaterialData, MeshChoice, SceneBase, unreachable_accuracy
 
 #: Outputs a bladed disk can ask for.
-BLADED_DISK_WANTS = ("modes", "campbell", "interference")
+BLADED_DISK_WANTS = ("modes", "campbell", "interference", "response", "performance")
 BladedDiskWant = Annotated[str, q.one_of(BLADED_DISK_WANTS), q.Example('"modes"', '"campbell"')]
 
 
@@ -56,17 +58,72 @@ class SpinChoice:
     points: Annotated[int, q.at_least(2)] = 25
 
 
+@dataclass(frozen=True)
+class WedgeChoice:
+    """The wedge in every gap between platforms, a rigid body; F_C = m r w^2 at each speed.
+
+    Attributes
+    ----------
+    mass
+        Of the damper; its inertia is that of a box that fills the gap of the contact patches.
+    angle
+        Of its faces to the circumference.
+    normal_stiffness, tangential_stiffness
+        Of all contact points of a face.
+    friction
+        Coulomb's coefficient.
+    """
+
+    __pydantic_config__ = STRICT
+    mass: q.Mass = 1e-5
+    angle: Annotated[float, q.quantity("angle"), q.Example('"25 deg"')] = 25.0
+    normal_stiffness: Annotated[float, q.quantity("stiffness"), q.positive] = 2e4
+    tangential_stiffness: Annotated[float, q.quantity("stiffness"), q.positive] = 1e4
+    friction: q.Coefficient = 0.3
+
+
+@dataclass(frozen=True)
+class WaveChoice:
+    """Response to the engine order of the crossing nearest to the operating speed.
+
+    Attributes
+    ----------
+    force
+        Amplitude at the node set tip, along the circumference.
+    damping
+        Ratio of the mode at the crossing; damping is proportional to the stiffness.
+    harmonics
+        Number of harmonics above the mean. Cost: nodal diameters to reduce, unknowns in
+        proportion.
+    modes
+        Modes of a reduced sector with its contact points held. Cost: small.
+    points
+        Frequencies of a curve. Cost: time in proportion.
+    ratios
+        F_C/F_E of the performance curve. Cost: a curve each.
+    """
+
+    __pydantic_config__ = STRICT
+    force: q.Force = 1.0
+    damping: q.Share = 0.002
+    harmonics: Annotated[int, q.at_least(1)] = 1
+    modes: Annotated[int, q.at_least(1)] = 15
+    points: Annotated[int, q.at_least(5)] = 25
+    ratios: Annotated[tuple[q.Ratio, ...], q.FILLED] = (3.0, 10.0, 30.0, 100.0)
+
+
 @dataclass(frozen=True, kw_only=True)
 class BladedDiskScene(SceneBase):
-    """Free vibration of a tuned bladed disk, from one sector.
+    """Vibration of a tuned bladed disk, from one sector.
 
     Attributes
     ----------
     want
         Outputs: "modes", frequencies at rest by nodal diameter; "campbell", frequencies over the
         speed with engine orders and where they cross; "interference", frequencies by nodal
-        diameter at the operating speed with the lines of engine orders (SAFE diagram). Cost: upd
-        plan shows what each brings with it.
+        diameter at the operating speed with the lines of engine orders (SAFE diagram); "response",
+        free, stuck and damped response where an engine order crosses a mode; "performance", the
+        peak over F_C/F_E there. Cost: upd plan shows what each brings with it.
     material
         Of the sector.
     """
@@ -78,6 +135,8 @@ class BladedDiskScene(SceneBase):
     mesh: MeshChoice = field(default_factory=lambda: MeshChoice(element="hex20"))
     modes: SectorModesChoice = field(default_factory=SectorModesChoice)
     rotation: SpinChoice
+    damper: WedgeChoice = field(default_factory=WedgeChoice)
+    response: WaveChoice = field(default_factory=WaveChoice)
 
     @property
     def body_materials(self) -> Mapping[str, MaterialData]:

@@ -62,8 +62,6 @@ _NAMED: dict[str, tuple[type[AnyScene], tuple[str, ...]]] = {
     SEATED: (SeatedScene, SEATED_ONLY),
     FORCED: (ForcedScene, FORCED_ONLY),
 }
-#: Analyses that a recipe declares, other than contacts.
-_DECLARED: dict[str, type[AnyScene]] = {"rig": ModalScene, "bladed disk": BladedDiskScene}
 #: pydantic's validator of a class of scenes, compiled once: that takes longer than reading a scene
 _adapter: Callable[..., TypeAdapter[Any]] = cache(TypeAdapter)
 
@@ -309,6 +307,8 @@ def _analyses(data: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _kind(data: Mapping[str, Any], analyses: Sequence[str]) -> type[AnyScene]:
     """The class of the scene, from the analysis it names or those its recipe declares."""
+    if analyses[:1] == (BladedDiskScene.analysis,):
+        return BladedDiskScene
     named = data.get("analysis")
     if isinstance(named, str) and named in _NAMED:
         return _NAMED[named][0]
@@ -318,7 +318,7 @@ def _kind(data: Mapping[str, Any], analyses: Sequence[str]) -> type[AnyScene]:
     if "analysis" in data:
         return ForcedScene
     if analyses:
-        return _DECLARED.get(analyses[0], Scene)
+        return ModalScene if analyses[0] == "rig" else Scene
     # without a recipe the other keys show which scene is meant
     return max((Scene, ModalScene), key=lambda kind: sum(f.name in data for f in fields(kind)))
 

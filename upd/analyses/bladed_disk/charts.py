@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.bladed_disk.output import BY_DIAMETER, CAMPBELL, CROSSINGS
+from upd.analyses.bladed_disk.output import BY_DIAMETER, CAMPBELL, CROSSINGS, PERFORMANCE, WAVE
 from upd.plot.chart import Arrays, Axis, Band, Chart, Group, Mark, Trace
 from upd.plot.common import case_of, frequency_of, scalar, with_content
 
@@ -18,7 +18,9 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     """Campbell diagram, interference diagram, frequencies by nodal diameter."""
     del summary
     crossings = with_content(arrays, CROSSINGS)
-    found = [_campbell(group, crossings) for group in with_content(arrays, CAMPBELL)]
+    found = [_wave(group) for group in with_content(arrays, WAVE)]
+    found += [_performance(group) for group in with_content(arrays, PERFORMANCE)]
+    found += [_campbell(group, crossings) for group in with_content(arrays, CAMPBELL)]
     return found + [_by_diameter(group) for group in reversed(with_content(arrays, BY_DIAMETER))]
 
 
@@ -92,3 +94,25 @@ def _by_diameter(group: Group) -> Chart:
         figure="interference",
         marks=tuple(marks),
     )
+
+
+def _wave(group: Group) -> Chart:
+    """Free, stuck and damped amplitude at the tip."""
+    f, on = frequency_of(group), np.asarray(group["damped_frequency"].data)
+    traces = (
+        Trace("free", f, np.asarray(group["free"].data), "dashed", closed=True),
+        Trace("stuck", f, np.asarray(group["stuck"].data), "dotted", closed=True),
+        Trace("damped", on, np.asarray(group["damped"].data), "both", 0),
+    )
+    y = Axis("amplitude at the tip", "um", log=True)
+    label = case_of(group).label
+    return Chart("Response to an engine order", _HZ, y, traces, case=label, figure="response")
+
+
+def _performance(group: Group) -> Chart:
+    """Peak over F_C/F_E."""
+    ratio, height = (np.asarray(group[name].data) for name in ("ratio", "height"))
+    x, y = Axis("F_C/F_E", log=True), Axis("peak at the tip", "um/N", log=True)
+    traces = (Trace("peak", ratio, height, "both", 0),)
+    label = case_of(group).label
+    return Chart("Performance curve", x, y, traces, case=label, figure="performance")

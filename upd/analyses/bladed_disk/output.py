@@ -8,30 +8,37 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.base import Resolved
+from upd.analyses.base import Resolved, conditions
 from upd.analyses.bladed_disk.plan import CORIOLIS, DISPLACED
-from upd.analyses.bladed_disk.solve import BladedDiskSolution, Proof
+from upd.analyses.bladed_disk.solve import BladedDiskSolution, DampedWave, Proof
 from upd.plot.chart import Entry
 from upd.results import NO_CASE, ArrayGroup, Case, Check, Result, variable
 from upd.results import quantities as q
 
 #: what the groups of result.nc hold, their attribute ``content``
 BY_DIAMETER, CAMPBELL, CROSSINGS = "nodal diameters", "campbell", "crossings"
-HEADLINE = ("crossing_speed", "crossing_frequency", "crossing_margin", "f1_at_speed", "f1")
-#: of each number in the headline
-_FEW = 2
+WAVE, PERFORMANCE = "travelling wave", "wave performance"
+HEADLINE = (
+    "crossing_speed",
+    "crossing_frequency",
+    "free_amplitude",
+    "stuck_amplitude",
+    "damped_amplitude",
+    "amplitude_reduction",
+    "best_damper_mass",
+    "f1",
+)
 #: largest error of a frequency in the span of the computed nodal diameters
 PROJECTION_LIMIT = 1e-3
 _RPM = 60.0 / (2.0 * np.pi)
 
 
 def headline(results: Sequence[Entry]) -> list[Entry]:
-    """The crossings nearest to the operating speed, and the first frequencies."""
-    return [
-        entry
-        for name in HEADLINE
-        for entry in [one for one in results if one["name"] == name][:_FEW]
-    ]
+    """The crossing nearest to the operating speed, its peaks, and the first frequency."""
+    first: dict[str, Entry] = {}
+    for entry in results:
+        first.setdefault(entry["name"], entry)
+    return [first[name] for name in HEADLINE if name in first]
 
 
 def make_results(solution: BladedDiskSolution) -> list[Result]:
@@ -50,6 +57,8 @@ def make_results(solution: BladedDiskSolution) -> list[Result]:
     if scene.wants("campbell") and not solution.crossings:
         reason = "no engine order crosses a mode up to the largest speed; raise rotation.up_to"
         results.append(q.CROSSING_SPEED.withheld(NO_CASE, reason))
+    if solution.wave is not None:
+        results += _wave_results(solution.wave)
     wanted = [
         ("modes", q.F_SECTOR, solution.at_rest),
         ("interference", q.F_SPINNING, solution.at_speed),
@@ -63,11 +72,39 @@ def make_results(solution: BladedDiskSolution) -> list[Result]:
     ]
 
 
+def _wave_results(wave: DampedWave) -> list[Result]:
+    """Peaks at the tip and the best mass."""
+    case = Case(
+        engine_order=wave.crossing.engine_order, nodal_diameter=wave.crossing.nodal_diameter
+    )
+    free = float(wave.free.max())
+    results = [
+        q.WAVE_FREE.of(free, case),
+        q.WAVE_STUCK.of(float(wave.stuck.max()), case),
+        q.WAVE_DAMPED.of(wave.peak[1], case),
+        q.WAVE_FREQUENCY.of(wave.peak[0], case),
+        q.WAVE_REDUCTION.of(1.0 - wave.peak[1] / free, case),
+        q.WAVE_CENTRIFUGAL.of(wave.f_c, case),
+    ]
+    if wave.performance is not None:
+        results.append(q.BEST_MASS.of(wave.best_mass, case))
+    return results
+
+
 def check_solution(solution: BladedDiskSolution) -> list[Check]:
     """Frequencies solved by themselves, and with what the model leaves out."""
-    proof = solution.proof
+    proof, wave = solution.proof, solution.wave
+    reduced = []
+    if wave is not None:
+        errors = [one.frequency_error for one in wave.sectors.values()]
+        balance = wave.answer.energy_balance
+        rows = (
+            ("reduced sectors", np.max(errors), PROJECTION_LIMIT, "|reduced / full - 1|"),
+            ("energy balance", np.abs(balance).max(), 1e-3, "|power in / dissipated - 1|"),
+        )
+        reduced = conditions(NO_CASE, "raise response.modes or response.harmonics", *rows)
     if proof is None:
-        return []
+        return reduced
     scene, case = solution.plan.scene, Case(nodal_diameter=proof.nodal_diameter)
     error = float(np.abs(proof.projected / proof.direct - 1.0).max())
     changed = {
@@ -89,7 +126,7 @@ def check_solution(solution: BladedDiskSolution) -> list[Check]:
         numbers = float(proof.direct[k]), float(other[k])
         resolved = Resolved(name, q.F_SPINNING.named(k + 1), case, *numbers, "Hz", remedy)
         checks.append(resolved.check(scene.left_out))
-    return checks
+    return checks + reduced
 
 
 def _farther(proof: Proof) -> np.ndarray:
@@ -135,6 +172,27 @@ def arrays(solution: BladedDiskSolution) -> dict[str, ArrayGroup]:
             columns["speed"] = variable("crossing", table[:, 3] * _RPM, "rpm")
             columns["frequency"] = variable("crossing", table[:, 4], "Hz")
             out["crossings"] = ArrayGroup(columns, content=CROSSINGS)
+    return out | ({} if solution.wave is None else _wave_arrays(solution.wave))
+
+
+def _wave_arrays(wave: DampedWave) -> dict[str, ArrayGroup]:
+    case = Case(
+        engine_order=wave.crossing.engine_order, nodal_diameter=wave.crossing.nodal_diameter
+    )
+    curves = {
+        "frequency": variable("frequency", wave.frequency, "Hz"),
+        "free": variable("frequency", 1e3 * wave.free, "um"),
+        "stuck": variable("frequency", 1e3 * wave.stuck, "um"),
+        "damped_frequency": variable("point", wave.answer.frequency, "Hz"),
+        "damped": variable("point", 1e3 * wave.damped, "um"),
+    }
+    out = {"travelling wave": ArrayGroup(curves, content=WAVE, case=case)}
+    if wave.performance is not None:
+        over = {
+            "ratio": variable("ratio", wave.performance.ratio),
+            "height": variable("ratio", 1e3 * wave.performance.height, "um/N"),
+        }
+        out["wave performance"] = ArrayGroup(over, content=PERFORMANCE, case=case)
     return out
 
 

@@ -35,7 +35,12 @@ def computed(scene: BladedDiskScene) -> tuple[int, ...]:
 
 def rotates(scene: BladedDiskScene) -> bool:
     """Whether any output needs the rotating sector."""
-    return scene.wants("campbell", "interference")
+    return scene.wants("campbell", "interference") or damped(scene)
+
+
+def damped(scene: BladedDiskScene) -> bool:
+    """Whether the damped response is solved."""
+    return scene.wants("response", "performance")
 
 
 def make_plan(scene: BladedDiskScene) -> BladedDiskPlan:
@@ -47,7 +52,8 @@ def make_plan(scene: BladedDiskScene) -> BladedDiskPlan:
         cost.dynamic_body(count["hexes"], count["nodes"], 2.0)
         # the check solves one more, the static state half of one
         times = int(_COMPLEX * (len(computed(scene)) + 1.5))
-        cost.modes(f"{body}, modes", count["hexes"], count["nodes"], times)
+        reduced = 2 * (scene.response.harmonics + 1) if damped(scene) else 0
+        cost.modes(f"{body}, modes", count["hexes"], count["nodes"], times + reduced)
     memory, workers = cost.side_by_side(1, 1)
     return BladedDiskPlan(
         scene,
@@ -82,7 +88,14 @@ def _effects(scene: BladedDiskScene) -> list[Effect]:
         Effect(DISPLACED, False, "small" if turns else unasked, DISPLACED, applies=turns),
         Effect(CORIOLIS, False, "small" if turns else unasked, CORIOLIS, applies=turns),
         Effect("mistuning", False, "all blades are alike", applies=True),
-        Effect("friction", False, "no output asks for the damped response", applies=False),
+        Effect(
+            "friction",
+            damped(scene),
+            "a rigid wedge in every gap, at the speed of the crossing"
+            if damped(scene)
+            else "no output asks for the damped response",
+            applies=damped(scene),
+        ),
     ]
 
 

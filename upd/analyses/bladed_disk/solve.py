@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
-from upd.analyses.bladed_disk.plan import BladedDiskPlan, computed, rotates
-from upd.errors import MeshError
+from upd.analyses.bladed_disk.plan import BladedDiskPlan, computed, damped, rotates
+from upd.analyses.bladed_disk.response import (
+    WavePerformance,
+    Wedge,
+    on_sector,
+    performance,
+    wave_response,
+)
+from upd.errors import InputError, MeshError
 from upd.fem import Material, mass, stiffness
 from upd.fem.rotation import (
     centrifugal_load,
@@ -20,9 +27,18 @@ from upd.fem.rotation import (
     plane_mass,
     stress_stiffness,
 )
+from upd.hbm import FrequencyResponse, nodal_diameters
 from upd.mesh import Mesh, recipes
 from upd.progress import Stages
-from upd.reduction.cyclic import CyclicModel, ModeFamily, Sector, with_coriolis
+from upd.reduction.cyclic import (
+    CyclicModel,
+    ModeFamily,
+    ReducedSector,
+    Sector,
+    reduce_sector,
+    with_coriolis,
+)
+from upd.scene import BladedDiskScene
 
 Array = NDArray[np.float64]
 
@@ -68,6 +84,43 @@ class Proof(NamedTuple):
     coriolis: Array
 
 
+class DampedWave(NamedTuple):
+    """Response at a crossing.
+
+    Attributes
+    ----------
+    crossing : Crossing
+    sectors : dict
+        Nodal diameter -> reduced sector.
+    f_c : float
+        N.
+    frequency : (k,) ndarray
+        Hz.
+    free, stuck : (k,) ndarray
+        Linear amplitudes at the tip, mm.
+    answer : FrequencyResponse
+    damped : (n,) ndarray
+        Amplitudes at its frequencies, mm.
+    peak : (2,) tuple
+        Hz and mm.
+    performance : WavePerformance or None
+    best_mass : float
+        t; nan without it.
+    """
+
+    crossing: Crossing
+    sectors: dict[int, ReducedSector]
+    f_c: float
+    frequency: Array
+    free: Array
+    stuck: Array
+    answer: FrequencyResponse
+    damped: Array
+    peak: tuple[float, float]
+    performance: WavePerformance | None
+    best_mass: float
+
+
 @dataclass
 class BladedDiskSolution:
     """All that was solved, for results, arrays and files.
@@ -84,6 +137,7 @@ class BladedDiskSolution:
     crossings : list
         The nearest to the operating speed first.
     proof : Proof or None
+    wave : DampedWave or None
     """
 
     plan: BladedDiskPlan
@@ -94,6 +148,7 @@ class BladedDiskSolution:
     campbell: Array = field(default_factory=lambda: np.empty((0, 0, 0)))
     crossings: list[Crossing] = field(default_factory=list)
     proof: Proof | None = None
+    wave: DampedWave | None = None
 
 
 def folded(engine_order: int, n_sectors: int) -> int:
@@ -143,6 +198,8 @@ def _solve(solution: BladedDiskSolution, stages: Stages) -> None:
         rows = [_by_diameter(family, model, count, float(w)) for w in solution.speeds]
         solution.campbell = np.stack(rows, axis=1)
         solution.crossings = _crossings(solution, family)
+    if damped(scene):
+        solution.wave = _damped_wave(solution, model, stages)
     if scene.left_out.solves:
         with stages("effects left out", "one nodal diameter solved by itself"):
             solution.proof = _proof(solution, model, family, u)
@@ -214,4 +271,86 @@ def _proof(solution: BladedDiskSolution, model: CyclicModel, family: ModeFamily,
         found.frequency,
         np.sqrt(value) / (2.0 * np.pi),
         with_coriolis(found.frequency, U, coriolis(M), speed),
+    )
+
+
+def _damped_wave(solution: BladedDiskSolution, model: CyclicModel, stages: Stages) -> DampedWave:
+    """Free, stuck and damped response at the crossing nearest to the operating speed."""
+    scene, chosen = solution.plan.scene, solution.plan.scene.response
+    if not solution.crossings:
+        raise InputError(
+            "rotation.engine_orders: none crosses a mode up to the largest speed, so there is no "
+            "resonance to damp; raise rotation.up_to or name others"
+        )
+    crossing = solution.crossings[0]
+    mesh, harmonics = model.sector.mesh, range(chosen.harmonics + 1)
+    tip = mesh.nodes.get("tip", np.empty(0, np.int64))[:1]
+    if not len(tip):
+        raise MeshError("the mesh has no node set tip, where the blade is excited: name one node.")
+    # C = beta K has the ratio asked for at the crossing
+    beta = 2.0 * chosen.damping / (2.0 * np.pi * crossing.frequency)
+    needed = nodal_diameters(scene.n_sectors, crossing.engine_order, harmonics)
+    with stages("reduction", f"nodal diameters {', '.join(map(str, needed))}"):
+        sectors = {
+            n: reduce_sector(
+                model,
+                n,
+                n_modes=chosen.modes,
+                keep={"tip": tip},
+                speed=crossing.speed,
+                damping=(0.0, beta),
+            )
+            for n in needed
+        }
+    one = sectors[crossing.nodal_diameter]
+    x, y, _ = mesh.points[tip[0]]
+    row = np.array([-y, x, 0.0]) / np.hypot(x, y) @ one.rows["tip"]
+    wedge = _wedge(scene, one)
+    f_c = wedge.centrifugal_force(crossing.speed)
+    low = 0.97 * crossing.frequency
+    given: dict[str, Any] = {"engine_order": crossing.engine_order, "harmonics": harmonics}
+    with stages("response", f"EO {crossing.engine_order}, {chosen.points} frequencies"):
+        force, out = chosen.force * row, on_sector(row)
+        probe = wave_response(sectors, wedge, f_c, force=force, frequencies=[low], **given)
+        wide = np.linspace(low, 2.0 * low, 4001)
+        top = float(wide[probe.stuck(out, wide).argmax()])
+        frequencies = np.linspace(low, 1.03 * top, chosen.points)
+        answer = wave_response(sectors, wedge, f_c, force=force, frequencies=frequencies, **given)
+        fine = np.linspace(low, frequencies[-1], 2001)
+        free, stuck = answer.free(out, fine), answer.stuck(out, fine)
+        peak = answer.peak(out)
+    curve, mass = None, float("nan")
+    if scene.wants("performance"):
+        with stages("performance", f"{len(chosen.ratios)} ratios F_C/F_E"):
+            curve = performance(
+                sectors, wedge, f_c, chosen.ratios, row, force=row, frequencies=frequencies, **given
+            )
+        mass = curve.ratio[curve.best] * chosen.force / (wedge.radius * crossing.speed**2)
+    amplitude = np.asarray(answer.amplitude(out))
+    return DampedWave(
+        crossing, sectors, f_c, fine, free, stuck, answer, amplitude, peak, curve, float(mass)
+    )
+
+
+def _wedge(scene: BladedDiskScene, sector: ReducedSector) -> Wedge:
+    """The wedge with the inertia of a box between both patches."""
+    given, places = scene.damper, np.vstack([sector.high, sector.low])
+    r = np.hypot(places[:, 0], places[:, 1])
+    sides = np.array(
+        [
+            np.ptp(r),
+            np.linalg.norm(sector.high.mean(axis=0) - sector.low.mean(axis=0)),
+            np.ptp(places[:, 2]),
+        ]
+    )
+    squares = given.mass / 12.0 * sides**2
+    inertia = tuple(float(squares.sum() - one) for one in squares)
+    return Wedge(
+        given.mass,
+        (inertia[0], inertia[1], inertia[2]),
+        float(r.mean()),
+        given.angle,
+        given.normal_stiffness,
+        given.tangential_stiffness,
+        given.friction,
     )
