@@ -109,7 +109,7 @@ class WaveChoice:
     harmonics: Annotated[int, q.at_least(1)] = 1
     modes: Annotated[int, q.at_least(1)] = 15
     points: Annotated[int, q.at_least(5)] = 25
-    ratios: Annotated[tuple[q.Ratio, ...], q.FILLED] = (3.0, 10.0, 30.0, 100.0)
+    ratios: Annotated[tuple[q.Ratio, ...], q.FILLED] = (300.0, 600.0, 1200.0)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -87,7 +87,11 @@ def _wave_results(wave: DampedWave) -> list[Result]:
         q.WAVE_CENTRIFUGAL.of(wave.f_c, case),
     ]
     if wave.performance is not None:
-        results.append(q.BEST_MASS.of(wave.best_mass, case))
+        reason = "no curve converged at response.ratios; give larger ones"
+        found = np.isfinite(wave.best_mass)
+        results.append(
+            q.BEST_MASS.of(wave.best_mass, case) if found else q.BEST_MASS.withheld(case, reason)
+        )
     return results
 
 

@@ -325,7 +325,8 @@ def _damped_wave(solution: BladedDiskSolution, model: CyclicModel, stages: Stage
             curve = performance(
                 sectors, wedge, f_c, chosen.ratios, row, force=row, frequencies=frequencies, **given
             )
-        mass = curve.ratio[curve.best] * chosen.force / (wedge.radius * crossing.speed**2)
+        if np.isfinite(curve.height).any():
+            mass = curve.ratio[curve.best] * chosen.force / (wedge.radius * crossing.speed**2)
     amplitude = np.asarray(answer.amplitude(out))
     return DampedWave(
         crossing, sectors, f_c, fine, free, stuck, answer, amplitude, peak, curve, float(mass)
