@@ -17,7 +17,7 @@ below it, none in a circle; contracts in pyproject.toml hold this.
     batch       many runs: sweeps, samples, studies
     runner      one run: plan, solve, check, write the run folder
     report      the run folder read back: page, comparison, notebook, figures
-    analyses    contact, modal, seated, forced: each plans, solves, checks and describes its charts
+    analyses    contact, modal, seated, forced, bladed disk: each plans, solves, checks and draws
     vary        one scene with one thing changed, solved again: errors, effects, inputs
     plot        a Chart of arrays drawn by matplotlib or plotly; pictures of modes and surfaces
     scene       scene.toml -> frozen dataclasses
@@ -26,8 +26,8 @@ below it, none in a circle; contracts in pyproject.toml hold this.
     contact     normal and tangential contact, tilt, contact points
     hbm         harmonic balance with friction
     dynamics    linear response, peaks, damping
-    reduction   Guyan, Craig-Bampton
-    fem         mesh -> K, M
+    reduction   Guyan, Craig-Bampton, cyclic sectors
+    fem         mesh -> K, M, rotation
     linalg      factorisation, Schur complement, modes
     reference   closed forms, usable by themselves
     mesh        Mesh, checks and quality, recipes (the one door to geometry), export

@@ -22,6 +22,7 @@ _NAMES = {
     "curved contact": "hertz",
     "flat contact": "flat",
     "rig": "modal",
+    "bladed disk": "bladed_disk",
     "forced response": "forced",
     "seated damper": "seated",
 }

@@ -23,6 +23,7 @@ from upd.mesh.checks import Pairs, centre_of, check_pairs, quality
 from upd.mesh.export import ENDINGS, write_mesh
 from upd.mesh.fields import table
 from upd.progress import Listener, Stages
+from upd.reduction.cyclic import Sector
 from upd.scene.keys import recipe_keys
 
 #: nodes per hexahedron that a .inp file can hold
@@ -77,7 +78,7 @@ def regenerate(
             _draw(request, meshes, picture)
     console.print(_configuration(request, cached))
     _print_shapes(console, meshes)
-    _print_pairs(console, pairs, meshes)
+    _print_pairs(console, pairs, meshes, request.parameters)
     return meshes
 
 
@@ -134,8 +135,19 @@ def _print_shapes(console: Console, meshes: Mapping[str, Mesh]) -> None:
     print_table(console, columns_of(heads, rows), title=title, box=SIMPLE_HEAD)
 
 
-def _print_pairs(console: Console, pairs: Sequence[Pairs], meshes: Mapping[str, Mesh]) -> None:
-    """Pairs of contact nodes and how well they face each other."""
+def _print_pairs(
+    console: Console, pairs: Sequence[Pairs], meshes: Mapping[str, Mesh], params: Any
+) -> None:
+    """Pairs of contact nodes, or of the faces of a sector, and how well they match."""
+    sectors = getattr(params, "n_sectors", 0)
+    if sectors:
+        for name, mesh in meshes.items():
+            found = Sector.of(mesh, sectors)
+            console.print(
+                f"{name}: {len(found.low)} nodes of low and high match under rotation by "
+                f"2 pi/{sectors}, largest offset {number(found.offset, 'mm')}"
+            )
+        return
     if not pairs:
         glued = [
             f"{key} {len(nodes)} nodes"

@@ -26,6 +26,13 @@ from upd.hbm.springs.points import Contacts, contacts
 from upd.hbm.springs.response import FrequencyResponse, frequency_response
 from upd.hbm.springs.stability import Stability, stability
 from upd.hbm.springs.time_integration import SteadyState, steady_state
+from upd.hbm.springs.waves import (
+    WaveInTime,
+    all_sectors,
+    nodal_diameters,
+    travelling_wave_response,
+    wave_in_time,
+)
 
 __all__ = [
     "Contacts",
@@ -40,14 +47,19 @@ __all__ = [
     "Stability",
     "State",
     "SteadyState",
+    "WaveInTime",
+    "all_sectors",
     "climb",
     "contact_rows",
     "contacts",
     "follow",
     "frequency_response",
     "harmonics",
+    "nodal_diameters",
     "nonlinear_mode",
     "rigid_damper",
     "stability",
     "steady_state",
+    "travelling_wave_response",
+    "wave_in_time",
 ]

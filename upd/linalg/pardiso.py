@@ -33,6 +33,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.common import (
@@ -41,6 +42,7 @@ from upd.linalg.common import (
     FloatArray,
     IntArray,
     SignedFactor,
+    Solve,
     checked_dofs,
     checked_vectors,
     inner_free_error,
@@ -50,7 +52,7 @@ from upd.linalg.common import (
 from upd.linalg.symmetric import Matrix, Symmetric, checked, upper_triangle, with_diagonal
 from upd.linalg.uncoupled import uncoupled
 
-SPD, SYMMETRIC = 2, -2
+SPD, SYMMETRIC, HERMITIAN = 2, -2, 4
 ANALYSE, FACTORISE, SOLVE, BACKWARD, RELEASE = 11, 22, 33, 333, -1
 NOT_POSITIVE = -4
 _FAULTS = {
@@ -126,7 +128,7 @@ def _call(
 
 def _release(handle: IntArray, n: int, iparm: IntArray, kind: int) -> None:
     """Give the memory back; runs when the owner is collected."""
-    none, whole = np.zeros(1), np.zeros(1, np.int64)
+    none, whole = np.zeros(2), np.zeros(1, np.int64)
     _call(handle, RELEASE, n, (none, whole, whole), whole, iparm, (none, none), kind)
 
 
@@ -172,7 +174,7 @@ class _Pardiso:
         """One phase. Returns 0 or NOT_POSITIVE; raises ConvergenceError for any other error."""
         if not self._release.alive:
             raise ConvergenceError("PARDISO: the factor was already released: factorise again.")
-        none = np.zeros(1)
+        none = np.zeros(2)  # the size of one complex number too
         rhs, x = none if rhs is None else rhs, none if x is None else x
         code = _call(
             self.handle, phase, self.n, self.matrix, self.perm, self.iparm, (rhs, x), self.kind
@@ -186,7 +188,7 @@ class _Pardiso:
 
     def substitute(self, phase: int, rhs: FloatArray) -> FloatArray:
         """Solve phases for right-hand sides (n,) or (n, m)."""
-        b = np.asfortranarray(rhs, dtype=np.float64)
+        b = np.asfortranarray(rhs, dtype=self.matrix[0].dtype)
         x = np.zeros_like(b, order="F")
         if b.size:
             self.run(phase, b, x)
@@ -253,6 +255,26 @@ def factorise_pardiso(K: Any) -> Factor:
         return np.ascontiguousarray(solver.solve(checked_vectors(rhs, solver.n, "right-hand side")))
 
     return Factor(solve, "pardiso", perf_counter() - start, solver.factor_nnz, solver.peak_bytes)
+
+
+def hermitian_pardiso(upper: csr_array) -> Solve:
+    """x -> A^-1 x of a Hermitian positive definite matrix.
+
+    Parameters
+    ----------
+    upper : (n, n) csr_array of complex
+        Its upper triangle, indices sorted, every diagonal entry stored.
+
+    Raises
+    ------
+    ConvergenceError
+        When it is not positive definite, or memory runs out.
+    """
+    solver = _Pardiso(Symmetric(upper), kind=HERMITIAN)
+    solver.run(ANALYSE)
+    if solver.run(FACTORISE):
+        raise inner_free_error(None, np.arange(solver.n), "PARDISO")
+    return solver.solve
 
 
 def signed_pardiso(A: Matrix) -> SignedFactor | None:

@@ -230,6 +230,8 @@ def _blocks(data: bytes) -> Iterator[_Block]:
 ENDINGS = (".msh", ".inp")
 #: bodies of a rig without its damper, and the one of a rig with the damper glued in
 _BLADES, _GLUED = ("left", "right"), "rig"
+#: node sets of a sector
+_FACES = {"low", "high"}
 #: what reads a file: points and named groups
 Reader = Callable[[Path], tuple[FloatArray, list[NamedElements]]]
 
@@ -274,6 +276,24 @@ class RigFile(MeshFile):
             raise InputError('symmetry: the file holds the whole rig; set mesh.symmetry = "full"')
 
 
+@dataclass(frozen=True)
+class SectorFile(MeshFile):
+    """Parameters of the mesh file of a sector of a bladed disk.
+
+    Attributes
+    ----------
+    n_sectors
+        Number of blades.
+    """
+
+    n_sectors: int = 0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.n_sectors < 2:
+            raise InputError(f"n_sectors: {self.n_sectors} is less than 2; give that of the disk")
+
+
 def recipe_of(path: Path, read_msh: Reader) -> ModuleType:
     """The file as a recipe: a module with ``build`` and the analysis its sets are for.
 
@@ -290,6 +310,7 @@ def recipe_of(path: Path, read_msh: Reader) -> ModuleType:
     module = ModuleType(f"upd_mesh_{path.stem}")
     module.__file__ = str(path.resolve())
     rig = set(_BLADES) <= set(meshes)
+    sector = all(set(mesh.nodes) >= _FACES for mesh in meshes.values())
 
     def build_rig(params: RigFile) -> dict[str, Mesh]:
         names = [_GLUED] if params.damper == "glued" else list(_BLADES)
@@ -300,11 +321,15 @@ def recipe_of(path: Path, read_msh: Reader) -> ModuleType:
             )
         return _scaled({name: meshes[name] for name in names}, params)
 
+    def build_sector(params: SectorFile) -> dict[str, Mesh]:
+        return _scaled(meshes, params)
+
     def build(params: MeshFile) -> dict[str, Mesh]:
         return _scaled(meshes, params)
 
-    vars(module)["build"] = build_rig if rig else build
-    vars(module)["ANALYSIS"] = "rig" if rig else _contact_analysis(meshes)
+    vars(module)["build"] = build_rig if rig else build_sector if sector else build
+    other = "bladed disk" if sector else _contact_analysis(meshes)
+    vars(module)["ANALYSIS"] = "rig" if rig else other
     return module
 
 

@@ -22,7 +22,7 @@ from upd.mesh.own_mesh import recipe_of
 log = logging.getLogger(__name__)
 
 #: ready recipes, modules of the geometry package
-READY = ("sphere_block", "wedge_platform", "pads_platform", "blade_rig")
+READY = ("sphere_block", "wedge_platform", "pads_platform", "blade_rig", "sector")
 
 
 def is_file(recipe: str) -> bool:

@@ -51,6 +51,10 @@ class Case:
         Face: "left", "right".
     choice
         What was chosen differently: "start mid", "3 harmonics".
+    nodal_diameter
+        Of the modes of a bladed disk.
+    engine_order
+        That excites them.
     """
 
     name: str = ""
@@ -70,6 +74,8 @@ class Case:
     blade: str = ""
     side: str = ""
     choice: str = ""
+    nodal_diameter: int | None = None
+    engine_order: int | None = None
 
     @property
     def label(self) -> str:
@@ -105,6 +111,8 @@ class Case:
             shown("part", "{} f1"),
             shown("frequency", "{} Hz"),
             shown("side"),
+            shown("engine_order", "EO {}"),
+            shown("nodal_diameter", "ND {}"),
         ]
         return ", ".join(part for part in parts if part)
 

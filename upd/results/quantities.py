@@ -221,6 +221,21 @@ PARTICIPATION = Quantity("participation", "1/kg", "participation phi_force phi_o
 RESPONSE_BELOW = Quantity("response_below", "(m/s2)/N", "accelerance at 0.5 f1, reduced")
 RESPONSE_ABOVE = Quantity("response_above", "(m/s2)/N", "accelerance at 1.2 f1, reduced")
 
+# -- bladed disk ---------------------------------------------------------------------------------
+
+F_SECTOR = Quantity("f{n}", "Hz", same_bodies=True)
+F_SPINNING = Quantity("f{n}_at_speed", "Hz", same_bodies=True)
+CROSSING_SPEED = Quantity("crossing_speed", "rpm", "speed of the crossing")
+CROSSING_FREQUENCY = Quantity("crossing_frequency", "Hz", "frequency of the crossing")
+CROSSING_MARGIN = Quantity("crossing_margin", "%", "distance from the operating speed")
+WAVE_FREE = Quantity("free_amplitude", "um", "free peak")
+WAVE_STUCK = Quantity("stuck_amplitude", "um", "stuck peak")
+WAVE_DAMPED = Quantity("damped_amplitude", "um", "damped peak")
+WAVE_FREQUENCY = Quantity("damped_frequency", "Hz", "frequency of the damped peak")
+WAVE_REDUCTION = Quantity("amplitude_reduction", "%", "reduction of the free peak")
+WAVE_CENTRIFUGAL = Quantity("wedge_centrifugal", "N", "F_C of the wedge")
+BEST_MASS = Quantity("best_damper_mass", "g", "mass with the lowest peak")
+
 # -- damper between two blades ---------------------------------------------------------------------
 
 DAMPER_MASS = Quantity("damper_mass", "g", "mass of the damper")

@@ -4,6 +4,7 @@ the file.
 
 from __future__ import annotations
 
+from upd.scene.bladed_disk import BLADED_DISK_WANTS, BladedDiskScene
 from upd.scene.contact import FRICTION_WANTS, WANTS, Scene, friction_on
 from upd.scene.forced import FORCED_WANTS, ForcedScene
 from upd.scene.modal import MODAL_WANTS, ModalScene
@@ -15,6 +16,7 @@ RIG_WANTS = MODAL_WANTS
 RigScene = ModalScene
 
 __all__ = [
+    "BLADED_DISK_WANTS",
     "FORCED_WANTS",
     "FRICTION_WANTS",
     "MODAL_WANTS",
@@ -22,6 +24,7 @@ __all__ = [
     "SEATED_WANTS",
     "WANTS",
     "AnyScene",
+    "BladedDiskScene",
     "ForcedScene",
     "ModalScene",
     "RigScene",

@@ -324,7 +324,7 @@ def rig_problems(scene: RigBase) -> Iterator[str]:
         )
 
 
-def unreachable_accuracy(scene: RigBase, what: str, instead: str) -> list[str]:
+def unreachable_accuracy(scene: SceneBase, what: str, instead: str) -> list[str]:
     """The problem of a target accuracy where the levels are not chosen by the run.
 
     Parameters

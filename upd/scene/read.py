@@ -22,6 +22,7 @@ from upd.errors import InputError, did_you_mean
 from upd.mesh import recipes
 from upd.mesh.recipe_modules import is_file
 from upd.scene.base import INSIDE, SceneBase
+from upd.scene.bladed_disk import BladedDiskScene, bladed_disk_problems
 from upd.scene.contact import Scene, contact_problems
 from upd.scene.forced import FORCED, FORCED_ONLY, ForcedScene, forced_problems
 from upd.scene.measured import note_files
@@ -33,7 +34,7 @@ from upd.scene.toml import plain, read_overrides
 from upd.scene.uncertain import taken_out, uncertainties
 from upd.units import parse_quantity
 
-AnyScene = Scene | ModalScene | ForcedScene | SeatedScene
+AnyScene = Scene | ModalScene | ForcedScene | SeatedScene | BladedDiskScene
 
 #: Parameters of a recipe that may be "auto".
 _AUTO = ("patch", "core_depth", "divisions")
@@ -54,6 +55,7 @@ _PROBLEMS: dict[type[AnyScene], Callable[[Any], Iterable[str]]] = {
     ModalScene: modal_problems,
     ForcedScene: forced_problems,
     SeatedScene: seated_problems,
+    BladedDiskScene: bladed_disk_problems,
 }
 #: Analyses that a scene names, its class, and the tables that only it has.
 _NAMED: dict[str, tuple[type[AnyScene], tuple[str, ...]]] = {
@@ -305,6 +307,8 @@ def _analyses(data: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _kind(data: Mapping[str, Any], analyses: Sequence[str]) -> type[AnyScene]:
     """The class of the scene, from the analysis it names or those its recipe declares."""
+    if analyses[:1] == (BladedDiskScene.analysis,):
+        return BladedDiskScene
     named = data.get("analysis")
     if isinstance(named, str) and named in _NAMED:
         return _NAMED[named][0]

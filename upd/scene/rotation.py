@@ -15,6 +15,7 @@ from typing import Any
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene.base import Rotation
+from upd.scene.bladed_disk import BladedDiskScene
 from upd.scene.contact import Scene
 from upd.scene.forced import ForcedScene
 from upd.scene.measured import (
@@ -125,6 +126,7 @@ DERIVED: Mapping[type[Any], Callable[[Any, Mapping[str, Any]], Any]] = {
     ModalScene: _modal,
     ForcedScene: _forced,
     SeatedScene: _seated,
+    BladedDiskScene: lambda scene, data: scene,
 }
 
 

@@ -206,8 +206,10 @@ def test_bounds_that_others_allow_are_where_the_checks_end(recipe: str) -> None:
         ends = [(low, -1), (high, 1)] if high else [(low, 1 if row.here[0] == "<" else -1)]
         for text, sign in ends:
             # four digits, rounded inwards: so far beyond the end is out
-            end, step = float(text), 2e-3 * float(text)
-            recipes.made(recipe, {row.name: end - sign * 1e-3 * step})
+            end, step, inside = float(text), 2e-3 * float(text), 1e-3
+            if isinstance(row.value, int):
+                end, step, inside = int(text), 1, 0
+            recipes.made(recipe, {row.name: end - sign * inside * step})
             with pytest.raises(InputError, match=r"\w+: "):
                 recipes.made(recipe, {row.name: end + sign * step})
     with_bounds = [row for row in table(params) if row.bounds]

@@ -36,6 +36,10 @@ CASES: dict[str, list[dict[str, Any]]] = {
             "pad_along_slope": 4,
         },
     ],
+    "sector": [
+        {},
+        {"n_sectors": 12, "blade_thickness": 12.0, "bore_width": 30.0, "face_angle": 11.0},
+    ],
 }
 ALL = [(recipe, given) for recipe, cases in CASES.items() for given in cases]
 OWN = Path(recipes.__file__).parents[1] / "scenes" / "examples" / "own_damper.py"

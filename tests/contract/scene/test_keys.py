@@ -13,7 +13,15 @@ import pytest
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.recipe_modules import READY
-from upd.scene import ForcedScene, ModalScene, Scene, SeatedScene, load_scene, ready_scenes
+from upd.scene import (
+    BladedDiskScene,
+    ForcedScene,
+    ModalScene,
+    Scene,
+    SeatedScene,
+    load_scene,
+    ready_scenes,
+)
 from upd.scene.keys import (
     SceneKey,
     chosen_keys,
@@ -27,7 +35,7 @@ from upd.scene.keys import (
 from upd.units import UNITS, parse_quantity, quantity_text, unit_inside
 
 EXAMPLE = Path(recipes.__file__).parents[1] / "scenes" / "examples" / "own_damper.toml"
-KINDS = (Scene, ModalScene, ForcedScene, SeatedScene)
+KINDS = (Scene, ModalScene, ForcedScene, SeatedScene, BladedDiskScene)
 SCENES = [*ready_scenes(), str(EXAMPLE)]
 #: numbers without a unit: ratios, counts, coefficients
 BARE = {
@@ -35,6 +43,7 @@ BARE = {
     *("accuracy", "error", "damping", "centrifugal_to_force", "lowest", "highest"),
     *("left_out.stiffness", "left_out.frequency", "left_out.peak"),
     *("growth", "growth_inside", "core_depth", "first_layer", "refine", "seating.over"),
+    *("taper", "up_to", "ratios"),
 }
 
 

@@ -34,7 +34,7 @@ from upd.hbm.springs.friction import (
 from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart, linear_part
 from upd.hbm.springs.modal import Modal, modal
 from upd.hbm.springs.points import Contacts, frictionless, stuck_constant, stuck_stiffness
-from upd.hbm.springs.terms import contact_terms, residual_terms
+from upd.hbm.springs.terms import contact_terms
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -111,7 +111,24 @@ class Balance:
         }
         self.__dict__.update(values)
 
-    def modal_row(self, row: ArrayLike) -> FloatArray:
+    def part(self, harmonic: int | None = None) -> tuple[Modal, FloatArray]:
+        """The linear system in one harmonic above 0, and the rows Psi on its modes.
+
+        Parameters
+        ----------
+        harmonic : int, optional
+            Its number, kept or not; the lowest above 0 by default.
+        """
+        return self.modal, self.Psi
+
+    def has_part(self, harmonic: int) -> bool:
+        """Whether the linear system is known in a harmonic above 0."""
+        return True
+
+    def require_all_sectors(self, what: str) -> None:
+        """Raise InputError where this is one sector of a travelling wave."""
+
+    def modal_row(self, row: ArrayLike, harmonic: int | None = None) -> FloatArray:
         """Row on the modes (m,) of a row (n_dof,) that weighs the displacements.
 
         Raises InputError for a row of another length.
@@ -122,7 +139,7 @@ class Balance:
                 f"row has shape {given.shape}; to fix it: give one weight for every dof, "
                 f"({len(self.modal.Phi)},), those of a damper last"
             )
-        return np.asarray(given @ self.modal.Phi)
+        return np.asarray(given @ self.part(harmonic)[0].Phi)
 
     @cached_property
     def _layout(self) -> tuple[int, tuple[int, int, int]]:
@@ -277,16 +294,9 @@ class Balance:
         F, state, DF = contact_terms(
             W, self._transform, static, self.contacts.law.arrays, begin, jacobian
         )
-        residual, by_frequency = residual_terms(
-            W.reshape(c, -1),
-            a,
-            F.reshape(c, -1),
-            linear.k,
-            omega,
-            static,
-            linear.arrays,
-            (self.loads, self.u0, self.rigid_load),
-            jacobian,
+        acting = (self.loads, self.u0, self.rigid_load)
+        residual, by_frequency = linear.residual(
+            W.reshape(c, -1), a, F.reshape(c, -1), omega, acting, jacobian
         )
         if not jacobian:
             return residual, None, by_frequency
@@ -303,7 +313,7 @@ class Balance:
         """The linear system as the contacts see it."""
         # loads, preload and sliders may change in copies: none of them enters
         h = self.harmonics
-        return linear_part(self.modal, self.Psi, self.G0, h.dynamic, h.offset)
+        return linear_part(self.modal, self.Psi, self.G0, self._rigid_rows, h.dynamic, h.offset)
 
     @cached_property
     def _transform(self) -> tuple[FloatArray, ...]:
@@ -313,8 +323,9 @@ class Balance:
 
     def amplitudes(self, F: FloatArray, omega: float) -> ComplexArray:
         """Amplitudes (n_k, m) of the modes under the loads and contact forces F (c, size) [N]."""
-        pushed = self.loads - to_complex(F, self.harmonics).T @ self.Psi
-        return self.modal.solve(np.asarray(self.harmonics.dynamic * omega, dtype=float), pushed)
+        pushed = self.loads - self.linear.pushes(to_complex(F, self.harmonics).T)
+        w = np.asarray(self.harmonics.dynamic * omega, dtype=float)
+        return self.linear.modal.solve(w, pushed)
 
     def misfit(self, x: FloatArray, omega: float) -> float:
         """Residual of the contact condition w - u + G f = 0 over its largest terms.
@@ -337,8 +348,8 @@ class Balance:
         F, w = self.force(x).force.reshape(c, -1), W.reshape(c, -1)
         residual = self.linearised(x, omega, False)[0]
         off = np.abs(residual[: W.size].reshape(c, -1))
-        u = self.amplitudes(np.zeros_like(F), omega) @ self.Psi.T
-        G_f = u - self.amplitudes(F, omega) @ self.Psi.T
+        u = self.linear.moves(self.amplitudes(np.zeros_like(F), omega))
+        G_f = u - self.linear.moves(self.amplitudes(F, omega))
         rows: list[tuple[FloatArray, tuple[Any, ...]]] = [(off[:, o:], (w[:, o:], G_f, u))]
         if self.harmonics.static:
             terms = (w[:, 0], self.G0 @ F[:, 0], self.u0, self._rigid_rows @ a)
@@ -386,6 +397,18 @@ class Balance:
         given = self.slider if self.start in ("zero", "static") else None
         return stuck_constant(self.contacts, given)
 
+    @property
+    def frictionless_sliders(self) -> FloatArray:
+        """Slider positions (n_point, 2) at which closed points carry the static loads without
+        traction [mm].
+        """
+        law, out = self.contacts.law, np.zeros((self.contacts.n_point, 2))
+        k, constant = np.zeros_like(self._stiffness), np.zeros_like(self._stiffness)
+        k[:, 0], constant[:, 0] = law.k_n, law.preload - law.k_n * law.gap
+        mean = self._linear_rest(k.ravel(), constant.ravel())[0].reshape(k.shape)
+        out[:, : self.contacts.tangents] = mean[:, 1:]
+        return out
+
     def free(self, omega: float) -> FloatArray:
         """Unknowns of the linear answer without contacts, rigid amplitudes zero.
 
@@ -422,7 +445,7 @@ class Balance:
         c, o = len(self.Psi), self.harmonics.offset
         at = np.asarray(self.harmonics.dynamic * omega, dtype=float)
         try:
-            w = self._sprung(at, self.loads, k).T
+            w = _sprung(self.linear.modal, self.linear.Psi, at, self.loads, k).T
         except np.linalg.LinAlgError:
             raise InputError(
                 f"frequency_response: no damping at a resonance of the sticking contacts, "
@@ -456,18 +479,13 @@ class Balance:
         """
         k = stuck_stiffness(self.contacts).ravel() if stuck else np.zeros(len(self.Psi))
         j = self.harmonics.place(harmonic)
-        load = self.loads[j : j + 1]
-        out = np.empty((len(omega), len(self.modal.Phi)), dtype=complex)
+        load, (modal, Psi) = self.loads[j : j + 1], self.part(harmonic)
+        out = np.empty((len(omega), len(modal.Phi)), dtype=complex)
         for i, w in enumerate(self.harmonics.dynamic[j] * omega):
             at = np.array([w])
-            pushed = load - (k * self._sprung(at, load, k)) @ self.Psi
-            out[i] = self.modal.solve(at, pushed)[0] @ self.modal.Phi.T
+            pushed = load - (k * _sprung(modal, Psi, at, load, k)) @ Psi.conj()
+            out[i] = modal.solve(at, pushed)[0] @ modal.Phi.T
         return out
-
-    def _sprung(self, w: FloatArray, loads: ComplexArray, k: FloatArray) -> ComplexArray:
-        """Motion (n, c) of rows on springs k (c,) at w (n,) rad/s under modal loads (n, m)."""
-        G, u = self.modal.receptance(self.Psi, w, loads)
-        return np.asarray(np.linalg.solve(np.eye(len(k)) + G * k, u[..., None])[..., 0])
 
     def displacement(self, omega: FloatArray, force: FloatArray, rigid: FloatArray) -> FloatArray:
         """Displacement of all dofs from the contact forces.
@@ -490,7 +508,8 @@ class Balance:
         out = np.zeros((len(omega), len(Phi), self.harmonics.size))
         for j, k in enumerate(self.harmonics.dynamic):
             f = force[:, :, o + 2 * j] - 1j * force[:, :, o + 2 * j + 1]
-            q = self.modal.solve(k * omega, self.loads[j] - f @ self.Psi) @ Phi.T
+            modal, Psi = self.part(int(k))
+            q = modal.solve(k * omega, self.loads[j] - f @ Psi.conj()) @ modal.Phi.T
             out[:, :, o + 2 * j], out[:, :, o + 2 * j + 1] = q.real, -q.imag
         if self.harmonics.static:
             eta = np.zeros((len(omega), Phi.shape[1]))
@@ -536,7 +555,7 @@ class Balance:
         off = xi if self.modal.proportional else xi * np.eye(len(self.modal.eigenvalues))
         modal = replace(self.modal, damping=self.modal.damping - off)
         rows = np.ascontiguousarray(np.atleast_2d(modal.damping))
-        linear = self.linear._replace(modal=modal, damping=rows)
+        linear = replace(self.linear, modal=modal, damping=rows)
         return self._changed(modal=modal, linear=linear)
 
     def with_sliders(self, start: Start, slider: FloatArray | None = None) -> Balance:
@@ -590,6 +609,14 @@ class Balance:
         out.__dict__.pop("_stuck_rest", None)
         out.__dict__.update(values)
         return out
+
+
+def _sprung(
+    modal: Modal, Psi: FloatArray, w: FloatArray, loads: ComplexArray, k: FloatArray
+) -> ComplexArray:
+    """Motion (n, c) of rows on springs k (c,) at w (n,) rad/s under modal loads (n, m)."""
+    G, u = modal.receptance(Psi, w, loads)
+    return np.asarray(np.linalg.solve(np.eye(len(k)) + G * k, u[..., None])[..., 0])
 
 
 def assembled(

@@ -182,13 +182,17 @@ def truncation(
         W = b.coefficients(x[part])
         force = (b.marched(W, E) if known is None else known).coefficients(Q)
         F = to_complex(force.reshape(len(W), len(b.Psi), -1), rest)
-        w = (2 * np.pi * frequency[part][:, None] * rest.dynamic).ravel()
-        eta = b.modal.solve(w, np.swapaxes(F, 1, 2).reshape(len(w), -1) @ b.Psi)
-        # the force of the motion added would bring most of it back: springs in series with the
-        # structure
-        motion = np.abs(eta @ b.Psi.T) / (1 + b.modal.drive_point(b.Psi, w) * stiffness)
+        most = np.zeros(len(W))
+        for i, k in enumerate(rest.dynamic):
+            if not b.has_part(int(k)):
+                continue
+            (modal, Psi), w = b.part(int(k)), 2 * np.pi * k * frequency[part]
+            eta = modal.solve(w, F[:, :, i] @ Psi.conj())
+            # the force of the motion added would bring most of it back: springs in series with the
+            # structure
+            motion = np.abs(eta @ Psi.T) / (1 + modal.drive_point(Psi, w) * stiffness)
+            most = np.maximum(most, motion.max(axis=1))
         size = np.abs(to_complex(W, b.harmonics)).max(axis=(1, 2, 3))
-        most = motion.reshape(len(W), -1).max(axis=1)
         if rest.static:
             mean = force.reshape(len(W), len(b.Psi), -1)[..., 0]
             most = np.maximum(most, _mean_motion(b, mean).max(axis=1))

@@ -27,7 +27,7 @@ from upd.hbm.springs.period import GIVEN, LOWER, MID, UPPER, march_points
 from upd.labels import Shown
 
 FloatArray = NDArray[np.float64]
-Start = Literal["zero", "static", "mid", "upper", "lower"]
+Start = Literal["zero", "frictionless", "static", "mid", "upper", "lower"]
 
 START_CODE = {"zero": GIVEN, "static": GIVEN, "mid": MID, "upper": UPPER, "lower": LOWER}
 #: Friction in one direction forgets its start within one period; in two directions the memory fades

@@ -15,6 +15,9 @@ Both are the same Newton correction, in the same order, as that of the whole mat
 K_s is not negative and every harmonic above 0 gives a conjugate pair, so that the sign of the
 determinant is kept too.
 
+G is symmetric where all harmonics have the same real rows Psi. Those of a travelling wave are
+complex, Psi_k for each harmonic, and G_k = Psi_k D_k^-1 Psi_k^H is not.
+
 References
 ----------
 F. Zhang (ed.), The Schur Complement and Its Applications (2005), ch. 1; W. W. Hager, Updating the
@@ -23,6 +26,7 @@ inverse of a matrix, SIAM Review 31 (1989), for the low rank.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -42,16 +46,18 @@ EPS = float(np.finfo(float).eps)
 WORTH = 2e6
 
 
-class LinearPart(NamedTuple):
+@dataclass(frozen=True)
+class LinearPart:
     """The linear system as the contacts see it: what never changes on a curve.
 
     Attributes
     ----------
     modal : Modal
-        The linear system.
-    Psi : (c, m) ndarray
+        The linear system, or one for each harmonic above 0.
+    Psi : (c, m) ndarray, or (n_k, c, m) of complex
         Rows of the contacts on its modes.
-    transposed : (m, c) ndarray
+    transposed : (m, c) ndarray, or (n_k, m, c) of complex
+        Their conjugate transpose.
     damping : (1, m) or (m, m) ndarray
         Modal damping, one row where it is diagonal.
     basis : (c, r) ndarray or None
@@ -85,20 +91,75 @@ class LinearPart(NamedTuple):
         return self.offset + 2 * len(self.k)
 
     @property
-    def arrays(self) -> tuple[NDArray[np.generic], ...]:
-        """As compiled code takes them, see `upd.hbm.springs.terms.residual_terms`."""
-        m = self.modal
-        return m.eigenvalues, m.rigid, self.damping, self.Psi, self.transposed
+    def rows(self) -> int:
+        """Rows of the contacts, c."""
+        return len(self.G0)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether one real Psi serves all harmonics."""
+        return self.Psi.ndim == 2
+
+    def pushes(self, f: ComplexArray) -> ComplexArray:
+        """Modal forces (n_k, m) of amplitudes (n_k, c) of forces on the rows."""
+        if self.symmetric:
+            return np.asarray(f @ self.Psi)
+        return np.asarray((self.transposed @ f[:, :, None])[..., 0])
+
+    def moves(self, eta: ComplexArray) -> ComplexArray:
+        """Motion (n_k, c) of the rows with modal amplitudes (n_k, m)."""
+        if self.symmetric:
+            return np.asarray(eta @ self.Psi.T)
+        return np.asarray((self.Psi @ eta[:, :, None])[..., 0])
+
+    def damped(self, eta: ComplexArray) -> ComplexArray:
+        """Modal damping times amplitudes (n_k, m)."""
+        c = self.modal.damping
+        return np.asarray(c * eta if self.modal.proportional else (c @ eta[:, :, None])[..., 0])
+
+    def residual(
+        self,
+        W: FloatArray,
+        a: FloatArray,
+        F: FloatArray,
+        omega: float,
+        acting: tuple[ComplexArray, FloatArray, FloatArray],
+        slopes: bool,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Residual and its derivative by omega, see `upd.hbm.springs.terms.residual_terms`."""
+        if self.symmetric:
+            m = self.modal
+            linear = m.eigenvalues, m.rigid, self.damping, self.Psi, self.transposed
+            found: tuple[FloatArray, FloatArray] = residual_terms(
+                W, a, F, self.k, omega, self.offset == 1, linear, acting, slopes
+            )
+            return found
+        (loads, u0, rigid_load), o, w = acting, self.offset, self.k * omega
+        eta = self.modal.solve(w, loads - self.pushes(_complex_part(F, o)))
+        mean = u0 - self.G0 @ F[:, 0] + self.R @ a
+        left = W - _real_part(self.moves(eta), mean, o)
+        below = self.R.T @ F[:, 0] - rigid_load if o else a
+        by_omega = np.zeros(W.size + len(a))
+        if slopes:
+            slope = self.modal.solve(w, 2.0 * w[:, None] * eta - 1j * self.damped(eta))
+            moved = self.moves(self.k[:, None] * slope)
+            by_omega[: W.size] = -_real_part(moved, np.zeros(self.rows), o).ravel()
+        return np.concatenate([left.ravel(), below]), by_omega
 
 
 def linear_part(
-    modal: Modal, Psi: FloatArray, G0: FloatArray, k: NDArray[np.int64], offset: int
+    modal: Modal,
+    Psi: FloatArray,
+    G0: FloatArray,
+    R: FloatArray,
+    k: NDArray[np.int64],
+    offset: int,
 ) -> LinearPart:
     """The linear part of a balance.
 
     Parameters
     ----------
-    modal, Psi, G0
+    modal, Psi, G0, R
         As in `LinearPart`.
     k : (n_k,) ndarray of int
         Harmonics above 0.
@@ -109,16 +170,19 @@ def linear_part(
     -------
     LinearPart
     """
-    U, size, _ = np.linalg.svd(Psi, full_matrices=False)
-    rank = int(np.count_nonzero(size > max(Psi.shape) * EPS * size.max(initial=0.0)))
+    basis = None
+    if Psi.ndim == 2:
+        U, size, _ = np.linalg.svd(Psi, full_matrices=False)
+        rank = int(np.count_nonzero(size > max(Psi.shape) * EPS * size.max(initial=0.0)))
+        basis = np.ascontiguousarray(U[:, :rank]) if 0 < rank < len(Psi) else None
     return LinearPart(
         modal,
         Psi,
-        np.ascontiguousarray(Psi.T),
+        np.ascontiguousarray(np.swapaxes(Psi.conj(), -1, -2)),
         np.ascontiguousarray(np.atleast_2d(modal.damping)),
-        np.ascontiguousarray(U[:, :rank]) if 0 < rank < len(Psi) else None,
+        basis,
         G0,
-        np.ascontiguousarray(Psi[:, modal.rigid] if offset else Psi[:, :0]),
+        np.ascontiguousarray(R if offset else R[:, :0]),
         k.astype(float),
         offset,
         KeptFactors(),
@@ -193,12 +257,9 @@ class BalanceJacobian(NamedTuple):
         without loads.
         """
         of = self.of
-        none = (np.zeros((len(self.w), len(of.transposed)), complex), np.zeros(len(X)), 0.0 * a)
-        return np.asarray(
-            residual_terms(
-                X, a, self.force(X), self.w, 1.0, of.offset == 1, of.arrays, none, False
-            )[0]
-        )
+        modes = of.Psi.shape[-1]
+        none = (np.zeros((len(self.w), modes), complex), np.zeros(len(X)), 0.0 * a)
+        return of.residual(X, a, self.force(X), float(self.w[0] / of.k[0]), none, False)[0]
 
     def force(self, X: FloatArray) -> FloatArray:
         """Change of the contact forces (c, size) with a motion (c, size) of the rows [N]."""
@@ -225,7 +286,7 @@ class BalanceJacobian(NamedTuple):
         """The whole matrix (n, n)."""
         D, of, o = self.every_derivative(), self.of, self.of.offset
         n_point, d1, size = D.shape[:3]
-        c, m, D = len(of.Psi), len(of.Psi) * size, D.reshape(n_point, d1, size, -1)
+        c, m, D = of.rows, of.rows * size, D.reshape(n_point, d1, size, -1)
         real, imag = of.modal.receptance_parts(of.Psi, self.w)
         G = (real + 1j * imag).reshape(-1, c, n_point, d1)
         force = D[:, :, o::2] - 1j * D[:, :, o + 1 :: 2]
@@ -299,7 +360,7 @@ class _Matrix(NamedTuple):
 
     def product(self, z: FloatArray) -> FloatArray:
         """What scaled unknowns z (n + 1,) give: the equations (n,) and the border."""
-        x, p, c = z[:-1] * self.D, float(z[-1]) * self.p_scale, len(self.J.of.Psi)
+        x, p, c = z[:-1] * self.D, float(z[-1]) * self.p_scale, self.J.of.rows
         n = c * self.J.of.size
         out = np.empty(len(z))
         out[:-1] = self.J.product(x[:n].reshape(c, -1), x[n:]) + self.dp * p
@@ -328,7 +389,7 @@ class Factors:
         self, J: BalanceJacobian, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray
     ) -> None:
         self.J, self.p_scale, self.D, self.normal = J, p_scale, D, normal
-        c = len(J.of.Psi)
+        c = J.of.rows
         self.c, self.size, self.static = c, J.of.size, J.of.offset == 1
         self.n = c * self.size
         self.dp, self.dp_rigid = dp[: self.n].reshape(c, self.size), dp[self.n :]
@@ -340,7 +401,11 @@ class Factors:
         D: FloatArray,
         border: tuple[FloatArray, FloatArray, FloatArray, float],
     ) -> None:
-        """Parameters as of `upd.hbm.springs.terms.bordered`."""
+        """Parameters as of `upd.hbm.springs.terms.bordered`, the receptance as it is."""
+        if not self.J.of.symmetric:
+            real, imag, *rest = compliance
+            turned = (np.ascontiguousarray(np.swapaxes(G, 1, 2)) for G in (real, imag))
+            compliance = (*turned, *rest)
         A, self.rows = bordered(compliance, DF, self.static, D, self.D[self.n :], border)
         self.lu, self.piv, info = lapack.dgetrf(A.T, overwrite_a=True)
         diagonal = np.diagonal(self.lu)
@@ -419,7 +484,10 @@ class Eliminated(Factors):
         # (I + G_ss K)^-1 and with it G_sm
         self.inverse = np.linalg.inv(one + G[:, down, s] * K)
         self.across = self.inverse @ G[:, down, m]
-        self.back = np.ascontiguousarray(np.swapaxes(self.across, 1, 2) * K)
+        if of.symmetric:
+            self.back = np.ascontiguousarray(np.swapaxes(self.across, 1, 2) * K)
+        else:
+            self.back = (G[:, own, s] * K) @ self.inverse
         G = G[:, own, m] - self.back @ G[:, down, m]
         # without harmonic 0 none of these is read
         rigid_s = of.R[s]

@@ -25,6 +25,9 @@ EPS = float(np.finfo(float).eps)
 class Modal:
     """Modes of a linear system, all m = n of them.
 
+    Of a travelling wave they are complex. Several systems of one size may be stacked along a first
+    axis of all arrays; it then is that of the frequencies.
+
     Attributes
     ----------
     Phi : (n, m) ndarray
@@ -45,7 +48,7 @@ class Modal:
     @property
     def proportional(self) -> bool:
         """Whether the damping matrix is diagonal in the modes."""
-        return self.damping.ndim == 1
+        return self.damping.shape == self.eigenvalues.shape
 
     @property
     def frequencies(self) -> FloatArray:
@@ -91,7 +94,7 @@ class Modal:
         diagonal = self.damping if self.proportional else np.diagonal(self.damping)
         with np.errstate(divide="ignore", invalid="ignore"):
             inverse = 1 / (self.eigenvalues - w[:, None] ** 2 + 1j * w[:, None] * diagonal)
-            return np.abs(inverse @ (Psi**2).T)
+            return np.abs(inverse @ (Psi * Psi.conj()).real.T)
 
     def receptance(
         self, Psi: FloatArray, w: FloatArray, load: ComplexArray
@@ -110,49 +113,52 @@ class Modal:
         Returns
         -------
         G : (n_w, r, r) ndarray of complex
-            Psi D^-1 Psi' [mm/N], not finite at an undamped natural frequency.
+            Psi D^-1 Psi^H [mm/N], not finite at an undamped natural frequency.
         u : (n_w, r) ndarray of complex
             Psi D^-1 load [mm].
         """
+        H = np.swapaxes(Psi.conj(), -1, -2)
         if self.proportional:
             with np.errstate(divide="ignore", invalid="ignore"):
                 inverse = 1 / self._diagonal(w)
+                if np.iscomplexobj(Psi):
+                    u = Psi @ (inverse * load)[:, :, None]
+                    return (inverse[:, None, :] * Psi) @ H, u[..., 0]
                 # one real product: a complex one with a real matrix is several times slower
                 parts = np.concatenate([inverse.real, inverse.imag])[:, None, :] * Psi
                 P = (parts.reshape(-1, Psi.shape[1]) @ Psi.T).reshape(-1, len(Psi), len(Psi))
                 return P[: len(w)] + 1j * P[len(w) :], (inverse * load) @ Psi.T
-        across = np.broadcast_to(Psi.T, (len(w), *Psi.T.shape))
+        across = np.broadcast_to(H, (len(w), *H.shape[-2:]))
         right = np.concatenate([across, load[:, :, None]], axis=2)
         Y = np.asarray(Psi @ np.linalg.solve(self._matrix(w), right))
         return Y[..., :-1], Y[..., -1]
 
     def receptance_parts(self, Psi: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Real and imaginary part of the receptance alone, compiled where damping is diagonal."""
-        if self.proportional:
+        if self.proportional and not np.iscomplexobj(Psi):
             across = np.ascontiguousarray(Psi.T)
             real, imag = receptances(w, self.eigenvalues, self.damping, Psi, across)
             return real, imag
-        G, _ = self.receptance(Psi, w, np.zeros((len(w), Psi.shape[1]), complex))
+        G, _ = self.receptance(Psi, w, np.zeros((len(w), Psi.shape[-1]), complex))
         return np.ascontiguousarray(G.real), np.ascontiguousarray(G.imag)
 
     def _diagonal(self, w: FloatArray) -> ComplexArray:
         return np.asarray(self.eigenvalues - w[:, None] ** 2 + 1j * w[:, None] * self.damping)
 
     def _matrix(self, w: FloatArray) -> ComplexArray:
-        base = np.diag(self.eigenvalues) + 0j
-        return (
-            base - w[:, None, None] ** 2 * np.eye(len(base)) + 1j * w[:, None, None] * self.damping
-        )
+        one = np.eye(self.eigenvalues.shape[-1])
+        base = self.eigenvalues[..., None] * one + 0j
+        return base - w[:, None, None] ** 2 * one + 1j * w[:, None, None] * self.damping
 
 
 def modal(M: ArrayLike, C: ArrayLike, K: ArrayLike) -> Modal:
-    """Modes of a dense symmetric system.
+    """Modes of a dense symmetric or Hermitian system.
 
     Parameters
     ----------
     M, C, K : (n, n) array_like
         Mass [t], positive definite; damping [N s/mm], symmetric; stiffness [N/mm], positive
-        semi-definite.
+        semi-definite. Complex ones are Hermitian.
 
     Returns
     -------
@@ -163,7 +169,8 @@ def modal(M: ArrayLike, C: ArrayLike, K: ArrayLike) -> Modal:
     InputError
         On shapes, symmetry, an indefinite K or M, or a C that feeds energy into a motion.
     """
-    matrices = {name: np.asarray(A, dtype=float) for name, A in (("M", M), ("C", C), ("K", K))}
+    kind = np.result_type(float, *(np.asarray(A).dtype for A in (M, C, K)))
+    matrices = {name: np.asarray(A, dtype=kind) for name, A in (("M", M), ("C", C), ("K", K))}
     n = len(matrices["M"])
     problems = [
         f"{name} has shape {A.shape}, give ({n}, {n})"
@@ -177,14 +184,12 @@ def modal(M: ArrayLike, C: ArrayLike, K: ArrayLike) -> Modal:
         problems += [
             f"{name} is not symmetric"
             for name, A in matrices.items()
-            if np.abs(A - A.T).max() > n * np.sqrt(EPS) * np.abs(A).max()
+            if np.abs(A - A.conj().T).max() > n * np.sqrt(EPS) * np.abs(A).max()
         ]
     if problems:
         raise InputError("linear system: " + "; ".join(problems))
     try:
-        values, Phi = eigh(
-            (matrices["K"] + matrices["K"].T) / 2, (matrices["M"] + matrices["M"].T) / 2
-        )
+        values, Phi = eigh(*((matrices[name] + matrices[name].conj().T) / 2 for name in ("K", "M")))
     except LinAlgError as error:
         raise InputError(
             "linear system: M is not positive definite; condense massless dofs first"
@@ -199,7 +204,7 @@ def modal(M: ArrayLike, C: ArrayLike, K: ArrayLike) -> Modal:
     # leave counts as rigid
     rigid = values <= 10 * rounding
     damping = _damping(Phi, matrices["C"])
-    least = damping.min() if damping.ndim == 1 else eigvalsh((damping + damping.T) / 2)[0]
+    least = damping.min() if damping.ndim == 1 else eigvalsh((damping + damping.conj().T) / 2)[0]
     if least < -n * np.sqrt(EPS) * np.abs(damping).max():
         raise InputError(
             f"linear system: C feeds energy into a motion (x'C x = {least:.3g} for x'M x = 1): "
@@ -209,11 +214,11 @@ def modal(M: ArrayLike, C: ArrayLike, K: ArrayLike) -> Modal:
 
 
 def _damping(Phi: FloatArray, C: FloatArray) -> FloatArray:
-    c = Phi.T @ C @ Phi
+    c = Phi.conj().T @ C @ Phi
     off = c - np.diag(np.diagonal(c))
     level = np.abs(Phi).T @ np.abs(C) @ np.abs(Phi)
     return (
-        np.diagonal(c).copy()
+        np.diagonal(c).real.copy()
         if np.all(np.abs(off) <= len(C) * 64 * EPS * max(level.max(), EPS * EPS))
         else c
     )

@@ -80,7 +80,8 @@ class _Measure:
         b, j = self.b, self.place
         F = to_complex(b.force(x).force.reshape(len(b.Psi), -1), b.harmonics)[:, j]
         w = np.array([2 * np.pi * b.harmonics.dynamic[j] * frequency])
-        eta = b.modal.solve(w, b.loads[j : j + 1] - F @ b.Psi)[0]
+        modal, Psi = b.part(int(b.harmonics.dynamic[j]))
+        eta = modal.solve(w, b.loads[j : j + 1] - F @ Psi.conj())[0]
         return float(abs(eta @ self.modal_row))
 
     def slope(self, x: FloatArray, p: float, direction: FloatArray) -> float:
@@ -137,7 +138,7 @@ def climb(
     """
     s, measure = (
         settings or Settings(),
-        _Measure(b, b.modal_row(row), b.harmonics.place(harmonic), power),
+        _Measure(b, b.modal_row(row, harmonic), b.harmonics.place(harmonic), power),
     )
     function, scale, p_scale = over_frequency(b), scale_of(b), FREQUENCY_SHARE * frequency
 

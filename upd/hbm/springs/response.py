@@ -135,7 +135,7 @@ class FrequencyResponse:
         InputError
             For a harmonic that is not kept, or a row of another length.
         """
-        self.balance.modal_row(row)
+        self.balance.modal_row(row, harmonic)
         q = np.einsum("i,nis->ns", np.asarray(row, dtype=float), self.coefficients)
         return np.abs(to_complex(q, self.harmonics)[:, self.harmonics.place(harmonic)])
 
@@ -193,15 +193,14 @@ class FrequencyResponse:
 
         Zero up to the tolerance of the solver.
         """
-        h, b, q = self.harmonics, self.balance, to_complex(self.coefficients, self.harmonics)
-        k = h.dynamic
-        work = np.pi * np.einsum("k,ki,nik->n", k, b.dynamic, q.conj()).imag
-        # modal velocities: the damping matrix is kept in the modes only
-        eta = np.einsum("ij,nik->njk", np.linalg.inv(b.modal.Phi).T, q)
-        c = np.diag(b.modal.damping) if b.modal.proportional else b.modal.damping
-        viscous = (
-            np.pi * self._omega * np.einsum("k,nik,ij,njk->n", k**2.0, eta.conj(), c, eta).real
-        )
+        b, k = self.balance, self.harmonics.dynamic
+        force = self.contact_force.reshape(len(self.frequency), len(b.Psi), -1)
+        work, lost = np.zeros((2, len(force)))
+        for i, (F, omega) in enumerate(zip(force, self._omega, strict=True)):
+            eta = b.amplitudes(F, float(omega))
+            work[i] = np.pi * np.einsum("k,km,km", k, b.loads, eta.conj()).imag
+            lost[i] = np.einsum("k,km,km", k**2.0, eta.conj(), b.linear.damped(eta)).real
+        viscous = np.pi * self._omega * lost
         total = np.abs(work) + np.abs(viscous) + self.energy.sum(axis=1)
         return np.asarray(
             (work - viscous - self.energy.sum(axis=1)) / np.where(total > 0, total, 1.0)
@@ -237,7 +236,9 @@ class FrequencyResponse:
             raise InputError(f"peak: the path has no point: {self.message}")
         i = int(np.argmax(a))
         if 0 < i < len(a) - 1:
-            top = climb(self.balance, row, self.x[i], float(self.frequency[i]), harmonic=harmonic)
+            at = float(self.frequency[i])
+            with threads_for(self.balance.size):
+                top = climb(self.balance, row, self.x[i], at, harmonic=harmonic)
             if top.found and top.amplitude >= a[i] * (1 - EPS**0.5):
                 return top.frequency, top.amplitude
         return parabola(self.frequency, a)
@@ -249,7 +250,7 @@ class FrequencyResponse:
     def _linear(
         self, row: ArrayLike, frequencies: ArrayLike | None, harmonic: int | None, stuck: bool
     ) -> FloatArray:
-        self.balance.modal_row(row)
+        self.balance.modal_row(row, harmonic)
         f = self.frequency if frequencies is None else np.asarray(frequencies, dtype=float)
         q = self.balance.linear_displacement(2 * np.pi * f, stuck, harmonic)
         return np.asarray(np.abs(q @ np.asarray(row, dtype=float)))
@@ -324,9 +325,9 @@ def frequency_response(
         Its dofs and its centrifugal force are appended.
     damper_rows : (n_point, 1 + d, damper.n_dof) ndarray, optional
         The damper's share of the rows, see `contact_rows`; comes together with `damper`.
-    start : {"zero", "static", "mid", "upper", "lower"}
+    start : {"zero", "frictionless", "static", "mid", "upper", "lower"}
         Position of the sliders before the march, which decides the residual traction of points that
-        stick.
+        stick. "frictionless": where the closed contacts carry the static loads without traction.
     slider : (n_point, d) array_like, optional
         Positions [mm] from which the starts "zero" and "static" begin instead of zero: -T_0 / k_t
         carries the traction T_0 [N] where nothing has moved, a preload along the tangents.
@@ -376,7 +377,27 @@ def frequency_response(
     f = np.asarray(frequencies, dtype=float).ravel()
     rows = (damper, damper_rows)
     given = GivenSystem(M, C, K, contacts, static_force, *rows, harmonics, samples, start, slider)
-    b = given.balance("frequency_response", f, _force(harmonic_force), fast_exits=fast_exits)
+    b = given.balance("frequency_response", f, force_of(harmonic_force), fast_exits=fast_exits)
+    return response_of(b, f, sweep_down, fast_exits, settings)
+
+
+def response_of(
+    b: Balance, f: FloatArray, sweep_down: bool, fast_exits: bool, settings: Settings | None
+) -> FrequencyResponse:
+    """The response of a condensed problem.
+
+    Parameters
+    ----------
+    b : Balance
+    f : (k,) ndarray
+        Frequencies [Hz], in any order.
+    sweep_down, fast_exits, settings
+        As in `frequency_response`.
+
+    Returns
+    -------
+    FrequencyResponse
+    """
     order = np.unique(f)[::-1] if sweep_down else np.unique(f)
     with threads_for(b.size):
         b, curve = solve_curve(b, order, fast_exits, settings)
@@ -476,7 +497,8 @@ class GivenSystem(NamedTuple):
         self._require_harmonics(what, h, static, force)
         if self.damper is not None and self.damper_rows is not None:
             joined_to = self.damper, self.damper_rows
-        return assembled(
+        free = self.start == "frictionless"
+        b = assembled(
             *A,
             self.contacts,
             force,
@@ -484,10 +506,11 @@ class GivenSystem(NamedTuple):
             h,
             joined_to=joined_to,
             samples=self.samples,
-            start=self.start,
+            start="zero" if free else self.start,
             slider=slider,
             fast_exits=fast_exits,
         )
+        return b.with_sliders("zero", b.frictionless_sliders) if free else b
 
     def _dense(self, what: str) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The matrices as arrays."""
@@ -571,7 +594,8 @@ class GivenSystem(NamedTuple):
         return out
 
 
-def _force(given: ArrayLike | Mapping[int, ArrayLike]) -> dict[int, ComplexArray]:
+def force_of(given: ArrayLike | Mapping[int, ArrayLike]) -> dict[int, ComplexArray]:
+    """Harmonic number -> amplitude, of the first harmonic where it is alone."""
     if isinstance(given, Mapping):
         return {int(k): np.asarray(v, dtype=complex) for k, v in given.items()}
     return {1: np.asarray(given, dtype=complex)}

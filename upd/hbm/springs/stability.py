@@ -107,6 +107,7 @@ def stability(
     ('stable',)
     """
     n, b = len(answer.frequency), answer.balance
+    b.require_all_sectors("stability")
     chosen = np.arange(n) if points is None else np.asarray([*points], dtype=np.int64)
     problems = []
     if ((chosen < -n) | (chosen >= n)).any():

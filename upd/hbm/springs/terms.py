@@ -261,7 +261,7 @@ def bordered(compliance, DF, static, D, D_rigid, border):  # type: ignore[no-unt
     Parameters
     ----------
     compliance : tuple of ndarray
-        Receptance (n_k, c, c), symmetric, real and imaginary part [mm/N]; static compliance (c, c);
+        Transposed receptance (n_k, c, c), real and imaginary part [mm/N]; static compliance (c, c);
         rigid modes at the rows (c, n_rigid); stiffness (n_rigid, n_rigid) of the rigid modes
         against points not among the rows [N/mm].
     DF : (n_point, d1, size, d1, size) ndarray

@@ -214,6 +214,7 @@ def steady_state(
     >>> bool(abs(march.amplitude(np.array([1.0])) / answer.amplitude([1.0])[0] - 1) < 1e-3)
     True
     """
+    b.require_all_sectors("time integration")
     omega = 2 * np.pi * frequency
     dt = 2 * np.pi / omega / steps
     state = _initial(b, omega, x)

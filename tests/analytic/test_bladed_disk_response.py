@@ -1,0 +1,73 @@
+"""A bladed disk with wedges: one sector reduced, against all sectors unreduced."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.sectors import bladed_sector, model_of, with_contacts
+from upd.analyses.bladed_disk.response import Wedge, on_sector, performance, wave_response
+from upd.hbm import nodal_diameters
+from upd.reduction.cyclic import ReducedSector, reduce_sector
+
+N, ORDER, F_C = 12, 3, 60.0
+WEDGE = Wedge(1e-4, (2e-3, 2e-3, 2e-3), 143.0, 45.0, 2e4, 1e4, 0.3)
+
+
+@pytest.fixture(scope="module")
+def sectors() -> dict[int, ReducedSector]:
+    """The nodal diameters that three harmonics of the engine order 3 need."""
+    mesh = with_contacts(bladed_sector())
+    model = model_of(mesh, N)
+    damping = (0.0, 0.004 / (2.0 * np.pi * 560.0))
+    return {
+        n: reduce_sector(model, n, n_modes=20, keep={"tip": mesh.nodes["tip"]}, damping=damping)
+        for n in nodal_diameters(N, ORDER, range(4))
+    }
+
+
+def tip(sectors: dict[int, ReducedSector]) -> tuple[np.ndarray, np.ndarray]:
+    """A force of 1 N tangential and 1 N axial at the tip, and the tip's axial motion."""
+    rows, a = sectors[0].rows["tip"], np.radians(15.0)
+    return rows.T @ [-np.sin(a), np.cos(a), 1.0], rows[2]
+
+
+@pytest.mark.parametrize(
+    ("highest", "samples", "cyclic", "unreduced"),
+    [(1, 32, 0.02600565, 0.02600407), (3, 64, 0.02589690, 0.02589538)],
+)
+def test_one_sector_is_all_sectors(
+    sectors: dict[int, ReducedSector],
+    highest: int,
+    samples: int,
+    cyclic: float,
+    unreduced: float,
+) -> None:
+    force, row = tip(sectors)
+    answer = wave_response(
+        sectors,
+        WEDGE,
+        F_C,
+        force=force,
+        engine_order=ORDER,
+        frequencies=[520.0],
+        harmonics=range(highest + 1),
+        samples=samples,
+    )
+    found = answer.amplitude(on_sector(row))[0]
+    assert answer.x.shape[1] == 36 * (2 * highest + 1) + 6
+    assert found == pytest.approx(cyclic, rel=1e-6)
+    assert found == pytest.approx(unreduced, rel=1e-4)
+    assert abs(answer.energy_balance[0]) < 1e-9
+
+
+def test_the_best_wedge_lies_between_free_and_stuck(sectors: dict[int, ReducedSector]) -> None:
+    force, row = tip(sectors)
+    f = np.linspace(505.0, 535.0, 31)
+    given = {"force": force, "engine_order": ORDER, "frequencies": f, "harmonics": (0, 1)}
+    found = performance(sectors, WEDGE, F_C, [600.0, 60.0, 20.0], row, **given)
+    fixed = wave_response(sectors, WEDGE, F_C, **given | {"force": 0.1 * force})
+    assert found.height[0] == pytest.approx(fixed.stuck(on_sector(row), f).max() / 0.1, rel=0.02)
+    assert found.best > 0
+    assert found.height[found.best] < 0.7 * found.height[0]
+    assert WEDGE.centrifugal_force(100.0) == pytest.approx(143.0)

@@ -1,0 +1,111 @@
+"""The scene of a bladed disk: crossings, checks, what it refuses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from upd.analyses import make_plan
+from upd.analyses.bladed_disk import output, solve
+from upd.analyses.bladed_disk.plan import computed
+from upd.errors import ConvergenceError, InputError
+from upd.progress import Stages
+from upd.scene import load_scene
+
+SMALL: dict[str, Any] = {
+    "name": "small",
+    "want": ["modes", "campbell", "interference"],
+    "geometry": {"recipe": "sector", "disk_layers": 3, "blade_layers": 5, "axial": 2},
+    "mesh": {"element": "hex20"},
+    "material": {"E": "200 GPa", "nu": 0.3},
+    "modes": {"count": 3},
+    "rotation": {"speed": "6000 rpm", "engine_orders": [4, 5, 20], "points": 7},
+}
+
+
+def solved(**changed: Any) -> solve.BladedDiskSolution:
+    return solve.solve(make_plan(load_scene(SMALL, changed)), Stages(lambda *_: None))
+
+
+@pytest.fixture(scope="module")
+def disk() -> solve.BladedDiskSolution:
+    return solved()
+
+
+def test_crossings_lie_on_both_lines(disk: solve.BladedDiskSolution) -> None:
+    assert disk.crossings
+    for c in disk.crossings:
+        assert c.frequency == pytest.approx(c.engine_order * c.speed / (2.0 * np.pi))
+        on_mode = np.interp(c.speed, disk.speeds, disk.campbell[c.nodal_diameter, :, c.mode - 1])
+        assert on_mode == pytest.approx(c.frequency, rel=3e-3)
+    # EO 20 of 24 blades travels backwards on 4 nodal diameters
+    by_order = {c.engine_order: c.nodal_diameter for c in disk.crossings}
+    assert by_order[20] == by_order[4] == 4
+    margins = [abs(c.speed - 200.0 * np.pi) for c in disk.crossings]
+    assert margins == sorted(margins)
+
+
+def test_checks_pass_and_fail(disk: solve.BladedDiskSolution) -> None:
+    checks = {check.name: check for check in output.check_solution(disk)}
+    assert set(checks) == {
+        "nodal diameters in between",
+        "initial displacements",
+        "Coriolis force",
+    }
+    assert all(check.value <= check.limit for check in checks.values())
+    few = output.check_solution(solved(**{"modes.computed": 2, "want": ["campbell"]}))[0]
+    assert few.value > few.limit
+
+
+def test_rotation_stiffens(disk: solve.BladedDiskSolution) -> None:
+    assert disk.at_rest.shape == (13, 3)
+    assert (disk.at_speed[:, 0] > 1.01 * disk.at_rest[:, 0]).all()
+    np.testing.assert_allclose(disk.campbell[:, 0], disk.at_rest)
+
+
+def test_numbers_and_arrays(disk: solve.BladedDiskSolution) -> None:
+    names = {result.name for result in output.make_results(disk)}
+    assert {"crossing_speed", "f1", "f3_at_speed"} <= names
+    assert set(output.arrays(disk)) == {"at rest", "at speed", "campbell", "crossings"}
+    assert computed(disk.plan.scene) == (0, 2, 6, 12)
+
+
+def test_damped_response_lies_below_the_free_one() -> None:
+    found = solved(**{"want": ["response", "performance"], "response.ratios": [600, 1200]}).wave
+    assert found is not None
+    assert found.peak[1] < found.free.max()
+    assert found.f_c == pytest.approx(
+        1e-5 * np.hypot(*found.sectors[0].high[:, :2].T).mean() * found.crossing.speed**2, rel=1e-3
+    )
+    assert found.performance is not None and found.best_mass > 0.0
+    # the stuck blade is stiffer than the free one
+    assert found.frequency[found.stuck.argmax()] > found.frequency[found.free.argmax()]
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"mesh.element": "hex8i"}, "hex8i has no stress stiffness"),
+        ({"mesh.symmetry": "half"}, "a sector has no mirror plane"),
+        ({"solver.name": "amg"}, "modes need a direct solver"),
+        ({"accuracy": 0.01}, "accuracy: a bladed disk"),
+        ({"rotation.speed": "0 rpm"}, "rotation.speed"),
+        ({"geometry.n_sectors": 2}, "n_sectors"),
+    ],
+)
+def test_bad_input(changed: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        load_scene(SMALL, changed)
+
+
+def test_no_crossing_to_damp() -> None:
+    with pytest.raises(InputError, match="none crosses a mode up to the largest speed"):
+        solved(**{"want": ["response"], "rotation.engine_orders": [1]})
+
+
+def test_a_speed_beyond_static_stability() -> None:
+    """Against the stiffening of the stresses it takes a soft disk and a speed out of this world."""
+    with pytest.raises(ConvergenceError, match="static stability"):
+        solved(**{"rotation.speed": "900000 rpm"})

@@ -1,0 +1,118 @@
+"""Charts of a bladed disk, from the run folder's arrays alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from upd.analyses.bladed_disk.output import BY_DIAMETER, CAMPBELL, CROSSINGS, PERFORMANCE, WAVE
+from upd.plot.chart import Arrays, Axis, Band, Chart, Group, Mark, Trace
+from upd.plot.common import case_of, frequency_of, scalar, with_content
+
+_HZ, _ND = Axis("frequency", "Hz"), Axis("nodal diameter")
+
+
+def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
+    """Campbell diagram, interference diagram, frequencies by nodal diameter."""
+    del summary
+    crossings = with_content(arrays, CROSSINGS)
+    found = [_wave(group) for group in with_content(arrays, WAVE)]
+    found += [_performance(group) for group in with_content(arrays, PERFORMANCE)]
+    found += [_campbell(group, crossings) for group in with_content(arrays, CAMPBELL)]
+    return found + [_by_diameter(group) for group in reversed(with_content(arrays, BY_DIAMETER))]
+
+
+def _campbell(group: Group, crossings: list[Group]) -> Chart:
+    """Modes of the nodal diameters that engine orders excite, over the speed."""
+    speed, f = np.asarray(group["speed"].data), frequency_of(group)
+    orders = np.asarray(group["engine_order"].data)
+    most, top = 2 * (len(f) - 1), float(f.max())
+    by_order = {int(order): min(order % most, -order % most) for order in orders} if most else {}
+    traces = []
+    for colour, n in enumerate(dict.fromkeys(int(n) for n in by_order.values())):
+        for k in range(f.shape[2]):
+            label = f"nodal diameter {n}"
+            mine = f"{label}, mode {k + 1}"
+            traces.append(Trace(mine, speed, f[n, :, k], "line", colour, entry=label))
+    for order in by_order:
+        line = order * speed / 60.0
+        shown = np.where(line <= top, line, np.nan)
+        traces.append(Trace(f"EO {order}", speed, shown, "dotted", closed=True, entry="EO"))
+    marks = [
+        Mark(float(w), float(at), f"EO {order}")
+        for one in crossings
+        for order, w, at in zip(
+            one["engine_order"].data, one["speed"].data, one["frequency"].data, strict=True
+        )
+    ]
+    operating = scalar(group, "operating_speed") or 0.0
+    band = Band("operating speed", "x", operating, operating, dashed=True)
+    x = Axis("speed", "rpm", low=float(speed[0]), high=float(speed[-1]))
+    return Chart(
+        "Campbell diagram",
+        x,
+        _HZ,
+        tuple(traces),
+        bands=(band,),
+        figure="campbell",
+        marks=tuple(marks),
+    )
+
+
+def _by_diameter(group: Group) -> Chart:
+    """Frequencies over the nodal diameter; at a speed with the zigzag of the engine orders."""
+    n, f = np.asarray(group["nodal_diameter"].data, float), frequency_of(group)
+    traces = [
+        Trace(f"mode {k + 1}", n, f[:, k], "both", k % 10, entry="modes") for k in range(f.shape[1])
+    ]
+    speed, case, marks = scalar(group, "speed"), case_of(group), list[Mark]()
+    if speed is None:
+        return Chart(
+            "Frequencies by nodal diameter",
+            _ND,
+            _HZ,
+            tuple(traces),
+            case=case.label,
+            figure="nodal_diameters",
+        )
+    N, per_order = 2.0 * n[-1], speed / 60.0
+    orders = np.arange(int(f.max() / per_order) + 1)
+    at = np.minimum(orders % N, -orders % N) if N else 0.0 * orders
+    lines = np.asarray(at, float), np.asarray(orders * per_order, float)
+    traces.append(Trace("engine orders", *lines, "dotted", closed=True))
+    for order in np.asarray(group["engine_order"].data):
+        place = min(order % N, -order % N) if N else 0.0
+        marks.append(Mark(float(place), float(order * per_order), f"EO {order}", closed=True))
+    return Chart(
+        "Interference diagram",
+        _ND,
+        _HZ,
+        tuple(traces),
+        case=f"{speed:.5g} rpm",
+        figure="interference",
+        marks=tuple(marks),
+    )
+
+
+def _wave(group: Group) -> Chart:
+    """Free, stuck and damped amplitude at the tip."""
+    f, on = frequency_of(group), np.asarray(group["damped_frequency"].data)
+    traces = (
+        Trace("free", f, np.asarray(group["free"].data), "dashed", closed=True),
+        Trace("stuck", f, np.asarray(group["stuck"].data), "dotted", closed=True),
+        Trace("damped", on, np.asarray(group["damped"].data), "both", 0),
+    )
+    y = Axis("amplitude at the tip", "um", log=True)
+    label = case_of(group).label
+    return Chart("Response to an engine order", _HZ, y, traces, case=label, figure="response")
+
+
+def _performance(group: Group) -> Chart:
+    """Peak over F_C/F_E."""
+    ratio, height = (np.asarray(group[name].data) for name in ("ratio", "height"))
+    x, y = Axis("F_C/F_E", log=True), Axis("peak at the tip", "um/N", log=True)
+    traces = (Trace("peak", ratio, height, "both", 0),)
+    label = case_of(group).label
+    return Chart("Performance curve", x, y, traces, case=label, figure="performance")

@@ -1,0 +1,213 @@
+"""What the analysis of a bladed disk leaves behind: numbers, checks, arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from upd.analyses.base import Resolved, conditions
+from upd.analyses.bladed_disk.plan import CORIOLIS, DISPLACED
+from upd.analyses.bladed_disk.solve import BladedDiskSolution, DampedWave, Proof
+from upd.plot.chart import Entry
+from upd.results import NO_CASE, ArrayGroup, Case, Check, Result, variable
+from upd.results import quantities as q
+
+#: what the groups of result.nc hold, their attribute ``content``
+BY_DIAMETER, CAMPBELL, CROSSINGS = "nodal diameters", "campbell", "crossings"
+WAVE, PERFORMANCE = "travelling wave", "wave performance"
+HEADLINE = (
+    "crossing_speed",
+    "crossing_frequency",
+    "free_amplitude",
+    "stuck_amplitude",
+    "damped_amplitude",
+    "amplitude_reduction",
+    "best_damper_mass",
+    "f1",
+)
+#: largest error of a frequency in the span of the computed nodal diameters
+PROJECTION_LIMIT = 1e-3
+_RPM = 60.0 / (2.0 * np.pi)
+
+
+def headline(results: Sequence[Entry]) -> list[Entry]:
+    """The crossing nearest to the operating speed, its peaks, and the first frequency."""
+    first: dict[str, Entry] = {}
+    for entry in results:
+        first.setdefault(entry["name"], entry)
+    return [first[name] for name in HEADLINE if name in first]
+
+
+def make_results(solution: BladedDiskSolution) -> list[Result]:
+    """All numbers of a run."""
+    scene, results = solution.plan.scene, list[Result]()
+    for c in solution.crossings if scene.wants("campbell") else []:
+        case = Case(
+            engine_order=c.engine_order, nodal_diameter=c.nodal_diameter, mode=f"mode {c.mode}"
+        )
+        margin = c.speed / scene.rotation.speed - 1.0
+        results += [
+            q.CROSSING_SPEED.of(c.speed * _RPM, case),
+            q.CROSSING_FREQUENCY.of(c.frequency, case),
+            q.CROSSING_MARGIN.of(margin, case),
+        ]
+    if scene.wants("campbell") and not solution.crossings:
+        reason = "no engine order crosses a mode up to the largest speed; raise rotation.up_to"
+        results.append(q.CROSSING_SPEED.withheld(NO_CASE, reason))
+    if solution.wave is not None:
+        results += _wave_results(solution.wave)
+    wanted = [
+        ("modes", q.F_SECTOR, solution.at_rest),
+        ("interference", q.F_SPINNING, solution.at_speed),
+    ]
+    return results + [
+        quantity.of(f, Case(nodal_diameter=n), n=k, exact=False)
+        for want, quantity, rows in wanted
+        if scene.wants(want)
+        for n, row in enumerate(rows)
+        for k, f in enumerate(row, 1)
+    ]
+
+
+def _wave_results(wave: DampedWave) -> list[Result]:
+    """Peaks at the tip and the best mass."""
+    case = Case(
+        engine_order=wave.crossing.engine_order, nodal_diameter=wave.crossing.nodal_diameter
+    )
+    free = float(wave.free.max())
+    results = [
+        q.WAVE_FREE.of(free, case),
+        q.WAVE_STUCK.of(float(wave.stuck.max()), case),
+        q.WAVE_DAMPED.of(wave.peak[1], case),
+        q.WAVE_FREQUENCY.of(wave.peak[0], case),
+        q.WAVE_REDUCTION.of(1.0 - wave.peak[1] / free, case),
+        q.WAVE_CENTRIFUGAL.of(wave.f_c, case),
+    ]
+    if wave.performance is not None:
+        reason = "no curve converged at response.ratios; give larger ones"
+        found = np.isfinite(wave.best_mass)
+        results.append(
+            q.BEST_MASS.of(wave.best_mass, case) if found else q.BEST_MASS.withheld(case, reason)
+        )
+    return results
+
+
+def check_solution(solution: BladedDiskSolution) -> list[Check]:
+    """Frequencies solved by themselves, and with what the model leaves out."""
+    proof, wave = solution.proof, solution.wave
+    reduced = []
+    if wave is not None:
+        errors = [one.frequency_error for one in wave.sectors.values()]
+        balance = wave.answer.energy_balance
+        rows = (
+            ("reduced sectors", np.max(errors), PROJECTION_LIMIT, "|reduced / full - 1|"),
+            ("energy balance", np.abs(balance).max(), 1e-3, "|power in / dissipated - 1|"),
+        )
+        reduced = conditions(NO_CASE, "raise response.modes or response.harmonics", *rows)
+    if proof is None:
+        return reduced
+    scene, case = solution.plan.scene, Case(nodal_diameter=proof.nodal_diameter)
+    error = float(np.abs(proof.projected / proof.direct - 1.0).max())
+    changed = {
+        DISPLACED: (proof.displaced, "use another program for the last digits"),
+        CORIOLIS: (_farther(proof), "both travelling waves differ: see each in the check"),
+    }
+    checks = [
+        Check(
+            "nodal diameters in between",
+            case,
+            error,
+            PROJECTION_LIMIT,
+            f"|in the span of others / by itself - 1| at {proof.speed * _RPM:.5g} rpm",
+            "compute more nodal diameters: raise modes.computed",
+        )
+    ]
+    for name, (other, remedy) in changed.items():
+        k = int(np.abs(other / proof.direct - 1.0).argmax())
+        numbers = float(proof.direct[k]), float(other[k])
+        resolved = Resolved(name, q.F_SPINNING.named(k + 1), case, *numbers, "Hz", remedy)
+        checks.append(resolved.check(scene.left_out))
+    return checks + reduced
+
+
+def _farther(proof: Proof) -> np.ndarray:
+    """(m,) of both waves, the frequency farther from that without the Coriolis force."""
+    one, other = proof.coriolis
+    farther = np.abs(one - proof.direct) > np.abs(other - proof.direct)
+    return np.asarray(np.where(farther, one, other))
+
+
+def sizes(solution: BladedDiskSolution) -> dict[str, int]:
+    """Nodes of a cyclic face and modes found."""
+    face = 0 if solution.sector is None else len(solution.sector.low)
+    return {"n_face_nodes": face, "n_modes": solution.at_rest.size}
+
+
+def arrays(solution: BladedDiskSolution) -> dict[str, ArrayGroup]:
+    """Frequencies by nodal diameter, at rest and at speed; over the speed; crossings."""
+    scene, out = solution.plan.scene, dict[str, ArrayGroup]()
+    speed = variable("", scene.rotation.speed * _RPM, "rpm")
+    numbers = variable("nodal_diameter", np.arange(len(solution.at_rest)))
+    dims = "nodal_diameter mode"
+    if scene.wants("modes"):
+        rest = {"nodal_diameter": numbers, "frequency": variable(dims, solution.at_rest, "Hz")}
+        out["at rest"] = ArrayGroup(rest, content=BY_DIAMETER, case=Case(name="at rest"))
+    if scene.wants("interference"):
+        at = {"nodal_diameter": numbers, "frequency": variable(dims, solution.at_speed, "Hz")}
+        at |= {"speed": speed, "engine_order": _orders(solution)}
+        out["at speed"] = ArrayGroup(at, content=BY_DIAMETER, case=Case(name="at speed"))
+    if scene.wants("campbell"):
+        over = {
+            "speed": variable("speed", solution.speeds * _RPM, "rpm"),
+            "frequency": variable("nodal_diameter speed mode", solution.campbell, "Hz"),
+            "operating_speed": speed,
+            "engine_order": _orders(solution),
+        }
+        out["campbell"] = ArrayGroup(over, content=CAMPBELL)
+        if solution.crossings:
+            table = np.array(solution.crossings)
+            columns = {
+                name: variable("crossing", table[:, k].astype(int))
+                for k, name in enumerate(("engine_order", "nodal_diameter", "mode"))
+            }
+            columns["speed"] = variable("crossing", table[:, 3] * _RPM, "rpm")
+            columns["frequency"] = variable("crossing", table[:, 4], "Hz")
+            out["crossings"] = ArrayGroup(columns, content=CROSSINGS)
+    return out | ({} if solution.wave is None else _wave_arrays(solution.wave))
+
+
+def _wave_arrays(wave: DampedWave) -> dict[str, ArrayGroup]:
+    case = Case(
+        engine_order=wave.crossing.engine_order, nodal_diameter=wave.crossing.nodal_diameter
+    )
+    curves = {
+        "frequency": variable("frequency", wave.frequency, "Hz"),
+        "free": variable("frequency", 1e3 * wave.free, "um"),
+        "stuck": variable("frequency", 1e3 * wave.stuck, "um"),
+        "damped_frequency": variable("point", wave.answer.frequency, "Hz"),
+        "damped": variable("point", 1e3 * wave.damped, "um"),
+    }
+    out = {"travelling wave": ArrayGroup(curves, content=WAVE, case=case)}
+    if wave.performance is not None:
+        over = {
+            "ratio": variable("ratio", wave.performance.ratio),
+            "height": variable("ratio", 1e3 * wave.performance.height, "um/N"),
+        }
+        out["wave performance"] = ArrayGroup(over, content=PERFORMANCE, case=case)
+    return out
+
+
+def _orders(solution: BladedDiskSolution) -> Any:
+    return variable("engine_order", np.array(solution.plan.scene.rotation.engine_orders))
+
+
+def write_files(solution: BladedDiskSolution, folder: Path) -> None:
+    """The mesh of the sector."""
+    if solution.sector is not None:
+        # meshio is slow to import
+        from upd.mesh.export import write_mesh
+
+        write_mesh({"sector": solution.sector.mesh}, folder / "sector.vtu")

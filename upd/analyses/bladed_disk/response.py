@@ -1,0 +1,231 @@
+"""Response of a bladed disk to an engine order, with a wedge in every gap between its platforms.
+
+The wedge is a rigid body on contact points at both platforms. The centrifugal force presses it
+outwards; both faces lean towards the radius in the middle of the gap. It starts without mean
+friction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from upd.hbm import (
+    Contacts,
+    FrequencyResponse,
+    RigidDamper,
+    contact_rows,
+    contacts,
+    rigid_damper,
+    travelling_wave_response,
+)
+from upd.reduction.cyclic import ReducedSector, turn
+
+FloatArray = NDArray[np.float64]
+
+
+class Wedge(NamedTuple):
+    """A damper between two platforms.
+
+    Attributes
+    ----------
+    mass : float
+        t
+    inertia : (3,) tuple
+        About its centre: radial, tangential, axial [t mm2].
+    radius : float
+        Of its centre [mm].
+    angle : float
+        Between the normal of a face and the radius [deg].
+    k_n, k_t : float
+        Stiffness of all points of a face [N/mm].
+    mu : float
+    """
+
+    mass: float
+    inertia: tuple[float, float, float]
+    radius: float
+    angle: float
+    k_n: float
+    k_t: float
+    mu: float
+
+    def centrifugal_force(self, speed: float) -> float:
+        """F_C = m r Omega^2 [N] at a speed in rad/s."""
+        return self.mass * self.radius * speed**2
+
+
+class WedgeGap(NamedTuple):
+    """The wedge of one gap on the coordinates of both sectors beside it, see `upd.hbm`."""
+
+    points: Contacts
+    damper: RigidDamper
+    rows: FloatArray
+
+
+def gap_of(sector: ReducedSector, wedge: Wedge, f_c: float) -> WedgeGap:
+    """The contacts of a wedge under a centrifugal force.
+
+    Parameters
+    ----------
+    sector : ReducedSector
+        Of any nodal diameter.
+    wedge : Wedge
+    f_c : float
+        [N]
+
+    Returns
+    -------
+    WedgeGap
+    """
+    p, r = len(sector.high), sector.K.shape[0]
+    ends = [one.mean(axis=0) for one in (sector.high, sector.low)]
+    # half way between both platforms
+    middle = np.mean([np.arctan2(end[1], end[0]) for end in ends])
+    radial, across, axial = turn(float(middle)).T
+    centre = wedge.radius * radial + np.mean([end[2] for end in ends]) * axial
+    own = turn(float(middle))
+    damper = rigid_damper(wedge.mass, own * wedge.inertia @ own.T, centre, f_c * radial)
+    lean = np.radians(wedge.angle)
+    normals = [np.cos(lean) * radial + side * np.sin(lean) * across for side in (-1.0, 1.0)]
+    frames = [np.tile([n, axial, np.cross(n, axial)], (p, 1, 1)) for n in normals]
+    rows = np.zeros((2 * p, 3, 2 * r))
+    rows[:p, :, :r] = -frames[0] @ sector.B_high.reshape(p, 3, r)
+    rows[p:, :, r:] = -frames[1] @ sector.B_low.reshape(p, 3, r)
+    points = contacts(
+        rows[:, 0],
+        np.swapaxes(rows[:, 1:], 0, 1),
+        k_n=wedge.k_n / p,
+        k_t=wedge.k_t / p,
+        mu=wedge.mu,
+    )
+    places = np.vstack([sector.high, sector.low])
+    return WedgeGap(points, damper, contact_rows(damper, places, np.concatenate(frames)))
+
+
+def wave_response(
+    sectors: Mapping[int, ReducedSector],
+    wedge: Wedge,
+    f_c: float,
+    *,
+    force: ArrayLike,
+    engine_order: int,
+    frequencies: ArrayLike,
+    harmonics: Iterable[int] = range(4),
+    samples: int | None = None,
+) -> FrequencyResponse:
+    """The damped response; free and stuck ones are methods of the answer.
+
+    Parameters
+    ----------
+    sectors : mapping
+        Nodal diameter -> sector at one speed, of `upd.hbm.nodal_diameters`.
+    wedge : Wedge
+    f_c : float
+        Its centrifugal force [N].
+    force : (r,) array_like of complex
+        Amplitude on the coordinates of sector 0 [N].
+    engine_order : int
+    frequencies : (n,) array_like
+        Of the excitation [Hz].
+    harmonics : iterable of int
+    samples : int, optional
+        Per period; by rule when None.
+
+    Returns
+    -------
+    FrequencyResponse
+        On the coordinates of sector 0, then the six of its wedge; see `on_sector`.
+    """
+    one = next(iter(sectors.values()))
+    gap = gap_of(one, wedge, f_c)
+    return travelling_wave_response(
+        {n: (s.M, s.C, s.K) for n, s in sectors.items()},
+        gap.points,
+        n_sectors=one.n_sectors,
+        engine_order=engine_order,
+        harmonic_force=force,
+        frequencies=frequencies,
+        harmonics=harmonics,
+        samples=samples,
+        damper=gap.damper,
+        damper_rows=gap.rows,
+        start="frictionless",
+    )
+
+
+def on_sector(row: ArrayLike) -> FloatArray:
+    """A row (r,) on the coordinates of a sector as one of its answers, zero on the wedge."""
+    return np.append(np.asarray(row, dtype=float), np.zeros(6))
+
+
+class WavePerformance(NamedTuple):
+    """Highest amplitude over F_C/F_E, n values.
+
+    Attributes
+    ----------
+    ratio : (n,) ndarray
+        F_C/F_E.
+    frequency : (n,) ndarray
+        [Hz]
+    height : (n,) ndarray
+        Per unit of F_E [mm/N]; nan where no curve was found.
+    """
+
+    ratio: FloatArray
+    frequency: FloatArray
+    height: FloatArray
+
+    @property
+    def best(self) -> int:
+        """Number of the lowest peak."""
+        return int(np.nanargmin(self.height))
+
+
+def performance(
+    sectors: Mapping[int, ReducedSector],
+    wedge: Wedge,
+    f_c: float,
+    ratios: ArrayLike,
+    row: ArrayLike,
+    *,
+    force: ArrayLike,
+    engine_order: int,
+    frequencies: ArrayLike,
+    harmonics: Iterable[int] = range(4),
+) -> WavePerformance:
+    """The peak over F_C/F_E at one centrifugal force, which scales the answer with the load.
+
+    Parameters
+    ----------
+    sectors, wedge, f_c, engine_order, frequencies, harmonics
+        As in `wave_response`.
+    ratios : (n,) array_like
+        F_C over the excitation.
+    row : (r,) array_like
+        Weighs the coordinates of sector 0.
+    force : (r,) array_like of complex
+        Amplitude for F_E = 1 N.
+
+    Returns
+    -------
+    WavePerformance
+    """
+    unit, kept, found = np.asarray(force, dtype=complex), tuple(harmonics), []
+    for ratio in np.asarray(ratios, dtype=float):
+        F_E = f_c / ratio
+        answer = wave_response(
+            sectors,
+            wedge,
+            f_c,
+            force=F_E * unit,
+            engine_order=engine_order,
+            frequencies=frequencies,
+            harmonics=kept,
+        )
+        f, height = answer.peak(on_sector(row)) if answer.arrived else (np.nan, np.nan)
+        found.append((float(ratio), f, height / F_E))
+    return WavePerformance(*np.array(found).T)

@@ -1,0 +1,357 @@
+"""Modes by nodal diameter and speed, and where engine orders cross them. Arrays in, arrays out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.sparse import csr_array
+
+from upd.analyses.bladed_disk.plan import BladedDiskPlan, computed, damped, rotates
+from upd.analyses.bladed_disk.response import (
+    WavePerformance,
+    Wedge,
+    on_sector,
+    performance,
+    wave_response,
+)
+from upd.errors import InputError, MeshError
+from upd.fem import Material, mass, stiffness
+from upd.fem.rotation import (
+    centrifugal_load,
+    coriolis,
+    displaced_stiffness,
+    plane_mass,
+    stress_stiffness,
+)
+from upd.hbm import FrequencyResponse, nodal_diameters
+from upd.mesh import Mesh, recipes
+from upd.progress import Stages
+from upd.reduction.cyclic import (
+    CyclicModel,
+    ModeFamily,
+    ReducedSector,
+    Sector,
+    reduce_sector,
+    with_coriolis,
+)
+from upd.scene import BladedDiskScene
+
+Array = NDArray[np.float64]
+
+
+class Crossing(NamedTuple):
+    """Where an engine order meets a mode.
+
+    Attributes
+    ----------
+    engine_order, nodal_diameter, mode : int
+    speed : float
+        rad/s.
+    frequency : float
+        Hz.
+    """
+
+    engine_order: int
+    nodal_diameter: int
+    mode: int
+    speed: float
+    frequency: float
+
+
+class Proof(NamedTuple):
+    """A nodal diameter between the computed ones at the largest speed, solved by itself.
+
+    Attributes
+    ----------
+    nodal_diameter : int
+    speed : float
+        rad/s.
+    projected, direct, displaced : (m,) ndarray
+        In the span of the computed ones; by itself; with the stiffness of the displaced state. Hz.
+    coriolis : (2, m) ndarray
+        Both waves with the Coriolis force, Hz.
+    """
+
+    nodal_diameter: int
+    speed: float
+    projected: Array
+    direct: Array
+    displaced: Array
+    coriolis: Array
+
+
+class DampedWave(NamedTuple):
+    """Response at a crossing.
+
+    Attributes
+    ----------
+    crossing : Crossing
+    sectors : dict
+        Nodal diameter -> reduced sector.
+    f_c : float
+        N.
+    frequency : (k,) ndarray
+        Hz.
+    free, stuck : (k,) ndarray
+        Linear amplitudes at the tip, mm.
+    answer : FrequencyResponse
+    damped : (n,) ndarray
+        Amplitudes at its frequencies, mm.
+    peak : (2,) tuple
+        Hz and mm.
+    performance : WavePerformance or None
+    best_mass : float
+        t; nan without it.
+    """
+
+    crossing: Crossing
+    sectors: dict[int, ReducedSector]
+    f_c: float
+    frequency: Array
+    free: Array
+    stuck: Array
+    answer: FrequencyResponse
+    damped: Array
+    peak: tuple[float, float]
+    performance: WavePerformance | None
+    best_mass: float
+
+
+@dataclass
+class BladedDiskSolution:
+    """All that was solved, for results, arrays and files.
+
+    Attributes
+    ----------
+    sector : Sector or None
+    at_rest, at_speed : (N/2 + 1, m) ndarray
+        Frequencies by nodal diameter, at the operating speed too, Hz.
+    speeds : (k,) ndarray
+        rad/s.
+    campbell : (N/2 + 1, k, m) ndarray
+        Hz.
+    crossings : list
+        The nearest to the operating speed first.
+    proof : Proof or None
+    wave : DampedWave or None
+    """
+
+    plan: BladedDiskPlan
+    sector: Sector | None = None
+    at_rest: Array = field(default_factory=lambda: np.empty((0, 0)))
+    at_speed: Array = field(default_factory=lambda: np.empty((0, 0)))
+    speeds: Array = field(default_factory=lambda: np.empty(0))
+    campbell: Array = field(default_factory=lambda: np.empty((0, 0, 0)))
+    crossings: list[Crossing] = field(default_factory=list)
+    proof: Proof | None = None
+    wave: DampedWave | None = None
+
+
+def folded(engine_order: int, n_sectors: int) -> int:
+    """Nodal diameter that an engine order excites, 0 to N/2."""
+    n = engine_order % n_sectors
+    return min(n, n_sectors - n)
+
+
+def solve(plan: BladedDiskPlan, stages: Stages) -> BladedDiskSolution:
+    """Run everything the plan calls for.
+
+    An error raised on the way carries what converged so far as ``partial``.
+    """
+    solution = BladedDiskSolution(plan)
+    try:
+        _solve(solution, stages)
+    except BaseException as error:
+        error.partial = solution  # type: ignore[attr-defined]
+        raise
+    return solution
+
+
+def _solve(solution: BladedDiskSolution, stages: Stages) -> None:
+    plan, scene = solution.plan, solution.plan.scene
+    spin, count = scene.rotation, scene.modes.count
+    with stages("mesh", f"{scene.recipe}, 1 of {scene.n_sectors} sectors"):
+        sector = solution.sector = _sector(plan)
+    with stages("matrices", f"{3 * sector.mesh.n_node} dofs"):
+        K, M = _matrices(solution, sector.mesh)
+        model = CyclicModel.of(sector, K, M)
+    u = np.zeros(3 * sector.mesh.n_node)
+    if rotates(scene):
+        with stages("prestress", "static state at nodal diameter 0"):
+            mesh, material = sector.mesh, _material(plan)
+            u = model.static(centrifugal_load(mesh, M))
+            stress = stress_stiffness(mesh, material, u, scene.mesh.element)
+            model = CyclicModel.of(sector, K, M, csr_array(stress - plane_mass(M)))
+    known = computed(scene)
+    with stages("modes", f"nodal diameters {', '.join(map(str, known))}"):
+        family = ModeFamily.of(model, known, count + 2)
+        solution.at_rest = _by_diameter(family, model, count, 0.0)
+    if not rotates(scene):
+        return
+    with stages("speeds", f"{spin.points}, and crossings of {len(spin.engine_orders)} orders"):
+        solution.at_speed = _by_diameter(family, model, count, spin.speed)
+        solution.speeds = np.linspace(0.0, spin.up_to * spin.speed, spin.points)
+        rows = [_by_diameter(family, model, count, float(w)) for w in solution.speeds]
+        solution.campbell = np.stack(rows, axis=1)
+        solution.crossings = _crossings(solution, family)
+    if damped(scene):
+        solution.wave = _damped_wave(solution, model, stages)
+    if scene.left_out.solves:
+        with stages("effects left out", "one nodal diameter solved by itself"):
+            solution.proof = _proof(solution, model, family, u)
+
+
+def _sector(plan: BladedDiskPlan) -> Sector:
+    meshes, _ = recipes.build_mesh(plan.scene.recipe, plan.parameters)
+    if len(meshes) != 1:
+        raise MeshError(
+            f"a sector is one body, the mesh has {len(meshes)}: {', '.join(meshes)}; glue them."
+        )
+    return Sector.of(next(iter(meshes.values())), plan.scene.n_sectors)
+
+
+def _material(plan: BladedDiskPlan) -> Material:
+    given = plan.scene.material
+    return Material(given.E, given.nu, given.density)
+
+
+def _matrices(solution: BladedDiskSolution, mesh: Mesh) -> tuple[csr_array, csr_array]:
+    material = _material(solution.plan)
+    element = solution.plan.scene.mesh.element
+    return stiffness(mesh, material, element), mass(mesh, material, element)
+
+
+def _by_diameter(family: ModeFamily, model: CyclicModel, count: int, speed: float) -> Array:
+    """(N/2 + 1, m) frequencies, Hz."""
+    return np.array([family.frequencies(n, count, speed) for n in model.nodal_diameters])
+
+
+def _crossings(solution: BladedDiskSolution, family: ModeFamily) -> list[Crossing]:
+    """All up to the largest speed, the nearest to the operating speed first."""
+    scene, speeds = solution.plan.scene, solution.speeds
+    count, found = scene.modes.count, []
+    for order in scene.rotation.engine_orders:
+        n = folded(order, scene.n_sectors)
+        for mode in range(count):
+
+            def above(w: float, n: int = n, mode: int = mode, order: int = order) -> float:
+                return float(family.frequencies(n, count, w)[mode] - order * w / (2.0 * np.pi))
+
+            over = solution.campbell[n, :, mode] - order * speeds / (2.0 * np.pi)
+            for k in np.flatnonzero((over[:-1] > 0.0) & (over[1:] <= 0.0)):
+                w = float(brentq(above, speeds[k], speeds[k + 1]))
+                f = float(order * w / (2.0 * np.pi))
+                found.append(Crossing(order, n, mode + 1, w, f))
+    return sorted(found, key=lambda c: abs(c.speed - scene.rotation.speed))
+
+
+def _proof(solution: BladedDiskSolution, model: CyclicModel, family: ModeFamily, u: Array) -> Proof:
+    """The nodal diameter farthest from the computed ones, at the largest speed."""
+    scene, sector = solution.plan.scene, model.sector
+    known, count = np.array(computed(scene)), scene.modes.count
+    n = max(model.nodal_diameters, key=lambda n: int(np.abs(known - n).min()))
+    speed = float(solution.speeds[-1])
+    found = model.modes(n, count, speed)
+    U = sector.field(found.shapes, n)
+    K, M = _matrices(solution, sector.mesh)
+    moved = displaced_stiffness(
+        sector.mesh, _material(solution.plan), speed**2 * u, scene.mesh.element
+    )
+    # in the span of the modes
+    more = U.conj().T @ ((moved - K) @ U)
+    value = np.linalg.eigvalsh(np.diag((2.0 * np.pi * found.frequency) ** 2) + more)
+    return Proof(
+        n,
+        speed,
+        family.frequencies(n, count, speed),
+        found.frequency,
+        np.sqrt(value) / (2.0 * np.pi),
+        with_coriolis(found.frequency, U, coriolis(M), speed),
+    )
+
+
+def _damped_wave(solution: BladedDiskSolution, model: CyclicModel, stages: Stages) -> DampedWave:
+    """Free, stuck and damped response at the crossing nearest to the operating speed."""
+    scene, chosen = solution.plan.scene, solution.plan.scene.response
+    if not solution.crossings:
+        raise InputError(
+            "rotation.engine_orders: none crosses a mode up to the largest speed, so there is no "
+            "resonance to damp; raise rotation.up_to or name others"
+        )
+    crossing = solution.crossings[0]
+    mesh, harmonics = model.sector.mesh, range(chosen.harmonics + 1)
+    tip = mesh.nodes.get("tip", np.empty(0, np.int64))[:1]
+    if not len(tip):
+        raise MeshError("the mesh has no node set tip, where the blade is excited: name one node.")
+    # C = beta K has the ratio asked for at the crossing
+    beta = 2.0 * chosen.damping / (2.0 * np.pi * crossing.frequency)
+    needed = nodal_diameters(scene.n_sectors, crossing.engine_order, harmonics)
+    with stages("reduction", f"nodal diameters {', '.join(map(str, needed))}"):
+        sectors = {
+            n: reduce_sector(
+                model,
+                n,
+                n_modes=chosen.modes,
+                keep={"tip": tip},
+                speed=crossing.speed,
+                damping=(0.0, beta),
+            )
+            for n in needed
+        }
+    one = sectors[crossing.nodal_diameter]
+    x, y, _ = mesh.points[tip[0]]
+    row = np.array([-y, x, 0.0]) / np.hypot(x, y) @ one.rows["tip"]
+    wedge = _wedge(scene, one)
+    f_c = wedge.centrifugal_force(crossing.speed)
+    low = 0.97 * crossing.frequency
+    given: dict[str, Any] = {"engine_order": crossing.engine_order, "harmonics": harmonics}
+    with stages("response", f"EO {crossing.engine_order}, {chosen.points} frequencies"):
+        force, out = chosen.force * row, on_sector(row)
+        probe = wave_response(sectors, wedge, f_c, force=force, frequencies=[low], **given)
+        wide = np.linspace(low, 2.0 * low, 4001)
+        top = float(wide[probe.stuck(out, wide).argmax()])
+        frequencies = np.linspace(low, 1.03 * top, chosen.points)
+        answer = wave_response(sectors, wedge, f_c, force=force, frequencies=frequencies, **given)
+        fine = np.linspace(low, frequencies[-1], 2001)
+        free, stuck = answer.free(out, fine), answer.stuck(out, fine)
+        peak = answer.peak(out)
+    curve, mass = None, float("nan")
+    if scene.wants("performance"):
+        with stages("performance", f"{len(chosen.ratios)} ratios F_C/F_E"):
+            curve = performance(
+                sectors, wedge, f_c, chosen.ratios, row, force=row, frequencies=frequencies, **given
+            )
+        if np.isfinite(curve.height).any():
+            mass = curve.ratio[curve.best] * chosen.force / (wedge.radius * crossing.speed**2)
+    amplitude = np.asarray(answer.amplitude(out))
+    return DampedWave(
+        crossing, sectors, f_c, fine, free, stuck, answer, amplitude, peak, curve, float(mass)
+    )
+
+
+def _wedge(scene: BladedDiskScene, sector: ReducedSector) -> Wedge:
+    """The wedge with the inertia of a box between both patches."""
+    given, places = scene.damper, np.vstack([sector.high, sector.low])
+    r = np.hypot(places[:, 0], places[:, 1])
+    sides = np.array(
+        [
+            np.ptp(r),
+            np.linalg.norm(sector.high.mean(axis=0) - sector.low.mean(axis=0)),
+            np.ptp(places[:, 2]),
+        ]
+    )
+    squares = given.mass / 12.0 * sides**2
+    inertia = tuple(float(squares.sum() - one) for one in squares)
+    return Wedge(
+        given.mass,
+        (inertia[0], inertia[1], inertia[2]),
+        float(r.mean()),
+        given.angle,
+        given.normal_stiffness,
+        given.tangential_stiffness,
+        given.friction,
+    )
