@@ -40,7 +40,7 @@ _MATRICES: dict[str, Any] = {"M": [[1.0]], "C": [[0.02]], "K": [[1.0]]}
         ({"harmonics": (0.5, 1)}, "whole numbers"),
         ({"harmonics": "many"}, "no set of whole numbers"),
         ({"harmonics": (0, 2)}, r"acts in 1, .*harmonics = \(0, 1, 2\)"),
-        ({"start": "middle"}, "zero, static, mid, upper, lower"),
+        ({"start": "middle"}, "zero, frictionless, static, mid, upper, lower"),
         ({"K": csr_array(np.eye(1))}, r"K\.toarray\(\)"),
         ({"harmonic_force": {}}, "harmonic_force is empty"),
     ],

@@ -252,7 +252,8 @@ class FrequencyResponse:
     ) -> FloatArray:
         self.balance.modal_row(row, harmonic)
         f = self.frequency if frequencies is None else np.asarray(frequencies, dtype=float)
-        q = self.balance.linear_displacement(2 * np.pi * f, stuck, harmonic)
+        with threads_for(self.balance.size):
+            q = self.balance.linear_displacement(2 * np.pi * f, stuck, harmonic)
         return np.asarray(np.abs(q @ np.asarray(row, dtype=float)))
 
 

@@ -48,6 +48,7 @@ from upd.hbm.springs.modal import Modal, modal
 from upd.hbm.springs.points import Contacts
 from upd.hbm.springs.response import FrequencyResponse, GivenSystem, force_of, response_of
 from upd.hbm.springs.time_integration import SteadyState, steady_state
+from upd.linalg.parallel import threads_for
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -278,7 +279,8 @@ def travelling_wave_response(
         d: [block_diag(*pair) for pair in zip(A, none, strict=True)] if none else A
         for d, A in kept.items()
     }
-    modes = {d: modal(*A) if d else b.modal for d, A in joined.items()}
+    with threads_for(len(b.modal.Phi)):
+        modes = {d: modal(*A) if d else b.modal for d, A in joined.items()}
     d1 = 1 + b.contacts.tangents
     waves = Waves(N, EO, modes, near[:, :d1], far[:, :d1])
     parts = (b.modal, b.contacts, b.harmonics, b.samples, b.static, b.dynamic, b.start, b.slider)
