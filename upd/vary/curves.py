@@ -210,7 +210,7 @@ def finest_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[C
             order = float("nan") if estimate is None else estimate.order
             curves.append(
                 make_curve(
-                    mine[0].point.source,
+                    mine[-1].point.source,
                     key,
                     mine,
                     error,

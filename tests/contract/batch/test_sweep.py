@@ -578,12 +578,12 @@ def test_a_sweep_is_a_function_of_the_package(tmp_path: Path) -> None:
 
 
 def test_figures_of_one_two_and_three_parameters(tmp_path: Path) -> None:
-    for vary, count in (
-        (["a=1:3:3"], 1),
-        (["a=1:3:3", "b=1:2:2"], 1),
-        (["a=1:3:3", "b=x,y"], 1),
-        (["a=1:3:3", "b=1:2:2", "c=x,y"], 2),
-        (["b=x,y"], 1),
+    for vary in (
+        ["a=1:3:3"],
+        ["a=1:3:3", "b=1:2:2"],
+        ["a=1:3:3", "b=x,y"],
+        ["a=1:3:3", "b=1:2:2", "c=x,y"],
+        ["b=x,y"],
     ):
         axes = parse_axes(vary, {})
         grid = places(axes)
@@ -593,7 +593,7 @@ def test_figures_of_one_two_and_three_parameters(tmp_path: Path) -> None:
         ]
         columns = make_columns(outcomes, ["*"])
         written = draw(tmp_path, axes, columns)
-        assert len(written) == count
+        assert len(written) == 1
         assert sorted(tmp_path.glob("*.png")) == sorted(written), (
             "figures of the grid before are gone"
         )
