@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from upd.analyses.bladed_disk.output import BY_DIAMETER, CAMPBELL, CROSSINGS, PERFORMANCE, WAVE
-from upd.plot.chart import Arrays, Axis, Band, Chart, Group, Mark, Trace
+from upd.plot.chart import Axis, Band, Chart, Mark, Trace
 from upd.plot.common import case_of, frequency_of, scalar, with_content
+from upd.results import Arrays, Group
 
 _HZ, _ND = Axis("frequency", "Hz"), Axis("nodal diameter")
 

@@ -12,7 +12,7 @@ from upd.analyses.base import Resolved, conditions
 from upd.analyses.bladed_disk.plan import CORIOLIS, DISPLACED
 from upd.analyses.bladed_disk.solve import BladedDiskSolution, DampedWave, Proof
 from upd.plot.chart import Entry
-from upd.results import NO_CASE, ArrayGroup, Case, Check, Result, variable
+from upd.results import NO_CASE, Case, Check, Group, Result, variable
 from upd.results import quantities as q
 
 #: what the groups of result.nc hold, their attribute ``content``
@@ -146,19 +146,19 @@ def sizes(solution: BladedDiskSolution) -> dict[str, int]:
     return {"n_face_nodes": face, "n_modes": solution.at_rest.size}
 
 
-def arrays(solution: BladedDiskSolution) -> dict[str, ArrayGroup]:
+def arrays(solution: BladedDiskSolution) -> dict[str, Group]:
     """Frequencies by nodal diameter, at rest and at speed; over the speed; crossings."""
-    scene, out = solution.plan.scene, dict[str, ArrayGroup]()
+    scene, out = solution.plan.scene, dict[str, Group]()
     speed = variable("", scene.rotation.speed * _RPM, "rpm")
     numbers = variable("nodal_diameter", np.arange(len(solution.at_rest)))
     dims = "nodal_diameter mode"
     if scene.wants("modes"):
         rest = {"nodal_diameter": numbers, "frequency": variable(dims, solution.at_rest, "Hz")}
-        out["at rest"] = ArrayGroup(rest, content=BY_DIAMETER, case=Case(name="at rest"))
+        out["at rest"] = Group(rest, content=BY_DIAMETER, case=Case(name="at rest"))
     if scene.wants("interference"):
         at = {"nodal_diameter": numbers, "frequency": variable(dims, solution.at_speed, "Hz")}
         at |= {"speed": speed, "engine_order": _orders(solution)}
-        out["at speed"] = ArrayGroup(at, content=BY_DIAMETER, case=Case(name="at speed"))
+        out["at speed"] = Group(at, content=BY_DIAMETER, case=Case(name="at speed"))
     if scene.wants("campbell"):
         over = {
             "speed": variable("speed", solution.speeds * _RPM, "rpm"),
@@ -166,7 +166,7 @@ def arrays(solution: BladedDiskSolution) -> dict[str, ArrayGroup]:
             "operating_speed": speed,
             "engine_order": _orders(solution),
         }
-        out["campbell"] = ArrayGroup(over, content=CAMPBELL)
+        out["campbell"] = Group(over, content=CAMPBELL)
         if solution.crossings:
             table = np.array(solution.crossings)
             columns = {
@@ -175,11 +175,11 @@ def arrays(solution: BladedDiskSolution) -> dict[str, ArrayGroup]:
             }
             columns["speed"] = variable("crossing", table[:, 3] * _RPM, "rpm")
             columns["frequency"] = variable("crossing", table[:, 4], "Hz")
-            out["crossings"] = ArrayGroup(columns, content=CROSSINGS)
+            out["crossings"] = Group(columns, content=CROSSINGS)
     return out | ({} if solution.wave is None else _wave_arrays(solution.wave))
 
 
-def _wave_arrays(wave: DampedWave) -> dict[str, ArrayGroup]:
+def _wave_arrays(wave: DampedWave) -> dict[str, Group]:
     case = Case(
         engine_order=wave.crossing.engine_order, nodal_diameter=wave.crossing.nodal_diameter
     )
@@ -190,13 +190,13 @@ def _wave_arrays(wave: DampedWave) -> dict[str, ArrayGroup]:
         "damped_frequency": variable("point", wave.answer.frequency, "Hz"),
         "damped": variable("point", 1e3 * wave.damped, "um"),
     }
-    out = {"travelling wave": ArrayGroup(curves, content=WAVE, case=case)}
+    out = {"travelling wave": Group(curves, content=WAVE, case=case)}
     if wave.performance is not None:
         over = {
             "ratio": variable("ratio", wave.performance.ratio),
             "height": variable("ratio", 1e3 * wave.performance.height, "um/N"),
         }
-        out["wave performance"] = ArrayGroup(over, content=PERFORMANCE, case=case)
+        out["wave performance"] = Group(over, content=PERFORMANCE, case=case)
     return out
 
 

@@ -30,12 +30,7 @@ from upd.contact import tangential_contact, tangential_path
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import normal_contact, normal_curve
 from upd.contact.products import KNOWN, KNOWN_STIFFNESS, settled
-from upd.contact.tangential import (
-    TangentialContact,
-    TangentialPath,
-    tangential_contact,
-    tangential_path,
-)
+from upd.contact.tangential import TangentialContact, TangentialPath
 from upd.contact.tilt import tilted_contact
 from upd.progress import Stages
 from upd.results import Case
