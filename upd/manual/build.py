@@ -21,7 +21,7 @@ from upd.scene.keys import SceneKey, absent_keys, recipe_keys, scene_keys
 MARKED = str.maketrans({"*": "\\*", "<": "&lt;", "$": "\\$"})
 HERE = Path(__file__).resolve().parent
 #: one of every kind
-SCENES = ("hertz", "rig", "symmetric-seated", "asymmetric-response")
+SCENES = ("hertz", "rig", "symmetric-seated", "asymmetric-response", "bladed-disk")
 
 
 def main() -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -73,7 +74,8 @@ def test_numbers_and_arrays(disk: solve.BladedDiskSolution) -> None:
 
 
 def test_damped_response_lies_below_the_free_one() -> None:
-    found = solved(**{"want": ["response", "performance"], "response.ratios": [600, 1200]}).wave
+    whole = solved(**{"want": ["response", "performance"], "response.ratios": [600, 1200]})
+    found = whole.wave
     assert found is not None
     assert found.peak[1] < found.free.max()
     assert found.f_c == pytest.approx(
@@ -82,6 +84,14 @@ def test_damped_response_lies_below_the_free_one() -> None:
     assert found.performance is not None and found.best_mass > 0.0
     # the stuck blade is stiffer than the free one
     assert found.frequency[found.stuck.argmax()] > found.frequency[found.free.argmax()]
+    checks = {check.name: check for check in output.check_solution(whole)}
+    assert checks["omitted harmonics"].passed and checks["energy balance"].passed
+    spoiled = replace(found.answer, truncation=found.answer.truncation + 0.2)
+    checks = {
+        check.name: check
+        for check in output.check_solution(replace(whole, wave=found._replace(answer=spoiled)))
+    }
+    assert not checks["omitted harmonics"].passed
 
 
 @pytest.mark.parametrize(
