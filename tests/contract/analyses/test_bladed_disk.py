@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from upd.analyses import make_plan
-from upd.analyses.bladed_disk import output, solve
+from upd.analyses.bladed_disk import charts, output, solve
 from upd.analyses.bladed_disk.plan import computed
 from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages
@@ -119,3 +119,15 @@ def test_a_speed_beyond_static_stability() -> None:
     """Against the stiffening of the stresses it takes a soft disk and a speed out of this world."""
     with pytest.raises(ConvergenceError, match="static stability"):
         solved(**{"rotation.speed": "900000 rpm"})
+
+
+def test_lines_of_engine_orders_fold_at_half_an_odd_number_of_blades() -> None:
+    """EO 13 of 25 blades is on 12 nodal diameters, as EO 12 is."""
+    found = solved(
+        **{"want": ["interference"], "geometry.n_sectors": 25, "rotation.engine_orders": [12, 13]}
+    )
+    groups = output.arrays(found)
+    assert len(groups["at speed"]["nodal_diameter"].data) == 13
+    (chart,) = charts.charts(groups, {})
+    assert [mark.x for mark in chart.marks] == [12.0, 12.0]
+    assert [place for place, _ in chart.x.ticks] == [*map(float, range(13))]

@@ -12,7 +12,7 @@ from upd.plot.chart import Axis, Band, Chart, Mark, Trace
 from upd.plot.common import case_of, frequency_of, scalar, with_content
 from upd.results import Arrays, Group
 
-_HZ, _ND = Axis("frequency", "Hz"), Axis("nodal diameter")
+_HZ = Axis("frequency", "Hz")
 
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
@@ -29,8 +29,8 @@ def _campbell(group: Group, crossings: list[Group]) -> Chart:
     """Modes of the nodal diameters that engine orders excite, over the speed."""
     speed, f = np.asarray(group["speed"].data), frequency_of(group)
     orders = np.asarray(group["engine_order"].data)
-    most, top = 2 * (len(f) - 1), float(f.max())
-    by_order = {int(order): min(order % most, -order % most) for order in orders} if most else {}
+    N, top = int(group["sectors"].data), float(f.max())
+    by_order = {int(order): min(order % N, -order % N) for order in orders}
     traces = []
     for colour, n in enumerate(dict.fromkeys(int(n) for n in by_order.values())):
         for k in range(f.shape[2]):
@@ -69,26 +69,27 @@ def _by_diameter(group: Group) -> Chart:
         Trace(f"mode {k + 1}", n, f[:, k], "both", k % 10, entry="modes") for k in range(f.shape[1])
     ]
     speed, case, marks = scalar(group, "speed"), case_of(group), list[Mark]()
+    x = Axis("nodal diameter", ticks=tuple((k, f"{k:g}") for k in n[:: 1 + len(n) // 16].tolist()))
     if speed is None:
         return Chart(
             "Frequencies by nodal diameter",
-            _ND,
+            x,
             _HZ,
             tuple(traces),
             case=case.label,
             figure="nodal_diameters",
         )
-    N, per_order = 2.0 * n[-1], speed / 60.0
+    N, per_order = int(group["sectors"].data), speed / 60.0
     orders = np.arange(int(f.max() / per_order) + 1)
-    at = np.minimum(orders % N, -orders % N) if N else 0.0 * orders
+    at = np.minimum(orders % N, -orders % N)
     lines = np.asarray(at, float), np.asarray(orders * per_order, float)
     traces.append(Trace("engine orders", *lines, "dotted", closed=True))
     for order in np.asarray(group["engine_order"].data):
-        place = min(order % N, -order % N) if N else 0.0
+        place = min(order % N, -order % N)
         marks.append(Mark(float(place), float(order * per_order), f"EO {order}", closed=True))
     return Chart(
         "Interference diagram",
-        _ND,
+        x,
         _HZ,
         tuple(traces),
         case=f"{speed:.5g} rpm",
@@ -105,7 +106,7 @@ def _wave(group: Group) -> Chart:
         Trace("stuck", f, np.asarray(group["stuck"].data), "dotted", closed=True),
         Trace("damped", on, np.asarray(group["damped"].data), "both", 0),
     )
-    y = Axis("amplitude at the tip", "um", log=True)
+    y = Axis("amplitude at the tip", "µm", log=True)
     label = case_of(group).label
     return Chart("Response to an engine order", _HZ, y, traces, case=label, figure="response")
 
@@ -113,7 +114,7 @@ def _wave(group: Group) -> Chart:
 def _performance(group: Group) -> Chart:
     """Peak over F_C/F_E."""
     ratio, height = (np.asarray(group[name].data) for name in ("ratio", "height"))
-    x, y = Axis("F_C/F_E", log=True), Axis("peak at the tip", "um/N", log=True)
+    x, y = Axis("F_C/F_E", log=True), Axis("peak at the tip", "µm/N", log=True)
     traces = (Trace("peak", ratio, height, "both", 0),)
     label = case_of(group).label
     return Chart("Performance curve", x, y, traces, case=label, figure="performance")

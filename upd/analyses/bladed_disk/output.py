@@ -155,13 +155,14 @@ def arrays(solution: BladedDiskSolution) -> dict[str, Group]:
     scene, out = solution.plan.scene, dict[str, Group]()
     speed = variable("", scene.rotation.speed * _RPM, "rpm")
     numbers = variable("nodal_diameter", np.arange(len(solution.at_rest)))
+    sectors = variable("", scene.n_sectors)
     dims = "nodal_diameter mode"
     if scene.wants("modes"):
         rest = {"nodal_diameter": numbers, "frequency": variable(dims, solution.at_rest, "Hz")}
         out["at rest"] = Group(rest, content=BY_DIAMETER, case=Case(name="at rest"))
     if scene.wants("interference"):
         at = {"nodal_diameter": numbers, "frequency": variable(dims, solution.at_speed, "Hz")}
-        at |= {"speed": speed, "engine_order": _orders(solution)}
+        at |= {"speed": speed, "engine_order": _orders(solution), "sectors": sectors}
         out["at speed"] = Group(at, content=BY_DIAMETER, case=Case(name="at speed"))
     if scene.wants("campbell"):
         over = {
@@ -169,6 +170,7 @@ def arrays(solution: BladedDiskSolution) -> dict[str, Group]:
             "frequency": variable("nodal_diameter speed mode", solution.campbell, "Hz"),
             "operating_speed": speed,
             "engine_order": _orders(solution),
+            "sectors": sectors,
         }
         out["campbell"] = Group(over, content=CAMPBELL)
         if solution.crossings:
