@@ -11,6 +11,7 @@ import numpy as np
 from upd.analyses.base import Resolved, conditions
 from upd.analyses.bladed_disk.plan import CORIOLIS, DISPLACED
 from upd.analyses.bladed_disk.solve import BladedDiskSolution, DampedWave, Proof
+from upd.hbm.springs.checks import creep
 from upd.plot.chart import Entry
 from upd.results import NO_CASE, Case, Check, Group, Result, variable
 from upd.results import quantities as q
@@ -21,6 +22,8 @@ WAVE, PERFORMANCE = "travelling wave", "wave performance"
 #: motion of the contacts by harmonics that are omitted, relative: with .06 two more harmonics
 #: change the damped peak of the ready scene on a coarse mesh by .025
 OMITTED = 0.1
+#: change of contact forces from 40 to 80 periods of slip, relative
+CREEP = 0.01
 HEADLINE = (
     "crossing_speed",
     "crossing_frequency",
@@ -104,10 +107,14 @@ def check_solution(solution: BladedDiskSolution) -> list[Check]:
     reduced = []
     if wave is not None:
         errors = [one.frequency_error for one in wave.sectors.values()]
-        balance, truncation = wave.answer.energy_balance, wave.answer.truncation.max()
+        answer = wave.answer
+        balance, truncation = answer.energy_balance, answer.truncation.max()
+        crept = creep(answer.balance, answer.x).max()
         rows = (
             ("reduced sectors", np.max(errors), PROJECTION_LIMIT, "|reduced / full - 1|"),
             ("energy balance", np.abs(balance).max(), 1e-3, "|power in / dissipated - 1|"),
+            ("path complete", not answer.arrived, 0, "whether the damped curve stopped early"),
+            ("contact settled", crept, CREEP, "change of contact forces in 40 more periods"),
             ("omitted harmonics", truncation, OMITTED, "motion of the contacts by them, relative"),
         )
         reduced = conditions(NO_CASE, "raise response.modes or response.harmonics", *rows)

@@ -236,7 +236,7 @@ class Balance:
             jacobian=jacobian,
         )
 
-    def marched(self, W: FloatArray, E: FloatArray) -> March:
+    def marched(self, W: FloatArray, E: FloatArray, most: int = MOST_PERIODS) -> March:
         """Contact forces of many motions in one march.
 
         Parameters
@@ -245,6 +245,8 @@ class Balance:
             Coefficients of the contact displacements [mm].
         E : (n_sample, size) ndarray
             Synthesis matrix of the samples.
+        most : int
+            Periods at most.
 
         Returns
         -------
@@ -254,9 +256,8 @@ class Balance:
         n, n_point, rows, _ = W.shape
         slider = None if self.slider is None else np.tile(self.slider, (n, 1))
         w = np.ascontiguousarray(W @ E.T).reshape(n * n_point, rows, len(E))
-        found = march(
-            self.contacts.law.tiled(n), w, E, start=self.start, slider=slider, jacobian=False
-        )
+        law = self.contacts.law.tiled(n)
+        found = march(law, w, E, start=self.start, slider=slider, jacobian=False, most=most)
         shape = (n, n_point)
         return replace(
             found,

@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 from upd.hbm.core.fourier import Harmonics, analysis, harmonics, synthesis, to_complex
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
-from upd.hbm.springs.friction import March
+from upd.hbm.springs.friction import MOST_PERIODS, March
 from upd.hbm.springs.points import stuck_stiffness
 
 FloatArray = NDArray[np.float64]
@@ -238,6 +238,33 @@ def aliasing(b: Balance, x: FloatArray, force: FloatArray) -> FloatArray:
         out[part] = np.abs(finer - force[part]).max(axis=(1, 2, 3)) / np.where(
             size > 0, size, np.inf
         )
+    return out
+
+
+def creep(b: Balance, x: FloatArray) -> FloatArray:
+    """Change of the contact force in as many periods again, relative: where points slip in two
+    directions, the traction across the slip settles over many periods.
+
+    Parameters
+    ----------
+    b : Balance
+    x : (n, n_unknown) ndarray
+        Answers.
+
+    Returns
+    -------
+    (n,) ndarray
+        Change of the coefficients, relative to the largest of them.
+    """
+    out = np.zeros(len(x))
+    for part in portions(len(x)):
+        W = b.coefficients(x[part])
+        few, more = (
+            b.marched(W, b.E, n).coefficients(b.Q) for n in (MOST_PERIODS, 2 * MOST_PERIODS)
+        )
+        size = np.abs(more).max(axis=(1, 2, 3))
+        change = np.abs(more - few).max(axis=(1, 2, 3))
+        out[part] = change / np.where(size > 0, size, np.inf)
     return out
 
 

@@ -138,6 +138,7 @@ def march(
     start: Start = "zero",
     slider: FloatArray | None = None,
     jacobian: bool = True,
+    most: int = MOST_PERIODS,
 ) -> March:
     """Periodic contact force of all points along a motion.
 
@@ -156,6 +157,8 @@ def march(
     jacobian : bool
         Whether the derivative is wanted; it is exact for the discrete march, through all its
         periods.
+    most : int
+        Periods at most.
 
     Returns
     -------
@@ -167,7 +170,7 @@ def march(
     state, slope = np.zeros((n_point, n), dtype=np.int8), np.zeros((n_point, 3, n))
     tangent = np.zeros((n_point, rows - 1, n, rows * size) if jacobian else (1, 0, 0, 0))
     periodic, periods = np.zeros(n_point, dtype=np.bool_), np.zeros(n_point, dtype=np.int64)
-    begin = (START_CODE[start], np.zeros((n_point, 2)) if slider is None else slider, MOST_PERIODS)
+    begin = (START_CODE[start], np.zeros((n_point, 2)) if slider is None else slider, most)
     filled = (force, weighed, state, slope, tangent)
     march_points(w, E, law.arrays, begin, jacobian, filled, periodic, periods)
     return March(force, weighed, state, slope, tangent if jacobian else None, periodic, periods)
