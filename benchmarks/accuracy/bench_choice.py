@@ -123,7 +123,7 @@ def rows(name: str, found: BestDamper, took: float, grid: GridCheck) -> Iterator
     }
     for growth, told in zip(GROWTHS, chosen.reaches["damper.centrifugal"], strict=True):
         # points up to an end that is told; up to the bound where none is
-        low, high = (end.end for end in told)
+        low, high = told
         inside = ~((grid.values < low) | (grid.values > high)) & np.isfinite(grid.heights)
         if not inside.any():
             continue

@@ -195,13 +195,7 @@ def plan_study(scene: AnyScene, vary: str, asked: Asked = None) -> Study:
     """
     offered = ladders_of(scene)
     if vary not in offered:
-        known = ", ".join(offered)
-        way = (
-            f"choose one of {known}"
-            if known
-            else "no levels of such a scene are known; use a sweep"
-        )
-        raise InputError(f"--vary {vary}: {way}")
+        raise InputError(f"--vary {vary}: choose one of {', '.join(offered) or 'none: sweep it'}")
     ladder = offered[vary]
     analysis = analysis_of(scene)
     wanted = dict.fromkeys((*analysis.verdict_names, *analysis.headline_names, *ladder.follow))

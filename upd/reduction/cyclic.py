@@ -149,7 +149,7 @@ class Sector(Shown):
     def field(self, x: Field, nodal_diameter: int) -> Field:
         """Displacements (3 n_node, ...) of the whole sector from the unknowns (n, ...)."""
         T0, T1 = self._maps
-        phase = _phase(nodal_diameter, self.n_sectors)
+        phase = phase_of(nodal_diameter, self.n_sectors)
         out: Field = T0 @ x + (phase.real if phase.imag == 0.0 else phase) * (T1 @ x)
         return out
 
@@ -190,11 +190,11 @@ def _mismatch(points: FloatArray, low: IntArray, high: IntArray, N: int, offset:
     )
 
 
-def _phase(n: int, N: int) -> complex:
-    """exp(2 pi i n/N), exactly real for n = 0 and N/2."""
-    return (
-        float(1 - 2 * (2 * n // N)) + 0j if 2 * n % N == 0 else complex(np.exp(2j * np.pi * n / N))
-    )
+def phase_of(n: int, N: int) -> complex:
+    """exp(2 pi i n/N), exactly real for multiples of N/2."""
+    if 2 * n % N == 0:
+        return complex((-1.0) ** (2 * n // N))
+    return complex(np.exp(2j * np.pi * n / N))
 
 
 class CyclicMatrix(NamedTuple):
@@ -213,7 +213,7 @@ class CyclicMatrix(NamedTuple):
 
     def at(self, nodal_diameter: int) -> csr_array:
         """(n, n) K_n, real for n = 0 and N/2."""
-        phase = _phase(nodal_diameter, self.n_sectors)
+        phase = phase_of(nodal_diameter, self.n_sectors)
         real = self.same + phase.real * (self.following + self.following.T)
         if phase.imag == 0.0:
             return csr_array(real)
@@ -390,7 +390,7 @@ class ModeFamily(Shown):
 
 def _dense(A: CyclicMatrix, n: int) -> Field:
     """K_n of a projected matrix."""
-    phase = _phase(n, A.n_sectors)
+    phase = phase_of(n, A.n_sectors)
     K = A.same + phase * A.following + phase.conjugate() * A.following.T
     return np.asarray(K.real if phase.imag == 0.0 else 0.5 * (K + K.conj().T))
 

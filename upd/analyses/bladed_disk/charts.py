@@ -71,14 +71,8 @@ def _by_diameter(group: Group) -> Chart:
     speed, case, marks = scalar(group, "speed"), case_of(group), list[Mark]()
     x = Axis("nodal diameter", ticks=tuple((k, f"{k:g}") for k in n[:: 1 + len(n) // 16].tolist()))
     if speed is None:
-        return Chart(
-            "Frequencies by nodal diameter",
-            x,
-            _HZ,
-            tuple(traces),
-            case=case.label,
-            figure="nodal_diameters",
-        )
+        shown: dict[str, Any] = {"case": case.label, "figure": "nodal_diameters"}
+        return Chart("Frequencies by nodal diameter", x, _HZ, tuple(traces), **shown)
     N, per_order = int(group["sectors"].data), speed / 60.0
     orders = np.arange(int(f.max() / per_order) + 1)
     at = np.minimum(orders % N, -orders % N)

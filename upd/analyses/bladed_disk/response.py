@@ -85,9 +85,9 @@ def gap_of(sector: ReducedSector, wedge: Wedge, f_c: float) -> WedgeGap:
     ends = [one.mean(axis=0) for one in (sector.high, sector.low)]
     # half way between both platforms
     middle = np.mean([np.arctan2(end[1], end[0]) for end in ends])
-    radial, across, axial = turn(float(middle)).T
-    centre = wedge.radius * radial + np.mean([end[2] for end in ends]) * axial
     own = turn(float(middle))
+    radial, across, axial = own.T
+    centre = wedge.radius * radial + np.mean([end[2] for end in ends]) * axial
     damper = rigid_damper(wedge.mass, own * wedge.inertia @ own.T, centre, f_c * radial)
     lean = np.radians(wedge.angle)
     normals = [np.cos(lean) * radial + side * np.sin(lean) * across for side in (-1.0, 1.0)]

@@ -265,10 +265,9 @@ def _oscillating(curve: PointCurve) -> Iterator[Check]:
     motions: dict[int, tuple[float, Any]] = {}
     for (side, number), top in curve.tops.items():
         if top.slips and number not in motions:
-            below = curve.stayed(side, number)
-            sample = None if below is None else below.sample
-            f = top.frequency if sample is None else float(answer.frequency[sample])
-            motions[number] = f, top.x if sample is None else answer.x[sample]
+            motions[number] = top.frequency, top.x
+            if below := curve.stayed(side, number):
+                motions[number] = float(answer.frequency[below.sample]), answer.x[below.sample]
     for number, (f, x) in motions.items():
         label, multipliers = motion_stability(answer.balance, x, f)
         if label == OSCILLATING:

@@ -227,18 +227,18 @@ def aliasing(b: Balance, x: FloatArray, force: FloatArray) -> FloatArray:
     (n,) ndarray
         Change of the coefficients, relative to the largest of them.
     """
-    E, Q, out = (
-        synthesis(b.harmonics, 2 * b.samples),
-        analysis(b.harmonics, 2 * b.samples),
-        np.zeros(len(x)),
-    )
-    for part in portions(len(x)):
-        finer = b.marched(b.coefficients(x[part]), E).coefficients(Q)
-        size = np.abs(force[part]).max(axis=(1, 2, 3))
-        out[part] = np.abs(finer - force[part]).max(axis=(1, 2, 3)) / np.where(
-            size > 0, size, np.inf
-        )
-    return out
+    E, Q = (of(b.harmonics, 2 * b.samples) for of in (synthesis, analysis))
+    parts = [
+        _change(b.marched(b.coefficients(x[part]), E).coefficients(Q), force[part])
+        for part in portions(len(x))
+    ]
+    return np.concatenate([np.zeros(0), *parts])
+
+
+def _change(force: FloatArray, known: FloatArray) -> FloatArray:
+    """(n,) largest change of coefficients (n, n_point, 1 + d, size), over the largest of them."""
+    size = np.abs(known).max(axis=(1, 2, 3))
+    return np.asarray(np.abs(force - known).max(axis=(1, 2, 3)) / np.where(size > 0, size, np.inf))
 
 
 def creep(b: Balance, x: FloatArray) -> FloatArray:
@@ -256,16 +256,11 @@ def creep(b: Balance, x: FloatArray) -> FloatArray:
     (n,) ndarray
         Change of the coefficients, relative to the largest of them.
     """
-    out = np.zeros(len(x))
-    for part in portions(len(x)):
-        W = b.coefficients(x[part])
-        few, more = (
-            b.marched(W, b.E, n).coefficients(b.Q) for n in (MOST_PERIODS, 2 * MOST_PERIODS)
-        )
-        size = np.abs(more).max(axis=(1, 2, 3))
-        change = np.abs(more - few).max(axis=(1, 2, 3))
-        out[part] = change / np.where(size > 0, size, np.inf)
-    return out
+    parts = []
+    for W in (b.coefficients(x[part]) for part in portions(len(x))):
+        few, more = (b.marched(W, b.E, k * MOST_PERIODS).coefficients(b.Q) for k in (1, 2))
+        parts.append(_change(few, more))
+    return np.concatenate([np.zeros(0), *parts])
 
 
 def portions(n: int) -> list[slice]:

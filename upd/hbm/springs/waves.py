@@ -49,6 +49,7 @@ from upd.hbm.springs.points import Contacts
 from upd.hbm.springs.response import FrequencyResponse, GivenSystem, force_of, response_of
 from upd.hbm.springs.time_integration import SteadyState, steady_state
 from upd.linalg.parallel import threads_for
+from upd.reduction.cyclic import phase_of
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -80,14 +81,6 @@ def nodal_diameters(
     """
     waves = (h * engine_order % n_sectors for h in (0, *harmonics))
     return tuple(sorted({min(n, n_sectors - n) for n in waves}))
-
-
-def _turn(n: int, n_sectors: int) -> complex:
-    """exp(2 pi i n / N), exactly real at 0 and N/2."""
-    n %= n_sectors
-    if 2 * n % n_sectors == 0:
-        return -1.0 if n else 1.0
-    return complex(np.exp(2j * np.pi * n / n_sectors))
 
 
 @dataclass(frozen=True)
@@ -126,7 +119,7 @@ class Waves:
             m = self.modes[min(n, N - n)]
             if 2 * n > N:
                 m = Modal(m.Phi.conj(), m.eigenvalues, m.damping.conj(), m.rigid)
-            rows = (self.near + self.far * _turn(n, N)).reshape(-1, len(m.Phi))
+            rows = (self.near + self.far * phase_of(n, N)).reshape(-1, len(m.Phi))
             self._parts[n] = m, rows @ m.Phi
         return self._parts[n]
 
@@ -340,7 +333,7 @@ def _one_order(what: str, force: ComplexArray, n: int, order: int, N: int) -> Co
     """Force of sector 0, from it or from those of all sectors."""
     if force.shape != (N, n):
         return force
-    phases = np.array([_turn(j * order, N) for j in range(N)])
+    phases = np.array([phase_of(j * order, N) for j in range(N)])
     off = np.abs(force - phases[:, None] * force[0]).max()
     if off > ALIKE * np.abs(force).max():
         raise InputError(
@@ -376,7 +369,7 @@ def all_sectors(b: WaveBalance) -> Balance:
         raise InputError(f"all sectors: give the nodal diameters {missing} as well")
     modes = [waves.modes[d] for d in range(N // 2 + 1)]
     for d, m in enumerate(modes):
-        each = np.array([_turn(j * d, N) for j in range(N)])[:, None, None] * m.Phi
+        each = np.array([phase_of(j * d, N) for j in range(N)])[:, None, None] * m.Phi
         shapes = each.reshape(-1, each.shape[-1]) / N**0.5
         c = np.diag(m.damping) if m.proportional else m.damping
         if 2 * d % N == 0:
@@ -400,7 +393,9 @@ def all_sectors(b: WaveBalance) -> Balance:
     for j in range(N):
         rows[j, :, :, j] += waves.near
         rows[j, :, :, (j + 1) % N] += waves.far
-    turns = np.array([[_turn(j * waves.number(int(k)), N) for j in range(N)] for k in _k(b)])
+    turns = np.array(
+        [[phase_of(j * waves.number(k), N) for j in range(N)] for k in b.harmonics.dynamic.tolist()]
+    )
     return Balance(
         whole,
         Contacts(rows.reshape(N * n_point, d1, N * n), b.contacts.law.tiled(N)),
@@ -411,10 +406,6 @@ def all_sectors(b: WaveBalance) -> Balance:
         b.start,
         None if b.slider is None else np.tile(b.slider, (N, 1)),
     )
-
-
-def _k(b: Balance) -> list[int]:
-    return [int(k) for k in b.harmonics.dynamic]
 
 
 def spread_to_all(b: WaveBalance, x: FloatArray, whole: Balance) -> FloatArray:
@@ -433,8 +424,8 @@ def spread_to_all(b: WaveBalance, x: FloatArray, whole: Balance) -> FloatArray:
     """
     (W, a), N, o = b.split(x), b.waves.n_sectors, b.harmonics.offset
     out = np.repeat(W[None], N, axis=0)
-    for i, k in enumerate(_k(b)):
-        turns = np.array([_turn(j * b.waves.number(k), N) for j in range(N)])
+    for i, k in enumerate(b.harmonics.dynamic.tolist()):
+        turns = np.array([phase_of(j * b.waves.number(k), N) for j in range(N)])
         wave = turns[:, None, None] * (W[..., o + 2 * i] - 1j * W[..., o + 2 * i + 1])
         out[..., o + 2 * i], out[..., o + 2 * i + 1] = wave.real, -wave.imag
     # modes of nodal diameter 0 come first, each over all sectors
@@ -512,5 +503,5 @@ def wave_in_time(
         tolerance=tolerance,
     )
     q = to_complex(steady.coefficients, b.harmonics)[:, 0].reshape(N, -1)
-    back = np.array([_turn(-j * b.waves.number(k), N) for j in range(N)])
+    back = np.array([phase_of(-j * b.waves.number(k), N) for j in range(N)])
     return WaveInTime(back * (q @ np.asarray(row, dtype=float)), steady)
