@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from upd.analyses.base import Analysis, Plan
-from upd.scene import AnyScene
+from upd.scene import AnyScene, as_scene
 from upd.vary.inputs import with_input_cost
 
 if TYPE_CHECKING:
@@ -54,11 +55,12 @@ def ladders_of(scene: AnyScene) -> Mapping[str, Ladder]:
     return {vary: ladder for vary, ladder in offered.items() if ladder.applies(scene)}
 
 
-def make_plan(scene: AnyScene) -> Plan[Any]:
-    """Derive the plan of ``scene``.
+def make_plan(scene: AnyScene | str | Path | Mapping[str, Any]) -> Plan[Any]:
+    """Derive the plan of ``scene``: loaded, a ready name, a .toml path or a mapping.
 
     What will be simulated, what not and why, size and cost. Raises InputError.
     """
-    analysis = analysis_of(scene)
-    plan: Plan[Any] = with_input_cost(analysis, analysis.make_plan(scene))
+    loaded = as_scene(scene)
+    analysis = analysis_of(loaded)
+    plan: Plan[Any] = with_input_cost(analysis, analysis.make_plan(loaded))
     return plan

@@ -25,7 +25,7 @@ from upd.batch.point import Task
 from upd.batch.store import PointStore
 from upd.cache.files import write_text
 from upd.cache.sources import source_digest
-from upd.errors import InputError
+from upd.errors import InputError, did_you_mean
 from upd.linalg import select
 from upd.plot.matplotlib import draw_all, write_sheets
 from upd.plot.work_precision import work_precision_charts
@@ -195,7 +195,8 @@ def plan_study(scene: AnyScene, vary: str, asked: Asked = None) -> Study:
     """
     offered = ladders_of(scene)
     if vary not in offered:
-        raise InputError(f"--vary {vary}: choose one of {', '.join(offered) or 'none: sweep it'}")
+        known = f"choose one of {', '.join(offered) or 'none: sweep it'}"
+        raise InputError(f"--vary {vary}: no such study{did_you_mean(vary, offered, known)}")
     ladder = offered[vary]
     analysis = analysis_of(scene)
     wanted = dict.fromkeys((*analysis.verdict_names, *analysis.headline_names, *ladder.follow))

@@ -375,7 +375,7 @@ def design(
             found = design_damper(
                 loaded, minimise=minimise, over=over or [], for_=for_ or [], progress=live
             )
-    terminal.console.print(str(found), soft_wrap=True)
+    terminal.console.print(found.table(), soft_wrap=True)
     folder = out or Path("runs") / f"{found.figure}-{loaded.name}"
     found.write(folder)
     terminal.console.print(f"Report: {folder / 'report.html'}", soft_wrap=True)
@@ -423,7 +423,7 @@ def fit(
         folder = out or Path("runs") / f"fit-{loaded.name}"
         found = fit_inputs(loaded, to, vary, starts=starts, out=folder, progress=live)
         for line in (
-            str(found),
+            found.table(),
             f"Scene: {folder / found.scene.name}.toml",
             f"Figure: {folder / 'fit.png'}",
             f"Report: {folder / 'report.html'}",

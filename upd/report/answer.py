@@ -1,9 +1,10 @@
-"""The answer of a run, the same in the terminal and in `print(result)`: verdict, tables, checks,
-cost, files and what warns.
+"""The answer of a run in the terminal: verdict, tables, checks, cost, files and what warns; and in
+`print(result)`: the ten lines of it that matter most.
 """
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -14,7 +15,7 @@ from upd.analyses import analysis_named
 from upd.analyses.base import CHOSEN_BY_ACCURACY
 from upd.labels import check_number, number, percent, percent_of, plus_minus, shown
 from upd.plot.chart import Entry
-from upd.report.columns import whole_table
+from upd.report.columns import SHORT, whole_table
 from upd.report.tables import (
     MAIN,
     MOST_NOTES,
@@ -97,6 +98,29 @@ def answer(
         ):
             lines += _table(table, width)
     return lines + end
+
+
+def short_answer(summary: Mapping[str, Any], width: int, folder: Path | None) -> list[str]:
+    """Verdict, main numbers, checks, cost and the first warning, on at most ten lines."""
+    size, results = summary["size"], summary["results"]
+    cost = _cost(summary).partition(";")[0]
+    end = [_checked(summary).partition(". Left out")[0]]
+    end += [f"{cost}; all {len(results)} numbers: .table()".removeprefix("; ")]
+    end += [f"Run folder: {folder}"] * (folder is not None)
+    if outcome_of(summary["status"]) != FAILED:
+        noted = warnings(summary["checks"], results, 1)
+        names = "; ".join(re.split(r" \(|: ", text, maxsplit=1)[0] for text in noted)
+        text = f"Warnings, with what to do in .table(): {names}"
+        end += [textwrap.shorten(text, width, placeholder=" ...")] * bool(noted)
+    lines = [line.text for line in _verdict(summary, width)]
+    first = _most_important(summary)
+    for entry in main_numbers(size, results):
+        if entry is not first and len(lines) + len(end) < SHORT:
+            case = f"{entry['case']}: " * bool(entry["case"])
+            text = f"  {case}{number_label(entry['name'])} {shown(entry)} {plus_minus(entry)}"
+            beside = f" {_beside(entry)}" if entry["reference"] is not None else ""
+            lines.append(text + beside if len(text + beside) <= width else text)
+    return [*(line.rstrip() for line in lines), *end][:SHORT]
 
 
 def _table(table: AnswerTable, width: int, *, cut: bool = False) -> list[AnswerLine]:

@@ -18,7 +18,7 @@ from upd.cache.sources import versions
 from upd.errors import InputError, one_line
 from upd.plot.chart import Chart
 from upd.plot.matplotlib import chart_png, draw_all, write_sheet
-from upd.report.columns import whole_table
+from upd.report.columns import SHORT, whole_table
 from upd.report.page import Section, Verdict, image_uri, make_panels, page_text, versions_text
 from upd.results.answer_table import AnswerTable
 from upd.scene import AnyScene
@@ -168,7 +168,8 @@ class FigureAnswer(ABC):
         """Draw the charts of its figure with matplotlib, and return the axes."""
         return draw_all(self.charts)
 
-    def __str__(self) -> str:
+    def table(self) -> str:
+        """Its verdict, all its tables and its notes as text."""
         lines = wrapped(self.verdict, "")
         for table in self.tables:
             if table.rows:
@@ -178,9 +179,10 @@ class FigureAnswer(ABC):
         return "\n".join([*lines, *(line for note in self.notes for line in wrapped(note, ""))])
 
     def __repr__(self) -> str:
-        return str(self)
+        lines = self.table().splitlines()
+        return "\n".join(lines if len(lines) <= SHORT else [*lines[: SHORT - 1], "... .table()"])
 
     def _repr_html_(self) -> str:
         """As a notebook shows it: its text and its figure."""
         uri = image_uri(chart_png(self.charts))
-        return f'<pre>{escape(str(self))}</pre><img src="{uri}">'
+        return f'<pre>{escape(self.table())}</pre><img src="{uri}">'

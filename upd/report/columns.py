@@ -17,6 +17,8 @@ WIDTH = 120
 _LEAST_WIDTH = 40
 #: most lines of a column's head
 _HEAD_LINES = 3
+#: most lines that `print` shows of a result
+SHORT = 10
 #: characters of a column of words that are read with ease
 _WORDS = 20
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from upd.errors import ConvergenceError, InputError, did_you_mean
-from upd.report.answer import AnswerLine, Written, answer
+from upd.report.answer import AnswerLine, Written, answer, short_answer
 from upd.report.columns import text_width
 from upd.report.tables import analysis_charts, answer_tables, main_numbers
 from upd.results import FAILED, OK, Case, Check, Result, outcome_of
@@ -145,7 +145,9 @@ class RunResult:
         return [draw(chosen[0], ax)]
 
     def table(self) -> str:
-        """All its numbers as text, a line each: name, case, value, unit, bound of the error."""
+        """Its answer as the terminal prints it with --full: all numbers with the bounds of their
+        errors, effects, checks, sources of errors, cost.
+        """
         return "\n".join(line.text for line in self.answer(text_width(), full=True))
 
     def to_xarray(self) -> dict[str, Any]:
@@ -175,7 +177,7 @@ class RunResult:
         return answer(self.summary(), width, Written(self.folder, self.faults), full=full)
 
     def __repr__(self) -> str:
-        return "\n".join(line.text for line in self.answer(text_width()))
+        return "\n".join(short_answer(self.summary(), text_width(), self.folder))
 
     __str__ = __repr__
 
@@ -212,12 +214,12 @@ def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Cha
         return list({chart.title: chart for chart in reversed(found)}.values())[::-1][:_MOST_CHARTS]
     mine = [c for c in found if title is None or title.casefold() in c.title.casefold()]
     if not mine:
-        raise InputError(
-            f"plot: no chart {title!r}; there are "
-            f"{', '.join(dict.fromkeys(c.title for c in found))}"
-        )
+        titles = list(dict.fromkeys(c.title for c in found))
+        near = did_you_mean(title, titles, f"there are {', '.join(titles)}")
+        raise InputError(f"plot: no chart {title!r}{near}")
     cases = [c for c in mine if case is None or c.case == case]
     if not cases:
-        known = ", ".join(dict.fromkeys(c.case for c in mine if c.case))
-        raise InputError(f"plot: no chart of the case {case!r}; there are {known or 'none'}")
+        known = list(dict.fromkeys(c.case for c in mine if c.case))
+        near = did_you_mean(case, known, f"there are {', '.join(known) or 'none'}")
+        raise InputError(f"plot: no chart of the case {case!r}{near}")
     return cases[:_MOST_CHARTS] if case is None else cases

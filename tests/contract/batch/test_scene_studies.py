@@ -21,7 +21,7 @@ from upd.batch.studies import plan_study, point_task, run_study, scene_at
 from upd.cli import main
 from upd.cli.batch import study_columns
 from upd.cli.tables import print_table
-from upd.errors import InputError
+from upd.errors import InputError, did_you_mean
 from upd.mesh.recipes import build_mesh
 from upd.plot.work_precision import work_precision_charts
 from upd.results import Case, Result
@@ -89,7 +89,9 @@ def test_a_refusal_says_what_there_is(name: str, vary: str) -> None:
     scene = load_scene(name)
     with pytest.raises(InputError) as caught:
         plan_study(scene, vary)
-    assert str(caught.value) == f"--vary {vary}: choose one of {', '.join(ladders_of(scene))}"
+    offered = ladders_of(scene)
+    near = did_you_mean(vary, offered, f"choose one of {', '.join(offered)}")
+    assert str(caught.value) == f"--vary {vary}: no such study{near}"
 
 
 def test_the_load_that_is_studied() -> None:

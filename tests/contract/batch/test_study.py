@@ -193,7 +193,7 @@ def test_every_analysis_offers_its_studies(name: str, offered: set[str]) -> None
         # derivatives come from one set of modes, without points
         assert len(plan_study(scene, vary).points) > 1 or vary == "dimensions"
     for strange in SOME - offered:
-        with pytest.raises(InputError, match=f"--vary {strange}: choose one of "):
+        with pytest.raises(InputError, match=f"--vary {strange}: no such study"):
             plan_study(scene, strange)
 
 
@@ -201,6 +201,8 @@ def test_bad_study_arguments() -> None:
     scene = load_scene("hertz")
     with pytest.raises(InputError, match="choose one of"):
         plan_study(scene, "colour")
+    with pytest.raises(InputError, match="--vary meshes: no such study, did you mean 'mesh'"):
+        plan_study(scene, "meshes")
     with pytest.raises(InputError, match="even numbers"):
         plan_study(scene, "mesh", (9, 12))
     for name, vary in (

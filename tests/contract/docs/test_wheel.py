@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
-import venv
 import zipfile
 from pathlib import Path
 
@@ -40,9 +40,13 @@ def test_it_installs_one_package(wheel: Path) -> None:
     assert not any("__pycache__" in name or name.startswith("upd/manual") for name in names)
 
 
-def test_it_runs_elsewhere(wheel: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", ["3.11", "3.12", "3.13"])
+def test_it_runs_elsewhere(wheel: Path, tmp_path: Path, version: str) -> None:
     """In a fresh environment, from another folder: a scene, a recipe of one's own, the doctor."""
-    venv.create(tmp_path / "env", with_pip=True)
+    python = shutil.which(f"python{version}")
+    if python is None or subprocess.run([python, "-V"], check=False).returncode:
+        pytest.skip(f"Python {version} is not installed")
+    subprocess.run([python, "-m", "venv", tmp_path / "env"], check=True)
     bin_ = tmp_path / "env" / "bin"
     pins = ROOT / ".constraints.txt"
     subprocess.run([bin_ / "pip", "install", "-q", "-c", pins, wheel], check=True)

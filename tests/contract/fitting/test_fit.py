@@ -61,7 +61,7 @@ def test_determined_targets_are_recovered_and_the_written_scene_has_them(
     assert data["outcome"] == "Found"
     assert data["tables"][0]["rows"][0][3] == pytest.approx(found.value(RIGHT), rel=1e-12)
     assert min(png_size((tmp_path / "fit" / "fit.png").read_bytes())) > 300
-    assert max(map(len, str(found).splitlines())) <= 80
+    assert max(map(len, found.table().splitlines())) <= 80
 
 
 def test_answers_apart_from_each_other_are_all_told(scene: ForcedScene) -> None:
@@ -69,7 +69,7 @@ def test_answers_apart_from_each_other_are_all_told(scene: ForcedScene) -> None:
     made = numbers(scene, "stuck_in_phase,stuck_out_of_phase", [RIGHT, LEFT], [0.4, 0.07])
     found = upd.fit(scene, MODES.format(*made, w=""), [RIGHT, LEFT])
     assert found.status == "several"
-    assert "Other sets, times the scene's values" in str(found)
+    assert "Other sets, times the scene's values" in found.table()
     names = "stuck_in_phase,stuck_out_of_phase"
     for z in found.answers:
         assert numbers(scene, names, [RIGHT, LEFT], list(np.exp(z))) == pytest.approx(made)
@@ -124,7 +124,7 @@ def test_more_parameters_than_targets_are_told_as_a_family(scene: ForcedScene) -
         begin = np.array(found.answers[0])
         begin[k] = z
         assert residuals.met(residuals.solve(residuals.inside(begin), held=k).end)
-    assert str(found).count("not determined") == 1
+    assert found.table().count("not determined") == 1
 
 
 def test_friction_moves_no_linear_number(scene: ForcedScene) -> None:
@@ -176,7 +176,7 @@ def test_an_interval_that_is_not_of_first_order_is_the_profile_s(scene: ForcedSc
     assert inside.any()
     assert told[:2][inside] == pytest.approx(1.0, abs=0.02)
     assert np.abs(told[2:] - 1.0).max() > 0.1
-    assert "By profiles, in the same multiple" in " ".join(str(found).split())
+    assert "By profiles, in the same multiple" in " ".join(found.table().split())
 
 
 def test_what_a_target_within_limits_cannot_tell_is_unknown(scene: ForcedScene) -> None:

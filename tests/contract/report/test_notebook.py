@@ -48,8 +48,24 @@ def test_text_says_how_it_ended_and_the_main_numbers(sphere: RunResult) -> None:
     assert lines[0].startswith(f"hertz: ok - maximum pressure {pressure} (Hertz 2654, ")
     n = len(sphere.checks)
     assert f"Self-checks: {n} of {n} passed" in repr(sphere)
-    assert len(lines) <= 40
-    assert str(sphere.folder) in lines[-1]
+    assert f"Run folder: {sphere.folder}" in lines
+    assert any(line.startswith("  F=200 N: radius, second moment ") for line in lines)
+
+
+@pytest.mark.parametrize("columns", [80, 120])
+def test_print_has_ten_lines_and_the_table_all(
+    sphere: RunResult, columns: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However many numbers and warnings a run has."""
+    monkeypatch.setenv("COLUMNS", str(columns))
+    bad = [replace(check, value=2.0, limit=1.0, fatal=False) for check in sphere.checks]
+    warned = replace(sphere, checks=bad, folder=None, status=status_of(bad, sphere.results))
+    for result in (sphere, warned):
+        lines = repr(result).splitlines()
+        assert 5 < len(lines) <= 10
+        assert all(len(line) <= columns for line in lines if "folder" not in line)
+    assert lines[-1].startswith("Warnings, with what to do in .table(): ")
+    assert len(sphere.table().splitlines()) > 40
 
 
 def test_a_number_of_several_cases_asks_for_one(sphere: RunResult) -> None:

@@ -112,7 +112,7 @@ def test_what_is_told(found: BestDamper, tmp_path: Path) -> None:
     assert wide > tall > 400
     page = (tmp_path / "out" / "report.html").read_text()
     assert "worst peak" in page and "data:image/webp" in page
-    text = str(found)
+    text = found.table()
     assert text.startswith(f"{found.found.ranges.scene.name}: worst peak")
     sentences = " ".join(text.split())
     assert "best for" in sentences and "47 g as meshed" in sentences

@@ -218,7 +218,7 @@ def test_friction_known_within_limits() -> None:
     told = (
         "at 0.5 both faces carry in every motion; at 0.7 the damper jams, the left face lifts off"
     )
-    assert told in " ".join(str(found).split())
+    assert told in " ".join(found.table().split())
     ends = [(b.low, b.high) for c in found.charts for b in c.bands if "known within" in b.label]
     assert ends == [pytest.approx((0.5, 0.7))] * 2
 
@@ -233,7 +233,7 @@ def test_in_a_notebook() -> None:
     assert found.folder is None
     omega = 4000.0 * 2.0 * math.pi / 60.0
     assert found.statics.centrifugal == pytest.approx(7.8e-9 * 9180.0 * 300.0 * omega**2)
-    assert "F_C 3769.1 N = m r w^2: damper 71.604 g, 300 mm, 4000 rpm" in str(found)
+    assert "F_C 3769.1 N = m r w^2: damper 71.604 g, 300 mm, 4000 rpm" in found.table()
     page = found._repr_html_()
     assert "tilts" in page
     assert 'src="data:image/webp;base64,' in page

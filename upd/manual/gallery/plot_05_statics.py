@@ -8,7 +8,7 @@ Before any dynamics: the damper as a rigid body between two faces, in closed for
 import upd
 
 design = upd.design("symmetric-response")
-print(design)
+print(design.table())
 
 # %%
 # The same over the angles of the faces and over friction; the star is this damper:

@@ -16,7 +16,7 @@ found = upd.fit(
     overrides=["geometry.refine=0.5", "contact.rows=5"],
     starts=2,
 )
-print(found)
+print(found.table())
 
 # %%
 # What each input does to the targets, to first order:

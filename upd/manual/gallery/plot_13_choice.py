@@ -16,7 +16,7 @@ best = upd.design(
     over="damper.centrifugal=20:200",
     for_="excitation.force=0.5:2",
 )
-print(best)
+print(best.table())
 
 # %%
 # Left: the worst peak over F_C. Right: every peak over F_C/F_E.
