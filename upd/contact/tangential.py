@@ -357,7 +357,8 @@ class _TangentialSolver:
             else:
                 n = self.carried.size
                 rigid = np.kron(np.eye(2), np.ones((n, 1)))
-                self.disks = Coulomb(inner, rigid, np.ones(n), pressed=self.bound)
+                mu = np.ones(n)
+                self.disks = Coulomb(np.asarray(inner, np.float64), rigid, mu, pressed=self.bound)
 
     @property
     def n(self) -> int:
