@@ -41,8 +41,8 @@ from upd.errors import ConvergenceError, one_line
 from upd.hbm import climb
 from upd.hbm.core.fourier import to_complex
 from upd.hbm.faces.march import InterfaceMarch
-from upd.hbm.faces.settle import settle
 from upd.hbm.faces.state import InterfaceState
+from upd.hbm.faces.sweep import settle
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import STICK
 from upd.hbm.springs.peak import FIRST_REACH, is_near
