@@ -8,9 +8,48 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.hbm.springs.balance import Balance
-from upd.hbm.springs.friction import Harmonic
+from upd.hbm.springs.coulomb import LIFT
+from upd.hbm.springs.friction import MOST_PERIODS, START_CODE, Law, March, Start
+from upd.hbm.springs.period import march_points
 
 Array = NDArray[np.float64]
+
+
+class Derived(NamedTuple):
+    """Coefficients (n_point, 1 + d, size) of the contact force, their exact derivative by those of
+    the motion, and the period they were taken from.
+    """
+
+    force: Array
+    jacobian: Array
+    march: March
+
+
+def harmonic_force(
+    law: Law, X: Array, E: Array, Q: Array, *, start: Start = "zero", slider: Array | None = None
+) -> Derived:
+    """As `upd.hbm.springs.friction.harmonic_force`, with the derivative of the discrete march."""
+    n_point, rows, size = X.shape
+    w, n = np.ascontiguousarray(X @ E.T), len(E)
+    force, weighed = np.zeros((n_point, rows, n)), np.zeros((n_point, rows, n))
+    state, slope = np.zeros((n_point, n), dtype=np.int8), np.zeros((n_point, 3, n))
+    tangent = np.zeros((n_point, rows - 1, n, rows * size))
+    periodic, periods = np.zeros(n_point, dtype=np.bool_), np.zeros(n_point, dtype=np.int64)
+    sliders = np.zeros((n_point, 2)) if slider is None else slider
+    begin, filled = (START_CODE[start], sliders, MOST_PERIODS), (force, weighed, state, slope)
+    march_points(w, E, law.arrays, begin, True, (*filled, tangent), periodic, periods)
+    J = np.zeros((n_point, rows, size, rows, size))
+    for p in range(n_point):
+        block = np.eye(size)
+        if (state[p] == LIFT).any():
+            before, here, after = slope[p]
+            by_sample = here[:, None] * E
+            by_sample += before[:, None] * np.roll(E, 1, 0) + after[:, None] * np.roll(E, -1, 0)
+            block = Q @ by_sample
+        J[p, 0, :, 0, :] = law.k_n[p] * block
+    if rows > 1:
+        J[:, 1:] = np.matmul(Q, tangent).reshape(n_point, rows - 1, size, rows, size)
+    return Derived(weighed @ Q.T, J, March(force, weighed, state, periodic, periods))
 
 
 class Whole(NamedTuple):
@@ -21,14 +60,14 @@ class Whole(NamedTuple):
     residual: Array
     jacobian: Array
     by_frequency: Array
-    contact: Harmonic
+    contact: Derived
 
 
 def evaluate(b: Balance, x: Array, omega: float) -> Whole:
     """Residual w - u + G f(w) and the rigid equilibrium, with exact derivatives."""
     W, a = b.split(x)
-    contact, h, m = b.force(x, True), b.harmonics, b.modal
-    assert contact.jacobian is not None
+    h, m = b.harmonics, b.modal
+    contact = harmonic_force(b.contacts.law, W, b.E, b.Q, start=b.start, slider=b.slider)
     c, o, size = len(b.Psi), h.offset, h.size
     F, rigid_rows = contact.force.reshape(c, size), b.Psi[:, m.rigid]
     C = np.diag(m.damping) if m.proportional else m.damping

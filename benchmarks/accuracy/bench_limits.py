@@ -38,8 +38,8 @@ from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.march import InterfaceMarch
-from upd.hbm.faces.settle import SteadyPoint, settle
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
+from upd.hbm.faces.sweep import SteadyPoint, settle
 from upd.hbm.springs.peak import climb
 from upd.scene import load_scene
 

@@ -35,8 +35,8 @@ from upd.analyses.forced.interface_model import (
 from upd.analyses.forced.model import respond
 from upd.analyses.forced.plan import MARCH_SAMPLES
 from upd.hbm.faces.march import InterfaceMarch
-from upd.hbm.faces.settle import SteadyPoint, settle
 from upd.hbm.faces.state import InterfaceState
+from upd.hbm.faces.sweep import SteadyPoint, settle
 
 Row = dict[str, Any]
 RIGHT = 1

@@ -22,7 +22,7 @@ import upd
 from upd.errors import UpdError
 from upd.fem import Material, box_mesh, rigid_body_modes, stiffness
 from upd.linalg.multigrid import MultigridSolver
-from upd.linalg.solvers import DirectSolver, Solver
+from upd.linalg.schur import DirectSolver, Solver
 from upd.reduction.guyan import require_held
 
 Row = dict[str, Any]

@@ -7,8 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from upd.contact import normal_contact
-from upd.contact.edge import LocatedArea, located_area
-from upd.contact.patch import make_patch
+from upd.contact.patch import LocatedArea, located_area, make_patch
 from upd.reference import contact_modulus, half_space_compliance, hertz_sphere, sphere_gap
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from upd.contact import coupled_contact, normal_contact, tangential_path
-from upd.contact.locking import carries, self_locking
+from upd.contact.coulomb_conditions import carries, self_locking
 from upd.contact.rigid_damper import equilibrium
 from upd.errors import ConvergenceError, InputError
 from upd.reference import half_space_compliance

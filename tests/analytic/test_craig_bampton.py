@@ -10,8 +10,8 @@ from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, box_mesh, mass, rigid_body_modes, stiffness
-from upd.linalg import factorise, modes
-from upd.reduction import ErrorTarget, ReducedModel, craig_bampton, frequency_error, guyan_mass
+from upd.linalg import factorise, modes, schur_complement
+from upd.reduction import ErrorTarget, ReducedModel, craig_bampton, frequency_error
 
 EPS = np.finfo(float).eps
 STEEL = Material(200e3, 0.3)
@@ -43,16 +43,15 @@ def beam(clamped=True, shape=(10, 3, 3)):
 def test_without_modes_it_is_guyan():
     K, M, boundary, _, _ = beam()
     model = craig_bampton(K, M, boundary, n_modes=0)
-    np.testing.assert_allclose(
-        model.M, guyan_mass(M, K, boundary), rtol=0, atol=1e-12 * model.M.max()
-    )
+    T = schur_complement(K, boundary).recover(np.eye(12))
+    np.testing.assert_allclose(model.M, T.T @ (M @ T), rtol=0, atol=1e-12 * model.M.max())
     assert (model.n, model.n_boundary, model.n_modes) == (12, 12, 0)
     # Loads on the boundary give exact displacements everywhere.
     force = np.zeros(K.shape[0])
     force[boundary] = np.random.default_rng(0).standard_normal(12)
     exact = factorise(K)(force)
     np.testing.assert_allclose(
-        model.expand(np.linalg.solve(model.K, model.reduce_force(force))),
+        model.basis @ np.linalg.solve(model.K, model.basis.T @ force),
         exact,
         rtol=0,
         atol=1e-9 * abs(exact).max(),
@@ -86,7 +85,7 @@ def test_shapes_of_the_full_model_come_back():
     K, M, boundary, _, _ = beam()
     full = modes(K, M, count=3)
     model = craig_bampton(K, M, boundary, n_modes=30)
-    shapes = model.expand(model.modes(count=3).shapes)
+    shapes = model.basis @ model.modes(count=3).shapes
     mac = np.abs(np.einsum("ij,ij->j", full.shapes, M @ shapes))
     # 1 - MAC goes with the error of the eigenvalue over the gap.
     np.testing.assert_allclose(mac, 1.0, atol=1e-4)
@@ -138,7 +137,7 @@ def test_floating_body_keeps_six_rigid_motions(given):
     full = modes(K, M, count=10)
     np.testing.assert_allclose(found.frequency[6:9], full.frequency[6:9], rtol=1e-3)
     # Their displacement is rigid: nothing is left of it off the span of the six.
-    shapes = model.expand(found.shapes[:, :6])
+    shapes = model.basis @ found.shapes[:, :6]
     rest = shapes - rigid @ (rigid.T @ shapes)
     assert np.linalg.norm(rest) < 1e-6 * np.linalg.norm(shapes)
     # The mass of a unit translation is the body's own.
@@ -155,18 +154,17 @@ def test_rigid_modes_of_a_held_body_are_refused():
         craig_bampton(K, M, boundary, n_modes=2, rigid_modes=rigid_body_modes(mesh.points)[free])
 
 
-@pytest.mark.parametrize("ending", [".nc", ".npz"])
-def test_saved_and_loaded(tmp_path, ending):
+def test_saved_and_loaded(tmp_path):
     K, M, boundary, _, _ = beam(shape=(4, 2, 1))
     model = craig_bampton(K, M, boundary, n_modes=5, rows=boundary)
-    again = ReducedModel.load(model.save(tmp_path / f"blade{ending}"))
+    again = ReducedModel.load(model.save(tmp_path / "blade.nc"))
     for name in ("K", "M", "boundary", "fixed_frequency", "rows", "basis"):
         a, b = getattr(model, name), getattr(again, name)
         assert a.dtype == b.dtype
         np.testing.assert_array_equal(a, b)
     assert again.n_dof == model.n_dof
     empty = model.truncated(0)
-    assert ReducedModel.load(empty.save(tmp_path / f"static{ending}")).n_modes == 0
+    assert ReducedModel.load(empty.save(tmp_path / "static.nc")).n_modes == 0
     assert len(list(tmp_path.iterdir())) == 2
 
 
@@ -179,10 +177,6 @@ def test_only_the_rows_asked_for_are_kept():
     np.testing.assert_array_equal(model.at([5, 7]), whole.basis[[5, 7]])
     with pytest.raises(InputError, match="not kept"):
         model.at([11])
-    force = np.zeros(K.shape[0])
-    force[11] = 1.0
-    with pytest.raises(InputError, match="dof 11"):
-        model.reduce_force(force)
     with pytest.raises(InputError, match="not on the boundary"):
         model.coordinates([5])
 
@@ -209,19 +203,14 @@ def test_bad_files_and_a_body_that_floats_inside(tmp_path):
     with pytest.raises(ConvergenceError, match="floats"):
         craig_bampton(K, M, boundary[:3], n_modes=2)
     model = craig_bampton(K, M, boundary, n_modes=2)
-    with pytest.raises(InputError, match="one of these endings"):
+    with pytest.raises(InputError, match="give the ending"):
         model.save(tmp_path / "model.txt")
     with pytest.raises(InputError, match="cannot be written"):
         model.save(tmp_path / "nowhere" / "model.nc")
     with pytest.raises(InputError, match="cannot be read"):
-        ReducedModel.load(tmp_path / "absent.npz")
-    np.savez(tmp_path / "other.npz", a=1)
-    with pytest.raises(InputError, match="cannot be read"):
-        ReducedModel.load(tmp_path / "other.npz")
+        ReducedModel.load(tmp_path / "absent.nc")
     (tmp_path / "text.nc").write_text("no netCDF")
     with pytest.raises(InputError, match="cannot be read"):
         ReducedModel.load(tmp_path / "text.nc")
     with pytest.raises(InputError, match="0 to 2"):
         model.truncated(3)
-    with pytest.raises(InputError, match="Coordinates"):
-        model.expand(np.zeros(3))

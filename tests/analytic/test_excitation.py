@@ -27,8 +27,8 @@ from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.march import InterfaceMarch
-from upd.hbm.faces.settle import settle
 from upd.hbm.faces.state import InterfaceModel
+from upd.hbm.faces.sweep import settle
 from upd.hbm.springs.time_integration import steady_state
 from upd.progress import Stages, silent
 from upd.scene import load_scene

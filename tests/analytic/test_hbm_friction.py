@@ -104,9 +104,7 @@ def test_a_motion_straight_between_its_samples_is_marched_exactly(
         [[np.interp(share, np.arange(corners), row, period=corners) for row in p] for p in w]
     )
     parameters = point(tangents, preload).tiled(len(w))
-    coarse, exact = (
-        march(parameters, m, np.zeros((m.shape[-1], 1)), jacobian=False) for m in (w, fine)
-    )
+    coarse, exact = (march(parameters, m, np.zeros((m.shape[-1], 1))) for m in (w, fine))
     assert states <= set(np.unique(coarse.state))
     forgets = coarse.periodic & exact.periodic & (coarse.state != STICK).any(axis=1)
     assert forgets.sum() >= 20
@@ -130,7 +128,7 @@ def test_error_falls_with_the_square_of_the_sample(tangents: int, preload: float
     parameters = point(tangents, preload).tiled(len(X))
 
     def found(n: int) -> Harmonic:
-        return harmonic_force(parameters, X, synthesis(h, n), analysis(h, n), jacobian=False)
+        return harmonic_force(parameters, X, synthesis(h, n), analysis(h, n))
 
     exact = found(fine)
     at_samples, of_coefficients = [], []

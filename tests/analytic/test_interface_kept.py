@@ -13,7 +13,6 @@ from upd.analyses.seated.interface import make_interface
 from upd.hbm.faces.equations import InterfaceEquations
 from upd.hbm.faces.kept import border, kept_inverses, kept_step
 from upd.hbm.faces.march import InterfaceMarch
-from upd.hbm.faces.settle import SteadyPoint, settle
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
 from upd.hbm.faces.step import (
     FEW,
@@ -24,6 +23,7 @@ from upd.hbm.faces.step import (
     contact_step,
     newton_rows,
 )
+from upd.hbm.faces.sweep import SteadyPoint, settle
 from upd.scene import load_scene
 
 F_C, MU = 350.0, 0.6

@@ -25,10 +25,9 @@ from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, mass, stiffness
 from upd.hbm.faces.march import InterfaceMarch, modal_step, resolved
 from upd.hbm.faces.period import march_steps
-from upd.hbm.faces.settle import settle
 from upd.hbm.faces.state import InterfaceModel, InterfaceState, resting
 from upd.hbm.faces.step import OPEN, SLIP, STICK, contact_scratch, contact_step, judge
-from upd.hbm.faces.sweep import stepped_sine
+from upd.hbm.faces.sweep import settle, stepped_sine
 from upd.linalg import modes
 from upd.linalg.compiled import compiled
 from upd.scene import load_scene

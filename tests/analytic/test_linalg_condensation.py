@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
-from upd.fem import Material, RigidSet, Supports, box_mesh, mass, rigid_body_modes, stiffness
+from upd.fem import Material, RigidSet, Supports, box_mesh, rigid_body_modes, stiffness
 from upd.linalg import (
     amg_solve,
     available,
@@ -19,7 +19,7 @@ from upd.linalg import (
 )
 from upd.linalg import select as select_module
 from upd.linalg.select import has_pardiso
-from upd.reduction import condense, guyan_mass
+from upd.reduction import condense
 
 DIRECT = [
     pytest.param(
@@ -205,32 +205,6 @@ def test_multigrid_with_a_rigid_set():
     found = compliance_amg(K, reduction.rigid["top"], modes, layout=layout)
     expected = condense(K, reduction.rigid["top"], solver="superlu").compliance()
     np.testing.assert_allclose(found.C, expected, atol=1e-8 * abs(expected).max())
-
-
-def test_condensed_mass():
-    """A rigid motion of the whole body keeps its mass.
-
-    a clamped column gets the known share of its own.
-    """
-    mesh = box_mesh(*(np.linspace(0.0, 10.0, 4),) * 3)
-    K, M = stiffness(mesh, STEEL, "hex8"), mass(mesh, STEEL)
-    kept = (3 * mesh.nodes["z1"][:, None] + np.arange(3)).ravel()
-    m = guyan_mass(M, K, kept)
-    assert np.array_equal(m, m.T)
-    for component in range(3):
-        e = np.tile(np.eye(3)[component], len(kept) // 3)
-        assert e @ m @ e == pytest.approx(7.8e-9 * 1000.0, rel=1e-10)
-    # Two-node rod of consistent mass on its free end, clamped at the other: m/3.
-    rod = guyan_mass(
-        csr_array(np.array([[2 / 6 * 2, 1 / 6], [1 / 6, 2 / 6]])),
-        csr_array(np.array([[2.0, -1.0], [-1.0, 1.0]])),
-        [1],
-    )
-    assert rod[0, 0] == pytest.approx(
-        2.0 / 3.0, rel=1e-14
-    )  # linear shape over length 2, mass 2: a third of it
-    with pytest.raises(InputError, match="same dofs"):
-        guyan_mass(M[:3][:, :3], K, kept)
 
 
 def test_model_of_cost():

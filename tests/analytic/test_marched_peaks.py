@@ -24,8 +24,8 @@ from upd.analyses.forced.sweeps import (
     marched_loops,
 )
 from upd.hbm.faces.march import InterfaceMarch
-from upd.hbm.faces.record import period_of_sweep, recorded_period
 from upd.hbm.faces.step import OPEN, SLIP, STICK
+from upd.hbm.faces.sweep import period_of_sweep, recorded_period
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 

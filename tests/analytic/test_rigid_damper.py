@@ -14,16 +14,13 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from upd.contact.damper_section import (
-    DamperSection,
-    FaceSection,
-    admissible_forces,
-    eccentricity,
-    moment_share,
-)
 from upd.contact.rigid_damper import (
     SLIDINGS,
+    DamperSection,
+    FaceSection,
     Sliding,
+    admissible_forces,
+    eccentricity,
     equilibrium,
     face_forces,
     force_limits,
@@ -31,6 +28,7 @@ from upd.contact.rigid_damper import (
     friction_limits,
     jams,
     lifted,
+    moment_share,
 )
 from upd.errors import InputError
 

@@ -19,8 +19,7 @@ from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.sweeps import both_ways, sweep_maxima
 from upd.errors import InputError
 from upd.hbm.faces.march import InterfaceMarch
-from upd.hbm.faces.settle import settle
-from upd.hbm.faces.sweep import stepped_sine
+from upd.hbm.faces.sweep import settle, stepped_sine
 from upd.hbm.springs.time_integration import steady_state
 from upd.progress import Stages, silent
 from upd.scene import load_scene

@@ -135,4 +135,4 @@ def test_points_that_only_slipped_before_are_not_taken_for_sticking() -> None:
     assert parts is not None
     assert (whole.contact.march.state[0, 32:] == 0).all()
     assert parts.state[0] == MOVES
-    np.testing.assert_allclose(parts.DF[0], whole.contact.jacobian[0], atol=1e-12)  # type: ignore[index]
+    np.testing.assert_allclose(parts.DF[0], whole.contact.jacobian[0], atol=1e-12)

@@ -5,6 +5,7 @@ The same answers, without any help from Newton or the primal-dual set.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ import pytest
 from numpy.typing import NDArray
 
 from upd.contact import TangentialHistory, normal_contact, tangential_contact
+from upd.contact.coulomb import Coulomb
+from upd.contact.coulomb_conditions import AskedStep, CoupledStep
 
 FloatArray = NDArray[np.float64]
 
@@ -71,7 +74,12 @@ def test_convex_search_alone(seed: int, level: float, monkeypatch: pytest.Monkey
     pull = rng.normal(size=2)
     load = level * s.sum() * pull / np.hypot(*pull)
     by_load = tangential_contact(C, s, load=load)
-    monkeypatch.setattr("upd.contact.disk.NEWTON_STEPS", 0)
+
+    def lost(solver: Coulomb, step: AskedStep, *_: object) -> CoupledStep:
+        at = solver._linear(step, solver._stuck())
+        return replace(solver._judged(step, at, 0), residual=np.inf, converged=False)
+
+    monkeypatch.setattr(Coulomb, "_newton", lost)
     given = tangential_contact(C, s, displacement=by_load.displacement)
     assert (
         given.method == "fallback" and np.abs(given.force - by_load.force).max() <= 1e-9 * s.max()

@@ -10,8 +10,7 @@ from scipy.sparse import bsr_array, csr_array
 
 from upd.fem import Material, box_mesh, rigid_body_modes, stiffness
 from upd.linalg import amg_solve
-from upd.linalg.lines import find_cross_lines, find_lines, in_line_order
-from upd.linalg.smoothers import Smoother
+from upd.linalg.smoothers import Smoother, find_cross_lines, find_lines, in_line_order
 from upd.linalg.sweeps import WIDTH
 
 
@@ -171,7 +170,7 @@ def test_stretched_elements_take_few_iterations(monkeypatch: pytest.MonkeyPatch)
     _, K, free, points = plate((1.0, 1.0, 30.0), n=10)
     modes, load = rigid_body_modes(points)[free], np.ones(K.shape[0])
     with_lines = amg_solve(K, load, modes, layout=free, points=points)
-    monkeypatch.setattr("upd.linalg.lines.STRONG", np.inf)
+    monkeypatch.setattr("upd.linalg.smoothers.STRONG", np.inf)
     without = amg_solve(K, load, modes, layout=free, points=points)
     assert np.abs(with_lines.x - without.x).max() < 1e-7 * np.abs(without.x).max()
     assert with_lines.iterations < 0.8 * without.iterations

@@ -14,7 +14,7 @@ from upd.fem import Material, box_mesh, rigid_body_modes, stiffness
 from upd.linalg import amg_solve, factorise, multigrid
 from upd.linalg.conjugate import block_conjugate_gradients, conjugate_gradients
 from upd.linalg.multigrid import MultigridSolver
-from upd.linalg.strength import aggregates, near_neighbours
+from upd.linalg.nodes import aggregates, near_neighbours
 
 
 def clamped(

@@ -45,7 +45,7 @@ def examine() -> list[tuple[str, str, bool]]:
         except metadata.PackageNotFoundError:
             rows.append((package, _NO_MKL if optional else "missing", optional))
     rows += [(name, str(value), True) for name, value in select.available().items()]
-    kept = kept_in("upd.linalg.lines")
+    kept = kept_in("upd.linalg.smoothers")
     rows.append(("compiled functions", f"kept in {kept.parent}" if kept else _NOT_KEPT, bool(kept)))
     try:
         rows.append(("gmsh libraries", recipes.gmsh_version(), True))

@@ -60,9 +60,9 @@ class Bordered:
         """How many forces and rows other rows change: the size of their border."""
         was_open, is_open = self.rows.is_open, rows.is_open
         moved = (self.rows.relaxed != rows.relaxed).any(axis=1)
-        return self.base.of.c * int((was_open ^ is_open).sum()) + (self.base.of.c - 1) * int(
-            (moved & ~was_open & ~is_open).sum()
-        )
+        return self.base.of.c * int((was_open ^ is_open).sum()) + (
+            self.base.of.c - self.base.of.first
+        ) * int((moved & ~was_open & ~is_open).sum())
 
     def step(
         self, rows: NewtonRows, left: FloatArray, missing: FloatArray | None, rho: FloatArray
@@ -130,8 +130,8 @@ class Bordered:
         # Which rows of which nodes are new: all of those that opened or closed, the tangential ones
         # of those that stick or slip.
         new = np.zeros((of.c, of.n), bool)
-        new[1:, moved] = True
-        new[0, moved & is_open] = True
+        new[of.first :, moved] = True
+        new[: of.first, moved & is_open] = True
         joined = np.flatnonzero(was_open & ~is_open)
         R = self._place[new]
         k = len(R) + of.c * len(joined)

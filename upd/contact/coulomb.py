@@ -58,6 +58,8 @@ KEPT = 4
 NEWTON_STEPS = 40
 #: The fallback has no bound of its own where friction is so large that it need not converge.
 FALLBACK_STEPS = 20_000
+#: Guard of a search that ends by proof, but not in a number of steps known beforehand.
+MOTION_STEPS = 200
 #: Springs that relax, softer than the stuck contact by this, and rounds with each; any are exact.
 SOFTNESS = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e3, 1e1)
 MULTIPLIER_STEPS = 5
@@ -142,7 +144,7 @@ class Coulomb(CoulombConditions):
                 return replace(answer, iterations=used)
             best = answer if best is None or answer.residual < best.residual else best
         self._forget()
-        if load is not None and not load.any():
+        if load is not None and not load.any() and self.pressed is None:
             answer = self._judged(step, self._let_go(step, start), used)
             if answer.converged:
                 return answer
@@ -154,7 +156,8 @@ class Coulomb(CoulombConditions):
             answer = self._frictionless(step, start, used)
             if answer.converged:
                 return replace(answer, method="fallback")
-        answer = self._by_multipliers(step, start)
+        convex = self.pressed is not None and load is not None
+        answer = self._by_motion(step) if convex else self._by_multipliers(step, start)
         used += answer.iterations
         if not answer.converged:
             answer = self._fallback(step)
@@ -172,6 +175,7 @@ class Coulomb(CoulombConditions):
         best: CoupledStep | None = None
         ahead: CoupledStep | None = None
         fine = len(self.C) * EPS
+        hold = step.load is not None and self.pressed is not None
         for used in range(1, limit + 1):
             answer = (
                 self._judged(step, at, used) if ahead is None else replace(ahead, iterations=used)
@@ -183,9 +187,12 @@ class Coulomb(CoulombConditions):
             best = answer if best is None or answer.residual < best.residual else best
             if answer.converged:
                 best = answer
-                if answer.residual <= fine:
+                if answer.residual <= fine or self.pressed is not None:
                     break
             rows = self._rows(at)
+            if hold and rows.relaxed.all():
+                # Rarely the answer, and a poor place to come from: once is refused.
+                rows, hold = self._held(step, at, rows), False
             near = self._nearby(step, at, rows)
             if near is not None:
                 at = near
@@ -206,6 +213,17 @@ class Coulomb(CoulombConditions):
                 break
         assert best is not None
         return best
+
+    def _held(self, step: AskedStep, at: Iterate, rows: NewtonRows) -> NewtonRows:
+        """Instead of a set that slips everywhere: those nodes stick that slip least, enough to take
+        up what the load leaves.
+        """
+        assert step.load is not None and self.pressed is not None
+        limit, slips = self.mu * self.pressed, (at.y.reshape(self.c, self.n) ** 2).sum(axis=0)
+        order = np.argsort(slips, kind="stable")
+        missing = limit.sum() - float(np.linalg.norm(step.load))
+        count = int(np.searchsorted(np.cumsum(limit[order]), missing)) + 1
+        return self._stuck_at(rows, order[:count])
 
     def _let_go(self, step: AskedStep, start: Iterate | None) -> Iterate:
         """No forces under no load: the bodies as near to each other as nothing touches, from where
@@ -230,7 +248,7 @@ class Coulomb(CoulombConditions):
 
         Its residual is judged as that of every answer.
         """
-        if start is None or step.load is None:
+        if start is None or step.load is None or self.pressed is not None:
             return None
         before = self.B.T @ start.f
         size = float(before @ before)
@@ -258,9 +276,7 @@ class Coulomb(CoulombConditions):
         """
         rows = self._rows(start)
         if turned:
-            stuck, closed = self._stuck(), ~rows.is_open
-            for part in ("P", "Q", "rhs", "relaxed"):
-                getattr(rows, part)[closed] = getattr(stuck, part)[closed]
+            rows = self._stuck_at(rows, ~rows.is_open)
         s = start.s if step.motion is None else step.motion
         y = self.C @ start.f - self.B @ s - step.b
         near = self._nearby(step, Iterate(start.f, s, y, True), rows)
@@ -293,8 +309,7 @@ class Coulomb(CoulombConditions):
         left = rows.rhs - np.einsum("nij,jn->ni", rows.P, forces)
         left -= np.einsum("nij,jn->ni", rows.Q, self._misfit(step, at).reshape(c, n))
         missing = None if step.load is None else step.load - self.B.T @ at.f
-        rho = np.column_stack((self.rho_n, *[self.rho_t] * (c - 1)))
-        found = near.step(rows, left, missing, rho)
+        found = near.step(rows, left, missing, self.rho.T)
         if found is None:
             return None
         f, s = at.f + found[0], at.s + found[1]
@@ -394,6 +409,43 @@ class Coulomb(CoulombConditions):
             self._forget()
         return replace(best, iterations=used)
 
+    def _by_motion(self, step: AskedStep) -> CoupledStep:
+        """The load met by a search for the motion, where the pressing forces are given.
+
+        psi(s) = max over f of (B s + b).f - f'C f / 2, less s.p, is convex with the gradient
+        B'f - p, and bounded below because p is less than friction holds: damped Newton ends [1]_.
+        Each value is a problem with the motion given.
+
+        References
+        ----------
+        .. [1] J. Nocedal, S. Wright, Numerical Optimization, ch. 3.
+        """
+        assert step.load is not None and self.pressed is not None
+        p, scale = step.load, float((self.mu * self.pressed).sum())
+
+        def psi(at: Iterate) -> float:
+            # C f = y + B s + b
+            own = at.f @ (0.5 * (at.y + self.B @ at.s - step.b))
+            return float(at.s @ (self.B.T @ at.f - p) - own)
+
+        at = self.solve(step.b, motion=self.systems.carried[1] @ p).at
+        for used in range(1, MOTION_STEPS + 1):
+            missing = p - self.B.T @ at.f
+            K = self.B.T @ self.derivative(at)
+            more = (np.trace(K) + scale) * EPS + float(np.linalg.norm(missing)) / scale
+            way, length = np.linalg.solve(K + more * np.eye(len(K)), missing), 1.0
+            while length > EPS:
+                new = self.solve(step.b, motion=at.s + length * way, start=at).at
+                rest = p - self.B.T @ new.f
+                falls = psi(new) <= psi(at) - 0.1 * length * float(missing @ way)
+                if falls or np.linalg.norm(rest) <= 0.5 * np.linalg.norm(missing):
+                    break
+                length *= 0.5
+            answer, at = self._judged(step, new, used), new
+            if answer.converged or length <= EPS:
+                break
+        return answer
+
     def _frictionless(self, step: AskedStep, start: Iterate | None, used: int) -> CoupledStep:
         """Without friction the forces are the one answer of a box QP, which is proven to end."""
         n, s = self.n, np.zeros(self.B.shape[1]) if start is None else start.s
@@ -426,9 +478,8 @@ class Coulomb(CoulombConditions):
         """Alternating directions for f in Coulomb's cone, u + mu |u_t| in its dual; Newton ends.
 
         With the shift mu |u_t| held, the problem is convex and the iteration converges; the shift
-        follows it.
+        follows it. There is none where the pressing forces are given.
         """
-        n, c = self.n, self.c
         size = np.linalg.eigvalsh(self.C)
         sigma = float(size[-1] * np.sqrt(max(size[0] / size[-1], EPS)))
         try:
@@ -445,19 +496,18 @@ class Coulomb(CoulombConditions):
         used, batch, best = 0, 20, None
         while used < FALLBACK_STEPS:
             for _ in range(batch):
-                b = step.b.copy()
-                b[:n] -= self.mu * sigma * np.sqrt((v.reshape(c, n)[1:] ** 2).sum(axis=0))
-                f = cho_solve(factor, sigma * (z - v) + b)
+                f = cho_solve(factor, sigma * (z - v) + step.b - self._shift(sigma * v))
                 if step.load is not None:
                     s = lu_solve(rigid, step.load - self.B.T @ f)
                 f = f + CB @ s
-                z = self._onto_cone(f + v)
+                z = self.nearest(f + v)
                 v += f - z
             used += batch
             batch = min(2 * batch, FALLBACK_STEPS // 10)
-            y = -sigma * v
-            y[:n] -= self.mu * sigma * np.sqrt((v.reshape(c, n)[1:] ** 2).sum(axis=0))
-            answer = self._newton(step, Iterate(z, s, y), NEWTON_STEPS)
+            at = Iterate(z, s, -sigma * v - self._shift(sigma * v))
+            answer = self._judged(step, at, 0)
+            if not answer.converged:
+                answer = self._newton(step, at, NEWTON_STEPS)
             used += answer.iterations
             best = answer if best is None or answer.residual < best.residual else best
             if answer.converged:
@@ -465,9 +515,18 @@ class Coulomb(CoulombConditions):
         assert best is not None
         return replace(best, iterations=used)
 
-    def _onto_cone(self, v: FloatArray) -> FloatArray:
+    def _shift(self, u: FloatArray) -> FloatArray:
+        """De Saxce's change of variables of displacements u (m,): mu |u_t| at the normal ones."""
+        out = np.zeros((self.c, self.n))
+        if self.pressed is None:
+            out[0] = self.mu * np.sqrt((u.reshape(self.c, self.n)[1:] ** 2).sum(axis=0))
+        return out.ravel()
+
+    def nearest(self, v: FloatArray) -> FloatArray:
         """Nearest forces with f_n >= 0 and |f_t| <= mu f_n."""
         f = v.reshape(self.c, self.n).copy()
+        if self.pressed is not None:
+            return np.ravel(f * self._shrink(f, self.mu * self.pressed))
         normal, length = f[0].copy(), np.sqrt((f[1:] ** 2).sum(axis=0))
         inside = length <= self.mu * normal
         away = ~inside & (self.mu * length <= -normal)

@@ -1,5 +1,8 @@
 """Signorini's and Coulomb's conditions of one step: which iterate meets them, and their rows.
 
+With the pressing forces given, only the tangential forces and slips are unknown, and friction's
+limit is a disk at each node.
+
 See `upd.contact.coulomb` for the equations and how they are solved.
 
 References
@@ -12,18 +15,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linprog
 
 from upd.contact.checks import EPS
 from upd.contact.coupled_systems import CoupledSystems, NewtonRows
-from upd.contact.locking import self_locking
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 OPEN, STICK, SLIP = 0, 1, 2
+#: Sides of the polygons inside Coulomb's disks, for the question whether a contact can hold itself.
+_SIDES = 16
 
 
 @dataclass(frozen=True)
@@ -84,22 +90,29 @@ class CoulombConditions:
         Friction.
     proven : (m, m) ndarray, optional
         L of C = L L' where it is known.
+    pressed : (n,) ndarray, optional
+        Normal forces, above zero, where they are given: all c components are then tangential.
     """
 
     C: FloatArray
     B: FloatArray
     mu: FloatArray
     proven: FloatArray | None = None
+    pressed: FloatArray | None = None
 
     def __post_init__(self) -> None:
         self.n = len(self.mu)
-        self.systems = CoupledSystems(self.C, self.B, self.n, self.proven)
+        #: first tangential component
+        self.first = 1 if self.pressed is None else 0
+        self.systems = CoupledSystems(self.C, self.B, self.n, self.first, self.proven)
         self.c = self.systems.c
         diagonal = np.diagonal(self.C).reshape(self.c, self.n)
         # Weights of displacements against forces: one over the node's own compliance. Any positive
         # value is exact.
         self.rho_n = 1.0 / diagonal[0]
-        self.rho_t = (self.c - 1.0) / diagonal[1:].sum(axis=0)
+        self.rho_t = (self.c - self.first) / diagonal[self.first :].sum(axis=0)
+        self.rho = np.tile(self.rho_t, (self.c, 1))
+        self.rho[: self.first] = self.rho_n
 
     @cached_property
     def holds_itself(self) -> bool:
@@ -109,10 +122,14 @@ class CoulombConditions:
     def states(self, at: Iterate) -> IntArray:
         """OPEN, STICK or SLIP of every node."""
         f, y = at.f.reshape(self.c, self.n), at.y.reshape(self.c, self.n)
-        push = f[0] - self.rho_n * y[0]
-        q = f[1:] - self.rho_t * y[1:]
+        push = self._push(f, y)
+        q = f[self.first :] - self.rho_t * y[self.first :]
         slips = np.sqrt((q**2).sum(axis=0)) > self.mu * push
         return np.asarray(np.where(push <= 0.0, OPEN, np.where(slips, SLIP, STICK)), np.int64)
+
+    def _push(self, f: FloatArray, y: FloatArray) -> FloatArray:
+        """(n,) normal force of forces and misfits (c, n), below zero where the node opens."""
+        return f[0] - self.rho_n * y[0] if self.pressed is None else self.pressed
 
     def _misfit(self, step: AskedStep, at: Iterate) -> FloatArray:
         """y (m,) of the forces and the motion."""
@@ -134,17 +151,19 @@ class CoulombConditions:
         """Misfit f - Pi(f + rho u) of every dof in N, its rounding level, and the largest force."""
         f = at.f.reshape(self.c, self.n)
         y = self._misfit(step, at).reshape(self.c, self.n)
-        want_n = np.maximum(f[0] - self.rho_n * y[0], 0.0)
-        q = f[1:] - self.rho_t * y[1:]
-        want_t = q * self._shrink(q, self.mu * want_n)
-        misfit = np.abs(np.vstack((f[0] - want_n, f[1:] - want_t)))
+        want_n = np.maximum(self._push(f, y), 0.0)
+        q = f[self.first :] - self.rho_t * y[self.first :]
+        shrink = self._shrink(q, self.mu * want_n)
+        want = np.vstack((want_n, q * shrink))[1 - self.first :]
+        misfit = np.abs(f - want)
         size = float(np.abs(at.f).max(initial=0.0))
         terms = (
             np.sqrt(np.diagonal(self.C)) * float(np.sqrt(np.diagonal(self.C)) @ np.abs(at.f))
             + np.abs(self.B) @ np.abs(at.s)
             + np.abs(step.b)
         )
-        rho = np.concatenate((self.rho_n, *[self.rho_t] * (self.c - 1)))
+        # The projection shrinks errors of the slip, which far beyond a given limit are large.
+        rho = (self.rho if self.pressed is None else self.rho * shrink).ravel()
         # Nothing may touch: then what the displacements could press with is the measure.
         size = size or float((rho * terms).max())
         allowed = 4.0 * (len(self.C) + 10) * EPS * (np.abs(at.f) + rho * terms + size)
@@ -170,7 +189,15 @@ class CoulombConditions:
     def _stuck(self) -> NewtonRows:
         n, c = self.n, self.c
         one = np.broadcast_to(np.eye(c), (n, c, c)).copy()
-        return NewtonRows(np.zeros((n, c, c)), one, np.zeros((n, c)), np.zeros((n, c), bool))
+        free = np.zeros((n, c), bool)
+        return NewtonRows(np.zeros((n, c, c)), one, np.zeros((n, c)), free, free[:, 0].copy())
+
+    def _stuck_at(self, rows: NewtonRows, nodes: NDArray[Any]) -> NewtonRows:
+        """The rows with some nodes stuck, in place."""
+        stuck = self._stuck()
+        for part in ("P", "Q", "rhs", "relaxed", "is_open"):
+            getattr(rows, part)[nodes] = getattr(stuck, part)[nodes]
+        return rows
 
     def _rows(self, at: Iterate) -> NewtonRows:
         """Rows of the stabilised Jacobian at an iterate.
@@ -183,7 +210,9 @@ class CoulombConditions:
 
         written for the new values, where b is mu times the new f_n (g = 0 there):
 
-            (I - e (I - M)) f_t - rho e (I - M) dw - mu v f_n = -e (I - M) q.
+            (I - e (I - M)) f_t - rho e (I - M) dw - mu v f_n = -e (I - M) q,
+
+        with mu v f_n on the right where f_n is given.
         """
         n, c = self.n, self.c
         rows = self._stuck()
@@ -191,29 +220,34 @@ class CoulombConditions:
         state = self.states(at)
         is_open, slips = state == OPEN, state == SLIP
         rows.P[is_open], rows.Q[is_open] = np.eye(c), 0.0
-        rows.relaxed[is_open] = True
+        rows.relaxed[is_open] = rows.is_open[is_open] = True
         k = np.flatnonzero(slips)
         if k.size:
-            P, Q, rhs = self._slip_rows(f[:, k], y[:, k], k)
-            rows.P[k, 1:], rows.Q[k, 1:], rows.rhs[k, 1:] = P, Q, rhs
-            rows.relaxed[k, 1:] = True
+            P, Q, rhs = self._slip_rows(f[:, k], y[:, k], k, self._push(f, y)[k])
+            own = slice(self.first, None)
+            rows.P[k, own], rows.Q[k, own], rows.rhs[k, own] = P, Q, rhs
+            rows.relaxed[k, own] = True
         return rows
 
     def _slip_rows(
-        self, f: FloatArray, y: FloatArray, k: IntArray
+        self, f: FloatArray, y: FloatArray, k: IntArray, push: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """P (k, d, c), Q (k, d, c) and rhs (k, d) of slipping nodes, d = c - 1."""
-        d, mu, rho = self.c - 1, self.mu[k], self.rho_t[k]
-        t, dw = f[1:], -y[1:]
+        """P (k, d, c), Q (k, d, c) and rhs (k, d) of slipping nodes, d tangential components."""
+        first, mu, rho = self.first, self.mu[k], self.rho_t[k]
+        d, t, dw = self.c - first, f[first:], -y[first:]
         q = t + rho * dw
-        limit = mu * (f[0] - self.rho_n[k] * y[0])
+        limit = mu * push
         size_q, size_t = np.sqrt((q**2).sum(axis=0)), np.sqrt((t**2).sum(axis=0))
         P, Q = np.zeros((k.size, d, self.c)), np.zeros((k.size, d, self.c))
         way = q / np.where(size_q > 0.0, size_q, 1.0)
-        P[:, :, 0] = -(mu * way).T
+        rhs = np.zeros((k.size, d))
+        if first:
+            P[:, :, 0] = -(mu * way).T
+        else:
+            rhs += (limit * way).T
         if d == 1:
-            P[:, 0, 1] = 1.0
-            return P, Q, np.zeros((k.size, d))
+            P[:, 0, first] = 1.0
+            return P, Q, rhs
         e = limit / np.where(size_q > 0.0, size_q, 1.0)
         top = np.maximum(limit, size_t)
         safe = np.where(top > 0.0, top, 1.0)
@@ -223,7 +257,82 @@ class CoulombConditions:
         beta = 1.0 / (1.0 - np.minimum(cosine, 0.0) * short)
         M = np.einsum("in,jn->nij", beta * t / safe, way)
         turn = e[:, None, None] * (np.eye(d) - M)
-        P[:, :, 1:] = np.eye(d) - turn
-        Q[:, :, 1:] = rho[:, None, None] * turn
-        rhs = -np.einsum("nij,jn->ni", turn, q)
-        return P, Q, rhs
+        P[:, :, first:] = np.eye(d) - turn
+        Q[:, :, first:] = rho[:, None, None] * turn
+        return P, Q, rhs - np.einsum("nij,jn->ni", turn, q)
+
+
+def self_locking(columns: FloatArray, friction: FloatArray) -> bool:
+    """Whether forces within friction can balance each other without any load.
+
+    Then a state is not unique (residual forces remain after unloading), and a load may jam. By a
+    linear programme: the largest sum of normal forces with B'f = 0. Two tangential directions have
+    polygons inside Coulomb's disks: friction up to 2 % above the limit may be missed.
+
+    Parameters
+    ----------
+    columns : (c n, r) ndarray
+        B.
+    friction : (n,) ndarray
+
+    Returns
+    -------
+    bool
+    """
+    G = _pyramids(columns, friction)
+    n = len(friction)
+    size = np.abs(columns).max(axis=0)
+    found = linprog(
+        -np.ones(G.shape[1]),
+        A_eq=(G / size[:, None]),
+        b_eq=np.zeros(len(G)),
+        bounds=(0.0, 1.0),
+        method="highs",
+    )
+    most = 0.0 if found.fun is None else -float(found.fun)
+    return bool(found.status == 0 and most > np.sqrt(np.finfo(float).eps) * n)
+
+
+def carries(columns: FloatArray, friction: FloatArray, load: FloatArray) -> bool:
+    """Whether some forces within friction balance a load B'f = load.
+
+    Two tangential directions have polygons around Coulomb's disks: what is refused has no answer.
+
+    Parameters
+    ----------
+    columns : (c n, r) ndarray
+    friction : (n,) ndarray
+    load : (r,) ndarray
+        N.
+
+    Returns
+    -------
+    bool
+    """
+    G = _pyramids(columns, friction, around=True)
+    size = np.abs(columns).max(axis=0)
+    unit = float(np.abs(load).max(initial=0.0)) or 1.0
+    found = linprog(
+        np.ones(G.shape[1]),
+        A_eq=G / size[:, None],
+        b_eq=load / size / unit,
+        bounds=(0.0, None),
+        method="highs",
+    )
+    return bool(found.status == 0)
+
+
+def _pyramids(columns: FloatArray, friction: FloatArray, *, around: bool = False) -> FloatArray:
+    """(r, edges): B' on the edges of pyramids in or around the cones, unit normal force."""
+    n = len(friction)
+    parts = columns.reshape(-1, n, columns.shape[1])
+    if len(parts) == 2:
+        ways = np.array([[1.0], [-1.0]])
+    else:
+        angle = 2.0 * np.pi * np.arange(_SIDES) / _SIDES
+        ways = np.column_stack((np.cos(angle), np.sin(angle)))
+        ways /= np.cos(np.pi / _SIDES) if around else 1.0
+    edges = [
+        (parts[0] + friction[:, None] * np.einsum("d,dnr->nr", way, parts[1:])) for way in ways
+    ]
+    return np.concatenate(edges).T

@@ -9,9 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from upd.contact.checks import Problems, compliance_matrix, few_threads, numbers, proven_factor
 from upd.contact.coulomb import Coulomb
-from upd.contact.coulomb_conditions import CoupledStep, Iterate
+from upd.contact.coulomb_conditions import CoupledStep, Iterate, carries
 from upd.contact.load_steps import CoupledHistory, LoadSteps, SolvedStep, offset_of
-from upd.contact.locking import carries
 from upd.errors import ConvergenceError, InputError
 from upd.labels import Shown
 

@@ -31,18 +31,14 @@ _REFINED = 2
 class NewtonRows:
     """One Newton system per node: P f + Q (C f - B s - b) = rhs, (n, c, c) and (n, c).
 
-    `relaxed` (n, c) marks the rows that are not simply y = 0.
+    `relaxed` (n, c) marks the rows that are not simply y = 0, `is_open` (n,) nodes that are open.
     """
 
     P: FloatArray
     Q: FloatArray
     rhs: FloatArray
     relaxed: BoolArray
-
-    @property
-    def is_open(self) -> BoolArray:
-        """(n,) nodes that are open."""
-        return np.asarray((self.P[:, 0, 0] > 0.0) & self.relaxed[:, 0])
+    is_open: BoolArray
 
     def same_states(self, other: NewtonRows) -> bool:
         """Whether other rows have the same nodes open, stuck and slipping."""
@@ -85,6 +81,8 @@ class CoupledSystems:
         Rigid columns.
     n : int
         Nodes.
+    first : int
+        First tangential component: 0 where no other is unknown.
     proven : (m, m) ndarray, optional
         L of C = L L' where it is known, what is above its diagonal is not used.
     """
@@ -92,6 +90,7 @@ class CoupledSystems:
     C: FloatArray
     B: FloatArray
     n: int
+    first: int
     proven: FloatArray | None = None
 
     def __post_init__(self) -> None:
@@ -189,13 +188,13 @@ class ClosedSystem:
             M[q:, :q] = (B / size).T
             M[q:, q:] = 0.0
             self.scale = size
-        slips = np.flatnonzero(rows.relaxed[nodes, 1])
+        slips = np.flatnonzero(rows.relaxed[nodes, -1])
         place = [j * len(nodes) + slips for j in range(of.c)]
         self.P, self.Q = rows.P[nodes[slips]], rows.Q[nodes[slips]]
         self.place, self.slips = place, slips
         if slips.size:
             M[:q] = self.turned(M[:q])
-            for j in range(1, of.c):
+            for j in range(of.first, of.c):
                 for i in range(of.c):
                     M[place[j], place[i]] += self.P[:, j, i]
         self.size = np.maximum(M.max(axis=1, initial=0.0), -M.min(axis=1, initial=0.0))
@@ -218,7 +217,7 @@ class ClosedSystem:
     def turned(self, right: FloatArray) -> FloatArray:
         """Q of the closed rows (q, columns), in place."""
         old = [right[at] for at in self.place]
-        for j in range(1, self.of.c):
+        for j in range(self.of.first, self.of.c):
             row = np.zeros_like(old[j])
             for i in range(self.of.c):
                 if self.Q[:, j, i].any():
@@ -249,7 +248,7 @@ class ClosedSystem:
         f, s, y = self.solve(rhs, target)
         # What the rows leave, by the unprocessed y; one step gains all digits there are.
         left = self._asked(rhs, Target(-y, None, np.zeros(self.of.B.shape[1])))
-        for j in range(1, self.of.c):
+        for j in range(self.of.first, self.of.c):
             left[self.place[j]] -= sum(
                 self.P[:, j, i] * f[self.dofs][self.place[i]] for i in range(self.of.c)
             )
@@ -264,7 +263,7 @@ class ClosedSystem:
         known = target.b if target.motion is None else target.b + self.of.B @ target.motion
         right = known[self.dofs]
         old = [right[at].copy() for at in self.place]
-        for j in range(1, self.of.c):
+        for j in range(self.of.first, self.of.c):
             value = sum((self.Q[:, j, i] * old[i].T).T for i in range(self.of.c))
             right[self.place[j]] = value + rhs[j * self.of.n + self.nodes[self.slips]]
         return np.asarray(right)

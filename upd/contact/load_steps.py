@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.contact.coulomb import Coulomb
-from upd.contact.coulomb_conditions import CoupledStep, Iterate
-from upd.contact.locking import carries
+from upd.contact.coulomb_conditions import CoupledStep, Iterate, carries
 from upd.labels import Shown
 
 FloatArray = NDArray[np.float64]

@@ -18,7 +18,7 @@ and with |C_1 + C_2| at least as compliant as either body |delta_1 + delta_2|_{C
 sqrt(|delta_1|^2_{C_1^-1} + |delta_2|^2_{C_2^-1}), the infimal convolution of two quadratic forms.
 The approach d at a given load F has d F = f' (h + C f), hence |d - d*| <= 2 max(|f|_C, |f*|_C)
 |delta|_{C^-1} / F. Both need no more than the errors in energy of the products, see
-`upd.linalg.solvers`.
+`upd.linalg.schur`.
 
 References
 ----------

@@ -16,8 +16,18 @@ from upd.contact.checks import (
     numbers,
     unit_response,
 )
-from upd.contact.disk import DiskQP
-from upd.contact.qp import FREE, BoxQP, FloatArray, ForceSolution, State
+from upd.contact.coulomb import Coulomb
+from upd.contact.coulomb_conditions import Iterate
+from upd.contact.qp import (
+    FREE,
+    HALF_THE_DIGITS,
+    BoxQP,
+    FloatArray,
+    ForceSolution,
+    Method,
+    State,
+)
+from upd.errors import ConvergenceError
 from upd.labels import Shown
 
 BoolArray = NDArray[np.bool_]
@@ -345,7 +355,10 @@ class _TangentialSolver:
             if self.directions == 1:
                 self.box = BoxQP(inner)
             else:
-                self.disk = DiskQP(inner)
+                n = self.carried.size
+                rigid = np.kron(np.eye(2), np.ones((n, 1)))
+                mu = np.ones(n)
+                self.disks = Coulomb(np.asarray(inner, np.float64), rigid, mu, pressed=self.bound)
 
     @property
     def n(self) -> int:
@@ -429,15 +442,41 @@ class _TangentialSolver:
                 state=at.state[self.carried],
             )
         else:
-            answer = self.disk.solve(
-                before,
-                self.bound,
-                load=load,
-                motion=motion,
-                force=at.force[self.dofs],
-                slipping=at.state[self.carried] != FREE,
-            )
+            answer = self._in_two_directions(at, load, motion)
         return self._result(at, answer, load)
+
+    def _in_two_directions(
+        self, at: TangentialHistory, load: FloatArray | None, motion: FloatArray | None
+    ) -> ForceSolution:
+        # every step by itself: a path is its single steps
+        solver, before = self.disks.twin(), at.slip[self.dofs]
+        limit, slipping, start = np.tile(self.bound, 2), at.state[self.carried] != FREE, None
+        if slipping.any():
+            # on the rim, also when the limit changed since the last step
+            f = at.force[self.dofs]
+            size = np.tile(np.hypot(*f.reshape(2, -1)), 2)
+            rim = np.tile(slipping, 2) & (size > 0.0)
+            f[rim] *= (limit / np.where(rim, size, 1.0))[rim]
+            onwards = HALF_THE_DIGITS * f / solver.rho.ravel()
+            start = Iterate(f, np.zeros(2), -np.where(rim, onwards, 0.0))
+        found = solver.solve(-before, load=load, motion=motion, start=start)
+        if not found.converged:
+            raise ConvergenceError(
+                f"friction problem with {len(self.bound)} nodes in two directions: no answer after "
+                f"{found.iterations} steps of Newton and its fallback. Take smaller load steps, or "
+                "look for nearly dependent rows in the compliance matrix."
+            )
+        # rounding removed: no traction beyond its limit, no slip where a node sticks
+        x, s = solver.nearest(found.at.f), found.at.s
+        y = solver.C @ x - solver.B @ s + before
+        q = np.hypot(*(x - solver.rho.ravel() * y).reshape(2, -1))
+        slips = q > self.bound * (1.0 + 4.0 * (len(x) + 10) * EPS)
+        y[np.tile(~slips, 2)] = 0.0
+        rates = solver.derivative(Iterate(x, s, y))
+        method: Method = "fallback" if found.method == "fallback" else "active set"
+        state = slips.astype(np.int8)
+        K = solver.B.T @ rates
+        return ForceSolution(x, y, s, state, found.iterations, method, K, found.at.f, rates)
 
     def _frictionless(self, motion: FloatArray | None) -> ForceSolution:
         """No node can carry traction: the bodies slide past each other by the displacement.

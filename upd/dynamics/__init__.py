@@ -1,19 +1,23 @@
 """Linear dynamics: frequency response of full and reduced models, peaks, damping."""
 
 from upd.dynamics.peaks import Peaks, find_peaks, modulus
-from upd.dynamics.response import QUANTITIES, LinearResponse, converted, frequency_response
-from upd.dynamics.systems import DirectSystem, ModalSystem, direct_system, modal_system
+from upd.dynamics.response import (
+    QUANTITIES,
+    LinearResponse,
+    ModalSystem,
+    converted,
+    frequency_response,
+    modal_system,
+)
 from upd.dynamics.tuning import TunedDamping, peak_response, tune_damping
 
 __all__ = [
     "QUANTITIES",
-    "DirectSystem",
     "LinearResponse",
     "ModalSystem",
     "Peaks",
     "TunedDamping",
     "converted",
-    "direct_system",
     "find_peaks",
     "frequency_response",
     "modal_system",

@@ -11,13 +11,16 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from upd.dynamics.systems import ComplexArray
-from upd.errors import InputError
+from upd.errors import ConvergenceError, InputError
+from upd.fem.damping import checked_ratio
 from upd.labels import Shown
 from upd.linalg.common import checked_vectors
+from upd.linalg.eigen_checks import Modes
 from upd.mesh import FloatArray
+
+ComplexArray = NDArray[np.complex128]
 
 #: name -> power of i omega, factor to the unit, unit
 QUANTITIES = {
@@ -28,7 +31,7 @@ QUANTITIES = {
 
 
 class System(Protocol):
-    """What answers a harmonic force: DirectSystem, ModalSystem, or a user's own.
+    """What answers a harmonic force: ModalSystem, or a user's own.
 
     Attributes
     ----------
@@ -57,6 +60,108 @@ class System(Protocol):
             Displacement [mm].
         """
         ...
+
+
+@dataclass(frozen=True, repr=False)
+class ModalSystem(Shown):
+    """Superposition of modes with modal damping.
+
+    Attributes
+    ----------
+    frequency : (m,) ndarray
+        Natural frequencies [Hz].
+    shapes : (n, m) ndarray
+        Mass-normalised mode shapes [t^-1/2].
+    zeta : (m,) ndarray
+        Damping ratios; that of a rigid motion (0 Hz) has no effect.
+    static : callable, optional
+        K^-1 of the static problem as a function, f (n,) -> u (n,), for the modes left out; None:
+        they are left out.
+    """
+
+    frequency: FloatArray
+    shapes: FloatArray
+    zeta: FloatArray
+    static: Any = None
+
+    @property
+    def n(self) -> int:
+        """Number of dofs."""
+        return int(self.shapes.shape[0])
+
+    def receptance(self, force: FloatArray, rows: FloatArray, omega: FloatArray) -> ComplexArray:
+        """Displacement of the outputs under a harmonic force.
+
+        The sum of phi_out phi_f / (omega_j^2 - omega^2 + 2 i zeta_j omega_j omega); the rest
+        statically.
+
+        Parameters
+        ----------
+        force : (n,) ndarray
+            Amplitude of the force [N].
+        rows : (n_out, n) ndarray
+            Rows that weigh the displacements.
+        omega : (n_f,) ndarray
+            Angular frequencies [rad/s].
+
+        Returns
+        -------
+        (n_f, n_out) ndarray of complex
+            Displacement [mm].
+
+        Raises
+        ------
+        ConvergenceError
+            At an undamped natural frequency.
+
+        References
+        ----------
+        D. J. Ewins, Modal Testing, 2.4; static correction: R. W. Clough and J. Penzien, Dynamics of
+        Structures, ch. 13.
+        """
+        natural = 2.0 * np.pi * self.frequency
+        share, out = self.shapes.T @ force, rows @ self.shapes
+        below = (
+            natural[None, :] ** 2 - omega[:, None] ** 2 + 2j * self.zeta * natural * omega[:, None]
+        )
+        if (below == 0.0).any():
+            raise ConvergenceError(
+                "The response is infinite at an undamped natural frequency: add damping or "
+                "move the frequency."
+            )
+        H: ComplexArray = np.asarray((share / below) @ out.T, dtype=np.complex128)
+        if self.static is not None:
+            rest = self.static(force) - self.shapes @ (share / natural**2)
+            H += rows @ rest
+        return H
+
+
+def modal_system(found: Modes, zeta: ArrayLike, *, static: Any = None) -> ModalSystem:
+    """System of modes with damping ratios.
+
+    Parameters
+    ----------
+    found : Modes
+        What `upd.linalg.modes` found, m modes.
+    zeta : float or (m,) array_like
+        Damping ratios.
+    static : callable, optional
+        K^-1 f of a supported body, as `upd.linalg.factorise(K)` gives it.
+
+    Returns
+    -------
+    ModalSystem
+
+    Raises
+    ------
+    InputError
+        For ratios that do not fit, or a static correction of a body that floats.
+    """
+    if static is not None and found.n_rigid:
+        raise InputError("A body that floats has no static answer: leave `static` out.")
+    return ModalSystem(
+        found.frequency, found.shapes, checked_ratio(zeta, len(found.frequency)), static
+    )
 
 
 @dataclass(frozen=True, repr=False)
@@ -125,10 +230,11 @@ def frequency_response(
     At 0 Hz the receptance is the static compliance:
 
     >>> import numpy as np
-    >>> from upd.dynamics import direct_system, frequency_response
+    >>> from upd.dynamics import frequency_response, modal_system
+    >>> from upd.linalg import modes
     >>> K = np.array([[3000.0, -1000.0], [-1000.0, 3000.0]])  # N/mm
-    >>> M = 1e-3 * np.eye(2)  # t
-    >>> response = frequency_response(direct_system(K, M=M), 0, [0, 1], [0.0, 100.0], "receptance")
+    >>> system = modal_system(modes(K, 1e-3 * np.eye(2), count=2), 0.0)
+    >>> response = frequency_response(system, 0, [0, 1], [0.0, 100.0], "receptance")
     >>> response.unit
     'mm/N'
     >>> (1e6 * response.magnitude).round(3).tolist()  # nm/N

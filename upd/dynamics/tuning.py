@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize_scalar
 
-from upd.dynamics.response import frequency_response
-from upd.dynamics.systems import ModalSystem
+from upd.dynamics.response import ModalSystem, frequency_response
 from upd.errors import ConvergenceError, InputError
 from upd.mesh import FloatArray
 

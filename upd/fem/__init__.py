@@ -2,7 +2,7 @@
 
 from upd.fem.assembly import mass, stiffness
 from upd.fem.box import box_mesh
-from upd.fem.damping import modal_damping, rayleigh, rayleigh_coefficients, rayleigh_ratio
+from upd.fem.damping import modal_damping
 from upd.fem.elements import ELEMENTS
 from upd.fem.inertia import MassProperties, mass_properties
 from upd.fem.material import Material
@@ -21,9 +21,6 @@ __all__ = [
     "mass",
     "mass_properties",
     "modal_damping",
-    "rayleigh",
-    "rayleigh_coefficients",
-    "rayleigh_ratio",
     "rigid_body_modes",
     "stiffness",
     "traction_weights",

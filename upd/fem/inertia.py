@@ -81,19 +81,6 @@ class MassProperties(Shown):
             2.0 * self.mass, 2.0 * self.volume, centre, moved + np.outer(sign, sign) * moved
         )
 
-    def principal(self) -> tuple[FloatArray, FloatArray]:
-        """Principal moments and axes about the centre.
-
-        Returns
-        -------
-        moments : (3,) ndarray
-            t mm2, rising.
-        axes : (3, 3) ndarray
-            The unit vectors of the axes as columns.
-        """
-        moments, axes = np.linalg.eigh(self.inertia)
-        return moments, axes
-
 
 def mass_properties(
     mesh: Mesh, material: Material | Sequence[Material], regions: IntArray | None = None

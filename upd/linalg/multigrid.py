@@ -29,14 +29,12 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import bsr_array
 
 from upd.errors import ConvergenceError, InputError
-from upd.linalg.blocks import Single
 from upd.linalg.common import FloatArray, checked_vectors, log
 from upd.linalg.conjugate import UNSEEN, block_conjugate_gradients, conjugate_gradients
-from upd.linalg.nodes import padded, places, positions
+from upd.linalg.nodes import STRONG, aggregates, near_neighbours, padded, places, positions
+from upd.linalg.schur import Solved
 from upd.linalg.smoothers import Smoother, block_rows
-from upd.linalg.solvers import Solved
-from upd.linalg.strength import STRONG, aggregates, near_neighbours
-from upd.linalg.sweeps import WIDTH, symmetric_product, width_of
+from upd.linalg.sweeps import WIDTH, Single, symmetric_product, width_of
 from upd.linalg.symmetric import Matrix, Symmetric
 
 #: the coarsest level is factorised densely: below this many blocks, of 6 dofs each, that is free
@@ -150,7 +148,7 @@ def hierarchy(A: Any, modes: FloatArray | None, points: FloatArray | None = None
     modes : (n, m) ndarray or None
         Near null space.
     points : (n / 3, 3) ndarray, optional
-        Positions of the nodes, see `upd.linalg.strength`; without them all neighbours are joined.
+        Positions of the nodes, see `upd.linalg.nodes`; without them all neighbours are joined.
 
     Returns
     -------

@@ -12,7 +12,7 @@ chance; mostly they are zeros of fresh memory, hence a crash now and then. Seen 
 1 500 random matrices of 2 to 60 dofs all 611 with a diagonal K_ii crashed in the analysis, none of
 the 889 others. Arrays of exact length between inaccessible pages are read and written inside their
 bounds only, whatever the dummy right-hand side of the factorisation. So PARDISO never gets a
-diagonal K_ii, whose Schur complement needs no factor (`upd.linalg.uncoupled`).
+diagonal K_ii, whose Schur complement needs no factor (`uncoupled`).
 
 References
 ----------
@@ -33,7 +33,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.common import (
@@ -47,10 +47,18 @@ from upd.linalg.common import (
     checked_vectors,
     inner_free_error,
     log,
+    row_blocks,
     softest_motion,
 )
-from upd.linalg.symmetric import Matrix, Symmetric, checked, upper_triangle, with_diagonal
-from upd.linalg.uncoupled import uncoupled
+from upd.linalg.symmetric import (
+    Matrix,
+    Symmetric,
+    checked,
+    stored,
+    upper_triangle,
+    whole,
+    with_diagonal,
+)
 
 SPD, SYMMETRIC, HERMITIAN = 2, -2, 4
 ANALYSE, FACTORISE, SOLVE, BACKWARD, RELEASE = 11, 22, 33, 333, -1
@@ -395,3 +403,45 @@ def _ordered(S: FloatArray, kept: IntArray) -> FloatArray:
         return S
     place = np.argsort(np.argsort(kept))
     return S[np.ix_(place, place)]
+
+
+def uncoupled(K: Matrix, kept: IntArray) -> Condensation | None:
+    """Condensation of a matrix whose inner dofs touch kept dofs only, if it is one.
+
+    K_ii is then diagonal, D, and S = K_bb - K_bi D^-1 K_ib needs no factor; without any inner dof S
+    is K_bb.
+
+    Parameters
+    ----------
+    K : (n, n) Symmetric or csr_array
+        As `upd.linalg.symmetric.checked` gives it.
+    kept : (k,) array of int
+
+    Returns
+    -------
+    Condensation or None
+        None when two inner dofs are coupled.
+    """
+    A = stored(K)
+    n = A.shape[0]
+    is_inner = np.ones(n, bool)
+    is_inner[kept] = False
+    for first, last in row_blocks(A):
+        part = slice(A.indptr[first], A.indptr[last])
+        row = np.repeat(np.arange(first, last), np.diff(A.indptr[first : last + 1]))
+        column = A.indices[part]
+        if (is_inner[row] & is_inner[column] & (row != column) & (A.data[part] != 0.0)).any():
+            return None
+    A = whole(K)
+    inner = np.flatnonzero(is_inner)
+    K_ib, D = csr_array(A[inner][:, kept]), A.diagonal()[inner]
+    S = A[kept][:, kept].toarray() - (K_ib.T @ diags_array(1.0 / D) @ K_ib).toarray()
+
+    def recover(u_kept: FloatArray) -> FloatArray:
+        u_b = checked_vectors(u_kept, len(kept), "displacement of the kept dofs")
+        u = np.zeros((n, *u_b.shape[1:]))
+        u[kept] = u_b
+        u[inner] = -((K_ib @ u_b).T / D).T
+        return u
+
+    return Condensation(0.5 * (S + S.T), recover, "none", 0.0, 0, S.nbytes)

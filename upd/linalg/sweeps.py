@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.linalg.blocks import Index, Single
 from upd.linalg.compiled import compiled, inlined
 
 #: right-hand sides that are worked on at once, as many single-precision numbers as a register has
 WIDTH = 8
+Single = NDArray[np.float32]
+Index = NDArray[Any]
 Zeros = tuple[int, ...]
 Three = tuple[np.float32, np.float32, np.float32]
 #: size of the blocks and width of the vectors

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from upd.reduction.attachments import AttachedModel, attachment_modes
 from upd.reduction.component_modes import ErrorTarget, craig_bampton, frequency_error
-from upd.reduction.guyan import Condensed, condense, guyan_mass
+from upd.reduction.guyan import Condensed, condense
 from upd.reduction.mean_held import condense_held_in_mean
 from upd.reduction.reduced import ReducedModel
 
@@ -18,5 +18,4 @@ __all__ = [
     "condense_held_in_mean",
     "craig_bampton",
     "frequency_error",
-    "guyan_mass",
 ]

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve, lapack
-from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from upd.errors import ConvergenceError, InputError
+from upd.errors import ConvergenceError
 from upd.labels import Shown
 from upd.linalg.amg import compliance_amg
 from upd.linalg.common import EPS, checked_dofs, checked_vectors, log
@@ -311,37 +310,3 @@ def _null_motions(K: Matrix, R: FloatArray) -> list[str]:
         for name, s, w in zip(names, share, np.linalg.norm(W, axis=0), strict=True)
         if s > 0.1 * w
     ]
-
-
-def guyan_mass(M: Any, K: Any, kept: ArrayLike, *, solver: str = "auto") -> FloatArray:
-    """Mass T'MT of a body on its kept dofs, T = [I; -K_ii^-1 K_ib]; takes n k doubles.
-
-    Exact for statics only: inertia of the inner dofs follows the static shape, so natural
-    frequencies come out too high.
-
-    Parameters
-    ----------
-    M, K : (n, n) sparse array or array_like
-        t and N/mm.
-    kept : (k,) array_like of int
-    solver : {"auto", "pardiso", "superlu"}
-
-    Returns
-    -------
-    (k, k) ndarray
-        t, exactly symmetric.
-
-    Raises
-    ------
-    InputError
-        For bad arguments.
-    ConvergenceError
-        When a part of the body floats.
-    """
-    found = schur_complement(K, kept, solver=solver)
-    mass = csr_array(M, dtype=np.float64)
-    if mass.shape != tuple(K.shape):
-        raise InputError(f"M is {mass.shape}, K is {tuple(K.shape)}: give both on the same dofs.")
-    T = found.recover(np.eye(len(found.S)))
-    reduced = np.asarray(T.T @ (mass @ T))
-    return 0.5 * (reduced + reduced.T)

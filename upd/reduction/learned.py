@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from upd.errors import InputError
 from upd.linalg.common import EPS, FloatArray, IntArray, checked_dofs, checked_vectors, log
-from upd.linalg.solvers import Solved, Solver
+from upd.linalg.schur import Solved, Solver
 from upd.linalg.sweeps import WIDTH
 
 #: relative error in energy of one product
@@ -52,7 +52,7 @@ class LearnedCompliance:
     A chain of two springs of 1 kN/mm, started from a wrong compliance, pulled at both dofs:
 
     >>> import numpy as np
-    >>> from upd.linalg.solvers import DirectSolver
+    >>> from upd.linalg.schur import DirectSolver
     >>> from upd.linalg.symmetric import checked
     >>> from upd.reduction.learned import LearnedCompliance
     >>> K = checked(1e3 * np.array([[2.0, -1.0], [-1.0, 1.0]]))
@@ -208,7 +208,7 @@ class LearnedCompliance:
         """Bound of the relative error in energy of C_m f for a force (k,).
 
         |C_m f - C f|_{C^-1} / |f|_C. With f = P c + f', what the products lack is at most sum
-        |c_i| e_i (`upd.linalg.solvers`), and what was not shown |C f'| + |C_m f'|, both in the norm
+        |c_i| e_i (`upd.linalg.schur`), and what was not shown |C f'| + |C_m f'|, both in the norm
         of C^-1 and so of the size of |f'|_C: taken as twice |f'|_{C_0} times the root of the
         largest eigenvalue that C_0^-1 C has shown.
         """

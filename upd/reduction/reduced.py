@@ -1,23 +1,22 @@
-"""A reduced linear model: K and M on boundary dofs and modal coordinates, and the way back.
+"""A reduced linear model: K and M on boundary dofs and modal coordinates.
 
 Saved and loaded without pickle.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import h5netcdf
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from upd.cache.files import whole_bytes, whole_file
 from upd.errors import InputError
 from upd.labels import Shown
-from upd.linalg.common import FloatArray, IntArray, checked_vectors
+from upd.linalg.common import FloatArray, IntArray
 from upd.linalg.eigen import modes
 from upd.linalg.eigen_checks import Modes
 
@@ -79,60 +78,6 @@ class ReducedModel(Shown):
     def n(self) -> int:
         """r = k + m."""
         return len(self.K)
-
-    def expand(self, q: ArrayLike) -> NDArray[Any]:
-        """Displacements at `rows`.
-
-        Parameters
-        ----------
-        q : (r,) or (r, j) array_like
-            Coordinates, real or complex.
-
-        Returns
-        -------
-        (n_row,) or (n_row, j) ndarray
-            mm.
-
-        Raises
-        ------
-        InputError
-            For another number of coordinates.
-        """
-        values = np.asarray(q)
-        if values.ndim not in (1, 2) or values.shape[0] != self.n:
-            raise InputError(
-                f"Coordinates {values.shape} for a reduced model of {self.n}: give "
-                f"({self.n},) or ({self.n}, j)."
-            )
-        out: NDArray[Any] = self.basis @ values
-        return out
-
-    def reduce_force(self, force: ArrayLike) -> FloatArray:
-        """Forces on the coordinates.
-
-        Parameters
-        ----------
-        force : (n_dof,) or (n_dof, j) array_like
-            N, on the full model.
-
-        Returns
-        -------
-        (r,) or (r, j) ndarray
-
-        Raises
-        ------
-        InputError
-            When a force acts where the basis was not kept.
-        """
-        f = checked_vectors(force, self.n_dof, "force")
-        elsewhere = np.setdiff1d(np.flatnonzero(np.atleast_2d(f.T).any(axis=0)), self.rows)
-        if elsewhere.size:
-            raise InputError(
-                f"A force acts on dof {elsewhere[0]} and {elsewhere.size - 1} more, where "
-                "the basis was not kept: reduce with them kept."
-            )
-        out: FloatArray = self.basis.T @ f[self.rows]
-        return out
 
     def coordinates(self, dofs: ArrayLike) -> IntArray:
         """Numbers of the coordinates that are the displacements of boundary dofs.
@@ -245,12 +190,12 @@ class ReducedModel(Shown):
         )
 
     def save(self, path: Path | str) -> Path:
-        """Write as netCDF-4 (.nc) or .npz, in one step.
+        """Write as netCDF-4 (.nc), in one step.
 
         Parameters
         ----------
         path : path or str
-            Its ending chooses the format.
+            With the ending .nc.
 
         Returns
         -------
@@ -262,10 +207,22 @@ class ReducedModel(Shown):
             For another ending or a file that cannot be written.
         """
         path = _checked_ending(path)
-        values = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
         try:
-            with whole_file(path) as temporary:
-                (_write_netcdf if path.suffix == ".nc" else _write_npz)(temporary, values)
+            with (
+                whole_file(path) as temporary,
+                whole_bytes(temporary) as content,
+                h5netcdf.File(content, "w") as file,
+            ):
+                file.attrs["format"] = _FORMAT
+                file.attrs["n_dof"] = int(self.n_dof)
+                for name, dims in _DIMS.items():
+                    data = np.asarray(getattr(self, name))
+                    for dim, length in zip(dims, data.shape, strict=True):
+                        if dim not in file.dimensions:
+                            file.dimensions[dim] = length
+                    variable = file.create_variable(name, dims, data.dtype, data=data)
+                    if name in _UNITS:
+                        variable.attrs["units"] = _UNITS[name]
         except OSError as error:
             raise InputError(
                 f"{path} cannot be written ({error}): choose a folder that exists and is yours."
@@ -291,12 +248,13 @@ class ReducedModel(Shown):
         """
         path = _checked_ending(path)
         try:
-            values = (_read_netcdf if path.suffix == ".nc" else _read_npz)(path)
-            if str(values.pop("format")) != _FORMAT:
-                raise KeyError("format")
-            return cls(
-                **{f.name: values[f.name] for f in fields(cls)} | {"n_dof": int(values["n_dof"])}
-            )
+            with h5netcdf.File(path, "r") as file:
+                if str(file.attrs["format"]) != _FORMAT:
+                    raise KeyError("format")
+                values: dict[str, Any] = {
+                    name: np.asarray(file.variables[name][...]) for name in _DIMS
+                }
+                return cls(**values, n_dof=int(file.attrs["n_dof"]))
         except (OSError, KeyError, ValueError) as error:
             raise InputError(
                 f"{path} cannot be read as a reduced model ({error}): give a file that "
@@ -306,39 +264,6 @@ class ReducedModel(Shown):
 
 def _checked_ending(path: Path | str) -> Path:
     path = Path(path)
-    if path.suffix not in (".nc", ".npz"):
-        raise InputError(
-            f"{path}: a reduced model is kept as .nc (netCDF-4) or .npz; choose one of "
-            "these endings."
-        )
+    if path.suffix != ".nc":
+        raise InputError(f"{path}: a reduced model is kept as netCDF-4; give the ending .nc.")
     return path
-
-
-def _write_npz(path: Path, values: Mapping[str, Any]) -> None:
-    with path.open("wb") as file:
-        np.savez(file, format=np.array(_FORMAT), **values)
-
-
-def _read_npz(path: Path) -> dict[str, Any]:
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-        return {name: stored[name] for name in stored.files}
-
-
-def _write_netcdf(path: Path, values: Mapping[str, Any]) -> None:
-    with whole_bytes(path) as content, h5netcdf.File(content, "w") as file:
-        file.attrs["format"] = _FORMAT
-        file.attrs["n_dof"] = int(values["n_dof"])
-        for name, dims in _DIMS.items():
-            data = values[name]
-            for dim, length in zip(dims, data.shape, strict=True):
-                if dim not in file.dimensions:
-                    file.dimensions[dim] = length
-            variable = file.create_variable(name, dims, data.dtype, data=data)
-            if name in _UNITS:
-                variable.attrs["units"] = _UNITS[name]
-
-
-def _read_netcdf(path: Path) -> dict[str, Any]:
-    with h5netcdf.File(path, "r") as file:
-        values: dict[str, Any] = {name: np.asarray(file.variables[name][...]) for name in _DIMS}
-        return values | {"format": file.attrs["format"], "n_dof": int(file.attrs["n_dof"])}

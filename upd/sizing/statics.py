@@ -1,7 +1,7 @@
 """A damper between two blades before any dynamics: does it jam, lift off or tilt, and what can its
 faces carry.
 
-Closed forms of `upd.contact.rigid_damper` and `upd.contact.damper_section` at the angles, the
+Closed forms of `upd.contact.rigid_damper` at the angles, the
 friction, the faces and the centrifugal force of a scene. The damper is rigid, its mass does not
 count beside F_C, and the blades move in the plane of the slopes.
 """
@@ -19,21 +19,19 @@ from scipy.optimize import brentq
 
 from upd.analyses.seated.bodies import face_angles, patch_frame
 from upd.analyses.seated.plan import centrifugal_words
-from upd.contact.damper_section import (
+from upd.contact.rigid_damper import (
+    SLIDINGS,
     AdmissibleForces,
     DamperSection,
     FaceSection,
-    admissible_forces,
-    eccentricity,
-    moment_share,
-)
-from upd.contact.rigid_damper import (
-    SLIDINGS,
     FrictionLimits,
     Sliding,
+    admissible_forces,
+    eccentricity,
     friction_limits,
     jams,
     lifted,
+    moment_share,
 )
 from upd.errors import InputError
 from upd.fem import Material, mass_properties

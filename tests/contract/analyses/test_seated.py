@@ -16,8 +16,7 @@ from upd.analyses import make_plan, seated
 from upd.analyses.seated.interface import make_interface
 from upd.analyses.seated.plan import AGAIN, LOWERED, OVER, RAISED, SHAKEN, SMOOTH
 from upd.analyses.seated.solve import SeatedSolution
-from upd.contact.damper_section import admissible_forces, moment_share
-from upd.contact.rigid_damper import SLIDINGS, equilibrium
+from upd.contact.rigid_damper import SLIDINGS, admissible_forces, equilibrium, moment_share
 from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages, silent
 from upd.results import Check

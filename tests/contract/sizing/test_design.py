@@ -12,8 +12,7 @@ import pytest
 
 import upd
 from upd import cli
-from upd.contact.damper_section import DamperSection, FaceSection, eccentricity
-from upd.contact.rigid_damper import SLIDINGS
+from upd.contact.rigid_damper import SLIDINGS, DamperSection, FaceSection, eccentricity
 from upd.errors import InputError
 from upd.report.page import png_size
 from upd.scene import load_scene

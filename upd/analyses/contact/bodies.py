@@ -41,8 +41,8 @@ from upd.errors import MeshError
 from upd.fem import Material, rigid_body_modes, stiffness
 from upd.linalg.multigrid import MultigridSolver
 from upd.linalg.parallel import in_parallel
+from upd.linalg.schur import DirectSolver, Solver
 from upd.linalg.select import PRODUCTS
-from upd.linalg.solvers import DirectSolver, Solver
 from upd.linalg.symmetric import Symmetric, submatrix_of
 from upd.mesh import Mesh, recipes
 from upd.mesh.hexmesh import upper_and_lower

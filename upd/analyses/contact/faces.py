@@ -21,10 +21,9 @@ from scipy.sparse.csgraph import connected_components
 from upd.analyses.contact.loading import contact_points_of
 from upd.analyses.contact.plan import NORMAL
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
-from upd.contact.edge import LocatedArea, located_area
 from upd.contact.law import ContactLaw, contact_points
 from upd.contact.normal import NormalContact
-from upd.contact.patch import ContactMeasures, Patch, measure
+from upd.contact.patch import ContactMeasures, LocatedArea, Patch, located_area, measure
 from upd.mesh import IntArray, Mesh
 
 Array = NDArray[np.float64]

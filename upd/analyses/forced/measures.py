@@ -393,7 +393,7 @@ def residual_error(answer: FrequencyResponse) -> float:
     """
     b, worst = answer.balance, 0.0
     for f, x, kept in zip(answer.frequency, answer.x, answer.contact_force, strict=True):
-        off = np.abs(b.force(x, False).force - kept).max()
+        off = np.abs(b.force(x).force - kept).max()
         forces = off / max(float(np.abs(kept).max()), _TINY)
         worst = max(worst, b.misfit(x, float(2.0 * np.pi * f)), float(forces))
     return worst

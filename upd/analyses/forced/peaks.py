@@ -41,8 +41,8 @@ from upd.errors import ConvergenceError, one_line
 from upd.hbm import climb
 from upd.hbm.core.fourier import to_complex
 from upd.hbm.faces.march import InterfaceMarch
-from upd.hbm.faces.settle import settle
 from upd.hbm.faces.state import InterfaceState
+from upd.hbm.faces.sweep import settle
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import STICK
 from upd.hbm.springs.peak import FIRST_REACH, is_near
@@ -160,7 +160,7 @@ def climbed(
     height = 1e-3 * (2.0 * np.pi * k * top.frequency) ** 2 * top.amplitude / force
     if not top.found or not is_near(top.frequency / about.frequency, height / about.height):
         return None
-    slips = bool((b.force(top.x, False).march.state != STICK).any())
+    slips = bool((b.force(top.x).march.state != STICK).any())
     return Top(top.frequency, float(height), top.x, slips)
 
 
@@ -392,6 +392,6 @@ def _amplitude(model: Model, b: Balance, x: Array, f: float, side: Side) -> floa
     """Of a blade in the lowest harmonic excited, mm."""
     j = b.harmonics.place(model.excitation.lowest)
     omega = np.array([2.0 * np.pi * f])
-    force = b.force(x, False).force.reshape(1, len(b.Psi), b.harmonics.size)
+    force = b.force(x).force.reshape(1, len(b.Psi), b.harmonics.size)
     moving = to_complex(b.displacement(omega, force, b.split(x)[1][None])[0], b.harmonics)
     return float(abs(model.row(side) @ moving[:, j]))

@@ -494,7 +494,7 @@ def carried(b: Balance, old: Balance, x: Array, move: Array | None) -> Array:
     flat = np.concatenate([moved.ravel(), np.zeros(b.rigid)])
     if not b.rigid:
         return flat
-    F = b.force(flat, False).force.reshape(len(b.Psi), -1)
+    F = b.force(flat).force.reshape(len(b.Psi), -1)
     rows = b.Psi[:, b.modal.rigid]
     mean = moved.reshape(len(b.Psi), -1)[:, 0] + b.G0 @ F[:, 0] - b.u0
     a = np.linalg.lstsq(rows, mean, rcond=None)[0]

@@ -17,7 +17,7 @@ from upd.analyses.forced.peaks_again import PeaksAgain
 from upd.analyses.forced.performance import Performance
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.seated.bodies import Bodies
-from upd.hbm.faces.record import RecordedPeriod
+from upd.hbm.faces.sweep import RecordedPeriod
 from upd.mesh import IntArray
 from upd.results import Case, Result
 from upd.scene.forced_contact import SIDES

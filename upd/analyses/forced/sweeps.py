@@ -44,9 +44,8 @@ from upd.analyses.forced.plan import (
 )
 from upd.analyses.forced.solution import ForcedSolution, MarchedPeak
 from upd.hbm.faces.balance import interface_response
-from upd.hbm.faces.record import period_of_sweep
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
-from upd.hbm.faces.sweep import stepped_sine
+from upd.hbm.faces.sweep import period_of_sweep, stepped_sine
 from upd.linalg.parallel import threads_for
 from upd.progress import Stages
 from upd.scene.forced_contact import SIDES, Side

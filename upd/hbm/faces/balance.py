@@ -1,24 +1,32 @@
 """The response over frequency: blades in frequency, contact by whole faces and damper in time.
 
-The equations are those of `upd.hbm.faces.equations`, the walk over the frequencies that of
-`upd.hbm.faces.curve`. Nodes that never move keep the slips of the start, so that the curve has
-a past as a sweep has one, and up and down the frequencies it need not be the same.
+The equations are those of `upd.hbm.faces.equations`. The walk goes by arc length over all unknowns,
+with a corrector of its own, `upd.hbm.faces.corrector`: what sticks has a memory, so that the curve
+depends on the way along it, and every sample of every node puts a kink into it. A node's slips are
+taken among the unknowns from the first time it moves; nodes that never move keep the slips of the
+start, so that up and down the frequencies the curve need not be the same. Where it folds, or no
+step leads on, a motion whose frequency changes on must jump; the walk then marches in time at the
+next frequency, as a sweep would, and continues from the motion found there.
 """
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upd.errors import InputError
+from upd.errors import ConvergenceError, InputError
 from upd.hbm.core.newton import Settings
-from upd.hbm.faces.curve import InterfaceCurve, InterfacePoint
-from upd.hbm.faces.equations import InterfaceEquations
-from upd.hbm.faces.march import Fallback
-from upd.hbm.faces.state import ComplexArray, FloatArray, InterfaceModel, InterfaceState
+from upd.hbm.faces.corrector import InterfaceCorrector, InterfacePlace
+from upd.hbm.faces.equations import ContactPeriod, InterfaceEquations
+from upd.hbm.faces.march import Fallback, InterfaceMarch
+from upd.hbm.faces.state import EPS, ComplexArray, FloatArray, InterfaceModel, InterfaceState
+from upd.hbm.faces.step import OPEN, SLIP, STICK
+from upd.hbm.faces.sweep import settle
+from upd.hbm.springs.residuals import FREQUENCY_SHARE
 from upd.linalg.parallel import SideBySide
 from upd.linalg.select import threads_used
 
@@ -27,6 +35,22 @@ from upd.linalg.select import threads_used
 TOLERANCE = 1e-6
 #: steps, over the size of the solution, below which none is tried: a jump is shorter than many
 SHORTEST = 5e-4
+#: shortest step of the load on the way from rest to the first frequency's answer
+LEAST_LOAD = 1.0 / 64.0
+#: tolerances to which a motion is integrated before the balance is tried on it
+MARCHED = (1e-2, 1e-3)
+MOST_PERIODS = 2000
+#: difference of the blades' motions, relative, up to which balance and march are the same motion
+SAME = 0.1
+#: distance, over the size of the solution, from which a fold is not approached further: what its
+#: top may be off
+NEAR_FOLD = 0.005
+#: share of a step beyond a fold that the next one may have at most, so that the approach ends
+TURNED = 0.95
+#: share of a step without an answer that is tried next; it weighs costs
+FAILED = 0.25
+#: how far the corrector may move from the predicted point, in steps
+STRAY = 0.5
 
 
 @dataclass(frozen=True)
@@ -181,3 +205,401 @@ def interface_response(
 def _in_order(f: FloatArray) -> bool:
     steps = np.diff(f)
     return bool((steps > 0.0).all() or (steps < 0.0).all())
+
+
+class InterfacePoint(NamedTuple):
+    """A point of the curve.
+
+    Attributes
+    ----------
+    frequency : float
+        Hz.
+    q : (2 H + 1, m) ndarray
+        Coefficients of the blades' modes.
+    rigid : (3, r) ndarray
+        Damper's motion, velocity and acceleration before the period, time in steps.
+    slip : (2 n,) ndarray
+        Slips before the period [mm].
+    iterations : int
+        Of Newton's method.
+    amplitude : (H + 1, K) ndarray
+        Complex harmonics 0 to H of the outputs [mm].
+    share : (3,) ndarray
+        Of nodes and samples that are open, stick, slip.
+    truncation : float
+        Share of the modal contact forces' variation that harmonics above H hold.
+    energy : (3,) ndarray
+        In a period, of the whole: work of the excitation, lost by damping, by friction [N mm].
+    nodes : (n, 3) ndarray
+        Shares of the period in which each node is open, sticks, slips.
+    loss : (n,) ndarray
+        By friction at each node in a period, of the whole [N mm].
+    unresolved : float
+        Motion of the faces by blades' harmonics above H over that by those up to H.
+    residual : float
+        The residual of the equations: of the blades' forces over the forces, of slips and the
+        damper's motion after the period over the motion of the faces, whichever is larger.
+    """
+
+    frequency: float
+    q: FloatArray
+    rigid: FloatArray
+    slip: FloatArray
+    iterations: int
+    amplitude: ComplexArray
+    share: FloatArray
+    truncation: float
+    energy: FloatArray
+    nodes: FloatArray
+    loss: FloatArray
+    unresolved: float
+    residual: float
+
+
+def read_point(
+    e: InterfaceEquations,
+    period: ContactPeriod,
+    q: FloatArray,
+    rigid: FloatArray,
+    slip: FloatArray,
+    frequency: float,
+    iterations: int,
+) -> InterfacePoint:
+    """Read a point from its period; a period is large and is not kept.
+
+    Parameters
+    ----------
+    e : InterfaceEquations
+    period : ContactPeriod
+        That of the unknowns.
+    q, rigid, slip, frequency, iterations
+        As in `InterfacePoint`.
+
+    Returns
+    -------
+    InterfacePoint
+    """
+    w = 2.0 * np.pi * frequency
+    nodes = np.array([(period.state == code).mean(axis=0) for code in (OPEN, STICK, SLIP)]).T
+    loss = _rubbed(e, period)
+    return InterfacePoint(
+        frequency,
+        q,
+        rigid,
+        slip,
+        iterations,
+        _outputs(e, q, period),
+        nodes.mean(axis=0),
+        _left_out(period, e.highest),
+        np.append(_energy(e, q, period, w), loss.sum()),
+        nodes,
+        loss,
+        _unresolved(e, q, period, w),
+        _residual(e, period, q, rigid, slip, w),
+    )
+
+
+def _unresolved(e: InterfaceEquations, q: FloatArray, period: ContactPeriod, w: float) -> float:
+    """What the contact forces' harmonics above H would move the faces by the blades' modes."""
+    model = e.model
+    modal = 2.0 / e.samples * np.fft.rfft(period.modal, axis=0)[e.highest + 1 :]
+    kw = w * np.arange(e.highest + 1, e.highest + 1 + len(modal))[:, None]
+    resistance = model.omega**2 - kw**2 + 2j * model.damping * model.omega * kw
+    moved = float(np.linalg.norm(model.shapes @ q[1:].T))
+    if moved == 0.0:
+        return 0.0
+    return float(np.linalg.norm(model.shapes @ (modal / resistance).T)) / moved
+
+
+def _residual(
+    e: InterfaceEquations,
+    period: ContactPeriod,
+    q: FloatArray,
+    rigid: FloatArray,
+    slip: FloatArray,
+    w: float,
+) -> float:
+    """The largest of the residual of the equations, over what they are made of."""
+    model = e.model
+    forces = np.abs(e.Q @ period.modal).max() + np.abs(e.drive @ model.places.T).max()
+    blades = float(np.abs(e.misfit(period, q, w)).max() / forces) if forces > 0.0 else 0.0
+    face = float(np.abs(model.shapes @ q[1:].T).max())
+    if face <= EPS * float(np.abs(model.shapes @ q[0]).max()):
+        return blades
+    reach = np.abs(model.columns).max(axis=0)
+    ends = [np.abs((period.rigid - rigid)[0] * reach).max(), np.abs(period.slip - slip).max()]
+    return max(blades, float(max(ends)) / face)
+
+
+def _rubbed(e: InterfaceEquations, period: ContactPeriod) -> FloatArray:
+    """Lost by friction at each node, of the whole [N mm]."""
+    mean = 0.5 * (period.force + np.roll(period.force, 1, axis=0))
+    lost = (mean * period.relative).sum(axis=0).reshape(3, -1)[1:].sum(axis=0)
+    return np.asarray(e.model.copies * lost)
+
+
+def _outputs(e: InterfaceEquations, q: FloatArray, period: ContactPeriod) -> ComplexArray:
+    """(H + 1, K) harmonics of the outputs."""
+    model = e.model
+    real = q @ model.seen_modes.T + e.Q @ (period.force @ model.seen_contact.T)
+    real = real + e.drive @ model.seen_drive.T
+    out = np.zeros((e.highest + 1, real.shape[1]), complex)
+    out[0] = real[0]
+    out[1:] = real[1::2] - 1j * real[2::2]
+    return out
+
+
+def _left_out(period: ContactPeriod, highest: int) -> float:
+    """Share of the modal forces' variation that higher harmonics hold."""
+    modal = np.fft.rfft(period.modal, axis=0)
+    whole = float(np.linalg.norm(modal[1:]))
+    # sums of the samples' forces, rounded
+    if whole <= len(period.modal) * EPS * float(np.linalg.norm(modal[0])):
+        return 0.0
+    return float(np.linalg.norm(modal[1 + highest :])) / whole
+
+
+def _energy(e: InterfaceEquations, q: FloatArray, period: ContactPeriod, w: float) -> FloatArray:
+    """Work of the excitation and lost by damping, of the whole [N mm]."""
+    model, share = e.model, 2.0 * np.pi / e.samples
+    F, rate = e.E @ e.drive, e.E @ e.turned(e.drive, e.order)
+    v = e.E @ e.turned(q, e.order)
+    # the places also move with the contact forces: F d(E'f) = d(F E'f) - E'f dF
+    into = share * (np.sum(F * (v @ model.places)) - np.sum(rate * (period.force @ model.pushed)))
+    damped = share * w * float(np.sum(2.0 * model.damping * model.omega * v**2))
+    return np.asarray(model.copies * np.array([into, damped]))
+
+
+class InterfaceCurve:
+    """A curve on its way."""
+
+    def __init__(
+        self,
+        equations: InterfaceEquations,
+        drive: ArrayLike,
+        settings: Settings,
+        mean: float,
+    ) -> None:
+        self.equations, self.settings = equations, settings
+        self.p_scale = FREQUENCY_SHARE * mean
+        self.corrector = InterfaceCorrector(equations, settings, self.p_scale)
+        self.places: list[InterfacePoint] = []
+        self.jumps: list[float] = []
+        #: numbers of the points after which it jumped; frequencies at which nothing was found
+        self.broken: list[int] = []
+        self.missed: list[float] = []
+        self.length = settings.first_step
+        model = equations.model
+        n, m, L = model.n, len(model.frequency), model.places.shape[1]
+        #: the model with its modes as outputs
+        self.modes = replace(
+            model,
+            seen_modes=np.eye(m),
+            seen_contact=np.zeros((m, 3 * n)),
+            seen_drive=np.zeros((m, L)),
+        )
+        self.drive = drive
+        self.moving = equations.start.copy()
+
+    def follow(self, f: FloatArray) -> tuple[str, str]:
+        """Status and message of the walk over the frequencies."""
+        way = 1.0 if f[-1] >= f[0] else -1.0
+        at = self._first(float(f[0]))
+        if at is not None:
+            at = self._begin(at, way)
+        missed = self.missed
+        if at is None:
+            missed.append(float(f[0]))
+        while at is None or (f[-1] - at.p) * way > 0.0:
+            if len(self.places) >= self.settings.most_points:
+                return "step limit", (
+                    f"{len(self.places)} points used before {f[-1]:.9g} Hz{self._told(missed)}"
+                )
+            if at is not None:
+                found = self._advance(at, f)
+                if found is not None and float(found.tangent[-1]) * way > 0.0:
+                    at = found
+                    self.places.append(self._kept(at))
+                    continue
+                if found is not None:
+                    before, after = float(at.tangent[-1]), float(found.tangent[-1])
+                    fold = self.length * before / (before - after)
+                    if fold > NEAR_FOLD:
+                        at = replace(at, step=min(fold - 0.5 * NEAR_FOLD, TURNED * self.length))
+                        continue
+            # a fold, or a place from which no step leads on: a motion must jump there
+            passed = max([p * way for p in missed] + [one.frequency * way for one in self.places])
+            ahead = f[f * way > passed]
+            if not len(ahead):
+                break
+            at = self._jump(float(ahead[0]))
+            if at is None:
+                missed.append(float(ahead[0]))
+                continue
+            self.jumps.append(at.p)
+            if self.places:
+                self.broken.append(len(self.places) - 1)
+            self.places.append(self._kept(at))
+            at = self._begin(at, way)
+        if missed and missed[-1] == f[-1]:
+            return "stopped", (
+                f"no periodic motion found at {f[-1]:.9g} Hz{self._told(missed)}; march there, or "
+                "take more samples"
+            )
+        return (
+            "complete",
+            f"reached {f[-1]:.9g} Hz in {len(self.places)} points{self._told(missed)}",
+        )
+
+    def _kept(self, at: InterfacePlace) -> InterfacePoint:
+        """The point of a place; a jump from there begins with its state."""
+        e, w = self.equations, 2.0 * np.pi * at.p
+        q, rigid, slip = e.split(at.x)
+        period = e.march(at.x, w)
+        self.moving = e.state_in(period, q, rigid, slip, w)
+        return read_point(e, period, q, rigid, slip, at.p, at.iterations)
+
+    def _told(self, missed: list[float]) -> str:
+        """Where it jumped, and where nothing was found."""
+        lists = [
+            (self.jumps, "after a jump, found by time march, at"),
+            (missed, "no periodic motion found at"),
+        ]
+        parts = [f"; {words} {', '.join(f'{p:.6g}' for p in at)} Hz" for at, words in lists if at]
+        return "".join(parts)
+
+    def _jump(self, f: float) -> InterfacePlace | None:
+        """March in time from the last point until the balance finds that motion.
+
+        Parameters
+        ----------
+        f : float
+            Hz.
+
+        Returns
+        -------
+        InterfacePlace or None
+            None where the march does not settle, or the balance finds another motion.
+        """
+        e = self.equations
+        march = InterfaceMarch(self.modes, f, self.drive, e.samples, e.fallback)
+        for tolerance in MARCHED:
+            try:
+                settled = settle(march, self.moving, tolerance, MOST_PERIODS).settled
+                moving = self.moving.copy()
+                q = e.Q @ march.period(moving).output
+            except ConvergenceError:
+                return None
+            dt, at = march.dt, self.moving
+            e.slip = at.slip.copy()
+            e.known = None
+            rigid = np.array([at.s, dt * at.sv, dt**2 * at.sa])
+            x = e.joined(q, rigid, at.slip)
+            found = self._at_frequency(x, f)
+            if found is not None:
+                off = float(np.linalg.norm(e.split(found.x)[0][1:] - q[1:]))
+                if off <= SAME * float(np.linalg.norm(q[1:])):
+                    return found
+            if not settled:
+                break
+        return None
+
+    def _at_frequency(self, x: FloatArray, f: float) -> InterfacePlace | None:
+        """Newton's method at a frequency."""
+        return self.corrector.correct(
+            x, f, self.corrector.across(1.0, x), self.corrector.scale(x), self.equations.split(x)[2]
+        )
+
+    def _begin(self, at: InterfacePlace, way: float) -> InterfacePlace:
+        """The place with its tangent in the direction of travel, and the first step."""
+        tangent = at.tangent * np.sign(at.tangent[-1]) * way
+        return replace(at, tangent=tangent, step=self.settings.first_step)
+
+    def _advance(self, at: InterfacePlace, marks: FloatArray) -> InterfacePlace | None:
+        """One step; None when even the smallest fails.
+
+        There is a kink wherever a sample of a node changes its state, and what sticks has a memory,
+        so that neither turns of the tangent nor the sign of the determinant tell pieces of the
+        curve apart. A step is good where the corrector ends near the point it started from.
+        """
+        s, h, at = self.settings, at.step, self.corrector.widened(at)
+        past = self.equations.split(at.x)[2]
+        while h >= s.smallest_step:
+            D = self.corrector.scale(at.x)
+            normal, length, rate = at.tangent, h, float(at.tangent[-1]) * self.p_scale
+            ahead = marks[(marks - at.p) * np.sign(rate) > 4 * EPS * at.p]
+            mark = float(ahead[np.abs(ahead - at.p).argmin()]) if len(ahead) else np.inf
+            hit = abs(mark - at.p) <= h * abs(rate)
+            if hit:
+                length, normal = (mark - at.p) / rate, self.corrector.across(rate, at.x)
+            x = at.x + length * at.tangent[:-1] * D
+            p = mark if hit else at.p + length * rate
+            found = self.corrector.correct(x, p, normal, D, past, at.known)
+            at = self.corrector.widened(at)
+            if found is not None:
+                D = self.corrector.scale(at.x)
+                x = at.x + length * at.tangent[:-1] * D
+                off = np.append((found.x - x) / D, (found.p - p) / self.p_scale)
+                stray = float(np.linalg.norm(off)) / length
+                if stray <= STRAY and not hit and (found.p - mark) * rate > 0.0:
+                    # the corrector has passed a frequency that is asked for
+                    x = at.x + (mark - at.p) / (found.p - at.p) * (found.x - at.x)
+                    normal = self.corrector.across(rate, at.x)
+                    found = self.corrector.correct(x, mark, normal, D, past, found.known)
+                    at = self.corrector.widened(at)
+                if found is not None and stray <= STRAY:
+                    D = self.corrector.scale(at.x)
+                    self.length = length
+                    tangent = np.append(
+                        found.tangent[:-1] * D / self.corrector.scale(found.x), found.tangent[-1]
+                    )
+                    grow = min(
+                        s.wanted_iterations / found.iterations, STRAY / 2.0 / max(stray, EPS)
+                    )
+                    step = (h if hit else length) * float(np.clip(grow, 0.5, 2.0))
+                    return replace(
+                        found,
+                        tangent=tangent / np.linalg.norm(tangent),
+                        step=min(step, s.largest_step),
+                    )
+            # states that change to and fro ahead of a fold do so at half of the step as well
+            h = (FAILED if found is None else 0.5) * min(h, length)
+        return None
+
+    def _first(self, f: float) -> InterfacePlace | None:
+        """The load raised from rest in steps as long as Newton's method takes them.
+
+        A start that moves is integrated in time.
+        """
+        e = self.equations
+        moves = bool(e.start.v.any())
+        found = self._jump(f) if moves else self._raised(f) or self._jump(f)
+        if found is not None:
+            self.places.append(self._kept(found))
+        return found
+
+    def _raised(self, f: float) -> InterfacePlace | None:
+        """The answer by raising the load from rest."""
+        e, load, step, found = self.equations, 0.0, 1.0, None
+        q = np.zeros(e.shape)
+        q[0] = e.start.q
+        rigid = np.zeros((3, len(e.model.load)))
+        rigid[0] = e.start.s
+        slip, whole = e.slip.copy(), e.drive
+        try:
+            while load < 1.0:
+                trial = min(load + step, 1.0)
+                e.drive = trial * whole
+                e.forget()
+                found = self._at_frequency(e.joined(q, rigid, slip), f)
+                if found is None:
+                    step = 0.5 * (trial - load)
+                    if step < LEAST_LOAD:
+                        return None
+                    continue
+                (q, rigid, slip), load = e.split(found.x), trial
+                step *= 2.0 if found.iterations <= self.settings.wanted_iterations else 1.0
+        finally:
+            e.drive = whole
+            e.forget()
+        return found

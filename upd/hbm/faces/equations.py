@@ -2,7 +2,7 @@ r"""Equations of the balance of blades in frequency with contact and damper in t
 
 Unknowns are the harmonics 0 to H of the blades' modes q(t), coefficients as in
 `upd.hbm.core.fourier`, the damper's state and the slips before the period. Under q(t) one period of
-contact and damper is integrated (`upd.hbm.faces.samples`): this gives the forces f at N samples and
+contact and damper is integrated (`upd.hbm.faces.kept`): this gives the forces f at N samples and
 the state after it:
 
     (omega^2 - (k w)^2 + 2 i zeta omega k w) q_k = (Phi' f)_k + P F_k,      state after = before.
@@ -24,9 +24,8 @@ from scipy.linalg import cho_solve
 
 from upd.errors import ConvergenceError, InputError
 from upd.hbm.core.fourier import analysis, harmonics, synthesis
-from upd.hbm.faces.kept import kept_inverses
+from upd.hbm.faces.kept import given_blades, kept_inverses
 from upd.hbm.faces.march import Fallback
-from upd.hbm.faces.samples import given_blades
 from upd.hbm.faces.state import FloatArray, InterfaceModel, InterfaceState, factored, in_columns
 from upd.hbm.faces.step import STICK, judge
 from upd.linalg.parallel import SideBySide

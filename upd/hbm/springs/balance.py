@@ -212,29 +212,20 @@ class Balance:
         W, a = old.split(x)
         return np.concatenate([embed(W, old.harmonics, self.harmonics).ravel(), a])
 
-    def force(self, x: FloatArray, jacobian: bool = False) -> Harmonic:
+    def force(self, x: FloatArray) -> Harmonic:
         """Contact forces of one answer.
 
         Parameters
         ----------
         x : (n_unknown,) ndarray
             Unknowns.
-        jacobian : bool
-            Whether the derivative is wanted.
 
         Returns
         -------
         Harmonic
         """
-        return harmonic_force(
-            self.contacts.law,
-            self.split(x)[0],
-            self.E,
-            self.Q,
-            start=self.start,
-            slider=self.slider,
-            jacobian=jacobian,
-        )
+        law, W = self.contacts.law, self.split(x)[0]
+        return harmonic_force(law, W, self.E, self.Q, start=self.start, slider=self.slider)
 
     def marched(self, W: FloatArray, E: FloatArray, most: int = MOST_PERIODS) -> March:
         """Contact forces of many motions in one march.
@@ -257,7 +248,7 @@ class Balance:
         slider = None if self.slider is None else np.tile(self.slider, (n, 1))
         w = np.ascontiguousarray(W @ E.T).reshape(n * n_point, rows, len(E))
         law = self.contacts.law.tiled(n)
-        found = march(law, w, E, start=self.start, slider=slider, jacobian=False, most=most)
+        found = march(law, w, E, start=self.start, slider=slider, most=most)
         shape = (n, n_point)
         return replace(
             found,

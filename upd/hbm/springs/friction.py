@@ -22,7 +22,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.springs.coulomb import LIFT
 from upd.hbm.springs.period import GIVEN, LOWER, MID, UPPER, march_points
 from upd.labels import Shown
 
@@ -95,11 +94,6 @@ class March:
         The same with the corners between the samples, which its coefficients are taken from [N].
     state : (n_point, n) ndarray of int8
         STICK, SLIP or LIFT.
-    slope : (n_point, 3, n) ndarray
-        Derivative of the weighed normal force by N_0 + k_n w at the sample before, at the sample
-        and at the one after.
-    tangent : (n_point, d, n, (1 + d) size) ndarray or None
-        Derivative of the weighed traction by the coefficients of the motion [N/mm].
     periodic : (n_point,) ndarray of bool
         Whether each point came back to its start.
     periods : (n_point,) ndarray of int
@@ -109,8 +103,6 @@ class March:
     force: FloatArray
     weighed: FloatArray
     state: NDArray[np.int8]
-    slope: FloatArray
-    tangent: FloatArray | None
     periodic: NDArray[np.bool_]
     periods: NDArray[np.int64]
 
@@ -137,7 +129,6 @@ def march(
     *,
     start: Start = "zero",
     slider: FloatArray | None = None,
-    jacobian: bool = True,
     most: int = MOST_PERIODS,
 ) -> March:
     """Periodic contact force of all points along a motion.
@@ -154,9 +145,6 @@ def march(
         interval, or the traction at its upper or lower end along the first tangent.
     slider : (n_point, 2) ndarray, optional
         Slider positions [mm] before the march for start "zero" (not given) and "static".
-    jacobian : bool
-        Whether the derivative is wanted; it is exact for the discrete march, through all its
-        periods.
     most : int
         Periods at most.
 
@@ -165,15 +153,14 @@ def march(
     March
     """
     n_point, rows, n = w.shape
-    size = E.shape[1]
     force, weighed = np.zeros((n_point, rows, n)), np.zeros((n_point, rows, n))
-    state, slope = np.zeros((n_point, n), dtype=np.int8), np.zeros((n_point, 3, n))
-    tangent = np.zeros((n_point, rows - 1, n, rows * size) if jacobian else (1, 0, 0, 0))
+    state = np.zeros((n_point, n), dtype=np.int8)
     periodic, periods = np.zeros(n_point, dtype=np.bool_), np.zeros(n_point, dtype=np.int64)
     begin = (START_CODE[start], np.zeros((n_point, 2)) if slider is None else slider, most)
+    slope, tangent = np.zeros((n_point, 3, n)), np.zeros((1, 0, 0, 0))
     filled = (force, weighed, state, slope, tangent)
-    march_points(w, E, law.arrays, begin, jacobian, filled, periodic, periods)
-    return March(force, weighed, state, slope, tangent if jacobian else None, periodic, periods)
+    march_points(w, E, law.arrays, begin, False, filled, periodic, periods)
+    return March(force, weighed, state, periodic, periods)
 
 
 @dataclass(frozen=True)
@@ -184,14 +171,11 @@ class Harmonic:
     ----------
     force : (n_point, 1 + d, size) ndarray
         Coefficients [N].
-    jacobian : (n_point, 1 + d, size, 1 + d, size) ndarray or None
-        Derivative by the coefficients of the motion [N/mm].
     march : March
         The period they were taken from.
     """
 
     force: FloatArray
-    jacobian: FloatArray | None
     march: March
 
 
@@ -203,7 +187,6 @@ def harmonic_force(
     *,
     start: Start = "zero",
     slider: FloatArray | None = None,
-    jacobian: bool = True,
 ) -> Harmonic:
     """Coefficients of the contact force for those of the motion (alternating frequency/time).
 
@@ -216,39 +199,12 @@ def harmonic_force(
         Synthesis matrix of the samples.
     Q : (size, n) ndarray
         Analysis matrix of the samples.
-    start, slider, jacobian
+    start, slider
         As in `march`.
 
     Returns
     -------
     Harmonic
     """
-    n_point, rows, size = X.shape
-    result = march(
-        law, np.ascontiguousarray(X @ E.T), E, start=start, slider=slider, jacobian=jacobian
-    )
-    force = result.coefficients(Q)
-    if result.tangent is None:
-        return Harmonic(force, None, result)
-    J = np.zeros((n_point, rows, size, rows, size))
-    J[:, 0, :, 0, :] = law.k_n[:, None, None] * _normal_block(result, E, Q)
-    if rows > 1:
-        J[:, 1:] = np.matmul(Q, result.tangent).reshape(n_point, rows - 1, size, rows, size)
-    return Harmonic(force, J, result)
-
-
-def _normal_block(found: March, E: FloatArray, Q: FloatArray) -> FloatArray:
-    """Derivative of the normal force's coefficients by those of N_0 + k_n w, (n_point, size, size).
-
-    The identity where the contact never opens.
-    """
-    size = E.shape[1]
-    block = np.broadcast_to(np.eye(size), (len(found.state), size, size)).copy()
-    for p in np.flatnonzero((found.state == LIFT).any(axis=1)):
-        before, here, after = found.slope[p]
-        rows = here[:, None] * E
-        for beside, shift in ((before, -1), (after, 1)):
-            j = np.flatnonzero(beside)
-            rows[j] += beside[j, None] * E[(j + shift) % len(E)]
-        block[p] = Q @ rows
-    return block
+    found = march(law, np.ascontiguousarray(X @ E.T), E, start=start, slider=slider)
+    return Harmonic(found.coefficients(Q), found)
