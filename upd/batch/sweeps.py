@@ -23,7 +23,6 @@ from upd.batch.table import Column, as_csv, check_follow, csv_text, make_columns
 from upd.cache.files import json_text, write_text
 from upd.cache.sources import versions
 from upd.errors import InputError, one_line
-from upd.plot.matplotlib import draw_all, write_sheets
 from upd.plot.sweep_charts import FIGURES, is_constant, sample_charts, sweep_charts
 from upd.results import Group, write_netcdf
 from upd.results.sampled import SampledNumber, sampled_number
@@ -65,6 +64,8 @@ class SweepResult:
 
     def plot(self) -> list[Axes]:
         """Draw the followed numbers with matplotlib, and return the axes."""
+        from upd.plot.matplotlib import draw_all
+
         if self.sampled:
             return draw_all(sample_charts(self.sampled, [c.values for c in self.columns]))
         return draw_all(sweep_charts(self.plan.axes, self.columns)[:6])
@@ -269,6 +270,9 @@ def draw(
 
     Returns their paths.
     """
+    # slow to import
+    from upd.plot.matplotlib import write_sheets
+
     _remove_figures(folder)
     if sampled:
         values = [column.values for column in columns]

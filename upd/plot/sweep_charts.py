@@ -12,8 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from upd.labels import unit_label
-from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Trace
-from upd.plot.matplotlib import MOST_PANELS
+from upd.plot.chart import MOST_PANELS, Area, Array, Axis, Band, Chart, Map, Trace
 from upd.results.quantities import number_label, number_title
 from upd.results.sampled import SampledNumber
 

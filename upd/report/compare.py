@@ -179,7 +179,7 @@ def _spread(rows: Sequence[Entry | None]) -> float | None:
 def overlaid(runs: Sequence[Sequence[Chart]], names: Sequence[str]) -> list[Chart]:
     """The same chart of every run in one, a colour per run.
 
-    Maps and pies, which cannot lie on each other, become cases of one place.
+    Maps, which cannot lie on each other, become cases of one place.
     """
     charts = [(k, chart) for k, mine in enumerate(runs) for chart in mine]
     out: list[Chart] = []
@@ -197,9 +197,7 @@ def overlaid(runs: Sequence[Sequence[Chart]], names: Sequence[str]) -> list[Char
 
 def _fills(chart: Chart) -> bool:
     """Whether a chart fills its place, so that another cannot lie on it."""
-    return bool(
-        chart.maps or chart.pies or chart.scatters or any(area.state for area in chart.areas)
-    )
+    return bool(chart.maps or chart.scatters or any(area.state for area in chart.areas))
 
 
 def _alike(mine: Sequence[tuple[int, Chart]]) -> Iterator[tuple[int, Chart]]:

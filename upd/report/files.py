@@ -15,7 +15,6 @@ from upd.cache.files import whole_file
 from upd.errors import UpdError
 from upd.labels import file_name
 from upd.mesh import recipes
-from upd.plot.matplotlib import write_sheets
 from upd.report.notebook import RunResult, charts
 from upd.results import Arrays, Group, Variable
 
@@ -68,6 +67,9 @@ def write_figures(result: RunResult, folder: Path) -> list[Path]:
 
     Figures that lie there already stay. Returns what was written.
     """
+    # matplotlib takes a while to import
+    from upd.plot.matplotlib import write_sheets
+
     written = write_sheets(charts(result), folder, keep=True)
     return written + write_dimensions(result, folder / "dimensions.png")
 
@@ -82,7 +84,7 @@ def write_dimensions(result: RunResult, path: Path) -> list[Path]:
         return []
     # matplotlib takes a while to import
     from upd.plot.drawing import draw_sections
-    from upd.plot.sheet import write_png
+    from upd.plot.matplotlib import write_png
 
     return write_png(draw_sections(meshes, views), path)
 

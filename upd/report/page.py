@@ -20,7 +20,6 @@ from markupsafe import Markup, escape
 from upd.cache.files import write_text
 from upd.errors import InputError
 from upd.plot.chart import Chart
-from upd.plot.matplotlib import chart_png
 from upd.plot.plotly import figure
 from upd.plot.surface import Surface, n_bytes, packed
 from upd.report.tables import MOST_NOTES
@@ -174,7 +173,6 @@ def page_text(
         most_notes=MOST_NOTES,
         surfaces=bodies,
         surfaces_left_out=left_out,
-        surface_image=_picture(bodies[0]) if bodies else "",
         style=(_PARTS / "page.css").read_text("utf-8"),
         plotly=script,
         script=(_PARTS / "page.js").read_text("utf-8"),
@@ -188,13 +186,6 @@ def _folded(section: Section, shown: Sequence[Panel]) -> Section:
     each = bool(panels or section.surfaces)
     folded = not (each or section.notes)
     return section._replace(panels=panels, folded=folded, each_folded=each or section.each_folded)
-
-
-def _picture(surface: Surface) -> str:
-    # matplotlib is slow to import
-    from upd.plot.pictures import picture
-
-    return image_uri(picture(surface))
 
 
 def rendered(template: str, **content: Any) -> str:
@@ -266,6 +257,9 @@ def versions_text(versions: Mapping[str, str]) -> str:
 
 def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Panel]:
     """Charts with the PNG files that show the same, then the other PNG files."""
+    # matplotlib is slow to import
+    from upd.plot.matplotlib import chart_png
+
     groups: dict[str, list[Chart]] = {}
     for chart in charts:
         groups.setdefault(chart.figure or chart.title, []).append(chart)
