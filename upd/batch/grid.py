@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from upd.errors import InputError
+from upd.plot.sweep_charts import Parameter
 from upd.scene import AnyScene
 from upd.scene.quantities import Uncertainty
 from upd.scene.toml import put_back, value_of
@@ -40,43 +41,11 @@ MOST_POINTS = 200_000
 _FORMS = "write path=first:last:count, path=first:last:count:log or path=value,value,..."
 
 
-@dataclass(frozen=True)
-class GridAxis:
-    """One parameter of the scene and its values, as the scene takes them.
-
-    Attributes
-    ----------
-    numbers
-        The values in `unit`, or None when they are words.
-    wrapped
-        The scene's entry is a list; a value stands there alone in it.
-    """
-
-    path: str
-    values: tuple[Any, ...]
-    numbers: tuple[float, ...] | None
-    unit: str = ""
-    wrapped: bool = False
-
-    @property
-    def header(self) -> str:
-        """Path with the unit."""
-        return f"{self.path} [{self.unit}]" if self.unit else self.path
-
-    def setting(self, k: int) -> Any:
-        """What the scene is given for value `k`."""
-        return [self.values[k]] if self.wrapped else self.values[k]
-
-    def shown(self, k: int) -> float | str:
-        """Value `k` for tables."""
-        return str(self.values[k]) if self.numbers is None else self.numbers[k]
-
-
 #: one point of a grid: its place along every axis
 Place = tuple[int, ...]
 
 
-def parse_axes(texts: Sequence[str], scene: Mapping[str, Any]) -> tuple[GridAxis, ...]:
+def parse_axes(texts: Sequence[str], scene: Mapping[str, Any]) -> tuple[Parameter, ...]:
     """Axes of ``--vary`` texts; numbers without a unit take that of the scene's own value.
 
     Raises InputError with all problems.
@@ -103,22 +72,22 @@ def parse_axes(texts: Sequence[str], scene: Mapping[str, Any]) -> tuple[GridAxis
     return tuple(axes)
 
 
-def places(axes: Sequence[GridAxis]) -> list[Place]:
+def places(axes: Sequence[Parameter]) -> list[Place]:
     """Full factorial of the axes, the last one fastest."""
     return list(itertools.product(*(range(len(axis.values)) for axis in axes)))
 
 
-def values_at(axes: Sequence[GridAxis], place: Place) -> dict[str, Any]:
+def values_at(axes: Sequence[Parameter], place: Place) -> dict[str, Any]:
     """Path -> value of one point, as tables have it."""
     return {axis.path: axis.values[k] for axis, k in zip(axes, place, strict=True)}
 
 
-def settings(axes: Sequence[GridAxis], place: Place) -> dict[str, Any]:
+def settings(axes: Sequence[Parameter], place: Place) -> dict[str, Any]:
     """Path -> value of one point."""
     return {axis.path: axis.setting(k) for axis, k in zip(axes, place, strict=True)}
 
 
-def _axis(text: str, scene: Mapping[str, Any]) -> GridAxis:
+def _axis(text: str, scene: Mapping[str, Any]) -> Parameter:
     path, sep, given = text.partition("=")
     path, given = path.strip(), given.strip()
     if not sep or not path or not given:
@@ -135,8 +104,7 @@ def _axis(text: str, scene: Mapping[str, Any]) -> GridAxis:
         values = [_with_unit(value_of(part), own) for part in _listed(given)]
     if len(set(map(str, values))) < len(values):
         raise InputError(f"--vary {path}: a value is duplicated")
-    numbers, unit = _numbers(values)
-    return GridAxis(path, tuple(values), numbers, unit, wrapped)
+    return Parameter(path, tuple(values), wrapped)
 
 
 def _listed(given: str) -> list[str]:
@@ -183,15 +151,6 @@ def _entry(scene: Mapping[str, Any], path: str) -> Any:
     for key in path.split("."):
         node = node.get(key) if isinstance(node, Mapping) else None
     return node
-
-
-def _numbers(values: Sequence[Any]) -> tuple[tuple[float, ...] | None, str]:
-    """The values as numbers in their common unit, when they are."""
-    found = [one for v in values if (one := number_and_unit(str(v))) is not None]
-    units = {unit for _, unit in found}
-    if len(found) < len(values) or len(units) != 1:
-        return None, ""
-    return tuple(number for number, _ in found), units.pop()
 
 
 # -- a sample of a scene's uncertain inputs --------------------------------------------------------
@@ -260,14 +219,14 @@ def draw_sample(scene: AnyScene, count: int, seed: int) -> Sample:
     return Sample(seed, inputs, np.vstack([np.zeros(len(inputs)), 2.0 * drawn - 1.0]))
 
 
-def sample_axes(sample: Sample) -> tuple[GridAxis, ...]:
+def sample_axes(sample: Sample) -> tuple[Parameter, ...]:
     """A parameter for every input, with its values at all points in the unit inside."""
     out = []
     for one, shifts in zip(sample.inputs, sample.shifts.T, strict=True):
         unit = unit_inside(one.kind)
         numbers = tuple(float(one.value + shift * one.half_width) for shift in shifts)
         values = tuple(f"{number!r} {unit}" for number in numbers) if unit else numbers
-        out.append(GridAxis(one.path, values, numbers, unit))
+        out.append(Parameter(one.path, values))
     return tuple(out)
 
 
@@ -276,7 +235,7 @@ def sample_places(sample: Sample) -> tuple[Place, ...]:
     return tuple((k,) * len(sample.inputs) for k in range(len(sample.shifts)))
 
 
-def sample_texts(scene: AnyScene, sample: Sample, axes: Sequence[GridAxis]) -> list[str]:
+def sample_texts(scene: AnyScene, sample: Sample, axes: Sequence[Parameter]) -> list[str]:
     """The scenes of all points as TOML: first as given with its half-widths, whose run gives the
     first-order bands; then with the values drawn alone.
     """

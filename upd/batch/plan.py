@@ -16,7 +16,6 @@ from upd.analyses import analysis_of, make_plan
 from upd.analyses.base import Needs
 from upd.batch.engine import Workers, check_address, check_numbers, fitting
 from upd.batch.grid import (
-    GridAxis,
     Place,
     Sample,
     draw_sample,
@@ -32,6 +31,7 @@ from upd.batch.store import PointStore
 from upd.cache.arrays import cache_limit
 from upd.cache.sources import source_digest
 from upd.errors import InputError
+from upd.plot.sweep_charts import Parameter
 from upd.scene import AnyScene
 from upd.vary.outcome import Outcome
 
@@ -71,7 +71,7 @@ class SweepPlan:
     """
 
     scene: AnyScene
-    axes: tuple[GridAxis, ...]
+    axes: tuple[Parameter, ...]
     places: tuple[Place, ...]
     tasks: tuple[Task, ...]
     kept: dict[int, Outcome]

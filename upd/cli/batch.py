@@ -75,9 +75,7 @@ def print_sweep(console: Console, result: SweepResult) -> None:
     columns = [
         TextColumn(
             _head(axis.path.rpartition(".")[2], "", axis.unit),
-            tuple(
-                v if isinstance(v := axis.shown(place[k]), str) else f"{v:.6g}" for place in places
-            ),
+            tuple(axis.shown(place[k]) for place in places),
         )
         for k, axis in enumerate(plan.axes)
     ]

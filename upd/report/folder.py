@@ -12,7 +12,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from upd.cache.folders import plain_name
 from upd.errors import InputError
@@ -44,6 +44,7 @@ RUN_FILES = (
 #: names that the operating system or a viewer leaves
 _NOBODYS = (".DS_Store", "Thumbs.db", "desktop.ini")
 Kind = Literal["run", "sweep"]
+Kept = TypeVar("Kept")
 #: kind of a folder -> what makes its files again
 _AGAIN: dict[Kind, str] = {
     "run": "run the scene again",
@@ -193,7 +194,7 @@ def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
 
 
 def _summary(folder: Path) -> dict[str, Any]:
-    return read_json(folder / "summary.json", Summary, "run")
+    return read_json(folder / "summary.json", Summary, "run")[0]
 
 
 def _text(path: Path, missing: list[str]) -> str:
@@ -328,8 +329,9 @@ class Summary:
     result_nc_sha256: str = ""
 
 
-def read_json(path: Path, schema: type, kind: Kind) -> dict[str, Any]:
-    """The content of a JSON file of a folder that `upd run` or `upd sweep` wrote.
+def read_json(path: Path, schema: type[Kept], kind: Kind) -> tuple[dict[str, Any], Kept]:
+    """The content of a JSON file of a folder that `upd run` or `upd sweep` wrote: all there is,
+    and what must be there.
 
     Parameters
     ----------
@@ -351,7 +353,7 @@ def read_json(path: Path, schema: type, kind: Kind) -> dict[str, Any]:
     try:
         text = path.read_text("utf-8")
         found = json.loads(text)
-        TypeAdapter(schema).validate_json(text, strict=True)
+        checked = TypeAdapter(schema).validate_json(text, strict=True)
     except (FileNotFoundError, NotADirectoryError):
         raise InputError(
             f"{path.parent}: is no {kind} folder (it has no {path.name}); give the folder "
@@ -366,7 +368,7 @@ def read_json(path: Path, schema: type, kind: Kind) -> dict[str, Any]:
         raise damaged_file(path, dict.fromkeys(places), kind) from None
     except (ValueError, RecursionError) as problem:
         raise InputError(f"{path}: is not JSON ({problem}); {_AGAIN[kind]}") from None
-    return dict(found)
+    return dict(found), checked
 
 
 def damaged_file(path: Path, places: Iterable[str], kind: Kind) -> InputError:
