@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.text import Text
 
 from upd.analyses.meshing import MeshRequest
 from upd.cache.files import placed_file
@@ -21,7 +19,6 @@ from upd.labels import number
 from upd.mesh import Mesh, recipes
 from upd.mesh.checks import Pairs, centre_of, check_pairs, quality
 from upd.mesh.export import ENDINGS, write_mesh
-from upd.mesh.fields import table
 from upd.progress import Listener, Stages
 from upd.reduction.cyclic import Sector
 from upd.scene.keys import recipe_keys
@@ -105,9 +102,9 @@ def _draw(request: MeshRequest, meshes: Mapping[str, Mesh], path: Path) -> None:
 def _configuration(request: MeshRequest, cached: bool) -> str:
     """The parameters that differ from the recipe's defaults, in a line."""
     changed = [
-        f"{p.name} {_value(p.value)} {p.unit}".rstrip()
-        for p in table(request.parameters, here=False)
-        if p.default is not None and p.value != p.default
+        f"{key.name} {key.value}".replace('"', "")
+        for key in recipe_keys(request.recipe, request.parameters)
+        if key.given and key.default != "must be given"
     ]
     text = ", ".join(changed) if changed else "all parameters at their defaults"
     note = " (mesh from the cache)" if cached else ""
@@ -172,17 +169,7 @@ def _print_pairs(
 
 
 def print_parameters(console: Console, request: MeshRequest) -> None:
-    """The parameters of a recipe, with the bounds that the others leave."""
+    """The parameters of a recipe."""
     recipe, params = request.recipe, request.parameters
-    here = {row.name: row.here for row in table(params)}
-    keys = [
-        replace(key, bounds=f"{key.bounds}; here {here[key.name]}") if here[key.name] else key
-        for key in recipe_keys(recipe, params)
-    ]
-    print_keys(console, Described(f"Parameters of {recipe}", keys, recipe, params), "")
-    meaning = "the recipe's own checks pass while the other parameters stay as they are."
-    console.print(Text(f"here: between these values {meaning}", "dim"))
-
-
-def _value(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    found = Described(f"Parameters of {recipe}", recipe_keys(recipe, params), recipe, params)
+    print_keys(console, found, "")
