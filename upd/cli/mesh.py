@@ -6,13 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 
 from upd.analyses.meshing import MeshRequest
 from upd.cache.files import placed_file
 from upd.cli.describe import Described, print_keys
-from upd.cli.tables import columns_of, print_table
+from upd.cli.tables import print_table
 from upd.cli.terminal import check_ending
 from upd.errors import InputError
 from upd.labels import number
@@ -21,6 +20,7 @@ from upd.mesh.checks import Pairs, centre_of, check_pairs, quality
 from upd.mesh.export import ENDINGS, write_mesh
 from upd.progress import Listener, Stages
 from upd.reduction.cyclic import Sector
+from upd.results.answer_table import AnswerTable
 from upd.scene.keys import recipe_keys
 
 #: nodes per hexahedron that a .inp file can hold
@@ -128,8 +128,7 @@ def _print_shapes(console: Console, meshes: Mapping[str, Mesh]) -> None:
             place = ", ".join(f"{x + 0.0:.3g}" for x in centre_of(mesh, worst))
             rows.append((*row, measure, value, place))
     heads = ("body", "#nodes", "#hexahedra", "worst of", "#value", "at x, y, z, mm")
-    title = "Bodies and their worst elements"
-    print_table(console, columns_of(heads, rows), title=title, box=SIMPLE_HEAD)
+    print_table(console, AnswerTable("Bodies and their worst elements", heads, tuple(rows)))
 
 
 def _print_pairs(
@@ -154,7 +153,7 @@ def _print_pairs(
         ]
         console.print(f"Glued in one body: {', '.join(glued)}" if glued else "No bodies touch")
         return
-    rows = [
+    rows = tuple(
         (
             ", ".join(p.bodies),
             ", ".join(dict.fromkeys(p.sets)),
@@ -163,9 +162,9 @@ def _print_pairs(
             number(p.gap),
         )
         for p in pairs
-    ]
+    )
     heads = ("bodies", "node sets", "#pairs", "#largest offset, mm", "#largest gap, mm")
-    print_table(console, columns_of(heads, rows), title="Pairs of contact nodes", box=SIMPLE_HEAD)
+    print_table(console, AnswerTable("Pairs of contact nodes", heads, rows))
 
 
 def print_parameters(console: Console, request: MeshRequest) -> None:
