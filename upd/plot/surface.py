@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.mesh import FloatArray, IntArray, Mesh
-from upd.mesh.checks import quality
 from upd.plot.plotly import pack
 
 #: a displacement is drawn at most this part of the bodies' size
@@ -77,15 +76,11 @@ class Field:
 
 @dataclass(frozen=True)
 class Surface:
-    """Surfaces of all bodies of a file, with fields and shape of the mesh.
-
-    Body -> (name, text) rows.
-    """
+    """Surfaces of all bodies of a file, with fields."""
 
     label: str
     bodies: tuple[SurfaceBody, ...]
     fields: tuple[Field, ...]
-    shape: tuple[Mapping[str, Any], ...] = field(default=())
 
     @property
     def size(self) -> float:
@@ -109,7 +104,7 @@ def read_surface(path: Path, names: list[str], label: str = "") -> Surface:
     except SystemExit as stop:
         # meshio ends the program at a file it cannot read.
         raise ValueError("is not a VTU file") from stop
-    bodies, shape = [], []
+    bodies = []
     number = np.asarray(file.point_data["body"]).astype(int)
     hexes = np.vstack([block.data for block in file.cells])
     for k in range(int(number.max()) + 1):
@@ -117,8 +112,7 @@ def read_surface(path: Path, names: list[str], label: str = "") -> Surface:
         name = names[k] if k < len(names) else f"body {k + 1}"
         mesh = Mesh(np.asarray(file.points, float), np.asarray(mine, np.int64))
         bodies.append(_body(name, mesh))
-        shape.append(_shape(name, mesh))
-    return Surface(label, tuple(bodies), tuple(_fields(file.point_data, bodies)), tuple(shape))
+    return Surface(label, tuple(bodies), tuple(_fields(file.point_data, bodies)))
 
 
 def _body(name: str, mesh: Mesh) -> SurfaceBody:
@@ -131,18 +125,6 @@ def _body(name: str, mesh: Mesh) -> SurfaceBody:
     return SurfaceBody(
         name, mesh.points[nodes], np.vstack([q[:, [0, 1, 2]], q[:, [0, 2, 3]]]), nodes
     )
-
-
-def _shape(name: str, mesh: Mesh) -> dict[str, Any]:
-    found = quality(mesh)
-    return {
-        "body": name,
-        "hexahedra": mesh.n_hex,
-        "nodes": int(np.unique(mesh.hexes).size),
-        "min": found.min,
-        "mean": found.mean,
-        "aspect": found.aspect,
-    }
 
 
 def _fields(data: Mapping[str, NDArray[Any]], bodies: list[SurfaceBody]) -> list[Field]:
@@ -194,13 +176,6 @@ def _motion(u: FloatArray, bodies: list[SurfaceBody]) -> tuple[tuple[FloatArray,
     largest = float(np.linalg.norm(still, axis=1).max())
     # Nothing moves: any divisor will do.
     return tuple(still[b.nodes] / (largest or 1.0) for b in bodies), largest
-
-
-def n_bytes(surface: Surface) -> int:
-    """About what the surface takes on the page."""
-    n, m = sum(len(b.points) for b in surface.bodies), sum(len(b.triangles) for b in surface.bodies)
-    moving = len({id(f.motion) for f in surface.fields if f.motion is not None})
-    return int(4 / 3 * (12 * n + 12 * m + 4 * n * len(surface.fields) + 6 * n * moving))
 
 
 def offsets(surface: Surface) -> FloatArray:

@@ -20,34 +20,6 @@ from upd.results import Arrays, Group, Variable
 
 log = logging.getLogger(__name__)
 
-#: names of the figures a run may leave, without their ending
-FIGURES = (
-    "pressure",
-    "pressure_sections",
-    "force_approach",
-    "over_load",
-    "stick_slip",
-    "traction",
-    "hysteresis",
-    "contact_open",
-    "surface",
-    "force_displacement",
-    "contact_law",
-    "response",
-    "response_harmonics",
-    "damping",
-    "contact_state",
-    "contact_map",
-    "damper_motion",
-    "damper_period",
-    "seating",
-    "performance",
-    "nonlinear_modes",
-    "modes_free",
-    "modes_glued",
-    "dimensions",
-    "error_budget",
-)
 #: folder of the files in a run folder
 FOLDER = "curves"
 #: dimension of a pair of real and imaginary part

@@ -16,7 +16,6 @@ from typing import Any, Literal, TypeVar
 
 from upd.cache.folders import plain_name
 from upd.errors import InputError
-from upd.report.files import FIGURES
 from upd.results import (
     Arrays,
     Case,
@@ -26,6 +25,34 @@ from upd.results import (
 _LOG_LINE = re.compile(r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$")
 _VERSIONS = "versions: "
 _PNG = b"\x89PNG\r\n\x1a\n"
+#: names of the figures a run may leave, without their ending
+FIGURES = (
+    "pressure",
+    "pressure_sections",
+    "force_approach",
+    "over_load",
+    "stick_slip",
+    "traction",
+    "hysteresis",
+    "contact_open",
+    "surface",
+    "force_displacement",
+    "contact_law",
+    "response",
+    "response_harmonics",
+    "damping",
+    "contact_state",
+    "contact_map",
+    "damper_motion",
+    "damper_period",
+    "seating",
+    "performance",
+    "nonlinear_modes",
+    "modes_free",
+    "modes_glued",
+    "dimensions",
+    "error_budget",
+)
 #: What a run may write, whatever its analysis; all that may be removed when a run replaces another.
 RUN_FILES = (
     "scene.toml",
@@ -303,6 +330,7 @@ class _Size:
     n_dof: dict[str, int] = field(default_factory=dict)
     n_pairs: int | None = None
     analysis: str = ""
+    n_hex: dict[str, int] = field(default_factory=dict)
     mesh: dict[str, Any] = field(default_factory=dict)
     solver: dict[str, Any] = field(default_factory=dict)
 

@@ -21,17 +21,15 @@ from upd.cache.files import write_text
 from upd.errors import InputError
 from upd.plot.chart import Chart
 from upd.plot.plotly import figure
-from upd.plot.surface import Surface, n_bytes, packed
+from upd.plot.surface import Surface, packed
 from upd.report.tables import MOST_NOTES
 from upd.results.answer_table import AnswerTable
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-#: a page stays below this
-LIMIT_BYTES = 6_000_000
-#: markup, tables and rounding of the estimate of what is packed
-_MARGIN_BYTES = 150_000
+#: letters of the surfaces of a page at most, before they are packed
+MOST_LETTERS = 4_000_000
 _MU = re.compile(r"\bmu(?=N?\b)")
 _INDEX = re.compile(r"\b([KFTkh])_([A-Za-z]{1,2})\b")
 _PARTS = Path(__file__).parent / "parts"
@@ -136,11 +134,10 @@ def page_text(
     sections: Sequence[Section],
     *,
     verdict: Verdict | None = None,
-    lead: str = "",
     footer: str = "",
     surfaces: Sequence[Surface] = (),
 ) -> str:
-    """The page as HTML, and as much of the surfaces as the limit leaves room for. Where its first
+    """The page as HTML, with the surfaces that are not too large. Where its first
     section has tables, it opens on them beside the first figures, and all else but notes is folded.
     Sections without content are omitted.
     """
@@ -155,28 +152,20 @@ def page_text(
         first = found[0]._replace(panels=shown, opening=True)
         found = [first, *(_folded(s, shown) for s in found[1:])]
         found = [section for section in found if not section.is_empty]
-    script, charts = _packed_plotly(), _data(panels)
-    used = (
-        len(script.encode())
-        + len(_packed(_json({"panels": charts})).encode())
-        + sum(len(p.image) for p in panels)
-        + _MARGIN_BYTES
-    )
-    bodies, left_out = fitting(surfaces, LIMIT_BYTES - used)
+    bodies, left_out = fitting(surfaces)
     return rendered(
         "page.html.j2",
         title=title,
         verdict=verdict,
-        lead=lead,
         sections=found,
         footer=footer,
         most_notes=MOST_NOTES,
         surfaces=bodies,
         surfaces_left_out=left_out,
         style=(_PARTS / "page.css").read_text("utf-8"),
-        plotly=script,
+        plotly=_packed_plotly(),
         script=(_PARTS / "page.js").read_text("utf-8"),
-        page_data=_packed(_json({"panels": charts, "surfaces": [packed(s) for s in bodies]})),
+        page_data=_packed(_json({"panels": _data(panels), "surfaces": bodies})),
     )
 
 
@@ -297,23 +286,22 @@ def _data(panels: Iterable[Panel]) -> dict[str, Any]:
     return found
 
 
-def fitting(surfaces: Iterable[Surface], room: int) -> tuple[list[Surface], list[str]]:
-    """Surfaces that fit into ``room`` bytes, with as many of their fields as fit, and what had to
-    be left out, in words.
+def fitting(surfaces: Iterable[Surface]) -> tuple[list[dict[str, Any]], list[str]]:
+    """Surfaces for the script, with as many of their fields as a page holds, and what had to be
+    left out, in words.
     """
-    shown, left_out = [], []
+    shown, left_out, room = list[dict[str, Any]](), list[str](), MOST_LETTERS
     for surface in surfaces:
-        parts = (
-            replace(surface, fields=surface.fields[:n]) for n in range(len(surface.fields), -1, -1)
-        )
-        part = next((part for part in parts if n_bytes(part) <= room), None)
-        if part is None:
+        for n in range(len(surface.fields), -1, -1):
+            made = packed(replace(surface, fields=surface.fields[:n]))
+            if (size := len(_json(made))) <= room:
+                shown.append(made)
+                room -= size
+                break
+        else:
+            n = 0
             left_out.append(f"{surface.label}: too large for this page")
-            continue
-        lost = surface.fields[len(part.fields) :]
-        left_out += [f"{f.label}: too large for this page" for f in lost]
-        room -= n_bytes(part)
-        shown.append(part)
+        left_out += [f"{field.label}: too large for this page" for field in surface.fields[n:]]
     return shown, left_out
 
 
