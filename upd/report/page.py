@@ -299,8 +299,8 @@ def fitting(surfaces: Iterable[Surface]) -> tuple[list[dict[str, Any]], list[str
                 room -= size
                 break
         else:
-            n = 0
             left_out.append(f"{surface.label}: too large for this page")
+            continue
         left_out += [f"{field.label}: too large for this page" for field in surface.fields[n:]]
     return shown, left_out
 

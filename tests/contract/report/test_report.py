@@ -294,8 +294,7 @@ def test_fields_are_left_out_when_there_is_no_room(
         f"{surface.fields[1].label}: too large for this page"
     ]
     monkeypatch.setattr("upd.report.page.MOST_LETTERS", 10)
-    shown, left_out = fitting([surface])
-    assert shown == [] and left_out[0] == f"{surface.label}: too large for this page"
+    assert fitting([surface]) == ([], [f"{surface.label}: too large for this page"])
 
 
 @pytest.mark.parametrize(
