@@ -8,7 +8,7 @@ import io
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,7 +21,6 @@ from upd.cache.files import write_text
 from upd.errors import InputError
 from upd.plot.chart import Chart
 from upd.plot.plotly import figure
-from upd.plot.surface import Surface, packed
 from upd.report.tables import MOST_NOTES
 from upd.results.answer_table import AnswerTable
 
@@ -135,7 +134,7 @@ def page_text(
     *,
     verdict: Verdict | None = None,
     footer: str = "",
-    surfaces: Sequence[Surface] = (),
+    surfaces: Sequence[dict[str, Any]] = (),
 ) -> str:
     """The page as HTML, with the surfaces that are not too large. Where its first
     section has tables, it opens on them beside the first figures, and all else but notes is folded.
@@ -286,22 +285,25 @@ def _data(panels: Iterable[Panel]) -> dict[str, Any]:
     return found
 
 
-def fitting(surfaces: Iterable[Surface]) -> tuple[list[dict[str, Any]], list[str]]:
-    """Surfaces for the script, with as many of their fields as a page holds, and what had to be
-    left out, in words.
+def fitting(surfaces: Iterable[dict[str, Any]]) -> tuple[list[dict[str, Any]], list[str]]:
+    """Surfaces with as many of their fields as a page holds, and what had to be left out, in
+    words.
     """
     shown, left_out, room = list[dict[str, Any]](), list[str](), MOST_LETTERS
     for surface in surfaces:
-        for n in range(len(surface.fields), -1, -1):
-            made = packed(replace(surface, fields=surface.fields[:n]))
+        fields = surface["fields"]
+        for n in range(len(fields), -1, -1):
+            made = surface | {"fields": fields[:n]}
+            if not n:
+                made |= {"motions": []}
             if (size := len(_json(made))) <= room:
                 shown.append(made)
                 room -= size
                 break
         else:
-            left_out.append(f"{surface.label}: too large for this page")
+            left_out.append(f"{surface['label']}: too large for this page")
             continue
-        left_out += [f"{field.label}: too large for this page" for field in surface.fields[n:]]
+        left_out += [f"{field['label']}: too large for this page" for field in fields[n:]]
     return shown, left_out
 
 

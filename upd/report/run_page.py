@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from upd.plot.surface import Surface, read_surface
+from upd.plot.surface import read_surface
 from upd.report.folder import RunFolder, read_run
 from upd.report.page import Section, Verdict, make_panels, page_text, versions_text, write_page
 from upd.report.tables import (
@@ -49,7 +49,7 @@ def write_run_report(folder: Path) -> Path:
     return write_page(run.path / "report.html", html)
 
 
-def run_sections(run: RunFolder, surfaces: Sequence[Surface]) -> list[Section]:
+def run_sections(run: RunFolder, surfaces: Sequence[dict[str, Any]]) -> list[Section]:
     """The page of one run."""
     summary, entries = run.summary, run.summary["results"]
     size, cost = summary["size"], summary["cost"]
@@ -138,7 +138,7 @@ def page_warnings(run: RunFolder) -> list[str]:
     return list(dict.fromkeys([*found, *run.missing]))
 
 
-def run_surfaces(run: RunFolder) -> list[Surface]:
+def run_surfaces(run: RunFolder) -> list[dict[str, Any]]:
     """Surfaces of the run's VTU files: fields of a contact, else modes, else the bare mesh."""
     contact = [f for f in (run.path / "fields.vtu", run.path / "mesh.vtu") if f.exists()][:1]
     files = contact or sorted(
