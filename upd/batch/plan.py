@@ -5,7 +5,6 @@ Which points are missing, what they share, how many may run side by side.
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -39,7 +38,6 @@ _FACTORS = (
     "displacements inside the bodies are asked for: their factor is not kept on disk, each worker "
     "makes it once a model"
 )
-_DECIMAL = re.compile(r"\d+\.\d+(e[+-]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -90,14 +88,8 @@ class SweepPlan:
         if self.sample is not None:
             return f"point {number} of {self.sample.count}" if number else "inputs as given"
         return ", ".join(
-            f"{axis.path.rpartition('.')[2]} {_brief(axis.values[k])}"
-            for axis, k in zip(self.axes, self.places[number], strict=True)
+            axis.with_unit(k) for axis, k in zip(self.axes, self.places[number], strict=True)
         )
-
-
-def _brief(value: object) -> str:
-    """A value with six digits of its numbers."""
-    return _DECIMAL.sub(lambda found: f"{float(found[0]):.6g}", str(value))
 
 
 def plan_sweep(

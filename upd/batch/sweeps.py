@@ -32,6 +32,7 @@ from upd.plot.sweep_charts import (
     sample_charts,
     sweep_charts,
 )
+from upd.report import write_report
 from upd.results import Group, write_netcdf
 from upd.results.sampled import SampledNumber, sampled_number
 from upd.scene import load_scene
@@ -216,7 +217,7 @@ def run_sweep(
             (folder / "report.html").unlink(missing_ok=True)
         pictures: dict[str, Callable[[], list[Path]]] = {
             "figures": lambda: draw(folder, plan.axes, columns, sampled),
-            "report.html": lambda: _write_page(folder),
+            "report.html": lambda: [write_report(folder)],
         }
         faults = []
         for what, make in pictures.items():
@@ -236,13 +237,6 @@ def _sampled(sample: Sample, columns: Sequence[Column]) -> tuple[SampledNumber, 
         sampled_number(c.name, c.case, c.unit, c.values, sample.shifts, paths, c.inputs)
         for c in columns
     )
-
-
-def _write_page(folder: Path) -> list[Path]:
-    # Templates and charts are slow to import: only when a page is made.
-    from upd.report import write_report
-
-    return [write_report(folder)]
 
 
 # -- what a sweep leaves: table.csv, sweep.nc with named axes, sweep.json; then the figures --------

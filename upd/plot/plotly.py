@@ -289,11 +289,6 @@ def _area(chart: Chart, a: Area) -> Iterator[dict[str, Any]]:
     )
 
 
-def _diameter(size: Array, part: float = 1.0) -> Array:
-    """Pixels of markers of a size."""
-    return np.asarray(_PIXELS * np.sqrt(part * marker_area(size)))
-
-
 def _scale(axis: Axis, low: float, high: float) -> dict[str, Any]:
     """Colours of values; a horizontal bar under the drawing leaves a phone its width."""
     title = {"text": escape(axis.label), "side": "bottom"}
@@ -308,7 +303,7 @@ def _scale(axis: Axis, low: float, high: float) -> dict[str, Any]:
 def _coloured(chart: Chart, s: Scatter, *, first: bool) -> dict[str, Any]:
     """Coloured points; the first of a chart have the colour bar that all share."""
     marker = _scale(s.axis, *colour_range(chart.scatters)) | {
-        "size": _numbers(_diameter(s.size, 0.7)),
+        "size": _numbers(_PIXELS * np.sqrt(0.7 * marker_area(s.size))),
         "color": _numbers(s.value),
         "opacity": 1,
         "line": {"color": "#ffffff", "width": 0.5},

@@ -265,10 +265,8 @@ def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Pa
     return panels
 
 
-def _note(chart: Chart) -> str:
-    """What stands under a chart: its detail as a sentence, and what to see."""
-    detail = f"{chart.detail[:1].upper()}{chart.detail[1:]}." if chart.detail else ""
-    return " ".join(part for part in (detail, chart.note) if part)
+def _sentence(words: str) -> str:
+    return f"{words[:1].upper()}{words[1:]}." if words else ""
 
 
 def _data(panels: Iterable[Panel]) -> dict[str, Any]:
@@ -277,7 +275,11 @@ def _data(panels: Iterable[Panel]) -> dict[str, Any]:
     for panel in panels:
         for title in dict.fromkeys(chart.title for chart in panel.charts):
             charts = [
-                {"case": c.case.replace("muN", "µN"), "note": _note(c), "figure": figure(c)}
+                {
+                    "case": c.case.replace("muN", "µN"),
+                    "note": " ".join(filter(None, (_sentence(c.detail), c.note))),
+                    "figure": figure(c),
+                }
                 for c in panel.charts
                 if c.title == title
             ]

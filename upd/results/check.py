@@ -59,12 +59,10 @@ def warned(
 
 def warnings_of(checks: Sequence[Check], results: Sequence[Result]) -> list[str]:
     """What did not pass and what was not reached, one sentence per name with its cases."""
-    return [_named(name, labels) for name, (_, labels) in warned(checks, results).items()]
-
-
-def _named(name: str, labels: Sequence[str]) -> str:
-    """A name with its cases."""
-    return name + (f" ({_some(labels)})" if any(labels) else "")
+    return [
+        name + (f" ({_some(labels)})" if any(labels) else "")
+        for name, (_, labels) in warned(checks, results).items()
+    ]
 
 
 def _some(labels: Sequence[str], most: int = 2) -> str:
