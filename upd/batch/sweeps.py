@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from upd.batch.engine import Batch, Watcher, run_points
-from upd.batch.grid import Sample, values_at
-from upd.batch.plan import SweepPlan, plan_sweep
+from upd.batch.plan import Sample, SweepPlan, plan_sweep, values_at
 from upd.batch.store import PointStore
 from upd.batch.table import as_csv, check_follow, csv_text, make_columns, patterns, reasons
 from upd.cache.files import json_text, write_text

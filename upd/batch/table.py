@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses import analysis_of
-from upd.batch.grid import Place
+from upd.batch.plan import Place
 from upd.errors import InputError
 from upd.plot.sweep_charts import Column, Parameter
 from upd.results import Case, Result, shared_label

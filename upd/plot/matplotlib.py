@@ -85,13 +85,6 @@ def draw_sheet(
     return figure
 
 
-def png(figure: Figure) -> bytes:
-    """A figure as PNG."""
-    out = io.BytesIO()
-    figure.savefig(out, format="png")
-    return out.getvalue()
-
-
 def write_png(figure: Figure, path: Path) -> list[Path]:
     """Write a figure as PNG, whole or not at all; returns its path."""
     with whole_file(path) as temporary:
@@ -156,7 +149,9 @@ def draw_all(charts: Sequence[Chart]) -> list[Axes]:
 
 def chart_png(charts: Sequence[Chart]) -> bytes:
     """A sheet of ``charts`` as PNG for a page, at most `MOST_PANELS`."""
-    return png(_sheet(charts, _PAGE_DPI))
+    out = io.BytesIO()
+    _sheet(charts, _PAGE_DPI).savefig(out, format="png")
+    return out.getvalue()
 
 
 def write_sheet(charts: Sequence[Chart], path: Path) -> list[Path]:

@@ -317,7 +317,6 @@ class _NumberEntry:
     error: float | None = None
     thesis_error: float | None = None
     estimated_error: float | None = None
-    half_error_cost_s: float | None = None
     error_parts: list[_ErrorPartEntry] = field(default_factory=list)
     input_error: float | None = None
     input_parts: list[_InputPartEntry] = field(default_factory=list)

@@ -16,7 +16,7 @@ import pytest
 
 from upd import load_scene, run
 from upd.batch.engine import Progress
-from upd.batch.grid import parse_axes, places, settings
+from upd.batch.plan import parse_axes, places, settings
 from upd.batch.point import Task, solve_task
 from upd.batch.store import PointStore
 from upd.batch.sweeps import draw, sweep
