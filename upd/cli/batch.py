@@ -15,7 +15,8 @@ from upd.cli.tables import print_table
 from upd.cli.terminal import counted, duration
 from upd.plot.sweep_charts import is_constant
 from upd.report.columns import fitting
-from upd.report.tables import filled, sample_table
+from upd.report.tables import filled, sample_table, with_unit
+from upd.results.quantities import number_title
 from upd.results.sampled import sample_sentence
 
 #: rows shown; the files hold all
@@ -66,11 +67,12 @@ def print_sweep(console: Console, result: SweepResult) -> None:
     plan = result.plan
     places = plan.places[:_ROWS]
     columns = {axis.header: [axis.shown(p[k]) for p in places] for k, axis in enumerate(plan.axes)}
+    columns["status"] = ["failed" if one.failure else "" for one in result.outcomes[: len(places)]]
     # what varies first
     for column in sorted(result.columns, key=lambda one: is_constant(one.values)):
         values = column.values[: len(places)]
-        columns[f"# {column.header}"] = ["" if math.isnan(v) else f"{v:.4g}" for v in values]
-    columns["status"] = ["failed" if one.failure else "" for one in result.outcomes[: len(places)]]
+        head = with_unit(number_title(column.name, column.case), column.unit)
+        columns[f"# {head}"] = ["" if math.isnan(v) else f"{v:.4g}" for v in values]
     table = filled("Points", columns)
     shown = fitting(table, console.width)
     print_table(console, shown)

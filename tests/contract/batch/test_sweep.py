@@ -627,7 +627,7 @@ def test_command_prints_plan_and_table(tmp_path: Path, capsys: pytest.CaptureFix
     assert ended.value.code == 0
     told = capsys.readouterr().out
     assert "2 of 2 points ok" in told
-    assert 0 < told.index("[um]") < told.index("[MPa]"), "what varies comes first"
+    assert 0 < told.index("µm") < told.index("MPa"), "what varies comes first"
     with pytest.raises(SystemExit) as ended:
         main([*words, "--cluster", "nowhere"])
     assert ended.value.code == 2
