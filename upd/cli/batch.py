@@ -12,7 +12,8 @@ from upd.batch.plan import SweepPlan
 from upd.batch.studies import Study, StudyResult
 from upd.batch.sweeps import SweepResult
 from upd.cli.tables import print_table
-from upd.cli.terminal import counted, duration
+from upd.cli.terminal import duration
+from upd.labels import counted
 from upd.plot.sweep_charts import is_constant
 from upd.report.columns import fitting
 from upd.report.tables import filled, sample_table, with_unit

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.text import Text
 
 from upd.analyses.base import Plan, fitting, memory_limit
-from upd.cli.terminal import counted
+from upd.labels import counted
 from upd.linalg.select import PRODUCTS
 from upd.report.answer import TITLE
 from upd.report.columns import whole_table

@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 from markupsafe import Markup, escape
 
-from upd.cache.files import write_text
+from upd.cache.files import placed_file
 from upd.errors import InputError
+from upd.labels import sentence
 from upd.plot.chart import Chart
 from upd.plot.plotly import figure
 from upd.report.tables import MOST_NOTES
@@ -118,13 +119,8 @@ def write_page(path: Path, html: str) -> Path:
 
     Raises InputError when the place cannot be written.
     """
-    try:
-        write_text(path, html)
-    except OSError as problem:
-        raise InputError(
-            f"{path}: cannot be written ({problem.strerror}); make room there or choose "
-            "another place"
-        ) from None
+    with placed_file(path) as temporary:
+        temporary.write_text(html, encoding="utf-8")
     return path
 
 
@@ -265,10 +261,6 @@ def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Pa
     return panels
 
 
-def _sentence(words: str) -> str:
-    return f"{words[:1].upper()}{words[1:]}." if words else ""
-
-
 def _data(panels: Iterable[Panel]) -> dict[str, Any]:
     """What the page's script draws: panel -> list of {title, note, charts}."""
     found: dict[str, list[dict[str, Any]]] = {}
@@ -277,7 +269,7 @@ def _data(panels: Iterable[Panel]) -> dict[str, Any]:
             charts = [
                 {
                     "case": c.case.replace("muN", "µN"),
-                    "note": " ".join(filter(None, (_sentence(c.detail), c.note))),
+                    "note": " ".join(filter(None, (sentence(c.detail), c.note))),
                     "figure": figure(c),
                 }
                 for c in panel.charts

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from upd.labels import sentence
 from upd.plot.surface import read_surface
 from upd.report.folder import RunFolder, read_run
 from upd.report.page import Section, Verdict, make_panels, page_text, versions_text, write_page
@@ -133,8 +134,7 @@ def page_warnings(run: RunFolder) -> list[str]:
         known = line.text == status or (checks and line.where.startswith(_SOLVER))
         if line.level in ("WARNING", "ERROR", "CRITICAL") and not known:
             ours = line.where.startswith(_OURS)
-            text = f"{line.text[:1].upper()}{line.text[1:]}"
-            found.append(text if ours else f"{line.where}: {line.text}")
+            found.append(sentence(line.text, "") if ours else f"{line.where}: {line.text}")
     return list(dict.fromkeys([*found, *run.missing]))
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from upd.labels import number, unit_label
+from upd.labels import counted, number, sentence, unit_label
 from upd.plot.chart import Chart
 from upd.plot.sweep_charts import FIGURES, Column, Parameter, sample_charts, sweep_charts
 from upd.report.folder import damaged_file, is_png, read_json
@@ -170,7 +170,7 @@ def _grid(sweep: SweepFolder) -> Section:
         "# number of values": [str(len(p.values)) for p in sweep.axes],
         "values": [_values(p) for p in sweep.axes],
     }
-    points, sample = _counted(len(sweep.points)), sweep.sample
+    points, sample = counted(len(sweep.points), "point"), sweep.sample
     if sample is None:
         every = "Every value with every other: " if len(sweep.axes) > 1 else ""
         return Section("Grid", [filled("Grid", columns)], texts=[f"{every}{points}."])
@@ -211,18 +211,14 @@ def verdict(points: Sequence[_Point]) -> Verdict:
     failed = sum(p.status != "ok" for p in points)
     warned = sum(bool(p.warnings) for p in points)
     if points and failed == len(points):
-        text = f"None of {_counted(len(points))} could be solved."
+        text = f"None of {counted(len(points), 'point')} could be solved."
         return Verdict("failed", "Failed", text)
-    text = f"{len(points) - failed} of {_counted(len(points))} done"
+    text = f"{len(points) - failed} of {counted(len(points), 'point')} done"
     text += f", {failed} failed" if failed else ""
     text += f", {warned} with warnings." if warned else "."
     if failed or warned:
         return Verdict("warning", "Done in part" if failed else "Done, with warnings", text)
     return Verdict("passed", "Done", text)
-
-
-def _counted(n: int) -> str:
-    return f"{n} point{'' if n == 1 else 's'}"
 
 
 def grouped(heading: str, sweep: SweepFolder, texts: Iterable[Iterable[str]]) -> AnswerTable:
@@ -297,7 +293,7 @@ def _costs(sweep: SweepFolder) -> list[str]:
         text += f". Last call: {cost.this_call_s:.1f} s; {where}"
         text += f"; threads of each: {plan.get('threads', 1)}"
         text += f"; points kept from earlier calls: {kept}" if kept else ""
-    return [f"{text}.", *(f"{note[:1].upper()}{note[1:]}." for note in plan.get("notes", []))]
+    return [f"{text}.", *map(sentence, plan.get("notes", []))]
 
 
 # ---------------------------------------------------------------- a study
@@ -328,7 +324,7 @@ def write_study_report(
     InputError
         When it cannot be written.
     """
-    text = " ".join([*([f"{failed} point{'s' * (failed != 1)} failed."] if failed else []), *notes])
+    text = " ".join([*([f"{counted(failed, 'point')} failed."] if failed else []), *notes])
     verdict = Verdict(*("warning", "Done in part") if failed else ("passed", "Done"), text)
     panels = make_panels(charts, {path.stem: path for path in figures})
     sections = [Section("Figures", panels=panels)]
