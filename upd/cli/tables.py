@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 from rich.console import Console
@@ -10,7 +9,6 @@ from rich.text import Text
 
 from upd.analyses.base import Plan, fitting, memory_limit
 from upd.labels import counted
-from upd.linalg.select import PRODUCTS
 from upd.report.answer import TITLE
 from upd.report.columns import whole_table
 from upd.report.notebook import RunResult
@@ -38,30 +36,6 @@ def print_table(console: Console, table: AnswerTable) -> None:
             console.print(Text(line), soft_wrap=True)
 
 
-def _way(plan: Plan[Any], ways: Sequence[Any]) -> tuple[str, ...]:
-    """A way to see the bodies of a contact, how to choose it, and its cost over all tasks."""
-    products = ways[0].name.startswith(PRODUCTS)
-    names = list(dict.fromkeys(way.name.removeprefix(PRODUCTS) for way in ways))
-    word = "products by factor" if products else "condensed"
-    multigrid = products and names == ["amg"]
-    what = "products by multigrid" if multigrid else f"{word} ({', '.join(names)})"
-    by = [
-        task
-        for task, way in zip(plan.ways, ways, strict=True)
-        if plan.solver[task].partition(":")[0] == way.name
-    ]
-    if by:
-        what += " (taken)" if len(by) == len(ways) else f" (taken for {', '.join(by)})"
-    choice = f'solver.route = "{"products" if products else "condensed"}"'
-    return (
-        what,
-        choice + (f', solver.name = "{names[0]}"' if len(names) == 1 else ""),
-        f"{sum(way.cost.seconds for way in ways):.2g}",
-        f"{sum(way.cost.bytes for way in ways) / 1e9:.2g}",
-        ", ".join(dict.fromkeys(way.why for way in ways)) if products else "",
-    )
-
-
 def print_plan(console: Console, plan: Plan[Any]) -> None:
     """Print what a plan simulates, leaves out, and is predicted to cost."""
     effects = tuple((e.name, e.word, e.why, e.check) for e in plan.effects)
@@ -83,11 +57,6 @@ def print_plan(console: Console, plan: Plan[Any]) -> None:
     title = f"Size ({plan.symmetry} model)"
     counts = ("#hexahedra", "#nodes", "#dofs", "#contact nodes")
     print_table(console, AnswerTable(title, ("body", *counts, "linear solver"), sizes))
-    if plan.ways:
-        # each task lists its ways in one order: the condensing one, then those by products
-        ways = tuple(_way(plan, ways) for ways in zip(*plan.ways.values(), strict=True))
-        title = "Ways to see the bodies (one thread, all bodies and families of loads)"
-        print_table(console, AnswerTable(title, ("way", "set with", "#s", "#GB", "for"), ways))
     inputs = f"the bands by {counted(len(plan.scene.uncertain), 'uncertain input')}"
     parts = " and ".join(
         f"{seconds:.2g} s ({100.0 * seconds / plan.seconds:.0f} %) for {what}"

@@ -51,7 +51,8 @@ FIGURES = (
     "modes_free",
     "modes_glued",
     "dimensions",
-    "error_budget",
+    "campbell",
+    "interference",
 )
 #: What a run may write, whatever its analysis; all that may be removed when a run replaces another.
 RUN_FILES = (
