@@ -62,8 +62,7 @@ if TYPE_CHECKING:
     from upd.batch.sweeps import sweep
     from upd.fitting import fit
     from upd.measured import fit_damping, read_measured
-    from upd.report.load import load
-    from upd.report.notebook import RunResult
+    from upd.report.notebook import RunResult, load
     from upd.runner import run
     from upd.scene import Scene, load_scene
     from upd.sizing import design
@@ -76,7 +75,7 @@ _HOME = {
     "Scene": "upd.scene",
     "run": "upd.runner",
     "RunResult": "upd.report.notebook",
-    "load": "upd.report.load",
+    "load": "upd.report.notebook",
     "read_measured": "upd.measured",
     "fit_damping": "upd.measured",
     "sweep": "upd.batch.sweeps",

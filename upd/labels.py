@@ -63,6 +63,17 @@ def effect_word(effect: Mapping[str, Any]) -> str:
     return "yes" if effect["on"] else "no" if effect.get("applies", True) else "n/a"
 
 
+def sentence(words: str, end: str = ".") -> str:
+    """Words as a sentence: a capital first; nothing of none."""
+    return f"{words[:1].upper()}{words[1:]}{end}" if words else ""
+
+
+def counted(count: int, what: str) -> str:
+    """1 point, 2 points, 3 meshes."""
+    plural = "es" if what.endswith("sh") else "s"
+    return f"{count} {what}{plural if count != 1 else ''}"
+
+
 def file_name(title: str) -> str:
     """A title as the name of a file or variable."""
     return re.sub(r"\W+", "_", title).strip("_")

@@ -97,7 +97,7 @@ def run(
     handler = _begin(own, loaded)
     log.info(_versions())
     # matplotlib takes a while to import: meanwhile the solver computes.
-    threading.Thread(target=import_module, args=("upd.plot.matplotlib_parts",), daemon=True).start()
+    threading.Thread(target=import_module, args=("upd.plot.matplotlib",), daemon=True).start()
     try:
         result = _solved(_Run(analysis, stages, own.path, own.place), plan)
         if report:

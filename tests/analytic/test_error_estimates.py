@@ -133,7 +133,6 @@ def test_parts_add_up_and_the_largest_tells_the_cost() -> None:
     }
     (told,) = with_estimates([NUMBER], merged(*parts.values()))
     assert told.estimated_error == pytest.approx(0.03)
-    assert told.half_error_cost_s == 7.0
     # A number keeps the parts it has.
     own = with_parts(NUMBER, (ErrorPart("Betti", 0.5, "own"),))
     assert with_estimates([own], merged(*parts.values())) == (own,)

@@ -17,7 +17,6 @@ from upd.cache.sources import key_of
 from upd.errors import InputError
 from upd.labels import number
 from upd.linalg import select
-from upd.linalg.routes import Route
 from upd.plot.chart import Chart, Entry
 from upd.progress import Stages
 from upd.results import Arrays, Case, Check, Estimates, Group, Result
@@ -174,8 +173,6 @@ class Plan(Generic[S]):
         Of ``seconds``, those of what inputs known within limits do to the numbers.
     files_seconds
         Of ``seconds``, those of figures, files and page.
-    ways
-        "body, task" -> what each way to serve it is predicted to cost, where there are several.
     """
 
     scene: S
@@ -191,7 +188,6 @@ class Plan(Generic[S]):
     estimate_seconds: float = field(default=0.0, kw_only=True)
     input_seconds: float = field(default=0.0, kw_only=True)
     files_seconds: float = field(default=0.0, kw_only=True)
-    ways: Mapping[str, Sequence[Route]] = field(default_factory=dict, kw_only=True)
 
     @property
     def copies(self) -> int:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from upd.errors import InputError
 from upd.linalg import select
-from upd.linalg.routes import Route, choose_route, contact_routes
+from upd.linalg.routes import choose_route, contact_routes
 from upd.linalg.select import USUAL, Prediction, Solid
 from upd.scene import AnyScene
 
@@ -50,8 +50,6 @@ class CostModel:
     left: dict[int, float] = field(default_factory=dict)
     #: seconds of such jobs
     shared: float = 0.0
-    #: of the tasks that may go several ways: the cost of each
-    ways: dict[str, list[Route]] = field(default_factory=dict)
 
     @property
     def element(self) -> str:
@@ -132,7 +130,6 @@ class CostModel:
             ways, products, route=asked.route, memory_limit_bytes=room - copies
         )
         self.solver[task] = f"{choice.name}: {choice.why}"
-        self.ways[task] = ways
         self.shared += found.seconds
         self._lets_go(task, nodes, n_kept, solid)
         self.jobs.append(found.bytes + copies)

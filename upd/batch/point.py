@@ -137,7 +137,8 @@ def _solved(task: Task) -> Outcome:
     from upd.runner import run
 
     begin = time.perf_counter()
-    store = None if task.alone else _store(task)
+    mine = cache_folder() / "condensed", task.threads, task.limit_bytes
+    store = None if task.alone else _stores.setdefault(mine, Store(*mine))
     before = {} if store is None else dict(store.counts)
     try:
         scene = load_point(task)
@@ -155,11 +156,6 @@ def _solved(task: Task) -> Outcome:
     return _outcome(
         result, {} if store is None else {k: n - before[k] for k, n in store.counts.items()}
     )
-
-
-def _store(task: Task) -> Store:
-    mine = cache_folder() / "condensed", task.threads, task.limit_bytes
-    return _stores.setdefault(mine, Store(*mine))
 
 
 def _failed(error: Exception, seconds: float) -> Outcome:

@@ -57,7 +57,8 @@ class PointStore:
         """Keep a final outcome. Raises UpdError when the disk does not take it."""
         if outcome.final:
             with self.writing():
-                write_text(self.path(task), _sealed(outcome.text()) + "\n")
+                data = json.loads(outcome.text())
+                write_text(self.path(task), json.dumps(data | {_DIGEST: _digest(data)}) + "\n")
 
     def check(self) -> None:
         """Raise InputError where the folder cannot be written, or has other things in it."""
@@ -168,12 +169,6 @@ def _shown(grid: Mapping[str, Any]) -> str:
         return f"{grid['scene']}, a sample of {drawn['count']} with seed {drawn['seed']}"
     axes = (f"{axis['path']}={','.join(map(str, axis['values']))}" for axis in grid["axes"])
     return f"{grid['scene']}, {' and '.join(axes)}"
-
-
-def _sealed(text: str) -> str:
-    """A JSON text with the SHA-256 of its content."""
-    data = json.loads(text)
-    return json.dumps({**data, _DIGEST: _digest(data)}, indent=1)
 
 
 def _digest(data: Mapping[str, Any]) -> str:

@@ -27,7 +27,6 @@ from upd.cache.files import write_text
 from upd.cache.sources import source_digest
 from upd.errors import InputError, did_you_mean
 from upd.linalg import select
-from upd.plot.matplotlib import draw_all, write_sheets
 from upd.plot.work_precision import work_precision_charts
 from upd.scene import AnyScene, load_scene
 from upd.scene.quantities import UNKNOWN
@@ -88,10 +87,11 @@ class Study:
         }
         write_text(data, json.dumps(content, indent=1) + "\n")
         charts = work_precision_charts(curves)
-        figures = write_sheets(charts, folder)
         # slow to import: only where a page is made
+        from upd.plot.matplotlib import write_sheets
         from upd.report.sweep_page import write_study_report
 
+        figures = write_sheets(charts, folder)
         failed = sum(bool(one.outcome.failure) for one in solved)
         page = write_study_report(folder, self.title, failed, report.notes, tables, charts, figures)
         return [table, data, *figures, page]
@@ -129,6 +129,8 @@ class StudyResult:
 
     def plot(self) -> list[Axes]:
         """Draw error against seconds with matplotlib, and return the axes."""
+        from upd.plot.matplotlib import draw_all
+
         charts = work_precision_charts([asdict(one) for one in self.report.curves])
         return draw_all([one for one in charts if one.x.name == charts[0].x.name][:6])
 

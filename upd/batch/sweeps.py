@@ -16,15 +16,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from upd.batch.engine import Batch, Watcher, run_points
-from upd.batch.grid import GridAxis, Sample, values_at
-from upd.batch.plan import SweepPlan, plan_sweep
+from upd.batch.plan import Sample, SweepPlan, plan_sweep, values_at
 from upd.batch.store import PointStore
-from upd.batch.table import Column, as_csv, check_follow, csv_text, make_columns, patterns, reasons
+from upd.batch.table import as_csv, check_follow, csv_text, make_columns, patterns, reasons
 from upd.cache.files import json_text, write_text
 from upd.cache.sources import versions
 from upd.errors import InputError, one_line
-from upd.plot.matplotlib import draw_all, write_sheets
-from upd.plot.sweep_charts import FIGURES, is_constant, sample_charts, sweep_charts
+from upd.labels import file_name
+from upd.plot.sweep_charts import (
+    FIGURES,
+    Column,
+    Parameter,
+    is_constant,
+    sample_charts,
+    sweep_charts,
+)
+from upd.report import write_report
 from upd.results import Group, write_netcdf
 from upd.results.sampled import SampledNumber, sampled_number
 from upd.scene import load_scene
@@ -65,6 +72,8 @@ class SweepResult:
 
     def plot(self) -> list[Axes]:
         """Draw the followed numbers with matplotlib, and return the axes."""
+        from upd.plot.matplotlib import draw_all
+
         if self.sampled:
             return draw_all(sample_charts(self.sampled, [c.values for c in self.columns]))
         return draw_all(sweep_charts(self.plan.axes, self.columns)[:6])
@@ -207,7 +216,7 @@ def run_sweep(
             (folder / "report.html").unlink(missing_ok=True)
         pictures: dict[str, Callable[[], list[Path]]] = {
             "figures": lambda: draw(folder, plan.axes, columns, sampled),
-            "report.html": lambda: _write_page(folder),
+            "report.html": lambda: [write_report(folder)],
         }
         faults = []
         for what, make in pictures.items():
@@ -227,13 +236,6 @@ def _sampled(sample: Sample, columns: Sequence[Column]) -> tuple[SampledNumber, 
         sampled_number(c.name, c.case, c.unit, c.values, sample.shifts, paths, c.inputs)
         for c in columns
     )
-
-
-def _write_page(folder: Path) -> list[Path]:
-    # Templates and charts are slow to import: only when a page is made.
-    from upd.report import write_report
-
-    return [write_report(folder)]
 
 
 # -- what a sweep leaves: table.csv, sweep.nc with named axes, sweep.json; then the figures --------
@@ -261,7 +263,7 @@ def write_outputs(store: PointStore, result: SweepResult) -> list[Path]:
 
 def draw(
     folder: Path,
-    axes: Sequence[GridAxis],
+    axes: Sequence[Parameter],
     columns: Sequence[Column],
     sampled: Sequence[SampledNumber] = (),
 ) -> list[Path]:
@@ -269,6 +271,9 @@ def draw(
 
     Returns their paths.
     """
+    # slow to import
+    from upd.plot.matplotlib import write_sheets
+
     _remove_figures(folder)
     if sampled:
         values = [column.values for column in columns]
@@ -282,7 +287,7 @@ def _remove_figures(folder: Path) -> None:
         (folder / f"{name}.png").unlink(missing_ok=True)
 
 
-def dimension(axis: GridAxis, axes: Sequence[GridAxis]) -> str:
+def dimension(axis: Parameter, axes: Sequence[Parameter]) -> str:
     """Short name of an axis.
 
     The last word of its path, or the whole path when that would not be its own.
@@ -310,7 +315,7 @@ def _arrays(result: SweepResult) -> dict[str, Any]:
         out[name] = (along, *_coordinate(axis, notes))
     for column in result.columns:
         notes = {"long_name": column.title, "units": column.unit or "1"}
-        out[_free(column.variable, out)] = (dims, column.values.reshape(shape), notes)
+        out[_free(file_name(column.title), out)] = (dims, column.values.reshape(shape), notes)
     failed = np.array([bool(outcome.failure) for outcome in result.outcomes], np.int8)
     flags = {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "ok failed"}
     out["status"] = (dims, failed.reshape(shape), flags)
@@ -319,7 +324,7 @@ def _arrays(result: SweepResult) -> dict[str, Any]:
     return out
 
 
-def _coordinate(axis: GridAxis, notes: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+def _coordinate(axis: Parameter, notes: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
     """Numbers as they are; words as numbers with their meanings (CF conventions, flag_values and
     flag_meanings).
     """

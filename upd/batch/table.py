@@ -6,7 +6,7 @@ import csv
 import io
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses import analysis_of
-from upd.batch.grid import GridAxis, Place
+from upd.batch.plan import Place
 from upd.errors import InputError
-from upd.labels import file_name
-from upd.results import Case, InputPart, Result, shared_label
+from upd.plot.sweep_charts import Column, Parameter
+from upd.results import Case, Result, shared_label
 from upd.scene import AnyScene
 from upd.vary.outcome import Outcome
 
@@ -25,37 +25,6 @@ Array = NDArray[np.float64]
 
 #: Columns when nothing is named and nothing usual is found.
 _FEW = 12
-
-
-@dataclass(frozen=True)
-class Column:
-    """One followed number over all points.
-
-    Values (n,), NaN where there is none; why, "" where there is one or the point failed; what
-    inputs known within limits do to it, by the first point that knows any.
-    """
-
-    name: str
-    case: str
-    unit: str
-    values: Array
-    missing: tuple[str, ...] = ()
-    inputs: tuple[InputPart, ...] = ()
-
-    @property
-    def title(self) -> str:
-        """Name, and the case when there is one."""
-        return f"{self.name} ({self.case})" if self.case else self.name
-
-    @property
-    def header(self) -> str:
-        """Title with the unit."""
-        return f"{self.title} [{self.unit}]" if self.unit else self.title
-
-    @property
-    def variable(self) -> str:
-        """A name for files."""
-        return file_name(self.title)
 
 
 def patterns(scene: AnyScene, follow: Sequence[str]) -> tuple[str, ...]:
@@ -214,7 +183,7 @@ def _why(one: Result | None, key: _Key, results: Sequence[Result]) -> str:
 
 
 def csv_text(
-    axes: Sequence[GridAxis],
+    axes: Sequence[Parameter],
     places: Sequence[Place],
     outcomes: Sequence[Outcome],
     columns: Sequence[Column],
@@ -231,7 +200,7 @@ def csv_text(
         numbers = [float(column.values[number]) for column in columns]
         rows.append(
             [
-                *(axis.shown(k) for axis, k in zip(axes, place, strict=True)),
+                *(axis.column[k] for axis, k in zip(axes, place, strict=True)),
                 *("" if np.isnan(v) else repr(v) for v in numbers),
                 "failed" if outcome.failure else "ok",
                 why[number],

@@ -459,13 +459,14 @@ def report(runs: list[Path], *, out: Path | None = None) -> None:
 @app.command
 def scenes() -> None:
     """List the ready scenes."""
-    from upd.cli.tables import columns_of, print_table
+    from upd.cli.tables import print_table
+    from upd.results.answer_table import AnswerTable
     from upd.scene import load_scene, ready_scenes
 
     loaded = map(load_scene, ready_scenes())
-    rows = ((one.name, one.title, ", ".join(one.want)) for one in loaded)
-    heads = ("scene", "~what it is", "~outputs")
-    print_table(terminal.console, columns_of(heads, rows))
+    rows = tuple((one.name, one.title, ", ".join(one.want)) for one in loaded)
+    heads = ("scene", "what it is", "outputs")
+    print_table(terminal.console, AnswerTable("Ready scenes", heads, rows))
 
 
 @app.command
@@ -513,13 +514,17 @@ def new(scene: str, file: Path) -> None:
 def doctor() -> int:
     """Show versions, threads, the linear solver and the libraries gmsh needs."""
     from upd.cli.doctor import examine
-    from upd.cli.tables import columns_of, print_table
+    from upd.cli.tables import print_table
+    from upd.report.tables import filled
 
-    rows = examine()
-    bad = {found: "red" for _, found, fine in rows if not fine}
-    table = columns_of(("what", "~found"), (row[:2] for row in rows))
-    print_table(terminal.console, table, styles=bad)
-    return FAILED if bad else OK
+    found = examine()
+    columns = {
+        "what": [what for what, *_ in found],
+        "found": [words for _, words, _ in found],
+        "status": ["" if fine else "faulty" for *_, fine in found],
+    }
+    print_table(terminal.console, filled("This machine", columns))
+    return OK if all(fine for *_, fine in found) else FAILED
 
 
 def command_table() -> list[tuple[str, str]]:

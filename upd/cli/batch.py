@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections import Counter
 
-import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
-from rich.text import Text
 
 from upd.batch.engine import Workers
 from upd.batch.plan import SweepPlan
 from upd.batch.studies import Study, StudyResult
 from upd.batch.sweeps import SweepResult
 from upd.cli.tables import print_table
-from upd.cli.terminal import counted, duration
+from upd.cli.terminal import duration
+from upd.labels import counted
 from upd.plot.sweep_charts import is_constant
-from upd.report.columns import TextColumn, whole_table
-from upd.report.tables import sample_table
-from upd.results.answer_table import AnswerTable
+from upd.report.columns import fitting
+from upd.report.tables import filled, sample_table, with_unit
+from upd.results.quantities import number_title
 from upd.results.sampled import sample_sentence
 
-#: rows shown, and characters of a line of a head; the files hold all
-_ROWS, _WIDTH = 30, 14
-#: characters to which a column of words of a study may be folded
-_WORDS = 16
+#: rows shown; the files hold all
+_ROWS = 30
 #: most different reasons of failures that are shown
 _REASONS = 5
 #: ending of a study's file -> what it is
@@ -72,34 +67,27 @@ def print_sweep(console: Console, result: SweepResult) -> None:
     """The table, as far as it fits, and where the rest is."""
     plan = result.plan
     places = plan.places[:_ROWS]
-    columns = [
-        TextColumn(
-            _head(axis.path.rpartition(".")[2], "", axis.unit),
-            tuple(
-                v if isinstance(v := axis.shown(place[k]), str) else f"{v:.6g}" for place in places
-            ),
-        )
-        for k, axis in enumerate(plan.axes)
-    ]
+    columns = {axis.header: [axis.shown(p[k]) for p in places] for k, axis in enumerate(plan.axes)}
+    columns["status"] = ["failed" if one.failure else "" for one in result.outcomes[: len(places)]]
     # what varies first
-    for k, column in enumerate(sorted(result.columns, key=lambda one: is_constant(one.values))):
-        values = (_shown(result, number, column.values, k) for number in range(len(places)))
-        head = _head(column.name, column.case, column.unit)
-        columns.append(TextColumn(head, tuple(values), right=True, rank=k))
-    left_out = print_table(console, columns, note=False)
+    for column in sorted(result.columns, key=lambda one: is_constant(one.values)):
+        values = column.values[: len(places)]
+        head = with_unit(number_title(column.name, column.case), column.unit)
+        columns[f"# {head}"] = ["" if math.isnan(v) else f"{v:.4g}" for v in values]
+    table = filled("Points", columns)
+    shown = fitting(table, console.width)
+    print_table(console, shown)
     points = max(len(plan.places) - _ROWS, 0)
-    if points or left_out:
-        hidden = {"point": points, "number": len(left_out)}
-        text = " and ".join(counted(count, what) for what, count in hidden.items() if count)
+    hidden = {"point": points, "number": len(table.columns) - len(shown.columns)}
+    text = " and ".join(counted(count, what) for what, count in hidden.items() if count)
+    if text:
         console.print(f"Not shown: {text}; see the table's file")
     _print_end(console, result)
 
 
 def print_sample(console: Console, result: SweepResult) -> None:
     """What the sample makes of every number, and where the rest is."""
-    table = sample_table(result.sampled)
-    for line in (table.heading, *whole_table(table, console.width)):
-        console.print(Text(line), soft_wrap=True)
+    print_table(console, sample_table(result.sampled))
     console.print(sample_sentence(result.sampled))
     _print_end(console, result)
 
@@ -124,21 +112,6 @@ def _print_end(console: Console, result: SweepResult) -> None:
         console.print(line)
 
 
-def _shown(result: SweepResult, place: int, values: NDArray[np.float64], column: int) -> str:
-    """A number of a point; the first column shows that it failed."""
-    if result.outcomes[place].failure:
-        return "" if column else "failed"
-    value = float(values[place])
-    return "" if math.isnan(value) else f"{value:.4g}"
-
-
-def _head(name: str, case: str, unit: str) -> str:
-    """A head on narrow lines, long names broken at their underscores."""
-    broken = textwrap.wrap(name.replace("_", "_ "), _WIDTH)
-    lines = [*(line.replace("_ ", "_") for line in broken), *textwrap.wrap(case, _WIDTH)]
-    return "\n".join([*lines, f"[{unit}]"] if unit else lines)
-
-
 def print_study_plan(console: Console, title: str, study: Study, workers: Workers) -> None:
     """How many points, and who solves them."""
     threads = counted(workers.threads, "thread") if workers.threads else "all threads"
@@ -157,25 +130,9 @@ def print_study(console: Console, result: StudyResult) -> None:
     if result.kept:
         console.print(f"{counted(len(result.kept), 'point')} kept from an earlier call")
     for table in result.report.tables:
-        print_table(console, study_columns(table), title=table.heading)
+        print_table(console, table)
     files = [f"{_KINDS.get(path.suffix, 'File')}: {path}" for path in result.files]
     fine = sum(not one.outcome.failure for one in result.solved)
     many = f"{fine} of {counted(len(result.solved), 'point')} ok, " if result.solved else ""
     for line in (*files, f"{many}{duration(result.seconds)}", *result.report.notes):
         console.print(line)
-
-
-def study_columns(table: AnswerTable) -> list[TextColumn]:
-    """The columns of a study's table; the last numbers are left out where it is too wide."""
-    cells = list(zip(*table.rows, strict=True)) or [()] * len(table.columns)
-    numbers = [head.startswith("#") for head in table.columns]
-    return [
-        TextColumn(
-            head.lstrip("# "),
-            tuple(mine),
-            right=number,
-            rank=0 if any(numbers) and not number and head not in table.spare else k,
-            folds=0 if number else _WORDS,
-        )
-        for k, (head, number, mine) in enumerate(zip(table.columns, numbers, cells, strict=True))
-    ]

@@ -18,7 +18,6 @@ from upd.cache.files import placed_file
 from upd.cli.terminal import check_ending
 from upd.errors import InputError
 from upd.mesh import recipes
-from upd.mesh.fields import table
 from upd.mesh.recipe_modules import READY, is_file
 from upd.scene import load_scene
 from upd.scene.keys import (
@@ -69,7 +68,7 @@ def print_keys(console: Console, found: Described, asked: str) -> None:
     """All keys as tables, those of a table that was asked for, or one key in full."""
     chosen = chosen_keys(found.keys, asked) if asked else found.keys
     if asked and len(chosen) == 1:
-        _print_one(console, chosen[0], found.params)
+        _print_one(console, chosen[0])
         return
     console.print(Text(found.title, "bold"))
     for steps, mine in groupby(chosen, key=lambda k: k.steps[:-1]):
@@ -100,12 +99,8 @@ def _table(name: str, keys: Sequence[SceneKey]) -> Table:
     return out
 
 
-def _print_one(console: Console, key: SceneKey, params: Any) -> None:
-    """One key in full, with the bounds that the other parameters leave."""
-    # a recipe's key stands alone, in a scene it stands in its table
-    of_recipe = key.steps[:-1] in ((), ("geometry",)) and key.name != "recipe"
-    rows = table(params) if of_recipe else []
-    here = next((row.here for row in rows if row.name == key.name), "")
+def _print_one(console: Console, key: SceneKey) -> None:
+    """One key in full."""
     others = f"; understood: {', '.join(key.units)}" if len(key.units) > 1 else ""
     texts = {
         "meaning": key.meaning,
@@ -114,7 +109,6 @@ def _print_one(console: Console, key: SceneKey, params: Any) -> None:
         "unit": f"{key.unit}{others}" if key.unit else "",
         "bounds": key.bounds or "none",
         "uncertainty": UNCERTAINTY if key.uncertain else "",
-        "here": f"{here} (what the other parameters leave)" if here else "",
         "cost": key.cost,
     }
     console.print(Text(key.path, "bold"))

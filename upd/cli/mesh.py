@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.text import Text
 
 from upd.analyses.meshing import MeshRequest
 from upd.cache.files import placed_file
 from upd.cli.describe import Described, print_keys
-from upd.cli.tables import columns_of, print_table
+from upd.cli.tables import print_table
 from upd.cli.terminal import check_ending
 from upd.errors import InputError
 from upd.labels import number
 from upd.mesh import Mesh, recipes
 from upd.mesh.checks import Pairs, centre_of, check_pairs, quality
 from upd.mesh.export import ENDINGS, write_mesh
-from upd.mesh.fields import table
 from upd.progress import Listener, Stages
 from upd.reduction.cyclic import Sector
+from upd.results.answer_table import AnswerTable
 from upd.scene.keys import recipe_keys
 
 #: nodes per hexahedron that a .inp file can hold
@@ -105,9 +102,9 @@ def _draw(request: MeshRequest, meshes: Mapping[str, Mesh], path: Path) -> None:
 def _configuration(request: MeshRequest, cached: bool) -> str:
     """The parameters that differ from the recipe's defaults, in a line."""
     changed = [
-        f"{p.name} {_value(p.value)} {p.unit}".rstrip()
-        for p in table(request.parameters, here=False)
-        if p.default is not None and p.value != p.default
+        f"{key.name} {key.value}".replace('"', "")
+        for key in recipe_keys(request.recipe, request.parameters)
+        if key.given and key.default != "must be given"
     ]
     text = ", ".join(changed) if changed else "all parameters at their defaults"
     note = " (mesh from the cache)" if cached else ""
@@ -131,8 +128,7 @@ def _print_shapes(console: Console, meshes: Mapping[str, Mesh]) -> None:
             place = ", ".join(f"{x + 0.0:.3g}" for x in centre_of(mesh, worst))
             rows.append((*row, measure, value, place))
     heads = ("body", "#nodes", "#hexahedra", "worst of", "#value", "at x, y, z, mm")
-    title = "Bodies and their worst elements"
-    print_table(console, columns_of(heads, rows), title=title, box=SIMPLE_HEAD)
+    print_table(console, AnswerTable("Bodies and their worst elements", heads, tuple(rows)))
 
 
 def _print_pairs(
@@ -157,7 +153,7 @@ def _print_pairs(
         ]
         console.print(f"Glued in one body: {', '.join(glued)}" if glued else "No bodies touch")
         return
-    rows = [
+    rows = tuple(
         (
             ", ".join(p.bodies),
             ", ".join(dict.fromkeys(p.sets)),
@@ -166,23 +162,13 @@ def _print_pairs(
             number(p.gap),
         )
         for p in pairs
-    ]
+    )
     heads = ("bodies", "node sets", "#pairs", "#largest offset, mm", "#largest gap, mm")
-    print_table(console, columns_of(heads, rows), title="Pairs of contact nodes", box=SIMPLE_HEAD)
+    print_table(console, AnswerTable("Pairs of contact nodes", heads, rows))
 
 
 def print_parameters(console: Console, request: MeshRequest) -> None:
-    """The parameters of a recipe, with the bounds that the others leave."""
+    """The parameters of a recipe."""
     recipe, params = request.recipe, request.parameters
-    here = {row.name: row.here for row in table(params)}
-    keys = [
-        replace(key, bounds=f"{key.bounds}; here {here[key.name]}") if here[key.name] else key
-        for key in recipe_keys(recipe, params)
-    ]
-    print_keys(console, Described(f"Parameters of {recipe}", keys, recipe, params), "")
-    meaning = "the recipe's own checks pass while the other parameters stay as they are."
-    console.print(Text(f"here: between these values {meaning}", "dim"))
-
-
-def _value(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    found = Described(f"Parameters of {recipe}", recipe_keys(recipe, params), recipe, params)
+    print_keys(console, found, "")

@@ -2,28 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from rich.box import HEAVY_HEAD, Box
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from upd.analyses.base import Plan, fitting, memory_limit
-from upd.cli.terminal import counted
-from upd.linalg.select import PRODUCTS
+from upd.labels import counted
 from upd.report.answer import TITLE
-from upd.report.columns import TextColumn, fitted
+from upd.report.columns import whole_table
 from upd.report.notebook import RunResult
 from upd.results import FAILED, OK, WARNED
+from upd.results.answer_table import AnswerTable
 
 #: mood of a line -> how it looks
 _STYLES = {OK: "green", WARNED: "yellow", FAILED: "red", TITLE: "bold"}
-#: characters a table needs between two columns, and at its sides
-_GAP, _SIDES = 3, 4
-#: characters to which a column of words may be folded
-_WORDS = 12
 
 
 def print_result(console: Console, result: RunResult, *, full: bool = False) -> None:
@@ -33,117 +26,37 @@ def print_result(console: Console, result: RunResult, *, full: bool = False) -> 
         console.print(Text(line.text, style=_STYLES.get(line.mood, "")), soft_wrap=True)
 
 
-def print_table(
-    console: Console,
-    columns: Sequence[TextColumn],
-    *,
-    title: str = "",
-    styles: Mapping[str, str] | None = None,
-    note: bool = True,
-    box: Box = HEAVY_HEAD,
-) -> list[TextColumn]:
-    """Print a table as wide as the console, at most; returns the columns that did not fit.
-
-    Columns that do not fit are left out and named below it; no number is cut.
-
-    Parameters
-    ----------
-    styles
-        Cell -> its style.
-    note
-        Name the columns left out.
-    box
-        Its frame.
-    """
-    kept, left_out = fitted(columns, console.width - _SIDES, gap=_GAP)
-    table = Table(title=Text(title, "bold") if title else None, title_justify="left", box=box)
-    for column in kept:
-        table.add_column(
-            Text(column.head),
-            justify="right" if column.right else "left",
-            no_wrap=not column.folds,
-            min_width=None if column.folds else column.width,
-            overflow="fold",
-        )
-    for row in zip(*(column.cells for column in kept), strict=True):
-        table.add_row(*(Text(cell, style=(styles or {}).get(cell, "")) for cell in row))
-    console.print(table)
-    if left_out and note:
-        names = ", ".join(column.head.replace("\n", " ") for column in left_out)
-        console.print(Text(f"not shown at this width: {names}", style="dim"))
-    return left_out
-
-
-def columns_of(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> list[TextColumn]:
-    """Columns of rows of cells.
-
-    Parameters
-    ----------
-    heads
-        Those that begin with # hold numbers, flush right; those with ~ words, which may be folded.
-    """
-    cells = list(zip(*rows, strict=True)) or [()] * len(heads)
-    return [
-        TextColumn(head.lstrip("#~"), mine, right=head[0] == "#", folds=_WORDS * (head[0] == "~"))
-        for head, mine in zip(heads, cells, strict=True)
-    ]
-
-
-def _way(plan: Plan[Any], ways: Sequence[Any]) -> tuple[str, ...]:
-    """A way to see the bodies of a contact, how to choose it, and its cost over all tasks."""
-    products = ways[0].name.startswith(PRODUCTS)
-    names = list(dict.fromkeys(way.name.removeprefix(PRODUCTS) for way in ways))
-    word = "products by factor" if products else "condensed"
-    multigrid = products and names == ["amg"]
-    what = "products by multigrid" if multigrid else f"{word} ({', '.join(names)})"
-    by = [
-        task
-        for task, way in zip(plan.ways, ways, strict=True)
-        if plan.solver[task].partition(":")[0] == way.name
-    ]
-    if by:
-        what += " (taken)" if len(by) == len(ways) else f" (taken for {', '.join(by)})"
-    choice = f'solver.route = "{"products" if products else "condensed"}"'
-    return (
-        what,
-        choice + (f', solver.name = "{names[0]}"' if len(names) == 1 else ""),
-        f"{sum(way.cost.seconds for way in ways):.2g}",
-        f"{sum(way.cost.bytes for way in ways) / 1e9:.2g}",
-        ", ".join(dict.fromkeys(way.why for way in ways)) if products else "",
-    )
+def print_table(console: Console, table: AnswerTable) -> None:
+    """Print a table with its heading, as wide as the console."""
+    if table.rows:
+        console.print()
+        if table.heading:
+            console.print(Text(table.heading, "bold"))
+        for line in whole_table(table, console.width):
+            console.print(Text(line), soft_wrap=True)
 
 
 def print_plan(console: Console, plan: Plan[Any]) -> None:
     """Print what a plan simulates, leaves out, and is predicted to cost."""
-    effects = columns_of(
-        ("~effect", "simulated", "~why", "~check after the solve"),
-        ((e.name, e.word, e.why, e.check) for e in plan.effects),
-    )
-    print_table(console, effects, title=plan.scene.title or plan.scene.name)
-    sizes = columns_of(
-        ("body", "#hexahedra", "#nodes", "#dofs", "#contact nodes", "~linear solver"),
+    effects = tuple((e.name, e.word, e.why, e.check) for e in plan.effects)
+    title = plan.scene.title or plan.scene.name
+    heads = ("effect", "simulated", "why", "check after the solve")
+    print_table(console, AnswerTable(title, heads, effects))
+    sizes = tuple(
         (
-            (
-                body,
-                *(f"{n}" for n in (n["hexes"], n["nodes"], 3 * n["nodes"], n["contact"])),
-                "\n".join(
-                    f"{task.removeprefix(f'{body}, ')}: {solver}"
-                    for task, solver in plan.solver.items()
-                    if task.startswith(f"{body}, ")
-                ),
-            )
-            for body, n in plan.size.items()
-        ),
-    )
-    print_table(console, sizes, title=f"Size ({plan.symmetry} model)")
-    if plan.ways:
-        # each task lists its ways in one order: the condensing one, then those by products
-        ways = columns_of(
-            ("~way", "~set with", "#s", "#GB", "~for"),
-            (_way(plan, ways) for ways in zip(*plan.ways.values(), strict=True)),
+            body,
+            *(f"{n}" for n in (n["hexes"], n["nodes"], 3 * n["nodes"], n["contact"])),
+            "; ".join(
+                f"{task.removeprefix(f'{body}, ')}: {solver}"
+                for task, solver in plan.solver.items()
+                if task.startswith(f"{body}, ")
+            ),
         )
-        title = "Ways to see the bodies (one thread, all bodies and families of loads)"
-        print_table(console, ways, title=title)
+        for body, n in plan.size.items()
+    )
+    title = f"Size ({plan.symmetry} model)"
+    counts = ("#hexahedra", "#nodes", "#dofs", "#contact nodes")
+    print_table(console, AnswerTable(title, ("body", *counts, "linear solver"), sizes))
     inputs = f"the bands by {counted(len(plan.scene.uncertain), 'uncertain input')}"
     parts = " and ".join(
         f"{seconds:.2g} s ({100.0 * seconds / plan.seconds:.0f} %) for {what}"

@@ -159,12 +159,6 @@ def progress_text(progress: Progress) -> str:
     return text + (f"; last: {progress.label}, {progress.seconds:.2g} s" if progress.label else "")
 
 
-def counted(count: int, what: str) -> str:
-    """1 point, 2 points, 3 meshes."""
-    plural = "es" if what.endswith("sh") else "s"
-    return f"{count} {what}{plural if count != 1 else ''}"
-
-
 def duration(seconds: float) -> str:
     """Seconds, minutes or hours."""
     if seconds < 90.0:

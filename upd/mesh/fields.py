@@ -1,26 +1,19 @@
 """What recipes share: fields of their dataclasses as data, and the sizes of a damper.
 
 A recipe writes ``radius: float = in_mm(5.0)`` and asks `field_faults` for what is out of bounds;
-bounds that depend on other parameters stay in the recipe's own checks. `table` gives all of them,
-the latter by asking the recipe itself. Two recipes are of the same damper when their `DamperSizes`
-agree; what stands for the blade, and the mesh, may differ.
+bounds that depend on other parameters stay in the recipe's own checks. Two recipes are of the same
+damper when their `DamperSizes` agree; what stands for the blade, and the mesh, may differ.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, field, fields, replace
-from typing import Any, Literal, get_args, get_origin, get_type_hints
-
-from upd.errors import InputError
+from collections.abc import Mapping, Sequence
+from dataclasses import Field, dataclass, field, fields
+from typing import Any, Literal, get_args, get_origin
 
 #: quantity -> unit inside
 UNITS_INSIDE = {"length": "mm", "angle": "deg"}
-#: halvings of an interval: down to the rounding of a double
-_HALVINGS = 60
-#: numbers further from their value than this factor are called unbounded
-_FAR = 1e6
 #: rounding of lengths and angles that follow from others, relative to the largest of them
 _ROUNDING = 1e-12
 
@@ -143,130 +136,18 @@ def _either(choices: Sequence[Any]) -> str:
     return f"{', '.join(texts[:-1])} or {texts[-1]}" if len(texts) > 1 else texts[0]
 
 
-@dataclass(frozen=True)
-class RecipeParameter:
-    """One row of the table of a recipe's parameters.
+def bounds_of(f: Field[Any], kind: Any) -> str:
+    """Bounds or choices of a parameter, whatever the others are; "" where it has none.
 
-    Attributes
+    Parameters
     ----------
-    unit
-        "" for a number without one and for choices.
-    default
-        None when it must be given.
-    bounds
-        Whatever the other parameters are; "" when the recipe has none.
-    here
-        With the other parameters as they are; "" where that is all of ``bounds``.
+    kind
+        Its annotation.
     """
-
-    name: str
-    value: Any
-    default: Any
-    unit: str
-    bounds: str
-    here: str
-
-
-def table(params: Any, *, here: bool = True) -> list[RecipeParameter]:
-    """The parameters of a recipe with units, defaults and bounds.
-
-    Bounds that follow from the other parameters are those between which the recipe's own checks
-    pass, found by halving: the interval about the present value, which must be sound itself. They
-    are left out without ``here``.
-    """
-    hints = get_type_hints(type(params))
-    return [_row(params, f, hints[f.name], here=here) for f in fields(params) if f.init]
-
-
-def _row(params: Any, f: Field[Any], kind: Any, *, here: bool) -> RecipeParameter:
-    bounds: Bounds = f.metadata.get("bounds", Bounds())
     choices = f.metadata.get("choices") or (get_args(kind) if get_origin(kind) is Literal else ())
-    return RecipeParameter(
-        f.name,
-        getattr(params, f.name),
-        None if f.default is MISSING else f.default,
-        UNITS_INSIDE.get(str(f.metadata.get("quantity")), ""),
-        ", ".join(map(str, choices)) if choices else bounds.text,
-        _here(params, f.name, bounds, choices) if here else "",
-    )
-
-
-def _here(params: Any, name: str, bounds: Bounds, choices: Sequence[Any]) -> str:
-    """What the other parameters leave of bounds or choices, "" where that is all."""
     if choices:
-        sound = [str(c) for c in choices if _passes(params, name, c)]
-        return ", ".join(sound) if len(sound) < len(choices) else ""
-    value = getattr(params, name)
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return _interval(params, name, bounds) if number else ""
-
-
-def _passes(params: Any, name: str, value: Any) -> bool:
-    try:
-        replace(params, **{name: value})
-    # a recipe of the user's own may raise anything
-    except (InputError, ArithmeticError, ValueError):
-        return False
-    return True
-
-
-def _interval(params: Any, name: str, bounds: Bounds) -> str:
-    """The numbers about the present one that pass the recipe's checks, in words."""
-    value = getattr(params, name)
-    step = 2 if bounds.even else 1
-    ends = [_end(params, name, value, sign, step) for sign in (-1, 1)]
-    low, high = (_rounded(end, sign) for end, sign in zip(ends, (-1, 1), strict=True))
-    known_low = bounds.least if bounds.least is not None else bounds.above
-    low_text = "" if ends[0] is None or _alike(ends[0], known_low) else f"{low:g}"
-    high_text = "" if ends[1] is None or _alike(ends[1], bounds.most) else f"{high:g}"
-    if low_text and high_text:
-        return f"{low_text} ... {high_text}"
-    if low_text:
-        return f"{'>=' if _passes(params, name, type(value)(low)) else '>'} {low_text}"
-    if high_text:
-        return f"{'<=' if _passes(params, name, type(value)(high)) else '<'} {high_text}"
-    return ""
-
-
-def _alike(end: float, known: float | None) -> bool:
-    return known is not None and abs(end - known) <= 1e-9 * max(1.0, abs(known))
-
-
-def _end(params: Any, name: str, value: float, sign: int, step: int) -> float | None:
-    """Last number in one direction that passes, None when none is met within a factor."""
-    whole_number = isinstance(value, int)
-    scale = max(abs(value), 1e-3)
-
-    def candidate(way: float) -> float:
-        return value + sign * step * round(way) if whole_number else value + sign * way * scale
-
-    # outwards by doubling, to the first number that does not pass
-    good, bad = 0.0, 1.0 if whole_number else 1e-3
-    furthest = 1e5 if whole_number else _FAR
-    while _passes(params, name, candidate(bad)):
-        good, bad = bad, 2.0 * bad
-        if bad > furthest:
-            return None
-    for _ in range(_HALVINGS):
-        middle = (good + bad) / 2.0
-        if whole_number and bad - good <= 1.0:
-            break
-        if _passes(params, name, candidate(middle)):
-            good = middle
-        else:
-            bad = middle
-    return candidate(good)
-
-
-def _rounded(end: float | None, sign: int) -> float:
-    """Four digits, towards the inside."""
-    if not end or isinstance(end, int):
-        return end or 0.0
-    unit = 10.0 ** (math.floor(math.log10(abs(end))) - 3)
-    inwards: Callable[[float], int] = math.ceil if sign < 0 else math.floor
-    # what is a round number but for the halving's last digit stays one
-    nearest = round(end / unit)
-    return (nearest if abs(end / unit - nearest) < 1e-6 else inwards(end / unit)) * unit
+        return ", ".join(map(str, choices))
+    return str(f.metadata.get("bounds", Bounds()).text)
 
 
 @dataclass(frozen=True)

@@ -130,26 +130,6 @@ class Area:
 
 
 @dataclass(frozen=True)
-class Pies:
-    """A pie at each point ``x``, ``y`` (n,): ``shares`` (n, n_state) of ``states``.
-
-    ``size`` (n,) from 0 to 1 is the area of each.
-
-    Attributes
-    ----------
-    what
-        What the size shows, for the legend.
-    """
-
-    x: Array
-    y: Array
-    shares: Array
-    size: Array
-    states: tuple[str, ...]
-    what: str = ""
-
-
-@dataclass(frozen=True)
 class Scatter:
     """Points ``x``, ``y`` (n,) coloured by ``value`` (n,), their area by ``size`` (n,) from 0 to
     1.
@@ -229,7 +209,6 @@ class Chart:
     marks: tuple[Mark, ...] = ()
     bands: tuple[Band, ...] = ()
     areas: tuple[Area, ...] = ()
-    pies: tuple[Pies, ...] = ()
     scatters: tuple[Scatter, ...] = ()
     sheet: bool = True
     columns: int = 2
@@ -238,5 +217,7 @@ class Chart:
     heading: str = ""
 
 
+#: charts on one sheet at most: more is no figure any more
+MOST_PANELS = 24
 #: states of a contact point, in the order of the values 0, 1, 2
 STATES = ("open", "slip", "stick")

@@ -17,7 +17,7 @@ from matplotlib.patches import Arc
 
 from upd.mesh import FloatArray, Mesh
 from upd.mesh.section import CutBody, Length, Opening, SectionView, cut
-from upd.plot.sheet import draw_sheet
+from upd.plot.matplotlib import draw_sheet
 from upd.plot.style import COLOURS, OUTLINE
 
 #: white mixed to the colours of the bodies

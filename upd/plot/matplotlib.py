@@ -5,34 +5,93 @@ On axes, on the PNG sheets of a run folder, and as pictures for pages read witho
 
 from __future__ import annotations
 
+import io
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Any, Literal
 
-from upd.plot.chart import Array, Axis, Chart
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator, ScalarFormatter
+from matplotlib.transforms import ScaledTranslation
+
+from upd.cache.files import whole_file
+from upd.plot.chart import MOST_PANELS, Area, Axis, Band, Chart, Map, Trace
 from upd.plot.style import (
+    CROSS,
+    area_colour,
+    band_colour,
+    colour_of,
+    colour_range,
     coordinates,
     is_log,
     is_wide,
-    log_ticks,
-    log_view,
+    labelled,
+    legend_names,
+    marker_area,
     plain,
     proportion,
-    tick_text,
+    sides,
+    state_colours,
     title_of,
     with_room,
 )
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+Drawing = Callable[[Axes], Any]
 
-#: charts on one sheet at most: more is no figure any more
-MOST_PANELS = 24
-#: dots per inch of a run folder's sheets, and of a page's pictures
-_DPI, _PAGE_DPI = 130, 110
+#: inches of one drawing, dots per inch
+_SIZE, _DPI = (5.6, 4.4), 130
+#: the same of a page's pictures
+_PAGE_DPI = 110
+
+
+def own_axes(ax: Axes | None) -> Axes:
+    """The axes given, or new ones in a figure of their own."""
+    if ax is not None:
+        return ax
+    figure = Figure(figsize=(6, 4.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure.add_subplot()
+
+
+def draw_sheet(
+    drawings: Sequence[Drawing],
+    columns: int,
+    size: tuple[float, float] = _SIZE,
+    dpi: int = _DPI,
+) -> Figure:
+    """A figure of ``dpi`` dots per inch with each of ``drawings`` on axes of ``size`` inches,
+    ``columns`` side by side.
+    """
+    columns = min(columns, len(drawings))
+    rows = -(-len(drawings) // columns)
+    figure = Figure(figsize=(size[0] * columns, size[1] * rows), dpi=dpi, layout="constrained")
+    FigureCanvasAgg(figure)
+    for k, draw in enumerate(drawings):
+        ax = figure.add_subplot(rows, columns, k + 1)
+        draw(ax)
+        for axis in (ax.xaxis, ax.yaxis):
+            # Ticks with words stay all.
+            if isinstance(locator := axis.get_major_locator(), MaxNLocator):
+                locator.set_params(nbins=6)
+    return figure
+
+
+def write_png(figure: Figure, path: Path) -> list[Path]:
+    """Write a figure as PNG, whole or not at all; returns its path."""
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, format="png")
+    return [path]
+
+
 #: points of the letters of titles and ticks, and mean width of a letter as a part of them
 _LETTERS, _WIDE = 9.0, 0.56
 #: inches a title may reach over its axes on both sides together
@@ -56,30 +115,25 @@ def draw(chart: Chart, ax: Axes | None = None) -> Axes:
     Axes
         The axes drawn on.
     """
-    # matplotlib is slow to import: only when something is drawn.
-    from upd.plot import matplotlib_parts as parts
-    from upd.plot.sheet import own_axes
-
     ax, chart = own_axes(ax), with_room(chart)
     _grid(chart, ax)
-    parts.draw_maps(chart, ax)
+    _draw_maps(chart, ax)
     for area in chart.areas:
-        parts.draw_area(area, ax)
+        _draw_area(area, ax)
     for band in chart.bands:
-        parts.draw_band(band, ax)
+        _draw_band(band, ax)
     for trace in chart.traces:
-        parts.draw_trace(trace, ax)
-    for pies in chart.pies:
-        parts.draw_pies(pies, ax)
-    parts.draw_scatters(chart, ax)
+        _draw_trace(trace, ax)
+    _draw_scatters(chart, ax)
     _axis(chart, chart.x, "x", ax)
     _axis(chart, chart.y, "y", ax)
-    parts.draw_marks(chart.marks, ax)
+    for mark in chart.marks:
+        ax.plot(mark.x, mark.y, "o", ms=3.5, color=colour_of(mark), zorder=4)
     if chart.equal:
         ax.set_aspect("equal")
-    parts.draw_legend(chart, ax)
+    _draw_legend(chart, ax)
     _titles(chart, ax)
-    parts.draw_labels(chart, ax)
+    _draw_labels(chart, ax)
     return ax
 
 
@@ -95,9 +149,9 @@ def draw_all(charts: Sequence[Chart]) -> list[Axes]:
 
 def chart_png(charts: Sequence[Chart]) -> bytes:
     """A sheet of ``charts`` as PNG for a page, at most `MOST_PANELS`."""
-    from upd.plot.sheet import png
-
-    return png(_sheet(charts, _PAGE_DPI))
+    out = io.BytesIO()
+    _sheet(charts, _PAGE_DPI).savefig(out, format="png")
+    return out.getvalue()
 
 
 def write_sheet(charts: Sequence[Chart], path: Path) -> list[Path]:
@@ -116,8 +170,6 @@ def write_sheet(charts: Sequence[Chart], path: Path) -> list[Path]:
     list of Path
         ``path``, or nothing when no chart belongs to a sheet.
     """
-    from upd.plot.sheet import write_png
-
     shown = [chart for chart in charts if chart.sheet]
     return write_png(_sheet(shown, _DPI), path) if shown else []
 
@@ -151,8 +203,6 @@ def write_sheets(charts: Iterable[Chart], folder: Path, *, keep: bool = False) -
 
 
 def _sheet(charts: Sequence[Chart], dpi: int) -> Figure:
-    from upd.plot.sheet import draw_sheet
-
     first = charts[0]
     wide, tall = first.size
     if all(is_wide(chart) for chart in charts):
@@ -171,13 +221,12 @@ def _grid(chart: Chart, ax: Axes) -> None:
 
 def _axis(chart: Chart, axis: Axis, name: Literal["x", "y"], ax: Axes) -> None:
     """Scale, ticks and ends of one axis."""
-    from matplotlib.ticker import ScalarFormatter
-
     which = ax.xaxis if name == "x" else ax.yaxis
     values = coordinates(chart, name)
     limits = getattr(ax, f"set_{name}lim")
     if is_log(axis, values):
-        _log_axis(name, log_view(axis, values), ax)
+        getattr(ax, f"set_{name}scale")("log", nonpositive="mask")
+        ax.grid(visible=True, which="minor", axis=name, color="#eeeeee", lw=0.4)
     elif isinstance(which.get_major_formatter(), ScalarFormatter):
         # Numbers as they are, without an offset in a corner.
         ax.ticklabel_format(axis=name, useOffset=False)
@@ -192,17 +241,6 @@ def _axis(chart: Chart, axis: Axis, name: Literal["x", "y"], ax: Axes) -> None:
         # data.
         ax.autoscale_view()
         limits(axis.low, axis.high)
-
-
-def _log_axis(name: Literal["x", "y"], values: Array, ax: Axes) -> None:
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
-
-    getattr(ax, f"set_{name}scale")("log", nonpositive="mask")
-    which = ax.xaxis if name == "x" else ax.yaxis
-    which.set_minor_formatter(NullFormatter())
-    ax.grid(visible=True, which="minor", axis=name, color="#eeeeee", lw=0.4)
-    which.set_major_locator(FixedLocator(log_ticks(values)))
-    which.set_major_formatter(FuncFormatter(lambda value, _: tick_text(value)))
 
 
 def _titles(chart: Chart, ax: Axes) -> None:
@@ -225,3 +263,208 @@ def _lines(text: str, letters: int) -> str:
     """A text on at most two lines of so many letters; what does not fit is cut."""
     lines = textwrap.wrap(text, max(letters, 12), max_lines=2, placeholder=" …")
     return plain("\n".join(lines))
+
+
+_STYLE: dict[str, dict[str, Any]] = {
+    "line": {"ls": "-"},
+    "dashed": {"ls": "--"},
+    "dotted": {"ls": ":"},
+    "dashdot": {"ls": "-."},
+    "points": {"ls": "", "marker": "o", "ms": 4},
+    "both": {"ls": "-", "marker": "o", "ms": 4},
+    "open points": {"ls": "", "marker": "o", "ms": 4.5, "mfc": "white"},
+    "crosses": {"ls": "", "marker": "x", "ms": 5},
+    "star": {"ls": "", "marker": "*", "ms": 13},
+}
+#: points of the letters of a legend and of the words beside a mark, of what stands before an entry
+#: of a legend, and rows of it at most
+_SMALL, _HANDLE, _ROWS = 7.0, 32.0, 6
+#: inches from the axes to their legend: room for the numbers and words of the axis
+_BELOW = 0.42
+#: cells of a map of states along one side that have lines between them
+_FEW_CELLS = 32
+
+
+def _draw_trace(t: Trace, ax: Axes) -> None:
+    """One curve."""
+    # The linear limits lie over the curves that follow them, and leave their edges to be seen.
+    lw, zorder = (1.0, 3.0) if t.closed else (1.3, 2.0)
+    ax.plot(
+        t.x,
+        t.y,
+        color=colour_of(t),
+        lw=lw,
+        label=plain(t.entry or t.label) or None,
+        zorder=zorder,
+        **_STYLE[t.style],
+    )
+
+
+def _draw_band(band: Band, ax: Axes) -> None:
+    """What lies between two values of one axis, or a line at one."""
+    line, span = (ax.axvline, ax.axvspan) if band.axis == "x" else (ax.axhline, ax.axhspan)
+    style: dict[str, Any] = {"color": band_colour(band), "label": plain(band.label) or None}
+    if band.dashed:
+        for k, at in enumerate(dict.fromkeys((band.low, band.high))):
+            line(at, ls="--", lw=1.0, zorder=1.5, **style | ({"label": None} if k else {}))
+    elif band.low == band.high:
+        # Wide and pale: a measured value is no curve.
+        line(band.low, lw=4.0, alpha=0.3, zorder=0.5, **style)
+    else:
+        span(band.low, band.high, alpha=0.2, lw=0.0, zorder=0.5, **style)
+
+
+def _draw_area(area: Area, ax: Axes) -> None:
+    """What lies between two curves; states are opaque, for they are stacked."""
+    style: dict[str, Any] = (
+        {"alpha": 1.0, "zorder": 1.0} if area.state else {"alpha": 0.22, "zorder": 0.8}
+    )
+    ax.fill_between(
+        area.x,
+        area.low,
+        area.high,
+        color=area_colour(area),
+        lw=0.0,
+        label=plain(area.label) or None,
+        **style,
+    )
+
+
+def _draw_scatters(chart: Chart, ax: Axes) -> None:
+    """Coloured points with the colour bar they share."""
+    low, high = colour_range(chart.scatters)
+    for k, s in enumerate(chart.scatters):
+        area = 0.7 * marker_area(s.size)
+        drawn = ax.scatter(
+            s.x,
+            s.y,
+            area,
+            s.value,
+            cmap="viridis",
+            vmin=low,
+            vmax=high,
+            zorder=2.5,
+            edgecolors="white",
+            linewidths=0.4,
+        )
+        if k == 0:
+            _bar(drawn, chart, s.axis, ax)
+    if chart.scatters:
+        ax.margins(0.08)
+
+
+def _draw_maps(chart: Chart, ax: Axes) -> None:
+    """Maps with the colour bar they share."""
+    low, high = colour_range(chart.maps)
+    for k, m in enumerate(chart.maps):
+        drawn = _states(m, ax) if m.states else _field(m, low, high, ax)
+        if m.contours:
+            _points(m, ax)
+        # Axes for a colour bar cost as much as the map: states of a compact map stand in the
+        # legend. One value everywhere has no scale.
+        if k == 0 and (is_wide(chart) if m.states else low < high):
+            bar = _bar(drawn, chart, m.value, ax)
+            if m.states:
+                bar.set_ticks(list(range(len(m.states))), labels=[plain(s) for s in m.states])
+
+
+def _states(m: Map, ax: Axes) -> Any:
+    n = len(m.states)
+    colours = ListedColormap(state_colours(m))
+    # Between many cells the lines would take more room than the cells.
+    edges: dict[str, Any] = {"edgecolors": "w", "lw": 0.2} if max(m.z.shape) <= _FEW_CELLS else {}
+    return ax.pcolormesh(
+        m.x, m.y, m.z.T, cmap=colours, vmin=-0.5, vmax=n - 0.5, shading="nearest", **edges
+    )
+
+
+def _field(m: Map, low: float, high: float, ax: Axes) -> ScalarMappable:
+    whole = bool(np.isfinite(m.z).all())
+    drawn: Any
+    if m.contours and whole and low < high and min(m.z.shape) > 1:
+        drawn = ax.contourf(m.x, m.y, m.z.T, levels=12, cmap="viridis")
+    else:
+        # Shading between points needs all of them.
+        shading: Any = "gouraud" if m.smooth and whole and min(m.z.shape) > 1 else "nearest"
+        drawn = ax.pcolormesh(
+            m.x,
+            m.y,
+            np.ma.masked_invalid(m.z.T),
+            cmap="viridis",
+            vmin=low,
+            vmax=high,
+            shading=shading,
+        )
+    return drawn  # type: ignore[no-any-return]
+
+
+def _points(m: Map, ax: Axes) -> None:
+    """Dots at the points of a map, crosses where there is no value."""
+    x, y = np.meshgrid(m.x, m.y, indexing="ij")
+    known = np.isfinite(m.z)
+    ax.plot(x[known], y[known], "o", color="white", mec="#333333", mew=0.5, ms=3, clip_on=False)
+    if not known.all():
+        # without points matplotlib's layout makes room for one in the corner of the sheet
+        ax.plot(x[~known], y[~known], "x", color=CROSS, ms=6, clip_on=False)
+
+
+def _bar(drawn: Any, chart: Chart, axis: Axis, ax: Axes) -> Any:
+    """Colour bar: beside the axes, below those of a wide drawing."""
+    place: dict[str, Any] = {"shrink": 0.85}
+    if is_wide(chart):
+        place |= {"location": "bottom", "aspect": 40.0}
+    bar: Any = ax.figure.colorbar(drawn, ax=ax, **place)
+    bar.set_label(plain(axis.label) if axis.name != "state" else "")
+    bar.formatter.set_useOffset(False)
+    return bar
+
+
+def _draw_legend(chart: Chart, ax: Axes) -> None:
+    """Below the axes: an entry per name in the order of the names, and the states of maps."""
+    drawn, labels = ax.get_legend_handles_labels()
+    handles: dict[str, Any] = {
+        name: drawn[labels.index(plain(name))]
+        for name in legend_names(chart)
+        if plain(name) in labels
+    }
+    for m in () if is_wide(chart) else chart.maps:
+        for state, colour in zip(m.states, state_colours(m), strict=False):
+            handles[state] = Patch(facecolor=colour, edgecolor="#999999", lw=0.4)
+    if not handles:
+        return
+    figure = ax.figure.get_figure(root=True)
+    assert figure is not None
+    wide = 72.0 * figure.get_figwidth() * ax.get_position(original=True).width
+    columns = max(int(wide / (0.55 * _SMALL * max(map(len, handles)) + _HANDLE)), 1)
+    shown = dict(list(handles.items())[: _ROWS * columns - 1])
+    if more := len(handles) - len(shown):
+        shown |= {f"and {more} more": Line2D([], [], ls="")} if more > 1 else handles
+    ax.legend(
+        list(shown.values()),
+        [plain(name) for name in shown],
+        loc="upper center",
+        bbox_to_anchor=(0.5, 0.0),
+        # below the axis' own words, however high the axes are
+        bbox_transform=ax.transAxes + ScaledTranslation(0.0, -_BELOW, figure.dpi_scale_trans),
+        ncols=min(columns, len(shown)),
+        frameon=False,
+        fontsize=_SMALL,
+    )
+
+
+def _draw_labels(chart: Chart, ax: Axes) -> None:
+    """Words above the marks that have room for them."""
+    align = {"right": "left", "center": "center", "left": "right"}
+    for mark, shown, side in zip(chart.marks, labelled(chart), sides(chart), strict=True):
+        if shown:
+            ax.annotate(
+                plain(mark.text),
+                (mark.x, mark.y),
+                (0.0, 3.0),
+                textcoords="offset points",
+                ha=align[side],
+                va="bottom",
+                fontsize=_SMALL,
+                color=colour_of(mark),
+                bbox={"fc": "white", "ec": "none", "alpha": 0.7, "pad": 0.5},
+            )

@@ -1,4 +1,4 @@
-"""Pictures of bodies: mode shapes, meshes with their contacts, surfaces with a field.
+"""Pictures of bodies: mode shapes, meshes with their contacts.
 
 Parallel projection, the farthest faces first.
 """
@@ -6,29 +6,27 @@ Parallel projection, the farthest faces first.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import Normalize, to_hex, to_rgb
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch as LegendPatch
 from numpy.typing import NDArray
 
 from upd.mesh import FloatArray, IntArray, Mesh
 from upd.mesh.hexmesh import boundary_quads
-from upd.plot.sheet import Drawing, draw_sheet, own_axes, png
+from upd.plot.matplotlib import Drawing, draw_sheet, own_axes
 from upd.plot.style import COLOURS
-from upd.plot.surface import SCALE, Field, Surface, SurfaceBody, offsets
+from upd.plot.surface import SCALE
 
 #: degrees by which two faces turn where the outline has a line
 _OUTLINE_ANGLE = 30.0
-_STILL, _BARE = (0.83, 0.83, 0.83), (0.82, 0.82, 0.82)
+_STILL = (0.83, 0.83, 0.83)
 _OUTLINE, _CONTACT = "#8a8a8a", "#f0b400"
 # rounding of the product of two unit vectors: a side seen from its edge is not drawn
 _EDGE_ON = 16.0 * np.finfo(np.float64).eps
@@ -39,11 +37,10 @@ _AMBIENT = 0.65
 _PALE, _PALE_BODY = 0.12, 0.45
 #: gap between bodies drawn apart, as a part of the smaller one's height
 _APART = 0.5
-#: what is shown around a contact, as a part of its size: of meshes, of a pressure
-_AROUND, _AROUND_PRESSURE = 0.25, 0.75
-#: azimuth and elevation of the viewer in degrees: of modes, of meshes and near a contact, and that
-#: with which the page's script begins, where the quarter of a model shows its contact to the corner
-_VIEW, _MESH_VIEW, _STEEP, _PAGE_VIEW = (-60.0, 20.0), (-60.0, 22.0), 38.0, (-118.0, 25.0)
+#: what is shown around a contact, as a part of its size
+_AROUND = 0.25
+#: azimuth and elevation of the viewer in degrees: of modes, of meshes and near a contact
+_VIEW, _MESH_VIEW, _STEEP = (-60.0, 20.0), (-60.0, 22.0), 38.0
 #: width in points and opacity of the lines of the mesh: of whole bodies, and near a contact
 _FAR_LINES, _NEAR_LINES = (0.15, 0.45), (0.35, 0.8)
 
@@ -205,79 +202,6 @@ def _draw_sides(
 def _shade(k: int) -> tuple[float, float, float]:
     r, g, b = (_PALE_BODY + (1.0 - _PALE_BODY) * c for c in to_rgb(COLOURS[k % len(COLOURS)]))
     return r, g, b
-
-
-# ---------------------------------------------------------------- surfaces for pages without script
-
-
-def picture(surface: Surface) -> bytes:
-    """The first field on the bodies drawn apart, as PNG; of a pressure only what lies near it."""
-    shown = _near_contact(surface)
-    first = shown.fields[0] if shown.fields else None
-    shift, axes = offsets(shown), _view_axes(*_PAGE_VIEW)
-    begin = np.cumsum([0, *(len(body.points) for body in shown.bodies)])
-    points = np.vstack([_moved(shown, first, k) + shift[k] for k in range(len(shown.bodies))])
-    colours = np.vstack([_colours(body, first, k) for k, body in enumerate(shown.bodies)])
-    sides = np.vstack(
-        [b.triangles[:, [0, 1, 2, 2]] + n for b, n in zip(shown.bodies, begin, strict=False)]
-    )
-
-    def draw(ax: Axes) -> None:
-        faces = _shaded_sides(points, sides, colours, axes)
-        faces.set_edgecolor("face")
-        ax.add_collection(faces)
-        title = first.label if first else surface.label
-        _frame_axes(ax, (points @ axes[:2].T)[np.unique(sides)], 0.0, title)
-        if first is not None:
-            scale = ScalarMappable(Normalize(0.0, first.top), "viridis")
-            label = f"{first.quantity}, {first.unit or 'of the largest'}"
-            ax.figure.colorbar(scale, ax=ax, label=label, shrink=0.7)
-
-    return png(draw_sheet([draw], 1, (6.4, 4.8), 110))
-
-
-def _near_contact(surface: Surface) -> Surface:
-    """The faces near the pressure of the first field.
-
-    The whole surface when that is no pressure.
-    """
-    first = surface.fields[0] if surface.fields else None
-    if first is None or first.quantity != "pressure":
-        return surface
-    pressed = zip(surface.bodies, first.values, strict=True)
-    points = np.vstack([body.points[np.nan_to_num(v) > 0.0] for body, v in pressed])
-    if len(points) == 0:
-        return surface
-    low, high = points.min(axis=0), points.max(axis=0)
-    around = _AROUND_PRESSURE * float((high - low).max())
-    bodies = tuple(_cut(b, low - around, high + around) for b in surface.bodies)
-    # No whole face lies about a contact of one node.
-    return replace(surface, bodies=bodies) if any(b.triangles.size for b in bodies) else surface
-
-
-def _cut(body: SurfaceBody, low: FloatArray, high: FloatArray) -> SurfaceBody:
-    inside = np.logical_and(body.points >= low, body.points <= high)
-    within: NDArray[np.bool_] = np.all(inside, axis=1)
-    return replace(body, triangles=body.triangles[np.all(within[body.triangles], axis=1)])
-
-
-def _moved(surface: Surface, first: Field | None, k: int) -> FloatArray:
-    """Points of a body: deformed where the displacement itself is shown."""
-    points = surface.bodies[k].points
-    if first is None or first.motion is None or first.quantity == "pressure":
-        return points
-    moved: FloatArray = points + SCALE * surface.size * first.motion[k]
-    return moved
-
-
-def _colours(body: SurfaceBody, first: Field | None, k: int) -> FloatArray:
-    """Colour of every face, (n, 3); grey where there is no field or no pressure."""
-    grey = np.tile(_BARE, (len(body.triangles), 1))
-    if first is None or np.isnan(first.values[k]).all():
-        return grey
-    level = np.nan_to_num(first.values[k])[body.triangles].mean(axis=1) / first.top
-    coloured = np.asarray(colormaps["viridis"](np.clip(level, 0.0, 1.0)))[:, :3]
-    return np.where((level > 0.0)[:, None] | (first.quantity != "pressure"), coloured, grey)
 
 
 # ---------------------------------------------------------------- the painter

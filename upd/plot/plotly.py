@@ -15,27 +15,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Mark, Pies, Scatter, Trace
+from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Mark, Scatter, Trace
 from upd.plot.style import (
     CROSS,
-    SHARE_COLOURS,
     area_colour,
     band_colour,
     colour_of,
     colour_range,
     coordinates,
-    even_levels,
     is_log,
     labelled,
     legend_names,
-    log_ticks,
-    log_view,
     marker_area,
     proportion,
-    sector,
     sides,
     state_colours,
-    tick_text,
     with_room,
 )
 
@@ -53,8 +47,6 @@ _GRID = "#e6e6e6"
 _LINE = 42
 #: width over height of a chart
 _WIDE = 1.5
-#: part of an axis beyond the data, as plotly leaves it
-_AIR = 0.05
 
 
 def figure(chart: Chart) -> dict[str, Any]:
@@ -82,7 +74,7 @@ def figure(chart: Chart) -> dict[str, Any]:
         "yaxis": _axis(chart, chart.y, coordinates(chart, "y"), _LINE),
         "hovermode": "closest",
         "showlegend": any(trace["showlegend"] for trace in data),
-        "shapes": _shapes(chart),
+        "shapes": [shape for band in chart.bands for shape in _band(band)],
     }
     if chart.equal:
         layout["yaxis"] |= {"scaleanchor": "x", "scaleratio": 1, "constrain": "domain"}
@@ -105,8 +97,6 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
     log = is_log(axis, values)
     if log:
         out["type"] = "log"
-        ticks = log_ticks(log_view(axis, values))
-        out |= {"tickmode": "array", "tickvals": ticks, "ticktext": [tick_text(t) for t in ticks]}
     if axis.ticks:
         at = {
             "tickmode": "array",
@@ -116,7 +106,7 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
         # The last word may reach beyond the axis.
         out |= at | {"ticklabeloverflow": "allow"}
     if axis.low is not None or axis.high is not None:
-        out["range"] = _range(axis, values, log)
+        out["range"] = _range(axis, log)
     return out | {
         "linecolor": "#999999",
         "ticks": "outside",
@@ -127,20 +117,12 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
     }
 
 
-def _range(axis: Axis, values: Array, log: bool) -> list[float]:
-    """Ends of an axis as plotly takes them: logarithms on a logarithmic one.
-
-    Those of the data with some air where none is given, for plotly does not keep one that is alone.
-    """
-    seen = np.log10(values[values > 0.0]) if log else values
-    given = [
+def _range(axis: Axis, log: bool) -> list[float | None]:
+    """Ends of an axis as plotly takes them: logarithms on a logarithmic one, None at the data."""
+    return [
         None if end is None or (log and end <= 0.0) else math.log10(end) if log else end
         for end in (axis.low, axis.high)
     ]
-    data = (float(seen.min()), float(seen.max())) if seen.size else (0.0, 1.0)
-    low, high = (d if end is None else end for end, d in zip(given, data, strict=True))
-    air = _AIR * (high - low)
-    return [low - air * (given[0] is None), high + air * (given[1] is None)]
 
 
 def pack(values: NDArray[Any]) -> dict[str, str]:
@@ -194,19 +176,11 @@ def _traces(chart: Chart) -> Iterator[dict[str, Any]]:
         yield from _area(chart, area)
     for trace in chart.traces:
         yield _curve(chart, trace)
-    for pies in chart.pies:
-        yield from _pies(chart, pies)
     for k, points in enumerate(chart.scatters):
         yield _coloured(chart, points, first=k == 0)
     yield from _marks(chart)
     for band in chart.bands:
         yield _band_entry(band)
-
-
-def _shapes(chart: Chart) -> list[dict[str, Any]]:
-    """What is drawn beside the traces: bands, and the sectors of pies."""
-    bands = [shape for band in chart.bands for shape in _band(band)]
-    return bands + [shape for pies in chart.pies for shape in _sectors(pies)]
 
 
 def _curve(chart: Chart, t: Trace) -> dict[str, Any]:
@@ -305,47 +279,6 @@ def _area(chart: Chart, a: Area) -> Iterator[dict[str, Any]]:
     )
 
 
-def _pies(chart: Chart, p: Pies) -> Iterator[dict[str, Any]]:
-    """Unseen markers with the shares at the pointer below the sectors; an entry per state."""
-    shares = [
-        "<br>".join(f"{escape(s)}: {100.0 * v:.3g} %" for s, v in zip(p.states, row, strict=True))
-        for row in p.shares
-    ]
-    size = f"{_template(p.what)}: %{{marker.color:.3g}} of the largest"
-    lines = ("%{customdata}", size) if p.what else ("%{customdata}",)
-    # The colour carries the size to the pointer.
-    marker = {"size": _numbers(_diameter(p.size)), "color": _numbers(p.size), "opacity": 0}
-    template = _hover(chart, *lines)
-    yield _scatter(p.x, p.y, "markers", customdata=shares, marker=marker, hovertemplate=template)
-    for state in p.states:
-        look = {"size": 10, "color": SHARE_COLOURS.get(state)}
-        yield _scatter([np.nan], [np.nan], "markers", name=escape(state), marker=look)
-
-
-def _diameter(size: Array, part: float = 1.0) -> Array:
-    """Pixels of markers of a size."""
-    return np.asarray(_PIXELS * np.sqrt(part * marker_area(size)))
-
-
-def _sectors(p: Pies) -> Iterator[dict[str, Any]]:
-    """Shapes in pixels about the points, so that they stay round on any axes."""
-    ends = np.cumsum(p.shares, axis=1)
-    for k, diameter in enumerate(_diameter(p.size)):
-        for state, share, end in zip(p.states, p.shares[k], ends[k], strict=True):
-            if share > 0.0:
-                corners = diameter * sector(float(end - share), float(end))
-                yield {
-                    "type": "path",
-                    "path": "M" + "L".join(f"{x:.2f},{y:.2f}" for x, y in corners) + "Z",
-                    "xsizemode": "pixel",
-                    "ysizemode": "pixel",
-                    "xanchor": float(p.x[k]),
-                    "yanchor": float(p.y[k]),
-                    "fillcolor": SHARE_COLOURS.get(state),
-                    "line": {"width": 0},
-                }
-
-
 def _scale(axis: Axis, low: float, high: float) -> dict[str, Any]:
     """Colours of values; a horizontal bar under the drawing leaves a phone its width."""
     title = {"text": escape(axis.label), "side": "bottom"}
@@ -360,7 +293,7 @@ def _scale(axis: Axis, low: float, high: float) -> dict[str, Any]:
 def _coloured(chart: Chart, s: Scatter, *, first: bool) -> dict[str, Any]:
     """Coloured points; the first of a chart have the colour bar that all share."""
     marker = _scale(s.axis, *colour_range(chart.scatters)) | {
-        "size": _numbers(_diameter(s.size, 0.7)),
+        "size": _numbers(_PIXELS * np.sqrt(0.7 * marker_area(s.size))),
         "color": _numbers(s.value),
         "opacity": 1,
         "line": {"color": "#ffffff", "width": 0.5},
@@ -384,16 +317,8 @@ def _map(chart: Chart, m: Map, low: float, high: float) -> dict[str, Any]:
     whole = bool(np.isfinite(m.z).all()) and min(m.z.shape) > 1
     if not (m.contours and whole and low < high):
         return out | ({"zsmooth": "best"} if m.smooth and whole else {})
-    levels = even_levels(low, high)
-    steps = {"start": levels[0], "end": levels[-1], "size": levels[1] - levels[0]}
-    # The colours of matplotlib's levels: each that of its middle.
-    return out | {
-        "type": "contour",
-        "zmin": levels[0],
-        "zmax": levels[-1],
-        "contours": steps | {"coloring": "fill"},
-        "line": {"width": 0, "smoothing": 0},
-    }
+    look = {"contours": {"coloring": "fill"}, "line": {"width": 0, "smoothing": 0}}
+    return out | look | {"type": "contour", "ncontours": 12}
 
 
 def _points(m: Map) -> Iterator[dict[str, Any]]:

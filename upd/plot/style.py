@@ -5,7 +5,6 @@ Colours, ends of scales, ticks, entries of legends.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Literal
@@ -23,14 +22,8 @@ STATE_COLOURS = ("#f4f4f4", "#f0a35e", "#2b6cb0", "#8cc3a8", "#c9a0bd", "#c0695f
 SHARE_COLOURS = {"stick": "#2b6cb0", "slip": "#f0a35e", "lift-off": "#b9b9b9", "open": "#f4f4f4"}
 OUTLINE, CLOSED, CROSS = "#222222", "#555555", "#c0392b"
 MEASURED, LIMIT = "#d98200", "#333333"
-#: up to here a logarithmic axis has ticks between its decades
-_FEW_DECADES = 3
-#: decades with a tick each; of more not every one has a tick
-_MOST_DECADES = 8
 #: width over height from which the colour bar of a map lies below it
 _WIDE_MAP = 1.6
-#: largest over smallest value up to which a logarithmic axis has even steps
-_NARROW = 1.5
 #: area of a marker in square points: of the size 0, and what the size 1 adds. Few points have room
 #: for larger ones
 _SMALL, _LARGE, _FEW_POINTS = (40.0, 220.0), (110.0, 600.0), 40
@@ -82,9 +75,7 @@ def plain(text: str) -> str:
 def coordinates(chart: Chart, name: Literal["x", "y"]) -> Array:
     """All finite positions of a chart along one axis, (n,)."""
     parts = [
-        getattr(part, name)
-        for kind in (chart.traces, chart.pies, chart.scatters, chart.maps)
-        for part in kind
+        getattr(part, name) for kind in (chart.traces, chart.scatters, chart.maps) for part in kind
     ]
     parts += [np.array([getattr(mark, name) for mark in chart.marks])]
     parts += [np.array([band.low, band.high]) for band in chart.bands if band.axis == name]
@@ -113,63 +104,6 @@ def is_log(axis: Axis, values: Array) -> bool:
     return axis.log and bool((values > 0.0).any())
 
 
-def log_view(axis: Axis, values: Array) -> Array:
-    """The values (n,) and the ends that a logarithmic axis is given: what its ticks are for.
-
-    Parameters
-    ----------
-    values
-        (n,) of the data.
-    """
-    return np.append(values, [end for end in (axis.low, axis.high) if end is not None])
-
-
-def log_ticks(values: Array) -> list[float]:
-    """Ticks of a logarithmic axis.
-
-    Decades, numbers between them where there are few, even steps where there is not even one.
-
-    They reach a decade beyond the values (n,), for a view is wider than its data.
-    """
-    found = values[np.isfinite(values) & (values > 0.0)]
-    if found.size == 0:
-        return []
-    least, most = float(found.min()), float(found.max())
-    if least < most < _NARROW * least:
-        return _even_ticks(least, most)
-    low, high = math.floor(math.log10(least)), math.ceil(math.log10(most))
-    between: tuple[float, ...] = (1.0, 2.0, 5.0) if high - low <= _FEW_DECADES else (1.0,)
-    if most < 10.0 * least:
-        between = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)
-    step = math.ceil((high - low) / _MOST_DECADES)
-    return [float(f"{m}e{k}") for k in range(low - 1, high + 2, step) for m in between]
-
-
-def _even_ticks(low: float, high: float) -> list[float]:
-    """About five even steps; one step more on both sides."""
-    return [
-        tick
-        for tick in even_levels(low - (high - low) / 5.0, high + (high - low) / 5.0, 7)
-        if tick > 0.0
-    ]
-
-
-def even_levels(low: float, high: float, most: int = 12) -> list[float]:
-    """Multiples of one step, which is 1, 2, 2.5 or 5 units, from ``low`` or just below to ``high``
-    or just above: ``most`` steps within.
-    """
-    # matplotlib is slow to import
-    from matplotlib.ticker import MaxNLocator
-
-    ticks = MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
-    return [float(f"{tick:.12g}") for tick in ticks]
-
-
-def tick_text(value: float) -> str:
-    """A tick of a logarithmic axis in figures."""
-    return f"{value:.12g}" if 1e-3 <= value < 1e5 else f"{value:.4g}"
-
-
 def colour_range(parts: Iterable[Map | Scatter]) -> tuple[float, float]:
     """Ends of the colour scale that all maps, or all scattered points, of a chart share.
 
@@ -195,15 +129,6 @@ def marker_area(size: Array) -> Array:
     return np.asarray(least + more * np.clip(size, 0.0, 1.0))
 
 
-def sector(begin: float, end: float) -> Array:
-    """Outline (n, 2) of a sector of a disc of the diameter 1, from the top clockwise; ``begin`` and
-    ``end`` as parts of the whole.
-    """
-    angle = 2.0 * np.pi * (0.25 - np.linspace(begin, end, 25))
-    rim = 0.5 * np.column_stack([np.cos(angle), np.sin(angle)])
-    return rim if end - begin >= 1.0 else np.vstack([[0.0, 0.0], rim])
-
-
 def legend_names(chart: Chart) -> list[str]:
     """Entries of the legend, each once.
 
@@ -212,7 +137,6 @@ def legend_names(chart: Chart) -> list[str]:
     names = [t.entry or t.label for t in chart.traces] + [
         part.label for kind in (chart.areas, chart.bands) for part in kind
     ]
-    names += [state for pies in chart.pies for state in pies.states]
     found = [name for name in dict.fromkeys(names) if name]
     shown = " ".join((chart.title, chart.case, chart.y.name)).casefold()
     return [] if len(found) == 1 and found[0].casefold() in shown else found

@@ -7,15 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from upd.labels import unit_label
-from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Trace
-from upd.plot.matplotlib import MOST_PANELS
+from upd.plot.chart import MOST_PANELS, Area, Array, Axis, Band, Chart, Map, Trace
+from upd.results import InputPart
 from upd.results.quantities import number_label, number_title
 from upd.results.sampled import SampledNumber
+from upd.units import number_and_unit
 
 #: curves in one chart beside a map: of more one loses track; and at most
 _CURVES, _MOST = 8, 24
@@ -26,58 +28,103 @@ FIGURE, SAMPLE_FIGURE = FIGURES = ("sweep", "sample")
 _SAME = 1e-9
 
 
-class Varied(Protocol):
-    """A parameter of the grid.
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a sweep and its values.
 
-    Path in the scene, unit, its values, and as numbers (None when they are words).
+    Attributes
+    ----------
+    path
+        In the scene.
+    values
+        As the scene takes them.
+    wrapped
+        The scene's entry is a list; a value stands there alone in it.
     """
 
-    @property
-    def path(self) -> str: ...
+    path: str
+    values: tuple[Any, ...]
+    wrapped: bool = False
+
+    @cached_property
+    def _parsed(self) -> tuple[tuple[float, ...] | None, str]:
+        found = [one for v in self.values if (one := number_and_unit(str(v))) is not None]
+        units = {unit for _, unit in found}
+        if len(found) < len(self.values) or len(units) != 1:
+            return None, ""
+        return tuple(number for number, _ in found), units.pop()
 
     @property
-    def unit(self) -> str: ...
+    def numbers(self) -> tuple[float, ...] | None:
+        """The values in their common unit; None when they are words."""
+        return self._parsed[0]
 
     @property
-    def values(self) -> tuple[Any, ...]: ...
+    def unit(self) -> str:
+        """Of the numbers; "" of counts, ratios and words."""
+        return self._parsed[1]
 
     @property
-    def numbers(self) -> tuple[float, ...] | None: ...
-
-
-class FollowedNumber(Protocol):
-    """A number followed over the grid.
-
-    Name, case, unit and values (n_point,), nan where there is none.
-    """
+    def short(self) -> str:
+        """Last word of the path."""
+        return self.path.rpartition(".")[2].replace("_", " ")
 
     @property
-    def name(self) -> str: ...
+    def header(self) -> str:
+        """Path with the unit."""
+        return f"{self.path} [{self.unit}]" if self.unit else self.path
 
     @property
-    def case(self) -> str: ...
+    def column(self) -> tuple[float, ...] | tuple[str, ...]:
+        """The values for tables: numbers, or words."""
+        return tuple(map(str, self.values)) if self.numbers is None else self.numbers
 
-    @property
-    def unit(self) -> str: ...
+    def shown(self, k: int) -> str:
+        """Value `k` without the unit."""
+        return str(self.values[k]) if self.numbers is None else f"{self.numbers[k]:.6g}"
 
-    @property
-    def values(self) -> Array: ...
+    def with_unit(self, k: int) -> str:
+        """Value `k` with the unit, after the last word of the path."""
+        return f"{self.short} {self.shown(k)} {unit_label(self.unit)}".rstrip()
+
+    def setting(self, k: int) -> Any:
+        """What the scene is given for value `k`."""
+        return [self.values[k]] if self.wrapped else self.values[k]
 
 
 @dataclass(frozen=True)
-class Followed:
-    """A followed number as data.
+class Column:
+    """One followed number over all points, the last parameter of a grid fastest.
 
-    Name, case, unit and values (n_point,), the last parameter of the grid fastest.
+    Attributes
+    ----------
+    values
+        (n,), NaN where there is none.
+    missing
+        Why there is none; "" where there is one or the point failed.
+    inputs
+        What inputs known within limits do to it, by the first point that knows any.
     """
 
     name: str
     case: str
     unit: str
     values: Array
+    missing: tuple[str, ...] = ()
+    inputs: tuple[InputPart, ...] = ()
+
+    @property
+    def title(self) -> str:
+        """Name, and the case when there is one."""
+        return f"{self.name} ({self.case})" if self.case else self.name
+
+    @property
+    def header(self) -> str:
+        """Title with the unit."""
+        return f"{self.title} [{self.unit}]" if self.unit else self.title
 
 
-def sweep_charts(parameters: Sequence[Varied], numbers: Sequence[FollowedNumber]) -> list[Chart]:
+def sweep_charts(parameters: Sequence[Parameter], numbers: Sequence[Column]) -> list[Chart]:
     """Charts of all followed numbers over what varies.
 
     Returns
@@ -117,14 +164,14 @@ def is_constant(values: Array) -> bool:
     return not known.size or float(np.ptp(known)) <= _SAME * float(np.abs(known).max())
 
 
-def _chart(number: FollowedNumber, x: Axis, y: Axis, **more: Any) -> Chart:
+def _chart(number: Column, x: Axis, y: Axis, **more: Any) -> Chart:
     """A chart of a number on the sheet of the sweep."""
     shared: dict[str, Any] = {"case": number.case, "figure": FIGURE, "size": _SIZE}
     return Chart(number_label(number.name), x, y, **shared, **more)
 
 
 def _curves(
-    x: Varied, others: Sequence[Varied], number: FollowedNumber, values: Array, *, sheet: bool
+    x: Parameter, others: Sequence[Parameter], number: Column, values: Array, *, sheet: bool
 ) -> Chart:
     """Values over one parameter, one curve per combination of the ``others``."""
     along = (
@@ -138,7 +185,7 @@ def _curves(
         slice(solved[0], solved[-1] + 1) if x.numbers is not None and solved.size else slice(None)
     )
     labels = [
-        ", ".join(f"{short(p)} {_value(p, k)}" for p, k in zip(others, places, strict=True))
+        ", ".join(p.with_unit(k) for p, k in zip(others, places, strict=True))
         or number_title(number.name, number.case)
         for places in np.ndindex(*(len(p.values) for p in others))
     ]
@@ -151,10 +198,10 @@ def _curves(
     y_axis = Axis(number_label(number.name), unit_label(number.unit))
     chart = _chart(number, _abscissa(x), y_axis, traces=traces, sheet=sheet)
     # The map of the same number has the title itself.
-    return chart if sheet else replace(chart, title=f"{chart.title} over {short(x)}")
+    return chart if sheet else replace(chart, title=f"{chart.title} over {x.short}")
 
 
-def _map(x: Varied, y: Varied, number: FollowedNumber, values: Array) -> Chart:
+def _map(x: Parameter, y: Parameter, number: Column, values: Array) -> Chart:
     """Filled map over two parameters: values (n_x, n_y)."""
     X, Y = np.array(x.numbers, float), np.array(y.numbers, float)
     i, j = np.argsort(X, kind="stable"), np.argsort(Y, kind="stable")
@@ -171,23 +218,11 @@ def _map(x: Varied, y: Varied, number: FollowedNumber, values: Array) -> Chart:
     return replace(chart, case=", ".join(filter(None, (chart.case, everywhere))))
 
 
-def short(parameter: Varied) -> str:
-    """Last word of a parameter's path."""
-    return parameter.path.rpartition(".")[2].replace("_", " ")
-
-
-def _value(parameter: Varied, k: int) -> str:
-    """A value in figures with its unit, or the word."""
-    if parameter.numbers is None:
-        return str(parameter.values[k])
-    return f"{parameter.numbers[k]:.6g} {unit_label(parameter.unit)}".rstrip()
-
-
-def _abscissa(parameter: Varied) -> Axis:
+def _abscissa(parameter: Parameter) -> Axis:
     if parameter.numbers is not None:
-        return Axis(short(parameter), unit_label(parameter.unit))
+        return Axis(parameter.short, unit_label(parameter.unit))
     return Axis(
-        short(parameter),
+        parameter.short,
         low=-0.5,
         high=len(parameter.values) - 0.5,
         ticks=tuple(enumerate(map(str, parameter.values))),

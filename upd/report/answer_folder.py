@@ -17,7 +17,6 @@ from upd.cache.files import whole_files
 from upd.cache.sources import versions
 from upd.errors import InputError, one_line
 from upd.plot.chart import Chart
-from upd.plot.matplotlib import chart_png, draw_all, write_sheet
 from upd.report.columns import SHORT, whole_table
 from upd.report.page import Section, Verdict, image_uri, make_panels, page_text, versions_text
 from upd.results.answer_table import AnswerTable
@@ -147,6 +146,9 @@ class FigureAnswer(ABC):
         InputError
             When it cannot be written.
         """
+        # matplotlib is slow to import
+        from upd.plot.matplotlib import write_sheet
+
         charts, folder = self.charts, Path(out)
         summary = json.dumps(self.as_dict(), indent=1, allow_nan=False) + "\n"
         files = {"summary.json": summary, "report.html": self.page(charts)}
@@ -166,6 +168,8 @@ class FigureAnswer(ABC):
 
     def plot(self) -> list[Any]:
         """Draw the charts of its figure with matplotlib, and return the axes."""
+        from upd.plot.matplotlib import draw_all
+
         return draw_all(self.charts)
 
     def table(self) -> str:
@@ -184,5 +188,7 @@ class FigureAnswer(ABC):
 
     def _repr_html_(self) -> str:
         """As a notebook shows it: its text and its figure."""
+        from upd.plot.matplotlib import chart_png
+
         uri = image_uri(chart_png(self.charts))
         return f'<pre>{escape(self.table())}</pre><img src="{uri}">'

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 
@@ -24,37 +24,17 @@ _WORDS = 20
 
 
 @dataclass(frozen=True)
-class TextColumn:
-    """A column.
-
-    Attributes
-    ----------
-    head
-        Its head; may have several lines.
-    cells
-        One per row; may have several lines.
-    right
-        Flush right, as numbers are.
-    rank
-        The column of the highest rank is omitted first; one of rank 0 stays.
-    folds
-        Characters to which words may be folded; 0 for numbers, which stay whole.
-    """
+class _Column:
+    """A column: its head and its cells, all of one or more lines; numbers are flush right."""
 
     head: str
     cells: tuple[str, ...]
     right: bool = False
-    rank: int = 0
-    folds: int = 0
 
     @property
     def width(self) -> int:
         """Characters of the longest line."""
         return max(len(line) for text in (self.head, *self.cells) for line in text.split("\n"))
-
-    def line(self, text: str) -> str:
-        """A cell of the column, filled up."""
-        return text.rjust(self.width) if self.right else text.ljust(self.width)
 
 
 def text_width() -> int:
@@ -62,49 +42,6 @@ def text_width() -> int:
     a table needs.
     """
     return max(_LEAST_WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
-
-
-def fitted(
-    columns: Iterable[TextColumn], width: int, *, gap: int = GAP
-) -> tuple[list[TextColumn], list[TextColumn]]:
-    """The columns that fit into the width, and those left out.
-
-    A column that is empty in every row is neither.
-    """
-    kept = [column for column in columns if not column.rank or any(column.cells)]
-    left_out: list[TextColumn] = []
-    while sum(_least(c) for c in kept) + gap * (len(kept) - 1) > width:
-        worst = max(kept, key=lambda column: column.rank)
-        if not worst.rank:
-            break
-        kept.remove(worst)
-        left_out.insert(0, worst)
-    return kept, left_out
-
-
-def _least(column: TextColumn) -> int:
-    """Characters a column needs."""
-    return min(column.width, column.folds) if column.folds else column.width
-
-
-def text_lines(columns: Sequence[TextColumn]) -> tuple[list[str], list[str]]:
-    """Lines of the heads, and of each row."""
-    heads = [column.head.split("\n") for column in columns]
-    most = max(map(len, heads))
-    tops = [["", *[""] * (most - 1 - len(head)), *head][-most:] for head in heads]
-    rows = zip(*(column.cells for column in columns), strict=True)
-    return (
-        [_joined(columns, line) for line in zip(*tops, strict=True)],
-        [
-            "\n".join(_joined(columns, line) for line in zip_longest(*lines, fillvalue=""))
-            for lines in ([cell.split("\n") for cell in row] for row in rows)
-        ],
-    )
-
-
-def _joined(columns: Sequence[TextColumn], texts: Iterable[str]) -> str:
-    cells = (column.line(text) for column, text in zip(columns, texts, strict=True))
-    return (" " * GAP).join(cells).rstrip()
 
 
 def folded_head(words: str, least: int = 8) -> str:
@@ -115,26 +52,28 @@ def folded_head(words: str, least: int = 8) -> str:
     return "\n".join(lines)
 
 
+def fitting(table: AnswerTable, width: int) -> AnswerTable:
+    """The table without the last columns that ``width`` has no room for; the first two stay."""
+    columns = _columns(table)
+    while len(columns) > 2 and _wide(columns) > width:
+        columns.pop()
+    n = len(columns)
+    return replace(table, columns=table.columns[:n], rows=tuple(row[:n] for row in table.rows))
+
+
 def whole_table(table: AnswerTable, width: int, *, cut: bool = False) -> list[str]:
     """Lines of a table with all its columns, at most ``width`` characters each.
 
     Words are folded where that is enough; else the columns that find no room stand below, beside
     the first ones again, or, where the table may be ``cut``, its last ones are left out.
     """
-    columns = [
-        TextColumn(
-            folded_head(head.lstrip("# "), max(map(len, cells))), cells, right=head.startswith("#")
-        )
-        for head, cells in zip(table.columns, zip(*table.rows, strict=True), strict=True)
-    ]
-    while cut and len(columns) > 2 and _wide(columns) > width:
-        columns.pop()
+    columns = _columns(fitting(table, width) if cut else table)
     whole = _folded(columns, width)
     if _wide(whole) <= width:
         return _lines(whole)
     # the words before the first numbers tell what a row is of
     first = next((k for k, column in enumerate(columns) if k and column.right), 1)
-    groups: list[list[TextColumn]] = []
+    groups: list[list[_Column]] = []
     for column in columns[first:]:
         if column.head == "±" and groups:
             groups[-1].append(column)
@@ -148,11 +87,18 @@ def whole_table(table: AnswerTable, width: int, *, cut: bool = False) -> list[st
     return [line for block in blocks for line in _lines(_folded(block, width))]
 
 
-def _wide(columns: Sequence[TextColumn]) -> int:
+def _columns(table: AnswerTable) -> list[_Column]:
+    return [
+        _Column(folded_head(head.lstrip("# "), max(map(len, cells))), cells, head.startswith("#"))
+        for head, cells in zip(table.columns, zip(*table.rows, strict=True), strict=True)
+    ]
+
+
+def _wide(columns: Sequence[_Column]) -> int:
     return sum(column.width for column in columns) + GAP * (len(columns) - 1)
 
 
-def _folded(columns: Sequence[TextColumn], width: int) -> list[TextColumn]:
+def _folded(columns: Sequence[_Column], width: int) -> list[_Column]:
     """The columns with the words of the widest, one after the other, folded as far as they can be
     read.
     """
@@ -167,6 +113,18 @@ def _folded(columns: Sequence[TextColumn], width: int) -> list[TextColumn]:
     return out
 
 
-def _lines(columns: Sequence[TextColumn]) -> list[str]:
-    heads, rows = text_lines(columns)
-    return [line for row in (*heads, *rows) for line in row.split("\n")]
+def _lines(columns: Sequence[_Column]) -> list[str]:
+    """Heads, which end on one line, and rows, whose cells begin on one."""
+    heads = [column.head.split("\n") for column in columns]
+    most = max(map(len, heads))
+    lines = list(zip(*([""] * (most - len(head)) + head for head in heads), strict=True))
+    for row in zip(*(column.cells for column in columns), strict=True):
+        lines += zip_longest(*(cell.split("\n") for cell in row), fillvalue="")
+    aligned = (
+        [
+            text.rjust(column.width) if column.right else text.ljust(column.width)
+            for column, text in zip(columns, line, strict=True)
+        ]
+        for line in lines
+    )
+    return [(" " * GAP).join(cells).rstrip() for cells in aligned]

@@ -87,7 +87,6 @@ def comparison_sections(runs: Sequence[RunFolder], names: Sequence[str]) -> list
             kind="grid",
         ),
         Section("Figures", panels=make_panels(charts, {}), texts=[about]),
-        Section("Cost", [_costs([run.summary["cost"] for run in runs], names)], kind="grid"),
         Section("All other numbers", [others], kind="grid"),
         *(
             Section(f"Scene file of {name}", file=run.scene)
@@ -121,6 +120,7 @@ def _runs_table(runs: Sequence[RunFolder], names: Sequence[str]) -> AnswerTable:
         "scene": [run.summary["title"] or run.summary["scene"] for run in runs],
         "verdict": [f"{mark.word}. {mark.text}" for mark in verdicts],
         "# degrees of freedom": [str(size) for size in sizes],
+        "# seconds": [f"{run.summary['cost']['total_s']:.1f}" for run in runs],
     }
     return filled("Runs", columns)
 
@@ -179,13 +179,14 @@ def _spread(rows: Sequence[Entry | None]) -> float | None:
 def overlaid(runs: Sequence[Sequence[Chart]], names: Sequence[str]) -> list[Chart]:
     """The same chart of every run in one, a colour per run.
 
-    Maps and pies, which cannot lie on each other, become cases of one place.
+    Maps, which cannot lie on each other, become cases of one place.
     """
     charts = [(k, chart) for k, mine in enumerate(runs) for chart in mine]
     out: list[Chart] = []
     for key in dict.fromkeys((c.title, c.case) for _, c in charts):
         mine = [(k, c) for k, c in charts if (c.title, c.case) == key]
-        if any(_fills(c) for _, c in mine):
+        # another cannot lie on what fills its place
+        if any(c.maps or c.scatters or any(area.state for area in c.areas) for _, c in mine):
             out += [
                 replace(c, title=f"{c.title}: {names[k]}", heading=c.title, figure=c.title)
                 for k, c in _alike(mine)
@@ -193,13 +194,6 @@ def overlaid(runs: Sequence[Sequence[Chart]], names: Sequence[str]) -> list[Char
         else:
             out.append(_together(mine, names))
     return out
-
-
-def _fills(chart: Chart) -> bool:
-    """Whether a chart fills its place, so that another cannot lie on it."""
-    return bool(
-        chart.maps or chart.pies or chart.scatters or any(area.state for area in chart.areas)
-    )
 
 
 def _alike(mine: Sequence[tuple[int, Chart]]) -> Iterator[tuple[int, Chart]]:
@@ -256,17 +250,6 @@ def _axis(axes: Sequence[Axis]) -> Axis:
         max(highs) if len(highs) == len(axes) else None,
     )
     return replace(axes[0], low=low, high=high)
-
-
-def _costs(tables: Sequence[Mapping[str, Any]], names: Sequence[str]) -> AnswerTable:
-    """Seconds of every stage, per run."""
-    stages: list[Mapping[str, float]] = [table.get("stages", {}) for table in tables]
-    keys = list(dict.fromkeys(name for table in stages for name in table))
-    columns = {"stage": keys} | {
-        f"# {name}": [f"{table[key]:.2f} s" if key in table else "" for key in keys]
-        for name, table in zip(names, stages, strict=True)
-    }
-    return filled("Cost", columns)
 
 
 def differences(scenes: Sequence[Mapping[str, Any]]) -> tuple[tuple[str, ...], ...]:

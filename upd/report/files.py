@@ -15,40 +15,11 @@ from upd.cache.files import whole_file
 from upd.errors import UpdError
 from upd.labels import file_name
 from upd.mesh import recipes
-from upd.plot.matplotlib import write_sheets
 from upd.report.notebook import RunResult, charts
 from upd.results import Arrays, Group, Variable
 
 log = logging.getLogger(__name__)
 
-#: names of the figures a run may leave, without their ending
-FIGURES = (
-    "pressure",
-    "pressure_sections",
-    "force_approach",
-    "over_load",
-    "stick_slip",
-    "traction",
-    "hysteresis",
-    "contact_open",
-    "surface",
-    "force_displacement",
-    "contact_law",
-    "response",
-    "response_harmonics",
-    "damping",
-    "contact_state",
-    "contact_map",
-    "damper_motion",
-    "damper_period",
-    "seating",
-    "performance",
-    "nonlinear_modes",
-    "modes_free",
-    "modes_glued",
-    "dimensions",
-    "error_budget",
-)
 #: folder of the files in a run folder
 FOLDER = "curves"
 #: dimension of a pair of real and imaginary part
@@ -68,6 +39,9 @@ def write_figures(result: RunResult, folder: Path) -> list[Path]:
 
     Figures that lie there already stay. Returns what was written.
     """
+    # matplotlib takes a while to import
+    from upd.plot.matplotlib import write_sheets
+
     written = write_sheets(charts(result), folder, keep=True)
     return written + write_dimensions(result, folder / "dimensions.png")
 
@@ -82,7 +56,7 @@ def write_dimensions(result: RunResult, path: Path) -> list[Path]:
         return []
     # matplotlib takes a while to import
     from upd.plot.drawing import draw_sections
-    from upd.plot.sheet import write_png
+    from upd.plot.matplotlib import write_png
 
     return write_png(draw_sections(meshes, views), path)
 

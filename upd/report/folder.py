@@ -12,11 +12,10 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from upd.cache.folders import plain_name
 from upd.errors import InputError
-from upd.report.files import FIGURES
 from upd.results import (
     Arrays,
     Case,
@@ -26,6 +25,35 @@ from upd.results import (
 _LOG_LINE = re.compile(r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$")
 _VERSIONS = "versions: "
 _PNG = b"\x89PNG\r\n\x1a\n"
+#: names of the figures a run may leave, without their ending
+FIGURES = (
+    "pressure",
+    "pressure_sections",
+    "force_approach",
+    "over_load",
+    "stick_slip",
+    "traction",
+    "hysteresis",
+    "contact_open",
+    "surface",
+    "force_displacement",
+    "contact_law",
+    "response",
+    "response_harmonics",
+    "damping",
+    "contact_state",
+    "contact_map",
+    "damper_motion",
+    "damper_period",
+    "seating",
+    "performance",
+    "nonlinear_modes",
+    "modes_free",
+    "modes_glued",
+    "dimensions",
+    "campbell",
+    "interference",
+)
 #: What a run may write, whatever its analysis; all that may be removed when a run replaces another.
 RUN_FILES = (
     "scene.toml",
@@ -44,6 +72,7 @@ RUN_FILES = (
 #: names that the operating system or a viewer leaves
 _NOBODYS = (".DS_Store", "Thumbs.db", "desktop.ini")
 Kind = Literal["run", "sweep"]
+Kept = TypeVar("Kept")
 #: kind of a folder -> what makes its files again
 _AGAIN: dict[Kind, str] = {
     "run": "run the scene again",
@@ -193,7 +222,7 @@ def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
 
 
 def _summary(folder: Path) -> dict[str, Any]:
-    return read_json(folder / "summary.json", Summary, "run")
+    return read_json(folder / "summary.json", Summary, "run")[0]
 
 
 def _text(path: Path, missing: list[str]) -> str:
@@ -289,7 +318,6 @@ class _NumberEntry:
     error: float | None = None
     thesis_error: float | None = None
     estimated_error: float | None = None
-    half_error_cost_s: float | None = None
     error_parts: list[_ErrorPartEntry] = field(default_factory=list)
     input_error: float | None = None
     input_parts: list[_InputPartEntry] = field(default_factory=list)
@@ -302,6 +330,7 @@ class _Size:
     n_dof: dict[str, int] = field(default_factory=dict)
     n_pairs: int | None = None
     analysis: str = ""
+    n_hex: dict[str, int] = field(default_factory=dict)
     mesh: dict[str, Any] = field(default_factory=dict)
     solver: dict[str, Any] = field(default_factory=dict)
 
@@ -328,8 +357,9 @@ class Summary:
     result_nc_sha256: str = ""
 
 
-def read_json(path: Path, schema: type, kind: Kind) -> dict[str, Any]:
-    """The content of a JSON file of a folder that `upd run` or `upd sweep` wrote.
+def read_json(path: Path, schema: type[Kept], kind: Kind) -> tuple[dict[str, Any], Kept]:
+    """The content of a JSON file of a folder that `upd run` or `upd sweep` wrote: all there is,
+    and what must be there.
 
     Parameters
     ----------
@@ -351,7 +381,7 @@ def read_json(path: Path, schema: type, kind: Kind) -> dict[str, Any]:
     try:
         text = path.read_text("utf-8")
         found = json.loads(text)
-        TypeAdapter(schema).validate_json(text, strict=True)
+        checked = TypeAdapter(schema).validate_json(text, strict=True)
     except (FileNotFoundError, NotADirectoryError):
         raise InputError(
             f"{path.parent}: is no {kind} folder (it has no {path.name}); give the folder "
@@ -366,7 +396,7 @@ def read_json(path: Path, schema: type, kind: Kind) -> dict[str, Any]:
         raise damaged_file(path, dict.fromkeys(places), kind) from None
     except (ValueError, RecursionError) as problem:
         raise InputError(f"{path}: is not JSON ({problem}); {_AGAIN[kind]}") from None
-    return dict(found)
+    return dict(found), checked
 
 
 def damaged_file(path: Path, places: Iterable[str], kind: Kind) -> InputError:

@@ -8,7 +8,7 @@ import io
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,22 +17,19 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 from markupsafe import Markup, escape
 
-from upd.cache.files import write_text
+from upd.cache.files import placed_file
 from upd.errors import InputError
+from upd.labels import sentence
 from upd.plot.chart import Chart
-from upd.plot.matplotlib import chart_png
 from upd.plot.plotly import figure
-from upd.plot.surface import Surface, n_bytes, packed
 from upd.report.tables import MOST_NOTES
 from upd.results.answer_table import AnswerTable
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-#: a page stays below this
-LIMIT_BYTES = 6_000_000
-#: markup, tables and rounding of the estimate of what is packed
-_MARGIN_BYTES = 150_000
+#: letters of the surfaces of a page at most, before they are packed
+MOST_LETTERS = 4_000_000
 _MU = re.compile(r"\bmu(?=N?\b)")
 _INDEX = re.compile(r"\b([KFTkh])_([A-Za-z]{1,2})\b")
 _PARTS = Path(__file__).parent / "parts"
@@ -122,13 +119,8 @@ def write_page(path: Path, html: str) -> Path:
 
     Raises InputError when the place cannot be written.
     """
-    try:
-        write_text(path, html)
-    except OSError as problem:
-        raise InputError(
-            f"{path}: cannot be written ({problem.strerror}); make room there or choose "
-            "another place"
-        ) from None
+    with placed_file(path) as temporary:
+        temporary.write_text(html, encoding="utf-8")
     return path
 
 
@@ -137,11 +129,10 @@ def page_text(
     sections: Sequence[Section],
     *,
     verdict: Verdict | None = None,
-    lead: str = "",
     footer: str = "",
-    surfaces: Sequence[Surface] = (),
+    surfaces: Sequence[dict[str, Any]] = (),
 ) -> str:
-    """The page as HTML, and as much of the surfaces as the limit leaves room for. Where its first
+    """The page as HTML, with the surfaces that are not too large. Where its first
     section has tables, it opens on them beside the first figures, and all else but notes is folded.
     Sections without content are omitted.
     """
@@ -156,29 +147,20 @@ def page_text(
         first = found[0]._replace(panels=shown, opening=True)
         found = [first, *(_folded(s, shown) for s in found[1:])]
         found = [section for section in found if not section.is_empty]
-    script, charts = _packed_plotly(), _data(panels)
-    used = (
-        len(script.encode())
-        + len(_packed(_json({"panels": charts})).encode())
-        + sum(len(p.image) for p in panels)
-        + _MARGIN_BYTES
-    )
-    bodies, left_out = fitting(surfaces, LIMIT_BYTES - used)
+    bodies, left_out = fitting(surfaces)
     return rendered(
         "page.html.j2",
         title=title,
         verdict=verdict,
-        lead=lead,
         sections=found,
         footer=footer,
         most_notes=MOST_NOTES,
         surfaces=bodies,
         surfaces_left_out=left_out,
-        surface_image=_picture(bodies[0]) if bodies else "",
         style=(_PARTS / "page.css").read_text("utf-8"),
-        plotly=script,
+        plotly=_packed_plotly(),
         script=(_PARTS / "page.js").read_text("utf-8"),
-        page_data=_packed(_json({"panels": charts, "surfaces": [packed(s) for s in bodies]})),
+        page_data=_packed(_json({"panels": _data(panels), "surfaces": bodies})),
     )
 
 
@@ -188,13 +170,6 @@ def _folded(section: Section, shown: Sequence[Panel]) -> Section:
     each = bool(panels or section.surfaces)
     folded = not (each or section.notes)
     return section._replace(panels=panels, folded=folded, each_folded=each or section.each_folded)
-
-
-def _picture(surface: Surface) -> str:
-    # matplotlib is slow to import
-    from upd.plot.pictures import picture
-
-    return image_uri(picture(surface))
 
 
 def rendered(template: str, **content: Any) -> str:
@@ -266,6 +241,9 @@ def versions_text(versions: Mapping[str, str]) -> str:
 
 def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Panel]:
     """Charts with the PNG files that show the same, then the other PNG files."""
+    # matplotlib is slow to import
+    from upd.plot.matplotlib import chart_png
+
     groups: dict[str, list[Chart]] = {}
     for chart in charts:
         groups.setdefault(chart.figure or chart.title, []).append(chart)
@@ -283,19 +261,17 @@ def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Pa
     return panels
 
 
-def _note(chart: Chart) -> str:
-    """What stands under a chart: its detail as a sentence, and what to see."""
-    detail = f"{chart.detail[:1].upper()}{chart.detail[1:]}." if chart.detail else ""
-    return " ".join(part for part in (detail, chart.note) if part)
-
-
 def _data(panels: Iterable[Panel]) -> dict[str, Any]:
     """What the page's script draws: panel -> list of {title, note, charts}."""
     found: dict[str, list[dict[str, Any]]] = {}
     for panel in panels:
         for title in dict.fromkeys(chart.title for chart in panel.charts):
             charts = [
-                {"case": c.case.replace("muN", "µN"), "note": _note(c), "figure": figure(c)}
+                {
+                    "case": c.case.replace("muN", "µN"),
+                    "note": " ".join(filter(None, (sentence(c.detail), c.note))),
+                    "figure": figure(c),
+                }
                 for c in panel.charts
                 if c.title == title
             ]
@@ -303,23 +279,25 @@ def _data(panels: Iterable[Panel]) -> dict[str, Any]:
     return found
 
 
-def fitting(surfaces: Iterable[Surface], room: int) -> tuple[list[Surface], list[str]]:
-    """Surfaces that fit into ``room`` bytes, with as many of their fields as fit, and what had to
-    be left out, in words.
+def fitting(surfaces: Iterable[dict[str, Any]]) -> tuple[list[dict[str, Any]], list[str]]:
+    """Surfaces with as many of their fields as a page holds, and what had to be left out, in
+    words.
     """
-    shown, left_out = [], []
+    shown, left_out, room = list[dict[str, Any]](), list[str](), MOST_LETTERS
     for surface in surfaces:
-        parts = (
-            replace(surface, fields=surface.fields[:n]) for n in range(len(surface.fields), -1, -1)
-        )
-        part = next((part for part in parts if n_bytes(part) <= room), None)
-        if part is None:
-            left_out.append(f"{surface.label}: too large for this page")
+        fields = surface["fields"]
+        for n in range(len(fields), -1, -1):
+            made = surface | {"fields": fields[:n]}
+            if not n:
+                made |= {"motions": []}
+            if (size := len(_json(made))) <= room:
+                shown.append(made)
+                room -= size
+                break
+        else:
+            left_out.append(f"{surface['label']}: too large for this page")
             continue
-        lost = surface.fields[len(part.fields) :]
-        left_out += [f"{f.label}: too large for this page" for f in lost]
-        room -= n_bytes(part)
-        shown.append(part)
+        left_out += [f"{field['label']}: too large for this page" for field in fields[n:]]
     return shown, left_out
 
 

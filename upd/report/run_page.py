@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from upd.plot.surface import Surface, read_surface
+from upd.labels import sentence
+from upd.plot.surface import read_surface
 from upd.report.folder import RunFolder, read_run
 from upd.report.page import Section, Verdict, make_panels, page_text, versions_text, write_page
 from upd.report.tables import (
@@ -29,22 +30,6 @@ log = logging.getLogger("upd.report")
 
 #: records of the solvers, whose faults are among the checks, and of all modules of this package
 _SOLVER, _OURS = "upd.hbm", "upd."
-#: entries of a scene that its page begins with, in this order: words -> path
-_LEAD = {
-    "recipe": "geometry.recipe",
-    "friction": "contact.friction",
-    "contact model": "contact.model",
-    "normal force": "loads.normal",
-    "tangential force over µN": "loads.tangential",
-    "along": "loads.directions",
-    "centrifugal force": "loads.centrifugal",
-    "centrifugal force on the damper F_C": "damper.centrifugal",
-    "F_C/F_E": "excitation.centrifugal_to_force",
-    "F_E": "excitation.force",
-    "modes below": "modes.below",
-    "lowest F_C of seating": "seating.lowest",
-    "element": "mesh.element",
-}
 
 
 def write_run_report(folder: Path) -> Path:
@@ -59,14 +44,13 @@ def write_run_report(folder: Path) -> Path:
         run.summary["title"] or run.summary["scene"],
         run_sections(run, surfaces),
         verdict=verdict(run.summary),
-        lead=lead(run.summary),
         footer=f"Run folder {run.name}{started}. {versions_text(run.versions)}".rstrip(),
         surfaces=surfaces,
     )
     return write_page(run.path / "report.html", html)
 
 
-def run_sections(run: RunFolder, surfaces: Sequence[Surface]) -> list[Section]:
+def run_sections(run: RunFolder, surfaces: Sequence[dict[str, Any]]) -> list[Section]:
     """The page of one run."""
     summary, entries = run.summary, run.summary["results"]
     size, cost = summary["size"], summary["cost"]
@@ -98,35 +82,30 @@ def run_sections(run: RunFolder, surfaces: Sequence[Surface]) -> list[Section]:
         ),
         Section(
             "Cost and mesh",
-            [stage_table(cost.get("stages", {})), *_mesh_tables(surfaces)],
+            [stage_table(cost.get("stages", {})), _mesh_table(size)],
             texts=[total],
             kind="grid",
         ),
         Section("All numbers", all_numbers(entries), each_folded=True, kind="grid"),
         Section(
             "Scene file",
-            texts=[lead(summary), "Save as scene.toml and run upd run scene.toml."],
+            texts=["Save as scene.toml and run upd run scene.toml."],
             file=run.scene,
         ),
     ]
 
 
-def _mesh_tables(surfaces: Sequence[Surface]) -> Iterator[AnswerTable]:
-    """Size and quality of the bodies of each file."""
-    for surface in surfaces:
-        columns = {
-            "body": [str(b["body"]) for b in surface.shape],
-            "# hexahedra": [str(b["hexahedra"]) for b in surface.shape],
-            "# nodes": [str(b["nodes"]) for b in surface.shape],
-            "# least scaled Jacobian": [f"{b['min']:.3f}" for b in surface.shape],
-            "# mean scaled Jacobian": [f"{b['mean']:.3f}" for b in surface.shape],
-            "# largest edge ratio": [f"{b['aspect']:.1f}" for b in surface.shape],
-        }
-        note = (
-            "Scaled Jacobian: 1 for a brick, 0 for a collapsed element. Edge ratio: longest over "
-            "shortest edge of an element."
-        )
-        yield filled(f"Mesh{', ' + surface.label if surface.label else ''}", columns, note)
+def _mesh_table(size: Mapping[str, Any]) -> AnswerTable:
+    """Elements and degrees of freedom of the bodies."""
+    dofs = size.get("n_dof", {})
+    columns = {
+        "body": list(dofs),
+        "# hexahedra": [str(size.get("n_hex", {}).get(body, "")) for body in dofs],
+        "# degrees of freedom": [str(count) for count in dofs.values()],
+    }
+    facts = [f"{size['symmetry']} model"] * bool(size.get("symmetry"))
+    facts += [f"{size['n_pairs']} contact pairs"] * bool(size.get("n_pairs"))
+    return filled("Mesh", columns, f"{', '.join(facts)}.".capitalize() if facts else "")
 
 
 def verdict(summary: Mapping[str, Any]) -> Verdict:
@@ -145,25 +124,6 @@ def verdict(summary: Mapping[str, Any]) -> Verdict:
     return Verdict("passed", "Passed", f"{text}.")
 
 
-def lead(summary: Mapping[str, Any]) -> str:
-    """The main entries of the scene, and how large its model is."""
-    scene, size = summary["scene_file"], summary["size"]
-    parts = []
-    for words, path in _LEAD.items():
-        table, _, key = path.partition(".")
-        value = scene.get(table, {}).get(key)
-        if value:
-            listed = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
-            parts.append(f"{words} {listed}")
-    parts.append(f"{sum(size.get('n_dof', {}).values())} degrees of freedom")
-    if size.get("n_pairs"):
-        parts.append(f"{size['n_pairs']} contact pairs")
-    if size.get("symmetry"):
-        parts.append(f"{size['symmetry']} model")
-    text = "; ".join(parts)
-    return f"{text[:1].upper()}{text[1:]}."
-
-
 def page_warnings(run: RunFolder) -> list[str]:
     """What a run warns of, the warnings of its log that are no check's, and the files that could
     not be read; each once.
@@ -174,12 +134,11 @@ def page_warnings(run: RunFolder) -> list[str]:
         known = line.text == status or (checks and line.where.startswith(_SOLVER))
         if line.level in ("WARNING", "ERROR", "CRITICAL") and not known:
             ours = line.where.startswith(_OURS)
-            text = f"{line.text[:1].upper()}{line.text[1:]}"
-            found.append(text if ours else f"{line.where}: {line.text}")
+            found.append(sentence(line.text, "") if ours else f"{line.where}: {line.text}")
     return list(dict.fromkeys([*found, *run.missing]))
 
 
-def run_surfaces(run: RunFolder) -> list[Surface]:
+def run_surfaces(run: RunFolder) -> list[dict[str, Any]]:
     """Surfaces of the run's VTU files: fields of a contact, else modes, else the bare mesh."""
     contact = [f for f in (run.path / "fields.vtu", run.path / "mesh.vtu") if f.exists()][:1]
     files = contact or sorted(

@@ -18,6 +18,7 @@ from upd.labels import (
     percent,
     percent_of,
     plus_minus,
+    sentence,
     shown,
     unit_label,
 )
@@ -328,12 +329,12 @@ def warnings(
     for name, mine in failed.items():
         worst = worst_check(mine)
         cases = _in_brackets(_listed([worst["case"], *(c["case"] for c in mine)], most))
-        remedy = f". {_capital(worst['remedy'])}" if worst.get("remedy") else ""
-        out.append(_capital(f"{name}{cases}: {check_words(worst)}{remedy}."))
+        remedy = f". {sentence(worst['remedy'], '')}" if worst.get("remedy") else ""
+        out.append(sentence(f"{name}{cases}: {check_words(worst)}{remedy}"))
     for reason, numbers in lost.items():
         names = _listed([number_label(entry["name"]) for entry in numbers], most)
         cases = _in_brackets(_listed([entry["case"] for entry in numbers], most))
-        out.append(_capital(f"{names}{cases}: not reached, {reason}."))
+        out.append(sentence(f"{names}{cases}: not reached, {reason}"))
     return out
 
 
@@ -346,10 +347,6 @@ def _listed(items: Iterable[str], most: int | None) -> str:
 
 def _in_brackets(text: str) -> str:
     return f" ({text})" if text else ""
-
-
-def _capital(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}"
 
 
 # ---------------------------------------------------------------- charts

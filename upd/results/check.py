@@ -40,35 +40,21 @@ def with_fault(status: str, fault: str) -> str:
     return f"{WARNED}: {fault}" if status == OK else f"{status}; {fault}"
 
 
-def warned(
-    checks: Sequence[Check], results: Sequence[Result]
-) -> dict[str, tuple[list[Check] | list[Result], list[str]]]:
-    """What did not pass and what was not reached: name -> the checks or numbers, their cases."""
-    found: dict[str, list[Any]] = {}
-    for check in checks:
-        if not check.passed:
-            found.setdefault(check.name, []).append(check)
-    for one in results:
-        if one.withheld:
-            found.setdefault(f"{number_label(one.name)} not reached", []).append(one)
-    return {
-        name: (mine, list(dict.fromkeys(one.case.label for one in mine)))
-        for name, mine in found.items()
-    }
-
-
 def warnings_of(checks: Sequence[Check], results: Sequence[Result]) -> list[str]:
     """What did not pass and what was not reached, one sentence per name with its cases."""
-    return [_named(name, labels) for name, (_, labels) in warned(checks, results).items()]
-
-
-def _named(name: str, labels: Sequence[str]) -> str:
-    """A name with its cases."""
-    return name + (f" ({_some(labels)})" if any(labels) else "")
+    found: dict[str, list[str]] = {}
+    for check in checks:
+        if not check.passed:
+            found.setdefault(check.name, []).append(check.case.label)
+    for one in results:
+        if one.withheld:
+            found.setdefault(f"{number_label(one.name)} not reached", []).append(one.case.label)
+    return [name + (f" ({_some(cases)})" if any(cases) else "") for name, cases in found.items()]
 
 
 def _some(labels: Sequence[str], most: int = 2) -> str:
-    """The first labels, and how many more there are."""
+    """The first labels, each once, and how many more there are."""
+    labels = list(dict.fromkeys(labels))
     shown = "; ".join(label for label in labels[:most] if label)
     return shown + (f"; and {len(labels) - most} more" if len(labels) > most else "")
 

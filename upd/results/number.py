@@ -131,9 +131,8 @@ class Result:
         Value it is compared with, in the same unit; ``source`` is where that comes from.
     printed_error
         Relative difference of a published value from the reference.
-    estimated_error, half_error_cost_s
-        Estimated relative error, and predicted seconds of a run with half of it. Of a number with
-        ``parts`` their sum, None where one of them was not found, and the seconds of the largest.
+    estimated_error
+        Relative; of a number with ``parts`` their sum, None where one of them was not found.
     exact
         Whether the reference is what the number should converge to; another's measured or computed
         value is not.
@@ -154,7 +153,6 @@ class Result:
     source: str = ""
     printed_error: float | None = None
     estimated_error: float | None = None
-    half_error_cost_s: float | None = None
     exact: bool = True
     withheld: str = ""
     parts: tuple[ErrorPart, ...] = ()
@@ -199,7 +197,6 @@ class Result:
         }
         known = {
             "estimated_error": self.estimated_error,
-            "half_error_cost_s": self.half_error_cost_s,
             "error_parts": [part.as_dict() for part in self.parts] or None,
             "input_parts": [part.as_dict() for part in self.inputs] or None,
             "withheld": self.withheld or None,
@@ -229,7 +226,6 @@ def with_parts(result: Result, parts: Iterable[ErrorPart]) -> Result:
         result,
         parts=mine,
         estimated_error=math.fsum(part.error for part in mine) if known else None,
-        half_error_cost_s=largest(mine).half_cost_s if known else None,
     )
 
 
@@ -251,7 +247,6 @@ def read_result(data: Mapping[str, Any], case: Case | None = None) -> Result:
         data.get("source", ""),
         data.get("thesis_error"),
         data.get("estimated_error"),
-        data.get("half_error_cost_s"),
         data.get("exact", True),
         data.get("withheld", ""),
         tuple(map(read_part, data.get("error_parts", ()))),

@@ -4,25 +4,18 @@ the file.
 
 from __future__ import annotations
 
-from upd.scene.bladed_disk import BLADED_DISK_WANTS, BladedDiskScene
-from upd.scene.contact import FRICTION_WANTS, WANTS, Scene, friction_on
-from upd.scene.forced import FORCED_WANTS, ForcedScene
-from upd.scene.modal import MODAL_WANTS, ModalScene
+from upd.scene.bladed_disk import BladedDiskScene
+from upd.scene.contact import FRICTION_WANTS, Scene, friction_on
+from upd.scene.forced import ForcedScene
+from upd.scene.modal import ModalScene
 from upd.scene.read import AnyScene, as_scene, geometry_parameters, load_scene, ready_scenes
-from upd.scene.seated import SEATED_WANTS, SeatedScene
+from upd.scene.seated import SeatedScene
 
-#: names that scripts know
-RIG_WANTS = MODAL_WANTS
+#: the name that scripts know
 RigScene = ModalScene
 
 __all__ = [
-    "BLADED_DISK_WANTS",
-    "FORCED_WANTS",
     "FRICTION_WANTS",
-    "MODAL_WANTS",
-    "RIG_WANTS",
-    "SEATED_WANTS",
-    "WANTS",
     "AnyScene",
     "BladedDiskScene",
     "ForcedScene",

@@ -20,7 +20,7 @@ from typing import Any, Literal, get_args, get_origin
 
 from upd.errors import InputError
 from upd.mesh import recipes
-from upd.mesh.fields import table
+from upd.mesh.fields import bounds_of
 from upd.mesh.recipe_modules import READY
 from upd.scene.base import INSIDE
 from upd.scene.quantities import (
@@ -161,25 +161,26 @@ def recipe_keys(recipe: str, params: Any = None, path: Steps = ()) -> list[Scene
         Tables in front of every name: of a scene, "geometry".
     """
     cls = recipes.parameters(recipe)
-    texts = entries(cls)
-    known = {f.name: f for f in fields(cls)}
+    texts, types = entries(cls), hints(cls)
+    made = recipes.made(recipe, {}) if params is None else params
     out = []
-    for row in table(recipes.made(recipe, {}) if params is None else params, here=False):
-        f = known[row.name]
-        meaning, cost = _parted(texts.get(row.name, ""))
+    for f in fields(cls):
+        if not f.init:
+            continue
+        meaning, cost = _parted(texts.get(f.name, ""))
         # the unit has a column of its own
         meaning = _UNIT.sub("", meaning)
-        kind = str(f.metadata.get("quantity") or "")
+        kind, value = str(f.metadata.get("quantity") or ""), getattr(made, f.name)
         out.append(
             SceneKey(
-                (*path, row.name),
+                (*path, f.name),
                 meaning,
                 kind,
                 _MUST if f.default is MISSING else _text(f.default, kind),
-                row.bounds,
+                bounds_of(f, types[f.name]),
                 cost,
-                _text(row.value, kind),
-                row.value != f.default,
+                _text(value, kind),
+                value != f.default,
             )
         )
     return out

@@ -13,8 +13,8 @@ from upd.results import (
     Result,
     outcome_of,
     status_of,
-    warnings_of,
 )
+from upd.results.check import warnings_of
 from upd.results.quantities import PEAK_FREQUENCY
 from upd.scene.base import LeftOut
 

@@ -16,7 +16,7 @@ import pytest
 
 from upd import load_scene, run
 from upd.batch.engine import Progress
-from upd.batch.grid import parse_axes, places, settings
+from upd.batch.plan import parse_axes, places, settings
 from upd.batch.point import Task, solve_task
 from upd.batch.store import PointStore
 from upd.batch.sweeps import draw, sweep
@@ -627,7 +627,7 @@ def test_command_prints_plan_and_table(tmp_path: Path, capsys: pytest.CaptureFix
     assert ended.value.code == 0
     told = capsys.readouterr().out
     assert "2 of 2 points ok" in told
-    assert 0 < told.index("[um]") < told.index("[MPa]"), "what varies comes first"
+    assert 0 < told.index("µm") < told.index("MPa"), "what varies comes first"
     with pytest.raises(SystemExit) as ended:
         main([*words, "--cluster", "nowhere"])
     assert ended.value.code == 2

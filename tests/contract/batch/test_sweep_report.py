@@ -25,7 +25,7 @@ from upd.cli import main
 from upd.errors import InputError
 from upd.plot.sweep_charts import sweep_charts
 from upd.report import sweep_page, write_comparison, write_report
-from upd.report.sweep_page import MOST_ROWS, followed, grouped, read_sweep, sweep_panels, verdict
+from upd.report.sweep_page import MOST_ROWS, grouped, read_sweep, sweep_panels, verdict
 
 EVIL = '</script><script>alert("x")</script>'
 TINY = {"title": EVIL, "geometry.divisions": 8, "want": ["normal"], "geometry.core_depth": 0.2}
@@ -149,7 +149,7 @@ def test_hover_curves_are_the_numbers_of_the_table(folder: Path, html: str) -> N
     page = json.loads(gzip.decompress(np.packbits(bits[: bits.size // 8 * 8]).tobytes()))
     (trace,) = page["panels"]["sweep"][0]["charts"][0]["figure"]["data"]
     x, y = (np.frombuffer(base64.b64decode(trace[key]["bdata"]), "<f4") for key in "xy")
-    table = read_sweep(folder).table[:, 0]
+    table = read_sweep(folder).columns[0].values
     assert np.isnan(table[2])
     # Single precision on the page; the last point failed, so the axis ends before it.
     np.testing.assert_array_equal(x, [40.0, 60.0])
@@ -164,7 +164,7 @@ def test_failed_points_are_gaps_and_end_no_axis(tmp_path: Path) -> None:
             {0: "no", 2: "no", 4: "no"},
         )
     )
-    (chart,) = sweep_charts(made.parameters, followed(made))
+    (chart,) = sweep_charts(made.axes, made.columns)
     np.testing.assert_array_equal(chart.traces[0].x, [2.0, 3.0, 4.0])
     np.testing.assert_array_equal(chart.traces[0].y, [1.0, np.nan, 3.0])
 
@@ -197,7 +197,7 @@ def test_two_parameters_give_one_curve_per_value_of_the_shorter(tmp_path: Path) 
             {"contact.friction": [0.3, 0.1, 0.2], "mesh.element": ["hex8", "hex20"]},
         )
     )
-    (chart,) = sweep_charts(made.parameters, followed(made))
+    (chart,) = sweep_charts(made.axes, made.columns)
     assert [t.label for t in chart.traces] == ["element hex8", "element hex20"]
     np.testing.assert_array_equal(chart.traces[0].x, [0.1, 0.2, 0.3])
     # Points 0..5, the element fastest.
@@ -213,7 +213,7 @@ def test_two_parameters_with_numbers_give_a_map_and_curves(tmp_path: Path) -> No
             {5: "no"},
         )
     )
-    over, curves = sweep_charts(made.parameters, followed(made))
+    over, curves = sweep_charts(made.axes, made.columns)
     (m,) = over.maps
     assert (
         over.sheet and m.contours and m.x.tolist() == [0.1, 0.2, 0.3] and m.y.tolist() == [2.0, 4.0]
@@ -227,14 +227,14 @@ def test_two_parameters_with_numbers_give_a_map_and_curves(tmp_path: Path) -> No
 
 def test_words_are_ticks(tmp_path: Path) -> None:
     made = read_sweep(_made(tmp_path / "words", {"e": ["a", "b"]}))
-    (chart,) = sweep_charts(made.parameters, followed(made))
+    (chart,) = sweep_charts(made.axes, made.columns)
     assert chart.x.ticks == ((0, "a"), (1, "b")) and chart.traces[0].style == "points"
     assert "page-data" in write_report(made.path).read_text("utf-8")
 
 
 def test_more_parameters_give_a_curve_per_combination_of_the_others(tmp_path: Path) -> None:
     made = read_sweep(_made(tmp_path / "many", {"a": [1, 2, 3], "b": [1, 2], "e": ["x", "y"]}))
-    (chart,) = sweep_charts(made.parameters, followed(made))
+    (chart,) = sweep_charts(made.axes, made.columns)
     assert chart.figure == "sweep" and not chart.maps
     assert [t.label for t in chart.traces] == ["b 1, e x", "b 1, e y", "b 2, e x", "b 2, e y"]
     np.testing.assert_array_equal(chart.traces[1].y, [1.0, 5.0, 9.0])
@@ -245,11 +245,11 @@ def test_more_parameters_give_a_curve_per_combination_of_the_others(tmp_path: Pa
 
 def test_one_value_everywhere_is_told(tmp_path: Path) -> None:
     made = read_sweep(_made(tmp_path / "same", {"a": [1, 2], "b": [1, 2]}))
-    over = sweep_charts(made.parameters, [replace(followed(made)[0], values=np.full(4, 3.5))])[0]
+    over = sweep_charts(made.axes, [replace(made.columns[0], values=np.full(4, 3.5))])[0]
     assert over.case == "3.5 µm everywhere"
-    varying = replace(followed(made)[0], values=np.arange(4.0))
+    varying = replace(made.columns[0], values=np.arange(4.0))
     flat = replace(varying, values=np.full(4, 3.5))
-    first, last = sweep_charts(made.parameters, [flat, varying])[:2]
+    first, last = sweep_charts(made.axes, [flat, varying])[:2]
     assert "everywhere" not in first.case and "everywhere" in last.case
 
 
@@ -279,7 +279,7 @@ def test_reasons_are_told_once_with_their_points(tmp_path: Path) -> None:
 )
 def test_verdict(failed: int, warned: int, kind: str) -> None:
     points = [
-        {"status": "failed" if k < failed else "ok", "warnings": ["w"] * (k < warned)}
+        sweep_page._Point([], "failed" if k < failed else "ok", "", ["w"] * (k < warned), 1.0)
         for k in range(3)
     ]
     assert verdict(points).kind == kind

@@ -18,7 +18,7 @@ import upd
 from upd import cli
 from upd.cli.tables import print_result, print_table
 from upd.report.answer import LINES
-from upd.report.columns import TextColumn, fitted, folded_head, text_lines
+from upd.report.columns import fitting, folded_head, whole_table
 from upd.report.notebook import RunResult, headline
 from upd.report.tables import MOST_NOTES, warnings
 from upd.results import (
@@ -29,6 +29,7 @@ from upd.results import (
     outcome_of,
     status_of,
 )
+from upd.results.answer_table import AnswerTable
 from upd.results.quantities import Quantity
 from upd.scene import ready_scenes
 
@@ -254,36 +255,29 @@ def answer_text(folder: Path, width: int) -> str:
     return "\n".join(line.text for line in upd.load(folder).answer(width))
 
 
-COLUMNS = (
-    TextColumn("number", ("a", "b")),
-    TextColumn("value", ("1.2345e+06", "7"), right=True),
-    TextColumn("reference", ("1.2e+06", ""), right=True, rank=1),
-    TextColumn("thesis", ("", ""), right=True, rank=2),
-    TextColumn("source", ("somebody", "else"), rank=3),
+TABLE = AnswerTable(
+    "",
+    ("number", "#value", "#reference", "source"),
+    (("a", "1.2345e+06", "1.2e+06", "somebody"), ("b", "7", "", "else")),
 )
 
 
-def test_columns_are_left_out_by_rank_and_never_cut() -> None:
-    whole, none = fitted(COLUMNS, 80)
-    assert [c.head for c in whole] == ["number", "value", "reference", "source"]
-    assert not none
-    few, out = fitted(COLUMNS, 30)
-    assert [c.head for c in few] == ["number", "value", "reference"]
-    assert [c.head for c in out] == ["source"]
+def test_last_columns_are_left_out_and_no_number_is_cut() -> None:
+    assert fitting(TABLE, 80) == TABLE
+    few = fitting(TABLE, 30)
+    assert few.columns == ("number", "#value", "#reference")
     # what identifies a row and its number stay whatever the width
-    least, _ = fitted(COLUMNS, 5)
-    assert [c.head for c in least] == ["number", "value"]
-    heads, rows = text_lines(few)
-    assert heads == ["number       value  reference"]
+    assert fitting(TABLE, 5).columns == ("number", "#value")
+    heads, *rows = whole_table(few, 80)
+    assert heads == "number       value  reference"
     assert rows == ["a       1.2345e+06    1.2e+06", "b                7"]
 
 
-def test_narrow_table_names_what_it_leaves_out() -> None:
+def test_a_narrow_table_shows_the_rest_below() -> None:
     sheet = io.StringIO()
-    left_out = print_table(Console(file=sheet, width=40), COLUMNS)
-    assert [c.head for c in left_out] == ["source"]
-    assert "not shown at this width: source" in sheet.getvalue()
-    assert "1.2345e+06" in sheet.getvalue()
+    print_table(Console(file=sheet, width=30), TABLE)
+    assert "1.2345e+06" in sheet.getvalue() and "somebody" in sheet.getvalue()
+    assert max(map(len, sheet.getvalue().splitlines())) <= 30
 
 
 def test_heads_fold_at_words() -> None:

@@ -38,7 +38,6 @@ def test_one_key_in_full(capsys: pytest.CaptureFixture[str]) -> None:
         "default": '"5 mm"',
         "unit": "mm; understood: mm, m, cm, um, µm, nm",
         "bounds": "> 0",
-        "here": ">= 1.179 (what the other parameters leave)",
         "uncertainty": '"VALUE +- HALF-WIDTH" or "VALUE +- 10 %"',
         "cost": "none",
     }

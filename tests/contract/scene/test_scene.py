@@ -11,8 +11,12 @@ import pytest
 
 import upd
 from upd.errors import InputError
-from upd.scene import FORCED_WANTS, RIG_WANTS, SEATED_WANTS, WANTS, load_scene, ready_scenes
+from upd.scene import load_scene, ready_scenes
 from upd.scene.bladed_disk import BLADED_DISK_WANTS
+from upd.scene.contact import WANTS
+from upd.scene.forced import FORCED_WANTS
+from upd.scene.modal import MODAL_WANTS
+from upd.scene.seated import SEATED_WANTS
 
 
 def faults(*overrides: str) -> str:
@@ -23,7 +27,7 @@ def faults(*overrides: str) -> str:
 
 def test_ready_scenes_are_valid() -> None:
     assert "hertz" in ready_scenes()
-    known = {*WANTS, *RIG_WANTS, *FORCED_WANTS, *SEATED_WANTS, *BLADED_DISK_WANTS}
+    known = {*WANTS, *MODAL_WANTS, *FORCED_WANTS, *SEATED_WANTS, *BLADED_DISK_WANTS}
     for name in ready_scenes():
         scene = upd.load_scene(name)
         assert scene.name == name

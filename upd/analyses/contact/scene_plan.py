@@ -113,7 +113,6 @@ def contact_plan(
         workers,
         families,
         files_seconds=files,
-        ways=cost.ways,
     )
 
 

@@ -20,7 +20,7 @@ from upd.analyses.forced.arrays import (
     SWEEP,
 )
 from upd.analyses.measured.charts import damping_charts, measured_traces
-from upd.plot.chart import Area, Array, Axis, Band, Chart, Mark, Pies, Style, Trace
+from upd.plot.chart import Area, Array, Axis, Band, Chart, Mark, Scatter, Style, Trace
 from upd.plot.common import UM, case_of, frequency_of, magnitude, scalar, with_content
 from upd.results import Arrays, Case, Group
 from upd.scene.forced_contact import SIDES
@@ -155,20 +155,23 @@ def shares_chart(curve: ChartedCurve, k: int) -> Chart:
     return curve.sheet("contact_state", "Contact state", axes, areas=areas, case=case)
 
 
-def contact_map(at: ChartedPeak, points: Group, k: int) -> Chart:
-    """Contact points of one face at a peak.
-
-    Sectors of stick, slip and lift-off, size by the friction loss.
-    """
+def contact_maps(at: ChartedPeak, points: Group, k: int) -> Iterator[Chart]:
+    """Contact points of one face at a peak: how much of the cycle they slip, and are lifted off."""
     on, energy = np.asarray(points["face"].data) == k, at.curve.data("energy")[at.index]
     # Of all points, so that rounding on a face that sticks does not show.
     most = float(energy.max())
     size = np.maximum(energy[on], 0.0) / most if most > 0.0 else np.zeros(int(on.sum()))
     y, up = (np.asarray(points[name].data)[on] for name in ("along", "up"))
-    pies = Pies(y, up, at.curve.data("state")[at.index][on], size, SHARES, "friction loss")
     axes = (Axis("along the damper y", "mm"), Axis("up the slope", "mm"))
-    case = f"{at.case}, {SIDES[k]} face"
-    return at.sheet("contact_map", "Contact points at the peak", axes, pies=(pies,), case=case)
+    for state, share in zip(SHARES, at.curve.data("state")[at.index][on].T, strict=True):
+        if state != "stick" and share.any():
+            value = Axis(state, "% of the cycle", low=0.0, high=100.0)
+            more = {
+                "scatters": (Scatter(y, up, 100.0 * share, size, value),),
+                "case": f"{at.case}, {SIDES[k]} face",
+                "note": "The area of a mark is its friction loss.",
+            }
+            yield at.sheet("contact_map", f"Contact points at the peak: {state}", axes, **more)
 
 
 def loops_chart(at: ChartedPeak) -> Chart:
@@ -322,11 +325,12 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
         *_more_harmonics(arrays, curves),
         *(shares_chart(c, k) for c in moving if "share" in c.group for k in range(len(SIDES))),
         *(
-            contact_map(one, points[one.case.stiffness], k)
+            chart
             for one in sliding
             if "share" in one.curve.group
             for k in range(len(SIDES))
             if one.moves(points[one.case.stiffness], k)
+            for chart in contact_maps(one, points[one.case.stiffness], k)
         ),
         *(
             loops_chart(one)

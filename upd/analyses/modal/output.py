@@ -20,8 +20,8 @@ from upd.analyses.modal.solve import Array, ModalSolution, ModeSet, RigMode, Rig
 from upd.errors import MeshError
 from upd.matrices import DofMap, Matrices, write_dof_map, write_matrices
 from upd.mesh import IntArray, Mesh, recipes
+from upd.plot.matplotlib import Drawing, draw_sheet, write_png
 from upd.plot.pictures import draw_mode
-from upd.plot.sheet import Drawing, write_sheet
 from upd.results import Case, Group, variable
 
 #: modes drawn of each configuration
@@ -137,7 +137,7 @@ def _write_shapes(solution: ModalSolution, folder: Path) -> None:
                 drawings.setdefault(found.kind, []).append(picture)
         write_fields(folder / f"modes_{found.kind}_{found.arrangement}.vtu", meshes, data)
     for kind, mine in drawings.items():
-        write_sheet(folder / f"modes_{kind}.png", mine, _DRAWN, _SIZE)
+        write_png(draw_sheet(mine, _DRAWN, _SIZE), folder / f"modes_{kind}.png")
 
 
 # -- mode shapes on whole bodies: what half a rig saves is mirrored about y = 0 --------------------

@@ -247,10 +247,7 @@
       return Plotly.react(place, traces, layout, config3d);
     }
     [choice, range, apart, near].forEach((control) => control.addEventListener("input", show));
-    return whenSeen(panel, () => show().then(function () {
-      panel.classList.add("drawn");
-      panel.querySelector("details.static").open = false;
-    }));
+    return whenSeen(panel, () => show().then(() => panel.classList.add("drawn")));
   }
 
   // ------------------------------------------------------------------ the rest of the page
