@@ -132,33 +132,6 @@ def two_level_error(coarse: float, fine: float, ratio: float, order: float = 1.0
     return float(abs(fine - coarse) / (ratio**order - 1.0) / abs(fine))
 
 
-def finer_level_error(ratio: float, size: float) -> float:
-    """Bound of a level's relative error from one finer level.
-
-    The change to the finer level, and what that level leaves itself by Richardson's error with the
-    factor of safety of two levels.
-
-    Parameters
-    ----------
-    ratio
-        The number on the finer level over that on the level.
-    size
-        Of the finer level over that of the level, below 1.
-
-    Returns
-    -------
-    float
-        abs(ratio - 1) (1 + 3 / (size^-p - 1)), p the order the error is taken to have.
-
-    References
-    ----------
-    P. J. Roache, Verification and Validation in Computational Science and Engineering (1998), eq.
-    (5.4.2), and 5.6 on the factor of two grids.
-    """
-    rest = UNCONFIRMED * two_level_error(1.0, ratio, 1.0 / size, ASSUMED)
-    return abs(ratio - 1.0) + rest * abs(ratio)
-
-
 @dataclass(frozen=True)
 class ErrorEstimate:
     """Estimated bound of the relative error of the finest level.

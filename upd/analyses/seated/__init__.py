@@ -11,12 +11,13 @@ from upd.analyses.base import Analysis, rig_needs
 from upd.analyses.seated import charts, checks, output, results, solve, varied
 from upd.vary import errors
 from upd.vary.inputs import coarsened_rig
+from upd.vary.solve import plan_with_estimates
 
 ANALYSIS = Analysis(
     name="seated",
     headline_names=results.HEADLINE,
     input_checks=(),
-    make_plan=varied.plan_with_estimates,
+    make_plan=partial(plan_with_estimates, varied.PROBLEM),
     needs=partial(rig_needs, "blades"),
     solve=solve.solve,
     make_results=results.make_results,

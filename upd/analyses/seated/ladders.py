@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from functools import partial
 
-from upd.analyses.seated.varied import PATCH
 from upd.scene import SeatedScene
 from upd.vary.ladder import Asked, Ladder, counts, even, whole_levels
 from upd.vary.variation import Overrides, Variation
 
 #: numbers a ladder follows beside those the analysis names first
 _NUMBERS = ("closed_share", "max_pressure", "damper_u?", "seating_loss")
+#: arrangement -> elements up a patch, and those that go with them, along it first
+PATCH = {
+    "symmetric": ("patch_along_slope", ("patch_along_y",)),
+    "asymmetric": ("pad_along_slope", ("pad_along_y", "face_along_z")),
+}
 #: elements up a patch
 _SLOPE = (4, 8, 12, 16)
 _BASE: Overrides = (("want", ["seating", "stiffness"]), ("left_out.solve", "no"))
