@@ -12,8 +12,7 @@ from upd.errors import InputError, one_line
 from upd.progress import Stages
 from upd.results import ErrorPart, Estimates, Result
 from upd.results.quantities import quantity_of
-from upd.vary.orders import ErrorEstimate, ladder_error
-from upd.vary.scatter import sampled_error
+from upd.vary.orders import ErrorEstimate, ladder_error, sampled_error
 from upd.vary.solve import predicted_seconds, solve
 from upd.vary.variation import COARSER, RUN, Key, Problem, SolvedVariation, Variation
 

@@ -14,7 +14,7 @@ from upd.linalg.select import memory_left
 from upd.mesh import recipes
 from upd.progress import Stages
 from upd.results import Result
-from upd.vary.scatter import Samples
+from upd.vary.orders import Samples
 from upd.vary.variation import POWER, Overrides, Problem, SolvedVariation, Variation
 
 log = logging.getLogger(__name__)

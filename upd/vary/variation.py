@@ -11,7 +11,7 @@ from typing import Any
 from upd.progress import Stages
 from upd.results import Case, Estimates, Result
 from upd.scene.quantities import UNKNOWN
-from upd.vary.scatter import Samples
+from upd.vary.orders import Samples
 
 Key = tuple[str, Case]
 #: paths of a scene, and their values in the unit inside: ("geometry.divisions", 8)

@@ -10,8 +10,8 @@ import pytest
 
 import upd
 from upd.analyses import make_plan
+from upd.analyses.seated.ladders import PROBLEM, STEPS, levels
 from upd.analyses.seated.plan import make_plan as bare_plan
-from upd.analyses.seated.varied import PROBLEM, STEPS, levels
 from upd.errors import InputError
 from upd.report.tables import budget_table, error_parts
 from upd.scene import load_scene
@@ -64,7 +64,6 @@ def test_bounds_hold_against_finer_bodies_and_steps(wedge: upd.RunResult) -> Non
     for one in mine:
         true = abs(known[one.name, one.case] / one.value - 1.0)
         assert one.estimated_error is not None, one.name
-        print(one.name, one.case.label, true, one.estimated_error)
         held += true <= one.estimated_error
         assert true <= 1.5 * one.estimated_error, one.name
         assert one.estimated_error < 0.6, one.name

@@ -89,12 +89,6 @@ def _normal(solution: ContactSolution, k: FaceLattice, case: NormalCase) -> Vari
         "mm",
         "middle of the bands of the damper that the load comes from",
     )
-    upper = solution.model.upper
-    if upper.name in case.displacement:
-        # How far the contact nodes stay behind the distant set.
-        u = case.displacement[upper.name][upper.contact, 2]
-        whole = k.field(solution.model.multipliers.spread.T @ u)
-        out["surface_displacement"] = variable(XY, whole, "mm", body=upper.name)
     return out
 
 
@@ -206,12 +200,7 @@ def _curve(solution: ContactSolution) -> Variables:
         d, F = np.insert(d, 0, solution.model.gap.min()), np.insert(F, 0, 0.0)
         own = _approach_over_load(solution, d, F) | _along(solution)
     else:
-        pressures = ("max_pressure", "mean_pressure")
-        own = {
-            name: variable("point", [getattr(p.measures, name) for p in points], "MPa")
-            for name in pressures
-        }
-        own["stiffness"] = variable("", solution.normal[0].stiffness, "N/mm")
+        own = {"stiffness": variable("", solution.normal[0].stiffness, "N/mm")}
         own |= _printed(solution, "K_N", "_tangent_raw", solution.normal[0].case)
     return {"approach": variable("point", d, "mm"), "normal_force": variable("point", F, "N")} | own
 

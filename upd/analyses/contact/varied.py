@@ -47,7 +47,7 @@ from upd.results import Case
 from upd.scene import Scene
 from upd.scene.contact import Loads
 from upd.vary.errors import estimate_in_round
-from upd.vary.scatter import RADIUS, Samples
+from upd.vary.orders import RADIUS, Samples
 from upd.vary.solve import MESH
 from upd.vary.variation import ALONE, COARSER, Levels, Overrides, Problem, Variation
 from upd.vary.wanted import LevelChoice, Wanted

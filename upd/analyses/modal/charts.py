@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.measured import FREE, STUCK
-from upd.analyses.measured.charts import damping_charts, measured_traces
+from upd.analyses.measured import FREE, STUCK, damping_charts, measured_traces
 from upd.analyses.modal.output import MODES, REDUCTION, RESPONSE
 from upd.plot.chart import Axis, Chart, Mark, Trace
 from upd.plot.common import case_of, frequency_of, magnitude, scalar, with_content
