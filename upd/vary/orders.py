@@ -57,19 +57,8 @@ def fit_rate(h: ArrayLike, error: ArrayLike) -> float:
     return float(slope) if explained >= _EXPLAINED else float("nan")
 
 
-@dataclass(frozen=True)
-class Extrapolation:
-    """Limit of q(h) = limit + C h^order, and the largest deviation of the meshes from the fit,
-    relative to the limit.
-    """
-
-    limit: float
-    order: float
-    scatter: float
-
-
-def extrapolate(h: ArrayLike, values: ArrayLike) -> Extrapolation:
-    """Fit q(h) = limit + C h^p over three or more meshes.
+def extrapolate(h: ArrayLike, values: ArrayLike) -> tuple[float, float]:
+    """Limit and order p of q(h) = limit + C h^p over three or more meshes.
 
     p is the best of a fine grid from 0.5 to 4, limit and C are linear.
 
@@ -92,10 +81,7 @@ def extrapolate(h: ArrayLike, values: ArrayLike) -> Extrapolation:
 
     grid = np.linspace(0.5, 4.0, 141)
     best = min(grid, key=lambda p: fit(p)[0])
-    solution = fit(best)[1]
-    model = solution[0] + solution[1] * (size / size.max()) ** best
-    scale = abs(solution[0]) or 1.0
-    return Extrapolation(float(solution[0]), float(best), float(np.abs(model - q).max() / scale))
+    return float(fit(best)[1][0]), float(best)
 
 
 def two_level_error(coarse: float, fine: float, ratio: float, order: float = 1.0) -> float:

@@ -165,7 +165,9 @@ def solve_wanted(wanted: Wanted, plan: Any, stages: Stages) -> tuple[Any, Estima
                 raise
             raise search.missed(one_line(refused), solution, found) from None
         shares = None if found is None else shares_of(found, search.accuracies)
-        search.rounds.append(f"{search.text(levels)}: {_farthest(shares or {})}")
+        worst = max(shares or {}, key=lambda key: _sum((shares or {})[key]), default=None)
+        told = "no bound yet" if not shares or worst is None else _obstacle(worst, shares[worst])
+        search.rounds.append(f"{search.text(levels)}: {told}")
         log.info("accuracy: %s", search.rounds[-1])
         raised = search.raised(levels, shares)
         if raised is None:
@@ -174,7 +176,7 @@ def solve_wanted(wanted: Wanted, plan: Any, stages: Stages) -> tuple[Any, Estima
     if lack := search.lack(shares or {}):
         raise search.missed(lack, solution, found)
     whole = search.planned(levels)
-    whole = wanted.chosen(whole, f"{search.saving(levels)}; rounds: {' | '.join(search.rounds)}")
+    whole = wanted.chosen(whole, f"{search.text(levels)}; rounds: {' | '.join(search.rounds)}")
     if whole.scene != trial.scene:
         solution = None
         solution, found = search.solved(whole)
@@ -291,21 +293,9 @@ class LevelSearch:
         return levels
 
     def text(self, levels: Levels) -> str:
-        """What is above the lowest levels."""
-        return ", ".join(self._labels(levels, raised=True)) or "all at their lowest"
-
-    def _labels(self, levels: Levels, *, raised: bool) -> list[str]:
-        return [
-            f"{one.name} {one.labels[k]}"
-            for one, k in zip(self.choices, levels, strict=True)
-            if bool(k) == raised
-        ]
-
-    def saving(self, levels: Levels) -> str:
-        """What was raised, and what was not needed."""
-        text = f"raised: {', '.join(self._labels(levels, raised=True)) or 'nothing'}"
-        lowest = ", ".join(self._labels(levels, raised=False))
-        return f"{text}; not needed above: {lowest}" if lowest else text
+        """The levels in words."""
+        pairs = zip(self.choices, levels, strict=True)
+        return ", ".join(f"{one.name} {one.labels[k]}" for one, k in pairs)
 
     def lack(self, shares: Shares) -> str:
         """What is not reached and why, and what is; "" where all is."""
@@ -374,19 +364,10 @@ def _name(key: Key) -> str:
     return f"{key[0]} {key[1].label}".rstrip()
 
 
-def _farthest(shares: Shares) -> str:
-    key = max(shares, key=lambda key: _sum(shares[key]), default=None)
-    return "no bound yet" if key is None else f"{_name(key)} {_times(_sum(shares[key]))}"
-
-
-def _times(miss: float) -> str:
-    return f"{miss:.2g} times its accuracy" if math.isfinite(miss) else "without a bound"
-
-
 def _obstacle(key: Key, parts: Mapping[str, float]) -> str:
     """What keeps a number from its accuracy."""
     unknown = [source for source, error in parts.items() if not math.isfinite(error)]
     if unknown:
         return f"{_name(key)}: no estimate of what {', '.join(unknown)} leave"
     most = max(parts, key=lambda source: parts[source])
-    return f"{_name(key)}: most of it by {most}, {_times(_sum(parts))}"
+    return f"{_name(key)}: most of it by {most}, {_sum(parts):.2g} times its accuracy"

@@ -18,8 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from upd.analyses.contact.loading import contact_points_of
-from upd.analyses.contact.plan import NORMAL
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
 from upd.contact.edge import LocatedArea, located_area
 from upd.contact.law import ContactLaw, contact_points
@@ -217,27 +215,6 @@ def contact_law(solution: ContactSolution, case: NormalCase) -> ContactLaw | Non
         choice.weight,
         patches,
     )
-
-
-def tilt_stiffness(solution: ContactSolution, case: NormalCase) -> dict[str, float]:
-    """Resistance of the contact to a tilt of the damper, N mm per rad, by the axis its arms run
-    along.
-
-    About the centre of stiffness, contact set held. A tilt along x is odd about the mirror plane:
-    known on the full model only.
-    """
-    model = solution.model
-    on = np.flatnonzero(case.solution.contact)
-    if len(on) < 3:
-        return {}
-    points = contact_points_of(model)[on]
-    B = np.linalg.inv(model.compliance(NORMAL)[np.ix_(on, on)])
-    e, out = B.sum(axis=1), {}
-    for k, axis in enumerate("xy"):
-        if axis == "y" or 0 not in solution.plan.mirrors:
-            arm = points[:, k] - float(e @ points[:, k]) / float(e.sum())
-            out[axis] = solution.plan.copies * float(arm @ B @ arm)
-    return out
 
 
 def _whole(
