@@ -381,25 +381,6 @@ def _points(group: Group, blade: str, colour: int) -> Trace:
     f, H = frequency_of(group), magnitude(group[f"accelerance_{blade}"])
     case = case_of(group)
     words = Case(kind=case.kind, force_ratio=case.force_ratio).label
-    on = _spread(f, H)
+    on = np.unique([*range(0, len(f), 1 + (len(f) - 1) // _DRAWN), int(H.argmax())])
     some = f", {len(on)} of {len(f)} points" if len(on) < len(f) else ""
     return Trace(f"measured, {words}{some}", f[on], H[on], "open points", colour)
-
-
-def _spread(f: Array, H: Array) -> NDArray[np.int64]:
-    """Points (k,) that are as far from each other along the drawn curve, by frequency and the
-    logarithm of the height; all where they are few.
-    """
-    if len(f) <= _DRAWN:
-        return np.arange(len(f))
-    y = np.log(np.maximum(H, np.finfo(float).tiny))
-    # without noise: the path through means of as many points as are drawn
-    width = max(len(f) // _DRAWN, 1)
-    y = np.pad(y, (width // 2, width - 1 - width // 2), mode="edge")
-    y = np.convolve(y, np.full(width, 1.0 / width), mode="valid")
-    steps = np.hypot(
-        np.diff(f) / np.ptp(f), np.diff(y) / max(float(np.ptp(y)), np.finfo(float).tiny)
-    )
-    along = np.concatenate([[0.0], np.cumsum(steps)])
-    on = np.searchsorted(along, np.linspace(0.0, along[-1], _DRAWN))
-    return np.unique(np.append(np.minimum(on, len(f) - 1), int(H.argmax())))

@@ -29,7 +29,6 @@ Charts = Callable[[Arrays, Mapping[str, Any]], list[Chart]]
 _INPUT_CHECKS = (
     "patch rim",
     "Dundurs beta",
-    "contact radius against sphere",
     "slope in the contact",
 )
 

@@ -75,7 +75,10 @@ def flat_charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     normal, sheared = _loaded(arrays), _by_case(arrays, "tangential")
     first = next(iter(normal), None)
     return [
-        *(_pressure(c, g, sheet=k < _SHOWN) for k, (c, g) in enumerate(normal.items())),
+        *(
+            face_pressure(case.label, groups, sheet=k < _SHOWN)
+            for k, (case, groups) in enumerate(normal.items())
+        ),
         *([_per_length(normal)] if normal else []),
         *(
             _states(case, groups, normal[load], sheet=load == first, columns=_ratios(sheared))
@@ -340,22 +343,19 @@ def _states(case: Case, groups: list[Group], normal: list[Group], **more: Any) -
     return face_chart("Stick and slip", groups, case.label, "stick_slip", **more)
 
 
-def _joined(groups: list[Group], name: str) -> Array:
-    """A field of all faces as one row."""
-    return np.concatenate([values(group, name).ravel() for group in groups])
-
-
-def _pressure(case: Case, groups: list[Group], sheet: bool) -> Chart:
-    p = _joined(groups, "pressure")
-    top = float(np.percentile(p, TOP_PERCENTILE))
-    note = (
-        f"The largest pressure, {p.max():.3g} MPa, is an edge's; the colours end at the 99th "
-        "percentile. Open nodes are white."
-    )
-    more: dict[str, Any] = {"sheet": sheet, "columns": 3, "detail": f"largest {p.max():.3g} MPa"}
-    maps = tuple(pressure_map(group, 1.0, top=top) for group in groups)
-    title = "Contact pressure"
-    return face_chart(title, groups, case.label, "pressure", maps=maps, note=note, **more)
+def face_pressure(case: str, groups: list[Group], *, sheet: bool) -> Chart:
+    """Pressure of faces; the colours end where only edges go on."""
+    p = np.concatenate([values(group, "pressure").ravel() for group in groups])
+    top = float(np.percentile(p[p > 0.0], TOP_PERCENTILE)) if (p > 0.0).any() else None
+    more: dict[str, Any] = {
+        "maps": tuple(pressure_map(group, 1.0, top=top) for group in groups),
+        "note": "Open nodes are white; the colours end at the 99th percentile, where only edges "
+        "go on.",
+        "sheet": sheet,
+        "columns": 3,
+        "detail": f"largest {p.max():.3g} MPa",
+    }
+    return face_chart("Contact pressure", groups, case, "pressure", **more)
 
 
 def _per_length(normal: Faces) -> Chart:

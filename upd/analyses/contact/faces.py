@@ -23,7 +23,7 @@ from upd.contact.edge import LocatedArea, located_area
 from upd.contact.law import ContactLaw, contact_points
 from upd.contact.normal import NormalContact
 from upd.contact.patch import ContactMeasures, Patch, measure
-from upd.mesh import IntArray, Mesh
+from upd.mesh import IntArray
 
 Array = NDArray[np.float64]
 
@@ -246,7 +246,7 @@ def band_centres(solution: ContactSolution) -> list[float]:
     nodes = upper.nodes["distant"]
     x, weights = upper.points[nodes, 0], upper.weights.get("distant")
     found = []  # lower and upper end, middle
-    for part in _joined(upper, nodes):
+    for part in joined(upper.hexes, nodes):
         # A set without weights is as wide as its nodes lie apart.
         low, high = float(x[part].min()), float(x[part].max())
         middle = 0.5 * (low + high)
@@ -261,11 +261,11 @@ def band_centres(solution: ContactSolution) -> list[float]:
     return [middle for _, _, middle in sorted(found)]
 
 
-def _joined(mesh: Mesh, nodes: IntArray) -> list[IntArray]:
-    """Positions in ``nodes`` of those that elements join, part by part."""
-    number = np.full(mesh.n_node, -1)
+def joined(cells: IntArray, nodes: IntArray) -> list[IntArray]:
+    """Positions in ``nodes``, part by part, of those that cells (n, nodes of each) join."""
+    number = np.full(int(max(cells.max(), nodes.max())) + 1, -1)
     number[nodes] = np.arange(len(nodes))
-    at = number[mesh.hexes]
+    at = number[cells]
     first = np.broadcast_to(at.max(axis=1, keepdims=True), at.shape)
     both = at >= 0
     links = coo_array((np.ones(both.sum()), (first[both], at[both])), shape=(len(nodes),) * 2)

@@ -9,12 +9,11 @@ from dataclasses import replace
 from functools import partial
 
 from upd.analyses.base import chosen_by_accuracy, refuse_oversize
-from upd.analyses.modal.plan import ModalPlan, make_plan
+from upd.analyses.modal.plan import MODES_ABOVE, ModalPlan, make_plan
 from upd.analyses.modal.results import REDUCED, make_results
 from upd.analyses.modal.solve import ModalSolution, solve
 from upd.progress import Stages
 from upd.results import ErrorPart, Estimates, Result
-from upd.results import quantities as q
 from upd.results.quantities import quantity_of
 from upd.scene import RigScene
 from upd.vary.errors import estimate, estimate_in_round, merged
@@ -79,10 +78,10 @@ def _by_modes(solution: ModalSolution, numbers: Sequence[Result]) -> Estimates:
         if full is not None:
             error = abs(one.value / full.value - 1.0)
             out[one.name, one.case] = (ErrorPart(KEPT, error, "against the full model"),)
-        if one.name == q.FREE_PEAK_ACCELERANCE.name and solution.more_modes is not None:
-            error = abs(solution.more_modes / one.value - 1.0)
-            basis = "solved again with the modes up to twice the limit"
-            out[one.name, one.case] = (ErrorPart(KEPT, error, basis),)
+    for again in (one for one in solution.left_out if one.effect == MODES_ABOVE):
+        error = abs(again.included / again.without - 1.0)
+        basis = "solved again with the modes up to twice the limit"
+        out[again.quantity, again.case] = (ErrorPart(KEPT, error, basis),)
     return out
 
 

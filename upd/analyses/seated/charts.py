@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.contact.charts import TOP_PERCENTILE, face_chart, values
+from upd.analyses.contact.charts import face_chart, face_pressure, values
 from upd.analyses.seated.output import FACE, HISTORY, MOVED, SEATING
 from upd.analyses.seated.plan import RAISED, SMOOTH, WAYS
 from upd.plot.chart import STATES, Axis, Chart, Map, Style, Trace
-from upd.plot.common import UM, case_of, lattice, pressure_map, with_content
+from upd.plot.common import UM, case_of, lattice, with_content
 from upd.results import Arrays, Group
 from upd.scene.forced_contact import SIDES
 
@@ -44,7 +44,10 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     return [
         *(_seating(histories, summary, side) for side in SIDES if len(seating) == len(SEATING)),
         *_ways(histories),
-        *(_pressure(name, side, groups) for (name, side), groups in faces.items()),
+        *(
+            face_pressure(f"{name}, {side} face", groups, sheet=name == RAISED)
+            for (name, side), groups in faces.items()
+        ),
         *(_states(name, side, groups) for (name, side), groups in faces.items()),
         # what the scene moves first, then the vibration of a way of loading
         *(_moved(group) for group in sorted(moved, key=lambda one: case_of(one).name in WAYS)),
@@ -110,19 +113,6 @@ def _ways(histories: Mapping[str, Group]) -> list[Chart]:
     axes = Axis("way of loading", low=-0.5, high=len(found) - 0.5, ticks=ticks), _FORCE
     title = "Forces after each way of loading"
     return [Chart(title, *axes, tuple(traces), figure="seating", note=note)]
-
-
-def _pressure(name: str, side: str, groups: list[Group]) -> Chart:
-    p = np.concatenate([values(g, "pressure").ravel() for g in groups])
-    top = float(np.percentile(p[p > 0.0], TOP_PERCENTILE)) if (p > 0.0).any() else None
-    more: dict[str, Any] = {
-        "maps": tuple(pressure_map(g, 1.0, top=top) for g in groups),
-        "note": "Open nodes are white; the colours end at the 99th percentile, where only edges "
-        "go on.",
-        "sheet": name == RAISED,
-        "detail": f"largest {p.max():.3g} MPa",
-    }
-    return face_chart("Contact pressure", groups, f"{name}, {side} face", "pressure", **more)
 
 
 def _states(name: str, side: str, groups: list[Group]) -> Chart:

@@ -11,16 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from upd.analyses.contact.faces import FaceLattice
+from upd.analyses.contact.faces import FaceLattice, joined
 from upd.analyses.seated.plan import AGAIN, LOWERED, RAISED, WAYS
 from upd.analyses.seated.results import platform_force
 from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, STICK
 from upd.contact.patch import make_patch
-from upd.mesh import IntArray, Mesh
 from upd.results import Group, variable
 from upd.scene.forced_contact import SIDES, Side
 
@@ -173,7 +170,8 @@ def _faces(solution: SeatedSolution) -> list[tuple[Side, FaceLattice]]:
         mine = np.flatnonzero(of.face == k)
         points = np.column_stack([along, up - up[mine].min()])
         found = []
-        for part in _parts(solution.bodies.blades[side].mesh):
+        quads = solution.bodies.blades[side].mesh.faces["patch"][:, :4]
+        for part in joined(quads, np.unique(quads)):
             # the line on the plane once
             on_plane = half and bool((along[mine[part]] == 0.0).any())
             patch = make_patch(points, of.area, (on_plane, False), mine[part])
@@ -186,16 +184,6 @@ def _faces(solution: SeatedSolution) -> list[tuple[Side, FaceLattice]]:
             for i, one in enumerate(found)
         ]
     return out
-
-
-def _parts(mesh: Mesh) -> list[IntArray]:
-    """Places in the nodes of the patch of each connected part."""
-    nodes, faces = np.unique(mesh.faces["patch"][:, :4], return_inverse=True)
-    faces, n = faces.reshape(-1, 4), len(nodes)
-    ends = np.concatenate([faces[:, [k, (k + 1) % 4]] for k in range(4)])
-    graph = coo_array((np.ones(len(ends)), ends.T), shape=(n, n))
-    count, part = connected_components(graph, directed=False)
-    return [np.flatnonzero(part == k) for k in range(count)]
 
 
 def write_files(solution: SeatedSolution, folder: Path) -> None:
