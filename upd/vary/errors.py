@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any
@@ -54,7 +54,8 @@ def estimate(
         reason = found if isinstance(found, str) else ""
         half = partial(half_cost, problem, plan, source, run.seconds)
         parts.append(source_estimates(source, run, solved[source], half, reason))
-    return problem.corrected(solution, numbers, merged(*parts))
+    found_all = merged(*parts)
+    return problem.corrected(solution, numbers, found_all) if problem.corrected else found_all
 
 
 def estimate_in_round(
@@ -95,7 +96,7 @@ def estimate_in_round(
         return None
     half = partial(half_cost, problem, solution.plan, level.source, seconds)
     found = source_estimates(level.source, run, coarser, half)
-    return problem.corrected(solution, numbers, found)
+    return problem.corrected(solution, numbers, found) if problem.corrected else found
 
 
 def source_estimates(
@@ -129,8 +130,11 @@ def source_estimates(
     seconds = math.fsum(one.seconds for one in known)
     seconds_of_half = cache(partial(_or_reason, half))
     out: dict[Key, tuple[ErrorPart, ...]] = {}
-    for number in _judged(run.numbers):
+    for number in run.numbers:
         key = number.name, number.case
+        # an error itself has none
+        if number.withheld or quantity_of(number.name)[0].is_error:
+            continue
         found = bound(key, run, known)
         if math.isfinite(found.error):
             cost, why = seconds_of_half(
@@ -187,13 +191,6 @@ def _or_reason(half: Callable[[float], float], order: float) -> tuple[float | No
         return half(order), ""
     except InputError as error:
         return None, one_line(error)
-
-
-def _judged(numbers: Iterable[Result]) -> Iterator[Result]:
-    """Those that were reached and are no errors themselves."""
-    for one in numbers:
-        if not one.withheld and not quantity_of(one.name)[0].is_error:
-            yield one
 
 
 def merged(*found: Estimates) -> Estimates:

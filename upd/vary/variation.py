@@ -81,11 +81,6 @@ class SolvedVariation:
 Levels = Mapping[str, Sequence[Variation] | str]
 
 
-def _as_found(solution: Any, numbers: Sequence[Result], found: Estimates) -> Estimates:
-    del solution, numbers
-    return found
-
-
 @dataclass(frozen=True)
 class Problem:
     """What an analysis gives to have its scenes varied.
@@ -106,7 +101,7 @@ class Problem:
         solution -> its numbers at neighbouring loads; None where those show nothing.
     corrected
         solution, numbers of the run, the parts found -> the parts, with those that are known
-        otherwise.
+        otherwise; None where none are.
     """
 
     make_plan: Callable[[Any], Any]
@@ -116,4 +111,4 @@ class Problem:
     levels: Callable[[Any], Levels]
     finer: Callable[[Any, str, float], Overrides]
     sample: Callable[[Any], Samples] | None = None
-    corrected: Callable[[Any, Sequence[Result], Estimates], Estimates] = _as_found
+    corrected: Callable[[Any, Sequence[Result], Estimates], Estimates] | None = None

@@ -50,10 +50,6 @@ class LevelChoice:
     at: Callable[[Any, int], Any]
 
 
-def _whole(scene: Any) -> Any:
-    return scene
-
-
 @dataclass(frozen=True)
 class Wanted:
     """What an analysis gives to have its levels chosen.
@@ -91,7 +87,7 @@ class Wanted:
     estimate: Callable[[Any, Sequence[Result], Stages, list[SolvedVariation]], Estimates | None]
     refuse: Callable[[Any], None]
     chosen: Callable[[Any, str], Any]
-    trial: Callable[[Any], Any] = _whole
+    trial: Callable[[Any], Any] = lambda scene: scene
     predicted: Callable[[Any], Sequence[Any]] | None = None
 
 

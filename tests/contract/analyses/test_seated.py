@@ -13,8 +13,7 @@ from rigs import undeclared
 
 import upd
 from upd.analyses import make_plan, seated
-from upd.analyses.seated.interface import make_interface
-from upd.analyses.seated.interface import Interface
+from upd.analyses.seated.interface import Interface, make_interface
 from upd.analyses.seated.plan import AGAIN, LOWERED, OVER, RAISED, SHAKEN, SMOOTH
 from upd.analyses.seated.solve import SeatedSolution
 from upd.contact.damper_section import admissible_forces, moment_share

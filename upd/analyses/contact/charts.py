@@ -59,8 +59,12 @@ def curved_charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
             for case, (group,) in reversed(sheared.items())
             if Case(load=case.load) in normal
         ),
-        *(_tractions(group, mine) for group in loaded if (mine := _of_load(sheared, group))),
-        *_approaches(arrays),
+        *(
+            _tractions(group, mine)
+            for group in loaded
+            if (mine := [g for c, (g,) in sheared.items() if c.load == case_of(group).load])
+        ),
+        *(_approach(group) for group in with_content(arrays, "force-approach")),
         *(_over_load(group, *quantity) for group in curves for quantity in _OVER_LOAD),
         *(_compressions(group) for group in curves if _beyond_3a(group)),
         *(_loop(group) for group in reversed(with_content(arrays, "cycle"))),
@@ -85,7 +89,7 @@ def flat_charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
             for case, groups in reversed(sheared.items())
             if (load := Case(load=case.load)) in normal
         ),
-        *_approaches(arrays),
+        *(_approach(group) for group in with_content(arrays, "force-approach")),
         *_paths(arrays, "path"),
         *_paths(arrays, "cycle"),
         *(
@@ -135,12 +139,8 @@ def values(group: Group, name: str, scale: float = 1.0) -> Array:
     return np.asarray(group[name].data, float) * scale
 
 
-def _approaches(arrays: Arrays) -> list[Chart]:
-    """Force over approach, beside the closed form or the printed stiffness."""
-    return [_approach(group) for group in with_content(arrays, "force-approach")]
-
-
 def _approach(group: Group) -> Chart:
+    """Force over approach, beside the closed form or the printed stiffness."""
     F, d = values(group, "normal_force"), values(group, "approach", UM)
     # The curve of flat faces starts unloaded.
     flat, stiffness = F[0] != 0.0, scalar(group, "stiffness")
@@ -208,16 +208,6 @@ def _states_about_middle(group: Group, normal: Group, columns: int) -> Chart:
     more |= {"size": (4.6, 4.0), "columns": columns}
     states = state_map(group, _closed(normal), UM)
     return _about_middle("Stick and slip", group, normal, states, **more)
-
-
-def _of_load(sheared: Faces, normal: Group) -> list[Group]:
-    """The tangential loads after a normal one."""
-    return [one for case, (one,) in sheared.items() if case.load == case_of(normal).load]
-
-
-def _middle(field: Array) -> Array:
-    """The field along y = 0."""
-    return field[:, field.shape[1] // 2]
 
 
 def _three_sections(group: Group) -> Chart:
@@ -293,7 +283,7 @@ def _tractions(normal: Group, tangential: Sequence[Group]) -> Chart:
     for k, group in enumerate(tangential):
         x, q = values(group, "x", UM), values(group, "traction")
         inside, name = np.abs(x) <= half, f"T/µN={case_of(group).ratio:g}"
-        along = _middle(q[..., 0] if q.ndim == 3 else q)[inside]
+        along = (q[..., 0] if q.ndim == 3 else q)[:, q.shape[1] // 2][inside]
         computed.append(Trace(f"{name}, computed", x[inside], along, "points", k, entry=name))
         if "mindlin_traction" in group:
             at, y = values(group, "mindlin_x", UM), values(group, "mindlin_traction")

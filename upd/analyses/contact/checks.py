@@ -6,7 +6,7 @@ the size of the contact, the onset of yield, the effects left out.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -192,13 +192,6 @@ def _locking_check(solution: ContactSolution) -> Check:
     )
     largest = max(one.nu for one in solution.plan.scene.materials.values())
     return _warning("locking", NO_CASE, largest, 0.48, "Poisson's ratio of bodies of hex8", remedy)
-
-
-def _missing(shown: Iterable[str], made: set[str]) -> Iterable[Check]:
-    """A failed check for every effect left out whose check was not made."""
-    for name in (one for one in shown if one not in made):
-        what, remedy = f"the check of {name} was not made", "report this scene"
-        yield Check(name, NO_CASE, 1, 0, what, remedy)
 
 
 # -- size and place of the contact -----------------------------------------------------------------
@@ -409,7 +402,14 @@ def check_solution(solution: ContactSolution) -> list[Check]:
     checks += yield_checks(solution)
     checks += _left_out_checks(solution)
     checks += _curved_checks(solution) if solution.curved else [_flat_resolution_check(solution)]
-    return [*checks, *_missing(solution.plan.shown, {c.name for c in checks})]
+    missing = set(solution.plan.shown) - {c.name for c in checks}
+    return [
+        *checks,
+        *(
+            Check(name, NO_CASE, 1, 0, f"the check of {name} was not made", "report this scene")
+            for name in sorted(missing)
+        ),
+    ]
 
 
 def _normal(solution: ContactSolution, one: NormalCase) -> list[Check]:

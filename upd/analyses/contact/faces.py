@@ -238,8 +238,8 @@ def _whole(
 # -- peaks of the pressure of flat faces, and the bands that the load comes from -------------------
 
 
-def band_centres(solution: ContactSolution) -> list[float]:
-    """Middles along x (contact axes, mm) of the parts of the damper's distant set, which the loads
+def band_middles(solution: ContactSolution) -> list[float]:
+    """Middles along x (report axes, mm) of the parts of the damper's distant set, which the loads
     come from, both sides of a mirror.
     """
     upper = solution.model.upper.mesh
@@ -258,7 +258,7 @@ def band_centres(solution: ContactSolution) -> list[float]:
             found += [(low, high, middle), (-high, -low, -middle)]
         else:
             found.append((-high, high, 0.0))
-    return [middle for _, _, middle in sorted(found)]
+    return [float(middle - corner(solution)[0]) for _, _, middle in sorted(found)]
 
 
 def joined(cells: IntArray, nodes: IntArray) -> list[IntArray]:
@@ -271,23 +271,6 @@ def joined(cells: IntArray, nodes: IntArray) -> list[IntArray]:
     links = coo_array((np.ones(both.sum()), (first[both], at[both])), shape=(len(nodes),) * 2)
     count, part = connected_components(links, directed=False)
     return [np.flatnonzero(part == k) for k in range(count)]
-
-
-def band_middles(solution: ContactSolution) -> list[float]:
-    """The same in report axes, mm."""
-    return [float(c - corner(solution)[0]) for c in band_centres(solution)]
-
-
-def line_pressure(lattice: FaceLattice, force: Array) -> Array:
-    """(len(X),) normal force per length along x in N/mm.
-
-    Nodal forces summed over y, over the length each column stands for.
-    """
-    return np.asarray(
-        lattice.field(force, extensive=True).sum(axis=1)
-        * np.ptp(lattice.Y)
-        / lattice.area().sum(axis=1)
-    )
 
 
 def pressure_peaks(solution: ContactSolution, case: NormalCase) -> list[tuple[float, float]]:
@@ -305,18 +288,14 @@ def pressure_peaks(solution: ContactSolution, case: NormalCase) -> list[tuple[fl
     found, origin = [], corner(solution)
     for lattice in (k for k in lattices(solution) if k.lattice):
         force = lattice.field(case.solution.force, extensive=True)[1:-1]
-        X, p = lattice.X[1:-1], line_pressure(lattice, case.solution.force)[1:-1]
+        # normal force per length along x, N/mm: over the length each column stands for
+        X, lengths = lattice.X[1:-1], lattice.area().sum(axis=1)[1:-1] / np.ptp(lattice.Y)
+        p = force.sum(axis=1) / lengths
         tops, _ = find_peaks(p, prominence=0.1 * float(p.max(initial=0.0)), plateau_size=1)
         _, _, left, right = peak_widths(p, tops, rel_height=0.5)
         places = np.arange(len(X))
         for begin, end in zip(left, right, strict=True):
             inside = (places >= begin) & (places <= end)
-            middle = float(np.interp([begin, end], places, X).mean())
-            found.append(
-                (middle - origin[0], _centre(force[inside].sum(axis=0), lattice.Y) - origin[1])
-            )
+            middle, across = np.interp([begin, end], places, X).mean(), force[inside].sum(axis=0)
+            found.append((middle - origin[0], float(across @ lattice.Y / across.sum()) - origin[1]))
     return [(float(x), float(y)) for x, y in found]
-
-
-def _centre(force: Array, Y: Array) -> float:
-    return float(force @ Y / force.sum())

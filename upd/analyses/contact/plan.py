@@ -4,7 +4,7 @@ effects simulated and omitted, what the recipe is given, and what its meshes mus
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -124,12 +124,6 @@ def slip_components(scene: Scene, direction: float) -> tuple[int, ...]:
 def direction_name(direction: float) -> str:
     """x, y or the angle."""
     return {0.0: "x", 90.0: "y"}.get(direction % 360.0, f"{direction:g}deg")
-
-
-def unit_vector(direction: float, components: Sequence[int]) -> Array:
-    """(n_component,) of the unit vector along ``direction``."""
-    radians = np.radians(direction)
-    return np.asarray(np.array([np.cos(radians), np.sin(radians)])[list(components)])
 
 
 @dataclass(frozen=True)
@@ -287,7 +281,13 @@ def _friction_effects(scene: Scene, loaded: bool) -> list[Effect]:
     two, why = scene.slip_directions == 2, _TOGETHER if coupled else "asked for"
     if not two:
         why = "the load has one direction" if curved else "loads run along the axes"
-    shows = loaded and (not curved or _slip_shows(scene))
+    # a number of a curved contact that depends on the directions of slip
+    depends = (
+        (scene.wants("stiffness") and scene.sphere_radius is not None)
+        or (scene.wants("tangential") and len(scene.loads.tangential) > 0)
+        or scene.wants("cycle")
+    )
+    shows = loaded and (not curved or depends)
     return [
         _effect("friction", True, f"mu = {mu:g} and the outputs {outputs}"),
         _effect(DIRECTIONS, two, why, "contact.directions=2", shows=shows),
@@ -307,13 +307,6 @@ def _coupling_effect(scene: Scene, loaded: bool) -> Effect:
         )
     how = "asked for" if coupled else frozen
     return _effect(COUPLING, coupled, how, "contact.coupling=coupled", shows=loaded)
-
-
-def _slip_shows(scene: Scene) -> bool:
-    """Whether a number of the run depends on the directions of slip."""
-    shear = scene.wants("stiffness") and scene.sphere_radius is not None
-    loads = scene.wants("tangential") and len(scene.loads.tangential) > 0
-    return shear or loads or scene.wants("cycle")
 
 
 def _inside(scene: Scene) -> list[str]:

@@ -85,7 +85,8 @@ def solve_normal(solution: ContactSolution, stages: Stages) -> None:
     loads = planned.normal_loads(plan.scene)
     wanted = [load.force for load in loads]
     curve = _curve_loads(plan, max(wanted), solution.curved)
-    around = loading.slope_loads(wanted) if _by_slope(solution) else []
+    steps = (-loading.LOAD_STEP, 0.0, loading.LOAD_STEP) if _by_slope(solution) else ()
+    around = [F * (1.0 + s) for F in wanted for s in steps]
     with stages("normal contact", f"{len({*wanted, *curve, *around})} loads"):
         found = press(solution, [*wanted, *curve, *around])
         solution.normal = [_case(solution, load, found) for load in loads]
@@ -179,15 +180,13 @@ def _sheared_too(
     for F, state in states.items():
         sloped = all(F * (1.0 + s) in states for s in (-loading.LOAD_STEP, loading.LOAD_STEP))
         free = loading.slope(states, F) if sloped else float("nan")
-        held = _held_stiffness(state) if arms.size and sloped and body is None else free
+        held = free
+        if arms.size and sloped and body is None:
+            # dF/d approach with the tilts held and the states kept, shifts following
+            held = float(1.0 / np.linalg.inv(state.found.stiffness()[:3, :3])[0, 0])
         tilt = state.motion[3:] if arms.size else None
         out[F] = PressedContact(loading.as_normal(state, held), free, state, tilt)
     return out
-
-
-def _held_stiffness(state: loading.CoupledState) -> float:
-    """dF/d approach in N/mm with the tilts held and the states kept, shifts following."""
-    return float(1.0 / np.linalg.inv(state.found.stiffness()[:3, :3])[0, 0])
 
 
 def _bodies_alone(solution: ContactSolution) -> tuple[Body, ...]:
@@ -272,7 +271,8 @@ class Frozen:
         scene, force = solution.plan.scene, case.solution.force
         self.solution, self.case, self.direction = solution, case, direction
         self.components = planned.slip_components(scene, direction)
-        self.unit = planned.unit_vector(direction, self.components)
+        angle, axes = np.radians(direction), list(self.components)
+        self.unit = np.array([np.cos(angle), np.sin(angle)])[axes]
         self.friction, self.loads = scene.contact.friction, scene.loads
         self.copies = solution.plan.copies
         self.loaded = np.flatnonzero(force > 0.0)
