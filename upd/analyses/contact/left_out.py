@@ -27,7 +27,7 @@ from upd.contact.checks import few_threads
 from upd.contact.model import ContactModel
 from upd.errors import InputError, UpdError
 from upd.progress import Stages
-from upd.results import Result
+from upd.results import Case, Result
 from upd.results import quantities as q
 from upd.scene import Scene
 from upd.vary.solve import changed
@@ -152,10 +152,10 @@ def _displaced(plan: ContactPlan, model: ContactModel) -> list[Result]:
         return press(displaced, [load])[load].solution.approach
 
     out = []
-    for load in (one for one in planned.normal_loads(plan.scene) if one.force > 0.0):
-        low, own, high = (approach(load.force * (1.0 + s)) for s in (-LOAD_STEP, 0.0, LOAD_STEP))
-        stiffness = 2.0 * LOAD_STEP * load.force / (high - low)
-        out += [q.K_N_TANGENT_RAW.of(stiffness, load.case), q.APPROACH.of(own, load.case)]
+    for F in (load for load in planned.normal_loads(plan.scene) if load > 0.0):
+        low, own, high = (approach(F * (1.0 + s)) for s in (-LOAD_STEP, 0.0, LOAD_STEP))
+        stiffness, case = 2.0 * LOAD_STEP * F / (high - low), Case(load=F)
+        out += [q.K_N_TANGENT_RAW.of(stiffness, case), q.APPROACH.of(own, case)]
     return out
 
 

@@ -126,44 +126,30 @@ def direction_name(direction: float) -> str:
     return {0.0: "x", 90.0: "y"}.get(direction % 360.0, f"{direction:g}deg")
 
 
-@dataclass(frozen=True)
-class DamperLoad:
-    """A normal force in N, and the damper's equilibrium it comes from, if any."""
-
-    force: float
-    state: str = ""
-    faces: FaceForces | None = None
-
-    @property
-    def case(self) -> Case:
-        """The force, with as many digits as distinguish the scene's loads."""
-        return Case(load=self.force)
-
-
-def normal_loads(scene: Scene) -> tuple[DamperLoad, ...]:
-    """The scene's normal loads in N. Raises InputError, with all problems, for an equilibrium that
-    jams or lifts.
+def normal_loads(scene: Scene) -> dict[float, tuple[str, FaceForces] | None]:
+    """The scene's normal loads in N, each with the damper's state and equilibrium it comes from, if
+    any. Raises InputError, with all problems, for an equilibrium that jams or lifts.
     """
-    loads, problems = [], []
+    loads: dict[float, tuple[str, FaceForces] | None] = {}
+    problems = []
     for value in dict.fromkeys(scene.loads.normal):
         if not isinstance(value, str):
-            loads.append(DamperLoad(float(value)))
+            loads.setdefault(float(value), None)
             continue
         try:
-            parameters = mesh_parameters(scene, "full")
-            left, right = recipes.inclination(scene.recipe, parameters)
+            left, right = recipes.inclination(scene.recipe, mesh_parameters(scene, "full"))
             assert scene.loads.centrifugal is not None
             found = equilibrium(left, right, scene.loads.centrifugal, scene.contact.friction, value)
-            loads.append(DamperLoad(found.normal_right, value, found))
+            loads.setdefault(found.normal_right, (value, found))
         except InputError as error:
             problems.append(f"loads.normal: {value!r}: {error}")
     if problems:
         raise InputError("\n".join(problems))
     # Without friction all equilibria are one.
-    different: dict[str, DamperLoad] = {}
-    for load in loads:
-        different.setdefault(load.case.label, load)
-    return tuple(different.values())
+    different: dict[str, float] = {}
+    for force in loads:
+        different.setdefault(Case(load=force).label, force)
+    return {force: loads[force] for force in different.values()}
 
 
 def choose_symmetry(scene: Scene) -> tuple[str, str]:

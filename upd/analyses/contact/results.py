@@ -129,7 +129,7 @@ def printed_of(scene: Scene) -> Lookup:
     look_up, ready = printed.printed_of(scene), printed.ready_scene(scene)
     if ready is None or recipes.closed_form(scene.recipe):
         return look_up
-    loads = {round(load.force) for load in normal_loads(ready)}
+    loads = {round(load) for load in normal_loads(ready)}
 
     def under_load(name: str, case: Mapping[str, Any]) -> tuple[Printed, ...]:
         load = case.get("load")
@@ -150,14 +150,13 @@ def _area(solution: ContactSolution, area: Quantity) -> Quantity:
 
 def _equilibrium(solution: ContactSolution) -> list[Result]:
     out = []
-    for load in (case.load for case in solution.normal):
-        if load.faces is not None:
-            case = Case(name="equilibrium", friction=load.state)
-            out += [
-                q.F_N.of(load.faces.normal_right, case),
-                q.F_T.of(load.faces.tangential_right, case),
-                q.F_N_OTHER_FACE.of(load.faces.normal_left, case),
-            ]
+    for state, balance in filter(None, normal_loads(solution.plan.scene).values()):
+        case = Case(name="equilibrium", friction=state)
+        out += [
+            q.F_N.of(balance.normal_right, case),
+            q.F_T.of(balance.tangential_right, case),
+            q.F_N_OTHER_FACE.of(balance.normal_left, case),
+        ]
     return out
 
 

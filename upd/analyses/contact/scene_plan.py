@@ -32,7 +32,7 @@ def make_plan(scene: Scene) -> ContactPlan:
             f"materials: a contact has two bodies, {len(scene.materials)} given "
             f"({', '.join(scene.materials)})"
         )
-    loaded = any(load.force > 0.0 for load in planned.normal_loads(scene))
+    loaded = any(load > 0.0 for load in planned.normal_loads(scene))
     if not is_curved(scene):
         _require_fitting(scene)
     symmetry, why = planned.choose_symmetry(scene)

@@ -19,7 +19,7 @@ from upd.analyses.contact import loading
 from upd.analyses.contact import plan as planned
 from upd.analyses.contact.bodies import learns, prepare, show_normal, solve_inside
 from upd.analyses.contact.faces import measured
-from upd.analyses.contact.plan import NORMAL, ContactPlan, DamperLoad
+from upd.analyses.contact.plan import NORMAL, ContactPlan
 from upd.analyses.contact.solution import (
     ContactSolution,
     NormalCase,
@@ -82,15 +82,21 @@ def solve_plan(
 def solve_normal(solution: ContactSolution, stages: Stages) -> None:
     """Every normal load and the force-approach curve."""
     plan = solution.plan
-    loads = planned.normal_loads(plan.scene)
-    wanted = [load.force for load in loads]
+    wanted = list(planned.normal_loads(plan.scene))
     curve = _curve_loads(plan, max(wanted), solution.curved)
     steps = (-loading.LOAD_STEP, 0.0, loading.LOAD_STEP) if _by_slope(solution) else ()
     around = [F * (1.0 + s) for F in wanted for s in steps]
     with stages("normal contact", f"{len({*wanted, *curve, *around})} loads"):
         found = press(solution, [*wanted, *curve, *around])
-        solution.normal = [_case(solution, load, found) for load in loads]
-        solution.curve = [_case(solution, DamperLoad(F), found) for F in curve]
+        solution.normal, solution.curve = (
+            [
+                NormalCase(
+                    **vars(found[F]), force=F, measures=measured(solution, found[F].solution, F)
+                )
+                for F in loads
+            ]
+            for loads in (wanted, curve)
+        )
         for body in _bodies_alone(solution):
             alone = press(solution, [*wanted, *around], body)
             for case in solution.normal:
@@ -197,13 +203,6 @@ def _bodies_alone(solution: ContactSolution) -> tuple[Body, ...]:
     if scene.wants("stiffness"):
         return model.upper, model.lower
     return (model.upper,) if scene.wants("contact_law") and scene.law.bodies == "upper" else ()
-
-
-def _case(
-    solution: ContactSolution, load: DamperLoad, found: dict[float, PressedContact]
-) -> NormalCase:
-    measures = measured(solution, found[load.force].solution, load.force)
-    return NormalCase(**vars(found[load.force]), load=load, measures=measures)
 
 
 # -- tangential loads ------------------------------------------------------------------------------
