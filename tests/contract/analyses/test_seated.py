@@ -234,14 +234,6 @@ def test_blade_moved_in_cycles_closes_its_loop(wedge: SeatedSolution) -> None:
     assert loss > 0.0
 
 
-def test_state_is_left_in_the_folder(wedge: SeatedSolution) -> None:
-    """Of the nodes of both faces, after each way of loading."""
-    groups = seated.ANALYSIS.arrays(wedge)
-    state, found = groups[f"state {OVER}"], wedge.phases[OVER].found
-    np.testing.assert_array_equal(state["force"][1], found.force[-1])
-    assert len(groups["faces"]["position"][1]) == wedge.interface.n
-
-
 def test_a_way_that_fails_leaves_the_raised_state(monkeypatch: pytest.MonkeyPatch) -> None:
     seat = Interface.seat
 
