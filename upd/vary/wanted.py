@@ -253,14 +253,11 @@ class LevelSearch:
         where no number has a bound yet.
         """
         if shares is None:
-            return self._within_memory(self._lifted(levels, 0))
+            return self._higher(levels, 0)
         missed = {key: parts for key, parts in shares.items() if 1.0 < _sum(parts) < math.inf}
         for key in sorted(missed, key=lambda key: -_sum(missed[key])):
             parts = missed[key]
-            higher = {
-                one.source: self._within_memory(self._lifted(levels, k))
-                for k, one in enumerate(self.choices)
-            }
+            higher = {one.source: self._higher(levels, k) for k, one in enumerate(self.choices)}
             raisable = {s: share for s, share in parts.items() if higher.get(s) is not None}
             if not raisable or _sum(parts) - _sum(raisable) > 1.0:
                 continue
@@ -274,19 +271,16 @@ class LevelSearch:
             return max(gains, key=lambda one: gains[one])
         return None
 
-    def _lifted(self, levels: Levels, k: int) -> Levels | None:
-        """The levels with a choice one higher; None where there is none."""
+    def _higher(self, levels: Levels, k: int) -> Levels | None:
+        """The levels with a choice one higher; None where there is none, or it does not fit."""
         if levels[k] + 1 == len(self.choices[k].labels):
             return None
-        return (*levels[:k], levels[k] + 1, *levels[k + 1 :])
-
-    def _within_memory(self, levels: Levels | None) -> Levels | None:
+        higher = (*levels[:k], levels[k] + 1, *levels[k + 1 :])
         try:
-            if levels is not None:
-                self.wanted.refuse(self.planned(levels))
+            self.wanted.refuse(self.planned(higher))
         except InputError:
             return None
-        return levels
+        return higher
 
     def text(self, levels: Levels) -> str:
         """The levels in words."""
