@@ -9,8 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from upd.analyses.contact.varied import neighbours
-from upd.vary.orders import ladder_error
-from upd.vary.scatter import sampled_error
+from upd.vary.orders import ladder_error, sampled_error
 
 FloatArray = NDArray[np.float64]
 #: sizes of a run and its companions

@@ -147,12 +147,6 @@ APPROACH_FINITE_BODY = Quantity(
     "finite bodies in the approach",
     source="solved for, without the mesh's error",
 )
-APPROACH_FAR_MESH = Quantity(
-    "approach_far_mesh",
-    "um",
-    "error of the far mesh in the approach",
-    source="fitted along the axis less solved",
-)
 APPROACH_WITHIN_3A = Quantity("approach_within_3a", "um", "approach within 3a (thesis 6.5)")
 COMPRESSION_3A = Quantity("compression_3a_{n}", "um", "{n} beyond 3a")
 K_N_TANGENT = Quantity("K_N_tangent", "N/mm", "K_N tangent, bulk compliance removed")
@@ -169,9 +163,6 @@ STICK_RADIUS = Quantity("stick_radius", "um", "stick radius")
 SHEAR_RAW = Quantity("tangential_displacement_raw", "um", "displacement, raw")
 SHEAR = Quantity("tangential_displacement", "um", "displacement, bulk compliance removed")
 MISFIT = Quantity("traction_misfit_L2", words="traction misfit (L2)", is_error=True)
-MISFIT_OF_LIMIT = Quantity(
-    "traction_misfit_of_limit_L2", words="traction misfit (L2) over mu p", is_error=True
-)
 
 # -- flat contact ----------------------------------------------------------------------------------
 
@@ -198,12 +189,9 @@ LAW_POINTS = Quantity("law_points", words="contact points")
 LAW_K_N = Quantity("law_k_n", "N/mm", "contact points, sum of k_n")
 LAW_K_T = Quantity("law_k_t{n}", "N/mm", "contact points, sum of k_t along {n}")
 LAW_PRELOAD = Quantity("law_preload", "N", "contact points, sum of preloads")
-LAW_LUMPING = Quantity("law_lumping_{n}", "%", "contact points, spread along {n} lost by lumping")
-LAW_TILT = Quantity("law_tilt_{n}", "N mm", "contact points, tilt stiffness along {n}")
 TANGENTIAL_LOAD = Quantity("tangential_load", "N")
 DISPLACEMENT = Quantity("displacement", "um")
 STICK_SHARE = Quantity("stick_share", "%")
-SLOPE_SPREAD = Quantity("slope_spread", "%", "spread of the slope F_N / approach")
 
 # -- rig of two blades, free and glued -------------------------------------------------------------
 

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from upd.results.quantities import quantity_of
 from upd.vary.orders import (
     ErrorEstimate,
-    Extrapolation,
     change_order,
     estimate_error,
     extrapolate,
@@ -50,8 +49,6 @@ class ConvergenceCurve:
         The fitted rate; nan where the levels show none.
     thesis_error
         Relative error of a printed value.
-    limit
-        Where the ladder itself leads.
     change
         Order at which the number still changes, `upd.vary.orders.change_order`.
     estimate
@@ -71,7 +68,6 @@ class ConvergenceCurve:
     against: str
     order: float = float("nan")
     thesis_error: float | None = None
-    limit: Extrapolation | None = None
     change: float = float("nan")
     estimate: ErrorEstimate | None = None
 
@@ -164,7 +160,7 @@ def _curve(key: Key, points: Sequence[SolvedPoint], finer: SolvedPoint | None) -
         reference = np.array([finer.values[key]])
         against = f"finer level, {finer.point.source} {finer.point.label}"
     elif own is not None and change >= _CONVERGES:
-        reference, against = np.array([own.limit]), "its own extrapolation"
+        reference, against = np.array(own[:1]), "its own extrapolation"
     else:
         clear = len(h) < 3
         reference = np.array([_finest(points).values[key]])
@@ -181,7 +177,6 @@ def _curve(key: Key, points: Sequence[SolvedPoint], finer: SolvedPoint | None) -
         against,
         order=fit_rate(h, error) if clear else float("nan"),
         thesis_error=next((p.printed_errors[key] for p in points if key in p.printed_errors), None),
-        limit=own,
         change=change,
         estimate=estimate_error(h, values) if len(set(h)) == len(h) and not no_limit else None,
     )

@@ -1,9 +1,9 @@
-"""Errors of a run's numbers from variations of its scene: coarser levels, or a base refined."""
+"""Errors of a run's numbers from variations of its scene: coarser levels."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any
@@ -12,19 +12,13 @@ from upd.errors import InputError, one_line
 from upd.progress import Stages
 from upd.results import ErrorPart, Estimates, Result
 from upd.results.quantities import quantity_of
-from upd.vary.orders import (
-    ASSUMED,
-    UNCONFIRMED,
-    ErrorEstimate,
-    finer_level_error,
-    ladder_error,
-    two_level_error,
-)
-from upd.vary.scatter import sampled_error
-from upd.vary.solve import solve
+from upd.vary.orders import ErrorEstimate, ladder_error, sampled_error
+from upd.vary.solve import predicted_seconds, solve
 from upd.vary.variation import COARSER, RUN, Key, Problem, SolvedVariation, Variation
 
-_NONE, _LACKING = "not estimated: ", "no companion has this number"
+_LACKING = "no companion has this number"
+_ZERO = "the number is zero: its error is not relative to it"
+_SIGNLESS = "not estimated: zero or of the other sign on other levels"
 
 
 def estimate(
@@ -48,24 +42,20 @@ def estimate(
     if known is not None:
         return known
     plan, run = solution.plan, SolvedVariation(RUN, numbers, stages.elapsed())
-    variations, reasons = problem.levels(plan)
-    solved = solve(problem, plan.scene, run, variations, stages)
-    if variations and problem.sample is not None:
+    levels, parts = problem.levels(plan), list[Estimates]()
+    solved = {
+        source: [] if isinstance(found, str) else solve(problem, plan.scene, found, stages)
+        for source, found in levels.items()
+    }
+    if any(solved.values()) and problem.sample is not None:
         with stages("error estimates", "neighbouring loads"):
             run = replace(run, samples=problem.sample(solution))
-    found = merged(
-        *(
-            source_estimates(
-                source,
-                run,
-                [one for one in solved if one.variation.source == source],
-                partial(problem.half_cost, plan, source, run.seconds),
-                reasons.get(source, ""),
-            )
-            for source in problem.sources
-        )
-    )
-    return problem.corrected(solution, run, solved, found)
+    for source, found in levels.items():
+        reason = found if isinstance(found, str) else ""
+        half = partial(half_cost, problem, plan, source, run.seconds)
+        parts.append(source_estimates(source, run, solved[source], half, reason))
+    found_all = merged(*parts)
+    return problem.corrected(solution, numbers, found_all) if problem.corrected else found_all
 
 
 def estimate_in_round(
@@ -104,16 +94,16 @@ def estimate_in_round(
         memo.append(run)
     if not coarser:
         return None
-    half_cost = partial(problem.half_cost, solution.plan, level.source, seconds)
-    found = source_estimates(level.source, run, coarser, half_cost)
-    return problem.corrected(solution, run, coarser, found)
+    half = partial(half_cost, problem, solution.plan, level.source, seconds)
+    found = source_estimates(level.source, run, coarser, half)
+    return problem.corrected(solution, numbers, found) if problem.corrected else found
 
 
 def source_estimates(
     source: str,
     run: SolvedVariation,
     levels: Sequence[SolvedVariation],
-    half_cost: Callable[[float], float],
+    half: Callable[[float], float],
     reason: str = "",
 ) -> Estimates:
     """What one source adds to the errors of a run's numbers.
@@ -124,7 +114,7 @@ def source_estimates(
         Name of it.
     levels
         Its variations, the finest of coarser ones first.
-    half_cost
+    half
         Order of convergence -> seconds that a level with half the error adds. InputError where
         there is no such level.
     reason
@@ -137,16 +127,19 @@ def source_estimates(
     """
     known = [one for one in levels if not one.reason]
     faults = "; ".join(one.reason for one in levels if one.reason) if levels else reason
-    if faults and levels and levels[0].variation.base is not None:
-        faults = _NONE + faults
     seconds = math.fsum(one.seconds for one in known)
-    half = cache(partial(_half, half_cost))
+    seconds_of_half = cache(partial(_or_reason, half))
     out: dict[Key, tuple[ErrorPart, ...]] = {}
-    for number in _judged(run.numbers):
+    for number in run.numbers:
         key = number.name, number.case
+        # an error itself has none
+        if number.withheld or quantity_of(number.name)[0].is_error:
+            continue
         found = bound(key, run, known)
         if math.isfinite(found.error):
-            cost, why = half(found.order if 0.0 < found.order < math.inf else found.falls)
+            cost, why = seconds_of_half(
+                found.order if 0.0 < found.order < math.inf else found.falls
+            )
             part = ErrorPart(source, found.error, found.basis, cost, seconds, why)
         else:
             part = ErrorPart(source, math.nan, found.basis or faults or _LACKING)
@@ -157,64 +150,47 @@ def source_estimates(
 def bound(key: Key, run: SolvedVariation, levels: Sequence[SolvedVariation]) -> ErrorEstimate:
     """Bound of a number's error by what the levels of one source are.
 
-    A level with a base stands for the run: the run has the same error in proportion. Where the run
-    and its levels have the number at neighbouring loads it is `sampled_error`, `ladder_error` else.
+    Where the run and its levels have the number at neighbouring loads it is `sampled_error`,
+    `ladder_error` else.
 
     Returns
     -------
     ErrorEstimate
-        Its error is NaN, with the reason, where a level lacks the number or has it zero; without
-        one where no level has it.
+        Its error is NaN, with the reason, where the number is zero or has no sign; without one
+        where no level has it.
     """
-    if levels and (base := levels[0].base) is not None:
-        return _paired(key, base, levels[0])
     known = [one for one in levels if key in one.values]
     if not known:
         return ErrorEstimate(math.nan, math.nan, "")
+    own = run.values[key]
+    if any(one.values[key] * own <= 0.0 for one in known):
+        return ErrorEstimate(math.nan, math.nan, _SIGNLESS if own else _ZERO)
     if key in run.samples and all(key in one.samples for one in known):
         # Far coarser ones follow no law of the spacing yet.
         known = known[: len(COARSER)]
         at_loads = [run.samples[key], *(one.samples[key] for one in known)]
         found = sampled_error([1.0, *(one.variation.size for one in known)], at_loads)
     else:
-        values = [run.values[key], *(one.values[key] for one in known)]
+        values = [own, *(one.values[key] for one in known)]
         found = ladder_error([1.0, *(one.variation.size for one in known)], values)
-    if not math.isfinite(found.error):
-        return replace(found, basis="the number is zero: its error is not relative to it")
     labels = ", ".join(one.variation.label for one in known)
     return replace(found, basis=f"against {labels}: {found.basis}")
 
 
-def _paired(key: Key, base: SolvedVariation, other: SolvedVariation) -> ErrorEstimate:
-    """From a base that stands for the run, and the base with the source refined, or coarser."""
-    lost = next((one for one in (base, other) if not one.values.get(key)), None)
-    if lost is not None:
-        why = f"{lost.variation.label}: {'zero' if key in lost.values else 'without this number'}"
-        return ErrorEstimate(math.nan, math.nan, _NONE + why)
-    ratio, size = other.values[key] / base.values[key], other.variation.size
-    if size < 1.0:
-        error = finer_level_error(ratio, size)
-        shown = f"change with {other.variation.label}, and what that leaves"
-    else:
-        error = UNCONFIRMED * two_level_error(ratio, 1.0, size, ASSUMED)
-        shown = f"against {other.variation.label}"
-    basis = f"{shown}: two levels, order {ASSUMED:g} assumed, factor {UNCONFIRMED:g}"
-    return ErrorEstimate(error, math.nan, basis)
+def half_cost(problem: Problem, plan: Any, source: str, seconds: float, order: float) -> float:
+    """Seconds that half of an error of the order adds to a run of so many. Raises InputError."""
+    factor = 2.0 ** (1.0 / order)
+    finer = Variation(source, "", problem.finer(plan, source, factor), 1.0 / factor)
+    own = predicted_seconds(problem, plan, RUN)
+    return max(0.0, seconds * (predicted_seconds(problem, plan, finer) / own - 1.0))
 
 
-def _half(half_cost: Callable[[float], float], order: float) -> tuple[float | None, str]:
+def _or_reason(half: Callable[[float], float], order: float) -> tuple[float | None, str]:
     """Seconds of half an error, or why there are none."""
     try:
-        return half_cost(order), ""
+        return half(order), ""
     except InputError as error:
         return None, one_line(error)
-
-
-def _judged(numbers: Iterable[Result]) -> Iterator[Result]:
-    """Those that were reached and are no errors themselves."""
-    for one in numbers:
-        if not one.withheld and not quantity_of(one.name)[0].is_error:
-            yield one
 
 
 def merged(*found: Estimates) -> Estimates:

@@ -12,8 +12,9 @@ import logging
 import math
 import tomllib
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -25,7 +26,7 @@ from upd.scene import load_scene
 from upd.scene.quantities import Uncertainty
 from upd.scene.toml import put_back
 from upd.vary.solve import changed
-from upd.vary.variation import ALONE, POWER, Key, Overrides
+from upd.vary.variation import ALONE, Key, Overrides
 
 log = logging.getLogger(__name__)
 #: parameters of a recipe that say how fine a mesh is
@@ -34,16 +35,8 @@ _LEVELS = ("divisions", "refine")
 _COARSER, _LEAST = 0.7, 0.5
 
 
-@dataclass(frozen=True)
-class InputEnds:
-    """An input known within limits, the scene as its file gives it, and with the input at both ends
-    of its interval.
-    """
-
-    of: Uncertainty
-    given: Any
-    low: Any
-    high: Any
+#: an input known within limits, and the scene with it at both ends of its interval
+Ends = tuple[Uncertainty, Any, Any]
 
 
 def input_parts(
@@ -71,23 +64,22 @@ def input_parts(
     plan = solution.plan
     if not plan.scene.uncertain:
         return {}
-    ends = input_ends(plan.scene)
     main = [one for one in numbers if is_main(analysis, one)]
-    found: dict[str, tuple[dict[Key, float], str]] = {}
-    for one in ends:
-        path = one.of.path
+    out: dict[Key, tuple[InputPart, ...]] = {(one.name, one.case): () for one in main}
+    for ends in input_ends(plan.scene):
+        of = ends[0]
         try:
-            with stages("input uncertainty", f"{path}: both ends"):
-                found[path] = _solved_at_ends(analysis, plan, main, one)
+            with stages("input uncertainty", f"{of.path}: both ends"):
+                found, basis = _solved_at_ends(analysis, plan, main, ends)
         except UpdError as error:
-            log.info("%s: not solved at both ends: %s", path, error)
-            found[path] = {}, f"not solved at both ends ({one_line(error)})"
-    return {
-        (number.name, number.case): tuple(
-            _part(one, (number.name, number.case), *found[one.of.path]) for one in ends
-        )
-        for number in main
-    }
+            log.info("%s: not solved at both ends: %s", of.path, error)
+            found, basis = {}, f"not solved at both ends ({one_line(error)})"
+        for key, parts in out.items():
+            lost = bool(found) and key not in found
+            how = "this number was not found at both ends" if lost else basis
+            part = InputPart(of.path, of.relative, found.get(key, math.nan), how)
+            out[key] = (*parts, part)
+    return out
 
 
 def is_main(analysis: Any, number: Result) -> bool:
@@ -97,50 +89,36 @@ def is_main(analysis: Any, number: Result) -> bool:
     )
 
 
-def input_ends(scene: Any) -> list[InputEnds]:
+def input_ends(scene: Any) -> list[Ends]:
     """Every input known within limits, with the scene at both ends of its interval."""
     data = tomllib.loads(scene.text)
 
-    def at(one: Any, shift: float) -> Any:
+    def at(one: Uncertainty, shift: float) -> Any:
         return load_scene(put_back(data, one.steps, one.at(shift)))
 
-    given = load_scene(data)
-    return [InputEnds(one, given, at(one, -1.0), at(one, 1.0)) for one in scene.uncertain.values()]
+    return [(one, at(one, -1.0), at(one, 1.0)) for one in scene.uncertain.values()]
 
 
 def with_input_cost(analysis: Any, plan: Any) -> Any:
     """The plan with what its scene's inputs known within limits cost."""
     if not plan.scene.uncertain:
         return plan
-    ends = input_ends(plan.scene)
-    seconds = 2.0 * len(ends) * _companion_seconds(analysis, plan, ends[0])
+    ends, seconds = input_ends(plan.scene), 0.0
+    if recipes.counted_by_mesh(plan.scene.recipe):
+        # a plan runs a user's recipe once; the run makes coarser meshes: this much at most
+        seconds = plan.seconds - plan.estimate_seconds - plan.files_seconds
+    else:
+        # what is refused is not solved either
+        with suppress(UpdError):
+            cheap = analysis.make_plan(_cheap(analysis, plan, ends[0][1]))
+            seconds = cheap.seconds - cheap.files_seconds
+    seconds *= 2.0 * len(ends)
     return replace(plan, seconds=plan.seconds + seconds, input_seconds=seconds)
 
 
-def _companion_seconds(analysis: Any, plan: Any, one: InputEnds) -> float:
-    """Of the cheap companion at one end of an interval; all ends cost about the same."""
-    scene = changed(one.low, _coarser(analysis, plan))
-    own = plan.seconds - plan.estimate_seconds - plan.files_seconds
-    if recipes.counted_by_mesh(scene.recipe):
-        # a plan runs a user's recipe once: the run makes the coarser mesh
-        sizes = [(plan.parameters.get(name), scene.geometry.get(name)) for name in _LEVELS]
-        ratios = [b / a for a, b in sizes if _is_number(a) and _is_number(b)]
-        return float(own * min(ratios, default=1.0) ** POWER)
-    try:
-        companion = analysis.make_plan(scene)
-    except UpdError:
-        # not solved either
-        return 0.0
-    return float(companion.seconds - companion.files_seconds)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
-def _coarser(analysis: Any, plan: Any) -> Overrides:
-    """What makes a scene into its cheap level."""
-    return () if analysis.coarsened is None else analysis.coarsened(plan)
+def _cheap(analysis: Any, plan: Any, scene: Any) -> Any:
+    """The scene on its cheap level."""
+    return scene if analysis.coarsened is None else changed(scene, analysis.coarsened(plan))
 
 
 def coarsened_rig(plan: Any, wanted: tuple[str, ...], *more: tuple[str, Any]) -> Overrides:
@@ -161,18 +139,11 @@ def coarsened_rig(plan: Any, wanted: tuple[str, ...], *more: tuple[str, Any]) ->
     return alone
 
 
-def _part(one: InputEnds, key: Key, found: Mapping[Key, float], basis: str) -> InputPart:
-    if found and key not in found:
-        basis = "this number was not found at both ends"
-    return InputPart(one.of.path, one.of.relative, found.get(key, math.nan), basis)
-
-
 def _solved_at_ends(
-    analysis: Any, plan: Any, numbers: Sequence[Result], one: InputEnds
+    analysis: Any, plan: Any, numbers: Sequence[Result], ends: Ends
 ) -> tuple[dict[Key, float], str]:
     """Half of the relative change between both ends of an interval, each solved again, and how."""
-    coarser = _coarser(analysis, plan)
-    plans = [analysis.make_plan(changed(scene, coarser)) for scene in (one.low, one.high)]
+    plans = [analysis.make_plan(_cheap(analysis, plan, scene)) for scene in ends[1:]]
     sides = [
         [r for r in analysis.make_results(analysis.solve(each, Stages())) if not r.withheld]
         for each in plans

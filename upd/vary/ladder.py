@@ -102,12 +102,6 @@ def accuracy_report(
     return StudyReport(tuple(tables), bool(known), (), curves)
 
 
-def costs_title(scene: object, vary: str) -> str:
-    """Title of most studies."""
-    del scene
-    return f"what accuracy costs, {vary}"
-
-
 @dataclass(frozen=True)
 class Ladder:
     """What is varied in a scene, and the report of its numbers.
@@ -133,7 +127,7 @@ class Ladder:
     follow: tuple[str, ...] = ()
     report: Reporter = limit_report
     notes: Callable[[Any], Iterable[str]] = lambda scene: ()
-    title: Callable[[Any, str], str] = costs_title
+    title: Callable[[Any, str], str] = lambda scene, vary: f"what accuracy costs, {vary}"
     applies: Callable[[Any], bool] = lambda scene: True
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
-from scipy.special import fdtri, stdtrit
+from scipy.special import fdtri, stdtr, stdtrit
 
 from upd.errors import InputError
+from upd.results.case import Case
 
 FloatArray = NDArray[np.float64]
 
@@ -55,19 +57,8 @@ def fit_rate(h: ArrayLike, error: ArrayLike) -> float:
     return float(slope) if explained >= _EXPLAINED else float("nan")
 
 
-@dataclass(frozen=True)
-class Extrapolation:
-    """Limit of q(h) = limit + C h^order, and the largest deviation of the meshes from the fit,
-    relative to the limit.
-    """
-
-    limit: float
-    order: float
-    scatter: float
-
-
-def extrapolate(h: ArrayLike, values: ArrayLike) -> Extrapolation:
-    """Fit q(h) = limit + C h^p over three or more meshes.
+def extrapolate(h: ArrayLike, values: ArrayLike) -> tuple[float, float]:
+    """Limit and order p of q(h) = limit + C h^p over three or more meshes.
 
     p is the best of a fine grid from 0.5 to 4, limit and C are linear.
 
@@ -90,10 +81,7 @@ def extrapolate(h: ArrayLike, values: ArrayLike) -> Extrapolation:
 
     grid = np.linspace(0.5, 4.0, 141)
     best = min(grid, key=lambda p: fit(p)[0])
-    solution = fit(best)[1]
-    model = solution[0] + solution[1] * (size / size.max()) ** best
-    scale = abs(solution[0]) or 1.0
-    return Extrapolation(float(solution[0]), float(best), float(np.abs(model - q).max() / scale))
+    return float(fit(best)[1][0]), float(best)
 
 
 def two_level_error(coarse: float, fine: float, ratio: float, order: float = 1.0) -> float:
@@ -130,33 +118,6 @@ def two_level_error(coarse: float, fine: float, ratio: float, order: float = 1.0
     if fine == 0.0:
         return 0.0 if coarse == 0.0 else float("inf")
     return float(abs(fine - coarse) / (ratio**order - 1.0) / abs(fine))
-
-
-def finer_level_error(ratio: float, size: float) -> float:
-    """Bound of a level's relative error from one finer level.
-
-    The change to the finer level, and what that level leaves itself by Richardson's error with the
-    factor of safety of two levels.
-
-    Parameters
-    ----------
-    ratio
-        The number on the finer level over that on the level.
-    size
-        Of the finer level over that of the level, below 1.
-
-    Returns
-    -------
-    float
-        abs(ratio - 1) (1 + 3 / (size^-p - 1)), p the order the error is taken to have.
-
-    References
-    ----------
-    P. J. Roache, Verification and Validation in Computational Science and Engineering (1998), eq.
-    (5.4.2), and 5.6 on the factor of two grids.
-    """
-    rest = UNCONFIRMED * two_level_error(1.0, ratio, 1.0 / size, ASSUMED)
-    return abs(ratio - 1.0) + rest * abs(ratio)
 
 
 @dataclass(frozen=True)
@@ -394,15 +355,15 @@ def fitted_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
     if fine == 0.0:
         return ErrorEstimate(float("inf"), float("nan"), "the finest level is zero")
     found = {p: _weighted_fit(x, q, p) for p in np.linspace(_LOWEST, _FORMAL, 31)}
-    best, n = min(found, key=lambda p: found[p].squares), len(q)
-    least = found[best].squares / (n - 3)
-    gain = found[_FORMAL].squares - found[best].squares
+    best, n = min(found, key=lambda p: found[p][2]), len(q)
+    least = found[best][2] / (n - 3)
+    gain = found[_FORMAL][2] - found[best][2]
     free = best < _FORMAL and gain > fdtri(1, n - 3, CONFIDENCE) * least
     p, dof = (best, n - 3) if free else (_FORMAL, n - 2)
-    fit = found[p]
-    scatter = math.sqrt(fit.squares / dof * fit.variance)
+    limit, variance, squares = found[p]
+    scatter = math.sqrt(squares / dof * variance)
     half_width = float(stdtrit(dof, 0.5 + 0.5 * CONFIDENCE)) * scatter
-    away = _CONFIRMED * abs(fine - fit.limit)
+    away = _CONFIRMED * abs(fine - limit)
     order = float(p) if away > half_width else float("nan")
     shown = f"order {p:.1f}" if away > half_width else "scatter above convergence"
     basis = f"{shown}, least squares of {n} levels, {100 * CONFIDENCE:.0f} % interval"
@@ -426,23 +387,134 @@ def ladder_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
     return estimate_error(h, values) if one_way else fitted_error(h, values)
 
 
-@dataclass(frozen=True)
-class _Fit:
-    """limit + C h^p: the limit, its variance over that of the weighted deviations, the sum of their
-    squares.
-    """
-
-    limit: float
-    variance: float
-    squares: float
-
-
 def _weighted_fit(
     x: np.ndarray[Any, np.dtype[np.float64]], q: np.ndarray[Any, np.dtype[np.float64]], p: float
-) -> _Fit:
-    """Least squares with deviations that go with x^(3/2)."""
+) -> tuple[float, float, float]:
+    """limit + C h^p by least squares with deviations that go with x^(3/2).
+
+    The limit, its variance over that of the weighted deviations, the sum of their squares.
+    """
     weight = x**-SCATTER
     A = np.column_stack([weight, weight * x**p])
     solution, *_ = np.linalg.lstsq(A, weight * q, rcond=None)
     off = weight * q - A @ solution
-    return _Fit(float(solution[0]), float(np.linalg.inv(A.T @ A)[0, 0]), float(off @ off))
+    return float(solution[0]), float(np.linalg.inv(A.T @ A)[0, 0]), float(off @ off)
+
+
+# -- levels that are each sampled at neighbouring loads --------------------------------------------
+
+#: name and case of a number -> (n, 2): logarithms of neighbouring loads over that of the case, in
+#: one row 0, and the number at each
+Samples = Mapping[tuple[str, Case], FloatArray]
+#: orders of what scatter leaves: 1 of numbers that count nodes, whose edge is known to one spacing;
+#: 2 of integrals, the formal order of linear elements
+ORDERS = (1.0, 2.0)
+#: power of the load that the radius of a smooth curved contact goes with (Hertz)
+RADIUS = 1.0 / 3.0
+#: coefficients of a fit: the number, its slope and curvature over the load, the error
+_COEFFICIENTS = 4
+
+
+def sampled_error(sizes: Sequence[float], samples: Sequence[FloatArray]) -> ErrorEstimate:
+    r"""Bound the error of the finest of several levels by what each shows at neighbouring loads.
+
+    Nothing but x = h / a(F), the spacing over the radius of the contact, distinguishes a curved
+    contact on a lattice from its limit, if the bodies are large against it. So a number is
+
+    q(F, h) = Q(F) (1 + C x^p + s(x)),
+
+    with a smooth Q, a part of order p and a part s that changes its sign as the edge passes from
+    node to node. Levels at one load draw s once each and cannot tell it from C x^p. Neighbouring
+    loads move the edge through the lattice on one level, at the price of a contact set. Over all
+    loads and levels
+
+    log q = log Q(F0) + b t + c t^2 + C x^p,   t = log(F / F0),   x = h / a(F0) exp(-t / 3)
+
+    is fitted by least squares with deviations that go with x^(3/2), as the pressure falls to zero
+    as the root of the distance from the edge. What a sum over the lattice leaves on average is of
+    order 2, of a count of nodes of order 1; nothing shows which a number is, so both are fitted and
+    weighted by their likelihood, squares^(-n/2) with the same number of coefficients. n counts
+    levels, not loads: s changes little from a load to its neighbour, so that a level is one
+    observation of it; counted by loads, the weights go to the wrong order. The bound is exceeded by
+    the distance of the finest level's plain value from log Q(F0), under the two Student's t of this
+    limit with their weights, with a probability of 5 %.
+
+    Numbers that change their sign are fitted themselves instead of their logarithms.
+
+    Parameters
+    ----------
+    sizes
+        Of the levels over that of the finest, which is the first.
+    samples
+        Of each level, (n, 2): t and the number; of the finest one row has t = 0.
+
+    Returns
+    -------
+    ErrorEstimate
+        NaN where the samples are too few, or where the number is zero.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, Contact Mechanics (1985), sections 3.4 and 4.2: similarity, a ~ F^(1/3).
+    .. [2] J. A. Hoeting, D. Madigan, A. E. Raftery, C. T. Volinsky, Bayesian model averaging: a
+       tutorial, Statistical Science 14 (1999) 382: weights of models, averaged intervals.
+    .. [3] N. R. Draper, H. Smith, Applied Regression Analysis, 3rd ed. (1998), 1.4: the interval of
+       a coefficient.
+    """
+    t = np.concatenate([one[:, 0] for one in samples])
+    q = np.concatenate([one[:, 1] for one in samples])
+    x = np.concatenate(
+        [h * np.exp(-RADIUS * one[:, 0]) for h, one in zip(sizes, samples, strict=True)]
+    )
+    fine = float(samples[0][samples[0][:, 0] == 0.0, 1][0])
+    freedom = len(q) - _COEFFICIENTS
+    if freedom < 1 or fine == 0.0:
+        why = "the number is zero" if fine == 0.0 else f"{len(q)} samples: no estimate"
+        return ErrorEstimate(float("nan"), float("nan"), why)
+    logarithmic = bool(np.all(q / fine > 0.0))
+    y = np.log(q / fine) if logarithmic else q / fine - 1.0
+    fits = [_fit(t, x, y, p) for p in ORDERS]
+    away, spread, squares = (np.array(column) for column in zip(*fits, strict=True))
+    spread = spread * np.sqrt(squares / freedom)
+    least = float(squares.min())
+    weight = (squares / least) ** (-0.5 * len(sizes)) if least else (squares == 0.0).astype(float)
+    weight /= weight.sum()
+    bound = _exceeded(away, spread, weight, freedom)
+    k = int(weight.argmax())
+    share = ", ".join(f"{100 * w:.0f} % order {p:g}" for p, w in zip(ORDERS, weight, strict=True))
+    clear = abs(away[k]) > stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE) * spread[k]
+    return ErrorEstimate(
+        float(np.expm1(bound)) if logarithmic else bound,
+        ORDERS[k] if clear else float("nan"),
+        f"least squares of {len(q)} neighbouring loads on {len(sizes)} levels ({share}), "
+        f"{100 * CONFIDENCE:.0f} % interval",
+        ORDERS[k] if clear else SCATTER,
+    )
+
+
+def _fit(t: FloatArray, x: FloatArray, y: FloatArray, order: float) -> tuple[float, float, float]:
+    """The limit at t = 0, its standard error over that of a weighted deviation, their squares."""
+    weight = x**-SCATTER
+    A = np.column_stack([np.ones_like(t), t, t**2, x**order]) * weight[:, None]
+    solution, *_ = np.linalg.lstsq(A, weight * y, rcond=None)
+    off = weight * y - A @ solution
+    spread = np.sqrt(np.linalg.pinv(A.T @ A)[0, 0])
+    return float(solution[0]), float(spread), float(off @ off)
+
+
+def _exceeded(away: FloatArray, spread: FloatArray, weight: FloatArray, freedom: int) -> float:
+    """What the distances ``away`` +- Student's t times ``spread`` exceed with a probability of 5 %
+    under their weights.
+    """
+    likely = weight > 0.0
+    away, spread, weight = np.abs(away[likely]), spread[likely], weight[likely]
+    highest = float(np.max(away + stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE) * spread))
+    if not np.all(spread > 0.0):
+        return highest
+
+    def excess(bound: float) -> float:
+        beyond = stdtr(freedom, -(bound - away) / spread)
+        beyond = beyond + stdtr(freedom, -(bound + away) / spread)
+        return float(weight @ beyond) - (1.0 - CONFIDENCE)
+
+    return float(brentq(excess, 0.0, highest)) if excess(highest) < 0.0 else highest

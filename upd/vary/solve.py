@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import fields, replace
 from time import perf_counter
 from typing import Any
 
-from upd.errors import UpdError, one_line
+from upd.errors import InputError, UpdError, one_line
+from upd.linalg.select import memory_left
+from upd.mesh import recipes
 from upd.progress import Stages
 from upd.results import Result
-from upd.vary.scatter import Samples
-from upd.vary.variation import RUN, Overrides, Problem, SolvedVariation, Variation
+from upd.vary.orders import Samples
+from upd.vary.variation import POWER, Overrides, Problem, SolvedVariation, Variation
 
 log = logging.getLogger(__name__)
+#: source of error of all analyses
+MESH = "mesh"
+#: parts of a rig's refinement of its coarser levels
+REFINED = (0.7, 0.5)
 
 
 def changed(scene: Any, overrides: Overrides) -> Any:
@@ -33,38 +40,83 @@ def varied_plan(problem: Problem, scene: Any, variation: Variation) -> Any:
     return problem.make_plan(changed(scene, (*problem.bare(scene), *variation.overrides)))
 
 
-def solve(
-    problem: Problem,
-    scene: Any,
-    run: SolvedVariation,
-    variations: Sequence[Variation],
-    stages: Stages,
-) -> list[SolvedVariation]:
-    """Solve the variations of a scene, one after the other; a fault becomes its reason.
+def predicted_seconds(problem: Problem, plan: Any, variation: Variation) -> float:
+    """Of a variation of the plan's scene. Raises InputError where it does not fit the memory."""
+    scene = plan.scene
+    meshed = any(path.startswith("geometry.") for path, _ in variation.overrides)
+    if meshed and recipes.counted_by_mesh(scene.recipe):
+        # A plan runs a user's recipe once: the run makes these meshes.
+        return float(plan.solve_seconds * variation.size**-POWER)
+    level = varied_plan(problem, scene, variation)
+    room = scene.solver.memory or memory_left()
+    if level.memory_bytes > room:
+        raise InputError(f"needs {level.memory_bytes / 1e9:.2g} GB, there are {room / 1e9:.2g}")
+    return float(level.solve_seconds)
 
-    Parameters
-    ----------
-    run
-        The scene itself, solved.
-    variations
-        Bases before what is compared with them.
-    """
-    done = {RUN: run}
+
+def plan_with_estimates(problem: Problem, scene: Any) -> Any:
+    """The plan of a scene with what its variations cost. Raises InputError as ``make_plan``."""
+    plan, again = problem.make_plan(scene), 0.0
+    for found in problem.levels(plan).values():
+        for one in () if isinstance(found, str) else found:
+            # what is refused is the reason that the run gives
+            with suppress(InputError):
+                again += predicted_seconds(problem, plan, one)
+    return replace(plan, seconds=plan.seconds + again, estimate_seconds=again)
+
+
+def solve(
+    problem: Problem, scene: Any, variations: Sequence[Variation], stages: Stages
+) -> list[SolvedVariation]:
+    """Solve the variations of a scene, one after the other; a fault becomes its reason."""
+    done = []
     for one in variations:
-        base = None if one.base is None else done[one.base]
-        if base is not None and base.reason:
-            done[one] = SolvedVariation(one, reason=f"{base.variation.label} was not solved")
-            continue
         begin = perf_counter()
         try:
             with stages("error estimates", one.label):
                 numbers, samples = _numbers(problem, scene, one)
         except UpdError as error:
             log.info("variation with %s not solved: %s", one.label, error)
-            done[one] = SolvedVariation(one, reason=f"{one.label}: {one_line(error)}")
+            done.append(SolvedVariation(one, reason=f"{one.label}: {one_line(error)}"))
             continue
-        done[one] = SolvedVariation(one, numbers, perf_counter() - begin, samples, base)
-    return list(done.values())[1:]
+        done.append(SolvedVariation(one, numbers, perf_counter() - begin, samples))
+    return done
+
+
+# -- rigs: elements along every edge go with geometry.refine ---------------------------------------
+
+
+def refinement(scene: Any) -> float | None:
+    """Elements along every edge over those of the recipe; None where it has no such number."""
+    known = {one.name: one.default for one in fields(recipes.parameters(scene.recipe))}
+    refine = scene.geometry.get("refine", known.get("refine"))
+    return float(refine) if isinstance(refine, (int, float)) else None
+
+
+def refined(scene: Any, factor: float) -> Overrides:
+    """So many times the elements along every edge."""
+    return (("geometry.refine", factor * (refinement(scene) or 1.0)),)
+
+
+def coarser_rigs(problem: Problem, plan: Any) -> list[Variation] | str:
+    """The rig with fewer elements along every edge; why there is none."""
+    made: list[Variation] = []
+    for part in () if refinement(plan.scene) is None else REFINED:
+        overrides = refined(plan.scene, part)
+        one = Variation(MESH, f"geometry.refine = {overrides[0][1]:.2g}", overrides)
+        try:
+            coarse = varied_plan(problem, plan.scene, one)
+        except InputError:
+            # As coarse as it can be.
+            continue
+        size = (_hexes(plan) / _hexes(coarse)) ** (1.0 / 3.0)
+        if size > max((level.size for level in made), default=1.0):
+            made.append(replace(one, size=size))
+    return made or "the rig cannot be meshed coarser: its recipe has no smaller refinement"
+
+
+def _hexes(plan: Any) -> int:
+    return sum(count["hexes"] for count in plan.size.values())
 
 
 def _numbers(

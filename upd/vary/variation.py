@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 from upd.progress import Stages
 from upd.results import Case, Estimates, Result
 from upd.scene.quantities import UNKNOWN
-from upd.vary.scatter import Samples
+from upd.vary.orders import Samples
 
 Key = tuple[str, Case]
 #: paths of a scene, and their values in the unit inside: ("geometry.divisions", 8)
@@ -38,19 +38,16 @@ class Variation:
     overrides
         What changes in the scene.
     size
-        Of its elements or steps over that of its base: above 1 it is coarser, below 1 finer.
-    base
-        What it is compared with; None: the run, by the rules of a ladder of levels.
+        Of its elements or steps over that of the run: above 1 it is coarser.
     """
 
     source: str
     label: str
     overrides: Overrides = ()
     size: float = math.nan
-    base: Variation | None = None
 
 
-#: the run itself, as the base of a variation
+#: the run itself
 RUN = Variation("", "the run", size=1.0)
 
 
@@ -64,8 +61,6 @@ class SolvedVariation:
         Measured.
     samples
         The numbers at neighbouring loads, where it has them.
-    base
-        Its variation's base, solved.
     reason
         Why it was not solved, with its label.
     """
@@ -74,7 +69,6 @@ class SolvedVariation:
     numbers: Sequence[Result] = ()
     seconds: float = 0.0
     samples: Samples = field(default_factory=dict)
-    base: SolvedVariation | None = None
     reason: str = ""
 
     @cached_property
@@ -83,20 +77,8 @@ class SolvedVariation:
         return {(r.name, r.case): r.value for r in self.numbers if not r.withheld}
 
 
-class Levels(NamedTuple):
-    """What the errors of a run are estimated with: variations, bases before what they carry; why a
-    source has none.
-    """
-
-    variations: Sequence[Variation]
-    reasons: Mapping[str, str] = {}
-
-
-def _as_found(
-    solution: Any, run: SolvedVariation, solved: Sequence[SolvedVariation], found: Estimates
-) -> Estimates:
-    del solution, run, solved
-    return found
+#: source of error -> its variations, the finest of coarser ones first, or why there are none
+Levels = Mapping[str, Sequence[Variation] | str]
 
 
 @dataclass(frozen=True)
@@ -111,28 +93,22 @@ class Problem:
         plan, stages -> solution; its numbers.
     bare
         scene -> overrides without what costs and shows no number.
-    sources
-        Of errors that variations show, in the order of their parts.
     levels
         plan -> the variations that its errors are estimated with.
-    half_cost
-        plan, source, seconds of the run, order of convergence -> seconds that half of an error
-        adds. InputError: there is no such level.
+    finer
+        plan, source, factor -> overrides with elements or steps so many times smaller.
     sample
         solution -> its numbers at neighbouring loads; None where those show nothing.
     corrected
-        solution, the run, what was solved, the parts found -> the parts, with those that are known
-        otherwise.
+        solution, numbers of the run, the parts found -> the parts, with those that are known
+        otherwise; None where none are.
     """
 
     make_plan: Callable[[Any], Any]
     solve: Callable[[Any, Stages], Any]
     make_results: Callable[[Any], Sequence[Result]]
     bare: Callable[[Any], Overrides]
-    sources: tuple[str, ...]
     levels: Callable[[Any], Levels]
-    half_cost: Callable[[Any, str, float, float], float]
+    finer: Callable[[Any, str, float], Overrides]
     sample: Callable[[Any], Samples] | None = None
-    corrected: Callable[[Any, SolvedVariation, Sequence[SolvedVariation], Estimates], Estimates] = (
-        _as_found
-    )
+    corrected: Callable[[Any, Sequence[Result], Estimates], Estimates] | None = None

@@ -50,10 +50,6 @@ class LevelChoice:
     at: Callable[[Any, int], Any]
 
 
-def _whole(scene: Any) -> Any:
-    return scene
-
-
 @dataclass(frozen=True)
 class Wanted:
     """What an analysis gives to have its levels chosen.
@@ -91,7 +87,7 @@ class Wanted:
     estimate: Callable[[Any, Sequence[Result], Stages, list[SolvedVariation]], Estimates | None]
     refuse: Callable[[Any], None]
     chosen: Callable[[Any, str], Any]
-    trial: Callable[[Any], Any] = _whole
+    trial: Callable[[Any], Any] = lambda scene: scene
     predicted: Callable[[Any], Sequence[Any]] | None = None
 
 
@@ -165,7 +161,9 @@ def solve_wanted(wanted: Wanted, plan: Any, stages: Stages) -> tuple[Any, Estima
                 raise
             raise search.missed(one_line(refused), solution, found) from None
         shares = None if found is None else shares_of(found, search.accuracies)
-        search.rounds.append(f"{search.text(levels)}: {_farthest(shares or {})}")
+        worst = max(shares or {}, key=lambda key: _sum((shares or {})[key]), default=None)
+        told = "no bound yet" if not shares or worst is None else _obstacle(worst, shares[worst])
+        search.rounds.append(f"{search.text(levels)}: {told}")
         log.info("accuracy: %s", search.rounds[-1])
         raised = search.raised(levels, shares)
         if raised is None:
@@ -174,7 +172,7 @@ def solve_wanted(wanted: Wanted, plan: Any, stages: Stages) -> tuple[Any, Estima
     if lack := search.lack(shares or {}):
         raise search.missed(lack, solution, found)
     whole = search.planned(levels)
-    whole = wanted.chosen(whole, f"{search.saving(levels)}; rounds: {' | '.join(search.rounds)}")
+    whole = wanted.chosen(whole, f"{search.text(levels)}; rounds: {' | '.join(search.rounds)}")
     if whole.scene != trial.scene:
         solution = None
         solution, found = search.solved(whole)
@@ -255,14 +253,11 @@ class LevelSearch:
         where no number has a bound yet.
         """
         if shares is None:
-            return self._within_memory(self._lifted(levels, 0))
+            return self._higher(levels, 0)
         missed = {key: parts for key, parts in shares.items() if 1.0 < _sum(parts) < math.inf}
         for key in sorted(missed, key=lambda key: -_sum(missed[key])):
             parts = missed[key]
-            higher = {
-                one.source: self._within_memory(self._lifted(levels, k))
-                for k, one in enumerate(self.choices)
-            }
+            higher = {one.source: self._higher(levels, k) for k, one in enumerate(self.choices)}
             raisable = {s: share for s, share in parts.items() if higher.get(s) is not None}
             if not raisable or _sum(parts) - _sum(raisable) > 1.0:
                 continue
@@ -276,36 +271,21 @@ class LevelSearch:
             return max(gains, key=lambda one: gains[one])
         return None
 
-    def _lifted(self, levels: Levels, k: int) -> Levels | None:
-        """The levels with a choice one higher; None where there is none."""
+    def _higher(self, levels: Levels, k: int) -> Levels | None:
+        """The levels with a choice one higher; None where there is none, or it does not fit."""
         if levels[k] + 1 == len(self.choices[k].labels):
             return None
-        return (*levels[:k], levels[k] + 1, *levels[k + 1 :])
-
-    def _within_memory(self, levels: Levels | None) -> Levels | None:
+        higher = (*levels[:k], levels[k] + 1, *levels[k + 1 :])
         try:
-            if levels is not None:
-                self.wanted.refuse(self.planned(levels))
+            self.wanted.refuse(self.planned(higher))
         except InputError:
             return None
-        return levels
+        return higher
 
     def text(self, levels: Levels) -> str:
-        """What is above the lowest levels."""
-        return ", ".join(self._labels(levels, raised=True)) or "all at their lowest"
-
-    def _labels(self, levels: Levels, *, raised: bool) -> list[str]:
-        return [
-            f"{one.name} {one.labels[k]}"
-            for one, k in zip(self.choices, levels, strict=True)
-            if bool(k) == raised
-        ]
-
-    def saving(self, levels: Levels) -> str:
-        """What was raised, and what was not needed."""
-        text = f"raised: {', '.join(self._labels(levels, raised=True)) or 'nothing'}"
-        lowest = ", ".join(self._labels(levels, raised=False))
-        return f"{text}; not needed above: {lowest}" if lowest else text
+        """The levels in words."""
+        pairs = zip(self.choices, levels, strict=True)
+        return ", ".join(f"{one.name} {one.labels[k]}" for one, k in pairs)
 
     def lack(self, shares: Shares) -> str:
         """What is not reached and why, and what is; "" where all is."""
@@ -374,19 +354,10 @@ def _name(key: Key) -> str:
     return f"{key[0]} {key[1].label}".rstrip()
 
 
-def _farthest(shares: Shares) -> str:
-    key = max(shares, key=lambda key: _sum(shares[key]), default=None)
-    return "no bound yet" if key is None else f"{_name(key)} {_times(_sum(shares[key]))}"
-
-
-def _times(miss: float) -> str:
-    return f"{miss:.2g} times its accuracy" if math.isfinite(miss) else "without a bound"
-
-
 def _obstacle(key: Key, parts: Mapping[str, float]) -> str:
     """What keeps a number from its accuracy."""
     unknown = [source for source, error in parts.items() if not math.isfinite(error)]
     if unknown:
         return f"{_name(key)}: no estimate of what {', '.join(unknown)} leave"
     most = max(parts, key=lambda source: parts[source])
-    return f"{_name(key)}: most of it by {most}, {_times(_sum(parts))}"
+    return f"{_name(key)}: most of it by {most}, {_sum(parts):.2g} times its accuracy"

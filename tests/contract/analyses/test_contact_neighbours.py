@@ -61,5 +61,5 @@ def test_marched_contacts_have_none_and_keep_the_dearest_level() -> None:
     scene = load_scene("hertz", SMALL | {"contact.coupling": "coupled"})
     assert scene.coupled
     plan = make_plan(scene)
-    assert len(levels(plan).variations) == 3
-    assert len(levels(make_plan(load_scene("hertz", SMALL))).variations) == 2
+    assert len(levels(plan)["mesh"]) == 3
+    assert len(levels(make_plan(load_scene("hertz", SMALL)))["mesh"]) == 2

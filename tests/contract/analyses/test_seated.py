@@ -13,7 +13,7 @@ from rigs import undeclared
 
 import upd
 from upd.analyses import make_plan, seated
-from upd.analyses.seated.interface import make_interface
+from upd.analyses.seated.interface import Interface, make_interface
 from upd.analyses.seated.plan import AGAIN, LOWERED, OVER, RAISED, SHAKEN, SMOOTH
 from upd.analyses.seated.solve import SeatedSolution
 from upd.contact.rigid_damper import SLIDINGS, admissible_forces, equilibrium, moment_share
@@ -193,7 +193,7 @@ def test_stuck_stiffness_against_small_motion(wedge: SeatedSolution) -> None:
     for k, axis in enumerate(of.directions):
         step = moved.copy()
         step[0, axis] = tiny
-        found = of.seat_on(phase.found, [F_C], moved=step)
+        found = of.seat(0.6, [F_C], moved=step, after=phase.found)
         if (found.state[-1] == 2).any():
             continue
         force = (of.face_forces(found)[-1, 1] - wedge.forces(SHAKEN)[1]) @ -of.frame[1]
@@ -233,19 +233,15 @@ def test_blade_moved_in_cycles_closes_its_loop(wedge: SeatedSolution) -> None:
     assert loss > 0.0
 
 
-def test_state_is_left_in_the_folder(wedge: SeatedSolution) -> None:
-    """Of the nodes of both faces, after each way of loading."""
-    groups = seated.ANALYSIS.arrays(wedge)
-    state, found = groups[f"state {OVER}"], wedge.phases[OVER].found
-    np.testing.assert_array_equal(state["force"][1], found.force[-1])
-    assert len(groups["faces"]["position"][1]) == wedge.interface.n
-
-
 def test_a_way_that_fails_leaves_the_raised_state(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*_: Any, **__: Any) -> Any:
-        raise ConvergenceError("did not converge")
+    seat = Interface.seat
 
-    monkeypatch.setattr("upd.analyses.seated.interface.Interface.seat_on", refuse)
+    def refuse(of: Interface, *loads: Any, **more: Any) -> Any:
+        if "after" in more:
+            raise ConvergenceError("did not converge")
+        return seat(of, *loads, **more)
+
+    monkeypatch.setattr(Interface, "seat", refuse)
     with pytest.raises(ConvergenceError) as failed:
         solved("symmetric-seated", {**WEDGE, "want": ["seating"]})
     found = seated.ANALYSIS.make_results(failed.value.partial)  # type: ignore[attr-defined]

@@ -17,11 +17,11 @@ from upd.analyses.contact.varied import (
     PROBLEM,
     WANTED,
     coarsened,
-    plan_with_estimates,
 )
 from upd.plot.chart import Chart
 from upd.results import Arrays
 from upd.vary import errors
+from upd.vary.solve import plan_with_estimates
 from upd.vary.wanted import Wanted, plan_wanted
 
 #: arrays, summary -> charts
@@ -29,7 +29,6 @@ Charts = Callable[[Arrays, Mapping[str, Any]], list[Chart]]
 _INPUT_CHECKS = (
     "patch rim",
     "Dundurs beta",
-    "contact radius against sphere",
     "slope in the contact",
 )
 
@@ -42,7 +41,7 @@ def _analysis(
         name=name,
         headline_names=headline,
         input_checks=_INPUT_CHECKS,
-        make_plan=partial(plan_wanted, wanted, plan_with_estimates),
+        make_plan=partial(plan_wanted, wanted, partial(plan_with_estimates, PROBLEM)),
         needs=needs,
         solve=partial(left_out.solve, wanted),
         make_results=results.make_results,

@@ -328,7 +328,11 @@ def solve_inside(solution: ContactSolution) -> None:
     for case in solution.normal:
         frictionless = _displaced(solution, case, sphere)
         if sphere and case.force > 0.0:
-            _normal_shares(solution, case, frictionless)
+            (face,) = lattices(solution)
+            force = face.field(case.solution.force, extensive=True)
+            case.shares = _shares(solution, case, frictionless, force)
+            if case.shares:
+                case.mesh_error = _mesh_error(solution, case, frictionless)
             if solution.plan.effect("friction"):
                 _shear_shares(solution, case)
     for case in solution.curve if sphere else ():
@@ -352,20 +356,23 @@ def _displaced(solution: ContactSolution, case: NormalCase, sphere: bool) -> dic
     return pressed(model, case.solution.force, copies)[0]
 
 
-def _normal_shares(
-    solution: ContactSolution, case: NormalCase, displacement: Mapping[str, Array]
-) -> None:
-    model, radius = solution.model, case.measures.radius_moment
-    (face,) = lattices(solution)
-    force = face.field(case.solution.force, extensive=True)
+def _shares(
+    solution: ContactSolution,
+    case: NormalCase,
+    displacement: Mapping[str, Array],
+    force: Array,
+    *,
+    tangential: bool = False,
+) -> dict[str, bulk.BodyShare]:
+    """Of both bodies, from their displacements under the forces of the whole patch; empty where one
+    is not known.
+    """
     found = {
-        body.name: _share(solution, body, displacement[body.name], force, radius, tangential=False)
-        for body in (model.upper, model.lower)
+        body.name: _share(solution, case, body, displacement[body.name], force, tangential)
+        for body in (solution.model.upper, solution.model.lower)
     }
     shares = {name: share for name, share in found.items() if share is not None}
-    if len(shares) == len(found):
-        case.shares = shares
-        case.mesh_error = _mesh_error(solution, case, displacement)
+    return shares if len(shares) == len(found) else {}
 
 
 def _mesh_error(
@@ -401,13 +408,13 @@ def _mesh_error(
 
 def _share(
     solution: ContactSolution,
+    case: NormalCase,
     body: Body,
     displacement: Array,
     force: Array,
-    radius: float,
-    *,
     tangential: bool,
 ) -> bulk.BodyShare | None:
+    radius = case.measures.radius_moment
     along = displacement[:, ALONG] if tangential else body.side * displacement[:, NORMAL]
     axis = body.mesh.nodes["axis"]
     depth = np.abs(body.mesh.points[axis, 2])
@@ -439,15 +446,9 @@ def _shear_shares(solution: ContactSolution, case: NormalCase) -> None:
     """Shear of both bodies per N, from full slip t = mu f: their far field knows the total force
     only.
     """
-    model, radius = solution.model, case.measures.radius_moment
+    model = solution.model
     forces = solution.plan.scene.contact.friction * case.solution.force
-    whole = model.patch.whole(forces, extensive=True)
-    total, nodal = float(whole.sum()), model.nodal(forces)
-    shares = {}
-    for body in (model.upper, model.lower):
-        u = body.displacement(ALONG, nodal)
-        share = _share(solution, body, u, whole, radius, tangential=True)
-        if share is not None:
-            shares[body.name] = share.over(total)
-    if len(shares) == 2:
-        case.shear_shares = shares
+    whole, nodal = model.patch.whole(forces, extensive=True), model.nodal(forces)
+    moved = {b.name: b.displacement(ALONG, nodal) for b in (model.upper, model.lower)}
+    found = _shares(solution, case, moved, whole, tangential=True)
+    case.shear_shares = {name: one.over(float(whole.sum())) for name, one in found.items()}

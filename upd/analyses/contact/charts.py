@@ -1,5 +1,5 @@
-"""Charts of a contact, from the run folder's content alone: pressure, opening, stick and slip,
-force over approach and displacement, contact points, each with its closed form where there is one.
+"""Charts of a contact, from the run folder's content alone: pressure, stick and slip, force over
+approach and displacement, contact points, each with its closed form where there is one.
 
 A curved contact is drawn about its middle, in um; flat faces whole, in report axes, mm.
 """
@@ -7,7 +7,6 @@ A curved contact is drawn about its middle, in um; flat faces whole, in report a
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -54,15 +53,18 @@ def curved_charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
             _about_middle("Contact pressure", g, g, pressure_map(g, UM), sheet=k < _SHOWN)
             for k, g in enumerate(loaded)
         ),
-        *([_section(loaded[::-1])] if loaded else []),
         *(_three_sections(group) for group in loaded),
         *(
             _states_about_middle(group, normal[Case(load=case.load)][0], _ratios(sheared))
             for case, (group,) in reversed(sheared.items())
             if Case(load=case.load) in normal
         ),
-        *(_tractions(group, mine) for group in loaded if (mine := _of_load(sheared, group))),
-        *_approaches(arrays),
+        *(
+            _tractions(group, mine)
+            for group in loaded
+            if (mine := [g for c, (g,) in sheared.items() if c.load == case_of(group).load])
+        ),
+        *(_approach(group) for group in with_content(arrays, "force-approach")),
         *(_over_load(group, *quantity) for group in curves for quantity in _OVER_LOAD),
         *(_compressions(group) for group in curves if _beyond_3a(group)),
         *(_loop(group) for group in reversed(with_content(arrays, "cycle"))),
@@ -77,21 +79,17 @@ def flat_charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     normal, sheared = _loaded(arrays), _by_case(arrays, "tangential")
     first = next(iter(normal), None)
     return [
-        *(_pressure(c, g, sheet=k < _SHOWN) for k, (c, g) in enumerate(normal.items())),
-        *([_per_length(normal)] if normal else []),
-        *(_opening(case, groups, sheet=case == first) for case, groups in normal.items()),
         *(
-            _surface(case, groups, sheet=case == first)
-            for case, groups in normal.items()
-            if all("surface_displacement" in group for group in groups)
+            face_pressure(case.label, groups, sheet=k < _SHOWN)
+            for k, (case, groups) in enumerate(normal.items())
         ),
+        *([_per_length(normal)] if normal else []),
         *(
             _states(case, groups, normal[load], sheet=load == first, columns=_ratios(sheared))
             for case, groups in reversed(sheared.items())
             if (load := Case(load=case.load)) in normal
         ),
-        *_approaches(arrays),
-        *_pressures_over_force(arrays),
+        *(_approach(group) for group in with_content(arrays, "force-approach")),
         *_paths(arrays, "path"),
         *_paths(arrays, "cycle"),
         *(
@@ -141,12 +139,8 @@ def values(group: Group, name: str, scale: float = 1.0) -> Array:
     return np.asarray(group[name].data, float) * scale
 
 
-def _approaches(arrays: Arrays) -> list[Chart]:
-    """Force over approach, beside the closed form or the printed stiffness."""
-    return [_approach(group) for group in with_content(arrays, "force-approach")]
-
-
 def _approach(group: Group) -> Chart:
+    """Force over approach, beside the closed form or the printed stiffness."""
     F, d = values(group, "normal_force"), values(group, "approach", UM)
     # The curve of flat faces starts unloaded.
     flat, stiffness = F[0] != 0.0, scalar(group, "stiffness")
@@ -214,30 +208,6 @@ def _states_about_middle(group: Group, normal: Group, columns: int) -> Chart:
     more |= {"size": (4.6, 4.0), "columns": columns}
     states = state_map(group, _closed(normal), UM)
     return _about_middle("Stick and slip", group, normal, states, **more)
-
-
-def _of_load(sheared: Faces, normal: Group) -> list[Group]:
-    """The tangential loads after a normal one."""
-    return [one for case, (one,) in sheared.items() if case.load == case_of(normal).load]
-
-
-def _middle(field: Array) -> Array:
-    """The field along y = 0."""
-    return field[:, field.shape[1] // 2]
-
-
-def _section(loaded: Sequence[Group]) -> Chart:
-    traces: list[Trace] = []
-    widest = max(_window(group) for group in loaded)
-    for k, group in enumerate(loaded):
-        x, p, case = values(group, "x", UM), values(group, "pressure"), case_of(group).label
-        inside = np.abs(x) <= widest
-        traces.append(Trace(f"{case}, computed", x[inside], _middle(p)[inside], "points", k))
-        if "hertz_pressure" in group:
-            closed = values(group, "hertz_x", UM), values(group, "hertz_pressure")
-            traces.append(Trace(f"{case}, Hertz", *closed, "line", k))
-    title = "Pressure along y = 0"
-    return Chart(title, _X_UM, _PRESSURE, tuple(traces), figure="pressure", columns=3)
 
 
 def _three_sections(group: Group) -> Chart:
@@ -313,7 +283,7 @@ def _tractions(normal: Group, tangential: Sequence[Group]) -> Chart:
     for k, group in enumerate(tangential):
         x, q = values(group, "x", UM), values(group, "traction")
         inside, name = np.abs(x) <= half, f"T/µN={case_of(group).ratio:g}"
-        along = _middle(q[..., 0] if q.ndim == 3 else q)[inside]
+        along = (q[..., 0] if q.ndim == 3 else q)[:, q.shape[1] // 2][inside]
         computed.append(Trace(f"{name}, computed", x[inside], along, "points", k, entry=name))
         if "mindlin_traction" in group:
             at, y = values(group, "mindlin_x", UM), values(group, "mindlin_traction")
@@ -363,22 +333,19 @@ def _states(case: Case, groups: list[Group], normal: list[Group], **more: Any) -
     return face_chart("Stick and slip", groups, case.label, "stick_slip", **more)
 
 
-def _joined(groups: list[Group], name: str) -> Array:
-    """A field of all faces as one row."""
-    return np.concatenate([values(group, name).ravel() for group in groups])
-
-
-def _pressure(case: Case, groups: list[Group], sheet: bool) -> Chart:
-    p = _joined(groups, "pressure")
-    top = float(np.percentile(p, TOP_PERCENTILE))
-    note = (
-        f"The largest pressure, {p.max():.3g} MPa, is an edge's; the colours end at the 99th "
-        "percentile. Open nodes are white."
-    )
-    more: dict[str, Any] = {"sheet": sheet, "columns": 3, "detail": f"largest {p.max():.3g} MPa"}
-    maps = tuple(pressure_map(group, 1.0, top=top) for group in groups)
-    title = "Contact pressure"
-    return face_chart(title, groups, case.label, "pressure", maps=maps, note=note, **more)
+def face_pressure(case: str, groups: list[Group], *, sheet: bool) -> Chart:
+    """Pressure of faces; the colours end where only edges go on."""
+    p = np.concatenate([values(group, "pressure").ravel() for group in groups])
+    top = float(np.percentile(p[p > 0.0], TOP_PERCENTILE)) if (p > 0.0).any() else None
+    more: dict[str, Any] = {
+        "maps": tuple(pressure_map(group, 1.0, top=top) for group in groups),
+        "note": "Open nodes are white; the colours end at the 99th percentile, where only edges "
+        "go on.",
+        "sheet": sheet,
+        "columns": 3,
+        "detail": f"largest {p.max():.3g} MPa",
+    }
+    return face_chart("Contact pressure", groups, case, "pressure", **more)
 
 
 def _per_length(normal: Faces) -> Chart:
@@ -398,58 +365,6 @@ def _per_length(normal: Faces) -> Chart:
     more = FACE | {"y": Axis("force per length", "N/mm", low=0.0), "bands": tuple(bands)}
     more |= {"figure": "pressure", "columns": 3}
     return Chart("Normal force per length", traces=tuple(traces), **more)
-
-
-def _opening(case: Case, groups: list[Group], sheet: bool) -> Chart:
-    closed = np.concatenate([np.asarray(g["contact"].data).ravel() > 0 for g in groups])
-    lattices = [np.meshgrid(values(g, "x"), values(g, "y"), indexing="ij") for g in groups]
-    x, y = (np.concatenate([xy[k].ravel() for xy in lattices]) for k in range(2))
-    n = int(closed.sum())
-    exact = "; nothing opens: the linear answer is exact" * (n == x.size)
-    traces = list(_frames(groups))
-    kinds: tuple[tuple[Style, str, NDArray[np.bool_]], ...] = (
-        ("points", f"in contact: {n} of {x.size} nodes{exact}", closed),
-        ("crosses", "open", ~closed),
-    )
-    for colour, (style, label, nodes) in enumerate(kinds):
-        if nodes.any():
-            traces.append(Trace(label, x[nodes], y[nodes], style, colour))
-    # Room for the legend above the nodes.
-    width = np.ptp(np.concatenate([trace.x for trace in traces]))
-    upwards = replace(FACE["y"], high=float(max(values(g, "y")[-1] for g in groups) + 0.1 * width))
-    note = f"{n} of {x.size} nodes are in contact; crosses are open."
-    more: dict[str, Any] = {"note": note, "sheet": sheet, "columns": 1, "y": upwards}
-    traced = tuple(traces)
-    return face_chart("Nodes in contact", groups, case.label, "contact_open", traces=traced, **more)
-
-
-def _surface(case: Case, groups: list[Group], sheet: bool) -> Chart:
-    name, axis = "surface_displacement", Axis("displacement along the normal", "µm")
-    u = UM * _joined(groups, name)
-    low, top = float(u.min()), float(u.max())
-    maps = tuple(
-        Map(values(g, "x"), values(g, "y"), values(g, name, UM), axis, (), top, low, smooth=True)
-        for g in groups
-    )
-    body = groups[0][name].attributes.get("body", "upper body")
-    title = f"Deformed surface of the {body}"
-    note = f"How far the contact nodes of the {body} stay behind its distant set."
-    more: dict[str, Any] = {"maps": maps, "note": note, "sheet": sheet, "columns": 1}
-    return face_chart(title, groups, case.label, "surface", **more)
-
-
-def _pressures_over_force(arrays: Arrays) -> list[Chart]:
-    labels = {"max_pressure": "maximum (at an edge)", "mean_pressure": "mean over the contact"}
-    title, out = "Pressure over normal force", []
-    for group in with_content(arrays, "force-approach"):
-        if labels.keys() <= set(group):
-            F = values(group, "normal_force")
-            traces = tuple(
-                Trace(label, F, values(group, name), "both", k)
-                for k, (name, label) in enumerate(labels.items())
-            )
-            out.append(Chart(title, _FORCE, _PRESSURE, traces, figure="force_approach"))
-    return out
 
 
 def _paths(arrays: Arrays, content: str) -> list[Chart]:

@@ -6,7 +6,7 @@ the size of the contact, the onset of yield, the effects left out.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -194,13 +194,6 @@ def _locking_check(solution: ContactSolution) -> Check:
     return _warning("locking", NO_CASE, largest, 0.48, "Poisson's ratio of bodies of hex8", remedy)
 
 
-def _missing(shown: Iterable[str], made: set[str]) -> Iterable[Check]:
-    """A failed check for every effect left out whose check was not made."""
-    for name in (one for one in shown if one not in made):
-        what, remedy = f"the check of {name} was not made", "report this scene"
-        yield Check(name, NO_CASE, 1, 0, what, remedy)
-
-
 # -- size and place of the contact -----------------------------------------------------------------
 
 
@@ -290,21 +283,6 @@ def _curved_checks(solution: ContactSolution) -> list[Check]:
 
 
 def _steepness_check(solution: ContactSolution) -> Check:
-    radius = solution.plan.scene.sphere_radius
-    if radius is None:
-        text = "steepest slope of the gap where the bodies touch"
-        remedy = (
-            "the contact reaches where the faces are too steep for small-displacement theory: "
-            "lower the load"
-        )
-        return Check("slope in the contact", NO_CASE, _slope(solution), 0.2, text, remedy)
-    ratio = max(c.measures.radius_outermost for c in solution.normal) / radius
-    text = "outermost contact node / sphere radius"
-    remedy = "the contact is too large for small-displacement theory: lower the load"
-    return Check("contact radius against sphere", NO_CASE, ratio, 0.2, text, remedy)
-
-
-def _slope(solution: ContactSolution) -> float:
     """Steepest slope of the undeformed gap at the nodes in contact, over all loads.
 
     a / R for a sphere.
@@ -312,7 +290,13 @@ def _slope(solution: ContactSolution) -> float:
     patch = solution.model.patch
     steepness = np.hypot(*patch.slopes(solution.model.gap))
     touching = [steepness[patch.whole(c.solution.force) > 0.0] for c in solution.normal]
-    return max((float(s.max()) for s in touching if s.size), default=0.0)
+    slope = max((float(s.max()) for s in touching if s.size), default=0.0)
+    text = "steepest slope of the gap where the bodies touch"
+    remedy = (
+        "the contact reaches where the faces are too steep for small-displacement theory: lower "
+        "the load"
+    )
+    return Check("slope in the contact", NO_CASE, slope, 0.2, text, remedy)
 
 
 def _asymmetry(solution: ContactSolution, case: NormalCase) -> float:
@@ -418,7 +402,14 @@ def check_solution(solution: ContactSolution) -> list[Check]:
     checks += yield_checks(solution)
     checks += _left_out_checks(solution)
     checks += _curved_checks(solution) if solution.curved else [_flat_resolution_check(solution)]
-    return [*checks, *_missing(solution.plan.shown, {c.name for c in checks})]
+    missing = set(solution.plan.shown) - {c.name for c in checks}
+    return [
+        *checks,
+        *(
+            Check(name, NO_CASE, 1, 0, f"the check of {name} was not made", "report this scene")
+            for name in sorted(missing)
+        ),
+    ]
 
 
 def _normal(solution: ContactSolution, one: NormalCase) -> list[Check]:

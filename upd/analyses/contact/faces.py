@@ -18,13 +18,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from upd.analyses.contact.loading import contact_points_of
-from upd.analyses.contact.plan import NORMAL
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
 from upd.contact.law import ContactLaw, contact_points
 from upd.contact.normal import NormalContact
 from upd.contact.patch import ContactMeasures, LocatedArea, Patch, located_area, measure
-from upd.mesh import IntArray, Mesh
+from upd.mesh import IntArray
 
 Array = NDArray[np.float64]
 
@@ -218,27 +216,6 @@ def contact_law(solution: ContactSolution, case: NormalCase) -> ContactLaw | Non
     )
 
 
-def tilt_stiffness(solution: ContactSolution, case: NormalCase) -> dict[str, float]:
-    """Resistance of the contact to a tilt of the damper, N mm per rad, by the axis its arms run
-    along.
-
-    About the centre of stiffness, contact set held. A tilt along x is odd about the mirror plane:
-    known on the full model only.
-    """
-    model = solution.model
-    on = np.flatnonzero(case.solution.contact)
-    if len(on) < 3:
-        return {}
-    points = contact_points_of(model)[on]
-    B = np.linalg.inv(model.compliance(NORMAL)[np.ix_(on, on)])
-    e, out = B.sum(axis=1), {}
-    for k, axis in enumerate("xy"):
-        if axis == "y" or 0 not in solution.plan.mirrors:
-            arm = points[:, k] - float(e @ points[:, k]) / float(e.sum())
-            out[axis] = solution.plan.copies * float(arm @ B @ arm)
-    return out
-
-
 def _whole(
     solution: ContactSolution, fields: list[Array]
 ) -> tuple[Array, Array, list[Array], list[NDArray[np.int64]]]:
@@ -260,15 +237,15 @@ def _whole(
 # -- peaks of the pressure of flat faces, and the bands that the load comes from -------------------
 
 
-def band_centres(solution: ContactSolution) -> list[float]:
-    """Middles along x (contact axes, mm) of the parts of the damper's distant set, which the loads
+def band_middles(solution: ContactSolution) -> list[float]:
+    """Middles along x (report axes, mm) of the parts of the damper's distant set, which the loads
     come from, both sides of a mirror.
     """
     upper = solution.model.upper.mesh
     nodes = upper.nodes["distant"]
     x, weights = upper.points[nodes, 0], upper.weights.get("distant")
     found = []  # lower and upper end, middle
-    for part in _joined(upper, nodes):
+    for part in joined(upper.hexes, nodes):
         # A set without weights is as wide as its nodes lie apart.
         low, high = float(x[part].min()), float(x[part].max())
         middle = 0.5 * (low + high)
@@ -280,36 +257,19 @@ def band_centres(solution: ContactSolution) -> list[float]:
             found += [(low, high, middle), (-high, -low, -middle)]
         else:
             found.append((-high, high, 0.0))
-    return [middle for _, _, middle in sorted(found)]
+    return [float(middle - corner(solution)[0]) for _, _, middle in sorted(found)]
 
 
-def _joined(mesh: Mesh, nodes: IntArray) -> list[IntArray]:
-    """Positions in ``nodes`` of those that elements join, part by part."""
-    number = np.full(mesh.n_node, -1)
+def joined(cells: IntArray, nodes: IntArray) -> list[IntArray]:
+    """Positions in ``nodes``, part by part, of those that cells (n, nodes of each) join."""
+    number = np.full(int(max(cells.max(), nodes.max())) + 1, -1)
     number[nodes] = np.arange(len(nodes))
-    at = number[mesh.hexes]
+    at = number[cells]
     first = np.broadcast_to(at.max(axis=1, keepdims=True), at.shape)
     both = at >= 0
     links = coo_array((np.ones(both.sum()), (first[both], at[both])), shape=(len(nodes),) * 2)
     count, part = connected_components(links, directed=False)
     return [np.flatnonzero(part == k) for k in range(count)]
-
-
-def band_middles(solution: ContactSolution) -> list[float]:
-    """The same in report axes, mm."""
-    return [float(c - corner(solution)[0]) for c in band_centres(solution)]
-
-
-def line_pressure(lattice: FaceLattice, force: Array) -> Array:
-    """(len(X),) normal force per length along x in N/mm.
-
-    Nodal forces summed over y, over the length each column stands for.
-    """
-    return np.asarray(
-        lattice.field(force, extensive=True).sum(axis=1)
-        * np.ptp(lattice.Y)
-        / lattice.area().sum(axis=1)
-    )
 
 
 def pressure_peaks(solution: ContactSolution, case: NormalCase) -> list[tuple[float, float]]:
@@ -327,18 +287,14 @@ def pressure_peaks(solution: ContactSolution, case: NormalCase) -> list[tuple[fl
     found, origin = [], corner(solution)
     for lattice in (k for k in lattices(solution) if k.lattice):
         force = lattice.field(case.solution.force, extensive=True)[1:-1]
-        X, p = lattice.X[1:-1], line_pressure(lattice, case.solution.force)[1:-1]
+        # normal force per length along x, N/mm: over the length each column stands for
+        X, lengths = lattice.X[1:-1], lattice.area().sum(axis=1)[1:-1] / np.ptp(lattice.Y)
+        p = force.sum(axis=1) / lengths
         tops, _ = find_peaks(p, prominence=0.1 * float(p.max(initial=0.0)), plateau_size=1)
         _, _, left, right = peak_widths(p, tops, rel_height=0.5)
         places = np.arange(len(X))
         for begin, end in zip(left, right, strict=True):
             inside = (places >= begin) & (places <= end)
-            middle = float(np.interp([begin, end], places, X).mean())
-            found.append(
-                (middle - origin[0], _centre(force[inside].sum(axis=0), lattice.Y) - origin[1])
-            )
+            middle, across = np.interp([begin, end], places, X).mean(), force[inside].sum(axis=0)
+            found.append((middle - origin[0], float(across @ lattice.Y / across.sum()) - origin[1]))
     return [(float(x), float(y)) for x, y in found]
-
-
-def _centre(force: Array, Y: Array) -> float:
-    return float(force @ Y / force.sum())

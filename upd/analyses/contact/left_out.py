@@ -1,19 +1,15 @@
 """Effects left out of a contact, each verified on a number of the run: solved again with it.
 
-The tilt of the damper is solved with the run's own compliance. The others are solved on the plan's
-companion, a coarser whole model with all three directions, once without the effect and once with
-it:
-
-- normal and tangential contact at once, a run of its own with contact.coupling = "coupled",
-- the gap taken at the places that the displacement carries the faces to.
+All are solved on the plan's companion, a coarser whole model with all three directions condensed
+together, once without the effect and once with it switched on. Large displacements have no switch:
+the gap is taken at the places that the displacement carries the faces to.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
-from functools import cache, partial
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +17,11 @@ from numpy.typing import NDArray
 from upd.analyses.base import Resolved, keeping
 from upd.analyses.contact import plan as planned
 from upd.analyses.contact.bodies import prepare
-from upd.analyses.contact.loading import LOAD_STEP, slope_loads
+from upd.analyses.contact.loading import LOAD_STEP
 from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan
 from upd.analyses.contact.results import make_results
-from upd.analyses.contact.solution import ContactSolution, NormalCase, PressedContact
+from upd.analyses.contact.scene_plan import make_plan
+from upd.analyses.contact.solution import ContactSolution
 from upd.analyses.contact.solve import press, solve_plan
 from upd.contact.checks import few_threads
 from upd.contact.model import ContactModel
@@ -33,21 +30,26 @@ from upd.progress import Stages
 from upd.results import Case, Result
 from upd.results import quantities as q
 from upd.scene import Scene
-from upd.scene.contact import Coupling
+from upd.vary.solve import changed
+from upd.vary.variation import Key, Overrides
 from upd.vary.wanted import Wanted, solve_wanted
 
 Array = NDArray[np.float64]
-#: Numbers that show what coupling changes, of them those that a run has; and where no stiffness is
-#: asked for.
-_COUPLED = (
-    "K_N_tangent_raw",
-    "K_T_initial_raw",
-    "K_Tx_initial_raw",
-    "K_Ty_initial_raw",
-    "contact_area",
-    "stick_area",
-)
-_WITHOUT_STIFFNESS = ("approach", "K_T_secant_raw", "cycle_energy")
+_NORMAL = ("K_N_tangent_raw",), ("approach",)
+_SHEAR = ("K_T_initial_raw", "K_Tx_initial_raw", "K_Ty_initial_raw", "K_T_secant_raw")
+_AREAS = ("contact_area", "stick_area", "approach", "cycle_energy")
+#: effect -> numbers that show what it changes: the first row of which a run has some
+_SHOWN: Mapping[str, tuple[tuple[str, ...], ...]] = {
+    planned.TILT: _NORMAL,
+    planned.LARGE: _NORMAL,
+    planned.COUPLING: ((*_NORMAL[0], *_SHEAR, *_AREAS),),
+    planned.DIRECTIONS: ((*_SHEAR, "cycle_energy"), ("K_T_tangent_raw",)),
+}
+_SWITCHES: Mapping[str, tuple[str, object]] = {
+    planned.TILT: ("contact.tilt", "free"),
+    planned.COUPLING: ("contact.coupling", "coupled"),
+    planned.DIRECTIONS: ("contact.directions", 2),
+}
 #: of a damper that tips over when its tilt is free
 _TIPS = (
     "the load line runs beside the contact, so that a damper free to tilt tips over: give a "
@@ -62,160 +64,99 @@ def solve(wanted: Wanted, plan: ContactPlan, stages: Stages) -> ContactSolution:
     """
     found, estimates = solve_wanted(wanted, plan, stages)
     solution: ContactSolution = replace(found, estimates=estimates)
-    shown, companion = solution.plan.shown, solution.plan.companion
-    cases = [one for one in solution.normal if one.force]
-    if not shown:
-        return solution
-    with (
-        keeping(solution),
-        stages("effects left out", "the tilt; the others on a coarser whole model"),
-    ):
-        if planned.TILT in shown:
-            solution.left_out += [_tilted(solution, case) for case in cases]
-        if companion is not None:
-            try:
-                model = prepare(companion, Stages(), "companion")
-                with few_threads(model.gap):
-                    solution.left_out += list(_on_companion(solution, model))
-            except UpdError:
-                solution.left_out += _not_solved(solution.plan, [one.case for one in cases])
+    companion = solution.plan.companion
+    if companion is not None:
+        with keeping(solution), stages("effects left out", "on a coarser whole model"):
+            solution.left_out += _left_out(solution, companion)
     return solution
 
 
-def _tilted(solution: ContactSolution, case: NormalCase) -> Resolved:
-    """The run's own contact with a free tilt: rotations of the upper body as a whole beside its
-    condensed compliance.
-
-    A half model is its own mirror image, which leaves the tilt along the plane. A body that tips
-    over has neither stiffness nor approach: 0 N/mm, or NaN.
-    """
-    plan, remedy = solution.plan, ""
-    quantity, unit = _quantity(plan.scene)
-    stiff = unit == "N/mm"
-
-    def number(one: PressedContact) -> float:
-        return one.stiffness if stiff else 1e3 * one.solution.approach
-
-    def tilting(coupling: Coupling, loads: Sequence[float]) -> float:
-        contact = replace(plan.scene.contact, tilt="free", coupling=coupling)
-        free = replace(plan, scene=replace(plan.scene, contact=contact))
-        return number(press(ContactSolution(free, solution.model), loads)[case.force])
-
-    try:
-        included = tilting("uncoupled", [case.force])
-        if case.state is not None:
-            # It does not tip over; with friction again.
-            included = tilting("coupled", slope_loads([case.force]))
-    except InputError:
-        included, remedy = 0.0 if stiff else float("nan"), _TIPS
-    except UpdError:
-        included = float("nan")
-    return Resolved(planned.TILT, quantity, case.case, number(case), included, unit, remedy)
-
-
-def _on_companion(solution: ContactSolution, model: ContactModel) -> Iterator[Resolved]:
-    """Every number that shows what an effect left out changes, on the companion ``model``."""
-    plan = solution.plan
-    for case in solution.normal if planned.LARGE in plan.shown else ():
-        if case.force:
-            yield _displaced(plan, model, case.case, case.force)
-    # Coupled contact has the other effects.
-    if not plan.scene.coupled:
-        yield from _sheared(solution, model)
-
-
-def _displaced(plan: ContactPlan, model: ContactModel, case: Case, load: float) -> Resolved:
-    """What displaced faces change of the tangent stiffness, or of the approach where no stiffness
-    is asked for; NaN when it is not found.
-
-    Parameters
-    ----------
-    model
-        The companion's.
-    load
-        N on the whole contact.
-    """
-    quantity, unit = _quantity(plan.scene)
-    assert plan.companion is not None
-    companion = ContactSolution(plan.companion, model)
-
-    @cache
-    def pressed(load: float, displaced: bool) -> PressedContact:
-        one = companion
-        if displaced:
-            gap = displaced_gap(model, pressed(load, False).solution.force)
-            one = replace(companion, model=replace(model, gap=gap))
-        return press(one, [load])[load]
-
-    def number(displaced: bool) -> float:
-        loads = [load] if unit == "um" else [load * (1.0 - LOAD_STEP), load * (1.0 + LOAD_STEP)]
+def _left_out(solution: ContactSolution, companion: ContactPlan) -> Iterator[Resolved]:
+    """Every number that shows what an effect left out changes."""
+    without, model = _under_load(make_results(solution)), None
+    plan = make_plan(_smaller(solution.plan.scene, companion.scene))
+    with suppress(UpdError):
+        model = prepare(companion, Stages(), "companion")
+        without = _numbers(plan, model)
+    for effect in solution.plan.shown:
+        included, remedy = dict[Key, float](), ""
         try:
-            approaches = [pressed(one, displaced).solution.approach for one in loads]
-            if unit == "um":
-                return 1e3 * approaches[0]
-            return 2.0 * LOAD_STEP * load / (approaches[1] - approaches[0])
+            if model is not None:
+                included = {(r.name, r.case): r.value for r in _with(effect, plan, model)}
+        except InputError:
+            remedy = _TIPS
         except (UpdError, np.linalg.LinAlgError):
-            return float("nan")
-
-    return Resolved(planned.LARGE, quantity, case, number(False), number(True), unit)
-
-
-def _sheared(solution: ContactSolution, model: ContactModel) -> Iterator[Resolved]:
-    plan, scene = solution.plan, solution.plan.scene
-    companion = partial(solve_plan, stages=Stages(), model=model, companion=True)
-    numbers = make_results(companion(variant(plan, scene.contact.directions)))
-    if planned.COUPLING in plan.shown:
-        coupled = variant(plan, 2, coupling="coupled")
-        yield from _coupled_changes(scene, numbers, lambda: make_results(companion(coupled)))
-    if planned.DIRECTIONS in plan.shown:
-        both = make_results(companion(variant(plan, 2)))
-        names = ["K_T_initial_raw", "K_T_secant_raw", "cycle_energy"]
-        names += [f"K_T{planned.direction_name(d)}_initial_raw" for d in scene.loads.directions]
-        found = list(_changes(planned.DIRECTIONS, names, numbers, both))
-        yield from found or _changes(planned.DIRECTIONS, ("K_T_tangent_raw",), numbers, both)
+            pass
+        yield from _changes(effect, without, included, remedy)
 
 
 def _changes(
-    effect: str, names: Iterable[str], without: Iterable[Result], included: Iterable[Result]
+    effect: str, without: Sequence[Result], included: Mapping[Key, float], remedy: str
 ) -> Iterator[Resolved]:
-    """The numbers of ``names`` that both lists of results have."""
-    theirs = {(r.name, r.case): r.value for r in included}
-    wanted = set(names)
-    for r in without:
-        if r.name in wanted and (r.name, r.case) in theirs:
-            yield Resolved(effect, r.name, r.case, r.value, theirs[r.name, r.case], r.unit)
+    """The numbers that an effect changes; NaN where none was found with it.
 
-
-def _coupled_changes(
-    scene: Scene, uncoupled: Iterable[Result], solve: Callable[[], Iterable[Result]]
-) -> Iterator[Resolved]:
-    """What normal and tangential contact at once change of the stiffnesses and of the areas in
-    contact and in stick; of the approach, the secant and the loss where no stiffness is asked for.
-
-    Parameters
-    ----------
-    uncoupled
-        Numbers of the companion.
-    solve
-        Its numbers, coupled.
+    A body that tips over has neither stiffness nor approach: 0 N/mm, or NaN.
     """
-    names = _COUPLED if scene.wants("stiffness") else (*_COUPLED, *_WITHOUT_STIFFNESS)
-    # Nothing is coupled without a load.
-    mine = [r for r in uncoupled if r.name in names and r.case.load]
-    try:
-        again = list(solve())
-    except (UpdError, np.linalg.LinAlgError):
-        again = [replace(r, value=float("nan")) for r in mine]
-    areas = {r.case.load: r.value for r in mine if r.name == q.CONTACT_AREA.name}
-    for one in _changes(planned.COUPLING, names, mine, again):
-        area = areas.get(one.case.load, 0.0)
-        known = one.quantity == q.STICK_AREA.name and area > 0.0
-        yield replace(one, over=(area, q.STICK_AREA.part_of)) if known else one
+    areas = {r.case.load: r.value for r in without if r.name == q.CONTACT_AREA.name}
+    known = [r for r in without if (r.name, r.case) in included or not included]
+    rows = ([r for r in known if r.name in names] for names in _SHOWN[effect])
+    for r in next(filter(None, rows), ()):
+        none = 0.0 if remedy and r.unit == "N/mm" else float("nan")
+        value, area = included.get((r.name, r.case), none), areas.get(r.case.load, 0.0)
+        over = (area, q.STICK_AREA.part_of) if r.name == q.STICK_AREA.name and area else None
+        yield Resolved(effect, r.name, r.case, r.value, value, r.unit, remedy, over=over)
 
 
-def _quantity(scene: Scene) -> tuple[str, str]:
-    """Name and unit of the normal number that a run has."""
-    return ("K_N_tangent_raw", "N/mm") if scene.wants("stiffness") else ("approach", "um")
+def _smaller(scene: Scene, coarse: Scene) -> Scene:
+    """The companion's scene with the effects as the run has them, and what changes are looked for
+    in: sheared as far as the run is, and through a cycle where nothing else is sheared.
+    """
+    ratio = planned.largest_ratio(scene)
+    want = [w for w in ("stiffness", "tangential") if scene.wants(w)]
+    if scene.wants("cycle") and not scene.wants("stiffness") and not ratio > 0.0:
+        want.append("cycle")
+    loads = replace(coarse.loads, tangential=(ratio,))
+    return replace(coarse, want=tuple(want), contact=scene.contact, loads=loads)
+
+
+def _under_load(found: Sequence[Result]) -> list[Result]:
+    """Numbers of the loads that press: an effect changes nothing else."""
+    return [one for one in found if one.case.load and not one.withheld]
+
+
+def _numbers(plan: ContactPlan, model: ContactModel, *switch: tuple[str, object]) -> list[Result]:
+    """Of the companion, with an effect switched on."""
+    switched: Overrides = switch
+    with few_threads(model.gap):
+        chosen = make_plan(changed(plan.scene, switched)) if switched else plan
+        return _under_load(make_results(solve_plan(chosen, Stages(), model, companion=True)))
+
+
+def _with(effect: str, plan: ContactPlan, model: ContactModel) -> list[Result]:
+    """The companion's numbers with an effect; InputError where its upper body tips over."""
+    if effect == planned.LARGE:
+        return _displaced(plan, model)
+    if effect == planned.TILT and plan.scene.coupled:
+        # with friction it would not
+        _numbers(plan, model, _SWITCHES[effect], ("contact.coupling", "uncoupled"))
+    return _numbers(plan, model, _SWITCHES[effect])
+
+
+def _displaced(plan: ContactPlan, model: ContactModel) -> list[Result]:
+    """Tangent stiffness and approach of the companion between displaced faces."""
+    companion = ContactSolution(plan, model)
+
+    def approach(load: float) -> float:
+        force = press(companion, [load])[load].solution.force
+        displaced = replace(companion, model=replace(model, gap=displaced_gap(model, force)))
+        return press(displaced, [load])[load].solution.approach
+
+    out = []
+    for F in (load for load in planned.normal_loads(plan.scene) if load > 0.0):
+        low, own, high = (approach(F * (1.0 + s)) for s in (-LOAD_STEP, 0.0, LOAD_STEP))
+        stiffness, case = 2.0 * LOAD_STEP * F / (high - low), Case(load=F)
+        out += [q.K_N_TANGENT_RAW.of(stiffness, case), q.APPROACH.of(own, case)]
+    return out
 
 
 def displaced_gap(model: ContactModel, force: Array) -> Array:
@@ -240,37 +181,3 @@ def displaced_gap(model: ContactModel, force: Array) -> Array:
             slope[patch.order, k] = rise.ravel()[: len(patch.order)]
     moved = np.column_stack([model.compliance(c, NORMAL) @ force for c in (ALONG, ACROSS)])
     return np.asarray(model.gap - (slope * moved).sum(axis=1))
-
-
-def variant(
-    plan: ContactPlan, directions: Literal[1, 2], *, coupling: Coupling = "uncoupled"
-) -> ContactPlan:
-    """The companion's plan for slip in one direction or two: the loads that press, sheared as far
-    as the scene asks for, and only what a change is looked for in.
-    """
-    scene, companion = plan.scene, plan.companion
-    assert companion is not None
-    want = [w for w in ("stiffness", "tangential") if scene.wants(w)]
-    ratio = planned.largest_ratio(scene)
-    if scene.wants("cycle") and not scene.wants("stiffness") and not ratio > 0.0:
-        want.append("cycle")
-    smaller = replace(
-        scene,
-        want=tuple(want),
-        contact=replace(scene.contact, directions=directions, coupling=coupling),
-        loads=replace(scene.loads, tangential=(ratio,)),
-    )
-    family = planned.Family((NORMAL, *(ALONG, ACROSS)[:directions]))
-    return replace(companion, scene=smaller, families=(family,))
-
-
-def _not_solved(plan: ContactPlan, cases: Iterable[Case]) -> list[Resolved]:
-    """What the checks show when the companion has no answer."""
-    quantity, unit = _quantity(plan.scene)
-    none = float("nan")
-    return [
-        Resolved(name, quantity, case, none, none, unit)
-        for name in plan.shown
-        if name != planned.TILT
-        for case in cases
-    ]

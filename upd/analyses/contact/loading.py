@@ -264,11 +264,6 @@ def raised(
     return out
 
 
-def slope_loads(loads: Iterable[float]) -> list[float]:
-    """The loads with one a little below and above each, for `slope`."""
-    return [F * (1.0 + s) for F in loads for s in (-LOAD_STEP, 0.0, LOAD_STEP)]
-
-
 def slope(states: dict[float, CoupledState], load: float) -> float:
     """dF/d approach in N/mm while the normal load rises, tilts and shifts following."""
     low, high = (states[load * (1.0 + s)] for s in (-LOAD_STEP, LOAD_STEP))

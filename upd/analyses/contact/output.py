@@ -16,7 +16,6 @@ from upd.analyses.contact.faces import FaceLattice, corner, lattices
 from upd.analyses.contact.loading import LoadPath
 from upd.analyses.contact.results import printed_of
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
-from upd.contact.law import ContactLaw
 from upd.labels import file_name
 from upd.mesh import recipes
 from upd.reference import hertz_pressure, mindlin
@@ -89,12 +88,6 @@ def _normal(solution: ContactSolution, k: FaceLattice, case: NormalCase) -> Vari
         "mm",
         "middle of the bands of the damper that the load comes from",
     )
-    upper = solution.model.upper
-    if upper.name in case.displacement:
-        # How far the contact nodes stay behind the distant set.
-        u = case.displacement[upper.name][upper.contact, 2]
-        whole = k.field(solution.model.multipliers.spread.T @ u)
-        out["surface_displacement"] = variable(XY, whole, "mm", body=upper.name)
     return out
 
 
@@ -206,12 +199,7 @@ def _curve(solution: ContactSolution) -> Variables:
         d, F = np.insert(d, 0, solution.model.gap.min()), np.insert(F, 0, 0.0)
         own = _approach_over_load(solution, d, F) | _along(solution)
     else:
-        pressures = ("max_pressure", "mean_pressure")
-        own = {
-            name: variable("point", [getattr(p.measures, name) for p in points], "MPa")
-            for name in pressures
-        }
-        own["stiffness"] = variable("", solution.normal[0].stiffness, "N/mm")
+        own = {"stiffness": variable("", solution.normal[0].stiffness, "N/mm")}
         own |= _printed(solution, "K_N", "_tangent_raw", solution.normal[0].case)
     return {"approach": variable("point", d, "mm"), "normal_force": variable("point", F, "N")} | own
 
@@ -290,23 +278,19 @@ def _laws(solution: ContactSolution) -> dict[str, Group]:
         law = faces.contact_law(solution, case)
         if law is not None:
             placed = law.placed(*recipes.placement(scene.recipe, solution.plan.parameters))
-            groups = {
-                "contact law": law.to_arrays() | _report_places(solution, law),
-                "contact law in the rig": placed.to_arrays(),
+            at = law.position[:, :2] - corner(solution)
+            places = {
+                f"report_{axis}": variable("contact_point", at[:, k], "mm")
+                for k, axis in enumerate("xy")
+            }
+            groups: dict[str, Variables] = {
+                "contact law": dict(law.to_arrays()) | places,
+                "contact law in the rig": dict(placed.to_arrays()),
             }
             for content, variables in groups.items():
                 name = f"{content} {case.case.label}"
-                out[name] = Group(dict(variables), content=content, case=case.case)
+                out[name] = Group(variables, content=content, case=case.case)
     return out
-
-
-def _report_places(solution: ContactSolution, law: ContactLaw) -> Variables:
-    """Places of the contact points in report axes, mm."""
-    places = law.position[:, :2] - corner(solution)
-    return {
-        f"report_{axis}": variable("contact_point", places[:, k], "mm")
-        for k, axis in enumerate("xy")
-    }
 
 
 # -- meshes ----------------------------------------------------------------------------------------

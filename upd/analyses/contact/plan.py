@@ -4,7 +4,7 @@ effects simulated and omitted, what the recipe is given, and what its meshes mus
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -126,50 +126,30 @@ def direction_name(direction: float) -> str:
     return {0.0: "x", 90.0: "y"}.get(direction % 360.0, f"{direction:g}deg")
 
 
-def unit_vector(direction: float, components: Sequence[int]) -> Array:
-    """(n_component,) of the unit vector along ``direction``."""
-    radians = np.radians(direction)
-    return np.asarray(np.array([np.cos(radians), np.sin(radians)])[list(components)])
-
-
-@dataclass(frozen=True)
-class DamperLoad:
-    """A normal force in N, and the damper's equilibrium it comes from, if any."""
-
-    force: float
-    state: str = ""
-    faces: FaceForces | None = None
-
-    @property
-    def case(self) -> Case:
-        """The force, with as many digits as distinguish the scene's loads."""
-        return Case(load=self.force)
-
-
-def normal_loads(scene: Scene) -> tuple[DamperLoad, ...]:
-    """The scene's normal loads in N. Raises InputError, with all problems, for an equilibrium that
-    jams or lifts.
+def normal_loads(scene: Scene) -> dict[float, tuple[str, FaceForces] | None]:
+    """The scene's normal loads in N, each with the damper's state and equilibrium it comes from, if
+    any. Raises InputError, with all problems, for an equilibrium that jams or lifts.
     """
-    loads, problems = [], []
+    loads: dict[float, tuple[str, FaceForces] | None] = {}
+    problems = []
     for value in dict.fromkeys(scene.loads.normal):
         if not isinstance(value, str):
-            loads.append(DamperLoad(float(value)))
+            loads.setdefault(float(value), None)
             continue
         try:
-            parameters = mesh_parameters(scene, "full")
-            left, right = recipes.inclination(scene.recipe, parameters)
+            left, right = recipes.inclination(scene.recipe, mesh_parameters(scene, "full"))
             assert scene.loads.centrifugal is not None
             found = equilibrium(left, right, scene.loads.centrifugal, scene.contact.friction, value)
-            loads.append(DamperLoad(found.normal_right, value, found))
+            loads.setdefault(found.normal_right, (value, found))
         except InputError as error:
             problems.append(f"loads.normal: {value!r}: {error}")
     if problems:
         raise InputError("\n".join(problems))
     # Without friction all equilibria are one.
-    different: dict[str, DamperLoad] = {}
-    for load in loads:
-        different.setdefault(load.case.label, load)
-    return tuple(different.values())
+    different: dict[str, float] = {}
+    for force in loads:
+        different.setdefault(Case(load=force).label, force)
+    return {force: loads[force] for force in different.values()}
 
 
 def choose_symmetry(scene: Scene) -> tuple[str, str]:
@@ -287,7 +267,13 @@ def _friction_effects(scene: Scene, loaded: bool) -> list[Effect]:
     two, why = scene.slip_directions == 2, _TOGETHER if coupled else "asked for"
     if not two:
         why = "the load has one direction" if curved else "loads run along the axes"
-    shows = loaded and (not curved or _slip_shows(scene))
+    # a number of a curved contact that depends on the directions of slip
+    depends = (
+        (scene.wants("stiffness") and scene.sphere_radius is not None)
+        or (scene.wants("tangential") and len(scene.loads.tangential) > 0)
+        or scene.wants("cycle")
+    )
+    shows = loaded and (not curved or depends)
     return [
         _effect("friction", True, f"mu = {mu:g} and the outputs {outputs}"),
         _effect(DIRECTIONS, two, why, "contact.directions=2", shows=shows),
@@ -307,13 +293,6 @@ def _coupling_effect(scene: Scene, loaded: bool) -> Effect:
         )
     how = "asked for" if coupled else frozen
     return _effect(COUPLING, coupled, how, "contact.coupling=coupled", shows=loaded)
-
-
-def _slip_shows(scene: Scene) -> bool:
-    """Whether a number of the run depends on the directions of slip."""
-    shear = scene.wants("stiffness") and scene.sphere_radius is not None
-    loads = scene.wants("tangential") and len(scene.loads.tangential) > 0
-    return shear or loads or scene.wants("cycle")
 
 
 def _inside(scene: Scene) -> list[str]:

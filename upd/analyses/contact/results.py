@@ -21,7 +21,6 @@ from upd.contact.bulk import without_body
 from upd.contact.patch import consistent_average
 from upd.mesh import recipes
 from upd.plot.chart import Entry
-from upd.reference import hertz_pressure
 from upd.reference.printed import Lookup, Printed
 from upd.results import Case, ErrorPart, Result, with_parts
 from upd.results import quantities as q
@@ -38,9 +37,6 @@ _LOCATED: References = {
 }
 # Raw, and with the bulk compliance removed: one mesh's error is in both.
 _OF_APPROACH = (q.APPROACH.name, q.APPROACH_CONTACT.name)
-# Forces in N between which the slope of the force-approach curve should not change: dampers work
-# there.
-_WORKING = (50.0, 300.0)
 
 #: the numbers of a curved contact that matter, most important first
 CURVED_HEADLINE = (
@@ -121,7 +117,7 @@ def make_results(solution: ContactSolution, *, misfits: bool = True) -> list[Res
             out += _tangential(solution, t, misfits=misfits)
         for path in (p for p in solution.paths if p.cycle and p.normal == case.case):
             out += _beside(path.case, known, (q.CYCLE_ENERGY, path.slip_work))
-    return printed.with_printed([*out, *_working_slope(solution)], printed_of(scene))
+    return printed.with_printed(out, printed_of(scene))
 
 
 def printed_of(scene: Scene) -> Lookup:
@@ -133,7 +129,7 @@ def printed_of(scene: Scene) -> Lookup:
     look_up, ready = printed.printed_of(scene), printed.ready_scene(scene)
     if ready is None or recipes.closed_form(scene.recipe):
         return look_up
-    loads = {round(load.force) for load in normal_loads(ready)}
+    loads = {round(load) for load in normal_loads(ready)}
 
     def under_load(name: str, case: Mapping[str, Any]) -> tuple[Printed, ...]:
         load = case.get("load")
@@ -154,14 +150,13 @@ def _area(solution: ContactSolution, area: Quantity) -> Quantity:
 
 def _equilibrium(solution: ContactSolution) -> list[Result]:
     out = []
-    for load in (case.load for case in solution.normal):
-        if load.faces is not None:
-            case = Case(name="equilibrium", friction=load.state)
-            out += [
-                q.F_N.of(load.faces.normal_right, case),
-                q.F_T.of(load.faces.tangential_right, case),
-                q.F_N_OTHER_FACE.of(load.faces.normal_left, case),
-            ]
+    for state, balance in filter(None, normal_loads(solution.plan.scene).values()):
+        case = Case(name="equilibrium", friction=state)
+        out += [
+            q.F_N.of(balance.normal_right, case),
+            q.F_T.of(balance.tangential_right, case),
+            q.F_N_OTHER_FACE.of(balance.normal_left, case),
+        ]
     return out
 
 
@@ -233,11 +228,9 @@ def _approach_split(case: NormalCase, known: References) -> list[Result]:
     if not case.shares:
         return []
     at, bodies = case.case, case.shares.items()
-    far = sum(share.far_mesh for _, share in bodies)
     return [
         *_beside(at, known, (q.APPROACH_CONTACT, case.approach - case.finite_body)),
         q.APPROACH_FINITE_BODY.of(case.finite_body, at),
-        q.APPROACH_FAR_MESH.of(far, at),
         *(q.COMPRESSION_3A.of(share.compression, at, n=body) for body, share in bodies),
         *_beside(at, known, (q.APPROACH_WITHIN_3A, _within_3a(case))),
     ]
@@ -326,18 +319,6 @@ def _tangent_within_3a(solution: ContactSolution, case: NormalCase, known: Refer
     return _beside(case.case, known, (q.K_N_TANGENT_3A, 1.5 * case.force / within))[0]
 
 
-def _working_slope(solution: ContactSolution) -> list[Result]:
-    """Spread of the slope of the force-approach curve of flat faces, (max - min) / mean."""
-    low, high = _WORKING
-    inside = [(p.force, p.approach) for p in solution.curve if low <= p.force <= high]
-    if solution.curved or len(inside) < 2:
-        return []
-    F, d = np.array(inside).T
-    slope = np.diff(F) / np.diff(d)
-    case = Case(name=f"F_N from {low:g} to {high:g} N")
-    return [q.SLOPE_SPREAD.of(np.ptp(slope) / slope.mean(), case)]
-
-
 # -- of flat faces ---------------------------------------------------------------------------------
 
 
@@ -363,18 +344,12 @@ def _law(solution: ContactSolution, case: NormalCase) -> list[Result]:
     law, at = faces.contact_law(solution, case), case.case
     if law is None:
         return []
-    out = [
+    return [
         q.LAW_POINTS.of(law.n_point, at),
         q.LAW_K_N.of(law.k_n.sum(), at),
         *(q.LAW_K_T.of(law.k_t[:, i].sum(), at, n=axis) for i, axis in enumerate("xy")),
         q.LAW_PRELOAD.of(law.preload.sum(), at),
-        *(q.LAW_LUMPING.of(law.tilt_error()[i], at, n=axis) for i, axis in enumerate("xy")),
     ]
-    own = dict(zip("xy", law.tilt_stiffness(), strict=True))
-    if solution.plan.scene.law.bodies == "both":
-        for axis, true in faces.tilt_stiffness(solution, case).items():
-            out.append(q.LAW_TILT.of(own[axis], at, true, "contact's own", n=axis))
-    return out
 
 
 # -- tangential loads ------------------------------------------------------------------------------
@@ -402,22 +377,17 @@ def _tangential(solution: ContactSolution, t: TangentialCase, *, misfits: bool) 
 
 def _misfits(solution: ContactSolution, t: TangentialCase) -> list[Result]:
     """Root mean square difference of the traction from Cattaneo and Mindlin's, where they have a
-    closed form, over that of the closed form and over that of mu p.
+    closed form, over that of the closed form.
     """
-    hertz, closed = solution.hertz_of(t.normal.force), solution.closed_form_traction(t)
-    if hertz is None or closed is None or solution.model.patch.quads is not None:
+    closed = solution.closed_form_traction(t)
+    if closed is None or solution.model.patch.quads is not None:
         return []
-    patch, mu = solution.model.patch, solution.plan.scene.contact.friction
+    patch = solution.model.patch
     area, theirs = patch.area(), consistent_average(patch, closed)
-    limit = consistent_average(
-        patch, lambda r: mu * hertz_pressure(r, hertz.radius, hertz.max_pressure)
-    )
     traction = faces.tractions(solution, t)[0]
     misfit = np.sqrt((area * (patch.whole(traction) - theirs) ** 2).sum())
+    size = float(np.sqrt((area * theirs**2).sum()))
+    if size > 0.0:
+        return [q.MISFIT.of(misfit / size, t.case, source="Cattaneo-Mindlin")]
     lost = f"the contact lies between the nodes; {finer(solution.plan.scene)}"
-    return [
-        quantity.of(misfit / size, t.case, source="Cattaneo-Mindlin")
-        if (size := float(np.sqrt((area * scale**2).sum()))) > 0.0
-        else quantity.withheld(t.case, lost)
-        for quantity, scale in ((q.MISFIT, theirs), (q.MISFIT_OF_LIMIT, limit))
-    ]
+    return [q.MISFIT.withheld(t.case, lost)]

@@ -18,6 +18,8 @@ from upd.errors import InputError, UpdError
 from upd.linalg.routes import EACH, FIRST
 from upd.mesh import recipes
 from upd.scene import Scene, friction_on
+from upd.vary.solve import changed
+from upd.vary.variation import ALONE, Overrides
 
 
 def make_plan(scene: Scene) -> ContactPlan:
@@ -30,7 +32,7 @@ def make_plan(scene: Scene) -> ContactPlan:
             f"materials: a contact has two bodies, {len(scene.materials)} given "
             f"({', '.join(scene.materials)})"
         )
-    loaded = any(load.force > 0.0 for load in planned.normal_loads(scene))
+    loaded = any(load > 0.0 for load in planned.normal_loads(scene))
     if not is_curved(scene):
         _require_fitting(scene)
     symmetry, why = planned.choose_symmetry(scene)
@@ -174,8 +176,6 @@ _LOAD_S, _TANGENTIAL_S, _STEP_S, _COUPLED_S = 1e-3, 5e-3, {1: 1.5e-4, 2: 1.5e-3}
 _INSIDE_S = 1.4e-6
 # Figures and page, files of fields per node.
 _FILES_S, _NODE_S = 3.0, 3.5e-5
-# Dense factorisations with three directions of a load, of effects left out.
-_AGAIN = 20
 # Of coupled contact: flops of a load step over the cube of its closed dofs, and over those times
 # all; dense matrices of all dofs kept (compliance, factor, inverse, what solves them); steps of the
 # curve to gross slip.
@@ -230,56 +230,33 @@ def _with_companion(plan: ContactPlan) -> ContactPlan:
     The companion has half the elements along each edge of its contact, where the recipe can be made
     coarser.
     """
-    scene = plan.scene
-    if not {*plan.shown} - {planned.TILT}:
+    if not plan.shown:
         return plan
-    off = ("load curve", "internal displacement")
-    effects = [replace(e, on=e.on and e.name not in off) for e in plan.effects]
-    # It goes through a cycle only where nothing else is sheared.
-    sheared = scene.wants("stiffness") or scene.wants("tangential")
-    want = tuple(w for w in scene.want if w != "cycle" or not sheared)
-    # What couples the directions is looked up in the whole compliance.
-    route = "condensed" if scene.solver.route == "products" else scene.solver.route
-    smaller = replace(scene, want=want, solver=replace(scene.solver, route=route))
-    whole, family = _whole_parameters(scene), (Family(planned.COMPONENTS),)
+    scene, whole = plan.scene, (*ALONE, ("mesh.symmetry", "full"), ("solver.route", "auto"))
+    # all three directions at once
+    contact = replace(scene.contact, coupling="coupled", friction=scene.contact.friction or 1.0)
+    want = tuple(w for w in scene.want if w not in ("fields", "curve", "body_compression"))
+    smaller = replace(changed(scene, whole), contact=contact, want=want)
     try:
-        companion = contact_plan(smaller, "full", family, effects, _coarse(scene, whole))
+        companion = make_plan(changed(smaller, _coarse(plan)))
     except UpdError:
         # A recipe of the user's own that cannot be coarser.
-        companion = contact_plan(smaller, "full", family, effects, whole)
-    k = 3.0 * max(count["contact"] for count in companion.size.values())
-    again = companion.solve_seconds + len(scene.loads.normal) * _AGAIN * dense_s(k**3)
+        companion = make_plan(smaller)
     return replace(
         plan,
         companion=companion,
-        seconds=plan.seconds + again,
+        seconds=plan.seconds + companion.solve_seconds,
         # Both models are there at the same time, the libraries once.
         memory_bytes=plan.memory_bytes + companion.memory_bytes - START_BYTES,
     )
 
 
-def _coarse(scene: Scene, parameters: Mapping[str, Any]) -> dict[str, Any]:
+def _coarse(plan: ContactPlan) -> Overrides:
     """Half the elements along each edge of the contact, not fewer than it takes."""
-    fewest, coarse = _FEWEST[NODES[scene.mesh.element]], dict(parameters)
-    for name in _DIVISIONS:
-        n = parameters.get(name)
-        if isinstance(n, int) and n > fewest:
-            coarse[name] = max(fewest, 2 * (n // 4))
-    return coarse
-
-
-def _whole_parameters(scene: Scene) -> dict[str, Any]:
-    """Of the whole model at the run's spacing.
-
-    The patch is no larger than the largest load needs it.
-    """
-    parameters = planned.recipe_parameters(scene, "full")
-    if scene.sphere_radius is not None and max(scene.loads.forces) > 0.0:
-        needed = planned.auto_patch(scene)
-        if needed < float(parameters["patch"]):
-            share = needed / float(parameters["patch"])
-            parameters["patch"] = needed
-            parameters["divisions"] = 2 * round(0.5 * share * int(parameters["divisions"])) or 2
-            if scene.geometry.get("core_depth", "auto") == "auto":
-                parameters["core_depth"] = planned.auto_core_depth(scene, needed)
-    return parameters
+    fewest = _FEWEST[NODES[plan.scene.mesh.element]]
+    counts = {name: plan.parameters.get(name) for name in _DIVISIONS}
+    return tuple(
+        (f"geometry.{name}", max(fewest, 2 * (n // 4)))
+        for name, n in counts.items()
+        if isinstance(n, int) and n > fewest
+    )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from upd.analyses.base import Resolved
 from upd.analyses.contact.loading import CoupledState, LoadPath, Sheared
-from upd.analyses.contact.plan import ContactPlan, DamperLoad, direction_name, is_curved
+from upd.analyses.contact.plan import ContactPlan, direction_name, is_curved
 from upd.contact.bulk import BodyShare
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
@@ -70,6 +70,8 @@ class NormalCase(PressedContact):
 
     Attributes
     ----------
+    force
+        N on the whole contact.
     alone
         By body: its answer at the same load, pressed by a rigid counterpart, where a stiffness
         calls for it.
@@ -88,7 +90,7 @@ class NormalCase(PressedContact):
         where the shares are not known.
     """
 
-    load: DamperLoad
+    force: float
     measures: ContactMeasures
     alone: dict[str, PressedContact] = field(default_factory=dict)
     stuck: dict[float, tuple[float, dict[str, float]]] = field(default_factory=dict)
@@ -100,14 +102,9 @@ class NormalCase(PressedContact):
     mesh_error: tuple[float, float] | None = None
 
     @property
-    def force(self) -> float:
-        """N on the whole contact."""
-        return self.load.force
-
-    @property
     def case(self) -> Case:
-        """The load."""
-        return self.load.case
+        """The load, with as many digits as distinguish the scene's loads."""
+        return Case(load=self.force)
 
     @property
     def approach(self) -> float:

@@ -19,7 +19,7 @@ from upd.analyses.contact import loading
 from upd.analyses.contact import plan as planned
 from upd.analyses.contact.bodies import learns, prepare, show_normal, solve_inside
 from upd.analyses.contact.faces import measured
-from upd.analyses.contact.plan import NORMAL, ContactPlan, DamperLoad
+from upd.analyses.contact.plan import NORMAL, ContactPlan
 from upd.analyses.contact.solution import (
     ContactSolution,
     NormalCase,
@@ -82,14 +82,21 @@ def solve_plan(
 def solve_normal(solution: ContactSolution, stages: Stages) -> None:
     """Every normal load and the force-approach curve."""
     plan = solution.plan
-    loads = planned.normal_loads(plan.scene)
-    wanted = [load.force for load in loads]
+    wanted = list(planned.normal_loads(plan.scene))
     curve = _curve_loads(plan, max(wanted), solution.curved)
-    around = loading.slope_loads(wanted) if _by_slope(solution) else []
+    steps = (-loading.LOAD_STEP, 0.0, loading.LOAD_STEP) if _by_slope(solution) else ()
+    around = [F * (1.0 + s) for F in wanted for s in steps]
     with stages("normal contact", f"{len({*wanted, *curve, *around})} loads"):
         found = press(solution, [*wanted, *curve, *around])
-        solution.normal = [_case(solution, load, found) for load in loads]
-        solution.curve = [_case(solution, DamperLoad(F), found) for F in curve]
+        solution.normal, solution.curve = (
+            [
+                NormalCase(
+                    **vars(found[F]), force=F, measures=measured(solution, found[F].solution, F)
+                )
+                for F in loads
+            ]
+            for loads in (wanted, curve)
+        )
         for body in _bodies_alone(solution):
             alone = press(solution, [*wanted, *around], body)
             for case in solution.normal:
@@ -179,15 +186,13 @@ def _sheared_too(
     for F, state in states.items():
         sloped = all(F * (1.0 + s) in states for s in (-loading.LOAD_STEP, loading.LOAD_STEP))
         free = loading.slope(states, F) if sloped else float("nan")
-        held = _held_stiffness(state) if arms.size and sloped and body is None else free
+        held = free
+        if arms.size and sloped and body is None:
+            # dF/d approach with the tilts held and the states kept, shifts following
+            held = float(1.0 / np.linalg.inv(state.found.stiffness()[:3, :3])[0, 0])
         tilt = state.motion[3:] if arms.size else None
         out[F] = PressedContact(loading.as_normal(state, held), free, state, tilt)
     return out
-
-
-def _held_stiffness(state: loading.CoupledState) -> float:
-    """dF/d approach in N/mm with the tilts held and the states kept, shifts following."""
-    return float(1.0 / np.linalg.inv(state.found.stiffness()[:3, :3])[0, 0])
 
 
 def _bodies_alone(solution: ContactSolution) -> tuple[Body, ...]:
@@ -198,13 +203,6 @@ def _bodies_alone(solution: ContactSolution) -> tuple[Body, ...]:
     if scene.wants("stiffness"):
         return model.upper, model.lower
     return (model.upper,) if scene.wants("contact_law") and scene.law.bodies == "upper" else ()
-
-
-def _case(
-    solution: ContactSolution, load: DamperLoad, found: dict[float, PressedContact]
-) -> NormalCase:
-    measures = measured(solution, found[load.force].solution, load.force)
-    return NormalCase(**vars(found[load.force]), load=load, measures=measures)
 
 
 # -- tangential loads ------------------------------------------------------------------------------
@@ -272,7 +270,8 @@ class Frozen:
         scene, force = solution.plan.scene, case.solution.force
         self.solution, self.case, self.direction = solution, case, direction
         self.components = planned.slip_components(scene, direction)
-        self.unit = planned.unit_vector(direction, self.components)
+        angle, axes = np.radians(direction), list(self.components)
+        self.unit = np.array([np.cos(angle), np.sin(angle)])[axes]
         self.friction, self.loads = scene.contact.friction, scene.loads
         self.copies = solution.plan.copies
         self.loaded = np.flatnonzero(force > 0.0)

@@ -27,7 +27,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.base import chosen_by_accuracy, refuse_oversize, require_memory
+from upd.analyses.base import chosen_by_accuracy, refuse_oversize
 from upd.analyses.contact.faces import rim_nodes
 from upd.analyses.contact.plan import (
     ContactPlan,
@@ -37,7 +37,7 @@ from upd.analyses.contact.plan import (
     refined_growth,
 )
 from upd.analyses.contact.results import make_results
-from upd.analyses.contact.scene_plan import contact_plan, make_plan
+from upd.analyses.contact.scene_plan import make_plan
 from upd.analyses.contact.solution import ContactSolution, NormalCase
 from upd.analyses.contact.solve import solve_normal, solve_plan, solve_tangential
 from upd.errors import InputError, UpdError
@@ -47,22 +47,17 @@ from upd.results import Case
 from upd.scene import Scene
 from upd.scene.contact import Loads
 from upd.vary.errors import estimate_in_round
-from upd.vary.scatter import RADIUS, Samples
-from upd.vary.solve import varied_plan
-from upd.vary.variation import ALONE, COARSER, POWER, Levels, Overrides, Problem, Variation
+from upd.vary.orders import RADIUS, Samples
+from upd.vary.solve import MESH
+from upd.vary.variation import ALONE, COARSER, Levels, Overrides, Problem, Variation
 from upd.vary.wanted import LevelChoice, Wanted
 
 #: fewest divisions of a level
 FEWEST = 4
-#: source of error
-MESH = "mesh"
 _NO_DIVISIONS = "the mesh cannot be made coarser: its recipe has no divisions to lower"
 _COARSEST = "the mesh is the coarsest there is: set geometry.divisions to {} or more"
 #: outputs that a level need not give: no number of them is estimated, and they cost
 _SPARED = ("fields", "curve")
-#: power of the divisions that the memory of a level grows with: the entries of a factor by nested
-#: dissection, n^(4/3) (A. George, 1973)
-MEMORY_POWER = 4.0
 #: parameters of a recipe that the load may size
 SIZED_BY_LOAD = ("patch", "core_depth")
 #: Numbers that one accuracy for all is asked of, of a curved contact: those of the normal contact.
@@ -74,9 +69,6 @@ _NODES = (3.0, 4.2, 6.0, 8.5, 12.0, 17.0, 24.0)
 #: Growth of neighbouring elements (when the scene gives none) on a level with that many nodes along
 #: the radius.
 _GROWTH, _GROWTH_AT = 1.5, 6.0
-#: Largest error estimate of a level over (1 / nodes along the contact radius)^1.5, measured on the
-#: Hertz scene (0.45 with 8.5 nodes, 0.38 with 12): what to expect of a level before it has run.
-_SCATTER, _SCATTER_POWER = 0.4, 1.5
 #: And of a flat one: stiffnesses. The pressure at the edges of flat faces
 #: grows under refinement without a limit.
 FLAT_GOVERNING = ("K_N_secant_raw", "K_Tx_initial_raw", "K_Ty_initial_raw", "K_*_per_pad")
@@ -85,8 +77,8 @@ _SHARES = (0.35, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0)
 #: likewise where wires press, nearer to each other: with half the elements along each edge a level
 #: takes a fifteenth of the seconds, and only four show whether an order holds
 _SHARES_OF_WIRES = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0)
-#: the level a plan predicts: the first with two before it, which show an order
-_PREDICTED = 2
+#: levels a plan predicts: the third is the first that shows an order
+_PREDICTED = 3
 #: thickness of the elements under wires and at the contact, where wires press
 _UNDER_WIRES, _AT_CONTACT = 1.0, 0.5
 #: element of the levels of a scene with one of 8 nodes
@@ -198,12 +190,12 @@ def levels(plan: ContactPlan) -> Levels:
     """
     scene = plan.scene
     if not scene.estimates:
-        return Levels(())
+        return {}
     # Neighbouring loads show on half the divisions what the dearest level would.
     ratios = COARSER[1:] if has_neighbours(scene) else COARSER
     known = isinstance(plan.parameters.get("divisions"), int)
     why = _COARSEST.format(FEWEST + 2) if known else _NO_DIVISIONS
-    return Levels([_coarser(plan, n) for n in coarser_divisions(plan, ratios)], {MESH: why})
+    return {MESH: [_coarser(plan, n) for n in coarser_divisions(plan, ratios)] or why}
 
 
 def _coarser(plan: ContactPlan, divisions: int) -> Variation:
@@ -213,22 +205,6 @@ def _coarser(plan: ContactPlan, divisions: int) -> Variation:
         str(geometry[key]) for key in ("divisions_long", "divisions") if key in geometry
     )
     return Variation(MESH, f"{label} divisions", overridden(geometry), size)
-
-
-def plan_with_estimates(scene: Scene) -> ContactPlan:
-    """The plan of a scene with what its levels cost."""
-    plan = make_plan(scene)
-    again = sum(_seconds(plan, one) for one in levels(plan).variations)
-    return replace(plan, seconds=plan.seconds + again, estimate_seconds=again)
-
-
-def _seconds(plan: ContactPlan, one: Variation) -> float:
-    """Predicted for a level."""
-    if recipes.counted_by_mesh(plan.scene.recipe):
-        # A plan runs a user's recipe once: the run makes these meshes.
-        return plan.solve_seconds * float(one.size**-POWER)
-    level: ContactPlan = varied_plan(PROBLEM, plan.scene, one)
-    return level.solve_seconds
 
 
 def governing(scene: Scene) -> tuple[str, ...]:
@@ -247,17 +223,9 @@ def choices(scene: Scene) -> list[LevelChoice]:
 
 
 def _predicted(scene: Scene) -> list[Scene]:
-    """Levels up to the one that the scatter measured suggests, or to the first that shows an
-    order.
-    """
-    asked, last = scene.wanted_accuracy, _PREDICTED
-    assert asked is not None
-    if is_curved(scene):
-        least = min(asked.values()) if isinstance(asked, Mapping) else asked
-        enough = [_SCATTER / nodes**_SCATTER_POWER <= least for nodes in _NODES]
-        last = enough.index(True) if any(enough) else len(_NODES) - 1
+    """The lowest levels up to the first that shows an order."""
     (mesh,) = choices(scene)
-    return [mesh.at(scene, k) for k in range(min(last + 1, len(mesh.labels)))]
+    return [mesh.at(scene, k) for k in range(min(_PREDICTED, len(mesh.labels)))]
 
 
 def _curved_level(scene: Scene, level: int) -> Scene:
@@ -331,34 +299,12 @@ def level_of(plan: ContactPlan) -> Variation:
     return Variation(MESH, " x ".join(counts) + " divisions", size=size)
 
 
-def half_cost(plan: ContactPlan, source: str, seconds: float, order: float) -> float:
-    """Seconds that a mesh with half of an error of the order adds.
-
-    Parameters
-    ----------
-    seconds
-        Measured, of the plan.
-
-    Raises
-    ------
-    InputError
-        When the mesh does not fit the memory.
-    """
+def finer(plan: ContactPlan, source: str, factor: float) -> Overrides:
+    """A mesh with elements so many times smaller."""
     del source
-    finer = 2.0 ** (1.0 / order)
-    if recipes.counted_by_mesh(plan.scene.recipe) or "divisions" not in plan.parameters:
-        require_memory(plan.scene, plan.memory_bytes * finer**MEMORY_POWER)
-        return seconds * float(finer**POWER - 1.0)
-    divisions = 2 * max(1, round(0.5 * finer * int(plan.parameters["divisions"])))
-    now, more = (
-        contact_plan(plan.scene, plan.symmetry, plan.families, plan.effects, parameters)
-        for parameters in (
-            plan.parameters,
-            {**plan.parameters, **level_geometry(plan.parameters, divisions)},
-        )
-    )
-    require_memory(plan.scene, more.memory_bytes)
-    return max(0.0, seconds * (more.solve_seconds / now.solve_seconds - 1.0))
+    usual = plan.parameters.get("divisions", 1)
+    divisions = 2 * max(1, round(0.5 * factor * int(usual)))
+    return overridden(level_geometry({"divisions": usual, **plan.parameters}, divisions))
 
 
 # -- neighbouring loads ----------------------------------------------------------------------------
@@ -442,7 +388,7 @@ def _values(
         return []
 
 
-PROBLEM = Problem(make_plan, solve_plan, make_results, bare, (MESH,), levels, half_cost, sample)
+PROBLEM = Problem(make_plan, solve_plan, make_results, bare, levels, finer, sample)
 
 
 def _wanted(governing: Sequence[str]) -> Wanted:

@@ -19,7 +19,7 @@ from upd.analyses.forced.arrays import (
     POINTS,
     SWEEP,
 )
-from upd.analyses.measured.charts import damping_charts, measured_traces
+from upd.analyses.measured import damping_charts, measured_traces
 from upd.plot.chart import Area, Array, Axis, Band, Chart, Mark, Scatter, Style, Trace
 from upd.plot.common import UM, case_of, frequency_of, magnitude, scalar, with_content
 from upd.results import Arrays, Case, Group

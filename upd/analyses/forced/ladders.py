@@ -24,7 +24,7 @@ from typing import Any
 from upd.analyses.cost import NODES
 from upd.analyses.forced.interface_model import INTERFACE
 from upd.analyses.forced.levels import FACES, count_of
-from upd.analyses.seated.varied import PATCH
+from upd.analyses.seated.ladders import PATCH
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import ForcedScene

@@ -20,7 +20,7 @@ from upd.analyses.forced.plan import ForcedPlan, excitation_of
 from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
 from upd.analyses.forced.statics import StaticState
 from upd.analyses.forced.sweeps import marched_damper
-from upd.analyses.measured import FREE, STUCK, Computed
+from upd.analyses.measured import FREE, STUCK, Computed, numbered
 from upd.analyses.seated.results import RIGID
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.balance import InterfaceResponse
@@ -150,7 +150,7 @@ def _computed(solution: ForcedSolution, choice: MeasuredChoice) -> Iterator[Comp
             told = (linear.stuck_peaks if stuck else linear.free_peaks)[side]
             case = Case(stiffness=name, kind=choice.state, blade=side)
             band = (scene.excitation.start, scene.excitation.stop)
-            yield Computed(case, band, _linear_at(solution, name, side, stuck), told)
+            yield Computed(case, band, _linear_at(solution, name, side, stuck), numbered(told))
         return
     # as the labels of curves tell them apart
     wanted = f"{choice.centrifugal_to_force:.6g}"
@@ -184,7 +184,7 @@ def _with_friction(c: ForcedCurve[Any], side: Side) -> Computed:
         replace(c.case, blade=side),
         (float(f.min()), float(f.max())),
         lambda at: on_path(at, f, H),
-        list(peaks),
+        numbered(peaks),
     )
 
 

@@ -1,7 +1,4 @@
-"""Charts of a modal analysis, from the run folder's arrays alone.
-
-Responses of both blades, frequencies beside their references.
-"""
+"""Charts of a modal analysis, from the run folder's arrays alone: responses of both blades."""
 
 from __future__ import annotations
 
@@ -10,26 +7,23 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.measured import FREE, STUCK
-from upd.analyses.measured.charts import damping_charts, measured_traces
-from upd.analyses.modal.output import MODES, REDUCTION, RESPONSE
+from upd.analyses.measured import FREE, STUCK, damping_charts, measured_traces
+from upd.analyses.modal.output import RESPONSE
 from upd.plot.chart import Axis, Chart, Mark, Trace
-from upd.plot.common import case_of, frequency_of, magnitude, scalar, with_content
+from upd.plot.common import frequency_of, magnitude, scalar, with_content
 from upd.results import Arrays, Group
 
-_F = Axis("frequency", "Hz")
 #: the blade that is excited first
 _BLADES = ("right", "left")
 
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
-    """Responses of both blades, and frequencies beside their references."""
+    """Responses of both blades."""
     del summary
     responses = with_content(arrays, RESPONSE)
     return [
         *(chart for blade in _BLADES for chart in _response(arrays, responses, blade)),
         *damping_charts(arrays),
-        *_frequencies(arrays),
     ]
 
 
@@ -77,30 +71,3 @@ def _peaks(group: Group, blade: str, colour: int) -> list[Mark]:
     return [
         Mark(float(f), float(height), f"{f:.2f} Hz\n{height:.3g}", colour) for f, height in pairs
     ]
-
-
-def _frequencies(arrays: Arrays) -> list[Chart]:
-    """Difference of every frequency from its reference.
-
-    Printed ones of the modes, the full model's of the reduced blades.
-    """
-    compared = [(g, "reference") for g in with_content(arrays, MODES)] + [
-        (g, "full") for g in with_content(arrays, REDUCTION)
-    ]
-    traces: list[Trace] = []
-    for group, name in compared:
-        if name in group:
-            f, reference = frequency_of(group), np.asarray(group[name].data, float)
-            known = np.isfinite(reference)
-            label = f"{case_of(group).label}, against {group[name].attributes['source']}"
-            traces.append(
-                Trace(
-                    label,
-                    f[known],
-                    100.0 * (f[known] / reference[known] - 1.0),
-                    "points",
-                    len(traces),
-                )
-            )
-    axes = (_F, Axis("difference from the reference", "%"))
-    return [Chart("Frequencies against their references", *axes, tuple(traces))] if traces else []

@@ -5,19 +5,15 @@ Every mode's residual and orthogonality, none missed, the reduction's upper boun
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from upd.analyses.base import Resolved
 from upd.analyses.measured import fit_checks
-from upd.analyses.modal.plan import MODES_ABOVE
 from upd.analyses.modal.solve import FAMILIES, ModalSolution, ModeSet, ReducedBlade, RigBody
 from upd.linalg import Modes
 from upd.linalg.eigen import RESIDUAL_LIMIT
 from upd.results import NO_CASE, Case, Check
-from upd.results import quantities as q
 
 
 def check_solution(solution: ModalSolution) -> list[Check]:
@@ -40,29 +36,7 @@ def check_solution(solution: ModalSolution) -> list[Check]:
         Check(name, NO_CASE, value, 0.02, statement, remedy, fatal=False)
         for name, value, statement, remedy in compared
     ]
-    return checks + _left_out(solution)
-
-
-def _left_out(solution: ModalSolution) -> list[Check]:
-    """Modes above the limit in the response, and what hex8 leaves out, on the number itself."""
-    scene, response = solution.plan.scene, solution.response
-    found = []
-    if response is not None and response.peak is not None and scene.left_out.solves:
-        quantity, case = q.FREE_PEAK_ACCELERANCE, Case(kind="free", blade="right")
-        peak = math.nan if solution.more_modes is None else solution.more_modes
-        remedy = "raise modes.below"
-        found.append((MODES_ABOVE, quantity, case, response.peak[1], peak, remedy))
-    free = next((s for s in solution.sets if s.kind == "free" and s.modes), None)
-    if solution.unlocked is not None and free is not None:
-        first, remedy = free.modes[0].frequency, 'use mesh.element = "hex20" or "hex8i"'
-        remedy = f"fully integrated hex8 is too stiff in bending: {remedy}"
-        found.append(("shear locking", q.F_FREE, free.case, first, solution.unlocked, remedy))
-    return [
-        Resolved(effect, quantity.named(1), case, without, included, quantity.unit, remedy).check(
-            scene.left_out
-        )
-        for effect, quantity, case, without, included, remedy in found
-    ]
+    return checks + [one.check(solution.plan.scene.left_out) for one in solution.left_out]
 
 
 def _modes_checks(found: ModeSet) -> list[Check]:

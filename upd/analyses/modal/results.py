@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
-from typing import NamedTuple
 
 import numpy as np
 
-from upd.analyses.measured import FREE, Computed, measured_results
+from upd.analyses.measured import FREE, Computed, ComputedPeak, measured_results
 from upd.analyses.modal.solve import ModalSolution, ModeSet, ReducedBlade, RigResponse
 from upd.analyses.printed import printed_of, with_printed
 from upd.dynamics import find_peaks
@@ -30,15 +29,6 @@ HEADLINE = (
 )
 #: how many of each an engineer asks for first
 _FEW = 2
-
-
-class ResponsePeak(NamedTuple):
-    """A peak of a computed response: its number from the lowest, Hz, (m/s2)/N."""
-
-    number: int
-    frequency: float
-    height: float
-    mode: str = ""
 
 
 REDUCED = Case(name="Craig-Bampton")
@@ -140,7 +130,7 @@ def _beside_measured(solution: ModalSolution, response: RigResponse) -> list[Res
             return []
         found = find_peaks(f, np.abs(H))
         peaks = [
-            ResponsePeak(k, float(at), float(height))
+            ComputedPeak(k, float(at), float(height))
             for k, (at, height) in enumerate(zip(found.frequency, found.height, strict=True), 1)
         ]
         case = Case(kind=choice.state or "", blade=choice.blade)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 
-from upd.analyses.base import keeping
-from upd.analyses.modal.plan import MORE_MODES, ModalPlan, configurations, parameters
+from upd.analyses.base import Resolved, keeping
+from upd.analyses.modal.plan import MODES_ABOVE, MORE_MODES, ModalPlan, configurations, parameters
 from upd.dynamics import (
     ModalSystem,
     find_peaks,
@@ -30,6 +30,7 @@ from upd.mesh import Mesh, recipes
 from upd.progress import Stages
 from upd.reduction import ErrorTarget, ReducedModel, craig_bampton
 from upd.results import Case, Estimates
+from upd.results import quantities as q
 from upd.scene import RigScene
 
 Array = NDArray[np.float64]
@@ -149,12 +150,8 @@ class ModalSolution:
 
     Attributes
     ----------
-    more_modes
-        Height of the free right blade's peak with the modes up to twice the limit, (m/s2)/N; None
-        without a peak.
-    unlocked
-        First free frequency with the incompatible modes that hex8 leaves out, Hz; None for another
-        element.
+    left_out
+        Numbers solved again with effects left out.
     estimates
         Of its numbers, where the levels were chosen by an accuracy.
     """
@@ -163,8 +160,7 @@ class ModalSolution:
     sets: list[ModeSet] = field(default_factory=list)
     reductions: list[ReducedBlade] = field(default_factory=list)
     response: RigResponse | None = None
-    more_modes: float | None = None
-    unlocked: float | None = None
+    left_out: list[Resolved] = field(default_factory=list)
     estimates: Estimates | None = None
 
 
@@ -184,8 +180,7 @@ def solve(plan: ModalPlan, stages: Stages) -> ModalSolution:
                 solution.response = _response(solution)
         if plan.scene.left_out.solves:
             with stages("effects left out", "each solved again"):
-                solution.more_modes = _peak_with_more_modes(solution)
-                solution.unlocked = _unlocked(solution)
+                solution.left_out += [*_more_modes(solution), *_unlocked(solution)]
     return solution
 
 
@@ -364,11 +359,11 @@ def _response(solution: ModalSolution) -> RigResponse:
     )
 
 
-def _peak_with_more_modes(solution: ModalSolution) -> float | None:
+def _more_modes(solution: ModalSolution) -> Iterator[Resolved]:
     """Height of the free right blade's peak with the modes up to twice the limit, (m/s2)/N."""
     response, scene = solution.response, solution.plan.scene
     if response is None or response.peak is None:
-        return None
+        return
     _, body, family = _system_modes(free_set(solution, response.arrangement), ("right",))
     held = FAMILIES.get(family, ())
     found = _modes(solution.plan, body, held, MORE_MODES * scene.modes.below)
@@ -378,25 +373,27 @@ def _peak_with_more_modes(solution: ModalSolution) -> float | None:
         replace(found, shapes=shapes), response.damping, static=_static(body, family)
     )
     force, output = probes(body.mesh)
-    band = (scene.response.start, scene.response.stop)
-    return float(peak_response(system, force, [output], band)[1])
+    band, of = (scene.response.start, scene.response.stop), q.FREE_PEAK_ACCELERANCE
+    height = float(peak_response(system, force, [output], band)[1])
+    case, remedy = Case(kind="free", blade="right"), "raise modes.below"
+    yield Resolved(MODES_ABOVE, of.name, case, response.peak[1], height, of.unit, remedy)
 
 
-def _unlocked(solution: ModalSolution) -> float | None:
+def _unlocked(solution: ModalSolution) -> Iterator[Resolved]:
     """First free frequency on the same mesh with the incompatible modes that hex8 leaves out."""
     plan = solution.plan
     free = next((s for s in solution.sets if s.kind == "free" and s.modes), None)
     if plan.scene.mesh.element != "hex8" or free is None:
-        return None
-    first, material = free.modes[0], plan.scene.material
-    body = replace(
-        first.body,
-        K=Symmetric.of(
-            stiffness(first.body.mesh, Material(material.E, material.nu, material.density), "hex8i")
-        ),
+        return
+    first, data = free.modes[0], plan.scene.material
+    material = Material(data.E, data.nu, data.density)
+    K = Symmetric.of(stiffness(first.body.mesh, material, "hex8i"))
+    found = _modes(plan, replace(first.body, K=K), FAMILIES.get(first.family, ()), first.frequency)
+    lowest, of = float(found.frequency.min(initial=np.inf)), q.F_FREE
+    remedy = 'fully integrated hex8 is too stiff in bending: use mesh.element = "hex20" or "hex8i"'
+    yield Resolved(
+        "shear locking", of.named(1), free.case, first.frequency, lowest, of.unit, remedy
     )
-    held = FAMILIES.get(first.family, ())
-    return float(_modes(plan, body, held, first.frequency).frequency.min(initial=np.inf))
 
 
 def _half_power(system: ModalSystem, force: int, output: int, at: float, zeta: float) -> float:
@@ -479,6 +476,6 @@ def _against_full(solution: ModalSolution) -> dict[float, tuple[float, float]]:
     out = {}
     for part in OFF_RESONANCE:
         w2 = (2.0 * np.pi * part * float(one.full[0])) ** 2
-        q = np.linalg.solve(one.model.K - w2 * one.model.M, one.model.at([force])[0])
-        out[part] = (-1e-3 * w2 * float(one.model.at([output])[0] @ q), -1e-3 * w2 * direct(w2))
+        moved = np.linalg.solve(one.model.K - w2 * one.model.M, one.model.at([force])[0])
+        out[part] = (-1e-3 * w2 * float(one.model.at([output])[0] @ moved), -1e-3 * w2 * direct(w2))
     return out

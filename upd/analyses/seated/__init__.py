@@ -8,15 +8,16 @@ from __future__ import annotations
 from functools import partial
 
 from upd.analyses.base import Analysis, rig_needs
-from upd.analyses.seated import charts, checks, output, results, solve, varied
+from upd.analyses.seated import charts, checks, ladders, output, results, solve
 from upd.vary import errors
 from upd.vary.inputs import coarsened_rig
+from upd.vary.solve import plan_with_estimates
 
 ANALYSIS = Analysis(
     name="seated",
     headline_names=results.HEADLINE,
     input_checks=(),
-    make_plan=varied.plan_with_estimates,
+    make_plan=partial(plan_with_estimates, ladders.PROBLEM),
     needs=partial(rig_needs, "blades"),
     solve=solve.solve,
     make_results=results.make_results,
@@ -27,7 +28,7 @@ ANALYSIS = Analysis(
     charts=charts.charts,
     headline=results.headline,
     verdict_names=("face_N",),
-    estimate=partial(errors.estimate, varied.PROBLEM),
+    estimate=partial(errors.estimate, ladders.PROBLEM),
     coarsened=lambda plan: coarsened_rig(plan, ("seating", "stiffness", "moved")),
 )
 

@@ -7,19 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.contact.charts import TOP_PERCENTILE, face_chart, values
+from upd.analyses.contact.charts import face_chart, face_pressure, values
 from upd.analyses.seated.output import FACE, HISTORY, MOVED, SEATING
 from upd.analyses.seated.plan import RAISED, SMOOTH, WAYS
 from upd.plot.chart import STATES, Axis, Chart, Map, Style, Trace
-from upd.plot.common import UM, case_of, lattice, pressure_map, with_content
+from upd.plot.common import UM, case_of, lattice, with_content
 from upd.results import Arrays, Group
 from upd.scene.forced_contact import SIDES
 
 _STYLES: dict[str, Style] = dict(zip(SEATING, ("line", "dashed", "dotted"), strict=True))
-_MARKS: tuple[tuple[Style, str, str], ...] = (
-    ("points", "normal", "N"),
-    ("open points", "tangential", "T"),
-)
 #: how the variables of a motion begin, title, how its axis is named, unit and its scale
 _MOTIONS = (
     ("u", "Shift of the damper", "along", "µm", UM),
@@ -31,8 +27,8 @@ _ORDER = np.array([0.0, 2.0, 1.0])
 
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
-    """Forces while F_C is raised and lowered, ways of loading, pressure, stick and slip, hysteresis
-    of a blade moved, motion of the damper.
+    """Forces while F_C is raised and lowered, pressure, stick and slip, hysteresis of a blade
+    moved, motion of the damper.
     """
     histories = {case_of(g).name: g for g in with_content(arrays, HISTORY, MOVED)}
     faces: dict[tuple[str, str], list[Group]] = {}
@@ -43,8 +39,10 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     seating = [histories[name] for name in SEATING if name in histories]
     return [
         *(_seating(histories, summary, side) for side in SIDES if len(seating) == len(SEATING)),
-        *_ways(histories),
-        *(_pressure(name, side, groups) for (name, side), groups in faces.items()),
+        *(
+            face_pressure(f"{name}, {side} face", groups, sheet=name == RAISED)
+            for (name, side), groups in faces.items()
+        ),
         *(_states(name, side, groups) for (name, side), groups in faces.items()),
         # what the scene moves first, then the vibration of a way of loading
         *(_moved(group) for group in sorted(moved, key=lambda one: case_of(one).name in WAYS)),
@@ -92,37 +90,6 @@ def _rigid(summary: Mapping[str, Any], side: str, histories: Mapping[str, Group]
             words = known[phase]["source"].removeprefix("rigid damper").strip(", ")
             out.append(Trace(f"N, rigid damper, {words}", F, slope * F, "dashdot", closed=True))
     return out
-
-
-def _ways(histories: Mapping[str, Group]) -> list[Chart]:
-    """Forces of both faces after each way of loading."""
-    found = [name for name in (*WAYS, SMOOTH) if name in histories]
-    if len(found) < 3:
-        return []
-    place = np.arange(len(found), dtype=float)
-    traces = []
-    for k, side in enumerate(SIDES):
-        for style, name, words in _MARKS:
-            force = np.array([values(histories[one], f"{name}_{side}")[-1] for one in found])
-            traces.append(Trace(f"{words}, {side} face", place + 0.12 * (k - 0.5), force, style, k))
-    ticks = tuple((float(k), name) for k, name in enumerate(found))
-    note = "All hold the same F_C: friction leaves open which, and the way of loading decides."
-    axes = Axis("way of loading", low=-0.5, high=len(found) - 0.5, ticks=ticks), _FORCE
-    title = "Forces after each way of loading"
-    return [Chart(title, *axes, tuple(traces), figure="seating", note=note)]
-
-
-def _pressure(name: str, side: str, groups: list[Group]) -> Chart:
-    p = np.concatenate([values(g, "pressure").ravel() for g in groups])
-    top = float(np.percentile(p[p > 0.0], TOP_PERCENTILE)) if (p > 0.0).any() else None
-    more: dict[str, Any] = {
-        "maps": tuple(pressure_map(g, 1.0, top=top) for g in groups),
-        "note": "Open nodes are white; the colours end at the 99th percentile, where only edges "
-        "go on.",
-        "sheet": name == RAISED,
-        "detail": f"largest {p.max():.3g} MPa",
-    }
-    return face_chart("Contact pressure", groups, f"{name}, {side} face", "pressure", **more)
 
 
 def _states(name: str, side: str, groups: list[Group]) -> Chart:

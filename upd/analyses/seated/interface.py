@@ -93,6 +93,7 @@ class Interface:
         *,
         gap: Array | None = None,
         moved: Array | None = None,
+        after: CoupledContact | None = None,
     ) -> CoupledContact:
         """Raise and lower F_C, and move the right blade.
 
@@ -106,6 +107,8 @@ class Interface:
             (n,) mm before any load; None: the faces fit.
         moved
             (k, 3) mm, shift of what holds the right blade after each step; None: it stays.
+        after
+            A seating to go on from, with its friction and gap, beside others that do.
 
         Returns
         -------
@@ -117,54 +120,21 @@ class Interface:
         InputError, ConvergenceError
             As `upd.contact.coupled_contact`.
         """
-        load, offset = self._way(centrifugal, moved)
-        none = np.zeros(self.n)
+        if np.ndim(centrifugal) != 1:
+            raise InputError("centrifugal: give F_C after each step, in one dimension")
+        load = np.zeros((len(centrifugal), len(self.kept)))
+        load[:, self.kept.index(_Z)] = np.asarray(centrifugal) / self.copies
+        offset = None if moved is None else np.asarray(moved) @ self.shifts(1).T
+        if after is not None:
+            return after.fork().go_on(load=load, offset=offset)
         return coupled_contact(
             self.compliance,
-            none if gap is None else gap,
+            np.zeros(self.n) if gap is None else gap,
             friction,
             load=load,
             columns=self.columns,
             offset=offset,
         )
-
-    def seat_on(
-        self,
-        found: CoupledContact,
-        centrifugal: Sequence[float] | Array,
-        *,
-        moved: Array | None = None,
-    ) -> CoupledContact:
-        """Go on from a seating, with its friction and gap, beside others that do.
-
-        Parameters
-        ----------
-        found
-            Of `seat`.
-        centrifugal, moved
-            As `seat`.
-
-        Returns
-        -------
-        CoupledContact
-
-        Raises
-        ------
-        InputError, ConvergenceError
-            As `upd.contact.coupled_contact`.
-        """
-        load, offset = self._way(centrifugal, moved)
-        return found.fork().go_on(load=load, offset=offset)
-
-    def _way(
-        self, centrifugal: Sequence[float] | Array, moved: Array | None
-    ) -> tuple[Array, Array | None]:
-        """Loads (k, r) and offsets (k, 3 n) of the steps."""
-        if np.ndim(centrifugal) != 1:
-            raise InputError("centrifugal: give F_C after each step, in one dimension")
-        load = np.zeros((len(centrifugal), len(self.kept)))
-        load[:, self.kept.index(_Z)] = np.asarray(centrifugal) / self.copies
-        return load, None if moved is None else np.asarray(moved) @ self.shifts(1).T
 
     def shifts(self, side: int) -> Array:
         """(3 n, 3) displacement of the nodes of one face's blade by its shifts along x, y, z."""

@@ -1,4 +1,4 @@
-"""What a seated damper leaves behind: histories, fields of both faces, the states, meshes.
+"""What a seated damper leaves behind: histories, fields of both faces, meshes.
 
 Fields are on the lattices of the whole contact, mirror images included: x along the damper from its
 middle, y up the slope from the patch's lower edge.
@@ -11,16 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from upd.analyses.contact.faces import FaceLattice
-from upd.analyses.seated.plan import AGAIN, LOWERED, RAISED, WAYS
+from upd.analyses.contact.faces import FaceLattice, joined
+from upd.analyses.seated.plan import AGAIN, LOWERED, RAISED
 from upd.analyses.seated.results import platform_force
 from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, STICK
 from upd.contact.patch import make_patch
-from upd.mesh import IntArray, Mesh
 from upd.results import Group, variable
 from upd.scene.forced_contact import SIDES, Side
 
@@ -30,15 +27,6 @@ HISTORY, FACE, MOVED = "seating", "face", "moved"
 #: the phases that are one history
 SEATING = (RAISED, LOWERED, AGAIN)
 _STATES = "open stick slip"
-#: parts of the state after a way of loading
-_STATE: dict[str, tuple[str, str]] = {
-    "force": ("contact_node component", "N"),
-    "slip": ("contact_node tangent", "mm"),
-    "gap": ("contact_node", "mm"),
-    "motion": ("motion", "mm"),
-    "step": ("contact_node tangent", "mm"),
-    "load": ("motion", "N"),
-}
 
 
 def sizes(solution: SeatedSolution) -> dict[str, int]:
@@ -54,7 +42,7 @@ def arrays(solution: SeatedSolution) -> dict[str, Group]:
     dict
         Group -> variable -> (dimensions, array, attributes). Contents: "seating" (histories over
         F_C), "moved" (over the blade's shift), "face" (fields on a face's lattice after each way of
-        loading), "seated faces" and "seated state" (of the nodes of both faces, left ones first).
+        loading).
     """
     out: dict[str, Group] = {}
     for phase in solution.phases.values():
@@ -72,41 +60,7 @@ def arrays(solution: SeatedSolution) -> dict[str, Group]:
                 case=replace(phase.case, side=side),
                 **({"patch": face.name} if face.name else {}),
             )
-    out["faces"] = _nodes(solution)
-    for phase in solution.phases.values():
-        if phase.name in (*SEATING, *WAYS):
-            out[f"state {phase.name}"] = _state(phase)
     return out
-
-
-def _nodes(solution: SeatedSolution) -> Group:
-    """The nodes of both faces."""
-    of, node = solution.interface, "contact_node"
-    axes = "normal into the blade, along the damper, up the slope"
-    return Group(
-        {
-            "position": variable("contact_node axis", of.position, "mm"),
-            "face": variable(node, of.face, flag_meanings="left right"),
-            "area": variable(node, of.area, "mm2"),
-            "gap": variable(node, solution.gap, "mm", "gap before any load"),
-            "frame": variable("side component axis", of.frame, "", axes),
-            "copies": variable("", of.copies, "", "models that make the whole"),
-        },
-        content="seated faces",
-    )
-
-
-def _state(phase: Phase) -> Group:
-    """Forces, slip, gap and motion after a way of loading, in the layout of `Interface`."""
-    found = phase.found
-    variables: Variables = {
-        name: variable(dims, getattr(found.history, name), unit)
-        for name, (dims, unit) in _STATE.items()
-    }
-    variables["state"] = variable("contact_node", found.state[-1], flag_meanings=_STATES)
-    variables["centrifugal"] = variable("", float(phase.centrifugal[-1]), "N")
-    variables["friction"] = variable("", phase.friction, "1")
-    return Group(variables, content="seated state", case=phase.case)
 
 
 def _history(solution: SeatedSolution, phase: Phase) -> Variables:
@@ -173,7 +127,8 @@ def _faces(solution: SeatedSolution) -> list[tuple[Side, FaceLattice]]:
         mine = np.flatnonzero(of.face == k)
         points = np.column_stack([along, up - up[mine].min()])
         found = []
-        for part in _parts(solution.bodies.blades[side].mesh):
+        quads = solution.bodies.blades[side].mesh.faces["patch"][:, :4]
+        for part in joined(quads, np.unique(quads)):
             # the line on the plane once
             on_plane = half and bool((along[mine[part]] == 0.0).any())
             patch = make_patch(points, of.area, (on_plane, False), mine[part])
@@ -186,16 +141,6 @@ def _faces(solution: SeatedSolution) -> list[tuple[Side, FaceLattice]]:
             for i, one in enumerate(found)
         ]
     return out
-
-
-def _parts(mesh: Mesh) -> list[IntArray]:
-    """Places in the nodes of the patch of each connected part."""
-    nodes, faces = np.unique(mesh.faces["patch"][:, :4], return_inverse=True)
-    faces, n = faces.reshape(-1, 4), len(nodes)
-    ends = np.concatenate([faces[:, [k, (k + 1) % 4]] for k in range(4)])
-    graph = coo_array((np.ones(len(ends)), ends.T), shape=(n, n))
-    count, part = connected_components(graph, directed=False)
-    return [np.flatnonzero(part == k) for k in range(count)]
 
 
 def write_files(solution: SeatedSolution, folder: Path) -> None:

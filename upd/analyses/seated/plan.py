@@ -31,16 +31,10 @@ WAYS = (RAISED, AGAIN, OVER, SHAKEN)
 WORN = "worn faces"
 OTHER_WAYS = "other ways of loading"
 
-# Counted on the ready scenes and on pads of 629 nodes, one thread. A load step: Newton steps, each
-# passes over the matrix of all dofs, and new factors of the dofs that are closed; of a call, checks
-# and factors of all.
-_CHECKS = 8.0 / 3.0
-_NEWTON = {"symmetric": 6.0, "asymmetric": 4.2}
-_PASSES = {"symmetric": 75.0, "asymmetric": 60.0}
-# Factors, and the share of all dofs they have: of faces that touch along their edges, few and so
-# cheap that most Newton steps have their own; of pads that touch whole, kept for many load steps.
-_FACTORS = {"symmetric": 3.0, "asymmetric": 0.63}
-_CLOSED = {"symmetric": 0.15, "asymmetric": 0.6}
+# Counted on the ready scenes, one thread, within a factor of two. A load step: Newton steps, each
+# passes over the matrix of all dofs, and new factors of the share of dofs that is closed; of a
+# call, checks and factors of all.
+_CHECKS, _NEWTON_PASSES, _FACTORS, _CLOSED = 8.0 / 3.0, 330.0, 0.8, 0.5
 _STEP_S = 2e-3
 # Matrices of all dofs at a time.
 _MATRICES = 14.0
@@ -163,9 +157,7 @@ def _cost(
             cost.condensed(f"{body}, compliance", hexes, nodes, 3 * count["contact"])
     m = 3.0 * (size["left"]["contact"] + size["right"]["contact"])
     calls = 1 + sum(map(len, ways(scene)))
-    kind = scene.arrangement
-    step = _FACTORS[kind] * 2.0 / 3.0 * (_CLOSED[kind] * m) ** 3
-    step += _NEWTON[kind] * _PASSES[kind] * m**2
+    step = _FACTORS * 2.0 / 3.0 * (_CLOSED * m) ** 3 + _NEWTON_PASSES * m**2
     cost.seconds += dense_s(calls * _CHECKS * m**3)
     cost.seconds += load_steps(scene) * (_STEP_S + dense_s(step))
     cost.seconds += _FILES_S

@@ -182,7 +182,8 @@ def _losses(solution: SeatedSolution) -> Iterator[Result]:
     if len(loop) == 2:
         loss = of.copies * sum(float(one.friction_loss.sum()) for one in loop)
         yield q.SEATING_LOSS.of(loss, Case(name=f"{LOWERED} and {AGAIN}"))
-    for phase in _moved(solution):
+    moved = [p for p in solution.phases.values() if p.moved.any() and p.name not in WAYS]
+    for phase in moved:
         last = 4 * solution.plan.scene.moved.steps
         axis = int(np.flatnonzero(phase.moved.any(axis=0))[0])
         cycle = phase.friction_loss[-last:]
@@ -190,10 +191,6 @@ def _losses(solution: SeatedSolution) -> Iterator[Result]:
         force = platform_force(solution, phase)[-last:, axis]
         way = phase.moved[-last:, axis]
         yield q.MOVED_STIFFNESS.of(np.ptp(force) / np.ptp(way), phase.case)
-
-
-def _moved(solution: SeatedSolution) -> list[Phase]:
-    return [p for p in solution.phases.values() if p.moved.any() and p.name not in WAYS]
 
 
 def platform_force(solution: SeatedSolution, phase: Phase) -> np.ndarray:

@@ -81,8 +81,6 @@ class SeatedSolution:
         mm, before any load.
     phases
         By name, in the order they were solved.
-    worn
-        F_C raised on worn faces, where they are an effect left out.
     platforms
         The contact with the platforms held, for stiffnesses.
     omissions
@@ -94,7 +92,6 @@ class SeatedSolution:
     interface: Interface
     gap: Array
     phases: dict[str, Phase] = field(default_factory=dict)
-    worn: CoupledContact | None = None
     platforms: Interface | None = None
     omissions: list[Resolved] = field(default_factory=list)
 
@@ -137,7 +134,6 @@ def _go_on(solution: SeatedSolution, rows: Sequence[Sequence[Way]], stages: Stag
     """F_C lowered and raised again, and every other way that is asked for: each from the raised
     state, and so side by side.
     """
-    scene = solution.plan.scene
     names = [way.name for row in rows for way in row]
     steps = sum(len(way.centrifugal) for row in rows for way in row)
 
@@ -145,20 +141,10 @@ def _go_on(solution: SeatedSolution, rows: Sequence[Sequence[Way]], stages: Stag
         for way in row:
             _phase(solution, way)
 
-    jobs = [partial(done, row) for row in rows]
-    if scene.left_out.solves and scene.contact.worn < 1.0:
-        jobs.append(partial(_worn, solution))
     with stages("seating", f"{', '.join(names)}: {steps} load steps"):
-        in_parallel(jobs, 2)
+        in_parallel([partial(done, row) for row in rows], 2)
     # In the order of the report, whichever ended first.
     solution.phases = {name: solution.phases[name] for name in (RAISED, *names)}
-
-
-def _worn(solution: SeatedSolution) -> None:
-    """F_C raised on faces worn in, an effect left out."""
-    of, scene = solution.interface, solution.plan.scene
-    gap, raised = of.worn_gap(scene.damper.centrifugal), solution.phases[RAISED].centrifugal
-    solution.worn = of.seat(scene.contact.friction, raised, gap=gap)
 
 
 def _phase(solution: SeatedSolution, way: Way) -> None:
@@ -167,7 +153,7 @@ def _phase(solution: SeatedSolution, way: Way) -> None:
     if way.after:
         last = solution.phases[way.after].found
         before, moved = last.history, way.moved if way.moved.any() else None
-        found = of.seat_on(last, way.centrifugal, moved=moved)
+        found = of.seat(friction, way.centrifugal, moved=moved, after=last)
     else:
         friction = 0.0 if way.name == SMOOTH else friction
         found = of.seat(friction, way.centrifugal, gap=solution.gap)
@@ -187,8 +173,10 @@ def _solve_again(solution: SeatedSolution, stages: Stages) -> Iterator[Resolved]
         return Resolved(effect, "face_N", case, float(without[side]), included, "N", remedy)
 
     if scene.contact.worn < 1.0:
-        assert solution.worn is not None
-        included = float(of.face_forces(solution.worn)[-1, side, 0])
+        gap, raised = of.worn_gap(scene.damper.centrifugal), solution.phases[RAISED].centrifugal
+        with stages("seating", "on worn faces"):
+            found = of.seat(scene.contact.friction, raised, gap=gap)
+        included = float(of.face_forces(found)[-1, side, 0])
         yield resolved(WORN, included, 'set contact.fit = "worn"')
     if not scene.wants("band"):
         if SHAKEN not in solution.phases:

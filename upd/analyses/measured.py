@@ -1,11 +1,11 @@
-"""Computed curves beside the measured ones of the same blade and state."""
+"""Measured curves beside the computed ones of any analysis: numbers, checks, arrays, charts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,9 @@ from upd.measured import (
 )
 from upd.measured.compare import paired
 from upd.measured.curve import LEAST_POINTS
-from upd.results import Case, Check, ErrorPart, Group, Result, variable, with_parts
+from upd.plot.chart import Axis, Chart, Trace
+from upd.plot.common import case_of, frequency_of, magnitude, with_content
+from upd.results import Arrays, Case, Check, ErrorPart, Group, Result, variable, with_parts
 from upd.results import quantities as q
 from upd.results.quantities import Quantity
 from upd.scene.measured import MeasuredChoice, fit_of
@@ -38,24 +40,21 @@ MEASURED_CURVE = "measured curve"
 _WIDTHS, _POINTS = 4, 25
 
 
-class NumberedPeak(Protocol):
-    """A computed peak: its number, Hz, height in (m/s2)/N, the mode's words."""
+class ComputedPeak(NamedTuple):
+    """A peak of a computed curve.
 
-    @property
-    def number(self) -> int:
-        """From 1."""
+    Its number from the lowest, Hz, (m/s2)/N, how the blades move: "" where it is not known.
+    """
 
-    @property
-    def frequency(self) -> float:
-        """Hz."""
+    number: int
+    frequency: float
+    height: float
+    mode: str = ""
 
-    @property
-    def height(self) -> float:
-        """(m/s2)/N."""
 
-    @property
-    def mode(self) -> str:
-        """How the blades move, "" where it is not known."""
+def numbered(peaks: Iterable[Any]) -> list[ComputedPeak]:
+    """Peaks with these attributes and others."""
+    return [ComputedPeak(one.number, one.frequency, one.height, one.mode) for one in peaks]
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ class Computed:
     case: Case
     band: tuple[float, float]
     at: Callable[[Array], ComplexArray]
-    peaks: Sequence[NumberedPeak]
+    peaks: Sequence[ComputedPeak]
 
 
 def measured_results(
@@ -313,3 +312,75 @@ def measured_arrays(measured: MeasuredChoices) -> dict[str, Group]:
             measured_as=f"{curve.quantity}, {curve.unit}",
         )
     return out
+
+
+# -- charts ----------------------------------------------------------------------------------------
+
+_BLADES = ("right", "left")
+_PER_N = "(m/s²)/N"
+#: points of a measured curve that are drawn: so many that they touch would hide the computed one
+_DRAWN = 100
+
+
+def measured_traces(arrays: Arrays, blade: str, colours: Mapping[Any, int]) -> tuple[Trace, ...]:
+    """The measured curves of a blade as open points.
+
+    Parameters
+    ----------
+    arrays
+        Of the run.
+    blade
+        "right" or "left".
+    colours
+        Of the computed curves by their F_C/F_E, of linear limits by their kind; a measured curve
+        beside none of them has one of its own.
+    """
+    out, spare = [], 1 + max(colours.values(), default=-1)
+    for group in _of_blade(arrays, blade):
+        case = case_of(group)
+        colour = colours.get(case.kind if case.force_ratio is None else case.force_ratio)
+        if colour is None:
+            colour, spare = spare, spare + 1
+        out.append(_points(group, blade, colour))
+    return tuple(out)
+
+
+def damping_charts(arrays: Arrays) -> list[Chart]:
+    """Every measured free curve with the modes fitted to it."""
+    out = []
+    for group in with_content(arrays, MEASURED_CURVE):
+        blade = case_of(group).blade
+        if "fitted" not in group or blade not in _BLADES:
+            continue
+        f = frequency_of(group)
+        out.append(
+            Chart(
+                "Damping fitted to the measured curve",
+                Axis("frequency", "Hz", low=float(f[0]), high=float(f[-1])),
+                Axis("accelerance", _PER_N, log=True),
+                (
+                    _points(group, blade, 0),
+                    Trace("modes fitted", f, magnitude(group["fitted"]), "line", 1),
+                ),
+                case=f"{case_of(group).name}, {blade} blade",
+                figure="damping",
+                columns=2,
+                size=(6.4, 4.4),
+            )
+        )
+    return out
+
+
+def _of_blade(arrays: Arrays, blade: str) -> list[Group]:
+    return [
+        group for group in with_content(arrays, MEASURED_CURVE) if f"accelerance_{blade}" in group
+    ]
+
+
+def _points(group: Group, blade: str, colour: int) -> Trace:
+    f, H = frequency_of(group), magnitude(group[f"accelerance_{blade}"])
+    case = case_of(group)
+    words = Case(kind=case.kind, force_ratio=case.force_ratio).label
+    on = np.unique([*range(0, len(f), 1 + (len(f) - 1) // _DRAWN), int(H.argmax())])
+    some = f", {len(on)} of {len(f)} points" if len(on) < len(f) else ""
+    return Trace(f"measured, {words}{some}", f[on], H[on], "open points", colour)
