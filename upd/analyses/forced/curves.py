@@ -59,22 +59,16 @@ class Top(NamedTuple):
         (n_unknown,) unknowns there.
     slips
         Whether a contact point slips or opens.
-    crowded
-        Whether the path has other maxima about it that are nearly as high: points begin to slip or
-        open one after another there.
     """
 
     frequency: float
     height: float
     x: Array
     slips: bool
-    crowded: bool = False
 
 
 #: in place of a sample: the top between the samples of a path
 AT_TOP = -1
-#: how far below a top, as a part of it, a motion is about as high
-ABOUT = 0.05
 
 
 @dataclass(frozen=True)
@@ -93,9 +87,6 @@ class TimeCheck:
     step, apart
         Relative change of height and of frequency between it and the next motion towards the top,
         which leaves or is lower; 0 at the top.
-    way, share
-        Direction along the path from the top to it, 1 or -1; its height over that of the top, by
-        harmonic balance. 0 and 1 at the top.
     """
 
     blade: Side
@@ -107,8 +98,6 @@ class TimeCheck:
     sample: int
     step: float = 0.0
     apart: float = 0.0
-    way: int = 0
-    share: float = 1.0
 
     @property
     def stays(self) -> bool:
@@ -231,24 +220,6 @@ class ForcedCurve(Generic[Answer]):
         """The highest motion that stays, where the top of a peak leaves; None where it stays."""
         mine = (c for c in self.checked if (c.blade, c.number) == (side, number))
         return next((c for c in mine if c.stays and not c.at_top), None)
-
-    def below(self, side: Side, number: int) -> TimeCheck | None:
-        """The highest motion that stays, where it lies below the top of a peak; None where it stays
-        or is about as high: there the tops of other levels show the change.
-        """
-        check, top = self.stayed(side, number), self.tops.get((side, number))
-        if check is None or top is None or check.integrated >= (1.0 - ABOUT) * top.height:
-            return None
-        return check
-
-    def compared(self, side: Side, number: int) -> tuple[float, float] | None:
-        """Hz and height that other levels of a peak are compared with: of the motion that stays
-        below its top, else of that; None without.
-        """
-        check, top = self.below(side, number), self.tops.get((side, number))
-        if check is not None:
-            return check.frequency, check.integrated
-        return (top.frequency, top.height) if top is not None else None
 
     @property
     def rising(self) -> NDArray[np.bool_]:

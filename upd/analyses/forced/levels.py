@@ -6,24 +6,16 @@ Every level is the scene with one thing changed: a model of its own, or other ha
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 from upd.analyses.cost import NODES
-from upd.analyses.forced.model import Model, make_model
-from upd.analyses.forced.peaks_again import Variant
-from upd.analyses.forced.plan import ForcedPlan, parameters_of
-from upd.analyses.forced.stiffness import FaceLaw
-from upd.analyses.seated.bodies import Bodies, make_bodies
-from upd.errors import UpdError, one_line
+from upd.analyses.forced.plan import ForcedPlan
 from upd.hbm.core.fourier import harmonics, sample_count
 from upd.mesh import recipes
 from upd.scene import ForcedScene
-from upd.scene.forced_contact import GAUSS, SIDES, FaceLines, FrictionChoice, Side
+from upd.scene.forced_contact import GAUSS, SIDES, FaceLines, FrictionChoice
 from upd.scene.quantities import UNKNOWN
-from upd.vary.solve import changed
 from upd.vary.variation import Overrides, Variation
 
 RECIPE = "blade_rig"
@@ -82,7 +74,6 @@ _GAUSS_ROWS, _LATTICE = (4, 8), 3
 MORE_HARMONICS = 2
 #: times the samples of the run
 _MORE_SAMPLES = 2
-Laws = Mapping[Side, FaceLaw]
 
 
 def level_variations(plan: ForcedPlan) -> list[Variation]:
@@ -97,14 +88,15 @@ def level_variations(plan: ForcedPlan) -> list[Variation]:
     out += _contact_levels(scene.contact)
     more = highest + MORE_HARMONICS
     finer = (("balance.harmonics", more), ("balance.samples", samples(scene, 1, more)))
-    out.append(Variation(HARMONICS, f"{MORE_HARMONICS} harmonics more", finer))
-    twice = (("balance.samples", samples(scene, _MORE_SAMPLES, highest)),)
+    label = f"{MORE_HARMONICS} harmonics more"
+    out.append(Variation(HARMONICS, label, finer, size=highest / more))
+    twice = (("balance.samples", samples(scene, _MORE_SAMPLES)),)
     label = f"{_MORE_SAMPLES} times the samples"
     out.append(Variation(SAMPLES, label, twice, size=1.0 / _MORE_SAMPLES))
     return [*out, *(_coarser(plan, factor) for factor in COARSER)]
 
 
-def samples(scene: ForcedScene, factor: int, highest: int) -> int:
+def samples(scene: ForcedScene, factor: int, highest: int = 1) -> int:
     """So many times those of the scene's balance, and as many as the rule gives a harmonic."""
     given, rule = scene.balance.samples, sample_count(harmonics(range(highest + 1)))
     own = sample_count(harmonics(scene.harmonic_numbers)) if given == "auto" else int(given)
@@ -119,14 +111,10 @@ def _coarser(plan: ForcedPlan, factor: float) -> Variation:
     become linear ones with incompatible modes at the last.
     """
     scene, size = plan.scene, 1.0 / factor
-    label = f"{factor:g} times the elements along every edge"
-    gauss = scene.contact.rule == GAUSS
-    counts = (*OFF_CONTACT, *on_contact(scene)) if scene.recipe == RECIPE and gauss else ()
-    fewer, changes = times(scene, counts, factor), Overrides()
-    if fewer != times(scene, counts, 1.0):
-        changes = of_geometry(fewer)
-    elif gauss and "refine" in plan.parameters and scene.recipe != RECIPE:
-        changes = of_geometry({"refine": factor * plan.parameters["refine"]})
+    label, changes = f"{factor:g} times the elements along every edge", Overrides()
+    if scene.contact.rule == GAUSS and recipes.has_parameter(scene.recipe, "refine"):
+        refine = plan.parameters.get("refine", count_of(scene, "refine"))
+        changes = of_geometry({"refine": factor * refine})
     elif NODES[scene.mesh.element] > 8 and factor == min(COARSER):
         changes = (("mesh.element", "hex8i"),)
         label, size = "hex8i elements on the same lattice", _LINEAR
@@ -138,32 +126,6 @@ def _coarser(plan: ForcedPlan, factor: float) -> Variation:
 def of_geometry(parameters: Mapping[str, Any]) -> Overrides:
     """Parameters of a recipe as overrides."""
     return tuple((f"geometry.{name}", value) for name, value in parameters.items())
-
-
-def make_variant(
-    plan: ForcedPlan, base: Model, bodies: Bodies | None, laws: Laws, of: Variation
-) -> Variant:
-    """The model of a variation with the sliding directions and the static state of the run's.
-
-    Parameters
-    ----------
-    base
-        Of the run.
-    bodies
-        Of the run; None: they are meshed again.
-    """
-    begin, fixed = time.perf_counter(), "one" if base.contacts.tangents < 2 else "two"
-    if of.source == MESH and not of.overrides:
-        return Variant(of, why="the mesh has no such level")
-    scene = changed(plan.scene, (("contact.directions", fixed), *of.overrides))
-    other = replace(plan, scene=scene, parameters=parameters_of(scene), workers=1)
-    if of.source in (HARMONICS, SAMPLES):
-        return Variant(of, plan=other)
-    try:
-        model = make_model(other, bodies or make_bodies(other), laws, base.state)
-    except UpdError as error:
-        return Variant(of, why=one_line(error))
-    return Variant(of, model=model, seconds=time.perf_counter() - begin)
 
 
 def lines_named(contact: FrictionChoice) -> bool:
@@ -212,28 +174,12 @@ def count_of(scene: ForcedScene, key: str) -> int:
     return int(scene.geometry.get(key, default))
 
 
-def on_contact(scene: ForcedScene) -> tuple[str, ...]:
-    """Counts of the scene's contact faces that its recipe has."""
-    slopes, along = FACES[scene.arrangement]
-    return tuple(key for key in (*slopes, along) if recipes.has_parameter(scene.recipe, key))
-
-
 def meshed(scene: ForcedScene) -> tuple[str, ...]:
     """Counts that its mesh is refined by: on the contact too, where the contact points are none of
     its nodes.
     """
-    return (*OFF_CONTACT, *(on_contact(scene) if scene.contact.rule == GAUSS else ()))
-
-
-def times(scene: ForcedScene, keys: tuple[str, ...], factor: float) -> dict[str, Any]:
-    """So many times the counts, rounded up to those the recipe allows, as its parameters."""
-    known = recipes.parameters(scene.recipe).__dataclass_fields__
-    out = {}
-    for key in keys:
-        step = 2 if known[key].metadata["bounds"].even else 1
-        count = -int(-factor * count_of(scene, key) / step // 1)
-        out[key] = step * max(1, count)
-    return out
+    slopes, along = FACES[scene.arrangement]
+    return (*OFF_CONTACT, *((*slopes, along) if scene.contact.rule == GAUSS else ()))
 
 
 def graded(scene: ForcedScene, factor: float) -> dict[str, Any]:

@@ -26,7 +26,6 @@ from upd.analyses.forced.blade_parts import (
 from upd.analyses.forced.plan import Excitation, ForcedPlan, excitation_of
 from upd.analyses.forced.points import FacePoints, gauss_points, lattice_points
 from upd.analyses.forced.statics import StaticState, point_preload, static_state
-from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies
 from upd.fem import modal_damping
 from upd.hbm import (
@@ -46,7 +45,7 @@ from upd.hbm.springs.points import stuck_stiffness
 from upd.linalg.parallel import in_parallel
 from upd.mesh import IntArray
 from upd.scene import ForcedScene
-from upd.scene.forced_contact import GAUSS, SIDES, Side
+from upd.scene.forced_contact import GAUSS, SIDES, FaceStiffness, Side
 
 log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
@@ -95,7 +94,7 @@ class Model:
     excitation: Excitation
     output: Mapping[Side, Array]
     faces: Mapping[Side, FacePoints]
-    laws: Mapping[Side, FaceLaw]
+    laws: Mapping[Side, FaceStiffness]
     contacts: Contacts
     damper: RigidDamper
     damper_rows: Array
@@ -164,7 +163,7 @@ class Model:
 def make_model(
     plan: ForcedPlan,
     bodies: Bodies,
-    laws: Mapping[Side, FaceLaw],
+    laws: Mapping[Side, FaceStiffness],
     state: StaticState | None = None,
 ) -> Model:
     """Reduce both blades to the points of one contact stiffness and put them beside each other.
@@ -289,7 +288,7 @@ def _rigid(scene: ForcedScene, bodies: Bodies, half: bool) -> RigidDamper:
 
 def _stiffnesses(
     faces: Mapping[Side, FacePoints],
-    laws: Mapping[Side, FaceLaw],
+    laws: Mapping[Side, FaceStiffness],
     pairs: Mapping[Side, MirrorPairs] | None,
 ) -> list[Array]:
     """k_n and k_t of all points, of pairs together."""

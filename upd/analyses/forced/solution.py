@@ -13,7 +13,6 @@ from upd.analyses.forced.curves import ForcedCurve, LinearCurves, SweptCurve, Wh
 from upd.analyses.forced.measures import CurvePeak, in_faces
 from upd.analyses.forced.model import Array, Model
 from upd.analyses.forced.nonlinear_modes import ModeCurve
-from upd.analyses.forced.peaks_again import PeaksAgain
 from upd.analyses.forced.performance import Performance
 from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.seated.bodies import Bodies
@@ -21,6 +20,7 @@ from upd.hbm.faces.record import RecordedPeriod
 from upd.mesh import IntArray
 from upd.results import Case, Result
 from upd.scene.forced_contact import SIDES
+from upd.vary.variation import SolvedVariation
 
 _TINY = float(np.finfo(float).tiny)
 
@@ -99,7 +99,7 @@ class ForcedSolution:
     performances: dict[str, Performance] = field(default_factory=dict)
     nonlinear_modes: list[ModeCurve] = field(default_factory=list)
     omissions: list[Resolved] = field(default_factory=list)
-    levels: dict[str, list[PeaksAgain]] = field(default_factory=dict)
+    levels: list[SolvedVariation] = field(default_factory=list)
     effects: list[Result] = field(default_factory=list)
 
     @property

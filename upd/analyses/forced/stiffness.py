@@ -8,7 +8,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,40 +24,25 @@ from upd.results import Group, read_netcdf
 from upd.scene import Scene, load_scene
 from upd.scene.contact import CONTACT_WANTS
 from upd.scene.forced import ForcedScene
-from upd.scene.forced_contact import SIDES, Side, StiffnessChoice
+from upd.scene.forced_contact import SIDES, FaceStiffness, Side, StiffnessChoice
 
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class FaceLaw:
-    """Stiffness of one face.
-
-    Attributes
-    ----------
-    K_N, K_T
-        Totals, N/mm.
-    """
-
-    K_N: float
-    K_T: float
-
-
-def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceLaw]:
+def face_laws(choice: StiffnessChoice, stages: Stages) -> dict[Side, FaceStiffness]:
     """Stiffness of the left and the right face.
 
     A contact analysis stands for the right one and, mirrored, for the symmetric rig's left.
     """
     law = _law(choice, stages) if choice.from_contact else None
-    out: dict[Side, FaceLaw] = {}
+    out: dict[Side, FaceStiffness] = {}
     for side in SIDES:
         given = choice.face(side)
-        if given is not None:
-            out[side] = FaceLaw(given.K_N, given.K_T)
-        else:
+        if given is None:
             assert law is not None
             K_T = float(law.k_t.sum(axis=0).mean())
-            out[side] = FaceLaw(float(law.k_n.sum()), K_T)
+            given = FaceStiffness(float(law.k_n.sum()), K_T)
+        out[side] = given
     return out
 
 
