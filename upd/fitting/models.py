@@ -198,7 +198,7 @@ class ModelSource:
         return repr(replace(scene, stiffness={}, text="", contact=contact))
 
     def _plan(self, scene: ForcedScene) -> ForcedPlan:
-        return _remembered(self._plans, self._frame(scene), lambda: make_plan(scene))  # type: ignore[arg-type, return-value]
+        return _remembered(self._plans, self._frame(scene), lambda: make_plan(scene))
 
 
 def is_seated(scene: ForcedScene) -> bool:

@@ -74,8 +74,7 @@ class RigPeaks:
     ) -> None:
         self.scene, self._report, self.curves = scene, report, 0
         (self.stiffness,) = scene.contact.stiffness
-        plan = make_plan(scene)
-        assert isinstance(plan, ForcedPlan)
+        plan: ForcedPlan = make_plan(scene)
         self.plan = plan
         key = bodies_key(plan)
         if key not in bodies:

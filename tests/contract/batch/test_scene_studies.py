@@ -14,8 +14,8 @@ from rigs import LINES
 
 from upd import load_scene, make_plan, run
 from upd.analyses import ladders_of
+from upd.analyses.forced.blade_parts import lattice_points
 from upd.analyses.forced.ladders import response_meshes
-from upd.analyses.forced.points import lattice_points
 from upd.batch.engine import Workers
 from upd.batch.studies import plan_study, point_task, run_study, scene_at
 from upd.cli import main

@@ -22,8 +22,7 @@ from dataclasses import replace
 from typing import Any
 
 from upd.analyses.base import chosen_by_accuracy, refuse_oversize
-from upd.analyses.forced.again import Change, changed_results, run_curve
-from upd.analyses.forced.levels import (
+from upd.analyses.forced.again import (
     HARMONICS,
     MESH,
     MODES,
@@ -31,9 +30,12 @@ from upd.analyses.forced.levels import (
     RECIPE,
     SAMPLES,
     TIME,
+    Change,
+    changed_results,
     graded,
     lines_named,
     of_geometry,
+    run_curve,
     samples,
     with_gauss,
 )

@@ -22,8 +22,8 @@ from functools import partial
 from typing import Any
 
 from upd.analyses.cost import NODES
+from upd.analyses.forced.again import FACES, count_of
 from upd.analyses.forced.interface_model import INTERFACE
-from upd.analyses.forced.levels import FACES, count_of
 from upd.analyses.seated.varied import PATCH
 from upd.errors import InputError
 from upd.mesh import recipes

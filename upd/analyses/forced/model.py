@@ -16,15 +16,17 @@ from scipy.linalg import block_diag, eigh
 from upd.analyses.forced.blade_parts import (
     EVEN_DOFS,
     BladePart,
+    FacePoints,
     MirrorPairs,
     attached_part,
+    gauss_points,
+    lattice_points,
     mirror_pairs,
     nodal_part,
     ritz,
     symmetric,
 )
 from upd.analyses.forced.plan import Excitation, ForcedPlan, excitation_of
-from upd.analyses.forced.points import FacePoints, gauss_points, lattice_points
 from upd.analyses.forced.statics import StaticState, point_preload, static_state
 from upd.analyses.seated.bodies import Bodies
 from upd.fem import modal_damping

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses import measured, printed
+from upd.analyses import base, measured
 from upd.analyses.forced import measures
 from upd.analyses.forced.again import limit_results, peak_results
 from upd.analyses.forced.curves import ForcedCurve, PointCurve, WholeFaces
@@ -405,8 +405,8 @@ def motion_results(case: Case, static: Array, amplitude: Array) -> list[Result]:
 
 def printed_of(plan: ForcedPlan) -> Lookup:
     """What was printed of the rig, and of the damper in it under the loads of the ready scene."""
-    scene, look_up = plan.scene, printed.printed_of(plan.scene)
-    ready = printed.ready_scene(scene)
+    scene, look_up = plan.scene, base.printed_of(plan.scene)
+    ready = base.ready_scene(scene)
     damped = ready is not None and (
         (scene.damper.centrifugal, scene.damper.density, scene.contact.friction)
         == (ready.damper.centrifugal, ready.damper.density, ready.contact.friction)

@@ -11,7 +11,15 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from upd.analyses.base import keeping
-from upd.analyses.forced.again import Run, Variant, make_variant, run_curve, solve_again
+from upd.analyses.forced.again import (
+    MESH,
+    Run,
+    Variant,
+    level_variations,
+    make_variant,
+    run_curve,
+    solve_again,
+)
 from upd.analyses.forced.inputs import (
     along_changes,
     along_the_damper,
@@ -21,7 +29,6 @@ from upd.analyses.forced.inputs import (
     input_variants,
 )
 from upd.analyses.forced.interface_model import INTERFACE, make_springs, make_whole_faces
-from upd.analyses.forced.levels import MESH, level_variations
 from upd.analyses.forced.linear_limits import linear_of, linear_of_faces
 from upd.analyses.forced.model import Model, make_model, preloaded, quiet
 from upd.analyses.forced.nonlinear_modes import mode_over_amplitude
@@ -178,7 +185,7 @@ def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: St
     for name in names if scene.estimates else ():
         model = solution.models[name]
         for of in level_variations(plan):
-            given = _with_totals(plan, name, model), name, model
+            given = with_totals(plan, name, model), name, model
             if of.source != MESH:
                 variants[name].append(make_variant(*given, bodies, of))
             else:
@@ -203,7 +210,7 @@ def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: St
         _around(solution, variants, points, beside)
 
 
-def _with_totals(plan: ForcedPlan, name: str, model: Model) -> ForcedPlan:
+def with_totals(plan: ForcedPlan, name: str, model: Model) -> ForcedPlan:
     """The plan with the totals of a contact stiffness in its scene, wherever they come from."""
     totals = StiffnessChoice(left=model.laws["left"], right=model.laws["right"])
     return replace(plan, scene=changed(plan.scene, ((f"stiffness.{name}", totals),)))
@@ -232,7 +239,7 @@ def _around(
     further: list[RatioPoint] = []
     for name, model in solution.models.items():
         mine = tuple(c for c in solution.curves if c.stiffness == name and not c.empty)
-        given = _with_totals(plan, name, model), name, model, solution.linear[name]
+        given = with_totals(plan, name, model), name, model, solution.linear[name]
         run = Run(*given, tuple(run_curve(one) for one in mine))
         work += [_Work(solution.levels.append, solve_again, (run, one)) for one in variants[name]]
         if scene.left_out.solves:

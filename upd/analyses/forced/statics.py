@@ -138,17 +138,6 @@ def static_state(
     return _checked(StaticState(chosen, N, T, known), frames, F, c.friction)
 
 
-def state_of_ratio(frames: Array, F: float, mu: float, ratio: float) -> StaticState:
-    """The state in which both faces mobilise the same T/N.
-
-    Raises
-    ------
-    InputError
-        Where a face would have to pull.
-    """
-    return _given(frames, F, mu, dict.fromkeys(SIDES, float(ratio)))
-
-
 def admissible(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> list[StaticState]:
     """The named static states that exist here, each once; without friction one."""
     out: list[StaticState] = []
