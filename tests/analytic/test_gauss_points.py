@@ -189,7 +189,7 @@ def test_an_elastic_damper_is_the_same_on_half_a_rig() -> None:
         bodies = make_bodies(plan)
         assert bodies.half == (symmetry == "auto")
         model = make_model(plan, bodies, face_laws(scene.stiffnesses["thesis"], Stages()))
-        along_x = (m.frequency for m in elastic_stuck(plan, bodies, model) if m.axis == "x")
+        along_x = (m.frequency for m in elastic_stuck(plan, bodies, model))
         found.append([next(along_x), next(along_x)])
     assert found[0] == pytest.approx(found[1], rel=1e-4)
 

@@ -35,7 +35,6 @@ FIGURES = (
     "force_displacement",
     "contact_law",
     "response",
-    "response_harmonics",
     "damping",
     "contact_state",
     "contact_map",

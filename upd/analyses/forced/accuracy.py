@@ -266,7 +266,8 @@ def bound(source: str, found: Sequence[tuple[Variation, float]]) -> tuple[float,
         return error, f"against {names}: {words}"
     if source == SAMPLES:
         # the rule is of second order: a quarter of the change remains
-        return spread / (1.0 - 0.25), f"change with {names}, order 2"
+        error = _SAFETY * spread / (1.0 - 0.25)
+        return error, f"change with {names}, order 2, factor {_SAFETY:g}"
     if source == MODES:
         return spread, f"change from {names}: what more modes change is less"
     if source == TIME:

@@ -227,10 +227,9 @@ def _linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:
             out |= {f"accelerance_{kind}_{side}": accelerance_array(curves[side])}
             rising = sorted(peaks[side], key=lambda p: p.frequency)
             out |= peak_arrays(f"{kind}_{side}", rising)
-    x = [m for m in linear.modes if m.axis == "x"]
     damping = variable("", solution.plan.scene.excitation.damping, "1", "modal damping ratio")
     return out | {
-        "stuck_mode": variable("mode", [m.frequency for m in x], "Hz"),
+        "stuck_mode": variable("mode", [m.frequency for m in linear.modes], "Hz"),
         "damping": damping,
     }
 

@@ -25,7 +25,7 @@ from upd.analyses.forced.again import Run, Variant, make_variant, peak_again
 from upd.analyses.forced.blade_parts import MIRROR_SIGNS
 from upd.analyses.forced.curves import Top
 from upd.analyses.forced.linear_limits import stuck_frequency
-from upd.analyses.forced.measures import CurvePeak, StuckMode, tell_modes
+from upd.analyses.forced.measures import CurvePeak, StuckMode, shapes_along_x
 from upd.analyses.forced.model import Array, Model, balance_of, preloaded
 from upd.analyses.forced.plan import ALONG, ELASTIC, ForcedPlan
 from upd.analyses.seated.bodies import Bodies
@@ -270,7 +270,7 @@ def elastic_stuck(plan: ForcedPlan, bodies: Bodies, model: Model) -> list[StuckM
     # (k^-1 + G)^-1, also where k = 0
     joint = np.linalg.solve(np.eye(len(k)) + k[:, None] * G, np.diag(k))
     values, shapes = eigh(K + B.T @ joint @ B, M)
-    return tell_modes(model, values, shapes, 2.0 * plan.scene.excitation.stop)
+    return shapes_along_x(model, M, values, shapes, 2.0 * plan.scene.excitation.stop).modes
 
 
 def elastic_compliance(plan: ForcedPlan, bodies: Bodies, model: Model) -> Array:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -26,7 +25,6 @@ from upd.analyses.forced.measures import (
     StuckMode,
     chosen_peaks,
     numbered,
-    shapes_along_x,
     tell_stuck_peaks,
     unmoved,
 )
@@ -194,8 +192,8 @@ def stuck_system(march: InterfaceModel) -> tuple[Array, Array, Array]:
     return np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), shapes[:m], tips
 
 
-def stuck_modes_of(march: InterfaceModel, below: float) -> tuple[list[StuckMode], ModeShapes]:
-    """Stuck modes, and those that move the tips along x on the outputs behind the tips.
+def stuck_modes_of(march: InterfaceModel, below: float) -> ModeShapes:
+    """Stuck modes that move the tips along x, on the outputs behind the tips.
 
     Parameters
     ----------
@@ -205,9 +203,8 @@ def stuck_modes_of(march: InterfaceModel, below: float) -> tuple[list[StuckMode]
         Hz; modes above are left out.
     """
     frequency, shapes, tips = stuck_system(march)
-    modes, rows = measures.modes_of_tips(frequency, tips, below), march.seen_modes[len(SIDES) :]
-    found = shapes_along_x(np.eye(len(rows)), shapes, modes)
-    return modes, replace(found, shape=rows @ found.shape)
+    rows = march.seen_modes[len(SIDES) :]
+    return measures.modes_of_tips(np.eye(len(rows)), frequency, rows @ shapes, tips, below)
 
 
 def linear_curves(
@@ -252,14 +249,14 @@ def linear_of_faces(plan: ForcedPlan, march: InterfaceModel) -> LinearCurves:
     frequency, excitation = grid(plan), excitation_of(plan.scene.excitation)
     free, free_peaks = linear_curves(march, frequency, excitation, stuck=False)
     stuck, stuck_peaks = linear_curves(march, frequency, excitation, stuck=True)
-    modes, shapes = stuck_modes_of(march, CANDIDATES * plan.scene.excitation.stop)
+    shapes = stuck_modes_of(march, CANDIDATES * plan.scene.excitation.stop)
     named = {}
     for side, peaks in stuck_peaks.items():
         f = excitation.lowest * np.array([one.frequency for one in peaks])
         motion = march.linear_response(f, excitation.read, stuck=True)[:, len(SIDES) :]
         named[side] = numbered(shapes, peaks, motion)
     free_peaks = {side: unmoved(peaks) for side, peaks in free_peaks.items()}
-    return LinearCurves(frequency, free, stuck, modes, free_peaks, named)
+    return LinearCurves(frequency, free, stuck, shapes.modes, free_peaks, named)
 
 
 def linear_of(plan: ForcedPlan, model: Model) -> LinearCurves:
@@ -284,8 +281,8 @@ def linear_of(plan: ForcedPlan, model: Model) -> LinearCurves:
 
 
 def stuck_frequency(modes: Iterable[StuckMode], in_phase: bool) -> float:
-    """The lowest in Hz along x, in or out of phase; nan without."""
-    found = (m.frequency for m in modes if m.axis == "x" and m.in_phase == in_phase)
+    """The lowest in Hz, in or out of phase; nan without."""
+    found = (m.frequency for m in modes if m.in_phase == in_phase)
     return next(found, math.nan)
 
 

@@ -133,6 +133,20 @@ class Model:
         return -self.traction / law.k_t[:, None] if np.any(law.mu) else None
 
     @property
+    def system(self) -> dict[str, Any]:
+        """What `upd.hbm` takes of it, the excitation aside."""
+        return {
+            "M": self.M,
+            "C": self.C,
+            "K": self.K,
+            "contacts": self.contacts,
+            "static_force": self.static,
+            "damper": self.damper,
+            "damper_rows": self.damper_rows,
+            "slider": self.slider,
+        }
+
+    @property
     def halved(self) -> bool:
         """Whether a contact point stands for itself and its mirror image about y = 0."""
         return self.damper.n_dof < 6
@@ -389,11 +403,6 @@ LEAST_POINTS, MOST_POINTS = 1800, 4
 LONG_STEPS = Settings(angle=0.7, kink_step=0.1, wanted_iterations=8)
 
 
-def path_settings(points: int) -> Settings:
-    """How far a path along so many frequencies may go."""
-    return replace(LONG_STEPS, most_points=max(LEAST_POINTS, MOST_POINTS * points))
-
-
 def respond(
     plan: ForcedPlan, model: Model, force: float, frequencies: Array, **changes: Any
 ) -> FrequencyResponse:
@@ -408,24 +417,17 @@ def respond(
     **changes
         Replace the scene's harmonics, samples, start of the sliders, or settings of the path.
     """
-    b = plan.scene.balance
+    b, n = plan.scene.balance, len(frequencies)
     usual: dict[str, Any] = {
         "harmonics": plan.scene.harmonic_numbers,
         "samples": None if b.samples == "auto" else b.samples,
         "start": b.slider,
-        "slider": model.slider,
-        "settings": path_settings(len(frequencies)),
+        "settings": replace(LONG_STEPS, most_points=max(LEAST_POINTS, MOST_POINTS * n)),
     }
     return frequency_response(
-        model.M,
-        model.C,
-        model.K,
-        model.contacts,
+        **model.system,
         harmonic_force=model.harmonic_force(force),
-        static_force=model.static,
         frequencies=frequencies,
-        damper=model.damper,
-        damper_rows=model.damper_rows,
         **(usual | changes),
     )
 

@@ -89,19 +89,12 @@ def mode_over_amplitude(
     first = first_slip(b, shapes[:, k], float(omega[k]))
     rigid = int((values <= len(values) * np.finfo(float).eps * values[-1]).sum())
     found = nonlinear_mode(
-        model.M,
-        model.C,
-        model.K,
-        model.contacts,
+        **model.system,
         mode=k - rigid + 1,
         amplitudes=first * np.geomspace(*SPAN, POINTS),
         harmonics=numbers,
-        static_force=model.static,
-        damper=model.damper,
-        damper_rows=model.damper_rows,
         samples=b.samples,
         start=scene.balance.slider,
-        slider=model.slider,
         settings=replace(LONG_STEPS, most_points=MOST_POINTS),
     )
     square = (2.0 * np.pi * found.frequency) ** 2

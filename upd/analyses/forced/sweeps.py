@@ -115,7 +115,7 @@ def with_outputs(
         Frequencies and heights along the curve -> its local maxima.
     """
     excitation, stop = excitation_of(plan.scene.excitation), plan.scene.excitation.stop
-    (_, modes), f = stuck_modes_of(march, CANDIDATES * stop), curve.frequency
+    modes, f = stuck_modes_of(march, CANDIDATES * stop), curve.frequency
     blades: dict[int, dict[Side, ComplexArray]] = {
         k: {s: accelerance_of(u[:, j], f, k, curve.force) for j, s in enumerate(SIDES)}
         for k, u in moved.items()
