@@ -22,7 +22,7 @@ from rig_response import rig
 
 from upd.analyses.forced.again import OFF_CONTACT, count_of
 from upd.analyses.forced.again import graded as graded_mesh
-from upd.analyses.forced.linear_limits import linear_of
+from upd.analyses.forced.curves import linear_of
 from upd.scene import load_scene
 
 Row = dict[str, Any]

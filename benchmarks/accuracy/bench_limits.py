@@ -23,13 +23,13 @@ from rig_response import Rig, accelerance, rig
 
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
+from upd.analyses.forced.curves import stuck_modes_of
 from upd.analyses.forced.interface_model import (
     by_coulomb,
     make_interface_model,
     make_springs,
     worn_start,
 )
-from upd.analyses.forced.linear_limits import stuck_modes_of
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import preloaded, respond
 from upd.analyses.forced.plan import MARCH_SAMPLES

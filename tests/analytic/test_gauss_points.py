@@ -14,7 +14,7 @@ from upd.analyses.forced.blade_parts import FacePoints, gauss_points, lagrange
 from upd.analyses.forced.inputs import elastic_stuck, nearer
 from upd.analyses.forced.measures import stuck_modes
 from upd.analyses.forced.model import Model, make_model, preloaded
-from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.forced.statics import face_laws
 from upd.analyses.seated.bodies import make_bodies
 from upd.errors import InputError
 from upd.fem import Material, box_mesh, mass, mass_properties, stiffness

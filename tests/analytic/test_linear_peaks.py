@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.linear_limits import finer, linear_modes, linear_peaks
+from upd.analyses.forced.curves import finer, linear_modes, linear_peaks
 from upd.hbm import contacts, frequency_response
 from upd.scene.forced_contact import SIDES
 

@@ -12,7 +12,7 @@ from rigs import LINES
 from upd.analyses.forced import measures
 from upd.analyses.forced.model import make_model
 from upd.analyses.forced.plan import make_plan
-from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.forced.statics import face_laws
 from upd.analyses.seated.bodies import make_bodies
 from upd.progress import Stages
 from upd.scene import load_scene

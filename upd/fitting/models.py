@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from upd.analyses import make_plan
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.forced.statics import face_laws
 from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
 from upd.cache.arrays import cache_folder
 from upd.cache.files import write_text

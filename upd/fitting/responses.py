@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.linear_limits import fine_grid, linear_peaks
+from upd.analyses.forced.curves import fine_grid, linear_peaks
 from upd.analyses.forced.measures import (
     CANDIDATES,
     CurvePeak,

@@ -44,7 +44,7 @@ from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.solve import solve
 from upd.progress import Stages
-from upd.results import ErrorPart, Estimates, Result
+from upd.results import Case, ErrorPart, Estimates, Result
 from upd.results import quantities as q
 from upd.results.quantities import Quantity, quantity_of
 from upd.scene import ForcedScene
@@ -114,31 +114,17 @@ def _choice(
     return LevelChoice(source, source, labels, at)
 
 
-def _trial(scene: ForcedScene) -> ForcedScene:
-    return replace(scene, want=("response",), left_out=replace(scene.left_out, solve="no"))
-
-
-def _estimate(
-    solution: ForcedSolution,
-    numbers: Sequence[Result],
-    stages: Stages,
-    memo: list[SolvedVariation],
-) -> Estimates:
-    """By the levels that the solution has itself."""
-    del memo
-    return estimate(solution, numbers, stages)
-
-
 WANTED = Wanted(
     choices,
     ASKED,
     make_plan,
     solve,
     make_results,
-    _estimate,
+    # by the levels that the solution has itself
+    lambda solution, numbers, stages, memo: estimate(solution, numbers, stages),
     refuse_oversize,
     chosen_by_accuracy,
-    _trial,
+    lambda scene: changed(scene, (("want", ("response",)), ("left_out.solve", "no"))),
 )
 
 
@@ -195,6 +181,9 @@ def estimate(solution: ForcedSolution, numbers: Sequence[Result], stages: Stages
                 twin = one.name.replace("accelerance", "frequency"), one.case
                 parts = _at_least(parts, out.get(twin, ()))
             out[key] = tuple(parts)
+        elif quantity in (q.REDUCTION, q.REDUCTION.on("left")) and one.value:
+            side: Side = "right" if quantity == q.REDUCTION else "left"
+            out[key] = tuple(_of_reduction(one, numbers, side, out))
         elif quantity in _BEST:
             out[key] = _of_best(solution, quantity, one, out)
     return {key: parts for key, parts in out.items() if parts}
@@ -210,8 +199,7 @@ def _integrated(solution: ForcedSolution) -> Iterator[SolvedVariation]:
             change = Change(1.0 + one.apart, 1.0 + one.step, why)
             changes |= {(side, one.number): change for side in SIDES}
         if changes:
-            found = changed_results(run_curve(curve), changes, solution.linear[curve.stiffness])
-            yield SolvedVariation(of, list(found))
+            yield SolvedVariation(of, list(changed_results(run_curve(curve), changes)))
 
 
 def _parts(levels: Sequence[SolvedVariation], key: Key, own: float) -> Iterator[ErrorPart]:
@@ -291,6 +279,25 @@ def _of_meshes(found: Sequence[tuple[Variation, float]]) -> tuple[float, str]:
         return _SAFETY * (max(ratios) - min(ratios)), f"range, in no order, factor {_SAFETY:g}"
     words = f"order {shown:.1f}, taken as {_ORDER:.2g} of re-entrant edges, factor {_SAFETY:g}"
     return error, words
+
+
+def _of_reduction(
+    one: Result, numbers: Sequence[Result], side: Side, parts: Mapping[Key, tuple[ErrorPart, ...]]
+) -> Iterator[ErrorPart]:
+    """Of 100 (1 - h / free), the errors of the highest peak h and of the free one, times
+    (h / free) / (1 - h / free).
+    """
+    factor, found = abs((100.0 - one.value) / one.value), list[ErrorPart]()
+    height, free = q.PEAK_ACCELERANCE.on(side), Case(stiffness=one.case.stiffness, kind="free")
+    heights = [r for r in numbers if not r.withheld and quantity_of(r.name)[0] == height]
+    for case in (one.case, free):
+        mine = [r for r in heights if replace(r.case, mode="") == case]
+        top = max(mine, key=lambda r: r.value, default=None)
+        found += () if top is None else parts.get((top.name, top.case), ())
+    for source in dict.fromkeys(part.source for part in found):
+        same = [part for part in found if part.source == source]
+        words = f"of the highest peak and of the free one: {same[0].basis}"
+        yield replace(same[0], error=factor * math.fsum(p.error for p in same), basis=words)
 
 
 def _of_best(

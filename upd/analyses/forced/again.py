@@ -20,8 +20,14 @@ import numpy as np
 
 from upd.analyses.cost import NODES
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import LinearCurves, PointCurve, TimeCheck, Top
-from upd.analyses.forced.linear_limits import linear_of, stuck_frequency
+from upd.analyses.forced.curves import (
+    LinearCurves,
+    PointCurve,
+    TimeCheck,
+    Top,
+    linear_of,
+    stuck_frequency,
+)
 from upd.analyses.forced.measures import CurvePeak, numbered_peaks
 from upd.analyses.forced.model import (
     BAND,
@@ -35,7 +41,7 @@ from upd.analyses.forced.model import (
 )
 from upd.analyses.forced.peaks import climbed
 from upd.analyses.forced.plan import ForcedPlan, parameters_of
-from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.forced.statics import face_laws
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import ConvergenceError, UpdError, one_line
 from upd.hbm.core.fourier import harmonics, sample_count
@@ -162,7 +168,7 @@ def solve_again(run: Run, variant: Variant) -> SolvedVariation:
             numbers += limit_results(run.name, linear)
         for curve in run.curves:
             changes = _changes(run, variant.plan, model, linear, curve, of)
-            numbers += changed_results(curve, changes, linear)
+            numbers += changed_results(curve, changes)
     return SolvedVariation(of, numbers, time.perf_counter() - begin)
 
 
@@ -206,23 +212,14 @@ def peak_results(case: Case, peak: CurvePeak, blade: Side, withheld: str = "") -
     ]
 
 
-def changed_results(curve: RunCurve, changes: Changes, linear: LinearCurves) -> Iterator[Result]:
-    """Numbers of the peaks that changed, and the reduction where the highest did."""
-    for side in SIDES:
-        new, whys = [], []
-        for peak in curve.peaks.get(side, ()):
-            change = changes.get((side, peak.number), Change(1.0, 1.0))
-            f, height = peak.frequency * change.frequency, peak.height * change.height
-            new.append(peak._replace(frequency=f, height=height))
-            whys.append(change.why)
-            if (side, peak.number) in changes:
-                yield from peak_results(curve.case, new[-1], side, withheld=change.why)
-        free = [peak.height for peak in linear.free_peaks[side]]
-        highest = max(curve.peaks.get(side, ()), key=lambda peak: peak.height, default=None)
-        if free and highest is not None and (side, highest.number) in changes:
-            why = next(filter(None, whys), "")
-            height = math.nan if why else max(peak.height for peak in new)
-            yield q.REDUCTION.on(side).of(1.0 - height / max(free), curve.case, withheld=why)
+def changed_results(curve: RunCurve, changes: Changes) -> Iterator[Result]:
+    """Numbers of the peaks that changed."""
+    for side, peaks in curve.peaks.items():
+        for peak in peaks:
+            if change := changes.get((side, peak.number)):
+                f, height = peak.frequency * change.frequency, peak.height * change.height
+                again = peak._replace(frequency=f, height=height)
+                yield from peak_results(curve.case, again, side, change.why)
 
 
 def _changes(

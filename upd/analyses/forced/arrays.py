@@ -15,12 +15,16 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, PointCurve, SweptCurve
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array
-from upd.analyses.forced.nonlinear_modes import mode_arrays
-from upd.analyses.forced.performance import performance_arrays
+from upd.analyses.forced.performance import mode_arrays, performance_arrays
 from upd.analyses.forced.plan import excitation_of
 from upd.analyses.forced.results import measured_peaks
-from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
-from upd.analyses.forced.sweeps import marched_damper, marched_loops
+from upd.analyses.forced.solution import (
+    ContactPlaces,
+    ForcedSolution,
+    MarchedPeak,
+    marched_damper,
+    marched_loops,
+)
 from upd.analyses.measured import accelerance_array, measured_arrays
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.balance import InterfaceResponse

@@ -23,8 +23,7 @@ from scipy.spatial import cKDTree
 from upd.analyses.base import Resolved
 from upd.analyses.forced.again import Run, Variant, make_variant, peak_again
 from upd.analyses.forced.blade_parts import MIRROR_SIGNS
-from upd.analyses.forced.curves import Top
-from upd.analyses.forced.linear_limits import stuck_frequency
+from upd.analyses.forced.curves import Top, stuck_frequency
 from upd.analyses.forced.measures import CurvePeak, StuckMode, shapes_along_x
 from upd.analyses.forced.model import Array, Model, balance_of, preloaded
 from upd.analyses.forced.plan import ALONG, ELASTIC, ForcedPlan

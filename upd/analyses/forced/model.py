@@ -222,20 +222,6 @@ def make_model(
         np.vstack([faces[side].position for side in SIDES]),
         np.concatenate([np.tile(faces[side].frame, (faces[side].n_point, 1, 1)) for side in SIDES]),
     )
-    directions = scene.contact.directions
-    if (
-        directions == "auto"
-        and half
-        and _along_change(M, K, made, damper, on_damper) <= ALONG_MATTERS
-    ):
-        directions = "one"
-    if directions == "one":
-        # normal and up the slope
-        kept = [0, 2]
-        made, on_damper = (
-            replace(made, rows=np.ascontiguousarray(made.rows[:, kept])),
-            np.ascontiguousarray(on_damper[:, kept]),
-        )
     model = Model(
         M,
         modal_damping(M, shapes, frequency, damping),
@@ -254,6 +240,9 @@ def make_model(
         np.zeros(len(M)),
         np.zeros((made.n_point, made.tangents)),
     )
+    directions = scene.contact.directions
+    if directions == "one" or (directions == "auto" and half and not _along_matters(model)):
+        model = _without_along(model)
     if not scene.contact.loaded:
         return model
     return preloaded(model, state or static_state(plan, bodies))
@@ -345,21 +334,26 @@ def preloaded(model: Model, state: StaticState) -> Model:
     )
 
 
-def _along_change(
-    M: Array, K: Array, points: Contacts, damper: RigidDamper, on_damper: Array
-) -> float:
-    """Largest relative change of the two lowest stuck frequencies when nothing resists sliding
-    along the damper.
-    """
-    if not np.any(points.law.mu):
+def _without_along(model: Model) -> Model:
+    """The model in which nothing resists sliding along the damper."""
+    kept = [0, 2]
+    rows, on_damper = (
+        np.ascontiguousarray(of[:, kept]) for of in (model.contacts.rows, model.damper_rows)
+    )
+    contacts = replace(model.contacts, rows=rows)
+    return replace(model, contacts=contacts, damper_rows=on_damper, traction=model.traction[:, :1])
+
+
+def _along_matters(model: Model) -> bool:
+    """Whether resistance to sliding along the damper changes the two lowest stuck frequencies."""
+    if not np.any(model.contacts.law.mu):
         # without friction nothing resists
-        return 0.0
-    M, _, K, joined = attach(M, np.zeros_like(M), K, points, damper, on_damper)
+        return False
     found = []
-    for kept in ([0, 1, 2], [0, 2]):
-        B, k = joined.rows[:, kept].reshape(-1, len(M)), stuck_stiffness(joined)[:, kept].ravel()
-        found.append(np.sqrt(eigh(K + B.T @ (k[:, None] * B), M, subset_by_index=[0, 1])[0]))
-    return float(np.abs(found[1] / found[0] - 1.0).max())
+    for one in (model, _without_along(model)):
+        M, _, K, _ = one.linear(stuck=True)
+        found.append(np.sqrt(eigh(K, M, subset_by_index=[0, 1])[0]))
+    return bool(np.abs(found[1] / found[0] - 1.0).max() > ALONG_MATTERS)
 
 
 def _face(scene: ForcedScene, bodies: Bodies, side: Side) -> FacePoints:

@@ -30,10 +30,10 @@ from upd.analyses.forced.curves import (
     PointCurve,
     TimeCheck,
     Top,
+    fine_grid,
     rising,
 )
 from upd.analyses.forced.interface_model import SpringMarch, by_coulomb, make_springs, state_at
-from upd.analyses.forced.linear_limits import fine_grid
 from upd.analyses.forced.measures import CurvePeak, numbered_peaks
 from upd.analyses.forced.model import Array, Model, respond
 from upd.analyses.forced.plan import ForcedPlan, time_steps

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from upd.analyses.base import Effect, Plan
 from upd.analyses.cost import NODES, CostModel, dense_s
-from upd.analyses.forced.stiffness import check_sources, plans_to_solve
+from upd.analyses.forced.statics import check_sources, plans_to_solve
 from upd.analyses.seated.plan import centrifugal_effects
 from upd.hbm.core.fourier import harmonics, sample_count
 from upd.hbm.core.kept_factors import WORTH_KEEPING

@@ -11,16 +11,13 @@ import numpy as np
 from upd.analyses import base, measured
 from upd.analyses.forced import measures
 from upd.analyses.forced.again import limit_results, peak_results
-from upd.analyses.forced.curves import ForcedCurve, PointCurve, WholeFaces
-from upd.analyses.forced.linear_limits import linear_curves
+from upd.analyses.forced.curves import ForcedCurve, PointCurve, WholeFaces, linear_curves
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array, ComplexArray, Model, balance_of
-from upd.analyses.forced.nonlinear_modes import mode_results
-from upd.analyses.forced.performance import performance_results
+from upd.analyses.forced.performance import mode_results, performance_results
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
-from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
+from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak, marched_damper
 from upd.analyses.forced.statics import StaticState
-from upd.analyses.forced.sweeps import marched_damper
 from upd.analyses.measured import FREE, STUCK, Computed
 from upd.analyses.seated.results import RIGID
 from upd.hbm import FrequencyResponse

@@ -20,6 +20,7 @@ from upd.analyses.forced.again import (
     run_curve,
     solve_again,
 )
+from upd.analyses.forced.curves import linear_of, linear_of_faces
 from upd.analyses.forced.inputs import (
     along_changes,
     along_the_damper,
@@ -29,24 +30,21 @@ from upd.analyses.forced.inputs import (
     input_variants,
 )
 from upd.analyses.forced.interface_model import INTERFACE, make_springs, make_whole_faces
-from upd.analyses.forced.linear_limits import linear_of, linear_of_faces
 from upd.analyses.forced.model import Model, make_model, preloaded, quiet
-from upd.analyses.forced.nonlinear_modes import mode_over_amplitude
 from upd.analyses.forced.peaks import solve_curve
 from upd.analyses.forced.performance import (
     RatioPoint,
     further_points,
     harmonics_of,
+    mode_over_amplitude,
     peaks_at,
     performance_of,
     ratios_of,
     with_curves,
 )
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import ForcedSolution
-from upd.analyses.forced.statics import StaticState, admissible, same, static_state
-from upd.analyses.forced.stiffness import face_laws
-from upd.analyses.forced.sweeps import balance_curve, both_ways, march_peaks
+from upd.analyses.forced.solution import ForcedSolution, balance_curve, both_ways, march_peaks
+from upd.analyses.forced.statics import admissible, face_laws, same
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import InputError, UpdError, one_line
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
@@ -129,17 +127,9 @@ def _models(solution: ForcedSolution, stages: Stages) -> None:
         solution.bodies = make_bodies(plan)
     for name, law in laws.items():
         with stages("reduction", f"{name}: {scene.reduction.modes} modes a blade"):
-            state = _static(plan, solution.bodies, stages)
-            solution.models[name] = model = make_model(plan, solution.bodies, law, state)
+            solution.models[name] = model = make_model(plan, solution.bodies, law)
         with stages("free and stuck", name), threads_for(len(model.M)):
             solution.linear[name] = linear_of(plan, model)
-
-
-def _static(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> StaticState | None:
-    """The scene's static state, where the faces fit under it."""
-    if not plan.scene.contact.loaded:
-        return None
-    return static_state(plan, bodies, stages=stages)
 
 
 # -- harmonic balance ------------------------------------------------------------------------------
