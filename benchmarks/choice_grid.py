@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.forced.linear_limits import QUARTER, linear_modes
+from upd.analyses.forced.curves import QUARTER, linear_modes
 from upd.batch.engine import Watcher
 from upd.batch.plan import plan_sweep
 from upd.batch.sweeps import run_sweep

@@ -13,7 +13,7 @@ import numpy as np
 
 from upd.analyses.forced.model import Model, make_model, respond
 from upd.analyses.forced.plan import ForcedPlan, grid, make_plan
-from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.forced.statics import face_laws
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.hbm import FrequencyResponse
 from upd.progress import Stages

@@ -23,13 +23,13 @@ from rig_response import Rig, accelerance, rig
 
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
+from upd.analyses.forced.curves import stuck_modes_of
 from upd.analyses.forced.interface_model import (
     by_coulomb,
     make_interface_model,
     make_springs,
     worn_start,
 )
-from upd.analyses.forced.linear_limits import stuck_modes_of
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import preloaded, respond
 from upd.analyses.forced.plan import MARCH_SAMPLES
@@ -187,7 +187,7 @@ def modes(name: str, built: Rig) -> Iterator[Row]:
     for count in (MODES[0], READY, MODES[1]):
         fresh = replace(built.bodies, reduced={})
         one = rig(f"{name}-response", fresh, reduction__modes=count)
-        stuck = [m for m in measures.stuck_modes(one.model, 1000.0) if m.axis == "x"]
+        stuck = measures.stuck_modes(one.model, 1000.0)
         found[count] = {m.in_phase: m.frequency for m in reversed(stuck)}
     many = found.pop(MODES[1])
     for count, few in found.items():
@@ -291,8 +291,8 @@ def whole_faces(name: str) -> Iterator[Row]:
     glued = glued_frequencies(name)
     found = {}
     for count in MODES:
-        stuck, _ = stuck_modes_of(made(F, count)[0], 1000.0)
-        found[count] = {m.in_phase: m.frequency for m in reversed(stuck) if m.axis == "x"}
+        stuck = stuck_modes_of(made(F, count)[0], 1000.0)
+        found[count] = {m.in_phase: m.frequency for m in reversed(stuck.modes)}
     for in_phase, words in ((True, "in phase"), (False, "out of phase")):
         mine, many = found[MODES[0]][in_phase], found[MODES[1]][in_phase]
         off = 100.0 * (mine / many - 1.0)

@@ -13,7 +13,7 @@ import upd
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import checks
 from upd.analyses.forced.checks import check_solution
-from upd.analyses.forced.nonlinear_modes import ModeCurve, first_slip, mode_results
+from upd.analyses.forced.performance import ModeCurve, first_slip, mode_results
 from upd.analyses.forced.solution import ForcedSolution
 from upd.errors import InputError
 from upd.hbm import contacts, nonlinear_mode

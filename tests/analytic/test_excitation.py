@@ -11,18 +11,18 @@ from rigs import SET_LINES, state_of
 
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
+from upd.analyses.forced.curves import linear_curves, linear_peaks
 from upd.analyses.forced.interface_model import (
     by_coulomb,
     make_interface_model,
     spring_march,
     worn_start,
 )
-from upd.analyses.forced.linear_limits import linear_curves, linear_peaks
 from upd.analyses.forced.measures import Array, ComplexArray, tell_stuck_peaks
 from upd.analyses.forced.model import Model, make_model, respond
 from upd.analyses.forced.performance import peaks_at
 from upd.analyses.forced.plan import Excitation, ForcedPlan, excitation_of
-from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.forced.statics import face_laws
 from upd.analyses.seated.bodies import make_bodies
 from upd.analyses.seated.interface import make_interface
 from upd.hbm import FrequencyResponse

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from upd.analyses.forced.blade_parts import mirror_pairs
+from upd.analyses.forced.blade_parts import lattice, lattice_points, line_groups, mirror_pairs
 from upd.analyses.forced.measures import chosen_peaks, path_maxima
-from upd.analyses.forced.points import lattice, lattice_points, line_groups
 from upd.analyses.forced.statics import StaticState, point_preload
 from upd.errors import InputError
 from upd.fem import Material, mass_properties

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from rigs import LINES
 
 from upd.analyses.forced.accuracy import WANTED
-from upd.analyses.forced.levels import GRADED, OFF_CONTACT, graded, times
+from upd.analyses.forced.again import GRADED, OFF_CONTACT, count_of, graded
 from upd.fem import Material, mass, stiffness
 from upd.linalg import modes
 from upd.mesh import recipes
@@ -41,7 +42,8 @@ def test_graded_meshes_are_nearer_to_the_limit_with_fewer_dofs() -> None:
     """A stiffer mesh has the higher frequency: finer ones, graded far more, tend to 292.4 Hz."""
     scene = _scene(**GAUSS)
     found, few = _free(scene, graded(scene, 1))
-    even, many = _free(scene, times(scene, (*OFF_CONTACT, "patch_along_slope"), 1.5))
+    counts = (*OFF_CONTACT, "patch_along_slope")
+    even, many = _free(scene, {key: math.ceil(1.5 * count_of(scene, key)) for key in counts})
     finer, _ = _free(scene, graded(scene, 1.5))
     assert few < 0.6 * many
     assert finer < 293.0 < found < even < 294.0

@@ -9,15 +9,11 @@ import pytest
 from rigs import LINES
 
 from upd.analyses import forced, make_plan
-from upd.analyses.forced.inputs import (
-    INPUTS,
-    effects_of,
-    few_harmonics,
-    input_variants,
-)
-from upd.analyses.forced.linear_limits import linear_of
-from upd.analyses.forced.peaks_again import FoundPeaks, run_peaks, solve_again
+from upd.analyses.forced.again import Run, run_curve, solve_again
+from upd.analyses.forced.curves import linear_of
+from upd.analyses.forced.inputs import effects_of, few_harmonics, input_variants
 from upd.analyses.forced.solution import ForcedSolution
+from upd.analyses.forced.solve import with_totals
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 
@@ -37,7 +33,16 @@ RIG: dict[str, Any] = LINES | {
 }
 #: F_C/F_E at which all sticks, and at which points of the out-of-phase mode slip
 STICKS, SLIPS = 1e5, 240.0
-NAMES = list(INPUTS)
+NAMES = (
+    "fit of the faces",
+    "height of the contact patch",
+    "K_T of the left face",
+    "K_T of the right face",
+    "K_N of both faces",
+    "friction",
+    "static friction before vibration",
+    "modal damping",
+)
 
 
 @cache
@@ -63,11 +68,11 @@ class Effect(NamedTuple):
 def effects(ratio: float, name: str, **more: Any) -> dict[tuple[str, int], Effect]:
     """End and number of the mode -> what it does."""
     s = solved(ratio, **more)
-    found = tuple(peak for curve in s.curves for peak in run_peaks(curve))
-    peaks = FoundPeaks(s.plan, s.models["thesis"], s.linear["thesis"], found)
-    few = few_harmonics(peaks)
-    assert few is not None
-    mine = [one for one in input_variants(few) if one.of.source == name]
+    curves, model = tuple(run_curve(curve) for curve in s.curves), s.models["thesis"]
+    plan = with_totals(s.plan, "thesis", model)
+    few = few_harmonics(Run(plan, "thesis", model, s.linear["thesis"], curves))
+    assert few is not None and s.bodies is not None
+    mine = [one for one in input_variants(few, s.bodies) if one.of.source == name]
     found_again = {v.of.label: effects_of(few, solve_again(few, v)) for v in mine}
     changes: dict[tuple[str, int], list[float]] = {}
     for label, results in found_again.items():

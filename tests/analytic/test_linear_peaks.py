@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.linear_limits import finer, linear_modes, linear_peaks
+from upd.analyses.forced.curves import finer, linear_modes, linear_peaks
 from upd.hbm import contacts, frequency_response
 from upd.scene.forced_contact import SIDES
 
@@ -81,7 +81,7 @@ def test_a_light_shape_far_above_does_not_turn_modes_across_the_blades() -> None
             return tips[SIDES.index(side)]
 
     model: Any = Tips()
-    found = measures.tell_modes(model, (2 * np.pi * frequency) ** 2, np.eye(4), 1000.0)
-    assert [(m.axis, m.in_phase) for m in found[:2]] == [("x", True), ("x", False)]
-    assert found[2].axis == "y"
-    assert len(found) == 3
+    values = (2 * np.pi * frequency) ** 2
+    found = measures.shapes_along_x(model, np.eye(4), values, np.eye(4), 1000.0)
+    assert [m.words for m in found.modes] == ["in phase", "out of phase"]
+    assert np.array_equal(found.shape, np.eye(4)[:, :2])

@@ -18,8 +18,9 @@ from upd.analyses.forced.arrays import arrays
 from upd.analyses.forced.interface_model import by_coulomb, make_springs
 from upd.analyses.forced.model import respond
 from upd.analyses.forced.results import make_results
-from upd.analyses.forced.solution import ForcedSolution, MarchedPeak
-from upd.analyses.forced.sweeps import (
+from upd.analyses.forced.solution import (
+    ForcedSolution,
+    MarchedPeak,
     marched_damper,
     marched_loops,
 )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from upd.analyses.forced.measures import (
     CurvePeak,
     ModeShapes,
+    StuckMode,
     in_quadrature,
     motion_shares,
     numbered,
@@ -23,7 +24,9 @@ Array = NDArray[np.float64]
 M = np.diag([1.0, 4.0])
 #: in phase and out of phase, orthonormal in M
 SHAPE = np.array([[1.0, 1.0], [0.5, -0.5]]) / np.sqrt(2.0)
-MODES = ModeShapes(M, SHAPE, (1, 2), ("in phase", "out of phase"))
+MODES = ModeShapes(
+    M, SHAPE, [StuckMode(95.0, True, 1, "in phase"), StuckMode(105.0, False, 2, "out of phase")]
+)
 
 
 def peaks(in_phase: float, out_of_phase: float) -> list[CurvePeak]:

@@ -12,13 +12,12 @@ import pytest
 from rigs import LINES
 
 from upd.analyses.forced import checks
-from upd.analyses.forced.linear_limits import linear_of
+from upd.analyses.forced.curves import linear_of
 from upd.analyses.forced.measures import accelerance, stuck_motion
 from upd.analyses.forced.model import Model, make_model, preloaded, respond
 from upd.analyses.forced.plan import ForcedPlan, make_plan
 from upd.analyses.forced.solution import ForcedSolution
-from upd.analyses.forced.statics import static_state
-from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.forced.statics import face_laws, static_state
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import InputError
 from upd.progress import Stages

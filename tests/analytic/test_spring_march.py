@@ -12,11 +12,10 @@ import pytest
 from rigs import LINES, state_of
 
 from upd.analyses import forced, make_plan
+from upd.analyses.forced.curves import stuck_modes_of
 from upd.analyses.forced.interface_model import by_coulomb, make_springs, spring_march
-from upd.analyses.forced.linear_limits import stuck_modes_of
 from upd.analyses.forced.measures import stuck_motion
-from upd.analyses.forced.solution import ForcedSolution
-from upd.analyses.forced.sweeps import both_ways, sweep_maxima
+from upd.analyses.forced.solution import ForcedSolution, both_ways, sweep_maxima
 from upd.errors import InputError
 from upd.hbm.faces.march import InterfaceMarch
 from upd.hbm.faces.sweep import settle, stepped_sine
@@ -63,9 +62,9 @@ def test_the_stuck_march_is_the_stuck_blades(solution: ForcedSolution) -> None:
 
 def test_stuck_modes_are_those_of_the_whole_model(solution: ForcedSolution) -> None:
     march = make_springs(solution.plan, solution.models["thesis"]).march
-    _, told = stuck_modes_of(march, 1000.0)
-    assert told.number[:2] == (1, 2)
-    assert told.words[:2] == ("in phase", "out of phase")
+    told = stuck_modes_of(march, 1000.0).modes
+    assert [one.number for one in told[:2]] == [1, 2]
+    assert [one.words for one in told[:2]] == ["in phase", "out of phase"]
 
 
 def test_nothing_moves_without_a_force(solution: ForcedSolution) -> None:

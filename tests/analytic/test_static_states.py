@@ -19,11 +19,11 @@ from upd.analyses.forced.statics import (
     BALANCE,
     admissible,
     face_frames,
+    face_laws,
     imbalance,
     point_preload,
     static_state,
 )
-from upd.analyses.forced.stiffness import face_laws
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.contact.rigid_damper import equilibrium
 from upd.errors import InputError

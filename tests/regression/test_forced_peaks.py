@@ -11,7 +11,7 @@ from rigs import LINES
 
 from upd.analyses.forced.model import Model, make_model, respond
 from upd.analyses.forced.plan import ForcedPlan, make_plan
-from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.forced.statics import face_laws
 from upd.analyses.seated.bodies import make_bodies
 from upd.progress import Stages
 from upd.scene import load_scene

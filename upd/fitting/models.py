@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from upd.analyses import make_plan
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.stiffness import FaceLaw, face_laws
+from upd.analyses.forced.statics import face_laws
 from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
 from upd.cache.arrays import cache_folder
 from upd.cache.files import write_text
@@ -27,7 +27,7 @@ from upd.linalg.parallel import threads_for
 from upd.mesh import recipes
 from upd.progress import Stages
 from upd.scene import ForcedScene, load_scene
-from upd.scene.forced_contact import SIDES, Side
+from upd.scene.forced_contact import SIDES, FaceStiffness, Side
 from upd.scene.ranges import one_model, stiffness_of
 from upd.scene.toml import toml_key, toml_value
 
@@ -134,7 +134,7 @@ class ModelSource:
         """
         return self._model(self.bare(fitted_scene(self.scene, self.parameters, z)))
 
-    def totals(self, z: Array) -> dict[Side, FaceLaw]:
+    def totals(self, z: Array) -> dict[Side, FaceStiffness]:
         """Contact stiffness of both faces."""
         scene = self.bare(fitted_scene(self.scene, self.parameters, z))
         return face_laws(scene.stiffnesses[self.stiffness], self._stages)
@@ -198,7 +198,7 @@ class ModelSource:
         return repr(replace(scene, stiffness={}, text="", contact=contact))
 
     def _plan(self, scene: ForcedScene) -> ForcedPlan:
-        return _remembered(self._plans, self._frame(scene), lambda: make_plan(scene))  # type: ignore[arg-type, return-value]
+        return _remembered(self._plans, self._frame(scene), lambda: make_plan(scene))
 
 
 def is_seated(scene: ForcedScene) -> bool:
@@ -243,7 +243,7 @@ def contact_scene(scene: ForcedScene, name: str) -> str:
 _OF_CONTACT = ("patch_length", "patch_width", "patch_offset")
 
 
-def _with_contact(model: Model, laws: Mapping[Side, FaceLaw], friction: float) -> Model:
+def _with_contact(model: Model, laws: Mapping[Side, FaceStiffness], friction: float) -> Model:
     """The model with other totals of its faces and another friction: those of its points grow
     alike, and the directions in which friction resists stay.
     """

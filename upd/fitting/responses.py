@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.linear_limits import fine_grid, linear_peaks
+from upd.analyses.forced.curves import fine_grid, linear_peaks
 from upd.analyses.forced.measures import (
     CANDIDATES,
     CurvePeak,
@@ -113,10 +113,9 @@ class LimitNumbers:
     def _mode(self, of: str) -> float:
         below = CANDIDATES * self.plan.scene.excitation.stop
         if self._modes is None:
-            _, values, shapes = measures.stuck_shapes(self.model)
-            self._modes = measures.tell_modes(self.model, values, shapes, below)
+            self._modes = measures.stuck_modes(self.model, below)
         for one in self._modes:
-            if one.axis == "x" and one.in_phase == (of == "stuck_in_phase"):
+            if one.in_phase == (of == "stuck_in_phase"):
                 return float(one.frequency)
         raise ConvergenceError(
             f"{of}: no such mode below {below:g} Hz, {CANDIDATES:g} times excitation.stop"

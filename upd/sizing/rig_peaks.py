@@ -10,13 +10,12 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from upd.analyses import make_plan
-from upd.analyses.forced.linear_limits import linear_peaks
+from upd.analyses.forced.curves import linear_peaks
 from upd.analyses.forced.measures import tell_stuck_peaks
 from upd.analyses.forced.model import Model, balance_of, make_model
 from upd.analyses.forced.performance import peaks_at
 from upd.analyses.forced.plan import ForcedPlan, grid
-from upd.analyses.forced.statics import static_state
-from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.forced.statics import face_laws, static_state
 from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
 from upd.cache.arrays import Journal
 from upd.cache.sources import key_of, source_digest
@@ -74,8 +73,7 @@ class RigPeaks:
     ) -> None:
         self.scene, self._report, self.curves = scene, report, 0
         (self.stiffness,) = scene.contact.stiffness
-        plan = make_plan(scene)
-        assert isinstance(plan, ForcedPlan)
+        plan: ForcedPlan = make_plan(scene)
         self.plan = plan
         key = bodies_key(plan)
         if key not in bodies:

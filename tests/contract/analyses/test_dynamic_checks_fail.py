@@ -15,9 +15,8 @@ from upd.analyses.base import Resolved
 from upd.analyses.forced.interface_model import make_springs
 from upd.analyses.forced.measures import accelerance, residual_error
 from upd.analyses.forced.performance import Performance, RatioPoint, of_curve
-from upd.analyses.forced.solution import ForcedSolution
+from upd.analyses.forced.solution import ForcedSolution, both_ways, marched_peak
 from upd.analyses.forced.statics import StaticState
-from upd.analyses.forced.sweeps import both_ways, marched_peak
 from upd.analyses.modal.solve import ModalSolution, modal_error
 from upd.progress import Stages, silent
 from upd.results import Check

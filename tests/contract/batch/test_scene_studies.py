@@ -7,7 +7,6 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from rich.console import Console
 from rigs import LINES
@@ -15,13 +14,11 @@ from rigs import LINES
 from upd import load_scene, make_plan, run
 from upd.analyses import ladders_of
 from upd.analyses.forced.ladders import response_meshes
-from upd.analyses.forced.points import lattice_points
 from upd.batch.engine import Workers
 from upd.batch.studies import plan_study, point_task, run_study, scene_at
 from upd.cli import main
 from upd.cli.tables import print_table
 from upd.errors import InputError, did_you_mean
-from upd.mesh.recipes import build_mesh
 from upd.plot.work_precision import work_precision_charts
 from upd.results import Case, Result
 from upd.vary.curves import ESTIMATED, TRUE, accuracy_curves, finest_curves, make_curves
@@ -161,32 +158,6 @@ def test_levels_that_are_none() -> None:
     assert [p.size for p in plan_study(rig, "mesh", (2, 0.5)).points] == [2.0, 0.5]
 
 
-@pytest.mark.parametrize("name", ["symmetric-response", "asymmetric-response"])
-def test_contact_points_are_the_same_areas_on_every_mesh(name: str) -> None:
-    """Their places and shares are, so that the ladder shows the mesh alone."""
-    scene = load_scene(name, LINES)
-    found: dict[str, list[Any]] = {"left": [], "right": []}
-    points = list(response_meshes(scene, (0.5, 1, 2)))
-    for point in points:
-        level = load_scene(name, {**LINES, **dict(point.overrides), "mesh.element": "hex8"})
-        parameters = {k: v for k, v in level.geometry.items() if k != "recipe"}
-        meshes, _ = build_mesh(
-            level.recipe, {**parameters, "damper": "free", "element_nodes": 8, "symmetry": "full"}
-        )
-        for side, mine in found.items():
-            mine.append(lattice_points(meshes[side], *level.contact.lines(side), side))  # type: ignore[arg-type]
-    for levels in found.values():
-        first = levels[0]
-        assert first.n_point == (6 if name[0] == "s" else 4)
-        for other in levels[1:]:
-            np.testing.assert_allclose(other.position, first.position, atol=1e-6)
-            np.testing.assert_allclose(other.weight, first.weight, rtol=1e-6)
-    sizes = [p.size for p in points]
-    # a little finer than twice the size where counts are rounded up
-    assert 1.5 < sizes[0] <= 2.0
-    assert sizes[1:] == [1.0, 0.5]
-
-
 def test_what_the_mesh_ladder_of_a_response_sets() -> None:
     scene = load_scene(
         "symmetric-response", {**LINES, "contact.left.rows": [1, 2], "contact.columns": 1}
@@ -198,7 +169,8 @@ def test_what_the_mesh_ladder_of_a_response_sets() -> None:
     assert {one.mesh.element for one in made} == {"hex8", "hex8i", "hex20", "hex27"}
     for one in made:
         assert one.excitation.centrifugal_to_force == (194.0,)
-        assert one.contact.lines("left") == one.contact.lines("right") == (2, 1)
+        assert one.contact.lines("left") == one.contact.lines("right") == (4, 2)
+        assert one.contact.rule == "gauss"
         assert one.left_out.solve == "no"
     faces = load_scene(
         "symmetric-response",
@@ -229,7 +201,7 @@ def test_a_toy_response_converges_with_its_mesh(tmp_path: Path) -> None:
     assert curve["estimate"]["error"] > 0.0
     assert min(curve["seconds"]) > 0.0
     assert min(curve["memory_mb"]) > 50.0
-    assert "the same area on every level" in (tmp_path / "study.md").read_text("utf-8")
+    assert "every level: 4 x 2 Gauss points" in (tmp_path / "study.md").read_text("utf-8")
     assert (tmp_path / "work_precision.png").stat().st_size > 10_000
 
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import pytest
 
+from upd.analyses.base import printed_of, with_printed
 from upd.analyses.contact.results import printed_of as flat_printed_of
 from upd.analyses.forced.plan import make_plan
 from upd.analyses.forced.results import printed_of as forced_printed_of
-from upd.analyses.printed import printed_of, with_printed
 from upd.reference import THESIS_FREQUENCIES, printed_values
 from upd.results import Case, Result
 from upd.scene import load_scene

@@ -21,7 +21,7 @@ from rigs import LINES
 import upd
 from upd import cli
 from upd.analyses.forced import peaks
-from upd.analyses.forced.linear_limits import linear_modes
+from upd.analyses.forced.curves import linear_modes
 from upd.errors import InputError
 from upd.report.page import png_size
 from upd.scene import load_scene

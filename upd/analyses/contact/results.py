@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from upd.analyses import printed
+from upd.analyses import base
 from upd.analyses.contact import faces
 from upd.analyses.contact.faces import lattices
 from upd.analyses.contact.loading import pressed_by
@@ -117,7 +117,7 @@ def make_results(solution: ContactSolution, *, misfits: bool = True) -> list[Res
             out += _tangential(solution, t, misfits=misfits)
         for path in (p for p in solution.paths if p.cycle and p.normal == case.case):
             out += _beside(path.case, known, (q.CYCLE_ENERGY, path.slip_work))
-    return printed.with_printed(out, printed_of(scene))
+    return base.with_printed(out, printed_of(scene))
 
 
 def printed_of(scene: Scene) -> Lookup:
@@ -126,7 +126,7 @@ def printed_of(scene: Scene) -> Lookup:
     Of a case with a normal load only where that is, to the newton it is printed with, a load of the
     ready scene; tables of closed forms print their loads themselves.
     """
-    look_up, ready = printed.printed_of(scene), printed.ready_scene(scene)
+    look_up, ready = base.printed_of(scene), base.ready_scene(scene)
     if ready is None or recipes.closed_form(scene.recipe):
         return look_up
     loads = {round(load) for load in normal_loads(ready)}

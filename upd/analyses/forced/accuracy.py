@@ -22,8 +22,7 @@ from dataclasses import replace
 from typing import Any
 
 from upd.analyses.base import chosen_by_accuracy, refuse_oversize
-from upd.analyses.forced.curves import TimeCheck
-from upd.analyses.forced.levels import (
+from upd.analyses.forced.again import (
     HARMONICS,
     MESH,
     MODES,
@@ -31,22 +30,19 @@ from upd.analyses.forced.levels import (
     RECIPE,
     SAMPLES,
     TIME,
+    Change,
+    changed_results,
     graded,
     lines_named,
     of_geometry,
+    run_curve,
+    samples,
     with_gauss,
 )
-from upd.analyses.forced.peaks_again import (
-    STUCK_MODE,
-    PeaksAgain,
-    Place,
-    stuck_places,
-)
-from upd.analyses.forced.plan import ForcedPlan, make_plan, time_steps
+from upd.analyses.forced.plan import ForcedPlan, make_plan
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.solve import solve
-from upd.hbm.core.fourier import harmonics, sample_count
 from upd.progress import Stages
 from upd.results import Case, ErrorPart, Estimates, Result
 from upd.results import quantities as q
@@ -55,7 +51,7 @@ from upd.scene import ForcedScene
 from upd.scene.forced_contact import GAUSS, SIDES, Side
 from upd.vary.orders import observed_order, two_level_error
 from upd.vary.solve import changed
-from upd.vary.variation import Overrides, SolvedVariation, Variation
+from upd.vary.variation import Key, Overrides, SolvedVariation, Variation
 from upd.vary.wanted import LevelChoice, Wanted, plan_wanted, solve_wanted
 
 #: names of accuracies -> numbers they are asked of
@@ -78,30 +74,35 @@ def choices(scene: ForcedScene) -> list[LevelChoice]:
     (`graded`); numbers of modes and harmonics may fall below its own. Gauss points
     stand for a face whatever its mesh, so that both errors fall, each by its own choice.
     """
-    found = [
-        _choice(MODES, "modes kept", _MODES, _modes, "{} a blade"),
-        _choice(HARMONICS, "harmonics", _HARMONICS, _highest, "to {}"),
-        _choice(SAMPLES, "samples", _MORE_SAMPLES, _samples, "x {}"),
-    ]
-    if scene.recipe == RECIPE:
-        found.insert(0, _choice(MESH, "mesh", _FINER, _mesh, "graded x {:g}", own=True))
-    if _raisable(scene):
+    table: dict[str, tuple[str, Sequence[float], Callable[[ForcedScene, Any], Overrides]]] = {
         # before the mesh, which it decides the counts of
-        words = "{} Gauss points up the slope"
-        found.insert(0, _choice(POINTS, "contact points", _GAUSS, _points, words, own=True))
-    return found
+        POINTS: ("{} Gauss points up the slope", _GAUSS, lambda _, n: with_gauss(n, _COLUMNS)),
+        MESH: ("graded x {:g}", _FINER, lambda s, n: of_geometry(graded(s, n))),
+        MODES: ("{} a blade", _MODES, lambda _, n: (("reduction.modes", n),)),
+        HARMONICS: ("to {}", _HARMONICS, lambda _, n: (("balance.harmonics", n),)),
+        SAMPLES: (
+            "x {}",
+            _MORE_SAMPLES,
+            lambda scene, n: (("balance.samples", samples(scene, n)),),
+        ),
+    }
+    contact = scene.contact
+    if contact.rule == GAUSS or contact.share != "area" or lines_named(contact):
+        # Gauss points do not stand for lines that a scene names
+        del table[POINTS]
+    if scene.recipe != RECIPE:
+        del table[MESH]
+    return [_choice(source, *one) for source, one in table.items()]
 
 
 def _choice(
     source: str,
-    name: str,
+    words: str,
     levels: Sequence[float],
     overrides: Callable[[ForcedScene, Any], Overrides],
-    words: str,
-    *,
-    own: bool = False,
 ) -> LevelChoice:
-    """Levels as overrides of the scene; ``own``: the first is the scene's."""
+    """Levels as overrides of the scene; the first of points, mesh and samples is its own."""
+    own = source in (POINTS, MESH, SAMPLES)
     labels = [words.format(n) for n in levels]
     if own:
         labels[0] = "of the scene"
@@ -110,57 +111,7 @@ def _choice(
         given: ForcedScene = changed(scene, overrides(scene, levels[k]))
         return scene if own and k == 0 else given
 
-    return LevelChoice(source, name, labels, at)
-
-
-def _raisable(scene: ForcedScene) -> bool:
-    """Whether Gauss points can stand for the scene's: not for lines that it names."""
-    return (
-        scene.contact.rule != GAUSS
-        and scene.contact.share == "area"
-        and not lines_named(scene.contact)
-    )
-
-
-def _mesh(scene: ForcedScene, factor: float) -> Overrides:
-    return of_geometry(graded(scene, factor))
-
-
-def _points(scene: ForcedScene, rows: int) -> Overrides:
-    del scene
-    return with_gauss(rows, _COLUMNS)
-
-
-def _modes(scene: ForcedScene, count: int) -> Overrides:
-    del scene
-    return (("reduction.modes", count),)
-
-
-def _highest(scene: ForcedScene, harmonic: int) -> Overrides:
-    del scene
-    return (("balance.harmonics", harmonic),)
-
-
-def _samples(scene: ForcedScene, factor: int) -> Overrides:
-    if factor == 1:
-        return ()
-    needed = sample_count(harmonics(scene.harmonic_numbers))
-    return (("balance.samples", factor * max(needed, time_steps(scene))),)
-
-
-def _trial(scene: ForcedScene) -> ForcedScene:
-    return replace(scene, want=("response",), left_out=replace(scene.left_out, solve="no"))
-
-
-def _estimate(
-    solution: ForcedSolution,
-    numbers: Sequence[Result],
-    stages: Stages,
-    memo: list[SolvedVariation],
-) -> Estimates:
-    """By the levels that the solution has itself."""
-    del memo
-    return estimate(solution, numbers, stages)
+    return LevelChoice(source, source, labels, at)
 
 
 WANTED = Wanted(
@@ -169,10 +120,11 @@ WANTED = Wanted(
     make_plan,
     solve,
     make_results,
-    _estimate,
+    # by the levels that the solution has itself
+    lambda solution, numbers, stages, memo: estimate(solution, numbers, stages),
     refuse_oversize,
     chosen_by_accuracy,
-    _trial,
+    lambda scene: changed(scene, (("want", ("response",)), ("left_out.solve", "no"))),
 )
 
 
@@ -191,7 +143,8 @@ def solve_to_accuracy(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
 # -- errors by source ------------------------------------------------------------------------------
 
 
-Key = tuple[str, Case]
+#: in the order of their parts
+_SOURCES = (MESH, MODES, POINTS, HARMONICS, SAMPLES, TIME)
 #: factor of safety of three levels that show an order
 _SAFETY = 1.25
 #: order of frequencies on fine meshes: twice the exponent of displacements at a re-entrant edge of
@@ -216,114 +169,73 @@ def estimate(solution: ForcedSolution, numbers: Sequence[Result], stages: Stages
         Of the run.
     """
     del stages
+    levels = [*solution.levels, *_integrated(solution)] if solution.levels else []
+    known = {(one.name, one.case) for level in levels for one in level.numbers}
     out: dict[Key, tuple[ErrorPart, ...]] = {}
-    for name, levels in solution.levels.items():
-        for place, case, own, check in _own(solution, name):
-            out |= _of_peak(levels, place, case, own, check)
-        for (_, _, number), found in stuck_places(solution.linear[name].modes).items():
-            stuck = q.STUCK_IN_PHASE if number == 1 else q.STUCK_OUT_OF_PHASE
-            key = stuck.name, Case(stiffness=name)
-            if math.isfinite(found.frequency):
-                out[key] = _parts(levels, (STUCK_MODE, "right", number), 0, found.frequency)
-    wanted = {(one.name, one.case): one for one in numbers if not one.withheld}
-    for side in SIDES:
-        out |= _reductions(wanted, out, side)
-    for key, one in wanted.items():
-        if (quantity := quantity_of(one.name)[0]) in _BEST:
+    for one in (one for one in numbers if not one.withheld):
+        key, quantity = (one.name, one.case), quantity_of(one.name)[0]
+        if key in known and one.value:
+            parts = list(_parts(levels, key, one.value))
+            if quantity in (q.PEAK_ACCELERANCE, q.PEAK_ACCELERANCE.on("left")):
+                # heights of few meshes may agree by chance: no better known than the frequency
+                twin = one.name.replace("accelerance", "frequency"), one.case
+                parts = _at_least(parts, out.get(twin, ()))
+            out[key] = tuple(parts)
+        elif quantity in (q.REDUCTION, q.REDUCTION.on("left")) and one.value:
+            side: Side = "right" if quantity == q.REDUCTION else "left"
+            out[key] = tuple(_of_reduction(one, numbers, side, out))
+        elif quantity in _BEST:
             out[key] = _of_best(solution, quantity, one, out)
     return {key: parts for key, parts in out.items() if parts}
 
 
-def _own(
-    solution: ForcedSolution, name: str
-) -> Iterator[tuple[Place, Case, tuple[float, float], TimeCheck | None]]:
-    """Place, case, frequency and height of every peak that levels are compared with, and what time
-    integration makes of it.
-    """
-    for kind in ("free", "stuck"):
-        for side in SIDES:
-            for peak in getattr(solution.linear[name], f"{kind}_peaks")[side]:
-                case = Case(stiffness=name, kind=kind, mode=peak.mode)
-                yield (kind, side, peak.number), case, (peak.frequency, peak.height), None
-    for curve in (c for c in solution.curves if c.stiffness == name):
-        for side in SIDES:
-            for peak in curve.peaks[side]:
-                mine = [c for c in curve.checked if (c.blade, c.number) == (side, peak.number)]
-                case = replace(curve.case, mode=peak.mode)
-                own = curve.compared(side, peak.number) or (peak.frequency, peak.height)
-                yield (curve.ratio, side, peak.number), case, own, next(iter(mine), None)
+def _integrated(solution: ForcedSolution) -> Iterator[SolvedVariation]:
+    """The next motion towards a top, which leaves, as a level of the highest that stays."""
+    of = Variation(TIME, "the next motion towards the top, which leaves")
+    for curve in solution.curves:
+        changes: dict[tuple[Side, int], Change] = {}
+        for one in (one for one in curve.checked if not one.at_top):
+            why = "" if one.stays else "no motion near it is stable"
+            change = Change(1.0 + one.apart, 1.0 + one.step, why)
+            changes |= {(side, one.number): change for side in SIDES}
+        if changes:
+            yield SolvedVariation(of, list(changed_results(run_curve(curve), changes)))
 
 
-def _of_peak(
-    levels: Sequence[PeaksAgain],
-    place: Place,
-    case: Case,
-    own: tuple[float, float],
-    check: TimeCheck | None,
-) -> dict[Key, tuple[ErrorPart, ...]]:
-    """Errors of a peak's frequency and height."""
-    _, side, number = place
-    out: dict[Key, tuple[ErrorPart, ...]] = {}
-    mesh = 0.0
-    for k, quantity in enumerate((q.PEAK_FREQUENCY, q.PEAK_ACCELERANCE)):
-        parts = list(_parts(levels, place, k, own[k]))
-        # of a height that the meshes show by chance: no better known than its frequency
-        known = [one.error for one in parts if one.source == MESH and one.known]
-        parts = [
-            replace(one, error=mesh, basis=f"as of its frequency; {one.basis}")
-            if one.source == MESH and one.known and one.error < mesh
-            else one
-            for one in parts
-        ]
-        mesh = max(known, default=0.0)
-        if check is not None:
-            parts = _with_time(parts, check, quantity)
-        out[quantity.on(side).named(number), case] = tuple(parts)
-    return out
-
-
-def _with_time(parts: Sequence[ErrorPart], check: TimeCheck, of: Quantity) -> list[ErrorPart]:
-    """The parts with what time integration shows: it holds all harmonics, so that where it gives
-    the reported motion no more are missing.
-    """
-    if check.at_top:
-        return list(parts)
-    kept = [one for one in parts if one.source not in (HARMONICS, SAMPLES)]
-    error = check.step if of == q.PEAK_ACCELERANCE else check.apart
-    if not math.isfinite(check.difference):
-        error = math.nan
-    why = "the highest motion that stays, and the next towards the top, which leaves"
-    return [*kept, ErrorPart(TIME, error, why)]
-
-
-def _parts(levels: Sequence[PeaksAgain], place: Place, k: int, own: float) -> tuple[ErrorPart, ...]:
+def _parts(levels: Sequence[SolvedVariation], key: Key, own: float) -> Iterator[ErrorPart]:
     """Parts of one number's error.
 
     Parameters
     ----------
-    place, k
-        Of its peak; 0 its frequency, 1 its height.
     own
         The number of the run.
     """
-    out = []
-    for source in (MESH, MODES, POINTS, HARMONICS, SAMPLES):
-        mine = [one for one in levels if one.of.source == source]
-        if source in (HARMONICS, SAMPLES):
-            # solved where something slips
-            mine = [one for one in mine if place in one.peaks]
-        if not mine or (source == POINTS and place[0] == "free"):
-            continue
-        ratios = [(one.of, one.peaks[place][k] / own) for one in mine if place in one.peaks]
-        good = [(of, ratio) for of, ratio in ratios if math.isfinite(ratio)]
+    for source in _SOURCES:
+        mine = [one for one in levels if one.variation.source == source]
+        found = [(one.variation, one.values[key] / own) for one in mine if key in one.values]
+        whys = [one.reason for one in mine if one.reason]
+        whys += [
+            one.withheld
+            for level in mine
+            for one in level.numbers
+            if one.withheld and (one.name, one.case) == key
+        ]
         seconds = math.fsum(one.seconds for one in mine)
-        if not good:
-            why = next((one.why for one in mine if one.why), "not found on the level")
-            out.append(ErrorPart(source, math.nan, f"not estimated: {why}", None, seconds))
-            continue
-        error, words = bound(source, good)
-        out.append(ErrorPart(source, error, words, None, seconds))
-    return tuple(out)
+        if found:
+            yield ErrorPart(source, *bound(source, found), None, seconds)
+        elif whys:
+            yield ErrorPart(source, math.nan, f"not estimated: {whys[0]}", None, seconds)
+
+
+def _at_least(parts: Sequence[ErrorPart], others: Sequence[ErrorPart]) -> list[ErrorPart]:
+    """The parts, that of the mesh at least as large as another number's."""
+    least = max((one.error for one in others if one.source == MESH and one.known), default=0.0)
+    return [
+        replace(one, error=least, basis=f"as of its frequency; {one.basis}")
+        if one.source == MESH and one.error < least
+        else one
+        for one in parts
+    ]
 
 
 def bound(source: str, found: Sequence[tuple[Variation, float]]) -> tuple[float, str]:
@@ -342,9 +254,12 @@ def bound(source: str, found: Sequence[tuple[Variation, float]]) -> tuple[float,
         return error, f"against {names}: {words}"
     if source == SAMPLES:
         # the rule is of second order: a quarter of the change remains
-        return spread / (1.0 - 0.25), f"change with {names}, order 2"
+        error = _SAFETY * spread / (1.0 - 0.25)
+        return error, f"change with {names}, order 2, factor {_SAFETY:g}"
     if source == MODES:
         return spread, f"change from {names}: what more modes change is less"
+    if source == TIME:
+        return spread, f"the highest motion that stays; {names}"
     if source == POINTS:
         # of an error C h^p, p >= 1, levels from the size s to S >= 1 show at least the part S - s
         sizes = [1.0, *(one.size for one, _ in found)]
@@ -366,37 +281,23 @@ def _of_meshes(found: Sequence[tuple[Variation, float]]) -> tuple[float, str]:
     return error, words
 
 
-def _reductions(
-    wanted: Mapping[Key, Result], parts: Mapping[Key, tuple[ErrorPart, ...]], side: Side
-) -> dict[Key, tuple[ErrorPart, ...]]:
+def _of_reduction(
+    one: Result, numbers: Sequence[Result], side: Side, parts: Mapping[Key, tuple[ErrorPart, ...]]
+) -> Iterator[ErrorPart]:
     """Of 100 (1 - h / free), the errors of the highest peak h and of the free one, times
     (h / free) / (1 - h / free).
     """
-    out, height = {}, q.PEAK_ACCELERANCE.on(side)
-    heights = [one for one in wanted.values() if quantity_of(one.name)[0] == height]
-    for key, one in wanted.items():
-        if one.name != q.REDUCTION.on(side).name or not one.value:
-            continue
-        free_case = Case(stiffness=one.case.stiffness, kind="free")
-        own = [h for h in heights if replace(h.case, mode="") == one.case]
-        free = [h for h in heights if h.case == free_case]
-        if own and free:
-            both = (max(some, key=lambda r: r.value) for some in (own, free))
-            out[key] = _reduction(one, *(parts.get((r.name, r.case), ()) for r in both))
-    return out
-
-
-def _reduction(
-    one: Result, top: Sequence[ErrorPart], free: Sequence[ErrorPart]
-) -> tuple[ErrorPart, ...]:
-    """Parts of a reduction's error from those of the highest peak and of the free one."""
-    factor, out = abs((100.0 - one.value) / one.value), []
-    for source in dict.fromkeys(p.source for p in (*top, *free)):
-        mine = [p for p in (*top, *free) if p.source == source]
-        error = factor * math.fsum(p.error for p in mine)
-        words = f"of the highest peak and of the free one: {mine[0].basis}"
-        out.append(ErrorPart(source, error, words, None, mine[0].companion_s))
-    return tuple(out)
+    factor, found = abs((100.0 - one.value) / one.value), list[ErrorPart]()
+    height, free = q.PEAK_ACCELERANCE.on(side), Case(stiffness=one.case.stiffness, kind="free")
+    heights = [r for r in numbers if not r.withheld and quantity_of(r.name)[0] == height]
+    for case in (one.case, free):
+        mine = [r for r in heights if replace(r.case, mode="") == case]
+        top = max(mine, key=lambda r: r.value, default=None)
+        found += () if top is None else parts.get((top.name, top.case), ())
+    for source in dict.fromkeys(part.source for part in found):
+        same = [part for part in found if part.source == source]
+        words = f"of the highest peak and of the free one: {same[0].basis}"
+        yield replace(same[0], error=factor * math.fsum(p.error for p in same), basis=words)
 
 
 def _of_best(
@@ -433,20 +334,16 @@ def _of_best(
         return ()
     worst = max(mine.values(), key=lambda found: math.fsum(p.error for p in found if p.known))
     out = [replace(p, basis=f"as of the run's peaks: {p.basis}") for p in worst]
-    again, top = performance.again, best.worst
-    if again is not None and top is not None:
+    if performance.again is not None:
         few, more = (
-            next((p for p in one.peaks if (p.blade, p.number) == (top.blade, top.number)), None)
-            for one in again
+            math.nan
+            if one.worst is None
+            else (one.worst.frequency if of == q.PEAK_FREQUENCY else one.worst.height)
+            for one in performance.again
         )
-        if few is not None and more is not None:
-            here, there = (few.frequency, more.frequency)
-            if of == q.PEAK_ACCELERANCE:
-                here, there = few.height, more.height
-            out = [part for part in out if part.source != HARMONICS]
-            change = abs(there / here - 1.0)
-            basis = f"change with the harmonics of the run, at F_C/F_E {again[0].ratio:.3g}"
-            out.append(ErrorPart(HARMONICS, change, basis))
+        basis = f"change with the harmonics of the run, at F_C/F_E {best.ratio:.3g}"
+        out = [part for part in out if part.source != HARMONICS]
+        out.append(ErrorPart(HARMONICS, abs(more / few - 1.0), basis))
     if quantity == q.BEST_REDUCTION and one.value:
         factor = abs((100.0 - one.value) / one.value)
         out = [replace(p, error=factor * p.error) for p in out]

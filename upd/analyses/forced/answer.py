@@ -6,7 +6,7 @@ From the numbers of a run as they stand in its summary, so that a run folder is 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -92,26 +92,23 @@ def answer(results: Sequence[Entry]) -> list[AnswerTable]:
     return [table for table in tables if table is not None]
 
 
-# -- static state ----------------------------------------------------------------------------------
+# -- tables ----------------------------------------------------------------------------------------
+
+
+def _table(
+    title: str, rows: Sequence[Any], note: str, *columns: tuple[str, Callable[[Any], str]]
+) -> AnswerTable | None:
+    """A table of columns, heads and what makes their cells of a row; None without rows."""
+    cells = tuple(tuple(cell(row) for _, cell in columns) for row in rows)
+    return AnswerTable(title, tuple(head for head, _ in columns), cells, note) if rows else None
 
 
 def _static(results: Sequence[Entry]) -> AnswerTable | None:
     """N and T of both faces, and whether the damper hangs."""
-    forces = [e for e in results if e["name"] in _FACES and _fields(e).get("side")]
-    mine = {
-        _fields(e)["side"]: e
-        for e in forces
-        if e["name"] == _FACES[0] and _fields(e).get("stiffness") == _fields(forces[0])["stiffness"]
-    }
-    if not mine:
-        return None
-    T = {side: _of(results, _FACES[1], _fields(n)) for side, n in mine.items()}
-    state = str(_fields(next(iter(mine.values()))).get("choice", ""))
-    rows = tuple(
-        (side, f"{n['value']:.1f}", "" if t is None else f"{t['value']:.1f}")
-        for (side, n), t in zip(mine.items(), T.values(), strict=True)
-    )
-    empty = [side for side, n in mine.items() if n["value"] == 0.0]
+    forces = [e for e in results if e["name"] == _FACES[0] and _fields(e).get("side")]
+    mine = [e for e in forces if _curve_of(e) == _curve_of(forces[0])]
+    state = str(_fields(mine[0]).get("choice", "")) if mine else ""
+    empty = [_fields(e)["side"] for e in mine if e["value"] == 0.0]
     note = f'Static state: "{state}".'
     if empty:
         note += (
@@ -120,82 +117,91 @@ def _static(results: Sequence[Entry]) -> AnswerTable | None:
         )
     elif state == "frictionless":
         note += " No mean friction: near what vibration leaves."
-    return AnswerTable("Static state", ("face", "#N, N", "#T, N"), rows, note)
-
-
-# -- peaks -----------------------------------------------------------------------------------------
+    return _table(
+        "Static state",
+        mine,
+        note,
+        ("face", lambda e: str(_fields(e)["side"])),
+        ("#N, N", lambda e: f"{e['value']:.1f}"),
+        ("#T, N", lambda e: _text("{:.1f}", _of(results, _FACES[1], _fields(e)))),
+    )
 
 
 def _peaks(results: Sequence[Entry], every: Sequence[Entry]) -> AnswerTable | None:
     """One row for every F_C/F_E and mode of the right blade."""
     found = [e for e in results if _is(e, q.PEAK_FREQUENCY) and _fields(e).get("kind") != "stuck"]
-    if not found:
-        return None
     several = len({_fields(e).get("stiffness") for e in found}) > 1
     heights = [e for e in results if _is(e, q.PEAK_ACCELERANCE)]
-    free = [e["value"] for e in heights if _fields(e).get("kind") == "free"]
+    free = max((e["value"] for e in heights if _fields(e).get("kind") == "free"), default=math.nan)
     rows = [
-        _peak_row(results, e, height, several, max(free, default=math.nan))
+        (e, height)
         for e in sorted(found, key=_order)
         for height in heights
-        if (height["name"], _fields(height)) == (_height_name(e), _fields(e))
+        if (height["name"], _fields(height)) == (_named(e, q.PEAK_ACCELERANCE), _fields(e))
     ]
-    heads: tuple[str, ...] = (
-        "F_C/F_E",
-        "mode",
-        "# Hz",
-        "# ±",
-        "# (m/s²)/N",
-        "# ±",
-        "# against free",
-        "# slips",
-        "# opens",
-        "# measured Hz",
-        "# a sweep up reaches",
-    )
-    if not any(row[-1] for row in rows):
-        heads, rows = heads[:-1], [row[:-1] for row in rows]
+
+    def against(height: Entry) -> str:
+        change = 100.0 * (height["value"] / free - 1.0)
+        shown = _fields(height).get("kind") != "free" and math.isfinite(change)
+        return f"{change:+.0f} %" if shown else ""
+
+    def moves(e: Entry, quantity: Quantity) -> str:
+        peak = {**_fields(e), "peak": int(quantity_of(e["name"])[1])}
+        return _text("{:.0f} %", _of(results, quantity.name, peak))
+
+    def reaches(e: Entry) -> str:
+        fold, up = (
+            _of(results, _named(e, one), _fields(e))
+            for one in (q.SWEEP_UP_ACCELERANCE, q.SWEEP_UP_FREQUENCY)
+        )
+        return "" if fold is None or up is None else f"{_height(fold)} at {up['value']:.1f}"
+
     lost = [e for e in every if e["value"] is None and _is(e, q.PEAK_FREQUENCY)]
     note = "Right blade; shares of all contact points and of the cycle."
     if lost:
         note += f" {len(lost)} peaks were not reached: see the notes."
-    return AnswerTable("Peaks", heads, tuple(rows), note)
-
-
-def _peak_row(
-    results: Sequence[Entry], e: Entry, height: Entry, several: bool, free: float
-) -> tuple[str, ...]:
-    """Cells of a peak from its frequency and height; ``free``: of the highest free peak."""
-    fields, number = _fields(e), quantity_of(e["name"])[1]
-    ratio, kind = fields.get("force_ratio"), fields.get("kind", "")
-    case = f"{ratio:g}" if ratio is not None else kind
-    if several:
-        case = f"{fields.get('stiffness')}, {case}"
-    if fields.get("choice"):
-        case += f", {fields['choice']}"
-    peak = {**fields, "peak": int(number)}
-    moved = [_of(results, one.name, peak) for one in (q.CONTACT_SLIP, q.CONTACT_LIFT)]
-    fold = _of(results, q.SWEEP_UP_ACCELERANCE.named(number), fields)
-    up = _of(results, q.SWEEP_UP_FREQUENCY.named(number), fields)
-    against = 100.0 * (height["value"] / free - 1.0)
-    reference = e.get("reference")
-    return (
-        case,
-        fields.get("mode") or ("one blade" if kind == "free" else f"peak {number}"),
-        f"{e['value']:.1f}",
-        _bound(e),
-        _height(height["value"]),
-        _bound(height),
-        f"{against:+.0f} %" if kind != "free" and math.isfinite(against) else "",
-        *("" if one is None else f"{one['value']:.0f} %" for one in moved),
-        f"{reference:g}" if reference is not None else "",
-        "" if fold is None or up is None else f"{_height(fold['value'])} at {up['value']:.1f}",
+    swept = [("# a sweep up reaches", lambda row: reaches(row[0]))]
+    return _table(
+        "Peaks",
+        rows,
+        note,
+        ("F_C/F_E", lambda row: _case(row[0], several)),
+        ("mode", lambda row: _mode(row[0])),
+        ("# Hz", lambda row: f"{row[0]['value']:.1f}"),
+        ("# ±", lambda row: _bound(row[0])),
+        ("# (m/s²)/N", lambda row: _height(row[1])),
+        ("# ±", lambda row: _bound(row[1])),
+        ("# against free", lambda row: against(row[1])),
+        ("# slips", lambda row: moves(row[0], q.CONTACT_SLIP)),
+        ("# opens", lambda row: moves(row[0], q.CONTACT_LIFT)),
+        ("# measured Hz", lambda row: _text("{:g}", row[0], "reference")),
+        *(swept if any(reaches(e) for e, _ in rows) else ()),
     )
 
 
-def _height_name(entry: Entry) -> str:
-    """Name of the height of a peak of which this is the frequency."""
-    return q.PEAK_ACCELERANCE.named(quantity_of(entry["name"])[1])
+def _case(e: Entry, several: bool) -> str:
+    """F_C/F_E or kind of a peak, with what tells it from others."""
+    fields = _fields(e)
+    ratio, choice = fields.get("force_ratio"), fields.get("choice")
+    case = f"{ratio:g}" if ratio is not None else fields.get("kind", "")
+    case = f"{fields.get('stiffness')}, {case}" if several else case
+    return f"{case}, {choice}" if choice else case
+
+
+def _mode(e: Entry) -> str:
+    fields = _fields(e)
+    alone = "one blade" if fields.get("kind") == "free" else f"peak {quantity_of(e['name'])[1]}"
+    return fields.get("mode") or alone
+
+
+def _named(e: Entry, quantity: Quantity) -> str:
+    """Name of another number of the same peak."""
+    return quantity.named(quantity_of(e["name"])[1])
+
+
+def _text(words: str, entry: Entry | None, key: str = "value") -> str:
+    """A value of a number; "" where there is none."""
+    return "" if entry is None or entry.get(key) is None else words.format(entry[key])
 
 
 def _is(entry: Entry, quantity: Quantity) -> bool:
@@ -219,75 +225,57 @@ def _bound(entry: Entry) -> str:
     return plus_minus(entry).removeprefix("±")
 
 
-def _height(value: float) -> str:
+def _height(entry: Entry) -> str:
+    value = entry["value"]
     return f"{value:.0f}" if value >= 100.0 else f"{value:.1f}"
 
 
-# -- the best damper -------------------------------------------------------------------------------
-
-
 def _best(results: Sequence[Entry]) -> AnswerTable | None:
+    """The best damper."""
     found = {quantity_of(e["name"])[0]: e for e in results}
-    if q.BEST_RATIO not in found or q.BEST_PEAK not in found:
-        return None
-    ratio, peak = found[q.BEST_RATIO], found[q.BEST_PEAK]
-    fields = _fields(peak)
+    rows = [found] if q.BEST_RATIO in found and q.BEST_PEAK in found else []
+    peak, inside = found.get(q.BEST_PEAK), found.get(q.BEST_INSIDE)
+    end = inside is not None and not inside["value"]
+    how = "still falls at this end of the curve" if end else "is lowest here"
     down = found.get(q.BEST_REDUCTION)
-    row = (
-        f"{ratio['value']:.3g}",
-        f"{_height(peak['value'])}",
-        _bound(peak),
-        "" if down is None else f"{-down['value']:+.0f} %",
-        ", ".join(filter(None, (f"{fields.get('blade')} blade", str(fields.get("mode", ""))))),
-        *(
-            f"{found[one]['value']:+.0f} %" if one in found else ""
-            for one in (q.HALF_OF_BEST, q.TWICE_THE_BEST)
-        ),
+    fields = _fields(peak) if peak else {}
+    where = (f"{fields.get('blade')} blade", str(fields.get("mode", "")))
+    return _table(
+        "Best F_C/F_E",
+        rows,
+        f"The highest peak of both blades and all modes {how}.",
+        ("#F_C/F_E", lambda found: f"{found[q.BEST_RATIO]['value']:.3g}"),
+        ("#highest peak, (m/s²)/N", lambda found: _height(found[q.BEST_PEAK])),
+        ("# ±", lambda found: _bound(found[q.BEST_PEAK])),
+        ("# against free", lambda _: "" if down is None else f"{-down['value']:+.0f} %"),
+        ("where", lambda _: ", ".join(filter(None, where))),
+        ("#with half of F_C", lambda found: _text("{:+.0f} %", found.get(q.HALF_OF_BEST))),
+        ("#with twice F_C", lambda found: _text("{:+.0f} %", found.get(q.TWICE_THE_BEST))),
     )
-    heads = (
-        "#F_C/F_E",
-        "#highest peak, (m/s²)/N",
-        "# ±",
-        "# against free",
-        "where",
-        "#with half of F_C",
-        "#with twice F_C",
-    )
-    note = "The highest peak of both blades and all modes is lowest here."
-    inside = found.get(q.BEST_INSIDE)
-    if inside is not None and not inside["value"]:
-        note = "The highest peak of both blades and all modes still falls at this end of the curve."
-    return AnswerTable("Best F_C/F_E", heads, (row,), note)
-
-
-# -- damping over amplitude ------------------------------------------------------------------------
-
-
-_DAMPED = {
-    q.DAMPING_ACCELERATION: "{:.3g}",
-    q.DAMPING_FREQUENCY: "{:.1f}",
-    q.DAMPING_SHIFT: "{:+.1f} %",
-    q.FORCE_FOR_DAMPING: "{:.3g}",
-}
 
 
 def _modes(results: Sequence[Entry]) -> AnswerTable | None:
     """The largest damping of every mode, where it is, and the F_C that puts a vibration there."""
-    rows = []
-    for e in (one for one in results if _is(one, q.LARGEST_DAMPING)):
-        rest = {one: _of(results, one.name, _fields(e)) for one in _DAMPED}
-        cells = (
-            _DAMPED[one].format(found["value"]) if found else "" for one, found in rest.items()
-        )
-        mode = ", ".join(filter(None, (_fields(e)["mode"], _fields(e).get("choice"))))
-        rows.append((mode, f"{e['value']:.2f} %", *cells))
-    if not rows:
-        return None
-    heads = ("mode", "#largest damping", "#at m/s²", "#Hz", "#against stuck", "#F_C per m/s², N")
+    rows = [e for e in results if _is(e, q.LARGEST_DAMPING)]
+
+    def at(quantity: Quantity, words: str) -> Callable[[Entry], str]:
+        return lambda e: _text(words, _of(results, quantity.name, _fields(e)))
+
+    acceleration = at(q.DAMPING_ACCELERATION, "{:.3g}")
     note = "Right accelerometer. F_C of the last column times an amplitude damps that one most."
-    if any("" in row for row in rows):
+    if not all(acceleration(e) for e in rows):
         note += " Without amplitude: the damping still rises where the path ends."
-    return AnswerTable("Damping over amplitude", heads, tuple(rows), note)
+    return _table(
+        "Damping over amplitude",
+        rows,
+        note,
+        ("mode", lambda e: ", ".join(filter(None, (_fields(e)["mode"], _fields(e).get("choice"))))),
+        ("#largest damping", lambda e: f"{e['value']:.2f} %"),
+        ("#at m/s²", acceleration),
+        ("#Hz", at(q.DAMPING_FREQUENCY, "{:.1f}")),
+        ("#against stuck", at(q.DAMPING_SHIFT, "{:+.1f} %")),
+        ("#F_C per m/s², N", at(q.FORCE_FOR_DAMPING, "{:.3g}")),
+    )
 
 
 # -- inputs ----------------------------------------------------------------------------------------

@@ -15,12 +15,16 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.curves import FacesCurve, ForcedCurve, LinearCurves, PointCurve, SweptCurve
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array
-from upd.analyses.forced.nonlinear_modes import mode_arrays
-from upd.analyses.forced.performance import performance_arrays
+from upd.analyses.forced.performance import mode_arrays, performance_arrays
 from upd.analyses.forced.plan import excitation_of
 from upd.analyses.forced.results import measured_peaks
-from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
-from upd.analyses.forced.sweeps import marched_damper, marched_loops
+from upd.analyses.forced.solution import (
+    ContactPlaces,
+    ForcedSolution,
+    MarchedPeak,
+    marched_damper,
+    marched_loops,
+)
 from upd.analyses.measured import accelerance_array, measured_arrays
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.balance import InterfaceResponse
@@ -227,10 +231,9 @@ def _linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:
             out |= {f"accelerance_{kind}_{side}": accelerance_array(curves[side])}
             rising = sorted(peaks[side], key=lambda p: p.frequency)
             out |= peak_arrays(f"{kind}_{side}", rising)
-    x = [m for m in linear.modes if m.axis == "x"]
     damping = variable("", solution.plan.scene.excitation.damping, "1", "modal damping ratio")
     return out | {
-        "stuck_mode": variable("mode", [m.frequency for m in x], "Hz"),
+        "stuck_mode": variable("mode", [m.frequency for m in linear.modes], "Hz"),
         "damping": damping,
     }
 

@@ -1,33 +1,300 @@
-"""A blade reduced to what its contact points and its probes see.
+"""Contact points on a blade's patch, and the blade reduced to what these and its probes see.
 
-Of rigs that are symmetric about the mid-plane y = 0 to even motion, in which a contact point and
-its mirror image move as one: it halves the unknowns. Rig, excitation and accelerometers are their
-own mirror images, so the answer may be taken even: normal and slope displacements of a pair are
-equal, those along y opposite. Motions that are odd about the plane, the damper's drift along y
-among them, are left out; friction in gross slip would not hold such a drift at all.
+Points are nodes of the patch's lattice, means over groups of them, or Gauss points.
+
+Gauss points are contact points by polynomials: mean motions that no mesh changes.
+
+A rigid damper presses a face with stiffness k per area, so the face's energy is
+1/2 int k (u - u_D)^2 dA. Tractions are taken from the polynomials of degree n - 1 up the slope, and
+as many along the damper; the displacement that does work on them is its projection
+
+    u_i = (1/w_i) int l_i u dA,    l_i(x_j) = delta_ij,    w_i = int l_i dA,
+
+with l_i Lagrange's polynomials of Gauss' points x_i. These are orthogonal, int l_i l_j = w_i
+delta_ij, as n points integrate degree 2n - 1 exactly: the projected face is n independent points
+x_i, each with the share w_i / A of the face's stiffness, moving by u_i. A motion that is itself
+such a polynomial is met exactly: two points of a slope have its stiffness in tilt too, of which n
+intervals between lattice lines with tributary areas have 2/n^2 too much.
+
+The integrals run over fixed parts of the face, not over nodes: finer elements change u_i by what
+they change of u. The displacement at a node, or the mean over a line of nodes, has no limit there:
+a force on a point moves it by 1/h and one on a line by log h of the element size h.
+
+Of rigs that are symmetric about the mid-plane y = 0 blades are reduced to even motion, in which a
+contact point and its mirror image move as one: it halves the unknowns. Rig, excitation and
+accelerometers are their own mirror images, so the answer may be taken even: normal and slope
+displacements of a pair are equal, those along y opposite. Motions that are odd about the plane, the
+damper's drift along y among them, are left out; friction in gross slip would not hold such a drift.
+
+References
+----------
+.. [1] C. Bernardi, Y. Maday, A. T. Patera, Domain decomposition by the mortar element method, NATO
+   ASI C 384 (1993): tractions and motions of non-matching sides by projection.
+.. [2] K. L. Johnson, Contact Mechanics (1985), 2.2 and 3.2: displacement under line and point
+   loads.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from upd.analyses.forced.points import FacePoints, fewer_points, gauss_points
-from upd.analyses.seated.bodies import Blade, Bodies
+from upd.analyses.seated.bodies import Blade, Bodies, is_half, lattice, patch_frame
+from upd.errors import InputError
+from upd.fem.surface import face_moments
+from upd.mesh import FloatArray, IntArray, Mesh
 from upd.reduction import attachment_modes, craig_bampton
 from upd.scene.forced_contact import Side
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+
+@dataclass(frozen=True)
+class FacePoints:
+    """Contact points of one blade's patch.
+
+    Attributes
+    ----------
+    position
+        (m, 3) mm.
+    frame
+        (3, 3) unit rows: normal from damper into blade, along the damper, up the slope.
+    weight
+        (m,) share of the face's stiffness, sum 1.
+    nodes
+        (k,) of the mesh that carry the points.
+    values
+        (m, k) of their shape functions.
+    line
+        (m, 2) row and column of points on the lattice, or of Gauss points, -1 for others.
+    """
+
+    position: FloatArray
+    frame: FloatArray
+    weight: FloatArray
+    nodes: IntArray
+    values: FloatArray
+    line: IntArray
+
+    @property
+    def n_point(self) -> int:
+        """m."""
+        return len(self.position)
+
+    @property
+    def at_nodes(self) -> bool:
+        """Whether every point is a node."""
+        return len(self.nodes) == self.n_point and np.array_equal(self.values, np.eye(self.n_point))
+
+
+def line_groups(choice: Any, count: int, where: str) -> FloatArray:
+    """Share of each lattice line in each line of points.
+
+    A line on the border of two groups belongs half to each.
+
+    Parameters
+    ----------
+    choice
+        "all", a list of lines, or a number of groups of neighbouring lines.
+    count
+        Lattice lines there are.
+    where
+        Beginning of the message of an error.
+
+    Returns
+    -------
+    FloatArray
+        (n_group, count).
+
+    Raises
+    ------
+    InputError
+        When the lattice has fewer lines.
+    """
+    lines = np.eye(count)
+    if choice == "all":
+        return lines
+    wanted = [int(v) for v in choice] if isinstance(choice, (tuple, list)) else []
+    if (not wanted and choice > count) or (wanted and max(wanted) >= count):
+        raise InputError(
+            f"{where}: {choice!r} asks for more than the {count} lattice lines there are, "
+            f"numbers 0 to {count - 1}"
+        )
+    if wanted:
+        return lines[wanted]
+    n, share = int(choice), np.zeros((int(choice), count))
+    for line in range(count):
+        # in whole numbers: group k holds k / n <= line / (count - 1) <= (k + 1) / n
+        place, rest = divmod(line * n, count - 1) if count > 1 else (0, 1)
+        on = (
+            {min(place, n - 1), max(place - 1, 0)}
+            if rest == 0 and 0 < place < n
+            else {min(place, n - 1)}
+        )
+        share[list(on), line] = 1.0 / len(on)
+    return share
+
+
+def lattice_points(
+    mesh: Mesh, rows: Any, columns: Any, side: str, equal: bool = False
+) -> FacePoints:
+    """Points at the chosen rows and columns of the patch's lattice, or means over groups of them.
+
+    Parameters
+    ----------
+    rows, columns
+        Choice of lines, see `line_groups`.
+    equal
+        They share the face by the number of their nodes; by tributary area otherwise.
+
+    Raises
+    ------
+    InputError
+        When the lattice has fewer lines.
+    """
+    found = lattice(mesh)
+    up = line_groups(rows, found.n_row, f"contact.rows, {side} face")
+    along = line_groups(columns, found.n_column, f"contact.columns, {side} face")
+    size = np.ones(len(found.nodes)) if equal else found.area
+    share = (up[:, None, found.row] * along[None, :, found.column] * size).reshape(
+        len(up) * len(along), -1
+    )
+    total = share.sum(axis=1)
+    used = np.flatnonzero(share.any(axis=0))
+    values, nodes = share[:, used] / total[:, None], found.nodes[used]
+    if len(used) == len(share) and np.count_nonzero(share) == len(share):
+        # every point is a node: in the order of the points
+        nodes, values = found.nodes[share.argmax(axis=1)], np.eye(len(share))
+    lines = np.column_stack(
+        [np.repeat(np.arange(len(up)), len(along)), np.tile(np.arange(len(along)), len(up))]
+    )
+    return FacePoints(
+        values @ mesh.points[nodes], found.frame, total / total.sum(), nodes, values, lines
+    )
+
+
+_HALF = float(np.finfo(float).eps) ** 0.5
+
+
+def lagrange(at: FloatArray, x: FloatArray) -> FloatArray:
+    """(n, ...) values at x (...) of Lagrange's polynomials on the points at (n,)."""
+    out = np.ones((len(at), *np.shape(x)))
+    for k, own in enumerate(at):
+        for other in np.delete(at, k):
+            out[k] *= (x - other) / (own - other)
+    return out
+
+
+def gauss_points(mesh: Mesh, rows: int, columns: int, side: str) -> FacePoints:
+    """Points of a patch by polynomials.
+
+    Parameters
+    ----------
+    mesh
+        Of the blade, whole or its half y >= 0.
+    rows
+        Gauss points up the slope.
+    columns
+        Along the damper, those of all parts of the whole face together: its pads, and each side of
+        the mid-plane.
+    side
+        Of the face, for errors.
+
+    Returns
+    -------
+    FacePoints
+
+    Raises
+    ------
+    InputError
+        For a patch whose parts are no rectangles, or columns that its parts cannot have alike.
+    """
+    frame, faces = patch_frame(mesh), mesh.faces["patch"]
+    parts = _parts(mesh.points, faces)
+    copies = 2 if is_half(mesh) else 1
+    count = columns // (copies * len(parts))
+    if not count or count * copies * len(parts) != columns:
+        raise InputError(
+            f"contact.columns, {side} face: {columns} are not the same number of Gauss points on "
+            f"each of its {copies * len(parts)} parts; give a multiple of it"
+        )
+    nodes = np.unique(faces)
+    found = [_rectangle(mesh.points, faces[part], frame, rows, count, side) for part in parts]
+    weight = np.concatenate([w for w, _ in found])
+    values = np.vstack([v for _, v in found])[:, nodes] / weight[:, None]
+    line = [
+        np.column_stack(
+            [np.repeat(np.arange(rows), count), np.tile(np.arange(count), rows) + k * count]
+        )
+        for k in range(len(parts))
+    ]
+    return FacePoints(
+        values @ mesh.points[nodes],
+        frame,
+        weight / weight.sum(),
+        nodes,
+        values,
+        np.vstack(line),
+    )
+
+
+def _parts(points: FloatArray, faces: IntArray) -> list[IntArray]:
+    """Numbers of the faces of each connected part on one side of the mid-plane y = 0, by y; parts
+    that the plane cuts through an element stay whole.
+    """
+    n = len(faces)
+    y = points[faces, 1]
+    size = float(np.ptp(y)) * _HALF
+    where = np.where(y.min(axis=1) >= -size, 1, np.where(y.max(axis=1) <= size, -1, 0))
+    if (where == 0).any():
+        where = np.zeros(n, int)
+    corner = coo_array(
+        (np.ones(faces.size), (np.repeat(np.arange(n), faces.shape[1]), faces.ravel())),
+        shape=(n, len(points)),
+    ).tocsr()
+    beside = (corner @ corner.T).tocoo()
+    same = where[beside.row] == where[beside.col]
+    joined = coo_array((beside.data[same], (beside.row[same], beside.col[same])), shape=(n, n))
+    count, label = connected_components(joined, directed=False)
+    parts = [np.flatnonzero(label == k) for k in range(count)]
+    return sorted(parts, key=lambda part: float(y[part].mean()))
+
+
+def _rectangle(
+    points: FloatArray, faces: IntArray, frame: FloatArray, rows: int, columns: int, side: str
+) -> tuple[FloatArray, FloatArray]:
+    """w_i (m,) and int l_i phi_a dA (m, n_node) of one part, rows first."""
+    local = points[np.unique(faces)] @ frame.T
+    low, high = local.min(axis=0), local.max(axis=0)
+    (up, w_up), (along, w_along) = map(np.polynomial.legendre.leggauss, (rows, columns))
+
+    def polynomials(x: FloatArray) -> FloatArray:
+        y, z = (2.0 * (x @ frame[k] - low[k]) / (high[k] - low[k]) - 1.0 for k in (1, 2))
+        both = lagrange(up, z)[:, None] * lagrange(along, y)[None, :]
+        return np.asarray(both.reshape(rows * columns, *both.shape[2:]))
+
+    found = face_moments(points, faces, polynomials, max(rows, columns) - 1)
+    wanted = np.outer(w_up, w_along).ravel() / 4.0 * np.prod((high - low)[1:])
+    weight = found.sum(axis=1)
+    if np.abs(weight - wanted).max() > _HALF * wanted.max():
+        raise InputError(
+            f"contact.rule: the {side} patch has parts that are no rectangles along the damper; "
+            'use contact.rule = "lines"'
+        )
+    return weight, found
+
+
+# -- a blade on its points -------------------------------------------------------------------------
+
+
 #: damper dofs that are even about y = 0: ux, uz and the rotation about y
 EVEN_DOFS = (0, 2, 4)
 #: signs of the mirror image's displacement: normal, along the damper, up the slope
 MIRROR_SIGNS = np.array([1.0, -1.0, 1.0])
-_HALF = float(np.finfo(float).eps) ** 0.5
 #: share of odd motion below which a mode counts as even, above one minus which as odd
 PARITY = 1e-4
 
@@ -68,7 +335,6 @@ class MirrorPairs:
             face.nodes,
             face.values[self.point],
             face.line[self.point],
-            face.per_part,
         )
 
 
@@ -117,7 +383,6 @@ def even_modes(rows: FloatArray, pairs: MirrorPairs, shapes: FloatArray) -> Floa
     return np.asarray(shapes[:, share <= PARITY])
 
 
-Array = NDArray[np.float64]
 #: modes of the whole blade beside the ones kept, of those that points off the nodes are put on
 _BESIDE = 6
 
@@ -138,10 +403,10 @@ class BladePart:
         Of the lowest to keep where the coordinates are changed.
     """
 
-    K: Array
-    M: Array
-    rows: Array
-    probes: Array
+    K: FloatArray
+    M: FloatArray
+    rows: FloatArray
+    probes: FloatArray
     n_modes: int
 
 
@@ -201,9 +466,8 @@ def attached_part(
     """By its lowest modes and the static shapes of its points' and probes' forces.
 
     A half blade has half of the energy, and its points stand for themselves and their mirror
-    images: K and M of the whole are twice its own. Fewer points are a part of those that a body was
-    reduced to before (`gauss_points.fewer_points`): where models with more points follow, to twice
-    the rows at once.
+    images: K and M of the whole are twice its own. Fewer points are means of those that a body was
+    reduced to before: where models with more points follow, to twice the rows at once.
 
     Parameters
     ----------
@@ -219,34 +483,21 @@ def attached_part(
         (k for k in known_keys if k[0] == side and k[1] >= rows and k[2] in (columns, 2 * columns)),
         (side, 2 * rows if again else rows, columns),
     )
-    face = gauss_points(blade.mesh, *key[1:], side)
+    many, face = (gauss_points(blade.mesh, *n, side) for n in (key[1:], lines))
     if key not in bodies.attached or len(bodies.attached[key].frequency) < most:
-        loads = _loads(blade, face, names)
+        loads = _loads(blade, many, names)
         found = attachment_modes(blade.K, blade.M, loads, most, solver=solver)
         bodies.attached[key] = found
     known = bodies.attached[key]
     twice = 2.0 if bodies.half else 1.0
-    seen, probes = np.split(known.rows, [3 * face.n_point])
-    seen = seen.reshape(face.n_point, 3, -1)
-    for axis, wanted, now in (
-        (0, rows, key[1]),
-        (1, face.per_part * columns // key[2], face.per_part),
-    ):
-        if wanted < now:
-            fewer = fewer_points(face, axis, wanted)
-            seen = np.einsum("mn,ncr->mcr", fewer.at, seen)
-            face = replace(
-                face,
-                position=fewer.at @ face.position,
-                weight=fewer.share @ face.weight,
-                values=fewer.at @ face.values,
-                line=fewer.line,
-                per_part=fewer.per_part,
-            )
+    seen, probes = np.split(known.rows, [3 * many.n_point])
+    # polynomials of a lower degree are sums of those of a higher one
+    at = np.linalg.lstsq(many.values.T, face.values.T)[0].T
+    seen = np.einsum("mn,ncr->mcr", at, seen.reshape(many.n_point, 3, -1))
     return BladePart(twice * known.K, twice * known.M, seen, probes, most)
 
 
-def _loads(blade: Blade, face: FacePoints, names: tuple[str, ...]) -> Array:
+def _loads(blade: Blade, face: FacePoints, names: tuple[str, ...]) -> FloatArray:
     """(3 m + n_probe, n_free) displacements of the points in the face's frame, then of the probes,
     of the blade's free dofs.
     """
@@ -260,7 +511,7 @@ def _loads(blade: Blade, face: FacePoints, names: tuple[str, ...]) -> Array:
 
 def ritz(
     model: BladePart, pairs: MirrorPairs | None = None
-) -> tuple[Array, Array, Array, Array] | None:
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
     """K, M, contact rows and probe rows on what points and probes see: their static shapes
     (attachment modes) and the lowest modes.
 
@@ -291,6 +542,6 @@ def ritz(
     return symmetric(K), symmetric(T.T @ model.M @ T), rows @ T, probes @ T
 
 
-def symmetric(A: Array) -> Array:
+def symmetric(A: FloatArray) -> FloatArray:
     """Its symmetric part."""
     return np.asarray(0.5 * (A + A.T))

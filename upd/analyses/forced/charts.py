@@ -322,7 +322,6 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
         *performance_charts(arrays),
         *mode_charts(arrays),
         *damping_charts(arrays),
-        *_more_harmonics(arrays, curves),
         *(shares_chart(c, k) for c in moving if "share" in c.group for k in range(len(SIDES))),
         *(
             chart
@@ -445,29 +444,6 @@ def _marks(curve: ChartedCurve, blade: str) -> Iterator[Mark]:
 
 #: least jump that is marked, over the height it reaches
 _SEEN = 0.2
-
-
-def _more_harmonics(arrays: Arrays, curves: Sequence[ChartedCurve]) -> list[Chart]:
-    """Both blades in the harmonics that are excited beside the one that is read."""
-    colours = {c.case.force_ratio: c.colour for c in curves}
-    groups = [c.group for c in curves] + with_content(arrays, SWEEP)
-    found: dict[tuple[str, str, str], list[Trace]] = {}
-    for group in groups:
-        case = case_of(group)
-        for blade in BLADES:
-            begins = f"accelerance_{blade}_harmonic_"
-            for name in (key for key in group if key.startswith(begins)):
-                label = replace(case, stiffness="").label
-                colour = colours.get(case.force_ratio, 0)
-                trace = Trace(label, frequency_of(group), magnitude(group[name]), "line", colour)
-                at = (str(case.stiffness), blade, name.removeprefix(begins))
-                found.setdefault(at, []).append(trace)
-    axes, parts = (Axis("frequency of the first harmonic", "Hz"), _HEIGHT), []
-    for (name, blade, k), traces in found.items():
-        given = {"traces": tuple(traces), "case": f"{blade} blade, stiffness {name}"}
-        title = f"Frequency response, harmonic {k}"
-        parts.append(_sheet("response_harmonics", title, axes, **given))
-    return parts
 
 
 def _sweep(group: Group, blade: str, colours: Mapping[float | None, int]) -> Iterator[Trace]:

@@ -17,9 +17,8 @@ from upd.analyses.forced.curves import FacesCurve, ForcedCurve, PointCurve, Swep
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.performance import Performance
 from upd.analyses.forced.plan import CONFIRMED, excitation_of
-from upd.analyses.forced.solution import ForcedSolution
+from upd.analyses.forced.solution import TOLERANCE, ForcedSolution
 from upd.analyses.forced.statics import BALANCE, StaticState
-from upd.analyses.forced.sweeps import TOLERANCE
 from upd.analyses.measured import fit_checks
 from upd.hbm.faces.balance import InterfaceResponse
 from upd.hbm.faces.sweep import SteppedSine

@@ -1,7 +1,7 @@
 """What the peaks of a response depend on most: inputs that are assumed, changed one at a time.
 
-Each input is a row of a table: what it is, and the models that stand for its ends. The
-peaks of the curve with the lowest F_C/F_E are found again with each, on the run's own mesh.
+Each end of an input is a variation of the scene. The peaks of the curve with the lowest F_C/F_E are
+found again with each, on the run's own mesh.
 
 Effects that a run leaves out are solved again with them: sliding along the damper, and the damper's
 own elasticity.
@@ -11,41 +11,33 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag, eigh
 from scipy.spatial import cKDTree
 
 from upd.analyses.base import Resolved
+from upd.analyses.forced.again import Run, Variant, make_variant, peak_again
 from upd.analyses.forced.blade_parts import MIRROR_SIGNS
-from upd.analyses.forced.levels import Laws, make_variant
-from upd.analyses.forced.linear_limits import stuck_frequency
-from upd.analyses.forced.measures import StuckMode, tell_modes
+from upd.analyses.forced.curves import Top, stuck_frequency
+from upd.analyses.forced.measures import CurvePeak, StuckMode, shapes_along_x
 from upd.analyses.forced.model import Array, Model, balance_of, preloaded
-from upd.analyses.forced.peaks_again import (
-    NOT_FOUND,
-    FoundPeaks,
-    PeaksAgain,
-    Variant,
-    found_again,
-    places_up,
-    straight,
-)
 from upd.analyses.forced.plan import ALONG, ELASTIC, ForcedPlan
-from upd.analyses.forced.statics import StaticState, state_of_ratio
 from upd.analyses.seated.bodies import Bodies
 from upd.analyses.seated.interface import damper_compliance
-from upd.errors import InputError, one_line
+from upd.errors import InputError, UpdError, one_line
 from upd.hbm.springs.points import stuck_stiffness
 from upd.linalg.parallel import threads_for
 from upd.mesh import IntArray
 from upd.results import Case, Result
 from upd.results import quantities as q
 from upd.scene.forced_contact import SIDES, Side
-from upd.vary.variation import Variation
+from upd.vary.solve import changed
+from upd.vary.variation import SolvedVariation, Variation
 
 log = logging.getLogger(__name__)
 #: factors on stiffnesses, the height of the patch, friction, damping
@@ -56,104 +48,81 @@ _MOBILISED = (-0.5, 0.5)
 FEW_HARMONICS = 3
 
 
-#: value of an input in words, and the model with it
-Changed = tuple[str, Model]
-
-
-def _stiffness(side: Side | None, of: str, peaks: FoundPeaks) -> Iterator[Changed]:
-    model = peaks.model
-    law = model.contacts.law
-    on = np.ones(len(model.face), bool) if side is None else model.face == SIDES.index(side)
-    for factor in _STIFFNESS:
-        changed = replace(law, **{of: np.where(on, factor, 1.0) * getattr(law, of)})
-        made = replace(model, contacts=replace(model.contacts, law=changed))
-        yield f"x {factor:g}", made
-
-
-def _patch(peaks: FoundPeaks) -> Iterator[Changed]:
-    """The same stiffness and forces on the middle of each face."""
-    made = nearer(peaks.model, _PATCH)
-    if made is None or made.state is None:
-        return
-    try:
-        made = preloaded(made, made.state)
-    except InputError as error:
-        log.info("patch: %s", one_line(error))
-        return
-    yield f"{_PATCH:g} of its height", made
-
-
-def _friction(peaks: FoundPeaks) -> Iterator[Changed]:
-    law = peaks.model.contacts.law
-    for factor in _FRICTION if np.any(law.mu) else ():
-        mu = factor * law.mu
-        made = replace(peaks.model.contacts, law=replace(law, mu=mu))
-        yield f"mu {float(mu.max()):g}", replace(peaks.model, contacts=made)
-
-
-def _static(peaks: FoundPeaks) -> Iterator[Changed]:
-    model, scene = peaks.model, peaks.plan.scene
-    mu, F = scene.contact.friction, scene.damper.centrifugal
-    if model.state is None or not mu:
-        return
-    frames = np.stack([model.faces[side].frame for side in SIDES])
-    for part in _MOBILISED:
-        ratio = part * mu
+def input_variants(few: Run, bodies: Bodies) -> list[Variant]:
+    """Both ends of every input that applies, those that take the longest first."""
+    plan, name, model = few.plan, few.name, few.model
+    out = [make_variant(plan, name, model, bodies, of) for of in _inputs(few)]
+    patch = nearer(model, _PATCH)
+    if patch is not None and patch.state is not None:
+        of = Variation("height of the contact patch", f"{_PATCH:g} of its height")
         try:
-            state: StaticState = state_of_ratio(frames, F, mu, ratio)
-            made = preloaded(model, state)
+            out.append(Variant(of, plan, preloaded(patch, patch.state)))
         except InputError as error:
-            log.info("static state T/N %g: %s", ratio, one_line(error))
-            continue
-        yield f"T/N {ratio:g} on both faces", made
+            log.info("patch: %s", one_line(error))
+    return out
 
 
-def _fit(peaks: FoundPeaks) -> Iterator[Changed]:
-    """Faces that fit without load: F_C spreads the blades."""
-    model = peaks.model
-    if model.state is None:
-        return
-    law = replace(model.contacts.law, preload=np.zeros(model.contacts.n_point))
-    made = replace(
-        model,
-        contacts=replace(model.contacts, law=law),
-        static=np.zeros_like(model.static),
-        traction=np.zeros_like(model.traction),
-        state=None,
-    )
-    yield "new, not worn in", made
-
-
-def _damping(peaks: FoundPeaks) -> Iterator[Changed]:
+def _inputs(few: Run) -> Iterator[Variation]:
+    """Inputs that are assumed, at their ends."""
+    scene, loaded = few.plan.scene, few.model.state is not None
+    mu, totals = scene.contact.friction, scene.stiffness[few.name]
+    if loaded:
+        # F_C then spreads the blades
+        fit = (("contact.fit", "unloaded"),)
+        yield Variation("fit of the faces", "new, not worn in", fit)
+    for name, sides, of in (
+        ("K_T of the left face", ("left",), "K_T"),
+        ("K_T of the right face", ("right",), "K_T"),
+        ("K_N of both faces", SIDES, "K_N"),
+    ):
+        for factor in _STIFFNESS:
+            faces: dict[str, Any] = {}
+            for face in sides:
+                own = getattr(totals, face)
+                faces[face] = replace(own, **{of: factor * getattr(own, of)})
+            moved = (f"stiffness.{few.name}", replace(totals, **faces))
+            yield Variation(name, f"x {factor:g}", (moved,))
+    for factor in _FRICTION if mu else ():
+        yield Variation("friction", f"mu {factor * mu:g}", (("contact.friction", factor * mu),))
+    for part in _MOBILISED if mu and loaded else ():
+        static = (("contact.static", dict.fromkeys(SIDES, part * mu)),)
+        label = f"T/N {part * mu:g} on both faces"
+        yield Variation("static friction before vibration", label, static)
     for factor in _DAMPING:
-        model = peaks.model
-        made = replace(model, C=factor * model.C, damping=factor * model.damping)
-        yield f"x {factor:g}", made
+        fitted = tuple(replace(one, zeta=factor * one.zeta) for one in scene.fitted)
+        damping = ("excitation.damping", factor * scene.excitation.damping), ("fitted", fitted)
+        yield Variation("modal damping", f"x {factor:g}", damping)
 
 
-#: input that is assumed -> its ends; those that take the longest first
-INPUTS: Mapping[str, Callable[[FoundPeaks], Iterator[Changed]]] = {
-    "fit of the faces": _fit,
-    "height of the contact patch": _patch,
-    "K_T of the left face": partial(_stiffness, "left", "k_t"),
-    "K_T of the right face": partial(_stiffness, "right", "k_t"),
-    "K_N of both faces": partial(_stiffness, None, "k_n"),
-    "friction": _friction,
-    "static friction before vibration": _static,
-    "modal damping": _damping,
-}
+def few_harmonics(run: Run) -> Run | None:
+    """The right blade's peaks of the curve with the lowest F_C/F_E, with few harmonics; None
+    without peaks.
+    """
+    curve = min(run.curves, key=lambda one: one.ratio, default=None)
+    if curve is None:
+        return None
+    plan, model = run.plan, run.model
+    most = min(max(FEW_HARMONICS, *model.excitation.harmonics), plan.scene.balance.harmonics)
+    scene = changed(plan.scene, (("balance.harmonics", most),))
+    plan, of, peaks = replace(plan, scene=scene), Variation("", ""), list[CurvePeak]()
+    tops: dict[tuple[Side, int], Top] = {}
+    with threads_for(len(model.M)):
+        b = balance_of(plan, model, curve.force, scene.harmonic_numbers)
+        for peak in curve.peaks["right"]:
+            top = curve.tops.get(("right", peak.number))
+            if top is None:
+                continue
+            with suppress(UpdError):
+                again = peak_again(run, plan, model, run.linear, curve, "right", peak.number, of)
+                f, height = again
+                x = b.embedded(top.x, curve.balance)
+                peaks.append(peak._replace(frequency=f, height=height))
+                tops["right", peak.number] = top._replace(frequency=f, height=height, x=x)
+    few = curve._replace(balance=b, peaks={"right": peaks}, tops=tops, checked=())
+    return run._replace(plan=plan, curves=(few,)) if peaks else None
 
 
-def input_variants(few: FoundPeaks) -> list[Variant]:
-    """Both ends of every input that applies."""
-    return [
-        Variant(Variation(name, label), model, any_height=True)
-        for name, ends in INPUTS.items()
-        for label, model in ends(few)
-    ]
-
-
-def effects_of(few: FoundPeaks, found: PeaksAgain) -> list[Result]:
+def effects_of(few: Run, found: SolvedVariation) -> list[Result]:
     """Relative changes of the right blade's peaks by one end of an input; none of a peak that was
     not found.
 
@@ -164,46 +133,31 @@ def effects_of(few: FoundPeaks, found: PeaksAgain) -> list[Result]:
     found
         The peaks with that end.
     """
-    out = []
-    for one in few.peaks:
-        again = found.peaks.get((one.ratio, one.blade, one.number), NOT_FOUND)
-        choice = f"{found.of.source}: {found.of.label}"
-        case = replace(one.case, mode=one.mode, choice=choice)
-        for quantity, new, old in (
-            (q.FREQUENCY_CHANGE, again.frequency, one.top.frequency),
-            (q.ACCELERANCE_CHANGE, again.height, one.top.height),
-        ):
-            if math.isfinite(new):
-                out.append(quantity.of(new / old - 1.0, case, n=one.number))
+    of, out = found.variation, []
+    for one, again in _pairs(few, found):
+        case = replace(few.curves[0].case, mode=one.mode, choice=f"{of.source}: {of.label}")
+        f, height = again.frequency / one.frequency, again.height / one.height
+        out.append(q.FREQUENCY_CHANGE.of(f - 1.0, case, n=one.number))
+        out.append(q.ACCELERANCE_CHANGE.of(height - 1.0, case, n=one.number))
     return out
 
 
-def few_harmonics(peaks: FoundPeaks) -> FoundPeaks | None:
-    """The right blade's peaks of the curve with the lowest F_C/F_E, with few harmonics; None
-    without peaks.
-    """
-    lowest = min((one.ratio for one in peaks.peaks), default=math.nan)
-    model, out = peaks.model, []
-    for one in peaks.peaks:
-        if one.ratio != lowest or one.blade != "right":
-            continue
-        old, top = one.balance, one.top
-        most = min(max(FEW_HARMONICS, *model.excitation.harmonics), old.harmonics.highest)
-        with threads_for(len(model.M)):
-            b = balance_of(peaks.plan, model, one.force, range(most + 1))
-            x = b.embedded(top.x, old)
-            found = found_again(peaks, model, one, b, x, any_height=True)
-        if math.isfinite(found.height):
-            top = top._replace(frequency=found.frequency, height=found.height, x=x)
-            out.append(one._replace(balance=b, top=top, check=None, other=None))
-    return peaks._replace(peaks=tuple(out)) if out else None
+def _pairs(few: Run, found: SolvedVariation) -> Iterator[tuple[CurvePeak, CurvePeak]]:
+    """Peaks of the right blade, and what is found of them again."""
+    (curve,) = few.curves
+    for one in curve.peaks["right"]:
+        case = replace(curve.case, mode=one.mode)
+        names = (q.PEAK_FREQUENCY.named(one.number), q.PEAK_ACCELERANCE.named(one.number))
+        if all((name, case) in found.values for name in names):
+            f, height = (found.values[name, case] for name in names)
+            yield one, one._replace(frequency=f, height=height)
 
 
 def nearer(model: Model, factor: float) -> Model | None:
     """The model with its points nearer to the middle of each face, up the slope.
 
-    The motion of a point between others is theirs by straight lines: that of a face under a rigid
-    damper is nearly one. Stiffness and static forces stay with the points.
+    The motion of a point between others of its column is theirs by straight lines: that of a face
+    under a rigid damper is nearly one. Stiffness and static forces stay with the points.
 
     Parameters
     ----------
@@ -220,20 +174,16 @@ def nearer(model: Model, factor: float) -> Model | None:
     faces = {}
     for k, side in enumerate(SIDES):
         face, on = model.faces[side], np.flatnonzero(model.face == k)
-        up = places_up(model)[on]
-        rows = np.unique(np.round(up, 6))
-        if len(rows) < 2:
-            return None
-        weight = straight(rows, factor * rows)
-        row = np.abs(up[:, None] - rows).argmin(axis=1)
-        column = face.position @ face.frame[1]
+        local = face.position @ face.frame[2]
+        up, columns = local - face.weight @ local, face.line[:, 1]
         mine = np.zeros((len(on), len(on)))
-        for i in range(len(on)):
-            # the points of every row nearest along the damper
-            for j in range(len(rows)):
-                there = np.flatnonzero(row == j)
-                near = there[np.abs(column[there] - column[i]).argmin()]
-                mine[i, near] += weight[row[i], j]
+        for column in np.unique(columns):
+            rows = np.flatnonzero(columns == column)
+            rows = rows[np.argsort(up[rows])]
+            if len(rows) < 2:
+                return None
+            for row, one in zip(rows, np.eye(len(rows)), strict=True):
+                mine[rows, row] = np.interp(factor * up[rows], up[rows], one)
         at[np.ix_(on, on)] = mine
         faces[side] = replace(face, position=mine @ face.position, values=mine @ face.values)
 
@@ -247,42 +197,31 @@ def nearer(model: Model, factor: float) -> Model | None:
 # -- an effect left out ----------------------------------------------------------------------------
 
 
-def along_variant(peaks: FoundPeaks, bodies: Bodies, laws: Laws) -> Variant | None:
-    """The model in which friction resists sliding along the damper too; None where the run has it
-    or nothing rubs.
+def along_the_damper(few: Run, bodies: Bodies) -> tuple[Run, Variant] | None:
+    """The highest peak on which a point slips alone, and the model in which friction resists
+    sliding along the damper too; None where the run has it or nothing rubs.
     """
-    if peaks.model.contacts.tangents == 2 or not peaks.plan.scene.contact.friction:
+    (curve,), model = few.curves, few.model
+    slipping = {key: top for key, top in curve.tops.items() if top.slips}
+    if model.contacts.tangents == 2 or not few.plan.scene.contact.friction or not slipping:
         return None
+    highest = max(slipping, key=lambda key: slipping[key].height)
+    alone = few._replace(curves=(curve._replace(tops={highest: slipping[highest]}),))
     of = Variation(ALONG, "both sliding directions", (("contact.directions", "two"),))
-    return make_variant(peaks.plan, peaks.model, bodies, laws, of)._replace(any_height=True)
+    return alone, make_variant(few.plan, few.name, model, bodies, of)
 
 
-def highest_slipping(few: FoundPeaks) -> FoundPeaks | None:
-    """The highest peak on which a point slips alone; None without one."""
-    slipping = [one for one in few.peaks if one.top.slips]
-    if not slipping:
-        return None
-    return few._replace(peaks=(max(slipping, key=lambda one: one.top.height),))
-
-
-def along_changes(few: FoundPeaks, found: PeaksAgain) -> list[Resolved]:
-    """Change of a peak by friction along the damper, with few harmonics.
-
-    Parameters
-    ----------
-    few
-        Of `highest_slipping`.
-    found
-        The peak with `along_variant`.
-    """
-    (one,) = few.peaks
-    top, again = one.top, found.peaks.get((one.ratio, one.blade, one.number), NOT_FOUND)
-    case, remedy = replace(one.case, mode=one.mode), 'set contact.directions = "two"'
+def along_changes(few: Run, found: SolvedVariation) -> list[Resolved]:
+    """Change of that peak by friction along the damper."""
+    remedy, case = 'set contact.directions = "two"', few.curves[0].case
     return [
-        Resolved(ALONG, f"peak_{one.number}_{kind}", case, before, after, unit, remedy)
-        for kind, unit, before, after in (
-            ("accelerance", "(m/s2)/N", top.height, again.height),
-            ("frequency", "Hz", top.frequency, again.frequency),
+        Resolved(
+            ALONG, of.named(one.number), replace(case, mode=one.mode), *values, of.unit, remedy
+        )
+        for one, again in _pairs(few, found)
+        for of, values in (
+            (q.PEAK_ACCELERANCE, (one.height, again.height)),
+            (q.PEAK_FREQUENCY, (one.frequency, again.frequency)),
         )
     ]
 
@@ -290,16 +229,10 @@ def along_changes(few: FoundPeaks, found: PeaksAgain) -> list[Resolved]:
 # -- the elastic damper ----------------------------------------------------------------------------
 
 
-def elastic_changes(peaks: FoundPeaks, bodies: Bodies, name: str) -> list[Resolved]:
-    """Stuck frequencies with the damper's elasticity in series with the contact springs.
-
-    Parameters
-    ----------
-    name
-        Of the contact stiffness.
-    """
-    out, rigid = [], peaks.linear.modes
-    elastic = elastic_stuck(peaks.plan, bodies, peaks.model)
+def elastic_changes(run: Run, bodies: Bodies) -> list[Resolved]:
+    """Stuck frequencies with the damper's elasticity in series with the contact springs."""
+    out, rigid = [], run.linear.modes
+    elastic = elastic_stuck(run.plan, bodies, run.model)
     for in_phase, quantity in ((True, "stuck_in_phase"), (False, "stuck_out_of_phase")):
         before, after = (stuck_frequency(modes, in_phase) for modes in (rigid, elastic))
         if math.isfinite(before):
@@ -307,7 +240,7 @@ def elastic_changes(peaks: FoundPeaks, bodies: Bodies, name: str) -> list[Resolv
                 "the rigid damper is too stiff for these springs, unless they hold its elasticity "
                 "already: compare with a contact analysis of the damper"
             )
-            case = Case(stiffness=name)
+            case = Case(stiffness=run.name)
             out.append(Resolved(ELASTIC, quantity, case, before, after, "Hz", remedy))
     return out
 
@@ -336,7 +269,7 @@ def elastic_stuck(plan: ForcedPlan, bodies: Bodies, model: Model) -> list[StuckM
     # (k^-1 + G)^-1, also where k = 0
     joint = np.linalg.solve(np.eye(len(k)) + k[:, None] * G, np.diag(k))
     values, shapes = eigh(K + B.T @ joint @ B, M)
-    return tell_modes(model, values, shapes, 2.0 * plan.scene.excitation.stop)
+    return shapes_along_x(model, M, values, shapes, 2.0 * plan.scene.excitation.stop).modes
 
 
 def elastic_compliance(plan: ForcedPlan, bodies: Bodies, model: Model) -> Array:

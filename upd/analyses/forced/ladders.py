@@ -4,9 +4,8 @@ contact points, meshes.
 All at the scene's first stiffness and lowest F_C/F_E.
 
 A contact point at a node of its own would never converge over meshes: the displacement under a
-point force grows with every refinement. On the ladders of meshes a point takes the mean over an
-area of the face which is the same on every level: groups of rows and columns into which every level
-divides evenly.
+point force grows with every refinement. On the ladders of meshes the points are Gauss points, mean
+motions that no mesh changes.
 
 The ladder of the contact runs springs on points, the cheap model, then both faces node by node,
 with elastic bodies and no springs: what each costs, where its peaks lie, and how far these are from
@@ -15,20 +14,17 @@ the finest mesh of the faces.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from upd.analyses.cost import NODES
 from upd.analyses.forced.interface_model import INTERFACE
-from upd.analyses.forced.levels import FACES, count_of
 from upd.analyses.seated.ladders import PATCH
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import ForcedScene
-from upd.scene.forced_contact import GAUSS, SIDES
+from upd.scene.forced_contact import GAUSS
 from upd.vary.ladder import (
     Asked,
     Ladder,
@@ -53,10 +49,13 @@ _REFINE: Mapping[str, tuple[float, ...]] = {
     "hex20": (0.5, 1, 2),
     "hex27": (0.5, 1),
 }
-#: arrangement -> the most columns of points
-_COLUMNS: Mapping[str, int] = {"symmetric": 3, "asymmetric": 2}
-#: rows of points, where there are more than one: those of a face of two elements
-_MOST_ROWS = 2
+#: Gauss points where a scene has lattice lines
+_GAUSS_POINTS: Overrides = (
+    ("contact.rule", GAUSS),
+    ("contact.share", "area"),
+    *((f"contact.{face}rows", 4) for face in ("", "left.", "right.")),
+    *((f"contact.{face}columns", 2) for face in ("", "left.", "right.")),
+)
 
 
 #: choices of contact points on the symmetric patch of 5 x 11 lattice lines, and on the asymmetric
@@ -125,12 +124,11 @@ def response_meshes(scene: ForcedScene, asked: Asked, *, vary: str = "mesh") -> 
     refined = refinements(asked)
     # Gauss points do not hang on the mesh
     keeps = whole_faces or scene.contact.rule == GAUSS
-    base = (*_base(scene), *(() if keeps else _same_areas(scene)))
+    base = (*_base(scene), *(() if keeps else _GAUSS_POINTS))
     for element in (scene.mesh.element,) if vary == "mesh" else known:
         for refine in refined or _usual(scene, element):
             overrides = (*base, ("geometry.refine", refine), ("mesh.element", element))
-            size = _size(scene, base, element, refine)
-            yield Variation(element, f"refine {refine:g}", overrides, size)
+            yield Variation(element, f"refine {refine:g}", overrides, 1.0 / refine)
 
 
 def _usual(scene: ForcedScene, element: str) -> tuple[float, ...]:
@@ -139,67 +137,13 @@ def _usual(scene: ForcedScene, element: str) -> tuple[float, ...]:
     return tuple(n for n in _REFINE[element] if n >= 1 or not isinstance(default, int))
 
 
-def _size(scene: ForcedScene, base: Overrides, element: str, refine: float) -> float:
-    """Size of an element against that at refine 1: counts that are not whole are rounded, so it is
-    found from the numbers of elements, a cube root.
-    """
-    if refine == int(refine) or recipes.counted_by_mesh(scene.recipe):
-        return 1.0 / refine
-    head = "geometry."
-    given = {key: value for key, value in scene.geometry.items() if key != "recipe"}
-    given |= {key.removeprefix(head): v for key, v in base if key.startswith(head)}
-    given |= {"element_nodes": NODES[element]}
-    hexes = [
-        sum(body["hexes"] for body in recipes.count(scene.recipe, given | {"refine": n}).values())
-        for n in (1, refine)
-    ]
-    return float((hexes[0] / hexes[1]) ** (1.0 / 3.0))
-
-
-def _same_areas(scene: ForcedScene) -> Overrides:
-    """Points over areas that all levels share: rows and columns of them, and counts of elements
-    that even half of them divides.
-    """
-    slopes, along = FACES[scene.arrangement]
-    rows, columns = _MOST_ROWS, _COLUMNS[scene.arrangement]
-    for side in SIDES:
-        up, across = scene.contact.lines(side)
-        rows, columns = min(rows, _lines(up)), min(columns, _lines(across))
-    settings: dict[str, Any] = {"contact.rows": rows, "contact.columns": columns}
-    for side, own in (("left", scene.contact.left), ("right", scene.contact.right)):
-        settings |= {f"contact.{side}.rows": rows} if own.rows is not None else {}
-        settings |= {f"contact.{side}.columns": columns} if own.columns is not None else {}
-    # two halves of the face along the damper, each with whole elements on half of the counts
-    wanted = dict.fromkeys(slopes, 2 * rows) | {
-        along: math.lcm(4, 2 * columns) if scene.arrangement == "symmetric" else 2
-    }
-    for key, step in wanted.items():
-        if recipes.has_parameter(scene.recipe, key):
-            settings[f"geometry.{key}"] = _multiple(count_of(scene, key), step)
-    return tuple(settings.items())
-
-
-def _lines(choice: Any) -> int:
-    """How many lines of points a choice gives, at least; "all" has as many as are asked."""
-    if choice == "all":
-        return max(_MOST_ROWS, *_COLUMNS.values())
-    return int(choice) if isinstance(choice, int) else len(choice)
-
-
-def _multiple(count: int, step: int) -> int:
-    """The nearest multiple, at least two of them: half of it is one still."""
-    return step * max(1, round(count / step))
-
-
 def _notes(scene: ForcedScene) -> Iterator[str]:
     """What the levels set in the scene."""
-    if scene.contact.model != "springs" or scene.contact.rule == GAUSS:
-        return
-    areas = ", ".join(f"{key} = {value}" for key, value in _same_areas(scene))
-    yield (
-        f"every level: {areas}: a contact point takes the mean over the same area on every level, "
-        "so that the ladder shows the mesh alone (what the choice of points does: --vary contacts)"
-    )
+    if scene.contact.model == "springs" and scene.contact.rule != GAUSS:
+        yield (
+            "every level: 4 x 2 Gauss points on each face, which do not hang on the mesh (what the "
+            "choice of points does: --vary contacts)"
+        )
 
 
 def response_title(scene: ForcedScene, vary: str) -> str:

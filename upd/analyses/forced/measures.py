@@ -40,14 +40,15 @@ MOTIONS = 6
 
 @dataclass(frozen=True)
 class StuckMode:
-    """A natural frequency in Hz with all points closed and sticking.
+    """A mode that moves the tips along x with all points closed and sticking.
 
-    Axis "x" or "y"; whether the blades' tips move in phase.
+    Its natural frequency in Hz, whether the tips move in phase, its number and words.
     """
 
     frequency: float
-    axis: str
     in_phase: bool
+    number: int
+    words: str
 
 
 @dataclass(frozen=True)
@@ -193,53 +194,6 @@ def path_maxima(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) 
                 continue
         out.append(CurvePeak(float(f[i]), float(a[i]), int(i)))
     return out
-
-
-def stuck_modes(model: Model, below: float) -> list[StuckMode]:
-    """Natural modes of the blades with the damper on its contact springs, all points closed and
-    sticking, up to ``below`` Hz.
-    """
-    _, values, shapes = stuck_shapes(model)
-    return tell_modes(model, values, shapes, below)
-
-
-def stuck_shapes(model: Model) -> tuple[Array, Array, Array]:
-    """Mass (n, n) of both blades and the damper, and their stuck eigenpairs.
-
-    Returns
-    -------
-    M, values, shapes
-        (n, n); (n,) squared angular frequencies, rising; (n, n) modes orthonormal in M.
-    """
-    M, _, K, _ = model.linear(stuck=True)
-    return M, *eigh(K, M)
-
-
-def tell_modes(model: Model, values: Array, shapes: Array, below: float) -> list[StuckMode]:
-    """What the eigenpairs of the blades with the damper are: axis and phase of the tips.
-
-    Parameters
-    ----------
-    values, shapes
-        (n,) squared angular frequencies and (n, n) modes on the dofs of both blades and the damper.
-    below
-        Hz; modes above are left out.
-    """
-    tips = np.array([model.row(side) @ shapes for side in SIDES])
-    return modes_of_tips(np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi), tips, below)
-
-
-def modes_of_tips(frequency: Array, tips: Array, below: float) -> list[StuckMode]:
-    """Modes (n,) below ``below`` Hz from the motion (2, n) of both tips along x."""
-    # a mode across the blades does not move their probes along x: the size of a whole tip motion is
-    # that of the modes below; far above, shapes of hardly any mass move more
-    size = np.abs(tips).max(axis=0)
-    moved = size > PEAKS_ABOVE * size[frequency < below].max(initial=0.0)
-    return [
-        StuckMode(float(f), "x" if x else "y", bool(tips[0, j] * tips[1, j] > 0.0))
-        for j, (f, x) in enumerate(zip(frequency, moved, strict=True))
-        if f < below
-    ]
 
 
 def loops(answer: FrequencyResponse, i: int, count: int) -> list[Loop]:
@@ -446,34 +400,63 @@ class ModeShapes:
         (n, n) of both blades and the damper, t.
     shape
         (n, m) orthonormal in M.
-    number, words
-        (m,) of each mode.
+    modes
+        What each is.
     """
 
     M: Array
     shape: Array
-    number: tuple[int, ...]
-    words: tuple[str, ...]
+    modes: list[StuckMode]
+
+
+def stuck_modes(model: Model, below: float) -> list[StuckMode]:
+    """The stuck modes along x below ``below`` Hz."""
+    return mode_shapes(model, below).modes
 
 
 def mode_shapes(model: Model, below: float) -> ModeShapes:
-    """The stuck modes along x below ``below`` Hz, numbered by the phase of the tips."""
-    M, values, shapes = stuck_shapes(model)
-    return shapes_along_x(M, shapes, tell_modes(model, values, shapes, below))
+    """The stuck modes along x below ``below`` Hz, of the blades with the damper on its springs."""
+    M, _, K, _ = model.linear(stuck=True)
+    return shapes_along_x(model, M, *eigh(K, M), below)
 
 
-def shapes_along_x(M: Array, shapes: Array, modes: Sequence[StuckMode]) -> ModeShapes:
-    """Of shapes (n, k), the first of which are these modes, those along x, numbered."""
-    count, column, number, words = {True: 0, False: 0}, [], [], []
-    for j, mode in enumerate(modes):
-        if mode.axis == "x":
-            count[mode.in_phase] += 1
-            k = count[mode.in_phase]
-            column.append(j)
-            number.append(2 * k - mode.in_phase)
-            kind = "in phase" if mode.in_phase else "out of phase"
-            words.append(kind + (f" {k}" if k > 1 else ""))
-    return ModeShapes(M, shapes[:, column], tuple(number), tuple(words))
+def shapes_along_x(
+    model: Model, M: Array, values: Array, shapes: Array, below: float
+) -> ModeShapes:
+    """Of eigenpairs of the blades with the damper those along x.
+
+    Parameters
+    ----------
+    M
+        (n, n) of the dofs of both blades and the damper.
+    values, shapes
+        (n,) squared angular frequencies, rising, and (n, n) modes, orthonormal in M.
+    below
+        Hz; modes above are left out.
+    """
+    tips = np.array([model.row(side) @ shapes for side in SIDES])
+    return modes_of_tips(M, np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi), shapes, tips, below)
+
+
+def modes_of_tips(
+    M: Array, frequency: Array, shapes: Array, tips: Array, below: float
+) -> ModeShapes:
+    """Modes (n, k) below ``below`` Hz that move both tips (2, k) along x, numbered by their
+    phase.
+    """
+    # a mode across the blades does not move their probes along x: the size of a whole tip motion is
+    # that of the modes below; far above, shapes of hardly any mass move more
+    size = np.abs(tips).max(axis=0)
+    low = frequency < below
+    column = np.flatnonzero(low & (size > PEAKS_ABOVE * size[low].max(initial=0.0)))
+    count, modes = {True: 0, False: 0}, []
+    for j in column:
+        in_phase = bool(tips[0, j] * tips[1, j] > 0.0)
+        count[in_phase] += 1
+        k, kind = count[in_phase], "in phase" if in_phase else "out of phase"
+        words = kind + (f" {k}" if k > 1 else "")
+        modes.append(StuckMode(float(frequency[j]), in_phase, 2 * k - in_phase, words))
+    return ModeShapes(M, shapes[:, column], modes)
 
 
 def motion_shares(M: Array, motion: ComplexArray, shape: Array) -> Array:
@@ -581,8 +564,9 @@ def numbered(
     share = motion_shares(modes.M, motion, modes.shape)
     found = tell_apart(share, np.array([one.height for one in maxima]))
     named = [
-        maxima[i]._replace(number=modes.number[j], mode=modes.words[j], mac=float(share[i, j]))
+        maxima[i]._replace(number=mode.number, mode=mode.words, mac=float(share[i, j]))
         for j, i in found.items()
+        for mode in (modes.modes[j],)
     ]
     return sorted(named, key=lambda peak: peak.number)
 

@@ -16,17 +16,18 @@ from scipy.linalg import block_diag, eigh
 from upd.analyses.forced.blade_parts import (
     EVEN_DOFS,
     BladePart,
+    FacePoints,
     MirrorPairs,
     attached_part,
+    gauss_points,
+    lattice_points,
     mirror_pairs,
     nodal_part,
     ritz,
     symmetric,
 )
 from upd.analyses.forced.plan import Excitation, ForcedPlan, excitation_of
-from upd.analyses.forced.points import FacePoints, gauss_points, lattice_points
 from upd.analyses.forced.statics import StaticState, point_preload, static_state
-from upd.analyses.forced.stiffness import FaceLaw
 from upd.analyses.seated.bodies import Bodies
 from upd.fem import modal_damping
 from upd.hbm import (
@@ -46,7 +47,7 @@ from upd.hbm.springs.points import stuck_stiffness
 from upd.linalg.parallel import in_parallel
 from upd.mesh import IntArray
 from upd.scene import ForcedScene
-from upd.scene.forced_contact import GAUSS, SIDES, Side
+from upd.scene.forced_contact import GAUSS, SIDES, FaceStiffness, Side
 
 log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
@@ -95,7 +96,7 @@ class Model:
     excitation: Excitation
     output: Mapping[Side, Array]
     faces: Mapping[Side, FacePoints]
-    laws: Mapping[Side, FaceLaw]
+    laws: Mapping[Side, FaceStiffness]
     contacts: Contacts
     damper: RigidDamper
     damper_rows: Array
@@ -132,6 +133,20 @@ class Model:
         return -self.traction / law.k_t[:, None] if np.any(law.mu) else None
 
     @property
+    def system(self) -> dict[str, Any]:
+        """What `upd.hbm` takes of it, the excitation aside."""
+        return {
+            "M": self.M,
+            "C": self.C,
+            "K": self.K,
+            "contacts": self.contacts,
+            "static_force": self.static,
+            "damper": self.damper,
+            "damper_rows": self.damper_rows,
+            "slider": self.slider,
+        }
+
+    @property
     def halved(self) -> bool:
         """Whether a contact point stands for itself and its mirror image about y = 0."""
         return self.damper.n_dof < 6
@@ -164,7 +179,7 @@ class Model:
 def make_model(
     plan: ForcedPlan,
     bodies: Bodies,
-    laws: Mapping[Side, FaceLaw],
+    laws: Mapping[Side, FaceStiffness],
     state: StaticState | None = None,
 ) -> Model:
     """Reduce both blades to the points of one contact stiffness and put them beside each other.
@@ -207,20 +222,6 @@ def make_model(
         np.vstack([faces[side].position for side in SIDES]),
         np.concatenate([np.tile(faces[side].frame, (faces[side].n_point, 1, 1)) for side in SIDES]),
     )
-    directions = scene.contact.directions
-    if (
-        directions == "auto"
-        and half
-        and _along_change(M, K, made, damper, on_damper) <= ALONG_MATTERS
-    ):
-        directions = "one"
-    if directions == "one":
-        # normal and up the slope
-        kept = [0, 2]
-        made, on_damper = (
-            replace(made, rows=np.ascontiguousarray(made.rows[:, kept])),
-            np.ascontiguousarray(on_damper[:, kept]),
-        )
     model = Model(
         M,
         modal_damping(M, shapes, frequency, damping),
@@ -239,6 +240,9 @@ def make_model(
         np.zeros(len(M)),
         np.zeros((made.n_point, made.tangents)),
     )
+    directions = scene.contact.directions
+    if directions == "one" or (directions == "auto" and half and not _along_matters(model)):
+        model = _without_along(model)
     if not scene.contact.loaded:
         return model
     return preloaded(model, state or static_state(plan, bodies))
@@ -289,7 +293,7 @@ def _rigid(scene: ForcedScene, bodies: Bodies, half: bool) -> RigidDamper:
 
 def _stiffnesses(
     faces: Mapping[Side, FacePoints],
-    laws: Mapping[Side, FaceLaw],
+    laws: Mapping[Side, FaceStiffness],
     pairs: Mapping[Side, MirrorPairs] | None,
 ) -> list[Array]:
     """k_n and k_t of all points, of pairs together."""
@@ -330,21 +334,26 @@ def preloaded(model: Model, state: StaticState) -> Model:
     )
 
 
-def _along_change(
-    M: Array, K: Array, points: Contacts, damper: RigidDamper, on_damper: Array
-) -> float:
-    """Largest relative change of the two lowest stuck frequencies when nothing resists sliding
-    along the damper.
-    """
-    if not np.any(points.law.mu):
+def _without_along(model: Model) -> Model:
+    """The model in which nothing resists sliding along the damper."""
+    kept = [0, 2]
+    rows, on_damper = (
+        np.ascontiguousarray(of[:, kept]) for of in (model.contacts.rows, model.damper_rows)
+    )
+    contacts = replace(model.contacts, rows=rows)
+    return replace(model, contacts=contacts, damper_rows=on_damper, traction=model.traction[:, :1])
+
+
+def _along_matters(model: Model) -> bool:
+    """Whether resistance to sliding along the damper changes the two lowest stuck frequencies."""
+    if not np.any(model.contacts.law.mu):
         # without friction nothing resists
-        return 0.0
-    M, _, K, joined = attach(M, np.zeros_like(M), K, points, damper, on_damper)
+        return False
     found = []
-    for kept in ([0, 1, 2], [0, 2]):
-        B, k = joined.rows[:, kept].reshape(-1, len(M)), stuck_stiffness(joined)[:, kept].ravel()
-        found.append(np.sqrt(eigh(K + B.T @ (k[:, None] * B), M, subset_by_index=[0, 1])[0]))
-    return float(np.abs(found[1] / found[0] - 1.0).max())
+    for one in (model, _without_along(model)):
+        M, _, K, _ = one.linear(stuck=True)
+        found.append(np.sqrt(eigh(K, M, subset_by_index=[0, 1])[0]))
+    return bool(np.abs(found[1] / found[0] - 1.0).max() > ALONG_MATTERS)
 
 
 def _face(scene: ForcedScene, bodies: Bodies, side: Side) -> FacePoints:
@@ -388,11 +397,6 @@ LEAST_POINTS, MOST_POINTS = 1800, 4
 LONG_STEPS = Settings(angle=0.7, kink_step=0.1, wanted_iterations=8)
 
 
-def path_settings(points: int) -> Settings:
-    """How far a path along so many frequencies may go."""
-    return replace(LONG_STEPS, most_points=max(LEAST_POINTS, MOST_POINTS * points))
-
-
 def respond(
     plan: ForcedPlan, model: Model, force: float, frequencies: Array, **changes: Any
 ) -> FrequencyResponse:
@@ -407,24 +411,17 @@ def respond(
     **changes
         Replace the scene's harmonics, samples, start of the sliders, or settings of the path.
     """
-    b = plan.scene.balance
+    b, n = plan.scene.balance, len(frequencies)
     usual: dict[str, Any] = {
         "harmonics": plan.scene.harmonic_numbers,
         "samples": None if b.samples == "auto" else b.samples,
         "start": b.slider,
-        "slider": model.slider,
-        "settings": path_settings(len(frequencies)),
+        "settings": replace(LONG_STEPS, most_points=max(LEAST_POINTS, MOST_POINTS * n)),
     }
     return frequency_response(
-        model.M,
-        model.C,
-        model.K,
-        model.contacts,
+        **model.system,
         harmonic_force=model.harmonic_force(force),
-        static_force=model.static,
         frequencies=frequencies,
-        damper=model.damper,
-        damper_rows=model.damper_rows,
         **(usual | changes),
     )
 

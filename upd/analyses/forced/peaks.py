@@ -30,10 +30,10 @@ from upd.analyses.forced.curves import (
     PointCurve,
     TimeCheck,
     Top,
+    fine_grid,
     rising,
 )
 from upd.analyses.forced.interface_model import SpringMarch, by_coulomb, make_springs, state_at
-from upd.analyses.forced.linear_limits import fine_grid
 from upd.analyses.forced.measures import CurvePeak, numbered_peaks
 from upd.analyses.forced.model import Array, Model, respond
 from upd.analyses.forced.plan import ForcedPlan, time_steps
@@ -57,8 +57,6 @@ PERIODS, TOLERANCE = 300, 1e-3
 STAYS = 0.05
 #: of a top's height, how far down the path a motion that stays is looked for: half the power
 LEAST = 0.5**0.5
-#: how far from a peak, as a share of its frequency, other maxima are about it
-NEAR = 0.02
 #: steps in a period of the time integration at least
 STEPS = 256
 
@@ -106,22 +104,10 @@ def with_tops(
             top = _top(model, linear, curve, side, peak)
             if top is not None:
                 peak = peak._replace(frequency=top.frequency, height=top.height)
-                tops[side, peak.number] = top._replace(crowded=_crowded(curve, size, peak))
+                tops[side, peak.number] = top
             mine.append(peak)
         peaks[side] = tuple(mine)
     return replace(curve, peaks=peaks, tops=tops)
-
-
-def _crowded(curve: PointCurve, size: Array, peak: CurvePeak) -> bool:
-    """Whether the path has more maxima about a peak that are nearly as high."""
-    f = curve.frequency
-    maxima = measures.path_maxima(f, size)
-    near = [
-        one
-        for one in maxima
-        if abs(one.frequency / peak.frequency - 1.0) <= NEAR and one.height >= LEAST * peak.height
-    ]
-    return len(near) > 1
 
 
 def _top(
@@ -196,17 +182,8 @@ def _folds(curve: PointCurve) -> Iterator[Fold]:
 # -- time integration ------------------------------------------------------------------------------
 
 
-def confirmed(
-    plan: ForcedPlan, model: Model, curve: PointCurve, like: TimeCheck | None = None
-) -> PointCurve:
-    """The curve with its peaks where a point slips or opens as time integration confirms them.
-
-    Parameters
-    ----------
-    like
-        Of the same peak of another model, where its top is unstable and the highest stable motion
-        is known: it is looked for about the same place.
-    """
+def confirmed(plan: ForcedPlan, model: Model, curve: PointCurve) -> PointCurve:
+    """The curve with its peaks where a point slips or opens as time integration confirms them."""
     loose = [(key, top) for key, top in curve.tops.items() if top.slips]
     if not loose:
         return curve
@@ -218,7 +195,7 @@ def confirmed(
     checked: list[TimeCheck] = []
     for (side, number), top in loose:
         place = next(k for k, p in enumerate(peaks[side]) if p.number == number)
-        found = _confirmed(integrate, curve, side, peaks[side][place], top, like, motions)
+        found = _confirmed(integrate, curve, side, peaks[side][place], top, motions)
         checked.append(found)
         if found.stays and not found.at_top:
             peaks[side][place] = peaks[side][place]._replace(
@@ -244,15 +221,12 @@ class _Reached(NamedTuple):
     ----------
     sample, beyond
         Its place on the path, and the next one towards the top.
-    way
-        Direction along the path from the top to it, 1 or -1.
     heights
         As of `_Steady`.
     """
 
     sample: int
     beyond: int
-    way: int
     heights: Array
 
 
@@ -262,31 +236,24 @@ def _confirmed(
     side: Side,
     peak: CurvePeak,
     top: Top,
-    like: TimeCheck | None,
     motions: dict[int, list[_Reached]],
 ) -> TimeCheck:
     """The top where it stays, else the highest motion down the path that does.
 
     Parameters
     ----------
-    like
-        As of `confirmed`.
     motions
         Number of a peak -> those that stay beside its top, once they are looked for: one motion
         has the heights of both blades.
     """
     k = SIDES.index(side)
     best = TimeCheck(side, peak.number, peak.mode, top.frequency, top.height, math.nan, peak.sample)
-
-    if like is None and (both := integrate(top.x, top.frequency, None)) is not None:
+    if (both := integrate(top.x, top.frequency, None)) is not None:
         balance, integrated = (float(one) for one in both.heights[:, k])
         return replace(best, balance=balance, integrated=integrated, sample=AT_TOP)
     size, f = np.abs(curve.accelerance[side]), curve.frequency
     if peak.number not in motions:
-        ways = _downhill(curve, size, peak.sample)
-        if like is not None and like.stays:
-            ways = [way for way in ways if way[1] - way[0] == like.way] or ways
-        found = (_highest(integrate, curve, size, way, like) for way in ways)
+        found = (_highest(integrate, curve, way) for way in _downhill(curve, size, peak.sample))
         motions[peak.number] = [one for one in found if one is not None]
     for one in motions[peak.number]:
         balance, integrated = (float(height) for height in one.heights[:, k])
@@ -300,35 +267,26 @@ def _confirmed(
                 sample=i,
                 step=abs(float(size[beyond] / size[i]) - 1.0),
                 apart=abs(float(f[beyond] / f[i]) - 1.0),
-                way=one.way,
-                share=float(size[i] / size[peak.sample]),
             )
     return best
 
 
 def _highest(
-    integrate: Callable[..., _Steady | None],
-    curve: PointCurve,
-    size: Array,
-    way: list[int],
-    like: TimeCheck | None,
+    integrate: Callable[..., _Steady | None], curve: PointCurve, way: list[int]
 ) -> _Reached | None:
     """The last motion of a way up to a top that stays, None without one."""
     x, f = curve.answer.x, curve.frequency
-    # `low` leaves, `high` stays: steps that double from a known place, then bisection
+    # `low` leaves, `high` stays
     low, high = 0, len(way)
     kept: _Steady | None = None
-    at, step = high - 1, high
-    if like is not None and like.stays:
-        at, step = int(np.abs(size[way] - like.share * size[way[0]]).argmin()), 1
+    at = high - 1
     while high - low > 1:
         both = integrate(x[way[at]], float(f[way[at]]), None)
         if both is None:
             low = at
         else:
             high, kept = at, both
-        at = min(low + step, len(way) - 1) if kept is None else max((low + high) // 2, high - step)
-        step *= 2
+        at = (low + high) // 2
     if kept is None:
         return None
     # up again from its own motion, as long as that grows
@@ -337,7 +295,7 @@ def _highest(
         if further is None or np.linalg.norm(further.heights[1]) < np.linalg.norm(kept.heights[1]):
             break
         high, kept = k, further
-    return _Reached(way[high], way[max(high - 1, 0)], way[1] - way[0], kept.heights)
+    return _Reached(way[high], way[max(high - 1, 0)], kept.heights)
 
 
 def _downhill(curve: PointCurve, size: Array, top: int) -> list[list[int]]:

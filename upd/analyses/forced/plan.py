@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 
 from upd.analyses.base import Effect, Plan
 from upd.analyses.cost import NODES, CostModel, dense_s
-from upd.analyses.forced.stiffness import check_sources, plans_to_solve
+from upd.analyses.forced.statics import check_sources, plans_to_solve
 from upd.analyses.seated.plan import centrifugal_effects
 from upd.hbm.core.fourier import harmonics, sample_count
-from upd.hbm.core.kept_factors import SOLUTIONS, WORTH_KEEPING
+from upd.hbm.core.kept_factors import WORTH_KEEPING
 from upd.mesh import recipes
 from upd.scene import ForcedScene
 from upd.scene.base import rig_parameters
@@ -42,19 +42,16 @@ ALONG = "sliding along y"
 CONFIRMED = "confirmed by time integration"
 ELASTIC = "elastic damper"
 # Counted and timed on the ready scenes with one thread. A Newton step with new factors: its small
-# calls, each contact point and each of its samples, each entry of the Jacobian, times of its LU. Of
-# large ones, steps for each new factor, and solutions with the kept ones in a step.
+# calls, each contact point and each of its samples, each entry of the Jacobian, times of its LU.
 _STEP_S, _POINT_S, _SAMPLE_S, _ENTRY_S, _STEP_LU = 4.5e-4, 1.9e-5, 2e-7, 1.7e-8, 0.55
-_STEPS_KEPT, _SOLVED = 10.0, 19.0
-# Newton steps of a curve over F_C/F_E (points that begin or end to slip are kinks of its path), and
-# for each frequency asked for.
-_KINKS = {"symmetric": 1.2e5, "asymmetric": 1.1e5}
+# Large factors are kept for several steps.
+_KEPT = 0.15
+# Newton steps of a curve over F_C/F_E (points that begin or end to slip are kinks of its path).
+_KINKS = 1.2e5
 # Newton steps of a mode over its amplitude.
 _MODE = 600.0
 # What is solved again around the peaks, and the coarser meshes, over the run.
 _AROUND = 0.4
-# Lines of contact points up the slope of a patch whose rows are all taken, at refine 1.
-_ROWS = {"symmetric": 5.0, "asymmetric": 4.0}
 # Sweeps: periods at each frequency until it settles; seconds of a time step, of each point there.
 _PERIODS, _MARCH_S, _MARCH_POINT_S = 150.0, 1.2e-6, 4e-8
 # Whole faces by sweeps: frequencies of one in a unit of the logarithm, time steps at each, seconds
@@ -69,9 +66,8 @@ _FILES_S, _CURVE_S = 4.0, 1.0
 MARCH_SAMPLES = 128
 
 
-@dataclass(frozen=True)
-class ForcedPlan(Plan[ForcedScene]):
-    """Plan of a forced response."""
+#: plan of a forced response
+ForcedPlan = Plan[ForcedScene]
 
 
 def make_plan(scene: ForcedScene) -> ForcedPlan:
@@ -173,7 +169,7 @@ def _curves_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -
     if scene.balance.method == "march":
         solved = 2.0 * e.points * len(scene.stiffnesses) * len(e.centrifugal_to_force)
         return solved * _PERIODS * time_steps(scene) * (_MARCH_S + _MARCH_POINT_S * points)
-    kinks = _KINKS[scene.arrangement] * (scene.contact.friction > 0.0)
+    kinks = _KINKS * (scene.contact.friction > 0.0)
     steps = sum(kinks / ratio + e.points for ratio in e.centrifugal_to_force)
     steps *= len(scene.stiffnesses)
     if scene.wants("performance"):
@@ -197,34 +193,24 @@ def _step_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> 
     points = _points(scene, size)
     # coefficients of the motion of the contact points
     n = across * points * (2 * highest + 1)
-    factor = dense_s(_STEP_LU * 2.0 / 3.0 * n**3)
-    factors = _ENTRY_S * n**2 + factor
-    if n > WORTH_KEEPING:
-        factors = min(factors, factors / _STEPS_KEPT + _SOLVED * factor * SOLUTIONS / n)
+    factors = _ENTRY_S * n**2 + dense_s(_STEP_LU * 2.0 / 3.0 * n**3)
+    factors *= _KEPT if n > WORTH_KEEPING else 1.0
     count = sample_count(harmonics(range(highest + 1)), None if given == "auto" else given)
     return _STEP_S + (_POINT_S + _SAMPLE_S * count) * points + factors
 
 
 def _points(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
-    """Contact points of both faces."""
-    return sum(_point_count(scene, size[side]["contact"], side) for side in ("left", "right"))
-
-
-def _point_count(scene: ForcedScene, nodes: int, side: Any) -> float:
-    """Contact points of a face, roughly: a few rows of many columns, and one for itself and its
-    mirror image.
-    """
-    corners = nodes / {8: 1.0, 20: 2.7, 27: 4.0}[NODES[scene.mesh.element]]
-    rows = _ROWS[scene.arrangement] * float(scene.geometry.get("refine", 1))
-    usual = {"rows": rows, "columns": max(1.0, corners / rows)}
-    product = 1.0
-    for name, choice in zip(usual, scene.contact.lines(side), strict=True):
-        lines = float(choice) if isinstance(choice, int) else float(len(choice))
-        lines = usual[name] if choice == "all" else lines
-        if name == "columns" and scene.mesh.symmetry != "full":
-            lines = float(int(lines + 1) // 2)
-        product *= lines
-    return product
+    """Contact points of both faces, roughly: one for itself and its mirror image."""
+    total = 0.0
+    for side in SIDES:
+        # of the nodes of quadratic elements those at corners
+        lines = math.sqrt(size[side]["contact"] * 8 / NODES[scene.mesh.element])
+        rows, columns = (
+            lines if one == "all" else float(one if isinstance(one, int) else len(one))
+            for one in scene.contact.lines(side)
+        )
+        total += rows * (columns if scene.mesh.symmetry == "full" else math.ceil(0.5 * columns))
+    return total
 
 
 def grid(plan: ForcedPlan) -> Array:

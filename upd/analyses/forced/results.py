@@ -8,18 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses import measured, printed
+from upd.analyses import base, measured
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import ForcedCurve, LinearCurves, PointCurve, WholeFaces
-from upd.analyses.forced.linear_limits import linear_curves
+from upd.analyses.forced.again import limit_results, peak_results
+from upd.analyses.forced.curves import ForcedCurve, PointCurve, WholeFaces, linear_curves
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array, ComplexArray, Model, balance_of
-from upd.analyses.forced.nonlinear_modes import mode_results
-from upd.analyses.forced.performance import performance_results
+from upd.analyses.forced.performance import mode_results, performance_results
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
-from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak
+from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak, marched_damper
 from upd.analyses.forced.statics import StaticState
-from upd.analyses.forced.sweeps import marched_damper
 from upd.analyses.measured import FREE, STUCK, Computed, numbered
 from upd.analyses.seated.results import RIGID
 from upd.hbm import FrequencyResponse
@@ -29,6 +27,7 @@ from upd.measured.curve import LEAST_POINTS
 from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result
 from upd.results import quantities as q
+from upd.results.quantities import quantity_of
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import SIDES, Side
 from upd.scene.measured import MeasuredChoice
@@ -42,9 +41,10 @@ def make_results(solution: ForcedSolution) -> list[Result]:
     for name, faces in solution.faces.items():
         results += _faces_results(solution, name, faces)
     for name, linear in solution.linear.items():
-        results += _linear_results(solution, name, linear)
+        results += limit_results(name, linear)
     for curve in solution.curves:
         results += curve_results(solution, curve)
+    results = _with_measured_peaks(solution, results)
     results += solution.band
     for name, performance in solution.performances.items():
         results += performance_results(name, performance)
@@ -97,19 +97,6 @@ def _static_forces(case: Case, state: StaticState, N: Array, T: Array) -> list[R
             source = RIGID.get(state.name, "") if known is not None else ""
             exact = state.name != "seated"
             results.append(quantity.of(values[k], at, known, source, exact=exact))
-    return results
-
-
-def _linear_results(solution: ForcedSolution, name: str, linear: LinearCurves) -> list[Result]:
-    results, case = [], Case(stiffness=name)
-    for in_phase, quantity in ((True, q.STUCK_IN_PHASE), (False, q.STUCK_OUT_OF_PHASE)):
-        found = next((m for m in linear.modes if m.axis == "x" and m.in_phase == in_phase), None)
-        if found is not None:
-            results.append(quantity.of(found.frequency, case))
-    # Without a damper a blade that is not excited, on a base of its own, stays at rest.
-    for blade in SIDES[::-1]:
-        for kind, peaks in (("free", linear.free_peaks), ("stuck", linear.stuck_peaks)):
-            results += peak_results(solution, replace(case, kind=kind), peaks[blade], blade)
     return results
 
 
@@ -219,7 +206,8 @@ def curve_results(solution: ForcedSolution, curve: ForcedCurve[Any]) -> list[Res
         *(
             one
             for blade in SIDES[::-1]
-            for one in peak_results(solution, case, curve.peaks.get(blade, ()), blade)
+            for peak in curve.peaks.get(blade, ())
+            for one in _peak(case, peak, blade)
         ),
         *_not_reached(solution, curve),
         *(r for blade in SIDES[::-1] for r in _reduction(solution, curve, blade)),
@@ -371,30 +359,25 @@ def _losses(
 # -- numbers of peaks and of the damper's motion ---------------------------------------------------
 
 
-def peak_results(
-    solution: ForcedSolution, case: Case, peaks: Sequence[CurvePeak], blade: Side
-) -> list[Result]:
-    """Numbered peaks of a blade; of the right one measured frequencies go to the nearest, each
-    once.
-    """
-    found = printed_of(solution.plan)(MEASURED_PEAK, case.given())
-    nearest = (
-        {int(np.argmin([abs(peak.frequency - p.value) for peak in peaks])): p for p in found}
-        if peaks and blade == "right"
-        else {}
-    )
-    results = []
-    for k, peak in enumerate(peaks):
-        one, n, mine = nearest.get(k), peak.number, replace(case, mode=peak.mode)
-        reference, source = (one.value, one.source) if one is not None else (None, "")
-        frequency, height = q.PEAK_FREQUENCY.on(blade), q.PEAK_ACCELERANCE.on(blade)
-        results += [
-            frequency.of(peak.frequency, mine, reference, source, n=n, exact=False),
-            height.of(peak.height, mine, n=n),
-        ]
-        if not case.kind and blade == "right":
-            results.append(q.PEAK_MAC.of(peak.mac, mine, n=n))
-    return results
+def _peak(case: Case, peak: CurvePeak, blade: Side) -> Iterator[Result]:
+    """A numbered peak with friction."""
+    yield from peak_results(case, peak, blade)
+    if blade == "right":
+        yield q.PEAK_MAC.of(peak.mac, replace(case, mode=peak.mode), n=peak.number)
+
+
+def _with_measured_peaks(solution: ForcedSolution, results: Sequence[Result]) -> list[Result]:
+    """The results with measured frequencies at the nearest peaks of the right blade's curves."""
+    out, look_up = list(results), printed_of(solution.plan)
+    curves: dict[Case, list[int]] = {}
+    for k, one in enumerate(out):
+        if not one.withheld and quantity_of(one.name)[0] == q.PEAK_FREQUENCY:
+            curves.setdefault(replace(one.case, mode=""), []).append(k)
+    for case, mine in curves.items():
+        for found in look_up(MEASURED_PEAK, case.given()):
+            k = min(mine, key=lambda k: abs(out[k].value - found.value))
+            out[k] = replace(out[k], reference=found.value, source=found.source, exact=False)
+    return out
 
 
 def motion_results(case: Case, static: Array, amplitude: Array) -> list[Result]:
@@ -419,8 +402,8 @@ def motion_results(case: Case, static: Array, amplitude: Array) -> list[Result]:
 
 def printed_of(plan: ForcedPlan) -> Lookup:
     """What was printed of the rig, and of the damper in it under the loads of the ready scene."""
-    scene, look_up = plan.scene, printed.printed_of(plan.scene)
-    ready = printed.ready_scene(scene)
+    scene, look_up = plan.scene, base.printed_of(plan.scene)
+    ready = base.ready_scene(scene)
     damped = ready is not None and (
         (scene.damper.centrifugal, scene.damper.density, scene.contact.friction)
         == (ready.damper.centrifugal, ready.damper.density, ready.contact.friction)

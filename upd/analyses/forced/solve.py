@@ -6,45 +6,45 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
 from upd.analyses.base import keeping
+from upd.analyses.forced.again import (
+    MESH,
+    Run,
+    Variant,
+    level_variations,
+    make_variant,
+    run_curve,
+    solve_again,
+)
+from upd.analyses.forced.curves import linear_of, linear_of_faces
 from upd.analyses.forced.inputs import (
     along_changes,
-    along_variant,
+    along_the_damper,
     effects_of,
     elastic_changes,
     few_harmonics,
-    highest_slipping,
     input_variants,
 )
 from upd.analyses.forced.interface_model import INTERFACE, make_springs, make_whole_faces
-from upd.analyses.forced.levels import MESH, Laws, level_variations, make_variant
-from upd.analyses.forced.linear_limits import linear_of, linear_of_faces
 from upd.analyses.forced.model import Model, make_model, preloaded, quiet
-from upd.analyses.forced.nonlinear_modes import mode_over_amplitude
 from upd.analyses.forced.peaks import solve_curve
-from upd.analyses.forced.peaks_again import (
-    FoundPeaks,
-    Variant,
-    run_peaks,
-    solve_again,
-)
 from upd.analyses.forced.performance import (
     RatioPoint,
     further_points,
     harmonics_of,
+    mode_over_amplitude,
     peaks_at,
     performance_of,
     ratios_of,
     with_curves,
 )
 from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import ForcedSolution
-from upd.analyses.forced.statics import StaticState, admissible, same, static_state
-from upd.analyses.forced.stiffness import face_laws
-from upd.analyses.forced.sweeps import balance_curve, both_ways, march_peaks
+from upd.analyses.forced.solution import ForcedSolution, balance_curve, both_ways, march_peaks
+from upd.analyses.forced.statics import admissible, face_laws, same
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import InputError, UpdError, one_line
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
@@ -53,6 +53,8 @@ from upd.linalg.processes import SideProcesses
 from upd.progress import Stages
 from upd.results import Case
 from upd.results import quantities as q
+from upd.scene.forced_contact import StiffnessChoice
+from upd.vary.solve import changed
 
 log = logging.getLogger(__name__)
 #: what a process beside this one imports at once
@@ -116,8 +118,8 @@ def _sweep(
     march_peaks(solution, name, stages)
 
 
-def _models(solution: ForcedSolution, stages: Stages) -> Mapping[str, Laws]:
-    """Bodies, models and linear limits of every stiffness; laws of their faces."""
+def _models(solution: ForcedSolution, stages: Stages) -> None:
+    """Bodies, models and linear limits of every stiffness."""
     plan = solution.plan
     scene = plan.scene
     laws = {name: face_laws(choice, stages) for name, choice in scene.stiffnesses.items()}
@@ -125,18 +127,9 @@ def _models(solution: ForcedSolution, stages: Stages) -> Mapping[str, Laws]:
         solution.bodies = make_bodies(plan)
     for name, law in laws.items():
         with stages("reduction", f"{name}: {scene.reduction.modes} modes a blade"):
-            state = _static(plan, solution.bodies, stages)
-            solution.models[name] = model = make_model(plan, solution.bodies, law, state)
+            solution.models[name] = model = make_model(plan, solution.bodies, law)
         with stages("free and stuck", name), threads_for(len(model.M)):
             solution.linear[name] = linear_of(plan, model)
-    return laws
-
-
-def _static(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> StaticState | None:
-    """The scene's static state, where the faces fit under it."""
-    if not plan.scene.contact.loaded:
-        return None
-    return static_state(plan, bodies, stages=stages)
 
 
 # -- harmonic balance ------------------------------------------------------------------------------
@@ -172,21 +165,22 @@ def _done(beside: SideProcesses, work: Sequence[_Work]) -> None:
 
 
 def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: Stages) -> None:
-    laws = _models(solution, stages)
+    _models(solution, stages)
     plan, bodies = solution.plan, solution.bodies
     assert bodies is not None
-    scene, first = plan.scene, next(iter(laws))
-    variants: dict[str, list[Variant]] = {name: [] for name in laws}
+    scene, names = plan.scene, list(solution.models)
+    variants: dict[str, list[Variant]] = {name: [] for name in names}
     points: list[RatioPoint] = []
     work: list[_Work] = []
-    for name in laws if scene.estimates else ():
+    for name in names if scene.estimates else ():
         model = solution.models[name]
         for of in level_variations(plan):
+            given = with_totals(plan, name, model), name, model
             if of.source != MESH:
-                variants[name].append(make_variant(plan, model, bodies, laws[name], of))
+                variants[name].append(make_variant(*given, bodies, of))
             else:
-                given = plan, model, None, laws[name], of
-                work.append(_Work(variants[name].append, make_variant, given, needed=True))
+                into = variants[name].append
+                work.append(_Work(into, make_variant, (*given, None, of), needed=True))
     order = list(scene.excitation.centrifugal_to_force)
     for name, model in solution.models.items():
         # those with most slip first
@@ -196,14 +190,20 @@ def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: St
     if scene.wants("performance"):
         highest = harmonics_of(plan)
         for ratio in ratios_of(plan):
-            point = plan, solution.models[first], ratio, highest
+            point = plan, solution.models[names[0]], ratio, highest
             work.append(_Work(points.append, peaks_at, point))
     work += _mode_work(solution)
-    with stages("friction", f"{len(laws) * len(order)} curves, {len(work)} pieces"), quiet():
+    with stages("friction", f"{len(names) * len(order)} curves, {len(work)} pieces"), quiet():
         _done(beside, work)
-    solution.curves.sort(key=lambda c: (list(laws).index(c.stiffness), order.index(c.ratio)))
+    solution.curves.sort(key=lambda c: (names.index(c.stiffness), order.index(c.ratio)))
     with stages("around the peaks", "levels, inputs, effects left out"), quiet():
-        _around(solution, laws, variants, points, beside)
+        _around(solution, variants, points, beside)
+
+
+def with_totals(plan: ForcedPlan, name: str, model: Model) -> ForcedPlan:
+    """The plan with the totals of a contact stiffness in its scene, wherever they come from."""
+    totals = StiffnessChoice(left=model.laws["left"], right=model.laws["right"])
+    return replace(plan, scene=changed(plan.scene, ((f"stiffness.{name}", totals),)))
 
 
 def _mode_work(solution: ForcedSolution) -> Iterator[_Work]:
@@ -218,30 +218,28 @@ def _mode_work(solution: ForcedSolution) -> Iterator[_Work]:
 
 def _around(
     solution: ForcedSolution,
-    laws: Mapping[str, Laws],
     variants: Mapping[str, Sequence[Variant]],
     points: Sequence[RatioPoint],
     beside: SideProcesses,
 ) -> None:
     """What is solved again around the peaks: once, on the reduced models."""
-    plan, first = solution.plan, next(iter(laws))
+    plan, bodies, first = solution.plan, solution.bodies, next(iter(solution.models))
+    assert bodies is not None
     scene, work = plan.scene, list[_Work]()
     further: list[RatioPoint] = []
     for name, model in solution.models.items():
         mine = tuple(c for c in solution.curves if c.stiffness == name and not c.empty)
-        found = tuple(peak for curve in mine for peak in run_peaks(curve))
-        peaks = FoundPeaks(plan, model, solution.linear[name], found)
-        levels = solution.levels.setdefault(name, []) if variants[name] else []
-        work += [_Work(levels.append, solve_again, (peaks, one)) for one in variants[name]]
+        given = with_totals(plan, name, model), name, model, solution.linear[name]
+        run = Run(*given, tuple(run_curve(one) for one in mine))
+        work += [_Work(solution.levels.append, solve_again, (run, one)) for one in variants[name]]
         if scene.left_out.solves:
-            assert solution.bodies is not None
-            solution.omissions += elastic_changes(peaks, solution.bodies, name)
+            solution.omissions += elastic_changes(run, bodies)
         if name == first:
             if scene.wants("performance"):
                 jobs = further_points(plan, model, with_curves(points, mine), points)
                 work += [_Work(further.append, *job) for job in jobs]
             if scene.wants("inputs") or scene.left_out.solves:
-                work += _at_few_harmonics(solution, peaks, name, laws[name])
+                work += _at_few_harmonics(solution, run, bodies)
             if scene.wants("band"):
                 work += _band(solution, name)
     _done(beside, work)
@@ -252,30 +250,18 @@ def _around(
         )
 
 
-def _at_few_harmonics(
-    solution: ForcedSolution, peaks: FoundPeaks, name: str, laws: Laws
-) -> Iterator[_Work]:
+def _at_few_harmonics(solution: ForcedSolution, run: Run, bodies: Bodies) -> Iterator[_Work]:
     """Inputs, and sliding along the damper, on the curve with the lowest F_C/F_E."""
-    scene, few = solution.plan.scene, few_harmonics(peaks)
+    scene, few = solution.plan.scene, few_harmonics(run)
     if few is None:
         return
-    if scene.wants("inputs"):
-        for variant in input_variants(few):
-            yield _Work(
-                lambda one: solution.effects.extend(effects_of(few, one)),
-                solve_again,
-                (few, variant),
-            )
-    highest = highest_slipping(few)
-    if highest is None or not scene.left_out.solves:
-        return
-    assert solution.bodies is not None
-    along = along_variant(few, solution.bodies, laws)
-    if along is not None:
+    for variant in input_variants(few, bodies) if scene.wants("inputs") else ():
         yield _Work(
-            lambda one: solution.omissions.extend(along_changes(highest, one)),
-            solve_again,
-            (highest, along),
+            lambda one: solution.effects.extend(effects_of(few, one)), solve_again, (few, variant)
+        )
+    if scene.left_out.solves and (along := along_the_damper(few, bodies)):
+        yield _Work(
+            lambda one: solution.omissions.extend(along_changes(few, one)), solve_again, along
         )
 
 

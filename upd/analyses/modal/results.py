@@ -7,9 +7,9 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
+from upd.analyses.base import printed_of, with_printed
 from upd.analyses.measured import FREE, Computed, ComputedPeak, measured_results
 from upd.analyses.modal.solve import ModalSolution, ModeSet, ReducedBlade, RigResponse
-from upd.analyses.printed import printed_of, with_printed
 from upd.dynamics import find_peaks
 from upd.measured.compare import on_path
 from upd.plot.chart import Entry
