@@ -151,12 +151,22 @@ def theirs(script: Path, names: tuple[str, ...], *arguments: str) -> Measured:
 
     Raises SideBySideError when it ended without a curve over the whole range.
     """
+    found = answer_of(script, problem(), *arguments)
+    points = list(zip(found["frequency"], found["amplitude"], strict=True))
+    return measured(points, found["seconds"], code_lines(script, names), found["version"])
+
+
+def answer_of(script: Path, given: Mapping[str, Any], *arguments: str) -> dict[str, Any]:
+    """What a script beside this file answers to a problem.
+
+    Raises SideBySideError when it ended without an answer.
+    """
     # pyHarm leaves a folder where it runs.
     with tempfile.TemporaryDirectory(prefix="upd-peers-") as folder:
         try:
             done = subprocess.run(
                 [interpreter(), str(script), *arguments],
-                input=json.dumps(problem()),
+                input=json.dumps(given),
                 cwd=folder,
                 env={**os.environ, **ONE_THREAD},
                 capture_output=True,
@@ -167,9 +177,8 @@ def theirs(script: Path, names: tuple[str, ...], *arguments: str) -> Measured:
             raise SideBySideError(f"{script.name} was stopped after {PATIENCE} s") from None
     if done.returncode != 0:
         raise SideBySideError(f"{script.name} ended with: {' '.join(done.stderr.split())[-300:]}")
-    found = json.loads(done.stdout.splitlines()[-1])
-    points = list(zip(found["frequency"], found["amplitude"], strict=True))
-    return measured(points, found["seconds"], code_lines(script, names), found["version"])
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return found
 
 
 def measured(

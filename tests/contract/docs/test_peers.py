@@ -47,6 +47,23 @@ def loaded(monkeypatch: pytest.MonkeyPatch, name: str) -> Any:
     return module
 
 
+def test_nonlinear_modes_without_other_codes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ours are measured, with the values by shooting beside them; two rows say what to install."""
+    module = loaded(monkeypatch, "bench_nonlinear_modes")
+    monkeypatch.setattr(module, "ROUNDS", 1)
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("UPD_TMDSIMPY", raising=False)
+    rows = list(module.run())
+    skipped = [row["note"] for row in rows if row.get("case") == "skipped"]
+    assert "clone github.com/tmd-lab/tmdsimpy" in skipped[0]
+    assert "apt-get install octave" in skipped[1]
+    hertz = [row for row in rows if row["name"] == "frequency"]
+    assert len(hertz) == 6
+    for row in hertz:
+        assert float(row["value"]) == pytest.approx(float(row["target"]), rel=1e-4)
+    assert all(row["value"] > 0.0 for row in rows if row["name"] == "time_point")
+
+
 @pytest.mark.parametrize(("name", "install"), NEEDS.items())
 def test_without_the_other_code_one_row_says_what_to_install(
     name: str, install: str, monkeypatch: pytest.MonkeyPatch

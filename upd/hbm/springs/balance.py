@@ -280,20 +280,32 @@ class Balance:
             Derivative by the angular frequency; zero unless asked for.
         """
         W, a = self.split(x)
-        linear, static, c = self.linear, self.harmonics.static, len(self.Psi)
-        slider = np.zeros((self.contacts.n_point, 2)) if self.slider is None else self.slider
-        begin = (START_CODE[self.start], slider, MOST_PERIODS)
-        F, state, DF = contact_terms(
-            W, self._transform, static, self.contacts.law.arrays, begin, jacobian
-        )
-        acting = (self.loads, self.u0, self.rigid_load)
+        linear, c = self.linear, len(self.Psi)
+        F, state, DF = self.contact_terms(x, jacobian)
         residual, by_frequency = linear.residual(
-            W.reshape(c, -1), a, F.reshape(c, -1), omega, acting, jacobian
+            W.reshape(c, -1), a, F.reshape(c, -1), omega, self.acting, jacobian
         )
         if not jacobian:
             return residual, None, by_frequency
         parts = BalanceJacobian(linear, linear.k * omega, state, self._stiffness, DF)
         return residual, parts, by_frequency
+
+    def contact_terms(
+        self, x: FloatArray, jacobian: bool
+    ) -> tuple[FloatArray, NDArray[np.int8], FloatArray]:
+        """Contact forces of one answer, see `upd.hbm.springs.terms.contact_terms`."""
+        slider = np.zeros((self.contacts.n_point, 2)) if self.slider is None else self.slider
+        begin = (START_CODE[self.start], slider, MOST_PERIODS)
+        W, law = self.split(x)[0], self.contacts.law.arrays
+        found: tuple[FloatArray, NDArray[np.int8], FloatArray] = contact_terms(
+            W, self._transform, self.harmonics.static, law, begin, jacobian
+        )
+        return found
+
+    @property
+    def acting(self) -> tuple[ComplexArray, FloatArray, FloatArray]:
+        """Loads as the linear part takes them: dynamic ones, static motion, on rigid modes."""
+        return self.loads, self.u0, self.rigid_load
 
     def forget_factors(self) -> None:
         """Let the factors go that corrections keep for later ones: their memory."""
@@ -531,24 +543,6 @@ class Balance:
             dynamic=dynamic * self.dynamic,
             loads=dynamic * self.loads,
         )
-
-    def shifted(self, xi: float) -> Balance:
-        """The same problem with xi off its modal damping, C - xi M.
-
-        Parameters
-        ----------
-        xi : float
-            [1/s]
-
-        Returns
-        -------
-        Balance
-        """
-        off = xi if self.modal.proportional else xi * np.eye(len(self.modal.eigenvalues))
-        modal = replace(self.modal, damping=self.modal.damping - off)
-        rows = np.ascontiguousarray(np.atleast_2d(modal.damping))
-        linear = replace(self.linear, modal=modal, damping=rows)
-        return self._changed(modal=modal, linear=linear)
 
     def with_sliders(self, start: Start, slider: FloatArray | None = None) -> Balance:
         """The same problem with another start of the sliders.

@@ -26,7 +26,7 @@ inverse of a matrix, SIAM Review 31 (1989), for the low rank.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -99,6 +99,13 @@ class LinearPart:
     def symmetric(self) -> bool:
         """Whether one real Psi serves all harmonics."""
         return self.Psi.ndim == 2
+
+    def shifted(self, xi: float) -> LinearPart:
+        """The same system with xi [1/s] off its modal damping, C - xi M."""
+        off = xi if self.modal.proportional else xi * np.eye(len(self.modal.eigenvalues))
+        modal = replace(self.modal, damping=self.modal.damping - off)
+        rows = np.ascontiguousarray(np.atleast_2d(modal.damping))
+        return replace(self, modal=modal, damping=rows)
 
     def pushes(self, f: ComplexArray) -> ComplexArray:
         """Modal forces (n_k, m) of amplitudes (n_k, c) of forces on the rows."""
@@ -282,8 +289,8 @@ class BalanceJacobian(NamedTuple):
         )
         return out.reshape(-1, d1, size, d1, size)
 
-    def matrix(self) -> FloatArray:
-        """The whole matrix (n, n)."""
+    def matrix(self, more: int = 0) -> FloatArray:
+        """The whole matrix (n, n), with `more` empty rows and columns after them."""
         D, of, o = self.every_derivative(), self.of, self.of.offset
         n_point, d1, size = D.shape[:3]
         c, m, D = of.rows, of.rows * size, D.reshape(n_point, d1, size, -1)
@@ -292,17 +299,19 @@ class BalanceJacobian(NamedTuple):
         force = D[:, :, o::2] - 1j * D[:, :, o + 1 :: 2]
         # (harmonic, point, row, column of the point)
         motion = G.transpose(0, 2, 1, 3) @ force.transpose(2, 0, 1, 3)
-        top = np.zeros((c, size, n_point, d1 * size))
+        n = m + of.R.shape[1]
+        J = np.zeros((n + more, n + more))
+        top = J[:m, :m].reshape(c, size, n_point, d1 * size)
         top[:, o::2] = motion.real.transpose(2, 0, 1, 3)
         top[:, o + 1 :: 2] = -motion.imag.transpose(2, 0, 1, 3)
-        J = np.zeros((m + of.R.shape[1],) * 2)
         if o:
             G0 = of.G0.reshape(c, n_point, d1).transpose(1, 0, 2)
             top[:, 0] = (G0 @ D[:, :, 0]).transpose(1, 0, 2)
-            J[:m:size, m:] = -of.R
+            J[:m:size, m:n] = -of.R
             R = of.R.reshape(n_point, d1, -1)
-            J[m:, :m] = np.einsum("pdr,pdl->rpl", R, D[:, :, 0]).reshape(-1, m)
-        J[:m, :m] = top.reshape(m, m) + np.eye(m)
+            J[m:n, :m] = np.einsum("pdr,pdl->rpl", R, D[:, :, 0]).reshape(-1, m)
+        place = np.arange(m)
+        J[place, place] += 1.0
         return J
 
 

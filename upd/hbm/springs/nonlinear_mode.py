@@ -27,13 +27,15 @@ from scipy.linalg import eigh
 from upd.errors import InputError
 from upd.hbm.core.continuation import follow
 from upd.hbm.core.fourier import harmonics as harmonics_of
+from upd.hbm.core.fourier import to_complex
 from upd.hbm.core.newton import Settings, solve
 from upd.hbm.springs import response
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.checks import measures
 from upd.hbm.springs.damper import RigidDamper
 from upd.hbm.springs.friction import Start
-from upd.hbm.springs.points import Contacts
+from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart
+from upd.hbm.springs.points import Contacts, stuck_stiffness
 from upd.hbm.springs.residuals import FREQUENCY_SHARE, scale_of
 from upd.labels import Shown
 from upd.linalg.parallel import threads_for
@@ -404,46 +406,53 @@ class ExtendedBalance:
 
     def fundamental(self, X: FloatArray) -> ComplexArray:
         """Modal amplitudes (m,) of the first harmonic."""
-        b = self.b.shifted(float(X[-1]))
-        F = b.force(X[:-2]).force.reshape(len(b.Psi), -1)
-        return np.asarray(b.amplitudes(F, float(X[-2]))[0])
+        F = self.b.contact_terms(X[:-2], False)[0]
+        return np.asarray(self._amplitudes(self.b.linear.shifted(float(X[-1])), F, X, 1)[0])
+
+    def _amplitudes(
+        self, linear: LinearPart, F: FloatArray, X: FloatArray, harmonics: int
+    ) -> ComplexArray:
+        """Modal amplitudes (harmonics, m) of the lowest harmonics above 0."""
+        f = to_complex(F.reshape(linear.rows, -1), self.b.harmonics).T[:harmonics]
+        return linear.modal.solve(linear.k[:harmonics] * float(X[-2]), -linear.pushes(f))
 
     def function(
         self, X: FloatArray, p: float, jacobian: bool
     ) -> tuple[FloatArray, FloatArray | None, FloatArray]:
         """Residual, Jacobian and derivative by log a, as the continuation takes them."""
-        omega, b, a = float(X[-2]), self.b.shifted(float(X[-1])), float(np.exp(p))
-        found, parts, by_omega = b.linearised(X[:-2], omega, jacobian)
-        c, o = len(b.Psi), b.harmonics.offset
-        w = np.asarray(b.harmonics.dynamic * omega, dtype=float)
-        F = b.force(X[:-2]).force.reshape(c, -1)
-        all_eta = b.amplitudes(F, omega)
-        eta, one = all_eta[0], w[:1]
+        b, omega, a = self.b, float(X[-2]), float(np.exp(p))
+        linear, (W, rigid) = b.linear.shifted(float(X[-1])), b.split(X[:-2])
+        c, o = linear.rows, linear.offset
+        F, state, moving = b.contact_terms(X[:-2], jacobian)
+        found, by_omega = linear.residual(
+            W.reshape(c, -1), rigid, F.reshape(c, -1), omega, b.acting, jacobian
+        )
+        all_eta = self._amplitudes(linear, F, X, len(linear.k) if jacobian else 1)
+        eta = all_eta[0]
         energy, phase = float((eta.conj() @ eta).real), float((self.shape @ eta).imag) / a
         amplitude = 0.5 * np.log(energy) - p if energy > 0.0 else -np.inf
         residual = np.concatenate([found, [amplitude, phase]])
         by_p = np.zeros(len(residual))
         by_p[-2:] = -1.0, -phase
-        if parts is None:
+        if not jacobian:
             return residual, None, by_p
-        n, DF = len(found), parts.every_derivative()
-        J = np.zeros((n + 2, n + 2))
-        J[:n, :n], J[:n, n] = parts.matrix(), by_omega
+        w, modal, n = linear.k * omega, linear.modal, len(found)
+        one = w[:1]
+        parts = BalanceJacobian(linear, w, state, stuck_stiffness(b.contacts), moving)
+        DF, J = parts.every_derivative(), parts.matrix(2)
+        J[:n, n] = by_omega
         # xi acts on each harmonic as i k omega eta_k, a force
-        moved = b.modal.solve(w, -1j * w[:, None] * all_eta) @ b.Psi.T
-        by_xi = np.zeros((c, b.harmonics.size))
+        moved = linear.moves(modal.solve(w, -1j * w[:, None] * all_eta))
+        by_xi = np.zeros((c, linear.size))
         by_xi[:, o::2], by_xi[:, o + 1 :: 2] = moved.real.T, -moved.imag.T
         J[: by_xi.size, n + 1] = by_xi.ravel()
-        damping = b.modal.damping
-        lost = damping * eta if b.modal.proportional else damping @ eta
-        slopes = b.modal.solve(one, np.array([2.0 * omega * eta - 1j * lost]))[0]
-        by_shift = b.modal.solve(one, np.array([1j * omega * eta]))[0]
+        slopes = modal.solve(one, 2.0 * omega * eta[None] - 1j * linear.damped(eta[None]))[0]
+        by_shift = modal.solve(one, 1j * omega * eta[None])[0]
         for row, weights, part in ((n, eta.conj() / energy, 1.0), (n + 1, self.shape / a, -1j)):
-            y = part * (b.modal.solve(one, weights[None].astype(complex))[0] @ b.Psi.T)
-            V = np.zeros((c, b.harmonics.size))
+            y = part * linear.moves(modal.solve(one, weights[None].astype(complex)))[0]
+            V = np.zeros((c, linear.size))
             V[:, o], V[:, o + 1] = -y.real, -y.imag
-            by_w = np.einsum("pcs,pcsdt->pdt", V.reshape(DF.shape[:3]), DF)
-            J[row, : V.size] = by_w.ravel()
+            J[row, : V.size] = np.einsum("pcs,pcsdt->pdt", V.reshape(DF.shape[:3]), DF).ravel()
             J[row, n] = (part * (weights @ slopes)).real
             J[row, n + 1] = (part * (weights @ by_shift)).real
         return residual, J, by_p
