@@ -6,7 +6,7 @@ import pytest
 from upd.contact.bordered import Bordered
 from upd.contact.coulomb import Coulomb
 from upd.contact.coulomb_conditions import Iterate
-from upd.contact.coupled_systems import ClosedSystem, Stuck, Target
+from upd.contact.coupled_systems import AskedStep, ClosedSystem, Stuck
 
 
 def contact(seed: int, c: int) -> tuple[Coulomb, np.random.Generator]:
@@ -33,7 +33,7 @@ def test_the_closed_system_solves_the_rows(seed: int, c: int, by_load: bool) -> 
     p, s = rng.standard_normal(c + 1), 1e-6 * rng.standard_normal(c + 1)
     for columns in ((), (3,)):
         b = 1e-6 * rng.standard_normal((m, *columns))
-        target = Target(
+        target = AskedStep(
             b,
             np.add.outer(p, np.zeros(columns)) if by_load else None,
             None if by_load else np.add.outer(s, np.zeros(columns)),
@@ -84,7 +84,7 @@ def test_a_factor_with_a_border_solves_other_rows(seed: int, c: int, by_load: bo
     opened = before.is_open != rows.is_open
     assert np.flatnonzero(opened).tolist() == [0, 20]
     assert (before.relaxed != rows.relaxed).any(axis=1)[[0, 6, 20, 21]].all()
-    bordered = Bordered(ClosedSystem(solver.systems, before, by_load), before)
+    bordered = Bordered(ClosedSystem(solver.systems, before, by_load))
     assert bordered.changed(rows) == 2 * c + 2 * (c - 1)
     rho = np.column_stack((solver.rho_n, *[solver.rho_t] * (c - 1)))
     weight = np.where(rows.relaxed, 1.0, rho)
@@ -112,7 +112,7 @@ def test_a_factor_with_a_border_solves_other_rows(seed: int, c: int, by_load: bo
 def test_everything_stuck(by_load: bool) -> None:
     solver, rng = contact(0, 3)
     b, p = 1e-6 * rng.standard_normal(24), rng.standard_normal(4)
-    target = Target(b, p if by_load else None, None if by_load else 1e-6 * p)
+    target = AskedStep(b, p if by_load else None, None if by_load else 1e-6 * p)
     system = solver.systems.system(solver._stuck(), by_load)
     assert isinstance(system, Stuck)
     f, s, _ = system.refined(np.zeros(24), target)

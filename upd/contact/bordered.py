@@ -29,7 +29,7 @@ Correction = tuple[FloatArray, FloatArray]
 
 @dataclass
 class Bordered:
-    """Newton steps of other rows with the factor of `base`, whose rows are `rows`.
+    """Newton steps of other rows with the factor of `base`.
 
     With the base's system M x = r, x = (f of its closed dofs, s), a set R of its rows that others
     take the place of, and u the forces of nodes that closed since,
@@ -47,10 +47,10 @@ class Bordered:
     """
 
     base: ClosedSystem
-    rows: NewtonRows
 
     def __post_init__(self) -> None:
         of, base = self.base.of, self.base
+        self.rows = base.rows
         self._place = np.full((of.c, of.n), -1)
         self._place[:, base.nodes] = np.arange(base.q).reshape(of.c, -1)
         self._known: dict[int, FloatArray] = {}

@@ -13,6 +13,7 @@ from upd.errors import InputError
 from upd.linalg.parallel import threads_for
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 EPS = float(np.finfo(float).eps)
 # Below this many unknowns the threads of a factorisation wait for each other longer than they work:
 # on two busy cores 300 load steps of 185 nodes took 3.5 s with two threads and 0.1 s with one.
@@ -80,6 +81,33 @@ def numbers(problems: Problems, name: str, values: ArrayLike) -> FloatArray | No
     ):
         return None
     return array
+
+
+def one_load(problems: Problems, name: str, value: float | None) -> float:
+    """One number, of a load not below zero; 0 for None and where a problem was noted."""
+    array = numbers(problems, name, np.asarray(0.0 if value is None else value))
+    if array is None or problems.add(
+        array.size != 1, f"{name} must be one number, it has {array.size} values."
+    ):
+        return 0.0
+    number = float(array.reshape(()))
+    problems.add(
+        name == "load" and number < 0.0,
+        f"load is {number:g} N: the bodies cannot pull on each other, give a load >= 0.",
+    )
+    return number
+
+
+def node_mask(problems: Problems, start: ArrayLike | None, n: int) -> BoolArray | None:
+    """A guess of the contact set (n,), checked; None for None."""
+    if start is None:
+        return None
+    mask = np.asarray(start)
+    problems.add(
+        mask.dtype != bool or mask.shape != (n,),
+        f"start must be a bool mask of shape ({n},), one per node.",
+    )
+    return mask
 
 
 def compliance_matrix(problems: Problems, values: ArrayLike) -> FloatArray | None:

@@ -28,7 +28,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, lstsq, lu_factor, lu_solve
@@ -37,13 +37,12 @@ from scipy.optimize import linprog
 from upd.contact.bordered import Bordered
 from upd.contact.checks import EPS
 from upd.contact.coulomb_conditions import (
-    AskedStep,
     CoulombConditions,
     CoupledStep,
     FloatArray,
     Iterate,
 )
-from upd.contact.coupled_systems import ClosedSystem, NewtonRows, NewtonSystem, Target
+from upd.contact.coupled_systems import AskedStep, ClosedSystem, NewtonRows, NewtonSystem
 from upd.contact.qp import BoxQP
 from upd.errors import ConvergenceError
 
@@ -65,25 +64,12 @@ SOFTNESS = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e3, 1e1)
 MULTIPLIER_STEPS = 5
 
 
-@dataclass(frozen=True)
-class KeptSystem:
-    """Rows of an iterate, whether the load is given, and their system, factored."""
-
-    rows: NewtonRows
-    by_load: bool
-    system: NewtonSystem
-
-    def serves(self, rows: NewtonRows, by_load: bool) -> bool:
-        """Whether other rows have the same nodes open, stuck and slipping."""
-        return self.by_load == by_load and self.rows.same_states(rows)
-
-
 class Coulomb(CoulombConditions):
     """Coupled contact solved; made of the same fields."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._kept: KeptSystem | None = None
+        self._kept: NewtonSystem | None = None
         self._bordered: list[Bordered] = []
 
     def twin(self) -> Coulomb:
@@ -282,10 +268,10 @@ class Coulomb(CoulombConditions):
         near = self._nearby(step, Iterate(start.f, s, y, True), rows)
         if near is not None:
             return near
-        if self._kept is not None and self._kept.serves(rows, step.load is not None):
+        kept = self._serving(step, rows)
+        if kept is not None:
             # Its rows are those of an iterate as near as the step before converged.
-            kept, target = self._kept, Target(step.b, step.load, step.motion)
-            return Iterate(*kept.system.refined(kept.rows.rhs.T.ravel(), target))
+            return Iterate(*kept.refined(kept.rows.rhs.T.ravel(), step))
         try:
             return self._linear(step, rows)
         except np.linalg.LinAlgError:
@@ -323,8 +309,8 @@ class Coulomb(CoulombConditions):
         The rows of `at` leave r = rhs - P f - Q y; the kept P, Q and the equilibrium give the step
         that takes it away, P' df + Q' (y + dy) = r + Q' y with C df - B ds = dy.
         """
-        kept, (n, c) = self._kept, (self.n, self.c)
-        if kept is None or not kept.serves(rows, step.load is not None):
+        kept, (n, c) = self._serving(step, rows), (self.n, self.c)
+        if kept is None:
             return None
         if at.f.reshape(c, n)[:, rows.is_open].any():
             return None
@@ -334,20 +320,25 @@ class Coulomb(CoulombConditions):
         left += np.einsum("nij,jn->ni", kept.rows.Q - rows.Q, by_node)
         missing = None if step.load is None else step.load - self.B.T @ at.f
         still = np.zeros_like(at.s) if step.load is None else None
-        df, ds, new = kept.system.solve(left.T.ravel(), Target(-y, missing, still))
+        df, ds, new = kept.solve(left.T.ravel(), AskedStep(-y, missing, still))
         return Iterate(at.f + df, at.s + ds, new)
 
     # -- linear algebra ----------------------------------------------------------------------------
 
+    def _serving(self, step: AskedStep, rows: NewtonRows) -> NewtonSystem | None:
+        """The kept system where its rows have the same nodes open, stuck and slipping."""
+        kept = self._kept
+        if kept is None or kept.by_load != (step.load is not None):
+            return None
+        return kept if kept.rows.same_states(rows) else None
+
     def _linear(self, step: AskedStep, rows: NewtonRows) -> Iterate:
         """The new iterate: P f + Q (C f - B s - b) = rhs."""
-        target = Target(step.b, step.load, step.motion)
-        system = self.systems.system(rows, step.load is not None)
-        self._kept = KeptSystem(rows, step.load is not None, system)
+        self._kept = system = self.systems.system(rows, step.load is not None)
         closed = isinstance(system, ClosedSystem)
         if isinstance(system, ClosedSystem) and system.dear:
-            self._bordered = [*self._bordered, Bordered(system, rows)][-KEPT:]
-        return Iterate(*system.refined(rows.rhs.T.ravel(), target), closed)
+            self._bordered = [*self._bordered, Bordered(system)][-KEPT:]
+        return Iterate(*system.refined(rows.rhs.T.ravel(), step), closed)
 
     def derivative(self, at: Iterate) -> FloatArray:
         """df/ds (m, r) with the states kept.
@@ -356,7 +347,7 @@ class Coulomb(CoulombConditions):
         """
         rows, r = self._rows(at), self.B.shape[1]
         zero = np.zeros((len(self.C), r))
-        return self.systems.system(rows, False).solve(zero, Target(zero, None, np.eye(r)))[0]
+        return self.systems.system(rows, False).solve(zero, AskedStep(zero, None, np.eye(r)))[0]
 
     # -- fallback ----------------------------------------------------------------------------------
 

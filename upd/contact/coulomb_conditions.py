@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from upd.contact.checks import EPS
-from upd.contact.coupled_systems import CoupledSystems, NewtonRows
+from upd.contact.coupled_systems import AskedStep, CoupledSystems, NewtonRows
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -65,15 +65,6 @@ class CoupledStep:
     converged: bool
     method: str
     iterations: int
-
-
-@dataclass(frozen=True)
-class AskedStep:
-    """What a step asks for: b (m,), and load p (r,) or motion s (r,)."""
-
-    b: FloatArray
-    load: FloatArray | None
-    motion: FloatArray | None
 
 
 @dataclass

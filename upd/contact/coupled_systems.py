@@ -48,8 +48,10 @@ class NewtonRows:
 
 
 @dataclass(frozen=True)
-class Target:
-    """b (m,), and load p (r,) or motion s (r,); columns of them for derivatives."""
+class AskedStep:
+    """What a step asks for: b (m,), and load p (r,) or motion s (r,); columns of them for
+    derivatives.
+    """
 
     b: FloatArray
     load: FloatArray | None
@@ -60,12 +62,15 @@ Solved = tuple[FloatArray, FloatArray, FloatArray]
 
 
 class NewtonSystem(Protocol):
-    """Newton's rows, factored."""
+    """Newton's rows, factored; by_load: the load is given, not the motion."""
 
-    def solve(self, rhs: FloatArray, target: Target) -> Solved:
+    rows: NewtonRows
+    by_load: bool
+
+    def solve(self, rhs: FloatArray, target: AskedStep) -> Solved:
         """f, s and y for rhs (m,) or (m, columns)."""
 
-    def refined(self, rhs: FloatArray, target: Target) -> Solved:
+    def refined(self, rhs: FloatArray, target: AskedStep) -> Solved:
         """The same for one column, to rounding."""
 
 
@@ -120,7 +125,7 @@ class CoupledSystems:
         A = 0.5 * (A + A.T)
         return CB @ A, A
 
-    def stuck_forces(self, target: Target) -> FloatArray:
+    def stuck_forces(self, target: AskedStep) -> FloatArray:
         """Forces with y = 0; one column or many."""
         if target.load is None:
             assert target.motion is not None
@@ -135,16 +140,17 @@ class CoupledSystems:
 
         Raises LinAlgError where the states carry no load.
         """
-        return ClosedSystem(self, rows, by_load) if rows.relaxed.any() else Stuck(self, by_load)
+        made = ClosedSystem if rows.relaxed.any() else Stuck
+        return made(self, rows, by_load)
 
 
 class Stuck:
     """Everything sticks: y = 0."""
 
-    def __init__(self, of: CoupledSystems, by_load: bool) -> None:
-        self.of, self.by_load = of, by_load
+    def __init__(self, of: CoupledSystems, rows: NewtonRows, by_load: bool) -> None:
+        self.of, self.rows, self.by_load = of, rows, by_load
 
-    def solve(self, rhs: FloatArray, target: Target) -> Solved:
+    def solve(self, rhs: FloatArray, target: AskedStep) -> Solved:
         of = self.of
         f = of.stuck_forces(target)
         if target.load is None:
@@ -153,13 +159,13 @@ class Stuck:
         V, A = of.carried
         return f, A @ target.load - V.T @ target.b, np.zeros_like(f)
 
-    def refined(self, rhs: FloatArray, target: Target) -> Solved:
+    def refined(self, rhs: FloatArray, target: AskedStep) -> Solved:
         of, (f, s, y) = self.of, self.solve(rhs, target)
         for _ in range(_REFINED):
             there = of.C @ f - of.B @ s - target.b
             missing = None if target.load is None else target.load - of.B.T @ f
             still = np.zeros_like(s) if target.load is None else None
-            df, ds, _ = self.solve(rhs, Target(-there, missing, still))
+            df, ds, _ = self.solve(rhs, AskedStep(-there, missing, still))
             f, s = f + df, s + ds
         return f, s, y
 
@@ -168,7 +174,7 @@ class ClosedSystem:
     """The forces of the closed dofs and the rigid motion, dense: the open forces are zero."""
 
     def __init__(self, of: CoupledSystems, rows: NewtonRows, by_load: bool) -> None:
-        self.of, self.by_load = of, by_load
+        self.of, self.rows, self.by_load = of, rows, by_load
         nodes = np.flatnonzero(~rows.is_open)
         self.nodes, r = nodes, of.B.shape[1] if by_load else 0
         self.dofs = (np.arange(of.c)[:, None] * of.n + nodes).ravel()
@@ -202,10 +208,14 @@ class ClosedSystem:
             raise np.linalg.LinAlgError(NOT_CARRIED)
         M /= self.size[:, None]
         norm = float(np.abs(M).sum(axis=1).max(initial=0.0))
-        self.lu = _lu(M.T, overwrite=True) if q else None
-        if self.lu is not None:
+        self.lu: tuple[FloatArray, IntArray] | None = None
+        if q:
+            lu, pivots, info = lapack.dgetrf(M.T, overwrite_a=True)
+            if info != 0:
+                raise np.linalg.LinAlgError("the states leave no unique answer")
+            self.lu = lu, pivots
             # Closed nodes that leave a motion free make a singular matrix, but for rounding.
-            reciprocal, _ = lapack.dgecon(self.lu[0], norm)
+            reciprocal, _ = lapack.dgecon(lu, norm)
             if reciprocal <= len(M) * EPS:
                 raise np.linalg.LinAlgError(NOT_CARRIED)
 
@@ -233,32 +243,32 @@ class ClosedSystem:
             return right
         return lu_solve(self.lu, (right.T / self.size).T, trans=1, check_finite=False)
 
-    def solve(self, rhs: FloatArray, target: Target) -> Solved:
+    def solve(self, rhs: FloatArray, target: AskedStep) -> Solved:
         f, s = self._step(self._asked(rhs, target), target)
         return f, s, self._misfit(f, s, target)
 
-    def _misfit(self, f: FloatArray, s: FloatArray, target: Target) -> FloatArray:
+    def _misfit(self, f: FloatArray, s: FloatArray, target: AskedStep) -> FloatArray:
         """y (m,), or columns of it, from forces and motion."""
         C, dofs = self.of.C, self.dofs
         # One product with all of C is cheaper than a copy of its closed columns.
         Cf = C @ f if f.ndim == 1 else C.take(dofs, axis=0).T @ f[dofs]
         return np.asarray(Cf - self.of.B @ s - target.b)
 
-    def refined(self, rhs: FloatArray, target: Target) -> Solved:
+    def refined(self, rhs: FloatArray, target: AskedStep) -> Solved:
         f, s, y = self.solve(rhs, target)
         # What the rows leave, by the unprocessed y; one step gains all digits there are.
-        left = self._asked(rhs, Target(-y, None, np.zeros(self.of.B.shape[1])))
+        left = self._asked(rhs, AskedStep(-y, None, np.zeros(self.of.B.shape[1])))
         for j in range(self.of.first, self.of.c):
             left[self.place[j]] -= sum(
                 self.P[:, j, i] * f[self.dofs][self.place[i]] for i in range(self.of.c)
             )
         none = np.zeros_like(s)
         missing = None if target.load is None else target.load - self.of.B.T @ f
-        df, ds = self._step(left, Target(target.b, missing, none if missing is None else None))
+        df, ds = self._step(left, AskedStep(target.b, missing, none if missing is None else None))
         f, s = f + df, (s + ds if self.by_load else s)
         return f, s, self._misfit(f, s, target)
 
-    def _asked(self, rhs: FloatArray, target: Target) -> FloatArray:
+    def _asked(self, rhs: FloatArray, target: AskedStep) -> FloatArray:
         """Right-hand sides (q,) of the closed rows: Q (b + B s) + rhs."""
         known = target.b if target.motion is None else target.b + self.of.B @ target.motion
         right = known[self.dofs]
@@ -268,7 +278,7 @@ class ClosedSystem:
             right[self.place[j]] = value + rhs[j * self.of.n + self.nodes[self.slips]]
         return np.asarray(right)
 
-    def _step(self, right: FloatArray, target: Target) -> tuple[FloatArray, FloatArray]:
+    def _step(self, right: FloatArray, target: AskedStep) -> tuple[FloatArray, FloatArray]:
         q = self.q
         f = np.zeros((len(self.of.C), *right.shape[1:]))
         if self.by_load:
@@ -280,10 +290,3 @@ class ClosedSystem:
             assert target.motion is not None
             return f, target.motion
         return f, (found[q:].T * self.unit).T
-
-
-def _lu(A: FloatArray, *, overwrite: bool = False) -> tuple[FloatArray, IntArray]:
-    lu, pivots, info = lapack.dgetrf(A, overwrite_a=overwrite)
-    if info != 0:
-        raise np.linalg.LinAlgError("the states leave no unique answer")
-    return lu, pivots

@@ -8,7 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upd.contact.checks import Problems, compliance_matrix, few_threads, numbers, unit_response
+from upd.contact.checks import (
+    Problems,
+    compliance_matrix,
+    few_threads,
+    node_mask,
+    numbers,
+    one_load,
+    unit_response,
+)
 from upd.contact.qp import FREE, LOWER, BoxQP, FloatArray, Method, State
 from upd.labels import Shown
 
@@ -126,19 +134,9 @@ def normal_contact(
         problems = Problems("normal contact")
         problems.add((load is None) == (approach is None), "give exactly one of load and approach.")
         solver = _NormalSolver(problems, compliance, gap)
-        mask = None
-        if start is not None:
-            mask = np.asarray(start)
-            problems.add(
-                mask.dtype != bool or mask.shape != (solver.n,),
-                f"start must be a bool mask of shape ({solver.n},), one per node.",
-            )
-        target = (
-            _scalar(problems, "load", load)
-            if load is not None
-            else _scalar(problems, "approach", approach)
-        )
-        _check_load(problems, load if load is not None else 0.0)
+        mask = node_mask(problems, start, solver.n)
+        name, given = ("load", load) if load is not None else ("approach", approach)
+        target = one_load(problems, name, given)
         problems.raise_any()
         if load is not None:
             return solver.at_load(target, mask)
@@ -176,7 +174,7 @@ def normal_curve(
         if values is not None and not problems.add(
             values.ndim != 1, f"loads has shape {values.shape}: it must be one-dimensional."
         ):
-            _check_load(problems, float(values.min(initial=0.0)))
+            one_load(problems, "load", float(values.min(initial=0.0)))
         problems.raise_any()
         assert values is not None
         curve: list[NormalContact] = []
@@ -185,24 +183,6 @@ def normal_curve(
             curve.append(solver.at_load(float(value), mask))
             mask = curve[-1].contact
         return curve
-
-
-def _scalar(problems: Problems, name: str, value: float | None) -> float:
-    array = numbers(problems, name, np.asarray(0.0 if value is None else value))
-    if array is None or problems.add(
-        array.size != 1, f"{name} must be one number, it has {array.size} values."
-    ):
-        return 0.0
-    return float(array.reshape(()))
-
-
-def _check_load(problems: Problems, load: float) -> None:
-    value = np.asarray(load)
-    if value.size == 1 and value.dtype.kind in "fiu":
-        problems.add(
-            bool(value < 0),
-            f"load is {float(value):g} N: the bodies cannot pull on each other, give a load >= 0.",
-        )
 
 
 class _NormalSolver:
@@ -239,7 +219,7 @@ class _NormalSolver:
                 "The load is zero: the bodies touch without force at the smallest gap, "
                 f"approach {self.closest:g} mm."
             )
-            return self._apart(self.closest, "no load", message)
+            return apart(self.gap, self.closest, "no load", message)
         mask = start if start is not None and start.any() else self._winkler(load)
         return self._solve(mask, load=load)
 
@@ -250,7 +230,7 @@ class _NormalSolver:
                 f"The approach {approach:g} mm does not exceed the smallest gap "
                 f"{self.closest:g} mm: no contact, no force."
             )
-            return self._apart(approach, "no contact", message)
+            return apart(self.gap, approach, "no contact", message)
         depth = approach - self.closest
         return self._solve(start if start is not None else self.h < depth, motion=depth)
 
@@ -284,21 +264,6 @@ class _NormalSolver:
             rates=answer.rates[:, 0],
         )
 
-    def _apart(self, approach: float, status: str, message: str) -> NormalContact:
-        gap = np.maximum(self.gap - approach, 0.0)
-        return NormalContact(
-            np.zeros(self.n),
-            gap,
-            np.zeros(self.n, dtype=bool),
-            approach,
-            0.0,
-            0,
-            "active set",
-            status,
-            message,
-            np.zeros(self.n),
-        )
-
     def _winkler(self, load: float) -> BoolArray:
         """Contact set of an elastic foundation as stiff as the whole patch pressed flat.
 
@@ -312,3 +277,20 @@ class _NormalSolver:
         )
         count = int(np.searchsorted(carried, load))
         return np.asarray(self.h <= order[max(count, 1) - 1])
+
+
+def apart(gap: FloatArray, approach: float, status: str, message: str) -> NormalContact:
+    """No node carries a force."""
+    none, n = np.zeros(gap.size), gap.size
+    return NormalContact(
+        none,
+        np.maximum(gap - approach, 0.0),
+        np.zeros(n, dtype=bool),
+        approach,
+        0.0,
+        0,
+        "active set",
+        status,
+        message,
+        none.copy(),
+    )

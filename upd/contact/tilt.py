@@ -16,8 +16,17 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import lapack, solve_triangular
 from scipy.spatial import ConvexHull
 
-from upd.contact.checks import EPS, Problems, compliance_matrix, few_threads, numbers, unit_response
-from upd.contact.normal import NormalContact
+from upd.contact.checks import (
+    EPS,
+    Problems,
+    compliance_matrix,
+    few_threads,
+    node_mask,
+    numbers,
+    one_load,
+    unit_response,
+)
+from upd.contact.normal import NormalContact, apart
 from upd.contact.qp import FREE, HALF_THE_DIGITS, LOWER, BoxQP, FloatArray
 from upd.errors import ConvergenceError
 from upd.labels import Shown
@@ -133,42 +142,33 @@ def tilted_contact(
     """
     with few_threads(gap):
         problems = Problems("contact with tilt")
-        C, h, T, M = (
+        C, h, T = (
             compliance_matrix(problems, compliance),
             numbers(problems, "gap", gap),
             numbers(problems, "arms", arms),
-            np.zeros(2),
         )
-        F, given = numbers(problems, "load", load), numbers(problems, "moment", moment)
-        if F is not None and not problems.add(
-            F.size != 1, f"load must be one number, it has {F.size} values."
-        ):
-            problems.add(
-                bool(F < 0),
-                f"load is {float(F):g} N: the bodies cannot pull on each other, give a load >= 0.",
-            )
-        if given is not None and not problems.add(
-            given.shape != (2,), f"moment has shape {given.shape}: it must be (2,)."
-        ):
-            M = given
+        F, M = one_load(problems, "load", load), numbers(problems, "moment", moment)
+        problems.add(
+            M is not None and M.shape != (2,),
+            f"moment has shape {None if M is None else M.shape}: it must be (2,).",
+        )
+        given = None
         if C is not None:
             unit_response(problems, C)
-            _check_shapes(problems, len(C), h, T, start)
+            _check_shapes(problems, len(C), h, T)
+            given = node_mask(problems, start, len(C))
         problems.raise_any()
-        assert C is not None and h is not None and T is not None and F is not None
-        mask = (
-            np.ones(len(C), dtype=bool) if start is None or not np.any(start) else np.asarray(start)
-        )
-        hull = None
-        if all(free):
-            hull = _hull(problems, T)
-        else:
+        assert C is not None and h is not None and T is not None and M is not None
+        mask = np.ones(len(C), dtype=bool) if given is None or not given.any() else given
+        if not all(free):
             # An arm of zero: the held tilt moves nothing and no moment resists it.
             T = T * np.array(free, dtype=float)
             problems.add(
                 bool(M[~np.array(free)].any()), "moment: a held tilt has none; give zero there."
             )
-        if float(F) == 0.0:
+        tilts = np.eye(2)[:, np.array(free)]
+        sides = _sides(problems, T, tilts)
+        if F == 0.0:
             problems.add(
                 bool(M.any()),
                 f"moment is {M} N mm under no load: nothing can carry it, give a load or "
@@ -176,19 +176,12 @@ def tilted_contact(
             )
             problems.raise_any()
             return _unloaded(h)
-        face = (
-            _supporting_face(problems, hull, T, M / float(F))
-            if hull is not None
-            else _supporting_end(problems, T, M / float(F), free)
-        )
+        face = _supporting_face(problems, sides, T, M / F, tilts)
         problems.raise_any()
-        assert face is not None
-        return _solve(C, h, T, float(F), M, mask, face, sum(free))
+        return _solve(C, h, T, F, M, mask, face, sum(free))
 
 
-def _check_shapes(
-    problems: Problems, n: int, h: FloatArray | None, T: FloatArray | None, start: ArrayLike | None
-) -> None:
+def _check_shapes(problems: Problems, n: int, h: FloatArray | None, T: FloatArray | None) -> None:
     problems.add(
         h is not None and h.shape != (n,),
         f"gap has shape {None if h is None else h.shape}: the compliance needs ({n},).",
@@ -197,12 +190,6 @@ def _check_shapes(
         T is not None and T.shape != (n, 2),
         f"arms has shape {None if T is None else T.shape}: the compliance needs ({n}, 2).",
     )
-    if start is not None:
-        mask = np.asarray(start)
-        problems.add(
-            mask.dtype != bool or mask.shape != (n,),
-            f"start must be a bool mask of shape ({n},), one per node.",
-        )
 
 
 @dataclass(frozen=True)
@@ -218,90 +205,61 @@ class _Face:
     across: FloatArray
 
 
-def _hull(problems: Problems, T: FloatArray) -> ConvexHull | None:
-    """Convex hull of the nodes; a problem when they lie on one line.
+def _sides(problems: Problems, T: FloatArray, tilts: FloatArray) -> FloatArray:
+    """Sides (k, 3) of what a load line must not leave: outward normals and offsets.
 
-    A moment across that line would meet no resistance.
+    With both tilts free the sides of the nodes' convex hull, with one its two ends. A problem when
+    the nodes lie on one line: a moment across it would meet no resistance.
     """
-    spread = np.linalg.svd(T - T.mean(axis=0), compute_uv=False)
-    flat = len(T) < 3 or not spread[1] > HALF_THE_DIGITS * spread[0]
-    if problems.add(
-        flat,
-        f"arms: the {len(T)} nodes lie on one line, about which nothing resists a tilt: "
-        "add nodes beside it, or hold the tilt (normal_contact).",
-    ):
-        problems.raise_any()
-    return ConvexHull(T)
+    if tilts.shape[1] == 2:
+        spread = np.linalg.svd(T - T.mean(axis=0), compute_uv=False)
+        flat = len(T) < 3 or not spread[1] > HALF_THE_DIGITS * spread[0]
+        if problems.add(
+            flat,
+            f"arms: the {len(T)} nodes lie on one line, about which nothing resists a tilt: "
+            "add nodes beside it, or hold the tilt (normal_contact).",
+        ):
+            problems.raise_any()
+        return np.asarray(ConvexHull(T).equations, np.float64)
+    ends = np.column_stack([tilts, -tilts]).T
+    return np.column_stack([ends, -(T @ ends.T).max(axis=0)])
 
 
 def _supporting_face(
-    problems: Problems, hull: ConvexHull, T: FloatArray, point: FloatArray
-) -> _Face | None:
-    """Smallest side of the hull that holds the load point; a problem when it stands outside."""
+    problems: Problems, sides: FloatArray, T: FloatArray, point: FloatArray, tilts: FloatArray
+) -> _Face:
+    """Smallest side that holds the load point; a problem when it stands outside."""
     tolerance = (len(T) + 10) * EPS * float(np.abs(T).max() + np.abs(point).max())
-    beyond = hull.equations[:, :2] @ point + hull.equations[:, 2]
-    worst = int(np.argmax(beyond))
-    ends = T[hull.simplices[worst]]
-    if problems.add(
-        bool(beyond[worst] > tolerance),
-        f"the load line meets the contact plane at arms ({point[0]:.6g}, {point[1]:.6g}) "
-        f"mm, {beyond[worst]:.3g} mm outside the nodes, "
-        f"beyond their side from ({ends[0, 0]:.6g}, {ends[0, 1]:.6g}) to "
-        f"({ends[1, 0]:.6g}, {ends[1, 1]:.6g}): the body tips over. "
-        "Move the load line inside, enlarge the patch, or hold the tilt (normal_contact).",
-    ):
-        return None
-    sides = hull.equations[beyond >= -tolerance]
+    beyond = sides[:, :2] @ point + sides[:, 2]
+    if len(beyond) and beyond.max() > tolerance:
+        side = sides[beyond.argmax()]
+        on = T[np.abs(T @ side[:2] + side[2]) <= tolerance]
+        along = on @ np.array([-side[1], side[0]])
+        ends = on[[along.argmin(), along.argmax()]]
+        problems.add(
+            True,
+            f"the load line meets the contact plane at arms ({point[0]:.6g}, {point[1]:.6g}) mm, "
+            f"{beyond.max():.3g} mm outside the nodes, beyond their side from ({ends[0, 0]:.6g}, "
+            f"{ends[0, 1]:.6g}) to ({ends[1, 0]:.6g}, {ends[1, 1]:.6g}): the body tips over. "
+            "Move the load line inside, enlarge the patch, or hold the tilt (normal_contact).",
+        )
+    sides = sides[beyond >= -tolerance]
     nodes = np.flatnonzero((np.abs(T @ sides[:, :2].T + sides[:, 2]) <= tolerance).all(axis=1))
     if not len(sides):
-        return _Face(nodes, np.eye(2), np.zeros((2, 0)))
-    if np.ptp(T[nodes], axis=0).max() <= tolerance:
-        return _Face(nodes, np.zeros((2, 0)), np.eye(2))
+        return _Face(nodes, tilts, np.zeros((2, 0)))
+    if np.ptp(T[nodes], axis=0).max(initial=0.0) <= tolerance:
+        return _Face(nodes, np.zeros((2, 0)), tilts)
     normal = sides[0, :2]
     return _Face(nodes, np.array([[-normal[1]], [normal[0]]]), normal[:, None])
 
 
-def _supporting_end(
-    problems: Problems, T: FloatArray, point: FloatArray, free: tuple[bool, bool]
-) -> _Face | None:
-    """The same with one free tilt: all nodes, or those at the end under the load point."""
-    everything, tilts = np.arange(len(T)), np.eye(2)[:, np.array(free)]
-    if not any(free):
-        return _Face(everything, tilts, tilts)
-    arms, at = (T @ tilts).ravel(), float((point @ tilts).item())
-    tolerance = (len(T) + 10) * EPS * float(np.abs(arms).max() + abs(at))
-    low, high = float(arms.min()), float(arms.max())
-    if problems.add(
-        not low - tolerance <= at <= high + tolerance,
-        f"the load line meets the contact plane at the arm {at:.6g} mm, outside the nodes from "
-        f"{low:.6g} to {high:.6g}: the body tips over. "
-        "Move the load line inside, enlarge the patch, or hold the tilt (normal_contact).",
-    ):
-        return None
-    end = np.flatnonzero(np.abs(arms - (low if at - low <= high - at else high)) <= tolerance)
-    if low + tolerance < at < high - tolerance:
-        return _Face(everything, tilts, np.zeros((2, 0)))
-    return _Face(end, np.zeros((2, 0)), tilts)
-
-
 def _unloaded(h: FloatArray) -> TiltedContact:
-    none, approach = np.zeros(h.size, dtype=bool), float(h.min())
+    approach = float(h.min())
     message = (
         "The load is zero: the bodies touch without force and without tilt at the smallest "
         f"gap, approach {approach:g} mm."
     )
-    normal = NormalContact(
-        np.zeros(h.size),
-        h - approach,
-        none,
-        approach,
-        0.0,
-        0,
-        "active set",
-        "no load",
-        message,
-        np.zeros(h.size),
-    )
+    normal = apart(h, approach, "no load", message)
     return TiltedContact(normal, np.zeros(2), np.zeros(2), "no load", message, np.zeros((3, 3)))
 
 
