@@ -156,8 +156,6 @@ class Map:
         Its end; the largest value when None.
     smooth
         Shaded between the lattice points instead of a cell each.
-    contours
-        Filled contours with dots at the points, crosses where there is no value.
     """
 
     x: Array
@@ -168,7 +166,6 @@ class Map:
     top: float | None = None
     low: float | None = 0.0
     smooth: bool = False
-    contours: bool = False
 
 
 @dataclass(frozen=True)

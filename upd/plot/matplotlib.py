@@ -26,7 +26,6 @@ from matplotlib.transforms import ScaledTranslation
 from upd.cache.files import whole_file
 from upd.plot.chart import MOST_PANELS, Area, Axis, Band, Chart, Map, Trace
 from upd.plot.style import (
-    CROSS,
     area_colour,
     band_colour,
     colour_of,
@@ -358,8 +357,6 @@ def _draw_maps(chart: Chart, ax: Axes) -> None:
     low, high = colour_range(chart.maps)
     for k, m in enumerate(chart.maps):
         drawn = _states(m, ax) if m.states else _field(m, low, high, ax)
-        if m.contours:
-            _points(m, ax)
         # Axes for a colour bar cost as much as the map: states of a compact map stand in the
         # legend. One value everywhere has no scale.
         if k == 0 and (is_wide(chart) if m.states else low < high):
@@ -379,33 +376,17 @@ def _states(m: Map, ax: Axes) -> Any:
 
 
 def _field(m: Map, low: float, high: float, ax: Axes) -> ScalarMappable:
-    whole = bool(np.isfinite(m.z).all())
-    drawn: Any
-    if m.contours and whole and low < high and min(m.z.shape) > 1:
-        drawn = ax.contourf(m.x, m.y, m.z.T, levels=12, cmap="viridis")
-    else:
-        # Shading between points needs all of them.
-        shading: Any = "gouraud" if m.smooth and whole and min(m.z.shape) > 1 else "nearest"
-        drawn = ax.pcolormesh(
-            m.x,
-            m.y,
-            np.ma.masked_invalid(m.z.T),
-            cmap="viridis",
-            vmin=low,
-            vmax=high,
-            shading=shading,
-        )
-    return drawn  # type: ignore[no-any-return]
-
-
-def _points(m: Map, ax: Axes) -> None:
-    """Dots at the points of a map, crosses where there is no value."""
-    x, y = np.meshgrid(m.x, m.y, indexing="ij")
-    known = np.isfinite(m.z)
-    ax.plot(x[known], y[known], "o", color="white", mec="#333333", mew=0.5, ms=3, clip_on=False)
-    if not known.all():
-        # without points matplotlib's layout makes room for one in the corner of the sheet
-        ax.plot(x[~known], y[~known], "x", color=CROSS, ms=6, clip_on=False)
+    # Shading between points needs all of them.
+    smooth = m.smooth and bool(np.isfinite(m.z).all()) and min(m.z.shape) > 1
+    return ax.pcolormesh(
+        m.x,
+        m.y,
+        np.ma.masked_invalid(m.z.T),
+        cmap="viridis",
+        vmin=low,
+        vmax=high,
+        shading="gouraud" if smooth else "nearest",
+    )
 
 
 def _bar(drawn: Any, chart: Chart, axis: Axis, ax: Axes) -> Any:

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Mark, Scatter, Trace
 from upd.plot.style import (
-    CROSS,
     area_colour,
     band_colour,
     colour_of,
@@ -171,7 +170,6 @@ def _traces(chart: Chart) -> Iterator[dict[str, Any]]:
     low, high = colour_range(chart.maps)
     for k, m in enumerate(chart.maps):
         yield _map(chart, m, low, high) | {"showscale": k == 0 and (bool(m.states) or low < high)}
-        yield from _points(m) if m.contours else ()
     for area in chart.areas:
         yield from _area(chart, area)
     for trace in chart.traces:
@@ -306,7 +304,7 @@ def _coloured(chart: Chart, s: Scatter, *, first: bool) -> dict[str, Any]:
 
 
 def _map(chart: Chart, m: Map, low: float, high: float) -> dict[str, Any]:
-    """Cells, a shaded field, filled contours, or states."""
+    """Cells, a shaded field, or states."""
     out: dict[str, Any] = {"type": "heatmap", "name": "", "hoverongaps": False}
     out |= {"x": _numbers(m.x), "y": _numbers(m.y), "z": _numbers(m.z.T)}
     if m.states:
@@ -314,25 +312,8 @@ def _map(chart: Chart, m: Map, low: float, high: float) -> dict[str, Any]:
     scale = _scale(m.value, low, high)
     out |= {"zmin": scale.pop("cmin"), "zmax": scale.pop("cmax"), **scale}
     out["hovertemplate"] = _hover(chart, _value(m.value, "z"))
-    whole = bool(np.isfinite(m.z).all()) and min(m.z.shape) > 1
-    if not (m.contours and whole and low < high):
-        return out | ({"zsmooth": "best"} if m.smooth and whole else {})
-    look = {"contours": {"coloring": "fill"}, "line": {"width": 0, "smoothing": 0}}
-    return out | look | {"type": "contour", "ncontours": 12}
-
-
-def _points(m: Map) -> Iterator[dict[str, Any]]:
-    """Dots at the points of a map, crosses where there is no value."""
-    x, y = np.meshgrid(m.x, m.y, indexing="ij")
-    known = np.isfinite(m.z)
-    dot = {"size": 5, "color": "#ffffff", "line": {"color": "#333333", "width": 0.7}}
-    cross = {"symbol": "x-thin", "size": 8, "color": CROSS, "line": {"color": CROSS, "width": 2}}
-    # Over a dot the map gives its value; over a cross there is none.
-    looks = ((known, dot, {"hoverinfo": "skip"}), (~known, cross, {"hovertemplate": "no value"}))
-    for where, marker, hover in looks:
-        if where.any():
-            more = {"marker": marker, "cliponaxis": False, **hover}
-            yield _scatter(x[where], y[where], "markers", **more)
+    smooth = m.smooth and bool(np.isfinite(m.z).all()) and min(m.z.shape) > 1
+    return out | ({"zsmooth": "best"} if smooth else {})
 
 
 def _states(chart: Chart, m: Map) -> dict[str, Any]:
