@@ -154,8 +154,6 @@ class Map:
         Start of the colour scale.
     top
         Its end; the largest value when None.
-    smooth
-        Shaded between the lattice points instead of a cell each.
     """
 
     x: Array
@@ -165,7 +163,6 @@ class Map:
     states: tuple[str, ...] = ()
     top: float | None = None
     low: float | None = 0.0
-    smooth: bool = False
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator, ScalarFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, ScalarFormatter
 from matplotlib.transforms import ScaledTranslation
 
 from upd.cache.files import whole_file
@@ -225,6 +225,9 @@ def _axis(chart: Chart, axis: Axis, name: Literal["x", "y"], ax: Axes) -> None:
     limits = getattr(ax, f"set_{name}lim")
     if is_log(axis, values):
         getattr(ax, f"set_{name}scale")("log", nonpositive="mask")
+        which.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        which.set_major_formatter("{x:g}")
+        which.set_minor_formatter(NullFormatter())
         ax.grid(visible=True, which="minor", axis=name, color="#eeeeee", lw=0.4)
     elif isinstance(which.get_major_formatter(), ScalarFormatter):
         # Numbers as they are, without an offset in a corner.
@@ -376,17 +379,8 @@ def _states(m: Map, ax: Axes) -> Any:
 
 
 def _field(m: Map, low: float, high: float, ax: Axes) -> ScalarMappable:
-    # Shading between points needs all of them.
-    smooth = m.smooth and bool(np.isfinite(m.z).all()) and min(m.z.shape) > 1
-    return ax.pcolormesh(
-        m.x,
-        m.y,
-        np.ma.masked_invalid(m.z.T),
-        cmap="viridis",
-        vmin=low,
-        vmax=high,
-        shading="gouraud" if smooth else "nearest",
-    )
+    z = np.ma.masked_invalid(m.z.T)
+    return ax.pcolormesh(m.x, m.y, z, cmap="viridis", vmin=low, vmax=high, shading="nearest")
 
 
 def _bar(drawn: Any, chart: Chart, axis: Axis, ax: Axes) -> Any:

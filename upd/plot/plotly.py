@@ -304,7 +304,7 @@ def _coloured(chart: Chart, s: Scatter, *, first: bool) -> dict[str, Any]:
 
 
 def _map(chart: Chart, m: Map, low: float, high: float) -> dict[str, Any]:
-    """Cells, a shaded field, or states."""
+    """A cell for every value."""
     out: dict[str, Any] = {"type": "heatmap", "name": "", "hoverongaps": False}
     out |= {"x": _numbers(m.x), "y": _numbers(m.y), "z": _numbers(m.z.T)}
     if m.states:
@@ -312,8 +312,7 @@ def _map(chart: Chart, m: Map, low: float, high: float) -> dict[str, Any]:
     scale = _scale(m.value, low, high)
     out |= {"zmin": scale.pop("cmin"), "zmax": scale.pop("cmax"), **scale}
     out["hovertemplate"] = _hover(chart, _value(m.value, "z"))
-    smooth = m.smooth and bool(np.isfinite(m.z).all()) and min(m.z.shape) > 1
-    return out | ({"zsmooth": "best"} if smooth else {})
+    return out
 
 
 def _states(chart: Chart, m: Map) -> dict[str, Any]:

@@ -419,17 +419,6 @@ def test_maps_of_one_chart_share_a_scale() -> None:
     ]
 
 
-def test_smooth_maps() -> None:
-    assert len(_mesh(drawn(_map(smooth=True))).get_coordinates()) == 2, (
-        "shaded between the points: as many corners as values"
-    )
-    assert len(_mesh(drawn(_map())).get_coordinates()) == 3
-    assert (
-        figure(_map(smooth=True))["data"][0]["zsmooth"] == "best"
-        and "zsmooth" not in figure(_map())["data"][0]
-    )
-
-
 def test_maps_of_states() -> None:
     chart = Chart(
         "t",
@@ -563,7 +552,6 @@ def every() -> list[Chart]:
         ),
         Chart("Points", X, Y, scatters=(points,), equal=True),
         _map(),
-        _map(smooth=True),
     ]
 
 

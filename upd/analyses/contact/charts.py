@@ -428,8 +428,7 @@ def _surface(case: Case, groups: list[Group], sheet: bool) -> Chart:
     u = UM * _joined(groups, name)
     low, top = float(u.min()), float(u.max())
     maps = tuple(
-        Map(values(g, "x"), values(g, "y"), values(g, name, UM), axis, (), top, low, smooth=True)
-        for g in groups
+        Map(values(g, "x"), values(g, "y"), values(g, name, UM), axis, (), top, low) for g in groups
     )
     body = groups[0][name].attributes.get("body", "upper body")
     title = f"Deformed surface of the {body}"
