@@ -93,6 +93,8 @@ def write_png(figure: Figure, path: Path) -> list[Path]:
 
 #: points of the letters of titles and ticks, and mean width of a letter as a part of them
 _LETTERS, _WIDE = 9.0, 0.56
+#: largest over smallest value up to which an axis has ticks between its decades
+_FEW_DECADES = 1e3
 #: inches a title may reach over its axes on both sides together
 _OVER = 0.45
 #: inches beside, and above and below, a wide map on its panel: labels, title and colour bar
@@ -225,7 +227,9 @@ def _axis(chart: Chart, axis: Axis, name: Literal["x", "y"], ax: Axes) -> None:
     limits = getattr(ax, f"set_{name}lim")
     if is_log(axis, values):
         getattr(ax, f"set_{name}scale")("log", nonpositive="mask")
-        which.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        seen = values[values > 0.0]
+        few = seen.max() < _FEW_DECADES * seen.min()
+        which.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
         which.set_major_formatter("{x:g}")
         which.set_minor_formatter(NullFormatter())
         ax.grid(visible=True, which="minor", axis=name, color="#eeeeee", lw=0.4)
