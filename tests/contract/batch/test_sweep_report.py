@@ -277,7 +277,7 @@ def test_reasons_are_told_once_with_their_points(tmp_path: Path) -> None:
 )
 def test_verdict(failed: int, warned: int, kind: str) -> None:
     points = [
-        sweep_page._Point([], "failed" if k < failed else "ok", "", ["w"] * (k < warned), 1.0)
+        sweep_page._SweepPoint([], "failed" if k < failed else "ok", "", ["w"] * (k < warned), 1.0)
         for k in range(3)
     ]
     assert verdict(points).kind == kind
