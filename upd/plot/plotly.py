@@ -46,6 +46,8 @@ _GRID = "#e6e6e6"
 _LINE = 42
 #: width over height of a chart
 _WIDE = 1.5
+#: part of an axis beyond the data, as plotly leaves it
+_AIR = 0.05
 
 
 def figure(chart: Chart) -> dict[str, Any]:
@@ -105,7 +107,7 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
         # The last word may reach beyond the axis.
         out |= at | {"ticklabeloverflow": "allow"}
     if axis.low is not None or axis.high is not None:
-        out["range"] = _range(axis, log)
+        out["range"] = _range(axis, values, log)
     return out | {
         "linecolor": "#999999",
         "ticks": "outside",
@@ -116,12 +118,20 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
     }
 
 
-def _range(axis: Axis, log: bool) -> list[float | None]:
-    """Ends of an axis as plotly takes them: logarithms on a logarithmic one, None at the data."""
-    return [
+def _range(axis: Axis, values: Array, log: bool) -> list[float]:
+    """Ends of an axis as plotly takes them: logarithms on a logarithmic one.
+
+    Those of the data with some air where none is given, for plotly does not keep one that is alone.
+    """
+    seen = np.log10(values[values > 0.0]) if log else values
+    given = [
         None if end is None or (log and end <= 0.0) else math.log10(end) if log else end
         for end in (axis.low, axis.high)
     ]
+    data = (float(seen.min()), float(seen.max())) if seen.size else (0.0, 1.0)
+    low, high = (d if end is None else end for end, d in zip(given, data, strict=True))
+    air = _AIR * (high - low)
+    return [low - air * (given[0] is None), high + air * (given[1] is None)]
 
 
 def pack(values: NDArray[Any]) -> dict[str, str]:

@@ -459,7 +459,7 @@ def test_ends_and_words_of_axes() -> None:
     ] and ax.get_xticks().tolist() == [0.0, 1.0, 2.0]
     layout = figure(chart)["layout"]
     assert (layout["xaxis"]["range"], layout["yaxis"]["range"]) == (
-        [0.5, None],
+        [0.5, pytest.approx(2.075)],
         [-1.0, 9.0],
     )
     assert (layout["xaxis"]["tickvals"], layout["xaxis"]["ticktext"]) == (
