@@ -192,20 +192,14 @@ def _solved(run: _Run, plan: Plan[Any]) -> RunResult:
         raise disk
     if result.outcome == FAILED:
         log.error(result.status)
-        failure = (
-            _failure(run.analysis, failed)
-            if failed
-            else ConvergenceError(result.status.removeprefix("failed: "))
+        inputs = failed and all(c.name in run.analysis.input_checks for c in failed)
+        text = "\n".join(["self-check failed", *(c.sentence for c in failed)])
+        failure = (InputError if inputs else ConvergenceError)(
+            text if failed else result.status.removeprefix("failed: ")
         )
         failure.result = result
         raise failure
     return result
-
-
-def _failure(analysis: Analysis, failed: list[Check]) -> UpdError:
-    text = "\n".join(c.sentence for c in failed)
-    kind = InputError if all(c.name in analysis.input_checks for c in failed) else ConvergenceError
-    return kind(f"self-check failed\n{text}")
 
 
 def _collected(
@@ -235,7 +229,8 @@ def _collected(
     if estimates is not None:
         results = with_estimates(results, estimates)
     else:
-        results = _with_estimates(analysis, solution, results, stages)
+        if analysis.estimate is not None and solution.plan.scene.estimates:
+            results = with_estimates(results, analysis.estimate(solution, results, stages))
         results = with_inputs(results, input_parts(analysis, solution, results, stages))
     return RunResult(
         scene=plan.scene.name,
@@ -297,15 +292,6 @@ def _leave(run: _Run, result: RunResult, solution: Any) -> tuple[RunResult, str]
         # The one written first has all but the seconds of the files.
         _write_summary(result, folder)
     return result, ""
-
-
-def _with_estimates(
-    analysis: Analysis, solution: Any, results: tuple[Result, ...], stages: Stages
-) -> tuple[Result, ...]:
-    """The numbers with the parts of their errors, where the scene wants them."""
-    if analysis.estimate is None or not solution.plan.scene.estimates:
-        return results
-    return with_estimates(results, analysis.estimate(solution, results, stages))
 
 
 def _reached(one: Result) -> Result:

@@ -22,7 +22,7 @@ import tomllib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import tomli_w
@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from upd.analyses import analysis_of, make_plan
-from upd.analyses.base import Needs
+from upd.analyses.base import Needs, Plan
 from upd.batch.engine import Workers, check_address, check_numbers, fitting
 from upd.batch.point import Task, load_point
 from upd.batch.store import PointStore
@@ -376,9 +376,9 @@ def plan_sweep(
             f"no point of the {'grid' if drawn is None else 'sample'} can be run. The first: "
             f"{refused[0].failure.removeprefix('InputError: ')}"
         )
-    memory = max((one.memory_bytes for one in needs.values()), default=0.0)
+    memory = max((one.memory_bytes for _, one in needs.values()), default=0.0)
     many, notes = fitting(workers, threads, len(needs), memory)
-    shared = [one.shared for one in needs.values()]
+    shared = [one for one, _ in needs.values()]
     return SweepPlan(
         scene=scene,
         axes=axes,
@@ -386,11 +386,11 @@ def plan_sweep(
         tasks=tasks,
         kept=kept,
         refused=refused,
-        groups={number: one.shared.model for number, one in needs.items()},
+        groups={number: one.model for number, (one, _) in needs.items()},
         meshes=len({one.mesh for one in shared}),
         condensations=len(frozenset().union(*(one.condensations for one in shared))),
         memory_bytes=memory,
-        seconds={number: one.seconds for number, one in needs.items()},
+        seconds={number: one.seconds for number, (_, one) in needs.items()},
         workers=Workers(many, threads, cluster),
         notes=(*notes, *([_FACTORS] if any(one.factors for one in shared) else [])),
         sample=drawn,
@@ -414,19 +414,13 @@ def _drawn(
     return draw_sample(scene, count, store.kept_seed() if seed is None else seed)
 
 
-class PointNeeds(NamedTuple):
-    """What a point shares with others, its memory and its seconds."""
-
-    shared: Needs
-    memory_bytes: float
-    seconds: float
-
-
 def point_needs(
     tasks: Sequence[Task], kept: Collection[int] = ()
-) -> tuple[dict[int, PointNeeds], dict[int, Outcome]]:
-    """What every missing point needs, and the points that the scene does not allow."""
-    needs: dict[int, PointNeeds] = {}
+) -> tuple[dict[int, tuple[Needs, Plan[Any]]], dict[int, Outcome]]:
+    """What every missing point shares with others and its plan, and the points that the scene does
+    not allow.
+    """
+    needs: dict[int, tuple[Needs, Plan[Any]]] = {}
     refused: dict[int, Outcome] = {}
     for number, task in enumerate(tasks):
         if number in kept:
@@ -438,5 +432,5 @@ def point_needs(
         except InputError as error:
             refused[number] = Outcome(failure=" ".join(f"InputError: {error}".split()))
         else:
-            needs[number] = PointNeeds(shared, plan.memory_bytes, plan.seconds)
+            needs[number] = shared, plan
     return needs, refused

@@ -21,8 +21,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from upd.cache.arrays import LIMIT_BYTES, cache_folder
-from upd.cache.shared import Store, sharing
+from upd.cache.arrays import LIMIT_BYTES, Store, cache_folder, sharing
 from upd.cache.sources import key_of, source_digest
 from upd.errors import UpdError
 from upd.linalg.pardiso import load as load_pardiso

@@ -251,7 +251,7 @@ def study_workers(
         return Workers(workers, default if threads is None else threads, cluster, fresh=True)
     each = each if threads is None else threads
     needs, _ = point_needs([point_task(one, scene, each, "") for one in planned.points])
-    largest = max((one.memory_bytes for one in needs.values()), default=0.0)
+    largest = max((one.memory_bytes for _, one in needs.values()), default=0.0)
     many, _ = fitting(workers, each, len(planned.points), largest)
     return Workers(many, each, cluster, fresh=True)
 

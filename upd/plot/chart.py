@@ -154,10 +154,6 @@ class Map:
         Start of the colour scale.
     top
         Its end; the largest value when None.
-    smooth
-        Shaded between the lattice points instead of a cell each.
-    contours
-        Filled contours with dots at the points, crosses where there is no value.
     """
 
     x: Array
@@ -167,8 +163,6 @@ class Map:
     states: tuple[str, ...] = ()
     top: float | None = None
     low: float | None = 0.0
-    smooth: bool = False
-    contours: bool = False
 
 
 @dataclass(frozen=True)

@@ -20,13 +20,12 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator, ScalarFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, ScalarFormatter
 from matplotlib.transforms import ScaledTranslation
 
 from upd.cache.files import whole_file
 from upd.plot.chart import MOST_PANELS, Area, Axis, Band, Chart, Map, Trace
 from upd.plot.style import (
-    CROSS,
     area_colour,
     band_colour,
     colour_of,
@@ -94,6 +93,8 @@ def write_png(figure: Figure, path: Path) -> list[Path]:
 
 #: points of the letters of titles and ticks, and mean width of a letter as a part of them
 _LETTERS, _WIDE = 9.0, 0.56
+#: largest over smallest value up to which an axis has ticks between its decades
+_FEW_DECADES = 1e3
 #: inches a title may reach over its axes on both sides together
 _OVER = 0.45
 #: inches beside, and above and below, a wide map on its panel: labels, title and colour bar
@@ -226,6 +227,11 @@ def _axis(chart: Chart, axis: Axis, name: Literal["x", "y"], ax: Axes) -> None:
     limits = getattr(ax, f"set_{name}lim")
     if is_log(axis, values):
         getattr(ax, f"set_{name}scale")("log", nonpositive="mask")
+        seen = values[values > 0.0]
+        few = seen.max() < _FEW_DECADES * seen.min()
+        which.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
+        which.set_major_formatter("{x:g}")
+        which.set_minor_formatter(NullFormatter())
         ax.grid(visible=True, which="minor", axis=name, color="#eeeeee", lw=0.4)
     elif isinstance(which.get_major_formatter(), ScalarFormatter):
         # Numbers as they are, without an offset in a corner.
@@ -358,8 +364,6 @@ def _draw_maps(chart: Chart, ax: Axes) -> None:
     low, high = colour_range(chart.maps)
     for k, m in enumerate(chart.maps):
         drawn = _states(m, ax) if m.states else _field(m, low, high, ax)
-        if m.contours:
-            _points(m, ax)
         # Axes for a colour bar cost as much as the map: states of a compact map stand in the
         # legend. One value everywhere has no scale.
         if k == 0 and (is_wide(chart) if m.states else low < high):
@@ -379,33 +383,8 @@ def _states(m: Map, ax: Axes) -> Any:
 
 
 def _field(m: Map, low: float, high: float, ax: Axes) -> ScalarMappable:
-    whole = bool(np.isfinite(m.z).all())
-    drawn: Any
-    if m.contours and whole and low < high and min(m.z.shape) > 1:
-        drawn = ax.contourf(m.x, m.y, m.z.T, levels=12, cmap="viridis")
-    else:
-        # Shading between points needs all of them.
-        shading: Any = "gouraud" if m.smooth and whole and min(m.z.shape) > 1 else "nearest"
-        drawn = ax.pcolormesh(
-            m.x,
-            m.y,
-            np.ma.masked_invalid(m.z.T),
-            cmap="viridis",
-            vmin=low,
-            vmax=high,
-            shading=shading,
-        )
-    return drawn  # type: ignore[no-any-return]
-
-
-def _points(m: Map, ax: Axes) -> None:
-    """Dots at the points of a map, crosses where there is no value."""
-    x, y = np.meshgrid(m.x, m.y, indexing="ij")
-    known = np.isfinite(m.z)
-    ax.plot(x[known], y[known], "o", color="white", mec="#333333", mew=0.5, ms=3, clip_on=False)
-    if not known.all():
-        # without points matplotlib's layout makes room for one in the corner of the sheet
-        ax.plot(x[~known], y[~known], "x", color=CROSS, ms=6, clip_on=False)
+    z = np.ma.masked_invalid(m.z.T)
+    return ax.pcolormesh(m.x, m.y, z, cmap="viridis", vmin=low, vmax=high, shading="nearest")
 
 
 def _bar(drawn: Any, chart: Chart, axis: Axis, ax: Axes) -> Any:

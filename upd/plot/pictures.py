@@ -37,12 +37,11 @@ _AMBIENT = 0.65
 _PALE, _PALE_BODY = 0.12, 0.45
 #: gap between bodies drawn apart, as a part of the smaller one's height
 _APART = 0.5
-#: what is shown around a contact, as a part of its size
-_AROUND = 0.25
-#: azimuth and elevation of the viewer in degrees: of modes, of meshes and near a contact
-_VIEW, _MESH_VIEW, _STEEP = (-60.0, 20.0), (-60.0, 22.0), 38.0
-#: width in points and opacity of the lines of the mesh: of whole bodies, and near a contact
-_FAR_LINES, _NEAR_LINES = (0.15, 0.45), (0.35, 0.8)
+#: azimuth and elevation of the viewer in degrees: of modes; of meshes and near a contact
+_VIEW, _AZIMUTH, _LOW, _STEEP = (-60.0, 20.0), -60.0, 22.0, 38.0
+#: width in points and opacity of the lines of a mesh, and what is shown around, as a part of its
+#: size: of whole bodies, and near a contact
+_FAR, _NEAR = (0.15, 0.45, 0.02), (0.35, 0.8, 0.25)
 
 
 # ---------------------------------------------------------------- mode shapes
@@ -108,17 +107,16 @@ def draw_meshes(meshes: Mapping[str, Mesh], title: str = "") -> Figure:
     First all bodies, drawn apart where one lies on others; then the contact faces that look up, and
     those that look down as one sees them from below, each with what lies near them.
     """
-    drawings: list[Drawing] = [partial(_draw_whole, meshes=_apart(meshes), title=title)]
+    draw = partial(_draw_bodies, among=list(meshes))
+    drawings: list[Drawing] = [
+        partial(draw, meshes=_apart(meshes), title=title, elevation=_LOW, near=False)
+    ]
     for up, side in ((True, "from above"), (False, "from below")):
         seen = {name: mesh for name, mesh in meshes.items() if _looks(mesh) == up}
         if seen:
             about = f"contact of {' and '.join(seen)}, {side}"
             elevation = _STEEP if up else -_STEEP
-            drawings.append(
-                partial(
-                    _draw_near, meshes=seen, among=list(meshes), title=about, elevation=elevation
-                )
-            )
+            drawings.append(partial(draw, meshes=seen, title=about, elevation=elevation, near=True))
     return draw_sheet(drawings, 3, size=(5.4, 5.2))
 
 
@@ -156,47 +154,36 @@ def _apart(meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
     }
 
 
-def _draw_whole(ax: Axes, *, meshes: Mapping[str, Mesh], title: str) -> None:
-    """The bodies with a legend."""
-    flat, shown, touched = _draw_sides(ax, meshes, list(meshes), _MESH_VIEW, _FAR_LINES)
-    framed = flat[np.unique(shown)]
-    _frame_axes(ax, framed, 0.02 * float(np.ptp(framed, axis=0).max()), title)
-    handles = [LegendPatch(color=to_hex(_shade(k)), label=name) for k, name in enumerate(meshes)]
-    if touched.any():
-        handles.append(LegendPatch(color=_CONTACT, label="contact faces"))
-    ax.legend(
-        handles=handles, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=4, frameon=False
-    )
-
-
-def _draw_near(
-    ax: Axes, *, meshes: Mapping[str, Mesh], among: Sequence[str], title: str, elevation: float
-) -> None:
-    """Of the bodies, ``among`` others, what lies near their contact."""
-    view = (_MESH_VIEW[0], elevation)
-    flat, shown, touched = _draw_sides(ax, meshes, among, view, _NEAR_LINES)
-    framed = flat[np.unique(shown[touched])]
-    _frame_axes(ax, framed, _AROUND * float(np.ptp(framed, axis=0).max()), title)
-
-
-def _draw_sides(
+def _draw_bodies(
     ax: Axes,
+    *,
     meshes: Mapping[str, Mesh],
     among: Sequence[str],
-    view: tuple[float, float],
-    lines: tuple[float, float],
-) -> tuple[FloatArray, IntArray, NDArray[np.bool_]]:
-    """Draw the bodies; points (n, 2) on the axes, sides (m, 4), and which of them touch (m,)."""
-    axes = _view_axes(*view)
+    title: str,
+    elevation: float,
+    near: bool,
+) -> None:
+    """Bodies, ``among`` others: with a legend, or what lies near their contact."""
+    axes = _view_axes(_AZIMUTH, elevation)
     points, sides, body = _together(meshes)
     nodes = np.concatenate([_touching(mesh) for mesh in meshes.values()])
     touched: NDArray[np.bool_] = np.all(nodes[sides], axis=1)
     shades = np.array([_shade(among.index(name)) for name in meshes])
     colours = np.where(touched[:, None], to_rgb(_CONTACT), shades[body])
     surface = _shaded_sides(points, sides, colours, axes)
-    surface.set(linewidths=lines[0], edgecolors=(0.1, 0.1, 0.1, lines[1]))
+    line, opacity, around = _NEAR if near else _FAR
+    surface.set(linewidths=line, edgecolors=(0.1, 0.1, 0.1, opacity))
     ax.add_collection(surface)
-    return points @ axes[:2].T, sides, touched
+    framed = (points @ axes[:2].T)[np.unique(sides[touched] if near else sides)]
+    _frame_axes(ax, framed, around * float(np.ptp(framed, axis=0).max()), title)
+    if near:
+        return
+    handles = [LegendPatch(color=to_hex(_shade(k)), label=name) for k, name in enumerate(meshes)]
+    if touched.any():
+        handles.append(LegendPatch(color=_CONTACT, label="contact faces"))
+    ax.legend(
+        handles=handles, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=4, frameon=False
+    )
 
 
 def _shade(k: int) -> tuple[float, float, float]:

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from upd.plot.chart import Area, Array, Axis, Band, Chart, Map, Mark, Scatter, Trace
 from upd.plot.style import (
-    CROSS,
     area_colour,
     band_colour,
     colour_of,
@@ -47,6 +46,8 @@ _GRID = "#e6e6e6"
 _LINE = 42
 #: width over height of a chart
 _WIDE = 1.5
+#: part of an axis beyond the data, as plotly leaves it
+_AIR = 0.05
 
 
 def figure(chart: Chart) -> dict[str, Any]:
@@ -106,7 +107,7 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
         # The last word may reach beyond the axis.
         out |= at | {"ticklabeloverflow": "allow"}
     if axis.low is not None or axis.high is not None:
-        out["range"] = _range(axis, log)
+        out["range"] = _range(axis, values, log)
     return out | {
         "linecolor": "#999999",
         "ticks": "outside",
@@ -117,12 +118,20 @@ def _axis(chart: Chart, axis: Axis, values: Array, letters: int = 1000) -> dict[
     }
 
 
-def _range(axis: Axis, log: bool) -> list[float | None]:
-    """Ends of an axis as plotly takes them: logarithms on a logarithmic one, None at the data."""
-    return [
+def _range(axis: Axis, values: Array, log: bool) -> list[float]:
+    """Ends of an axis as plotly takes them: logarithms on a logarithmic one.
+
+    Those of the data with some air where none is given, for plotly does not keep one that is alone.
+    """
+    seen = np.log10(values[values > 0.0]) if log else values
+    given = [
         None if end is None or (log and end <= 0.0) else math.log10(end) if log else end
         for end in (axis.low, axis.high)
     ]
+    data = (float(seen.min()), float(seen.max())) if seen.size else (0.0, 1.0)
+    low, high = (d if end is None else end for end, d in zip(given, data, strict=True))
+    air = _AIR * (high - low)
+    return [low - air * (given[0] is None), high + air * (given[1] is None)]
 
 
 def pack(values: NDArray[Any]) -> dict[str, str]:
@@ -171,7 +180,6 @@ def _traces(chart: Chart) -> Iterator[dict[str, Any]]:
     low, high = colour_range(chart.maps)
     for k, m in enumerate(chart.maps):
         yield _map(chart, m, low, high) | {"showscale": k == 0 and (bool(m.states) or low < high)}
-        yield from _points(m) if m.contours else ()
     for area in chart.areas:
         yield from _area(chart, area)
     for trace in chart.traces:
@@ -306,7 +314,7 @@ def _coloured(chart: Chart, s: Scatter, *, first: bool) -> dict[str, Any]:
 
 
 def _map(chart: Chart, m: Map, low: float, high: float) -> dict[str, Any]:
-    """Cells, a shaded field, filled contours, or states."""
+    """A cell for every value."""
     out: dict[str, Any] = {"type": "heatmap", "name": "", "hoverongaps": False}
     out |= {"x": _numbers(m.x), "y": _numbers(m.y), "z": _numbers(m.z.T)}
     if m.states:
@@ -314,25 +322,7 @@ def _map(chart: Chart, m: Map, low: float, high: float) -> dict[str, Any]:
     scale = _scale(m.value, low, high)
     out |= {"zmin": scale.pop("cmin"), "zmax": scale.pop("cmax"), **scale}
     out["hovertemplate"] = _hover(chart, _value(m.value, "z"))
-    whole = bool(np.isfinite(m.z).all()) and min(m.z.shape) > 1
-    if not (m.contours and whole and low < high):
-        return out | ({"zsmooth": "best"} if m.smooth and whole else {})
-    look = {"contours": {"coloring": "fill"}, "line": {"width": 0, "smoothing": 0}}
-    return out | look | {"type": "contour", "ncontours": 12}
-
-
-def _points(m: Map) -> Iterator[dict[str, Any]]:
-    """Dots at the points of a map, crosses where there is no value."""
-    x, y = np.meshgrid(m.x, m.y, indexing="ij")
-    known = np.isfinite(m.z)
-    dot = {"size": 5, "color": "#ffffff", "line": {"color": "#333333", "width": 0.7}}
-    cross = {"symbol": "x-thin", "size": 8, "color": CROSS, "line": {"color": CROSS, "width": 2}}
-    # Over a dot the map gives its value; over a cross there is none.
-    looks = ((known, dot, {"hoverinfo": "skip"}), (~known, cross, {"hovertemplate": "no value"}))
-    for where, marker, hover in looks:
-        if where.any():
-            more = {"marker": marker, "cliponaxis": False, **hover}
-            yield _scatter(x[where], y[where], "markers", **more)
+    return out
 
 
 def _states(chart: Chart, m: Map) -> dict[str, Any]:

@@ -20,7 +20,7 @@ COLOURS = ("#1f5fa8", "#c1561a", "#2a8a68", "#a24b8f", "#6b6b6b", "#b38600", "#3
 STATE_COLOURS = ("#f4f4f4", "#f0a35e", "#2b6cb0", "#8cc3a8", "#c9a0bd", "#c0695f")
 #: shares of a cycle by state; lift-off is darker than an open point, which lies on white
 SHARE_COLOURS = {"stick": "#2b6cb0", "slip": "#f0a35e", "lift-off": "#b9b9b9", "open": "#f4f4f4"}
-OUTLINE, CLOSED, CROSS = "#222222", "#555555", "#c0392b"
+OUTLINE, CLOSED = "#222222", "#555555"
 MEASURED, LIMIT = "#d98200", "#333333"
 #: width over height from which the colour bar of a map lies below it
 _WIDE_MAP = 1.6

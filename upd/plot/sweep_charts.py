@@ -131,7 +131,7 @@ def sweep_charts(parameters: Sequence[Parameter], numbers: Sequence[Column]) -> 
     -------
     list of Chart
         What varies first. Over one parameter a curve each, over more a curve for each combination
-        of the others, the first 24; over two with numbers a filled map before it. Parameters with
+        of the others, the first 24; over two with numbers a map before it. Parameters with
         one value are no dimension; no charts when nothing varies. A number without any value is
         left out.
     """
@@ -202,15 +202,13 @@ def _curves(
 
 
 def _map(x: Parameter, y: Parameter, number: Column, values: Array) -> Chart:
-    """Filled map over two parameters: values (n_x, n_y)."""
+    """Map over two parameters: values (n_x, n_y)."""
     X, Y = np.array(x.numbers, float), np.array(y.numbers, float)
     i, j = np.argsort(X, kind="stable"), np.argsort(Y, kind="stable")
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     same = high - low <= _SAME * max(abs(low), abs(high))
     scale = Axis(number_label(number.name), unit_label(number.unit))
-    m = Map(
-        X[i], Y[j], values[np.ix_(i, j)], scale, low=low, top=low if same else high, contours=True
-    )
+    m = Map(X[i], Y[j], values[np.ix_(i, j)], scale, low=low, top=low if same else high)
     chart = _chart(number, _abscissa(x), _abscissa(y), maps=(m,))
     if not same:
         return chart

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.cache.arrays import load_arrays, save_arrays, trim, unreadable
+from upd.cache.arrays import Store, load_arrays, save_arrays, trim, unreadable
 from upd.cache.files import locked
-from upd.cache.shared import Store
 from upd.reduction.guyan import Condensed
 
 

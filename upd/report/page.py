@@ -307,26 +307,17 @@ def png_size(png: bytes) -> tuple[int, int]:
 
 
 def image_uri(png: bytes) -> str:
-    """A PNG as the data URI of a picture with a palette of 256 colours.
-
-    WebP without loss: a fifth of the bytes, as good for a figure.
-    """
+    """A PNG as the data URI of a picture that a page holds: WebP, a third of the bytes."""
     from PIL import Image
 
     out = io.BytesIO()
     try:
         with Image.open(io.BytesIO(png)) as image:
-            flat = Image.new("RGB", image.size, "white")
-            flat.paste(image, mask=image.getchannel("A") if image.mode == "RGBA" else None)
+            image.thumbnail((_WIDTH, image.height))
+            image.save(out, "WEBP", quality=80)
     except (OSError, SyntaxError):
         # Damaged: the browser shows what there is of it.
         return _uri("png", png)
-    if flat.width > _WIDTH:
-        size = _WIDTH, round(flat.height * _WIDTH / flat.width)
-        flat = flat.resize(size, Image.Resampling.LANCZOS)
-    # An octree: a fifth of the time of cuts at medians, and smaller.
-    few = flat.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
-    few.convert("RGB").save(out, "WEBP", lossless=True)
     return _uri("webp", out.getvalue())
 
 

@@ -37,14 +37,14 @@ _FEW = 8
 
 
 @dataclass
-class _Followed:
+class _SweepFollowed:
     name: str
     case: str
     unit: str
 
 
 @dataclass
-class _Point:
+class _SweepPoint:
     values: list[float | None]
     status: str
     reason: str
@@ -53,14 +53,14 @@ class _Point:
 
 
 @dataclass
-class _Cost:
+class _SweepCost:
     this_call_s: float | None = None
     peak_rss_mb: float | None = None
     stages_s: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass
-class _Sample:
+class _SweepSample:
     seed: int
     inputs: dict[str, str]
     numbers: list[SampledNumber]
@@ -73,12 +73,12 @@ class SweepFolder:
     scene: str
     title: str
     axes: list[Parameter]
-    followed: list[_Followed]
+    followed: list[_SweepFollowed]
     plan: dict[str, Any]
-    cost: _Cost
-    points: list[_Point]
+    cost: _SweepCost
+    points: list[_SweepPoint]
     text: str
-    sample: _Sample | None = None
+    sample: _SweepSample | None = None
     versions: dict[str, str] = field(default_factory=dict)
     path: Path = Path()
 
@@ -206,7 +206,7 @@ def sweep_panels(sweep: SweepFolder) -> list[Panel]:
     return [replace(panel, heading=over) for panel in panels]
 
 
-def verdict(points: Sequence[_Point]) -> Verdict:
+def verdict(points: Sequence[_SweepPoint]) -> Verdict:
     """How the points ended."""
     failed = sum(p.status != "ok" for p in points)
     warned = sum(bool(p.warnings) for p in points)

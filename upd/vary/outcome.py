@@ -36,7 +36,7 @@ class Outcome:
     warnings
         Names of the self-checks that did not pass.
     shared
-        What was taken from where, see `upd.cache.shared.Store`.
+        What was taken from where, see `upd.cache.arrays.Store`.
     where
         "host:process".
     """

@@ -21,7 +21,7 @@ from upd.batch.point import Task, solve_task
 from upd.batch.store import PointStore
 from upd.batch.sweeps import draw, sweep
 from upd.batch.table import csv_text, make_columns, reasons
-from upd.cache.shared import Store, active
+from upd.cache.arrays import Store, active
 from upd.cli import main
 from upd.errors import InputError
 from upd.reduction.stored import stored_condensation

@@ -215,9 +215,7 @@ def test_two_parameters_with_numbers_give_a_map_and_curves(tmp_path: Path) -> No
     )
     over, curves = sweep_charts(made.axes, made.columns)
     (m,) = over.maps
-    assert (
-        over.sheet and m.contours and m.x.tolist() == [0.1, 0.2, 0.3] and m.y.tolist() == [2.0, 4.0]
-    )
+    assert over.sheet and m.x.tolist() == [0.1, 0.2, 0.3] and m.y.tolist() == [2.0, 4.0]
     # Points 0..5, the load fastest; the friction 0.2 with 2 N failed.
     np.testing.assert_array_equal(m.z, [[3.0, 2.0], [np.nan, 4.0], [1.0, 0.0]])
     assert not curves.sheet, "the sheet has the map, the page both"
@@ -279,7 +277,7 @@ def test_reasons_are_told_once_with_their_points(tmp_path: Path) -> None:
 )
 def test_verdict(failed: int, warned: int, kind: str) -> None:
     points = [
-        sweep_page._Point([], "failed" if k < failed else "ok", "", ["w"] * (k < warned), 1.0)
+        sweep_page._SweepPoint([], "failed" if k < failed else "ok", "", ["w"] * (k < warned), 1.0)
         for k in range(3)
     ]
     assert verdict(points).kind == kind

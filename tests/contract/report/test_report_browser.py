@@ -457,7 +457,7 @@ def test_a_title_stays_text(seen: dict[str, Any]) -> None:
 
 def test_figures_remain_without_script(seen: dict[str, Any]) -> None:
     still = seen["still"]
-    assert len(still["images"]) == 9
+    assert len(still["images"]) == 8
     assert all(
         image["natural"] > 400 and image["width"] > 0.75 * PHONE for image in still["images"]
     )

@@ -25,7 +25,7 @@ from upd.analyses.contact.plan import (
     require_contact_sets,
 )
 from upd.analyses.contact.solution import ContactSolution, NormalCase
-from upd.cache.shared import active
+from upd.cache.arrays import active
 from upd.cache.sources import key_of, source_digest
 from upd.contact import bulk
 from upd.contact.model import Body, ContactModel, free_dofs, make_contact_model
