@@ -35,14 +35,18 @@ from upd.vary.wanted import Wanted, solve_wanted
 
 Array = NDArray[np.float64]
 _NORMAL = ("K_N_tangent_raw",), ("approach",)
-_SHEAR = ("K_T_initial_raw", "K_Tx_initial_raw", "K_Ty_initial_raw", "K_T_secant_raw")
-_AREAS = ("contact_area", "stick_area", "approach", "cycle_energy")
-#: effect -> numbers that show what it changes: the first row of which a run has some
+_SHEAR = ("K_T_initial_raw", "K_Tx_initial_raw", "K_Ty_initial_raw")
+_AREAS = ("contact_area", "stick_area")
+#: effect -> numbers that show what it changes: the first row of which a run has some; coupling also
+#: changes areas
 _SHOWN: Mapping[str, tuple[tuple[str, ...], ...]] = {
     planned.TILT: _NORMAL,
     planned.LARGE: _NORMAL,
-    planned.COUPLING: ((*_NORMAL[0], *_SHEAR, *_AREAS),),
-    planned.DIRECTIONS: ((*_SHEAR, "cycle_energy"), ("K_T_tangent_raw",)),
+    planned.COUPLING: (
+        (*_NORMAL[0], *_SHEAR),
+        ("approach", "K_T_secant_raw", "cycle_energy"),
+    ),
+    planned.DIRECTIONS: ((*_SHEAR, "K_T_secant_raw", "cycle_energy"), ("K_T_tangent_raw",)),
 }
 _SWITCHES: Mapping[str, tuple[str, object]] = {
     planned.TILT: ("contact.tilt", "free"),
@@ -98,8 +102,10 @@ def _changes(
     """
     areas = {r.case.load: r.value for r in without if r.name == q.CONTACT_AREA.name}
     known = [r for r in without if (r.name, r.case) in included or not included]
-    rows = ([r for r in known if r.name in names] for names in _SHOWN[effect])
-    for r in next(filter(None, rows), ()):
+    had = {r.name for r in known}
+    names = next((row for row in _SHOWN[effect] if had.intersection(row)), ())
+    names += _AREAS if effect == planned.COUPLING else ()
+    for r in (one for one in known if one.name in names):
         none = 0.0 if remedy and r.unit == "N/mm" else float("nan")
         value, area = included.get((r.name, r.case), none), areas.get(r.case.load, 0.0)
         over = (area, q.STICK_AREA.part_of) if r.name == q.STICK_AREA.name and area else None
