@@ -62,7 +62,7 @@ def test_estimate_of_two_levels_is_three_times_first_order() -> None:
     coarse = limit + 0.017 * np.sqrt(2.0)
     found = estimate_error([np.sqrt(2.0), 1.0], [coarse, fine])
     assert found.error == pytest.approx(3.0 * 0.017 / fine, rel=1e-9)
-    assert not found.clear
+    assert np.isnan(found.order)
 
 
 def test_scatter_is_no_clear_order_and_counts_in_full() -> None:

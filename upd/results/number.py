@@ -18,8 +18,7 @@ class ErrorPart:
     ----------
     source
         Where the error comes from, in the field's words: "mesh", "contact points", "modes kept",
-        "harmonics", "samples", "steps", "continuation", "contact nodes", "load steps", "contact
-        solver".
+        "harmonics", "samples", "load steps".
     error
         Estimated bound of it, relative to the number; NaN where it was not found.
     basis

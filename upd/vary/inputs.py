@@ -25,7 +25,7 @@ from upd.results import InputPart, InputParts, Result
 from upd.scene import load_scene
 from upd.scene.quantities import Uncertainty
 from upd.scene.toml import put_back
-from upd.vary.solve import changed
+from upd.vary.solve import changed, refinement
 from upd.vary.variation import ALONE, Key, Overrides
 
 log = logging.getLogger(__name__)
@@ -131,12 +131,10 @@ def coarsened_rig(plan: Any, wanted: tuple[str, ...], *more: tuple[str, Any]) ->
     *more
         Overrides.
     """
-    refine, want = plan.parameters.get("refine"), plan.scene.want
-    kept = tuple(w for w in want if w in wanted) or want
-    alone = (("want", kept), *ALONE, *more)
-    if isinstance(refine, float) and _COARSER * refine >= _LEAST:
-        return (("geometry.refine", _COARSER * refine), *alone)
-    return alone
+    want = plan.scene.want
+    alone = (("want", tuple(w for w in want if w in wanted) or want), *ALONE, *more)
+    coarse = _COARSER * (refinement(plan.scene) or 0.0)
+    return (("geometry.refine", coarse), *alone) if coarse >= _LEAST else alone
 
 
 def _solved_at_ends(

@@ -141,11 +141,6 @@ class ErrorEstimate:
     basis: str
     falls: float = ASSUMED
 
-    @property
-    def clear(self) -> bool:
-        """Whether the levels show an order."""
-        return bool(np.isfinite(self.order))
-
 
 def estimate_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
     """Bound the error of the finest of several levels by their differences.

@@ -20,7 +20,6 @@ from upd.analyses.contact.bodies import prepare
 from upd.analyses.contact.loading import LOAD_STEP
 from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan
 from upd.analyses.contact.results import make_results
-from upd.analyses.contact.scene_plan import make_plan
 from upd.analyses.contact.solution import ContactSolution
 from upd.analyses.contact.solve import press, solve_plan
 from upd.contact.checks import few_threads
@@ -31,19 +30,23 @@ from upd.results import Case, Result
 from upd.results import quantities as q
 from upd.scene import Scene
 from upd.vary.solve import changed
-from upd.vary.variation import Key, Overrides
+from upd.vary.variation import Key
 from upd.vary.wanted import Wanted, solve_wanted
 
 Array = NDArray[np.float64]
 _NORMAL = ("K_N_tangent_raw",), ("approach",)
-_SHEAR = ("K_T_initial_raw", "K_Tx_initial_raw", "K_Ty_initial_raw", "K_T_secant_raw")
-_AREAS = ("contact_area", "stick_area", "approach", "cycle_energy")
-#: effect -> numbers that show what it changes: the first row of which a run has some
+_SHEAR = ("K_T_initial_raw", "K_Tx_initial_raw", "K_Ty_initial_raw")
+_AREAS = ("contact_area", "stick_area")
+#: effect -> numbers that show what it changes: the first row of which a run has some; coupling also
+#: changes areas
 _SHOWN: Mapping[str, tuple[tuple[str, ...], ...]] = {
     planned.TILT: _NORMAL,
     planned.LARGE: _NORMAL,
-    planned.COUPLING: ((*_NORMAL[0], *_SHEAR, *_AREAS),),
-    planned.DIRECTIONS: ((*_SHEAR, "cycle_energy"), ("K_T_tangent_raw",)),
+    planned.COUPLING: (
+        (*_NORMAL[0], *_SHEAR),
+        ("approach", "K_T_secant_raw", "cycle_energy"),
+    ),
+    planned.DIRECTIONS: ((*_SHEAR, "K_T_secant_raw", "cycle_energy"), ("K_T_tangent_raw",)),
 }
 _SWITCHES: Mapping[str, tuple[str, object]] = {
     planned.TILT: ("contact.tilt", "free"),
@@ -74,7 +77,7 @@ def solve(wanted: Wanted, plan: ContactPlan, stages: Stages) -> ContactSolution:
 def _left_out(solution: ContactSolution, companion: ContactPlan) -> Iterator[Resolved]:
     """Every number that shows what an effect left out changes."""
     without, model = _under_load(make_results(solution)), None
-    plan = make_plan(_smaller(solution.plan.scene, companion.scene))
+    plan = replace(companion, scene=_smaller(companion.scene))
     with suppress(UpdError):
         model = prepare(companion, Stages(), "companion")
         without = _numbers(plan, model)
@@ -99,24 +102,25 @@ def _changes(
     """
     areas = {r.case.load: r.value for r in without if r.name == q.CONTACT_AREA.name}
     known = [r for r in without if (r.name, r.case) in included or not included]
-    rows = ([r for r in known if r.name in names] for names in _SHOWN[effect])
-    for r in next(filter(None, rows), ()):
+    had = {r.name for r in known}
+    names = next((row for row in _SHOWN[effect] if had.intersection(row)), ())
+    names += _AREAS if effect == planned.COUPLING else ()
+    for r in (one for one in known if one.name in names):
         none = 0.0 if remedy and r.unit == "N/mm" else float("nan")
         value, area = included.get((r.name, r.case), none), areas.get(r.case.load, 0.0)
         over = (area, q.STICK_AREA.part_of) if r.name == q.STICK_AREA.name and area else None
         yield Resolved(effect, r.name, r.case, r.value, value, r.unit, remedy, over=over)
 
 
-def _smaller(scene: Scene, coarse: Scene) -> Scene:
-    """The companion's scene with the effects as the run has them, and what changes are looked for
-    in: sheared as far as the run is, and through a cycle where nothing else is sheared.
+def _smaller(scene: Scene) -> Scene:
+    """The scene with what changes are looked for in: sheared as far as the run is, and through a
+    cycle where nothing else is sheared.
     """
     ratio = planned.largest_ratio(scene)
     want = [w for w in ("stiffness", "tangential") if scene.wants(w)]
     if scene.wants("cycle") and not scene.wants("stiffness") and not ratio > 0.0:
         want.append("cycle")
-    loads = replace(coarse.loads, tangential=(ratio,))
-    return replace(coarse, want=tuple(want), contact=scene.contact, loads=loads)
+    return replace(scene, want=tuple(want), loads=replace(scene.loads, tangential=(ratio,)))
 
 
 def _under_load(found: Sequence[Result]) -> list[Result]:
@@ -126,10 +130,9 @@ def _under_load(found: Sequence[Result]) -> list[Result]:
 
 def _numbers(plan: ContactPlan, model: ContactModel, *switch: tuple[str, object]) -> list[Result]:
     """Of the companion, with an effect switched on."""
-    switched: Overrides = switch
+    switched = replace(plan, scene=changed(plan.scene, switch))
     with few_threads(model.gap):
-        chosen = make_plan(changed(plan.scene, switched)) if switched else plan
-        return _under_load(make_results(solve_plan(chosen, Stages(), model, companion=True)))
+        return _under_load(make_results(solve_plan(switched, Stages(), model, companion=True)))
 
 
 def _with(effect: str, plan: ContactPlan, model: ContactModel) -> list[Result]:

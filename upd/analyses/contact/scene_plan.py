@@ -19,7 +19,7 @@ from upd.linalg.routes import EACH, FIRST
 from upd.mesh import recipes
 from upd.scene import Scene, friction_on
 from upd.vary.solve import changed
-from upd.vary.variation import ALONE, Overrides
+from upd.vary.variation import ALONE
 
 
 def make_plan(scene: Scene) -> ContactPlan:
@@ -232,16 +232,19 @@ def _with_companion(plan: ContactPlan) -> ContactPlan:
     """
     if not plan.shown:
         return plan
-    scene, whole = plan.scene, (*ALONE, ("mesh.symmetry", "full"), ("solver.route", "auto"))
-    # all three directions at once
-    contact = replace(scene.contact, coupling="coupled", friction=scene.contact.friction or 1.0)
-    want = tuple(w for w in scene.want if w not in ("fields", "curve", "body_compression"))
-    smaller = replace(changed(scene, whole), contact=contact, want=want)
+    off = ("load curve", "internal displacement")
+    effects = [replace(e, on=e.on and e.name not in off) for e in plan.effects]
+    # It goes through a cycle only where nothing else is sheared.
+    sheared = plan.scene.wants("stiffness", "tangential")
+    want = tuple(w for w in plan.scene.want if w != "cycle" or not sheared)
+    # What couples the directions is looked up in the whole compliance.
+    scene = changed(plan.scene, (("want", want), ("solver.route", "condensed"), *ALONE))
+    whole, family = planned.recipe_parameters(scene, "full"), (Family(planned.COMPONENTS),)
     try:
-        companion = make_plan(changed(smaller, _coarse(plan)))
+        companion = contact_plan(scene, "full", family, effects, whole | _coarse(plan))
     except UpdError:
         # A recipe of the user's own that cannot be coarser.
-        companion = make_plan(smaller)
+        companion = contact_plan(scene, "full", family, effects, whole)
     return replace(
         plan,
         companion=companion,
@@ -251,12 +254,12 @@ def _with_companion(plan: ContactPlan) -> ContactPlan:
     )
 
 
-def _coarse(plan: ContactPlan) -> Overrides:
+def _coarse(plan: ContactPlan) -> dict[str, int]:
     """Half the elements along each edge of the contact, not fewer than it takes."""
     fewest = _FEWEST[NODES[plan.scene.mesh.element]]
     counts = {name: plan.parameters.get(name) for name in _DIVISIONS}
-    return tuple(
-        (f"geometry.{name}", max(fewest, 2 * (n // 4)))
+    return {
+        name: max(fewest, 2 * (n // 4))
         for name, n in counts.items()
         if isinstance(n, int) and n > fewest
-    )
+    }
