@@ -143,7 +143,7 @@ def test_the_second_harmonic_is_the_first_of_twice_the_frequency() -> None:
         grid = np.linspace(380.0, 480.0, 101) / k
         (peak,) = linear_peaks(found.balance, model.row("right"), STUCK, grid, True)
         (told,) = tell_stuck_peaks(model, [peak], 480.0)
-        damper = measures.damper_amplitude(found, model)[1]
+        damper = measures.damper_motion(found, model)[1][1]
         tops.append([k * peak.frequency, peak.height, told.mac, *damper[[0, 4]]])
     assert tops[1] == pytest.approx(tops[0], rel=1e-6)
 

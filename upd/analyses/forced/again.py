@@ -77,11 +77,6 @@ class RunCurve(NamedTuple):
     tops: Mapping[tuple[Side, int], Top]
     checked: Sequence[TimeCheck] = ()
 
-    @property
-    def ratio(self) -> float:
-        """F_C/F_E."""
-        return float(self.case.force_ratio or 0.0)
-
 
 def run_curve(curve: PointCurve) -> RunCurve:
     """The curve without its path."""
@@ -328,23 +323,6 @@ def _free(linear: LinearCurves) -> float:
 
 
 RECIPE = "blade_rig"
-#: off the contact, see `geometry.blade_rig_params`
-OFF_CONTACT = (
-    "across",
-    "base_columns",
-    "base_side",
-    "base_layers",
-    "shank_layers",
-    "platform_layers",
-    "core_layers",
-    "core_upper",
-    "wing_columns",
-)
-#: arrangement -> counts up its faces, and the count along the damper
-FACES: Mapping[str, tuple[tuple[str, ...], str]] = {
-    "symmetric": (("patch_along_slope",), "patch_along_y"),
-    "asymmetric": (("pad_along_slope", "face_along_z"), "pad_along_y"),
-}
 #: elements of the coarsest graded mesh for those of the recipe's defaults: from every re-entrant
 #: edge on as many, which shank, core and platform have on both sides; few along the damper and many
 #: up the slope, where free and stuck frequencies gain the least and the most for their dofs
@@ -364,6 +342,10 @@ GRADED: Mapping[str, int] = {
     "pad_along_y": 4,
     "face_along_z": 4,
 }
+#: begin counts on the contact
+_ON_CONTACT = {"symmetric": ("patch",), "asymmetric": ("pad", "face")}
+#: off the contact, see `geometry.blade_rig_params`
+OFF_CONTACT = tuple(key for key in GRADED if not key.startswith(("patch", "pad", "face")))
 #: ratio of neighbouring sizes in the coarsest graded mesh, and its elements beside a re-entrant
 #: edge outside and inside of shank, core and platform
 _GROWTH, _OUTSIDE, _INSIDE = 2.0, 4, 2
@@ -487,8 +469,8 @@ def meshed(scene: ForcedScene) -> tuple[str, ...]:
     """Counts that its mesh is refined by: on the contact too, where the contact points are none of
     its nodes.
     """
-    slopes, along = FACES[scene.arrangement]
-    return (*OFF_CONTACT, *((*slopes, along) if scene.contact.rule == GAUSS else ()))
+    on = _ON_CONTACT[scene.arrangement] if scene.contact.rule == GAUSS else ()
+    return (*OFF_CONTACT, *(key for key in GRADED if on and key.startswith(on)))
 
 
 def graded(scene: ForcedScene, factor: float) -> dict[str, Any]:

@@ -77,10 +77,6 @@ class ChartedCurve:
         """Whether a contact point slips or lifts off anywhere on it."""
         return bool(self.data("state")[..., STICK_SHARE].min() < 1.0)
 
-    def sheet(self, figure: str, title: str, axes: Axes, **parts: Any) -> Chart:
-        """A chart of the curve on a sheet of the run folder."""
-        return _sheet(figure, title, axes, **({"case": self.case.label} | parts))
-
 
 @dataclass(frozen=True)
 class ChartedPeak:
@@ -96,11 +92,6 @@ class ChartedPeak:
         """The curve's, at the peak."""
         given = self.curve.case.given() | {"peak": self.number, "mode": self.mode}
         return replace(Case(**given), choice="")
-
-    def sheet(self, figure: str, title: str, axes: Axes, **parts: Any) -> Chart:
-        """A chart of the peak on a sheet of the run folder."""
-        given = {"case": self.case.label, "detail": self.detail} | parts
-        return _sheet(figure, title, axes, **given)
 
     def moves(self, points: Group, side: int) -> bool:
         """Whether a contact point of a face slips or lifts off."""
@@ -152,7 +143,7 @@ def shares_chart(curve: ChartedCurve, k: int) -> Chart:
     )
     axes = axis, Axis("share of the cycle", "%", low=0.0, high=100.0)
     case = f"{curve.case}, {SIDES[k]} face"
-    return curve.sheet("contact_state", "Contact state", axes, areas=areas, case=case)
+    return _sheet("contact_state", "Contact state", axes, areas=areas, case=case)
 
 
 def contact_map(at: ChartedPeak, points: Group, k: int) -> Chart:
@@ -168,7 +159,8 @@ def contact_map(at: ChartedPeak, points: Group, k: int) -> Chart:
     pies = Pies(y, up, at.curve.data("state")[at.index][on], size, SHARES, "friction loss")
     axes = (Axis("along the damper y", "mm"), Axis("up the slope", "mm"))
     case = f"{at.case}, {SIDES[k]} face"
-    return at.sheet("contact_map", "Contact points at the peak", axes, pies=(pies,), case=case)
+    given = {"pies": (pies,), "case": case, "detail": at.detail}
+    return _sheet("contact_map", "Contact points at the peak", axes, **given)
 
 
 def loops_chart(at: ChartedPeak) -> Chart:
@@ -186,7 +178,8 @@ def loops_chart(at: ChartedPeak) -> Chart:
         )
         traces.append(Trace(label, UM * d, T, "line", len(traces)))
     axes = (Axis("sliding displacement", "µm"), Axis("friction force", "N"))
-    return at.sheet("hysteresis", "Hysteresis", axes, traces=tuple(traces))
+    given = {"traces": tuple(traces), "case": at.case.label, "detail": at.detail}
+    return _sheet("hysteresis", "Hysteresis", axes, **given)
 
 
 def loss_chart(curves: Sequence[ChartedCurve]) -> Chart:
@@ -204,7 +197,8 @@ def motion_chart(curve: ChartedCurve, kind: int) -> Chart:
     amplitude = scale * curve.data("damper_amplitude")[:, first : first + 3].T
     axes = HZ_AXIS, Axis(f"{name}, first harmonic", unit)
     traces = _motions(kind, curve.frequency, amplitude, amplitude.max(axis=1))
-    return curve.sheet("damper_motion", f"Damper motion: {name}", axes, traces=traces)
+    title, case = f"Damper motion: {name}", curve.case.label
+    return _sheet("damper_motion", title, axes, traces=traces, case=case)
 
 
 def turn_chart(at: ChartedPeak, kind: int) -> Chart:
@@ -216,7 +210,8 @@ def turn_chart(at: ChartedPeak, kind: int) -> Chart:
     axes = Axis("time in periods", low=0.0, high=1.0), Axis(f"{name} about its mean", unit)
     traces = _motions(kind, turn, motion, np.abs(motion).max(axis=1))
     title = f"Damper motion over a period: {name}"
-    return at.sheet("damper_period", title, axes, traces=traces)
+    given = {"traces": traces, "case": at.case.label, "detail": at.detail}
+    return _sheet("damper_period", title, axes, **given)
 
 
 def _motions(kind: int, x: Array, values: Array, size: Array) -> tuple[Trace, ...]:

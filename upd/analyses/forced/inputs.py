@@ -98,7 +98,7 @@ def few_harmonics(run: Run) -> Run | None:
     """The right blade's peaks of the curve with the lowest F_C/F_E, with few harmonics; None
     without peaks.
     """
-    curve = min(run.curves, key=lambda one: one.ratio, default=None)
+    curve = min(run.curves, key=lambda one: one.case.force_ratio or 0.0, default=None)
     if curve is None:
         return None
     plan, model = run.plan, run.model
