@@ -233,16 +233,12 @@ def performance_charts(arrays: Arrays) -> list[Chart]:
 
 
 def _chart(group: Group) -> Chart:
-    ratio = np.asarray(group["ratio"].data, float)
-    traces = [
-        Trace(
-            "highest of all", ratio, np.asarray(group["highest_accelerance"].data, float), "line", 0
-        )
-    ]
+    ratio = group["ratio"].data
+    traces = [Trace("highest of all", ratio, group["highest_accelerance"].data, "line", 0)]
     names = [key for key in group if key.startswith("peak_") and key.endswith("_right")]
     for name in sorted(key for key in names if "accelerance" in key):
         mode = str(group[name].attributes.get("mode", ""))
-        height, colour = np.asarray(group[name].data, float), len(traces)
+        height, colour = group[name].data, len(traces)
         found = np.isfinite(height)
         if found.sum() > 1 and len(traces) < _MOST:
             label = f"right blade, {mode}"
@@ -271,18 +267,10 @@ def mode_charts(arrays: Arrays) -> Iterator[Chart]:
             ("damping", Axis("damping ratio", "%"), 100.0),
             ("frequency", HZ_AXIS, 1.0),
         ):
-            traces = tuple(
-                Trace(
-                    str(g.attributes["mode"]),
-                    np.asarray(g["acceleration_right"].data, float),
-                    scale * np.asarray(g[quantity].data, float),
-                    "line",
-                    k,
-                )
-                for k, g in enumerate(mine)
-            )
-            title = f"{axis.name.capitalize()} over the amplitude"
-            case = f"stiffness {name}"
+            curves = [(g["acceleration_right"].data, scale * g[quantity].data) for g in mine]
+            modes = [str(g.attributes["mode"]) for g in mine]
+            traces = tuple(Trace(modes[k], *one, "line", k) for k, one in enumerate(curves))
+            title, case = f"{axis.name.capitalize()} over the amplitude", f"stiffness {name}"
             yield _sheet("nonlinear_modes", title, (x, axis), traces=traces, case=case)
 
 
