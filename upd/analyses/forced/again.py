@@ -156,14 +156,13 @@ def solve_again(run: Run, variant: Variant) -> SolvedVariation:
     if variant.plan is None:
         log.info("%s, %s: %s", of.source, of.label, variant.why)
         return SolvedVariation(of, reason=variant.why)
+    other = run._replace(plan=variant.plan, model=model)
     with threads_for(len(model.M)):
-        linear = run.linear
         if variant.model is not None:
-            linear = linear_of(variant.plan, model)
-            numbers += limit_results(run.name, linear)
+            other = other._replace(linear=linear_of(variant.plan, model))
+            numbers += limit_results(run.name, other.linear)
         for curve in run.curves:
-            changes = _changes(run, variant.plan, model, linear, curve, of)
-            numbers += changed_results(curve, changes)
+            numbers += changed_results(curve, _changes(run, other, curve, of))
     return SolvedVariation(of, numbers, time.perf_counter() - begin)
 
 
@@ -218,12 +217,7 @@ def changed_results(curve: RunCurve, changes: Changes) -> Iterator[Result]:
 
 
 def _changes(
-    run: Run,
-    plan: ForcedPlan,
-    model: Model,
-    linear: LinearCurves,
-    curve: RunCurve,
-    of: Variation,
+    run: Run, other: Run, curve: RunCurve, of: Variation
 ) -> dict[tuple[Side, int], Change]:
     """Of every peak of a curve: of the right blade where that has one, the other changes alike."""
     out: dict[tuple[Side, int], Change] = {}
@@ -231,11 +225,11 @@ def _changes(
         side: Side = "right" if ("right", number) in curve.tops else "left"
         top = curve.tops[side, number]
         leaves = any(one.number == number and not one.at_top for one in curve.checked)
-        if model is run.model and (leaves or not top.slips):
+        if other.model is run.model and (leaves or not top.slips):
             # all sticks, or the height is that of a time integration, which has all harmonics
             continue
         try:
-            f, height = peak_again(run, plan, model, linear, curve, side, number, of)
+            f, height = peak_again(run, other, curve, side, number, far=math.isnan(of.size))
             found = Change(f / top.frequency, height / top.height)
         except UpdError as error:
             log.info("%s, %s, %s: %s", of.source, of.label, curve.case, one_line(error))
@@ -248,27 +242,29 @@ def _changes(
 
 
 def peak_again(
-    run: Run,
-    plan: ForcedPlan,
-    model: Model,
-    linear: LinearCurves,
-    curve: RunCurve,
-    side: Side,
-    number: int,
-    of: Variation,
+    run: Run, other: Run, curve: RunCurve, side: Side, number: int, *, far: bool
 ) -> tuple[float, float]:
     """Frequency and height of a peak on another model: climbed to from the run's top; else on a
     path along a band about it, then along the whole sweep, as the loop of a fold may be longer than
     any band.
+
+    Parameters
+    ----------
+    run, other
+        With the peak, and with another plan, model and limits.
+    curve
+        Of the run.
+    far
+        Whether the peak may be far from the run's.
 
     Raises
     ------
     ConvergenceError
         Where none is near the run's.
     """
-    top, old = curve.tops[side, number], curve.balance
+    top, old, plan, model = curve.tops[side, number], curve.balance, other.plan, other.model
     b = balance_of(plan, model, curve.force, plan.scene.harmonic_numbers)
-    ratio = expected(run.linear, linear, top, number)
+    ratio = expected(run.linear, other.linear, top, number)
     alike = (len(b.Psi), b.contacts.tangents, b.rigid)
     if alike == (len(old.Psi), old.contacts.tangents, old.rigid):
         x = b.embedded(top.x, old)
@@ -295,7 +291,7 @@ def peak_again(
             continue
         size = np.abs(measures.accelerance(answer, model.row(side), curve.force))
         for peak in numbered_peaks(model, answer, size, e.stop):
-            near = math.isnan(of.size) or is_near(peak.frequency / f, peak.height / top.height)
+            near = far or is_near(peak.frequency / f, peak.height / top.height)
             if peak.number == number and near:
                 return peak.frequency, peak.height
     raise ConvergenceError("not found on the level")
