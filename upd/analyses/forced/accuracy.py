@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from upd.analyses.base import chosen_by_accuracy, refuse_oversize
@@ -128,10 +129,8 @@ WANTED = Wanted(
 )
 
 
-def plan_to_accuracy(scene: ForcedScene) -> ForcedPlan:
-    """The plan of a scene, as `upd.vary.wanted.plan_wanted`."""
-    plan: ForcedPlan = plan_wanted(WANTED, make_plan, scene)
-    return plan
+#: scene -> plan, as `upd.vary.wanted.plan_wanted`
+plan_to_accuracy: Callable[[ForcedScene], ForcedPlan] = partial(plan_wanted, WANTED, make_plan)
 
 
 def solve_to_accuracy(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
