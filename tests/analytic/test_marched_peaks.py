@@ -140,7 +140,7 @@ def test_a_period_from_the_balances_motion_is_the_balances(
     left_out = float(answer.truncation[i])
     (mean, amplitude), (wanted_mean, wanted) = (
         marched_damper(solution, mine),
-        measures.damper_motion(answer, model, i),
+        (of[i] for of in measures.damper_motion(answer, model)),
     )
     gone = np.zeros(6)
     gone[list(model.damper.kept)] = period.motion[-1] - at.s

@@ -275,11 +275,11 @@ def test_a_peak_is_found_again_on_its_own_model(
     slipping: Found, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By a climb from its top; in a band about it; in the sweep where the band misses it."""
-    run, top, of = searched(slipping[0]), top_of(slipping), Variation(MODES, "as many", size=1.0)
+    run, top = searched(slipping[0]), top_of(slipping)
 
     def again() -> tuple[float, float]:
         (curve,) = run.curves
-        return peak_again(run, run.plan, run.model, run.linear, curve, "right", 2, of)
+        return peak_again(run, run, curve, "right", 2, far=False)
 
     assert again() == pytest.approx((top.frequency, top.height), rel=1e-3)
     monkeypatch.setattr(solved_again, "climbed", lambda *_: None)

@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from upd.analyses.base import chosen_by_accuracy, refuse_oversize
@@ -128,10 +129,8 @@ WANTED = Wanted(
 )
 
 
-def plan_to_accuracy(scene: ForcedScene) -> ForcedPlan:
-    """The plan of a scene, as `upd.vary.wanted.plan_wanted`."""
-    plan: ForcedPlan = plan_wanted(WANTED, make_plan, scene)
-    return plan
+#: scene -> plan, as `upd.vary.wanted.plan_wanted`
+plan_to_accuracy: Callable[[ForcedScene], ForcedPlan] = partial(plan_wanted, WANTED, make_plan)
 
 
 def solve_to_accuracy(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
@@ -309,38 +308,33 @@ def _of_best(
     """The best F_C/F_E lies between its neighbours on the curve; its peak is as well known as the
     worst known one of the run's curves, beside what more harmonics change there.
     """
-    name = one.case.stiffness
-    performance = solution.performances[name]
+    performance = solution.performances[one.case.stiffness]
     best = performance.best
     if best is None:
         return ()
     if quantity == q.BEST_RATIO:
         known = [p.ratio for p in performance.known]
         k = known.index(best.ratio)
-        beside = [known[i] for i in (k - 1, k + 1) if 0 <= i < len(known)]
-        if not beside:
-            return ()
-        error = max(max(r / best.ratio, best.ratio / r) for r in beside) - 1.0
-        return (ErrorPart("points of the curve", error, "the next F_C/F_E on either side"),)
-    of = q.PEAK_FREQUENCY if quantity == q.BEST_FREQUENCY else q.PEAK_ACCELERANCE
-    mine = {
-        key: found
-        for key, found in parts.items()
-        if quantity_of(key[0])[0] in (of, of.on("left"))
-        and key[1].stiffness == name
-        and key[1].force_ratio is not None
-    }
+        beside = [known[i] / best.ratio for i in (k - 1, k + 1) if 0 <= i < len(known)]
+        error = max((max(r, 1.0 / r) for r in beside), default=math.nan) - 1.0
+        why = "the next F_C/F_E on either side"
+        return (ErrorPart("points of the curve", error, why),) if beside else ()
+    of, what = q.PEAK_ACCELERANCE, "height"
+    if quantity == q.BEST_FREQUENCY:
+        of, what = q.PEAK_FREQUENCY, "frequency"
+    mine = [
+        found
+        for (name, case), found in parts.items()
+        if quantity_of(name)[0] in (of, of.on("left"))
+        and case.stiffness == one.case.stiffness
+        and case.force_ratio is not None
+    ]
     if not mine:
         return ()
-    worst = max(mine.values(), key=lambda found: math.fsum(p.error for p in found if p.known))
+    worst = max(mine, key=lambda found: math.fsum(p.error for p in found if p.known))
     out = [replace(p, basis=f"as of the run's peaks: {p.basis}") for p in worst]
     if performance.again is not None:
-        few, more = (
-            math.nan
-            if one.worst is None
-            else (one.worst.frequency if of == q.PEAK_FREQUENCY else one.worst.height)
-            for one in performance.again
-        )
+        few, more = (getattr(p.worst, what, math.nan) for p in performance.again)
         basis = f"change with the harmonics of the run, at F_C/F_E {best.ratio:.3g}"
         out = [part for part in out if part.source != HARMONICS]
         out.append(ErrorPart(HARMONICS, abs(more / few - 1.0), basis))

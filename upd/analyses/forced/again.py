@@ -77,11 +77,6 @@ class RunCurve(NamedTuple):
     tops: Mapping[tuple[Side, int], Top]
     checked: Sequence[TimeCheck] = ()
 
-    @property
-    def ratio(self) -> float:
-        """F_C/F_E."""
-        return float(self.case.force_ratio or 0.0)
-
 
 def run_curve(curve: PointCurve) -> RunCurve:
     """The curve without its path."""
@@ -161,14 +156,13 @@ def solve_again(run: Run, variant: Variant) -> SolvedVariation:
     if variant.plan is None:
         log.info("%s, %s: %s", of.source, of.label, variant.why)
         return SolvedVariation(of, reason=variant.why)
+    other = run._replace(plan=variant.plan, model=model)
     with threads_for(len(model.M)):
-        linear = run.linear
         if variant.model is not None:
-            linear = linear_of(variant.plan, model)
-            numbers += limit_results(run.name, linear)
+            other = other._replace(linear=linear_of(variant.plan, model))
+            numbers += limit_results(run.name, other.linear)
         for curve in run.curves:
-            changes = _changes(run, variant.plan, model, linear, curve, of)
-            numbers += changed_results(curve, changes)
+            numbers += changed_results(curve, _changes(run, other, curve, of))
     return SolvedVariation(of, numbers, time.perf_counter() - begin)
 
 
@@ -223,12 +217,7 @@ def changed_results(curve: RunCurve, changes: Changes) -> Iterator[Result]:
 
 
 def _changes(
-    run: Run,
-    plan: ForcedPlan,
-    model: Model,
-    linear: LinearCurves,
-    curve: RunCurve,
-    of: Variation,
+    run: Run, other: Run, curve: RunCurve, of: Variation
 ) -> dict[tuple[Side, int], Change]:
     """Of every peak of a curve: of the right blade where that has one, the other changes alike."""
     out: dict[tuple[Side, int], Change] = {}
@@ -236,11 +225,11 @@ def _changes(
         side: Side = "right" if ("right", number) in curve.tops else "left"
         top = curve.tops[side, number]
         leaves = any(one.number == number and not one.at_top for one in curve.checked)
-        if model is run.model and (leaves or not top.slips):
+        if other.model is run.model and (leaves or not top.slips):
             # all sticks, or the height is that of a time integration, which has all harmonics
             continue
         try:
-            f, height = peak_again(run, plan, model, linear, curve, side, number, of)
+            f, height = peak_again(run, other, curve, side, number, far=math.isnan(of.size))
             found = Change(f / top.frequency, height / top.height)
         except UpdError as error:
             log.info("%s, %s, %s: %s", of.source, of.label, curve.case, one_line(error))
@@ -253,27 +242,29 @@ def _changes(
 
 
 def peak_again(
-    run: Run,
-    plan: ForcedPlan,
-    model: Model,
-    linear: LinearCurves,
-    curve: RunCurve,
-    side: Side,
-    number: int,
-    of: Variation,
+    run: Run, other: Run, curve: RunCurve, side: Side, number: int, *, far: bool
 ) -> tuple[float, float]:
     """Frequency and height of a peak on another model: climbed to from the run's top; else on a
     path along a band about it, then along the whole sweep, as the loop of a fold may be longer than
     any band.
+
+    Parameters
+    ----------
+    run, other
+        With the peak, and with another plan, model and limits.
+    curve
+        Of the run.
+    far
+        Whether the peak may be far from the run's.
 
     Raises
     ------
     ConvergenceError
         Where none is near the run's.
     """
-    top, old = curve.tops[side, number], curve.balance
+    top, old, plan, model = curve.tops[side, number], curve.balance, other.plan, other.model
     b = balance_of(plan, model, curve.force, plan.scene.harmonic_numbers)
-    ratio = expected(run.linear, linear, top, number)
+    ratio = expected(run.linear, other.linear, top, number)
     alike = (len(b.Psi), b.contacts.tangents, b.rigid)
     if alike == (len(old.Psi), old.contacts.tangents, old.rigid):
         x = b.embedded(top.x, old)
@@ -300,7 +291,7 @@ def peak_again(
             continue
         size = np.abs(measures.accelerance(answer, model.row(side), curve.force))
         for peak in numbered_peaks(model, answer, size, e.stop):
-            near = math.isnan(of.size) or is_near(peak.frequency / f, peak.height / top.height)
+            near = far or is_near(peak.frequency / f, peak.height / top.height)
             if peak.number == number and near:
                 return peak.frequency, peak.height
     raise ConvergenceError("not found on the level")
@@ -328,23 +319,6 @@ def _free(linear: LinearCurves) -> float:
 
 
 RECIPE = "blade_rig"
-#: off the contact, see `geometry.blade_rig_params`
-OFF_CONTACT = (
-    "across",
-    "base_columns",
-    "base_side",
-    "base_layers",
-    "shank_layers",
-    "platform_layers",
-    "core_layers",
-    "core_upper",
-    "wing_columns",
-)
-#: arrangement -> counts up its faces, and the count along the damper
-FACES: Mapping[str, tuple[tuple[str, ...], str]] = {
-    "symmetric": (("patch_along_slope",), "patch_along_y"),
-    "asymmetric": (("pad_along_slope", "face_along_z"), "pad_along_y"),
-}
 #: elements of the coarsest graded mesh for those of the recipe's defaults: from every re-entrant
 #: edge on as many, which shank, core and platform have on both sides; few along the damper and many
 #: up the slope, where free and stuck frequencies gain the least and the most for their dofs
@@ -364,6 +338,10 @@ GRADED: Mapping[str, int] = {
     "pad_along_y": 4,
     "face_along_z": 4,
 }
+#: begin counts on the contact
+_ON_CONTACT = {"symmetric": ("patch",), "asymmetric": ("pad", "face")}
+#: off the contact, see `geometry.blade_rig_params`
+OFF_CONTACT = tuple(key for key in GRADED if not key.startswith(("patch", "pad", "face")))
 #: ratio of neighbouring sizes in the coarsest graded mesh, and its elements beside a re-entrant
 #: edge outside and inside of shank, core and platform
 _GROWTH, _OUTSIDE, _INSIDE = 2.0, 4, 2
@@ -487,8 +465,8 @@ def meshed(scene: ForcedScene) -> tuple[str, ...]:
     """Counts that its mesh is refined by: on the contact too, where the contact points are none of
     its nodes.
     """
-    slopes, along = FACES[scene.arrangement]
-    return (*OFF_CONTACT, *((*slopes, along) if scene.contact.rule == GAUSS else ()))
+    on = _ON_CONTACT[scene.arrangement] if scene.contact.rule == GAUSS else ()
+    return (*OFF_CONTACT, *(key for key in GRADED if on and key.startswith(on)))
 
 
 def graded(scene: ForcedScene, factor: float) -> dict[str, Any]:

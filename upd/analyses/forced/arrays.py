@@ -271,7 +271,7 @@ def _point_arrays(solution: ForcedSolution, curve: PointCurve) -> Variables:
     if scene.wants("contact_state"):
         out["share"] = share_array(answer.state, places, "stiffness")
     if scene.wants("damper_motion"):
-        out["damper_amplitude"] = damper_array(solution, measures.damper_amplitude(answer, model))
+        out["damper_amplitude"] = damper_array(solution, measures.damper_motion(answer, model)[1])
     if not scene.wants("hysteresis"):
         return out
     loops = [
@@ -286,12 +286,10 @@ def _fold_arrays(curve: PointCurve) -> Variables:
     """Where slow sweeps jump, and the heights of the right blade before and after."""
     if not curve.folds:
         return {}
-    at, folds = "fold", curve.folds
+    units = {"frequency": "Hz", "up": "1", "before": "(m/s2)/N", "reached": "(m/s2)/N"}
     return {
-        "fold_frequency": variable(at, [one.frequency for one in folds], "Hz"),
-        "fold_up": variable(at, np.array([one.up for one in folds], np.int8), "1"),
-        "fold_before": variable(at, [one.before for one in folds], "(m/s2)/N"),
-        "fold_reached": variable(at, [one.reached for one in folds], "(m/s2)/N"),
+        f"fold_{name}": variable("fold", [getattr(one, name) for one in curve.folds], unit)
+        for name, unit in units.items()
     }
 
 

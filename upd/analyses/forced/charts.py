@@ -77,10 +77,6 @@ class ChartedCurve:
         """Whether a contact point slips or lifts off anywhere on it."""
         return bool(self.data("state")[..., STICK_SHARE].min() < 1.0)
 
-    def sheet(self, figure: str, title: str, axes: Axes, **parts: Any) -> Chart:
-        """A chart of the curve on a sheet of the run folder."""
-        return _sheet(figure, title, axes, **({"case": self.case.label} | parts))
-
 
 @dataclass(frozen=True)
 class ChartedPeak:
@@ -96,11 +92,6 @@ class ChartedPeak:
         """The curve's, at the peak."""
         given = self.curve.case.given() | {"peak": self.number, "mode": self.mode}
         return replace(Case(**given), choice="")
-
-    def sheet(self, figure: str, title: str, axes: Axes, **parts: Any) -> Chart:
-        """A chart of the peak on a sheet of the run folder."""
-        given = {"case": self.case.label, "detail": self.detail} | parts
-        return _sheet(figure, title, axes, **given)
 
     def moves(self, points: Group, side: int) -> bool:
         """Whether a contact point of a face slips or lifts off."""
@@ -152,7 +143,7 @@ def shares_chart(curve: ChartedCurve, k: int) -> Chart:
     )
     axes = axis, Axis("share of the cycle", "%", low=0.0, high=100.0)
     case = f"{curve.case}, {SIDES[k]} face"
-    return curve.sheet("contact_state", "Contact state", axes, areas=areas, case=case)
+    return _sheet("contact_state", "Contact state", axes, areas=areas, case=case)
 
 
 def contact_maps(at: ChartedPeak, points: Group, k: int) -> Iterator[Chart]:
@@ -169,9 +160,10 @@ def contact_maps(at: ChartedPeak, points: Group, k: int) -> Iterator[Chart]:
             more = {
                 "scatters": (Scatter(y, up, 100.0 * share, size, value),),
                 "case": f"{at.case}, {SIDES[k]} face",
+                "detail": at.detail,
                 "note": "The area of a mark is its friction loss.",
             }
-            yield at.sheet("contact_map", f"Contact points at the peak: {state}", axes, **more)
+            yield _sheet("contact_map", f"Contact points at the peak: {state}", axes, **more)
 
 
 def loops_chart(at: ChartedPeak) -> Chart:
@@ -189,7 +181,8 @@ def loops_chart(at: ChartedPeak) -> Chart:
         )
         traces.append(Trace(label, UM * d, T, "line", len(traces)))
     axes = (Axis("sliding displacement", "µm"), Axis("friction force", "N"))
-    return at.sheet("hysteresis", "Hysteresis", axes, traces=tuple(traces))
+    given = {"traces": tuple(traces), "case": at.case.label, "detail": at.detail}
+    return _sheet("hysteresis", "Hysteresis", axes, **given)
 
 
 def loss_chart(curves: Sequence[ChartedCurve]) -> Chart:
@@ -207,7 +200,8 @@ def motion_chart(curve: ChartedCurve, kind: int) -> Chart:
     amplitude = scale * curve.data("damper_amplitude")[:, first : first + 3].T
     axes = HZ_AXIS, Axis(f"{name}, first harmonic", unit)
     traces = _motions(kind, curve.frequency, amplitude, amplitude.max(axis=1))
-    return curve.sheet("damper_motion", f"Damper motion: {name}", axes, traces=traces)
+    title, case = f"Damper motion: {name}", curve.case.label
+    return _sheet("damper_motion", title, axes, traces=traces, case=case)
 
 
 def turn_chart(at: ChartedPeak, kind: int) -> Chart:
@@ -219,7 +213,8 @@ def turn_chart(at: ChartedPeak, kind: int) -> Chart:
     axes = Axis("time in periods", low=0.0, high=1.0), Axis(f"{name} about its mean", unit)
     traces = _motions(kind, turn, motion, np.abs(motion).max(axis=1))
     title = f"Damper motion over a period: {name}"
-    return at.sheet("damper_period", title, axes, traces=traces)
+    given = {"traces": traces, "case": at.case.label, "detail": at.detail}
+    return _sheet("damper_period", title, axes, **given)
 
 
 def _motions(kind: int, x: Array, values: Array, size: Array) -> tuple[Trace, ...]:
@@ -241,16 +236,12 @@ def performance_charts(arrays: Arrays) -> list[Chart]:
 
 
 def _chart(group: Group) -> Chart:
-    ratio = np.asarray(group["ratio"].data, float)
-    traces = [
-        Trace(
-            "highest of all", ratio, np.asarray(group["highest_accelerance"].data, float), "line", 0
-        )
-    ]
+    ratio = group["ratio"].data
+    traces = [Trace("highest of all", ratio, group["highest_accelerance"].data, "line", 0)]
     names = [key for key in group if key.startswith("peak_") and key.endswith("_right")]
     for name in sorted(key for key in names if "accelerance" in key):
         mode = str(group[name].attributes.get("mode", ""))
-        height, colour = np.asarray(group[name].data, float), len(traces)
+        height, colour = group[name].data, len(traces)
         found = np.isfinite(height)
         if found.sum() > 1 and len(traces) < _MOST:
             label = f"right blade, {mode}"
@@ -279,18 +270,10 @@ def mode_charts(arrays: Arrays) -> Iterator[Chart]:
             ("damping", Axis("damping ratio", "%"), 100.0),
             ("frequency", HZ_AXIS, 1.0),
         ):
-            traces = tuple(
-                Trace(
-                    str(g.attributes["mode"]),
-                    np.asarray(g["acceleration_right"].data, float),
-                    scale * np.asarray(g[quantity].data, float),
-                    "line",
-                    k,
-                )
-                for k, g in enumerate(mine)
-            )
-            title = f"{axis.name.capitalize()} over the amplitude"
-            case = f"stiffness {name}"
+            curves = [(g["acceleration_right"].data, scale * g[quantity].data) for g in mine]
+            modes = [str(g.attributes["mode"]) for g in mine]
+            traces = tuple(Trace(modes[k], *one, "line", k) for k, one in enumerate(curves))
+            title, case = f"{axis.name.capitalize()} over the amplitude", f"stiffness {name}"
             yield _sheet("nonlinear_modes", title, (x, axis), traces=traces, case=case)
 
 

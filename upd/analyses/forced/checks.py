@@ -56,31 +56,31 @@ _RULES = {
         "does not tend to the stuck one: upd design shows whether this damper hangs or jams; set "
         'contact.static = "frictionless", or N and T of both faces',
     ),
-    "path stopped": _Rule(
+    "path complete, stopped": _Rule(
         0,
         _PATH,
         "{message}, so that peaks beyond are missing: fewer contact points, another "
         "balance.slider or a lower start may go further",
     ),
-    "path periodic": _Rule(
+    "path complete, periodic": _Rule(
         0,
         _PATH,
         "at {count} points the contact forces do not come back to their start, so that they are no "
         'steady state: balance.slider = "mid", or contact.directions = "one"',
     ),
-    "residual of points": _Rule(
+    "balance residual, points": _Rule(
         _BALANCE,
         "misfit of contact motion and force at the worst point, evaluated again, relative",
         "that point is off by about this share, beside a contact that changes its state: read the "
         "curve there from its neighbours",
     ),
     # corrections of Newton's method end at 1e-6 of the unknowns, and their square remains
-    "residual of nodes": _Rule(
+    "balance residual, nodes": _Rule(
         1e-6, "misfit of blades' forces, slips and damper's motion of a period, relative"
     ),
-    "energy of points": _Rule(_BALANCE, "|work - viscous loss - friction| / work"),
+    "energy balance, points": _Rule(_BALANCE, "|work - viscous loss - friction| / work"),
     # slips are weighted with the mean of the forces at the ends of a step: of the step's square
-    "energy of nodes": _Rule(1e-2, _PERIOD, "take more samples: balance.samples"),
+    "energy balance, nodes": _Rule(1e-2, _PERIOD, "take more samples: balance.samples"),
     "damper at rest": _Rule(_BALANCE, "|mean contact forces - F_C| / F_C"),
     "truncation": _Rule(
         TRUNCATION,
@@ -93,20 +93,20 @@ _RULES = {
         "peak {number} at {frequency:.4g} Hz lies between points too far apart for its height; "
         "take more: excitation.points = {more}",
     ),
-    "top not reached": _Rule(
+    f"{CONFIRMED}, top": _Rule(
         0.05,
         "the top of a peak that was not reached",
         "of peak {number} of the {blade} blade near {frequency:.5g} Hz only a point is known, its "
         "top was not reached: take more excitation.points",
     ),
-    "confirmed": _Rule(
+    f"{CONFIRMED}, worst": _Rule(
         0.05,
         _CONFIRMED,
         "peak {number} of the {blade} blade at {frequency:.5g} Hz has the height of time "
         "integration, {integrated:.4g}; the curve and the slip there have too few harmonics: take "
         'more balance.harmonics, or sweep as a test does: balance.method = "march"',
     ),
-    "none stable": _Rule(
+    f"{CONFIRMED}, none": _Rule(
         0.05,
         _CONFIRMED,
         "peak {number} of the {blade} blade at {frequency:.5g} Hz is not confirmed (no motion near "
@@ -147,25 +147,15 @@ _RULES = {
         "a step has two answers there: take more steps (balance.samples)",
     ),
 }
-#: rules that are one check under another name
-_NAMES = {
-    "path stopped": "path complete",
-    "path periodic": "path complete",
-    "residual of points": "balance residual",
-    "residual of nodes": "balance residual",
-    "energy of points": "energy balance",
-    "energy of nodes": "energy balance",
-    "top not reached": CONFIRMED,
-    "confirmed": CONFIRMED,
-    "none stable": CONFIRMED,
-}
 
 
 def _check(rule: str, case: Case, value: float, **words: Any) -> Check:
-    """A check by its rule; none ends the run: a curve that stopped early is kept."""
+    """A check by its rule, its name before a comma; none ends the run: a curve that stopped early
+    is kept.
+    """
     limit, *texts = _RULES[rule]
     what, remedy = (text.format(**words) for text in texts)
-    return Check(_NAMES.get(rule, rule), case, value, limit, what, remedy, fatal=False)
+    return Check(rule.partition(",")[0], case, value, limit, what, remedy, fatal=False)
 
 
 def check_solution(solution: ForcedSolution) -> list[Check]:
@@ -226,15 +216,15 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve[Any]) -> Iterator
 
 def _path(curve: ForcedCurve[Any]) -> Check:
     if curve.stopped:
-        return _check("path stopped", curve.case, 1.0, message=curve.answer.message)
+        return _check("path complete, stopped", curve.case, 1.0, message=curve.answer.message)
     astray = int((~curve.answer.periodic).sum()) if hasattr(curve.answer, "periodic") else 0
-    return _check("path periodic", curve.case, float(astray), count=astray)
+    return _check("path complete, periodic", curve.case, float(astray), count=astray)
 
 
 def _point_checks(curve: PointCurve, model: Model) -> Iterator[Check]:
     answer, case = curve.answer, curve.case
-    yield _check("residual of points", case, measures.residual_error(answer))
-    yield _check("energy of points", case, float(np.abs(answer.energy_balance).max()))
+    yield _check("balance residual, points", case, measures.residual_error(answer))
+    yield _check("energy balance, points", case, float(np.abs(answer.energy_balance).max()))
     yield _check("damper at rest", case, measures.rest_error(answer, model))
     yield from _integrated(curve)
 
@@ -246,12 +236,17 @@ def _integrated(curve: PointCurve) -> Iterator[Check]:
             if (side, peak.number) not in curve.tops:
                 where = {"number": peak.number, "blade": side, "frequency": peak.frequency}
                 case = replace(curve.case, mode=peak.mode)
-                yield _check("top not reached", case, math.inf, **where)
+                yield _check(f"{CONFIRMED}, top", case, math.inf, **where)
                 return
     if curve.checked:
         worst = max(curve.checked, key=lambda one: one.difference)
-        rule = "confirmed" if worst.stays else "none stable"
-        yield _check(rule, replace(curve.case, mode=worst.mode), worst.difference, **vars(worst))
+        rule = "worst" if worst.stays else "none"
+        yield _check(
+            f"{CONFIRMED}, {rule}",
+            replace(curve.case, mode=worst.mode),
+            worst.difference,
+            **vars(worst),
+        )
     yield from _oscillating(curve)
 
 
@@ -324,8 +319,8 @@ def check_faces_curve(curve: FacesCurve, points: int, harmonic: int) -> Iterator
     answer, case, highest = curve.answer, curve.case, curve.answer.equations.highest
     residual = max(one.residual for one in answer.points)
     truncated = max(one.unresolved for one in answer.points)
-    yield _check("residual of nodes", case, float(residual))
-    yield _check("energy of nodes", case, float(_open_energy(answer.energy).max()))
+    yield _check("balance residual, nodes", case, float(residual))
+    yield _check("energy balance, nodes", case, float(_open_energy(answer.energy).max()))
     yield _check("truncation", case, float(truncated), highest=highest, more=highest + 2)
     # the steps beside the right blade's peaks against their widths
     f, steps = curve.frequency, {}

@@ -98,28 +98,27 @@ def few_harmonics(run: Run) -> Run | None:
     """The right blade's peaks of the curve with the lowest F_C/F_E, with few harmonics; None
     without peaks.
     """
-    curve = min(run.curves, key=lambda one: one.ratio, default=None)
+    curve = min(run.curves, key=lambda one: one.case.force_ratio or 0.0, default=None)
     if curve is None:
         return None
     plan, model = run.plan, run.model
     most = min(max(FEW_HARMONICS, *model.excitation.harmonics), plan.scene.balance.harmonics)
     scene = changed(plan.scene, (("balance.harmonics", most),))
-    plan, of, peaks = replace(plan, scene=scene), Variation("", ""), list[CurvePeak]()
+    other, peaks = run._replace(plan=replace(plan, scene=scene)), list[CurvePeak]()
     tops: dict[tuple[Side, int], Top] = {}
     with threads_for(len(model.M)):
-        b = balance_of(plan, model, curve.force, scene.harmonic_numbers)
+        b = balance_of(other.plan, model, curve.force, scene.harmonic_numbers)
         for peak in curve.peaks["right"]:
             top = curve.tops.get(("right", peak.number))
             if top is None:
                 continue
             with suppress(UpdError):
-                again = peak_again(run, plan, model, run.linear, curve, "right", peak.number, of)
-                f, height = again
+                f, height = peak_again(run, other, curve, "right", peak.number, far=True)
                 x = b.embedded(top.x, curve.balance)
                 peaks.append(peak._replace(frequency=f, height=height))
                 tops["right", peak.number] = top._replace(frequency=f, height=height, x=x)
     few = curve._replace(balance=b, peaks={"right": peaks}, tops=tops, checked=())
-    return run._replace(plan=plan, curves=(few,)) if peaks else None
+    return other._replace(curves=(few,)) if peaks else None
 
 
 def effects_of(few: Run, found: SolvedVariation) -> list[Result]:

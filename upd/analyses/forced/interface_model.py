@@ -163,7 +163,7 @@ def make_interface_model(
     """Blades in their free-interface modes and what those leave of the static compliance.
 
     Excited along x at the force nodes of some blades; the outputs are the displacements along x
-    of the left and the right accelerometer and of these force nodes.
+    of the left and the right accelerometer, then of both force nodes.
 
     Parameters
     ----------
@@ -196,10 +196,7 @@ def make_interface_model(
             "contact.model: the faces belong to other meshes: make them of these bodies"
         )
     solver = plan.scene.solver.name
-    parts = in_parallel(
-        [partial(_part, b, n_modes, solver, excited=b.side in excited) for b in blades],
-        plan.workers,
-    )
+    parts = in_parallel([partial(_part, b, n_modes, solver) for b in blades], plan.workers)
     both = _side_by_side(parts, interface, excited)
     Phi, frequency = both["shapes"], both["frequency"]
     G = interface.compliance - (Phi / (2.0 * np.pi * frequency) ** 2) @ Phi.T
@@ -227,49 +224,40 @@ def _side_by_side(
     excited: Sequence[Side],
 ) -> dict[str, Array]:
     """The blades' parts of `_part` beside each other, in the terms of `InterfaceModel`."""
-    n, n_modes = interface.n, len(parts[0][0])
-    m, L, K = 2 * n_modes, len(excited), len(SIDES) + len(excited)
-    shapes, seen_modes, places = np.zeros((3, n, m)), np.zeros((K, m)), np.zeros((m, L))
-    pushed, seen_contact, seen_drive = np.zeros((3, n, L)), np.zeros((K, 3, n)), np.zeros((K, L))
-    frequency = np.zeros(m)
-    for k, (hertz, Phi, seen, static, direct) in enumerate(parts):
-        on, mine = np.flatnonzero(interface.face == k), slice(k * n_modes, (k + 1) * n_modes)
-        # outputs of this blade: its accelerometer, and the force node where it is excited
-        forced = [j for j, side in enumerate(excited) if side == SIDES[k]]
-        rows = [k, *(len(SIDES) + j for j in forced)]
-        frequency[mine] = hertz
-        shapes[:, on, mine] = Phi
-        seen_modes[rows, mine] = seen
+    n, m = interface.n, len(parts[0][0])
+    shapes, pushed, carried = np.zeros((3, n, 2 * m)), np.zeros((3, n, 2)), np.zeros((4, 3, n))
+    places, seen, drive = np.zeros((2 * m, 2)), np.zeros((4, 2 * m)), np.zeros((4, 2))
+    for k, (hertz, Phi, probes, static, direct) in enumerate(parts):
+        on, mine = np.flatnonzero(interface.face == k), slice(k * m, (k + 1) * m)
         flexible = 1.0 / (2.0 * np.pi * hertz) ** 2
         # what the modes leave
-        rest = static - np.einsum("fim,m,pm->pfi", Phi, flexible, seen)
-        for j, row in enumerate(rows):
-            seen_contact[row][:, on] = rest[j]
-        for j in forced:
-            places[mine, j] = seen[1]
-            pushed[:, on, j] = rest[1]
-            seen_drive[rows, j] = direct[:, 1] - (seen * flexible) @ seen[1]
+        rest = static - np.einsum("fim,m,pm->pfi", Phi, flexible, probes)
+        shapes[:, on, mine], pushed[:, on, k] = Phi, rest[1]
+        # the accelerometers of both blades, then their force nodes
+        for row, one, static_one in zip((k, 2 + k), probes, rest, strict=True):
+            seen[row, mine] = one
+            carried[row][:, on] = static_one
+        places[mine, k] = probes[1]
+        drive[[k, 2 + k], k] = direct[:, 1] - (probes * flexible) @ probes[1]
+    forced = [SIDES.index(side) for side in excited]
     return {
-        "frequency": frequency,
-        "shapes": shapes.reshape(3 * n, m),
-        "places": places,
-        "pushed": pushed.reshape(3 * n, L),
-        "seen_modes": seen_modes,
-        "seen_contact": seen_contact.reshape(K, 3 * n),
-        "seen_drive": seen_drive,
+        "frequency": np.concatenate([part[0] for part in parts]),
+        "shapes": shapes.reshape(3 * n, -1),
+        "places": places[:, forced],
+        "pushed": pushed[..., forced].reshape(3 * n, -1),
+        "seen_modes": seen,
+        "seen_contact": carried.reshape(4, -1),
+        "seen_drive": drive[:, forced],
     }
 
 
-def _part(
-    blade: Blade, n_modes: int, solver: str, *, excited: bool
-) -> tuple[Array, Array, Array, Array, Array]:
-    """Frequencies in Hz, modes at the patch (3, i, m) and at the probes (p, m).
+def _part(blade: Blade, n_modes: int, solver: str) -> tuple[Array, Array, Array, Array, Array]:
+    """Frequencies in Hz, modes at the patch (3, i, m) and at accelerometer and force node (2, m).
 
-    Then the displacement of the patch (p, 3, i) and of the probes (p, p) by a unit force at each.
+    Then the displacement of the patch (2, 3, i) and of both (2, 2) by a unit force at each.
     """
     found = modes(blade.K, blade.M, count=n_modes, solver=solver)
-    names = ["accelerometer"] + (["force"] if excited else [])
-    probes = [blade.probe(name) for name in names]
+    probes = [blade.probe(name) for name in ("accelerometer", "force")]
     loads = np.zeros((blade.K.shape[0], len(probes)))
     loads[probes, np.arange(len(probes))] = 1.0
     moved = factorise(blade.K, solver=solver).solve(loads)

@@ -284,15 +284,6 @@ def in_faces(position: Array, face: IntArray, frames: Iterable[Array]) -> tuple[
     return along, up
 
 
-def damper_amplitude(answer: FrequencyResponse, model: Model) -> Array:
-    """Amplitude of the damper's six dofs along the path in the lowest harmonic that is excited,
-    (n, 6) in mm and rad.
-    """
-    q = model.damper_dofs(answer.coefficients)
-    first = answer.harmonics.offset + 2 * read_place(answer.balance)
-    return np.asarray(np.hypot(q[:, :, first], q[:, :, first + 1]))
-
-
 def power(answer: FrequencyResponse) -> Array:
     """Friction power of every contact point along the path, (n, n_point) in W: loop area per cycle
     in N mm times frequency.
@@ -300,17 +291,18 @@ def power(answer: FrequencyResponse) -> Array:
     return np.asarray(answer.energy * answer.frequency[:, None] * _M)
 
 
-def damper_motion(answer: FrequencyResponse, model: Model, i: int) -> tuple[Array, Array]:
-    """Motion of the damper's six dofs at point i of the path.
+def damper_motion(answer: FrequencyResponse, model: Model) -> tuple[Array, Array]:
+    """Motion of the damper's six dofs along the path.
 
     Returns
     -------
     static, amplitude
-        (6,) mean, and amplitude of the lowest harmonic that is excited, mm and rad.
+        (n, 6) mean, and amplitude of the lowest harmonic that is excited, mm and rad.
     """
-    q = model.damper_dofs(answer.coefficients[i])
-    static = q[:, 0] if answer.harmonics.static else np.zeros(6)
-    return static.copy(), np.abs(to_complex(q, answer.harmonics)[:, read_place(answer.balance)])
+    q = model.damper_dofs(answer.coefficients)
+    first = answer.harmonics.offset + 2 * read_place(answer.balance)
+    static = q[:, :, 0] if answer.harmonics.static else np.zeros(q.shape[:2])
+    return static.copy(), np.hypot(q[:, :, first], q[:, :, first + 1])
 
 
 def rest_error(answer: FrequencyResponse, model: Model) -> float:

@@ -163,10 +163,7 @@ def harmonics_of(plan: ForcedPlan) -> int:
     """The highest harmonic of the curve: its own choice, or that of the balance."""
     scene = plan.scene
     given, run = scene.performance.harmonics, scene.balance.harmonics
-    highest = max(scene.excitation.highest_harmonic, 1)
-    if given is not None:
-        return max(given, highest)
-    return int(run)
+    return int(run if given is None else max(given, scene.excitation.highest_harmonic))
 
 
 def beside_best(points: Sequence[RatioPoint]) -> list[float]:

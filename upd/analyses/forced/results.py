@@ -11,7 +11,7 @@ import numpy as np
 from upd.analyses import base, measured
 from upd.analyses.forced import measures
 from upd.analyses.forced.again import limit_results, peak_results
-from upd.analyses.forced.curves import ForcedCurve, PointCurve, WholeFaces, linear_curves
+from upd.analyses.forced.curves import ForcedCurve, PointCurve, linear_curves
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array, ComplexArray, Model, balance_of
 from upd.analyses.forced.performance import mode_results, performance_results
@@ -36,10 +36,8 @@ from upd.scene.measured import MeasuredChoice
 def make_results(solution: ForcedSolution) -> list[Result]:
     """All numbers of a run."""
     results: list[Result] = []
-    for name, model in solution.models.items():
-        results += _model_results(name, model)
-    for name, faces in solution.faces.items():
-        results += _faces_results(solution, name, faces)
+    for name in (*solution.models, *solution.faces):
+        results += _contact_results(solution, name)
     for name, linear in solution.linear.items():
         results += limit_results(name, linear)
     for curve in solution.curves:
@@ -53,38 +51,29 @@ def make_results(solution: ForcedSolution) -> list[Result]:
     return results + solution.effects + measured_results(solution)
 
 
-def _model_results(name: str, model: Model) -> list[Result]:
-    case, law = Case(stiffness=name), model.contacts.law
-    results = [
-        q.DAMPER_MASS.of(model.damper.mass, case),
-        q.CONTACT_POINTS.of(model.contacts.n_point, case),
-    ]
+def _contact_results(solution: ForcedSolution, name: str) -> Iterator[Result]:
+    """Mass of the damper, points or nodes, stiffness of the faces, forces at rest beside those of a
+    rigid damper in that state.
+    """
+    case, model = Case(stiffness=name), solution.models.get(name)
+    if model is None:
+        faces = solution.faces[name]
+        assert solution.bodies is not None
+        yield q.DAMPER_MASS.of(solution.plan.copies * solution.bodies.damper.mass, case)
+        yield q.CONTACT_POINTS.of(faces.of.n, case)
+        yield from _static_forces(case, faces.state, faces.state.N, faces.state.T)
+        return
+    law = model.contacts.law
+    yield q.DAMPER_MASS.of(model.damper.mass, case)
+    yield q.CONTACT_POINTS.of(model.contacts.n_point, case)
     for k, side in enumerate(SIDES):
         on, face = model.face == k, replace(case, side=side)
-        results += [q.FACE_K_N.of(law.k_n[on].sum(), face), q.FACE_K_T.of(law.k_t[on].sum(), face)]
-    return results + _static_results(case, model)
-
-
-def _faces_results(solution: ForcedSolution, name: str, faces: WholeFaces) -> list[Result]:
-    """Mass of the damper, nodes, forces at rest."""
-    case = Case(stiffness=name)
-    assert solution.bodies is not None
-    return [
-        q.DAMPER_MASS.of(solution.plan.copies * solution.bodies.damper.mass, case),
-        q.CONTACT_POINTS.of(faces.of.n, case),
-        *_static_forces(case, faces.state, faces.state.N, faces.state.T),
-    ]
-
-
-def _static_results(case: Case, model: Model) -> list[Result]:
-    """N and T of the faces before vibration, beside those of a rigid damper in that state."""
-    if model.state is None:
-        return []
-    N, T = (
-        np.array([values[model.face == k].sum() for k in range(len(SIDES))])
-        for values in (model.contacts.law.preload, model.traction[:, -1])
-    )
-    return _static_forces(case, model.state, N, T)
+        yield q.FACE_K_N.of(law.k_n[on].sum(), face)
+        yield q.FACE_K_T.of(law.k_t[on].sum(), face)
+    if model.state is not None:
+        of_points = (law.preload, model.traction[:, -1])
+        N, T = (np.array([one[model.face == k].sum() for k in (0, 1)]) for one in of_points)
+        yield from _static_forces(case, model.state, N, T)
 
 
 def _static_forces(case: Case, state: StaticState, N: Array, T: Array) -> list[Result]:
@@ -320,7 +309,7 @@ def _at_point(
         ),
     ]
     if scene.wants("damper_motion"):
-        results += motion_results(at, *measures.damper_motion(answer, model, i))
+        results += motion_results(at, *(of[i] for of in measures.damper_motion(answer, model)))
     return results
 
 

@@ -106,15 +106,10 @@ def _check_damper(scene: ForcedScene, source: str, contact: Scene | None) -> Non
     rig = _damper(scene.recipe, {**scene.geometry, "arrangement": scene.arrangement})
     other = None if contact is None else _damper(contact.recipe, contact.geometry)
     if rig is None or other is None:
-        why = "its folder holds no scene.toml that can be read"
-        if rig is None or contact is not None:
-            recipe = scene.recipe if contact is None or rig is None else contact.recipe
-            why = (
-                f"the recipe {recipe} does not tell the damper's sizes: add a function "
-                "damper_sizes(params)"
-            )
         log.warning(
-            "contact stiffness from %s: not compared with the rig's damper; %s", source, why
+            "contact stiffness from %s: not compared with the rig's damper; to fix it: both need a "
+            "scene.toml and a recipe with a function damper_sizes(params)",
+            source,
         )
         return
     different = rig.differences(other, "in the rig", "in the contact")
