@@ -42,7 +42,7 @@ from upd.errors import ConvergenceError, UpdError, one_line
 from upd.hbm import FrequencyResponse
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.peak import FIRST_REACH, is_near
-from upd.hbm.springs.starts import newton
+from upd.hbm.springs.sweep import newton
 from upd.linalg.parallel import threads_for
 from upd.results import Case
 from upd.scene.forced_contact import SIDES, Side
