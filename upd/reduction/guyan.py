@@ -18,9 +18,8 @@ from upd.cache.arrays import load_arrays, save_arrays, trim, unreadable
 from upd.cache.files import locked
 from upd.cache.shared import Store
 from upd.errors import ConvergenceError
-from upd.labels import Shown
 from upd.linalg.amg import compliance_amg
-from upd.linalg.common import EPS, checked_dofs, checked_vectors, log
+from upd.linalg.common import EPS, Condensation, checked_dofs, checked_vectors, log
 from upd.linalg.schur import schur_complement
 from upd.linalg.select import choose
 from upd.linalg.symmetric import Matrix, checked, stored, submatrix_of
@@ -39,7 +38,7 @@ _REMEDY = "To fix it: hold the distant set."
 
 
 @dataclass(frozen=True, repr=False)
-class Condensed(Shown):
+class Condensed(Condensation):
     """A body condensed on k kept dofs.
 
     Attributes
@@ -48,23 +47,15 @@ class Condensed(Shown):
         N/mm, symmetric positive definite stiffness at the kept dofs; loads elsewhere are zero.
     recover : callable
         u_kept (k,) or (k, m) -> u (n,) or (n, m), all dofs of K, by one back-substitution.
-    solver : str
-        Name of the solver that ran.
-    seconds : float
-        Wall time.
-    n_dof : int
-        n.
+    solver, seconds
+        As of `Condensation`.
     factor_nnz, peak_bytes : int
         Size of the factorisation (0 with multigrid: not known).
+    n_dof : int
+        n.
     """
 
-    S: FloatArray
-    recover: Callable[[FloatArray], FloatArray]
-    solver: str
-    seconds: float
-    n_dof: int
-    factor_nnz: int
-    peak_bytes: int
+    n_dof: int = 0
     _compliance: list[FloatArray] = field(default_factory=list, repr=False)
 
     @property
@@ -172,9 +163,7 @@ def condense(
     direct = "auto" if choice.name == "amg" else choice.name
     found = schur_complement(A, kept, solver=direct, keep_factor=keep_factor)
     _refuse_floating(found.S, A.diagonal()[kept])
-    return Condensed(
-        found.S, found.recover, found.solver, found.seconds, n, found.factor_nnz, found.peak_bytes
-    )
+    return Condensed(**vars(found), n_dof=n)
 
 
 def require_held(A: Matrix, modes: FloatArray | None) -> None:
@@ -218,7 +207,7 @@ def _by_multigrid(
         )
 
     found.C.flags.writeable = False
-    return Condensed(S, recover, "amg", found.seconds, A.shape[0], 0, 0, [found.C])
+    return Condensed(S, recover, "amg", found.seconds, 0, 0, A.shape[0], [found.C])
 
 
 def inverse_definite(S: FloatArray) -> FloatArray:
@@ -397,4 +386,4 @@ def _revived(
     n_dof, nnz, peak = (int(v) for v in arrays["sizes"])
     C = arrays["C"]
     C.flags.writeable = False
-    return Condensed(arrays["S"], recover, str(arrays["solver"]), 0.0, n_dof, nnz, peak, [C])
+    return Condensed(arrays["S"], recover, str(arrays["solver"]), 0.0, nnz, peak, n_dof, [C])
