@@ -84,7 +84,15 @@ def numbers(problems: Problems, name: str, values: ArrayLike) -> FloatArray | No
 
 
 def one_of(problems: Problems, **given: ArrayLike | None) -> tuple[str, FloatArray] | None:
-    """Name and numbers of the one argument of two that is not None."""
+    """Name and numbers of the one argument of two that is not None.
+
+    Parameters
+    ----------
+    problems : Problems
+        Receives the message when both or none are given, or what is given is no numbers.
+    given
+        Both arguments by their names.
+    """
     names = [name for name, value in given.items() if value is not None]
     if problems.add(len(names) != 1, f"give exactly one of {' and '.join(given)}."):
         return None
@@ -110,7 +118,16 @@ def one_load(problems: Problems, name: str, value: float | None) -> float:
 
 
 def node_mask(problems: Problems, start: ArrayLike | None, n: int) -> BoolArray | None:
-    """A guess of the contact set (n,), checked; None for None."""
+    """A guess of the contact set, checked.
+
+    Parameters
+    ----------
+    problems : Problems
+        Receives the message when it does not fit.
+    start : (n,) array_like of bool, optional
+    n : int
+        Number of nodes.
+    """
     if start is None:
         return None
     mask = np.asarray(start)
