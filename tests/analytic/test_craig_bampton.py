@@ -89,8 +89,7 @@ def test_shapes_of_the_full_model_come_back():
     mac = np.abs(np.einsum("ij,ij->j", full.shapes, M @ shapes))
     # 1 - MAC goes with the error of the eigenvalue over the gap.
     np.testing.assert_allclose(mac, 1.0, atol=1e-4)
-    coordinates = model.coordinates(boundary[::-1])
-    np.testing.assert_array_equal(coordinates, np.arange(12)[::-1])
+    np.testing.assert_array_equal(model.boundary, boundary)
     np.testing.assert_allclose(model.at(boundary[[3]])[0], np.eye(model.n)[3], atol=1e-14)
 
 
@@ -177,8 +176,6 @@ def test_only_the_rows_asked_for_are_kept():
     np.testing.assert_array_equal(model.at([5, 7]), whole.basis[[5, 7]])
     with pytest.raises(InputError, match="not kept"):
         model.at([11])
-    with pytest.raises(InputError, match="not on the boundary"):
-        model.coordinates([5])
 
 
 @pytest.mark.parametrize(

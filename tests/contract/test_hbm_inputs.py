@@ -105,7 +105,7 @@ def test_excitation_of_a_higher_harmonic_alone() -> None:
 
 def test_static_sliders_without_a_static_solution_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        import_module("upd.hbm.springs.starts"), "static_point", lambda *a, **k: None
+        import_module("upd.hbm.springs.sweep"), "static_point", lambda *a, **k: None
     )
     answer = oscillator(start="static", harmonics=(0, 1))
     assert answer.status == "stopped"

@@ -13,7 +13,7 @@ from upd.hbm import Contacts, FrequencyResponse, Settings, contacts, follow, fre
 from upd.hbm.core.newton import solve
 from upd.hbm.springs.coulomb import SLIP
 from upd.hbm.springs.friction import Start
-from upd.hbm.springs.starts import from_stuck
+from upd.hbm.springs.sweep import from_stuck
 
 HZ = 1 / (2 * np.pi)
 

@@ -21,7 +21,7 @@ from upd.hbm import (
 )
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.modal import modal
-from upd.hbm.springs.starts import from_stuck, newton, static_point
+from upd.hbm.springs.sweep import from_stuck, newton, static_point
 
 S = np.sqrt(0.5)
 #: blade dofs x, z, rotation about y of the platform, which carries the core as a rigid body 45 mm

@@ -85,7 +85,7 @@ def test_levels_visited_twice_keep_the_cycle_symmetric_and_positive(
         lowest.append(eigenvalues[0])
         R = np.random.default_rng(1).standard_normal((K.shape[0], 5))
         one_by_one = np.column_stack([solver._precondition(r) for r in R.T])
-        together = solver._precondition_many(R)
+        together = solver._precondition(R)
         np.testing.assert_allclose(together, one_by_one, atol=1e-5 * np.abs(one_by_one).max())
     assert lowest[0] > 1.2 * lowest[1] > 0.0
 

@@ -83,6 +83,25 @@ def numbers(problems: Problems, name: str, values: ArrayLike) -> FloatArray | No
     return array
 
 
+def one_of(problems: Problems, **given: ArrayLike | None) -> tuple[str, FloatArray] | None:
+    """Name and numbers of the one argument of two that is not None.
+
+    Parameters
+    ----------
+    problems : Problems
+        Receives the message when both or none are given, or what is given is no numbers.
+    given
+        Both arguments by their names.
+    """
+    names = [name for name, value in given.items() if value is not None]
+    if problems.add(len(names) != 1, f"give exactly one of {' and '.join(given)}."):
+        return None
+    value = given[names[0]]
+    assert value is not None
+    values = numbers(problems, names[0], value)
+    return None if values is None else (names[0], values)
+
+
 def one_load(problems: Problems, name: str, value: float | None) -> float:
     """One number, of a load not below zero; 0 for None and where a problem was noted."""
     array = numbers(problems, name, np.asarray(0.0 if value is None else value))
@@ -99,7 +118,16 @@ def one_load(problems: Problems, name: str, value: float | None) -> float:
 
 
 def node_mask(problems: Problems, start: ArrayLike | None, n: int) -> BoolArray | None:
-    """A guess of the contact set (n,), checked; None for None."""
+    """A guess of the contact set, checked.
+
+    Parameters
+    ----------
+    problems : Problems
+        Receives the message when it does not fit.
+    start : (n,) array_like of bool, optional
+    n : int
+        Number of nodes.
+    """
     if start is None:
         return None
     mask = np.asarray(start)

@@ -7,7 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upd.contact.checks import Problems, compliance_matrix, few_threads, numbers, proven_factor
+from upd.contact.checks import (
+    Problems,
+    compliance_matrix,
+    few_threads,
+    numbers,
+    one_of,
+    proven_factor,
+)
 from upd.contact.coulomb import Coulomb
 from upd.contact.coulomb_conditions import CoupledStep, Iterate, carries
 from upd.contact.load_steps import CoupledHistory, LoadSteps, SolvedStep, offset_of
@@ -295,16 +302,10 @@ def _targets(
     load: ArrayLike | None,
     displacement: ArrayLike | None,
 ) -> FloatArray | None:
-    if problems.add(
-        (load is None) == (displacement is None),
-        "give exactly one of load and displacement.",
-    ):
+    found = one_of(problems, load=load, displacement=displacement)
+    if found is None or solver is None:
         return None
-    name, given = ("load", load) if displacement is None else ("displacement", displacement)
-    assert given is not None
-    values = numbers(problems, name, given)
-    if values is None or solver is None:
-        return None
+    name, values = found
     r = solver.B.shape[1]
     if problems.add(
         values.ndim not in (1, 2) or values.shape[-1] != r or values.size == 0,

@@ -280,7 +280,17 @@ class _NormalSolver:
 
 
 def apart(gap: FloatArray, approach: float, status: str, message: str) -> NormalContact:
-    """No node carries a force."""
+    """No node carries a force.
+
+    Parameters
+    ----------
+    gap : (n,) ndarray
+        Before loading [mm].
+    approach : float
+        mm.
+    status, message : str
+        As of `NormalContact`.
+    """
     none, n = np.zeros(gap.size), gap.size
     return NormalContact(
         none,

@@ -14,6 +14,7 @@ from upd.contact.checks import (
     compliance_matrix,
     few_threads,
     numbers,
+    one_of,
     unit_response,
 )
 from upd.contact.coulomb import Coulomb
@@ -295,22 +296,23 @@ def tangential_path(
             steps.append(solver.step(value, loads is not None, at))
             at = steps[-1].history
     bad = [step for step in steps if step.status != "converged"]
+    stacked = {name: np.array([getattr(step, name) for step in steps]) for name in _STACKED}
     return TangentialPath(
-        displacement=np.array([step.displacement for step in steps]),
-        load=np.array([step.load for step in steps]),
-        force=np.array([step.force for step in steps]),
-        slip=np.array([step.slip for step in steps]),
+        **stacked,
         state=np.array([step.history.state for step in steps]),
-        slip_work=np.array([step.slip_work for step in steps]),
-        stiffness=np.array([step.stiffness for step in steps]),
-        iterations=np.array([step.iterations for step in steps]),
         fallbacks=sum(step.method == "fallback" for step in steps),
         status=bad[0].status if bad else "converged",
         message=f"{len(steps)} load steps solved."
         + (f" {len(bad)} of them: {bad[0].message}" if bad else ""),
         history=at,
-        unclipped=np.array([step.unclipped for step in steps]),
     )
+
+
+#: what a path has of each step
+_STACKED = (
+    *("displacement", "load", "force", "slip", "slip_work", "stiffness", "iterations"),
+    "unclipped",
+)
 
 
 class _TangentialSolver:
@@ -376,16 +378,10 @@ class _TangentialSolver:
         Problems are noted for a wrong shape and for gross slip.
         """
         names = ("loads", "displacements") if steps else ("load", "displacement")
-        if problems.add(
-            (load is None) == (displacement is None),
-            f"give exactly one of {names[0]} and {names[1]}.",
-        ):
+        found = one_of(problems, **dict(zip(names, (load, displacement), strict=True)))
+        if found is None:
             return np.zeros(0)
-        name, given = (names[0], load) if load is not None else (names[1], displacement)
-        assert given is not None
-        values = numbers(problems, name, given)
-        if values is None:
-            return np.zeros(0)
+        name, values = found
         shape: tuple[int, ...] = () if self.directions == 1 else (2,)
         wanted = f"{'k, ' if steps else ''}{'2' if self.directions == 2 else ''}".rstrip(", ")
         wrong = values.shape[1:] != shape or values.ndim == 0 if steps else values.shape != shape

@@ -40,7 +40,7 @@ from upd.fitting.targets import (
 from upd.hbm import FrequencyResponse, climb
 from upd.hbm.core.fourier import to_complex
 from upd.hbm.springs.balance import Balance
-from upd.hbm.springs.starts import first_point, newton, place_sliders
+from upd.hbm.springs.sweep import first_point, newton, place_sliders
 from upd.linalg.parallel import threads_for
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import SIDES, Side

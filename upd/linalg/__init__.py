@@ -5,7 +5,7 @@ Each is a function that returns an array, a result of arrays, or a function.
 
 from __future__ import annotations
 
-from upd.linalg.amg import AmgSolution, amg_solve, compliance_amg
+from upd.linalg.amg import amg_solve, compliance_amg
 from upd.linalg.common import Condensation, Factor
 from upd.linalg.eigen import Eigenproblem, modes
 from upd.linalg.eigen_checks import Modes
@@ -15,7 +15,6 @@ from upd.linalg.select import Choice, Prediction, available, choose, predict
 from upd.linalg.superlu import factorise_superlu, schur_superlu
 
 __all__ = [
-    "AmgSolution",
     "Choice",
     "Condensation",
     "Eigenproblem",

@@ -11,41 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.errors import InputError
-from upd.labels import Shown
 from upd.linalg.common import FloatArray, checked_dofs, checked_vectors, log
 from upd.linalg.multigrid import MAX_ITERATIONS, MultigridSolver
+from upd.linalg.schur import Solved
 from upd.linalg.sweeps import WIDTH
 from upd.linalg.symmetric import checked
 
 RTOL = 1e-10
-
-
-@dataclass(frozen=True, repr=False)
-class AmgSolution(Shown):
-    """One answer of conjugate gradients.
-
-    Attributes
-    ----------
-    x : (n,) ndarray
-        Solution.
-    iterations : int
-        Their number.
-    residual : float
-        |b - K x| / |b|.
-    seconds : float
-        Set-up and solution.
-    status : int
-        0.
-    message : str
-        How it ended.
-    """
-
-    x: FloatArray
-    iterations: int
-    residual: float
-    seconds: float
-    status: int
-    message: str
 
 
 def amg_solve(
@@ -57,7 +29,7 @@ def amg_solve(
     points: ArrayLike | None = None,
     rtol: float = RTOL,
     max_iterations: int = MAX_ITERATIONS,
-) -> AmgSolution:
+) -> Solved:
     """Solve K x = rhs for a symmetric positive definite K.
 
     Parameters
@@ -81,7 +53,7 @@ def amg_solve(
 
     Returns
     -------
-    AmgSolution
+    Solved
 
     Raises
     ------
@@ -96,18 +68,11 @@ def amg_solve(
         raise InputError(
             f"amg_solve takes one right-hand side (n,), not {b.shape}: call it once per load case."
         )
-    begin = perf_counter()
-    solver = MultigridSolver(
+    found = MultigridSolver(
         A, near_null_space, layout=layout, points=points, max_iterations=max_iterations
-    )
-    size = float(np.linalg.norm(b))
-    if size == 0.0:
-        return AmgSolution(np.zeros(len(b)), 0, 0.0, solver.seconds, 0, "The load is zero.")
-    found = solver(b, rtol)
-    residual = float(np.linalg.norm(b - A @ found.x)) / size
-    message = f"Converged in {found.iterations} iterations to residual {residual:.1e}."
-    log.info("amg: %d dofs, %s", A.shape[0], message)
-    return AmgSolution(found.x, found.iterations, residual, perf_counter() - begin, 0, message)
+    )(b, rtol)
+    log.info("amg: %d dofs, Converged in %d iterations", A.shape[0], found.iterations)
+    return found
 
 
 @dataclass(frozen=True)

@@ -85,30 +85,19 @@ class Hierarchy:
             ) from error
         self.sizes = [*(level.P.shape[0] for level in levels), len(coarsest)]
 
-    @property
-    def nbytes(self) -> int:
-        """Memory of the levels."""
-        moves = (M for level in self._levels for M in (level.P, level.R))
-        own = sum(part.nbytes for M in moves for part in (M.data, M.indices, M.indptr))
-        return int(own) + sum(level.smoother.nbytes for level in self._levels)
+    def __call__(self, residuals: FloatArray) -> FloatArray:
+        """M R for one residual (n,), or up to `WIDTH` of them (n, k).
 
-    def many(self, residuals: FloatArray) -> FloatArray:
-        """M R for up to `WIDTH` residuals (n, k)."""
-        k = residuals.shape[1]
+        Each is scaled to one first: single precision has few powers of ten.
+        """
         sizes = np.abs(residuals).max(axis=0)
-        sizes[sizes == 0.0] = 1.0
-        scaled = np.zeros((self.n, WIDTH), np.float32)
-        scaled[:, :k] = residuals / sizes
-        out: FloatArray = self._cycle(0, scaled)[:, :k].astype(np.float64) * sizes
-        return out
-
-    def __call__(self, residual: FloatArray) -> FloatArray:
-        """M r. The residual is scaled to one first: single precision has few powers of ten."""
-        size = float(np.abs(residual).max())
-        if not size > 0.0:
-            return np.zeros(self.n)
-        out = self._cycle(0, (residual / size).astype(np.float32))
-        return out.astype(np.float64) * size
+        sizes = np.where(sizes > 0.0, sizes, 1.0)
+        scaled = (residuals / sizes).astype(np.float32)
+        if residuals.ndim == 2:
+            scaled = np.pad(scaled, ((0, 0), (0, WIDTH - residuals.shape[1])))
+        out = self._cycle(0, scaled).astype(np.float64)
+        found: FloatArray = (out if out.ndim == 1 else out[:, : residuals.shape[1]]) * sizes
+        return found
 
     def _cycle(self, depth: int, b: Single) -> Single:
         """One right-hand side (n,), or (n, WIDTH)."""
@@ -257,19 +246,21 @@ class MultigridSolver:
         self.seconds = perf_counter() - begin
         log.info("multigrid of %d dofs: levels %s", n, self._cycle.sizes)
 
-    @property
-    def nbytes(self) -> int:
-        """Memory of the hierarchy."""
-        return self._cycle.nbytes
-
     def _product(self, x: FloatArray) -> FloatArray:
+        """K x for one column (n,) or up to `WIDTH` (n, k): the compiler knows these widths."""
         if not isinstance(self._K, Symmetric):
             return np.asarray(self._K @ x)
-        return _symmetric(self._K, x[:, None])[:, 0]
+        wide = x[:, None]
+        if x.ndim == 2:
+            wide = np.zeros((len(x), WIDTH))
+            wide[:, : x.shape[1]] = x
+        U = self._K.upper
+        y = symmetric_product(U.indptr, U.indices, U.data, wide, width_of(wide))
+        return np.asarray(y[:, 0] if x.ndim == 1 else y[:, : x.shape[1]])
 
-    def _precondition(self, residual: FloatArray) -> FloatArray:
-        whole = np.zeros(self._n_padded)
-        whole[self._place] = residual
+    def _precondition(self, residuals: FloatArray) -> FloatArray:
+        whole = np.zeros((self._n_padded, *residuals.shape[1:]))
+        whole[self._place] = residuals
         return self._cycle(whole)[self._place]
 
     def many(self, rhs: FloatArray, accuracy: float) -> list[Solved]:
@@ -282,8 +273,8 @@ class MultigridSolver:
                 found += [self(np.ascontiguousarray(b), accuracy) for b in B.T]
                 continue
             made = block_conjugate_gradients(
-                self._products,
-                self._precondition_many,
+                self._product,
+                self._precondition,
                 B,
                 accuracy=accuracy,
                 max_iterations=self._max_iterations,
@@ -295,18 +286,6 @@ class MultigridSolver:
                 for x, error in zip(made.x.T, made.error, strict=True)
             ]
         return found
-
-    def _products(self, X: FloatArray) -> FloatArray:
-        if not isinstance(self._K, Symmetric):
-            return np.asarray(self._K @ X)
-        wide = np.zeros((len(X), WIDTH))
-        wide[:, : X.shape[1]] = X
-        return _symmetric(self._K, wide)[:, : X.shape[1]]
-
-    def _precondition_many(self, residuals: FloatArray) -> FloatArray:
-        whole = np.zeros((self._n_padded, residuals.shape[1]))
-        whole[self._place] = residuals
-        return self._cycle.many(whole)[self._place]
 
     def __call__(self, rhs: FloatArray, accuracy: float, start: FloatArray | None = None) -> Solved:
         """K^-1 rhs to a relative error in energy, from ``start``.
@@ -324,9 +303,3 @@ class MultigridSolver:
         )
         self._lowest = found.lowest
         return Solved(found.x, float(found.error), found.iterations)
-
-
-def _symmetric(K: Symmetric, X: FloatArray) -> FloatArray:
-    """K X for one column or `WIDTH`: the compiler knows these widths."""
-    U = K.upper
-    return np.asarray(symmetric_product(U.indptr, U.indices, U.data, X, width_of(X)))

@@ -79,12 +79,6 @@ class Smoother:
             self._cross = (place[across], starts, *_factors(A, across, starts))
         self._size = (0,) * size
 
-    @property
-    def nbytes(self) -> int:
-        """Memory."""
-        parts = [*self._A, *self._rows[:4], *self._lines, *(self._cross or ()), self.order]
-        return int(sum(v.nbytes for v in parts if v is not None))
-
     def first(self, b: Single) -> tuple[Single, Single]:
         """A forward sweep from zero: x and b - A x, for (n,) or (n, w)."""
         B = b.reshape(len(b), -1)

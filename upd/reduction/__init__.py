@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-from upd.reduction.attachments import AttachedModel, attachment_modes
-from upd.reduction.component_modes import ErrorTarget, craig_bampton, frequency_error
+from upd.reduction.component_modes import (
+    AttachedModel,
+    ErrorTarget,
+    attachment_modes,
+    craig_bampton,
+    frequency_error,
+)
 from upd.reduction.guyan import Condensed, condense
 from upd.reduction.mean_held import condense_held_in_mean
 from upd.reduction.reduced import ReducedModel

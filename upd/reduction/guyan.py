@@ -1,9 +1,12 @@
-"""Guyan (static) condensation of a body on the dofs that contact needs."""
+"""Guyan (static) condensation of a body on the dofs that contact needs, kept on disk under the hash
+of all it depends on.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,10 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve, lapack
 from scipy.sparse.csgraph import connected_components
 
+from upd.cache.arrays import Store, load_arrays, save_arrays, trim, unreadable
+from upd.cache.files import locked
 from upd.errors import ConvergenceError
-from upd.labels import Shown
 from upd.linalg.amg import compliance_amg
-from upd.linalg.common import EPS, checked_dofs, checked_vectors, log
+from upd.linalg.common import EPS, Condensation, checked_dofs, checked_vectors, log
 from upd.linalg.schur import schur_complement
 from upd.linalg.select import choose
 from upd.linalg.symmetric import Matrix, checked, stored, submatrix_of
@@ -33,7 +37,7 @@ _REMEDY = "To fix it: hold the distant set."
 
 
 @dataclass(frozen=True, repr=False)
-class Condensed(Shown):
+class Condensed(Condensation):
     """A body condensed on k kept dofs.
 
     Attributes
@@ -42,23 +46,15 @@ class Condensed(Shown):
         N/mm, symmetric positive definite stiffness at the kept dofs; loads elsewhere are zero.
     recover : callable
         u_kept (k,) or (k, m) -> u (n,) or (n, m), all dofs of K, by one back-substitution.
-    solver : str
-        Name of the solver that ran.
-    seconds : float
-        Wall time.
-    n_dof : int
-        n.
+    solver, seconds
+        As of `Condensation`.
     factor_nnz, peak_bytes : int
         Size of the factorisation (0 with multigrid: not known).
+    n_dof : int
+        n.
     """
 
-    S: FloatArray
-    recover: Callable[[FloatArray], FloatArray]
-    solver: str
-    seconds: float
-    n_dof: int
-    factor_nnz: int
-    peak_bytes: int
+    n_dof: int = 0
     _compliance: list[FloatArray] = field(default_factory=list, repr=False)
 
     @property
@@ -166,9 +162,7 @@ def condense(
     direct = "auto" if choice.name == "amg" else choice.name
     found = schur_complement(A, kept, solver=direct, keep_factor=keep_factor)
     _refuse_floating(found.S, A.diagonal()[kept])
-    return Condensed(
-        found.S, found.recover, found.solver, found.seconds, n, found.factor_nnz, found.peak_bytes
-    )
+    return Condensed(**vars(found), n_dof=n)
 
 
 def require_held(A: Matrix, modes: FloatArray | None) -> None:
@@ -212,7 +206,7 @@ def _by_multigrid(
         )
 
     found.C.flags.writeable = False
-    return Condensed(S, recover, "amg", found.seconds, A.shape[0], 0, 0, [found.C])
+    return Condensed(S, recover, "amg", found.seconds, 0, 0, A.shape[0], [found.C])
 
 
 def inverse_definite(S: FloatArray) -> FloatArray:
@@ -310,3 +304,85 @@ def _null_motions(K: Matrix, R: FloatArray) -> list[str]:
         for name, s, w in zip(names, share, np.linalg.norm(W, axis=0), strict=True)
         if s > 0.1 * w
     ]
+
+
+def stored_condensation(
+    store: Store, key: str, make: Callable[[], Condensed], *, solver: str, with_factor: bool
+) -> Condensed:
+    """The condensation under ``key``, from disk or by ``make``.
+
+    Parameters
+    ----------
+    store
+        Folder, bound of its size, and counts of what was taken from where.
+    key
+        Hash of all the condensation depends on.
+    make
+        Factorises.
+    solver
+        The one `key` stands for; what another one made (memory ran short meanwhile) is not kept.
+    with_factor
+        The factor is needed too, which is not kept on disk: then nobody waits for another process
+        that makes the same.
+    """
+    path = store.folder / f"{key}.npz"
+    found = _read(store, path, make)
+    if found is not None:
+        return found
+    if with_factor:
+        return _made(store, path, make, solver)
+    with locked(store.folder / f"{key}.lock"):
+        # Another process may have made it while this one waited.
+        return _read(store, path, make) or _made(store, path, make, solver)
+
+
+def _made(store: Store, path: Path, make: Callable[[], Condensed], solver: str) -> Condensed:
+    made = make()
+    store.counts["made"] += 1
+    if made.solver == solver:
+        sizes = np.array([made.n_dof, made.factor_nnz, made.peak_bytes], np.int64)
+        save_arrays(
+            path,
+            {"S": made.S, "C": made.compliance(), "sizes": sizes, "solver": np.array(made.solver)},
+        )
+        trim(store.folder, store.limit_bytes, path.name)
+    return made
+
+
+def _read(store: Store, path: Path, make: Callable[[], Condensed]) -> Condensed | None:
+    arrays = load_arrays(path)
+    if arrays is None:
+        return None
+    try:
+        S, C = arrays["S"], arrays["C"]
+        if (
+            S.ndim != 2
+            or S.shape[0] != S.shape[1]
+            or S.shape != C.shape
+            or not (np.isfinite(S).all() and np.isfinite(C).all())
+        ):
+            raise ValueError("the arrays are not those of a condensation")
+        revived = _revived(arrays, make, store.counts)
+    except (KeyError, ValueError, TypeError) as problem:
+        unreadable(path, problem)
+        return None
+    store.counts["disk"] += 1
+    return revived
+
+
+def _revived(
+    arrays: Mapping[str, NDArray[Any]], make: Callable[[], Condensed], counts: dict[str, int]
+) -> Condensed:
+    """The condensation read; the factor behind `recover` is made when first asked for."""
+    again: list[Condensed] = []
+
+    def recover(u_kept: NDArray[np.float64]) -> NDArray[np.float64]:
+        if not again:
+            again.append(make())
+            counts["factor"] += 1
+        return again[0].recover(u_kept)
+
+    n_dof, nnz, peak = (int(v) for v in arrays["sizes"])
+    C = arrays["C"]
+    C.flags.writeable = False
+    return Condensed(arrays["S"], recover, str(arrays["solver"]), 0.0, nnz, peak, n_dof, [C])

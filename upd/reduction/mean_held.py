@@ -154,7 +154,7 @@ def condense_held_in_mean(
         return moved
 
     return Condensed(
-        S, recover, found.solver, found.seconds, n, found.factor_nnz, found.peak_bytes, [C]
+        S, recover, found.solver, found.seconds, found.factor_nnz, found.peak_bytes, n, [C]
     )
 
 

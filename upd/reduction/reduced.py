@@ -79,33 +79,6 @@ class ReducedModel(Shown):
         """r = k + m."""
         return len(self.K)
 
-    def coordinates(self, dofs: ArrayLike) -> IntArray:
-        """Numbers of the coordinates that are the displacements of boundary dofs.
-
-        Parameters
-        ----------
-        dofs : (j,) array_like of int
-            Dofs of the full model.
-
-        Returns
-        -------
-        (j,) array of int
-
-        Raises
-        ------
-        InputError
-            For a dof that is not on the boundary.
-        """
-        wanted = np.atleast_1d(np.asarray(dofs, dtype=np.int64))
-        place = {int(dof): i for i, dof in enumerate(self.boundary)}
-        missing = [int(dof) for dof in wanted if int(dof) not in place]
-        if missing:
-            raise InputError(
-                f"Dofs {missing[:5]} are not on the boundary of the reduced model: reduce "
-                "with them kept, or use `at`."
-            )
-        return np.array([place[int(dof)] for dof in wanted], dtype=np.int64)
-
     def at(self, dofs: ArrayLike) -> FloatArray:
         """Rows of the basis at dofs of the full model.
 

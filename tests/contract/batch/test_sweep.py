@@ -24,7 +24,7 @@ from upd.batch.table import csv_text, make_columns, reasons
 from upd.cache.arrays import Store, active
 from upd.cli import main
 from upd.errors import InputError
-from upd.reduction.stored import stored_condensation
+from upd.reduction.guyan import stored_condensation
 from upd.results import Case, Result, shared_label
 from upd.vary.outcome import Outcome, read_outcome
 

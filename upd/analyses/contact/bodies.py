@@ -47,10 +47,9 @@ from upd.linalg.symmetric import Symmetric, submatrix_of
 from upd.mesh import Mesh, recipes
 from upd.mesh.hexmesh import upper_and_lower
 from upd.progress import Stages
-from upd.reduction.guyan import Condensed, condense, require_held
+from upd.reduction.guyan import Condensed, condense, require_held, stored_condensation
 from upd.reduction.learned import LearnedCompliance
 from upd.reduction.mean_held import condense_held_in_mean, motions_left
-from upd.reduction.stored import stored_condensation
 from upd.results import Case, Check
 
 Array = NDArray[np.float64]

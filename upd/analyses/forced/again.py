@@ -47,7 +47,7 @@ from upd.errors import ConvergenceError, UpdError, one_line
 from upd.hbm.core.fourier import harmonics, sample_count
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.peak import FIRST_REACH, is_near
-from upd.hbm.springs.starts import newton
+from upd.hbm.springs.sweep import newton
 from upd.linalg.parallel import threads_for
 from upd.mesh import recipes
 from upd.progress import Stages
