@@ -106,7 +106,8 @@ class Section(NamedTuple):
     def is_empty(self) -> bool:
         """Whether there is nothing to show."""
         has_rows = any(table.rows for table in self.tables)
-        return not (has_rows or self.notes or self.panels or self.texts or self.file)
+        shown = self.notes or self.panels or self.texts or self.file or self.surfaces
+        return not (has_rows or shown)
 
 
 def write_page(path: Path, html: str) -> Path:
