@@ -229,7 +229,7 @@ def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Cha
 
 # -- read back from its folder --------------------------------------------------------------------
 
-_FIELDS = frozenset(f.name for f in fields(Case))
+_CASE, _CHECK = (frozenset(f.name for f in fields(one)) for one in (Case, Check))
 
 
 def load(folder: str | Path) -> RunResult:
@@ -272,25 +272,13 @@ def load(folder: str | Path) -> RunResult:
 def _case(entry: Entry) -> Case:
     """The case from its fields; of unknown fields, from its words."""
     given = entry["case_fields"]
-    case = Case(**{key: value for key, value in given.items() if key in _FIELDS})
+    case = Case(**{key: value for key, value in given.items() if key in _CASE})
     return case if case.label == entry["case"] else Case(name=entry["case"])
 
 
-def _number(value: float | None) -> float:
-    """A number of summary.json, which has null for what is none."""
-    return math.nan if value is None else value
-
-
 def _check(entry: Entry) -> Check:
-    return Check(
-        entry["name"],
-        _case(entry),
-        _number(entry["value"]),
-        _number(entry["limit"]),
-        entry["says"],
-        entry.get("remedy", ""),
-        entry.get("fatal", entry["verdict"] == "failed"),
-        entry.get("quantity", ""),
-        entry.get("without"),
-        entry.get("included") if entry.get("quantity") is None else _number(entry["included"]),
-    )
+    """The check that `Check.as_dict` wrote, which has null for what is no number."""
+    given = {key: value for key, value in entry.items() if key in _CHECK}
+    numbers = ("value", "limit", *(["included"] * bool(entry.get("quantity"))))
+    found = {key: math.nan if entry.get(key) is None else entry[key] for key in numbers}
+    return Check(**given | found | {"case": _case(entry)})

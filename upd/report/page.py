@@ -45,8 +45,6 @@ _HEADINGS = {
 }
 #: figures beside the first tables
 _OPENED = 2
-#: a picture wider than this has drawings side by side
-_SHEET_PIXELS = 1300
 
 
 class Verdict(NamedTuple):
@@ -65,8 +63,6 @@ class Panel:
     ----------
     image
         Data URI of the picture that needs no script.
-    sheet
-        Whether that picture has drawings side by side, which need the width of the page.
     charts
         In the order of the page; those of one title share a place.
     """
@@ -74,7 +70,6 @@ class Panel:
     name: str
     heading: str
     image: str
-    sheet: bool
     charts: tuple[Chart, ...]
 
 
@@ -111,7 +106,8 @@ class Section(NamedTuple):
     def is_empty(self) -> bool:
         """Whether there is nothing to show."""
         has_rows = any(table.rows for table in self.tables)
-        return not (has_rows or self.notes or self.panels or self.texts or self.file)
+        shown = self.notes or self.panels or self.texts or self.file or self.surfaces
+        return not (has_rows or shown)
 
 
 def write_page(path: Path, html: str) -> Path:
@@ -256,8 +252,7 @@ def make_panels(charts: Iterable[Chart], figures: Mapping[str, Path]) -> list[Pa
         # at most six charts: a sheet of more is not read
         drawn = [chart for chart in group if chart.sheet][:6] or group[:6]
         png = figures[name].read_bytes() if name in figures else chart_png(drawn)
-        is_sheet = png_size(png)[0] > _SHEET_PIXELS
-        panels.append(Panel(name, heading, image_uri(png), is_sheet, tuple(group)))
+        panels.append(Panel(name, heading, image_uri(png), tuple(group)))
     return panels
 
 
@@ -299,11 +294,6 @@ def fitting(surfaces: Iterable[dict[str, Any]]) -> tuple[list[dict[str, Any]], l
             continue
         left_out += [f"{field['label']}: too large for this page" for field in fields[n:]]
     return shown, left_out
-
-
-def png_size(png: bytes) -> tuple[int, int]:
-    """Width and height in pixels, from the header every PNG begins with."""
-    return int.from_bytes(png[16:20], "big"), int.from_bytes(png[20:24], "big")
 
 
 def image_uri(png: bytes) -> str:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.pictures import png_size
 from upd import cli
-from upd.report.page import png_size
 from upd.scene import load_scene
 
 

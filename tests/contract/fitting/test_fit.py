@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 import upd
+from tests.pictures import png_size
 from upd import cli
 from upd.errors import InputError
 from upd.fitting import FitResponses, Residuals, knowledge, read_parameters, read_targets
 from upd.fitting.targets import KNOWN
-from upd.report.page import png_size
 from upd.scene import ForcedScene, load_scene
 
 RIGHT, LEFT = "stiffness.thesis.right.K_T", "stiffness.thesis.left.K_T"

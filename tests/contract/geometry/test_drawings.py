@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.pictures import png_size
 from upd.mesh import FloatArray, recipes
 from upd.mesh.section import Length, SectionView, cut
 from upd.plot.drawing import draw_sections
-from upd.report.page import png_size
 
 #: parts of a side that a set of nodes takes: no corners of the mesh
 SETS = {"band", "wire_position", "wire_width"}

@@ -21,6 +21,7 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.text import Text
 
+from tests.pictures import png_size
 from upd.plot.chart import (
     STATES,
     Area,
@@ -49,7 +50,6 @@ from upd.plot.style import (
 )
 from upd.plot.work_precision import work_precision_charts
 from upd.report.compare import overlaid
-from upd.report.page import png_size
 
 X, Y = Axis("x", "mm"), Axis("y", "N")
 T = np.array([0.0, 1.0, 2.0])

@@ -19,11 +19,11 @@ import pytest
 from rigs import LINES
 
 import upd
+from tests.pictures import png_size
 from upd import cli
 from upd.analyses.forced import peaks
 from upd.analyses.forced.curves import linear_modes
 from upd.errors import InputError
-from upd.report.page import png_size
 from upd.scene import load_scene
 from upd.sizing import BestDamper, search
 from upd.sizing.choice import is_along, sensitivities

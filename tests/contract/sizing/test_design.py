@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import upd
+from tests.pictures import png_size
 from upd import cli
 from upd.contact.rigid_damper import SLIDINGS, DamperSection, FaceSection, eccentricity
 from upd.errors import InputError
-from upd.report.page import png_size
 from upd.scene import load_scene
 from upd.sizing import damper_statics
 from upd.sizing.statics import (
