@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from upd.analyses.measured import accelerance_array, measured_arrays
 from upd.analyses.modal.plan import parameters
-from upd.analyses.modal.results import REDUCED, mode_results, reduced_frequencies
+from upd.analyses.modal.results import REDUCED, reduced_frequencies
 from upd.analyses.modal.solve import Array, ModalSolution, ModeSet, RigMode, RigResponse
 from upd.errors import MeshError
 from upd.matrices import DofMap, Matrices, write_dof_map, write_matrices
@@ -47,10 +47,7 @@ def arrays(solution: ModalSolution) -> dict[str, Group]:
         Group -> variable -> (dimensions, array, attributes). Contents: "modes", "response",
         "reduction".
     """
-    out = {
-        f"modes {found.kind} {found.arrangement}": _modes(solution, found)
-        for found in solution.sets
-    }
+    out = {f"modes {found.kind} {found.arrangement}": _modes(found) for found in solution.sets}
     if solution.response is not None:
         out |= {
             f"response {kind}": _response(solution.response, kind)
@@ -67,20 +64,13 @@ def arrays(solution: ModalSolution) -> dict[str, Group]:
     return out
 
 
-def _modes(solution: ModalSolution, found: ModeSet) -> Group:
+def _modes(found: ModeSet) -> Group:
     variables: dict[str, Any] = {
         "frequency": variable("mode", [m.frequency for m in found.modes], "Hz"),
         "family": variable(
             "mode", [{"x": 0, "y": 1}.get(m.family, -1) for m in found.modes], flag_meanings="x y"
         ),
     }
-    printed = mode_results(solution, found)
-    references = np.array([np.nan if r.reference is None else r.reference for r in printed])
-    if np.isfinite(references).any():
-        source = ", ".join(dict.fromkeys(r.source for r in printed if r.source))
-        variables["reference"] = variable(
-            "mode", references, "Hz", "printed frequency", source=source
-        )
     return Group(variables, content=MODES, case=found.case)
 
 
