@@ -398,10 +398,12 @@ def _coarser(plan: ForcedPlan, factor: float) -> Variation:
     become linear ones with incompatible modes at the last.
     """
     scene, size = plan.scene, 1.0 / factor
+    gauss, own = scene.contact.rule == GAUSS, scene.recipe == RECIPE
     label, changes = f"{factor:g} times the elements along every edge", Overrides()
-    if scene.contact.rule == GAUSS and recipes.has_parameter(scene.recipe, "refine"):
-        refine = plan.parameters.get("refine", count_of(scene, "refine"))
-        changes = of_geometry({"refine": factor * refine})
+    if gauss and own and (fewer := times(scene, factor)) != times(scene, 1.0):
+        changes = of_geometry(fewer)
+    elif gauss and not own and "refine" in plan.parameters:
+        changes = of_geometry({"refine": factor * plan.parameters["refine"]})
     elif NODES[scene.mesh.element] > 8 and factor == min(COARSER):
         changes = (("mesh.element", "hex8i"),)
         label, size = "hex8i elements on the same lattice", _LINEAR
@@ -467,6 +469,16 @@ def meshed(scene: ForcedScene) -> tuple[str, ...]:
     """
     on = _ON_CONTACT[scene.arrangement] if scene.contact.rule == GAUSS else ()
     return (*OFF_CONTACT, *(key for key in GRADED if on and key.startswith(on)))
+
+
+def times(scene: ForcedScene, factor: float) -> dict[str, int]:
+    """So many times the counts, rounded up to those the recipe allows, as its parameters."""
+    known = recipes.parameters(scene.recipe).__dataclass_fields__
+    out = {}
+    for key in meshed(scene):
+        step = 2 if known[key].metadata["bounds"].even else 1
+        out[key] = step * max(1, math.ceil(factor * count_of(scene, key) / step))
+    return out
 
 
 def graded(scene: ForcedScene, factor: float) -> dict[str, Any]:

@@ -71,6 +71,8 @@ class FacePoints:
         (m, k) of their shape functions.
     line
         (m, 2) row and column of points on the lattice, or of Gauss points, -1 for others.
+    per_part
+        Gauss points along the damper in each part of the face; 0 for points of another rule.
     """
 
     position: FloatArray
@@ -79,6 +81,7 @@ class FacePoints:
     nodes: IntArray
     values: FloatArray
     line: IntArray
+    per_part: int = 0
 
     @property
     def n_point(self) -> int:
@@ -189,6 +192,19 @@ def lagrange(at: FloatArray, x: FloatArray) -> FloatArray:
     return out
 
 
+def fewer_rows(face: FacePoints, rows: int) -> FloatArray:
+    """(m, n) displacements of fewer rows of Gauss points from those of a face, exactly.
+
+    l_i of m < n points has a degree below n, so l_i = sum_j l_i(x_j) l_j of n points, and
+    u_i = sum_j l_i(x_j) (w_j / w_i) u_j.
+    """
+    n = int(face.line[:, 0].max()) + 1
+    (fine, w_fine), (coarse, w_coarse) = map(np.polynomial.legendre.leggauss, (n, rows))
+    up = lagrange(coarse, fine) * w_fine / w_coarse[:, None]
+    parts = face.n_point // (n * face.per_part)
+    return np.kron(np.eye(parts), np.kron(up, np.eye(face.per_part)))
+
+
 def gauss_points(mesh: Mesh, rows: int, columns: int, side: str) -> FacePoints:
     """Points of a patch by polynomials.
 
@@ -239,6 +255,7 @@ def gauss_points(mesh: Mesh, rows: int, columns: int, side: str) -> FacePoints:
         nodes,
         values,
         np.vstack(line),
+        count,
     )
 
 
@@ -480,10 +497,10 @@ def attached_part(
     rows, columns = lines
     known_keys = (key for key, one in bodies.attached.items() if len(one.frequency) >= most)
     key = next(
-        (k for k in known_keys if k[0] == side and k[1] >= rows and k[2] in (columns, 2 * columns)),
+        (k for k in known_keys if k[0] == side and k[1] >= rows and k[2] == columns),
         (side, 2 * rows if again else rows, columns),
     )
-    many, face = (gauss_points(blade.mesh, *n, side) for n in (key[1:], lines))
+    many = gauss_points(blade.mesh, *key[1:], side)
     if key not in bodies.attached or len(bodies.attached[key].frequency) < most:
         loads = _loads(blade, many, names)
         found = attachment_modes(blade.K, blade.M, loads, most, solver=solver)
@@ -491,8 +508,7 @@ def attached_part(
     known = bodies.attached[key]
     twice = 2.0 if bodies.half else 1.0
     seen, probes = np.split(known.rows, [3 * many.n_point])
-    # polynomials of a lower degree are sums of those of a higher one
-    at = np.linalg.lstsq(many.values.T, face.values.T)[0].T
+    at = fewer_rows(many, rows)
     seen = np.einsum("mn,ncr->mcr", at, seen.reshape(many.n_point, 3, -1))
     return BladePart(twice * known.K, twice * known.M, seen, probes, most)
 
