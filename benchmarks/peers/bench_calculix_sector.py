@@ -100,7 +100,13 @@ def compare(mesh: Mesh) -> Iterator[Row]:
     moved = displaced_stiffness(mesh, STEEL, SPEED**2 * u, "hex20") + SPEED**2 * spin
     kinds = (
         ("at rest", rest, 0.0, False, 1e-4),
-        (f"{SPEED:g} rad/s, displaced state too", CyclicModel.of(sector, moved, M), 0.0, True, 1e-4),
+        (
+            f"{SPEED:g} rad/s, displaced state too",
+            CyclicModel.of(sector, moved, M),
+            0.0,
+            True,
+            1e-4,
+        ),
         (f"{SPEED:g} rad/s", CyclicModel.of(sector, K, M, spin), SPEED, True, 0.05),
     )
     for n in DIAMETERS:
