@@ -80,7 +80,7 @@ def _curves_s(scene: BladedDiskScene, contact: int) -> float:
     """Seconds of the damped curves, of one thread."""
     curves = 1.5 * damped(scene) + len(scene.response.ratios) * scene.wants("performance")
     unknowns = 6 * contact * (2 * scene.response.harmonics + 1)
-    return curves * _CURVE_S * (unknowns / _UNKNOWNS) ** 1.5
+    return float(curves * _CURVE_S * (unknowns / _UNKNOWNS) ** 1.5)
 
 
 def _effects(scene: BladedDiskScene) -> list[Effect]:
