@@ -7,7 +7,7 @@ import pytest
 
 from tests.sectors import bladed_sector, model_of, with_contacts
 from upd.analyses.bladed_disk.response import Wedge, on_sector, performance, wave_response
-from upd.hbm import nodal_diameters
+from upd.hbm import FrequencyResponse, nodal_diameters
 from upd.reduction.cyclic import ReducedSector, reduce_sector
 
 N, ORDER, F_C = 12, 3, 60.0
@@ -32,17 +32,10 @@ def tip(sectors: dict[int, ReducedSector]) -> tuple[np.ndarray, np.ndarray]:
     return rows.T @ [-np.sin(a), np.cos(a), 1.0], rows[2]
 
 
-@pytest.mark.parametrize(
-    ("highest", "samples", "cyclic", "unreduced"),
-    [(1, 32, 0.02600565, 0.02600407), (3, 64, 0.02589690, 0.02589538)],
-)
-def test_one_sector_is_all_sectors(
-    sectors: dict[int, ReducedSector],
-    highest: int,
-    samples: int,
-    cyclic: float,
-    unreduced: float,
-) -> None:
+def at_520_hz(
+    sectors: dict[int, ReducedSector], highest: int, samples: int
+) -> tuple[FrequencyResponse, float]:
+    """The answer at one frequency, and the amplitude at the tip in mm."""
     force, row = tip(sectors)
     answer = wave_response(
         sectors,
@@ -54,11 +47,39 @@ def test_one_sector_is_all_sectors(
         harmonics=range(highest + 1),
         samples=samples,
     )
-    found = answer.amplitude(on_sector(row))[0]
+    return answer, float(answer.amplitude(on_sector(row))[0])
+
+
+@pytest.mark.parametrize(
+    ("highest", "samples", "cyclic", "unreduced"),
+    [(1, 32, 0.02600565, 0.02600407), (3, 64, 0.02589690, 0.02589538)],
+)
+def test_one_sector_is_all_sectors(
+    sectors: dict[int, ReducedSector],
+    highest: int,
+    samples: int,
+    cyclic: float,
+    unreduced: float,
+) -> None:
+    """At the samples of both: many more lower the amplitude by .12 and .02 %, see below."""
+    answer, found = at_520_hz(sectors, highest, samples)
     assert answer.x.shape[1] == 36 * (2 * highest + 1) + 6
     assert found == pytest.approx(cyclic, rel=1e-6)
     assert found == pytest.approx(unreduced, rel=1e-4)
     assert abs(answer.energy_balance[0]) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("highest", "samples", "limit"), [(1, 32, 0.02597499), (3, 64, 0.02589208)]
+)
+def test_the_limit_of_many_samples(
+    sectors: dict[int, ReducedSector], highest: int, samples: int, limit: float
+) -> None:
+    """Forces are straight between samples: the error falls at least with their square."""
+    few, more, many = (
+        abs(at_520_hz(sectors, highest, k * samples)[1] / limit - 1.0) for k in (1, 4, 16)
+    )
+    assert few < 1.3e-3 and more < few / 4.0 and many < 5e-6
 
 
 def test_the_best_wedge_lies_between_free_and_stuck(sectors: dict[int, ReducedSector]) -> None:
@@ -67,7 +88,8 @@ def test_the_best_wedge_lies_between_free_and_stuck(sectors: dict[int, ReducedSe
     given = {"force": force, "engine_order": ORDER, "frequencies": f, "harmonics": (0, 1)}
     found = performance(sectors, WEDGE, F_C, [600.0, 60.0, 20.0], row, **given)
     fixed = wave_response(sectors, WEDGE, F_C, **given | {"force": 0.1 * force})
-    assert found.height[0] == pytest.approx(fixed.stuck(on_sector(row), f).max() / 0.1, rel=0.02)
-    assert found.best > 0
-    assert found.height[found.best] < 0.7 * found.height[0]
+    stuck = fixed.stuck(on_sector(row), f).max() / 0.1
+    assert found.height[-1] == pytest.approx(stuck, rel=0.02)
+    ratio, lowest = found.best
+    assert ratio < 100.0 and lowest < 0.7 * stuck
     assert WEDGE.centrifugal_force(100.0) == pytest.approx(143.0)

@@ -227,18 +227,18 @@ def study(
     Parameters
     ----------
     vary
-        What is varied. mesh, element: every scene. steps: load steps (coupled contacts,
-        seated dampers) or time steps a period (forced responses: sweeps up and down). modes: rigs
-        and forced responses, those kept in the reduction. harmonics, samples, contacts (points of
-        the springs), contact (springs, then both faces node by node): forced responses. accuracy,
-        solver: contacts. patch: curved contacts. parameters (one at a time): flat contacts.
-        dimensions (d ln f / d ln p): rigs.
+        What is varied. mesh: every scene. element: all but bladed disks. steps: load steps (coupled
+        contacts, seated dampers) or time steps a period (forced responses: sweeps up and down).
+        modes: rigs and forced responses, those kept in the reduction. harmonics, samples, contacts
+        (points of the springs), contact (springs, then both faces node by node): forced responses;
+        harmonics of bladed disks too. accuracy, solver: contacts. patch: curved contacts.
+        parameters (one at a time): flat contacts. dimensions (d ln f / d ln p): rigs.
     levels
         Levels of a ladder, coarse to fine: divisions of the patch (mesh, element and solver of
-        contacts), refinements (of rigs and forced responses: 0.5 1 2), elements up a face (contact:
-        4 8 12 are 60, 198 and 468 nodes of the symmetric rig, 3 6 9 are 60, 196 and 460 of the
-        asymmetric one; without, two that take minutes), errors in per cent (accuracy: 5 2 1),
-        harmonics and so on.
+        contacts), refinements (of rigs and forced responses: 0.5 1 2), shares of the elements along
+        edges (bladed disks: 0.5 1), elements up a face (contact: 4 8 12 are 60, 198 and 468 nodes
+        of the symmetric rig, 3 6 9 are 60, 196 and 460 of the asymmetric one; without, two that
+        take minutes), errors in per cent (accuracy: 5 2 1), harmonics and so on.
     at
         The load that is studied: F_C/F_E of a forced response (--at 194; without, the scene's
         lowest), the normal force of a contact (--at "200 N"; without, all of the scene's), F_C of

@@ -31,6 +31,7 @@ from upd.errors import ConvergenceError, InputError, MeshError
 from upd.labels import Shown
 from upd.linalg.common import EPS, FloatArray, IntArray, Solve
 from upd.linalg.hermitian import ComplexArray, HermitianModes, hermitian_factor, hermitian_modes
+from upd.linalg.parallel import threads_for
 from upd.mesh import Mesh
 
 #: Largest offset of a node from its partner, relative to the distance of neighbours on the face.
@@ -381,7 +382,8 @@ class ModeFamily(Shown):
         if speed != 0.0 and self.spin is not None:
             K = K + speed**2 * _dense(self.spin, nodal_diameter)
         M = _dense(self.M, nodal_diameter)
-        value = eigh(K, M, eigvals_only=True, subset_by_index=[0, count - 1])
+        with threads_for(len(M)):
+            value = eigh(K, M, eigvals_only=True, subset_by_index=[0, count - 1])
         if not value[0] > 0.0:
             raise ConvergenceError(unstable(nodal_diameter, speed))
         out: FloatArray = np.sqrt(value) / (2.0 * np.pi)
@@ -521,6 +523,8 @@ def facing_contacts(sector: Sector) -> tuple[IntArray, IntArray]:
 
 
 _CONTACTS = ("contact_right", "contact_left")
+#: Frequencies of a reduced sector that are compared with those of the full one.
+_COMPARED = 4
 
 
 def reduce_sector(
@@ -531,7 +535,7 @@ def reduce_sector(
     keep: Mapping[str, IntArray],
     speed: float = 0.0,
     damping: tuple[float, float] = (0.0, 0.0),
-    compare: int = 4,
+    full: FloatArray | None = None,
 ) -> ReducedSector:
     """Craig-Bampton reduction [2]_ for one nodal diameter.
 
@@ -552,8 +556,8 @@ def reduce_sector(
         rad/s.
     damping : (alpha, beta)
         C = alpha M + beta K, 1/s and s.
-    compare : int
-        Frequencies compared with the full sector.
+    full : (c,) ndarray, optional
+        Lowest frequencies of the full sector, Hz, where they are known; else four are computed.
 
     Returns
     -------
@@ -575,7 +579,8 @@ def reduce_sector(
     b = np.unique(np.concatenate(list(dofs.values())))
     K, M = model.stiffness(nodal_diameter, speed), model.M.at(nodal_diameter)
     solve = model.factor(nodal_diameter, speed)
-    full = hermitian_modes(K, M, compare, solve).frequency
+    if full is None:
+        full = hermitian_modes(K, M, _COMPARED, solve).frequency
     Psi, S = _constraint_modes(solve, b, K.shape[0], K.dtype)
     fixed, Phi = _held_modes(K, M, solve, Psi, b, n_modes)
     T = np.hstack([Psi, Phi])
@@ -587,7 +592,7 @@ def reduce_sector(
     M_r = 0.5 * (M_r + M_r.conj().T)
     rows = {name: np.eye(r)[np.searchsorted(b, one)] for name, one in dofs.items()}
     R = turn(2.0 * np.pi / sector.n_sectors)
-    value = eigh(K_r, M_r, eigvals_only=True, subset_by_index=[0, compare - 1])
+    value = eigh(K_r, M_r, eigvals_only=True, subset_by_index=[0, len(full) - 1])
     return ReducedSector(
         sector.n_sectors,
         nodal_diameter,

@@ -222,7 +222,11 @@ WAVE_DAMPED = Quantity("damped_amplitude", "um", "damped peak")
 WAVE_FREQUENCY = Quantity("damped_frequency", "Hz", "frequency of the damped peak")
 WAVE_REDUCTION = Quantity("amplitude_reduction", "%", "reduction of the free peak")
 WAVE_CENTRIFUGAL = Quantity("wedge_centrifugal", "N", "F_C of the wedge")
+WAVE_START = Quantity("start_change", "%", "change of the damped peak by another slider start")
+WAVE_CREEP = Quantity("force_creep", "%", "change of contact forces in 40 more periods")
+WAVE_AXIAL = Quantity("wedge_axial", "N", "mean axial force on the guide of the wedge")
 BEST_MASS = Quantity("best_damper_mass", "g", "mass with the lowest peak")
+BEST_MASS_PEAK = Quantity("best_mass_amplitude", "um", "damped peak with it")
 
 # -- damper between two blades ---------------------------------------------------------------------
 

@@ -72,6 +72,9 @@ class WedgeChoice:
         Of all contact points of a face.
     friction
         Coulomb's coefficient.
+    axial_stiffness
+        Of what holds the wedge along the axis, a pin or end walls: friction alone lets a wedge walk
+        off that slips on all its faces. From 10 to 1000 N/mm it changes no peak by .1 %.
     """
 
     __pydantic_config__ = STRICT
@@ -80,6 +83,7 @@ class WedgeChoice:
     normal_stiffness: Annotated[float, q.quantity("stiffness"), q.positive] = 2e4
     tangential_stiffness: Annotated[float, q.quantity("stiffness"), q.positive] = 1e4
     friction: q.Coefficient = 0.3
+    axial_stiffness: Annotated[float, q.quantity("stiffness"), q.positive] = 100.0
 
 
 @dataclass(frozen=True)
@@ -93,23 +97,24 @@ class WaveChoice:
     damping
         Ratio of the mode at the crossing; damping is proportional to the stiffness.
     harmonics
-        Number of harmonics above the mean. Cost: nodal diameters to reduce, unknowns in
-        proportion.
+        Number of harmonics above the mean: of the ready scene's damped peak, 1 leaves out 3 %, 3
+        leave out .1 %, under ten times the load 40 % and 6 %. Cost: nodal diameters to reduce,
+        unknowns in proportion.
     modes
         Modes of a reduced sector with its contact points held. Cost: small.
     points
         Frequencies of a curve. Cost: time in proportion.
     ratios
-        F_C/F_E of the performance curve. Cost: a curve each.
+        F_C/F_E of the performance curve, beside that of the response. Cost: a curve each.
     """
 
     __pydantic_config__ = STRICT
     force: q.Force = 1.0
     damping: q.Share = 0.002
-    harmonics: Annotated[int, q.at_least(1)] = 1
+    harmonics: Annotated[int, q.at_least(1)] = 3
     modes: Annotated[int, q.at_least(1)] = 15
     points: Annotated[int, q.at_least(5)] = 25
-    ratios: Annotated[tuple[q.Ratio, ...], q.FILLED] = (300.0, 600.0, 1200.0)
+    ratios: Annotated[tuple[q.Ratio, ...], q.FILLED] = (10.0, 20.0, 40.0, 100.0)
 
 
 @dataclass(frozen=True, kw_only=True)

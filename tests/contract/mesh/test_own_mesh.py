@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import upd
+from geometry.blocks.gmsh_session import session
+from tests.sectors import STEEL, lattice_sector
 from upd.errors import InputError, UpdError
+from upd.fem import mass, stiffness
 from upd.mesh import Mesh, recipes
 from upd.mesh.checks import check_pairs
 from upd.mesh.export import write_mesh
 from upd.mesh.hexmesh import boundary_faces, boundary_quads
+from upd.reduction.cyclic import CyclicModel, Sector, facing_contacts
 from upd.report.tables import warnings
 
 EXAMPLES = Path(upd.__file__).parent / "scenes" / "examples"
@@ -277,3 +282,78 @@ def test_rig_of_one_s_own(tmp_path: Path) -> None:
     theirs = upd.run("rig", overrides={k: v for k, v in given.items() if k != "geometry"})
     for k in range(1, 5):
         assert ours.value(f"f{k}_free") == pytest.approx(theirs.value(f"f{k}_free"), rel=1e-8)
+
+
+def written_by_gmsh(file: Path) -> None:
+    """A sector of 30 deg, its middle third higher than the rest, revolved by gmsh."""
+    with session("sector") as gmsh:
+        geo, axis = gmsh.model.geo, (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        a = np.radians(10.0)
+        corner = {
+            (r, z): geo.addPoint(r * np.cos(a), r * np.sin(a), z)
+            for r in (60.0, 100.0, 120.0)
+            for z in (-4.0, 4.0)
+        }
+        around = [(60, -4), (100, -4), (120, -4), (120, 4), (100, 4), (60, 4), (60, -4)]
+        b = [geo.addLine(corner[i], corner[j]) for i, j in pairwise(around)]
+        middle = geo.addLine(corner[100.0, -4.0], corner[100.0, 4.0])
+        disk = geo.addPlaneSurface([geo.addCurveLoop([b[0], middle, b[4], b[5]])])
+        blade = geo.addPlaneSurface([geo.addCurveLoop([b[1], b[2], b[3], -middle])])
+        for one in (*b, middle):
+            geo.mesh.setTransfiniteCurve(one, 2 if one in (b[1], b[3]) else 3)
+        for one in (disk, blade):
+            geo.mesh.setTransfiniteSurface(one)
+            geo.mesh.setRecombine(2, one)
+        parts = [
+            geo.revolve([(2, disk)], *axis, -a, numElements=[2], recombine=True),
+            geo.revolve([(2, disk), (2, blade)], *axis, a, numElements=[2], recombine=True),
+        ]
+        parts.append(geo.revolve(parts[1][:1], *axis, a, numElements=[2], recombine=True))
+        geo.synchronize()
+        volumes = [tag for part in parts for dim, tag in part if dim == 3]
+        gmsh.model.addPhysicalGroup(3, volumes, name="sector")
+        gmsh.model.mesh.generate(3)
+        groups: dict[str, list[int]] = {}
+        for _, tag in gmsh.model.getEntities(2):
+            nodes = gmsh.model.mesh.getNodes(2, tag, includeBoundary=True)[1].reshape(-1, 3)
+            r, angle = np.hypot(nodes[:, 0], nodes[:, 1]), np.degrees(np.arctan2(*nodes.T[1::-1]))
+            for name, where in {
+                "low": np.isclose(angle, 0.0),
+                "high": np.isclose(angle, 30.0),
+                "clamped": np.isclose(r, 60.0),
+                "contact_left": np.isclose(angle, 10.0) & (r > 99.0),
+                "contact_right": np.isclose(angle, 20.0) & (r > 99.0),
+            }.items():
+                groups.setdefault(name, []).extend([tag] * bool(where.all()))
+        for name, tags in groups.items():
+            gmsh.model.addPhysicalGroup(2, tags, name=name)
+        gmsh.write(str(file))
+
+
+def test_a_sector_written_by_gmsh(tmp_path: Path) -> None:
+    written_by_gmsh(tmp_path / "sector.msh")
+    given = {
+        "name": "mine",
+        "want": ["modes"],
+        "geometry": {"recipe": str(tmp_path / "sector.msh"), "n_sectors": 12},
+        "mesh": {"element": "hex8"},
+        "material": {"E": "200 GPa", "nu": 0.3, "density": "7800 kg/m3"},
+        "modes": {"count": 2},
+        "rotation": {"speed": "6000 rpm"},
+    }
+    theirs = upd.run(given, report=False)
+    mesh = lattice_sector(
+        [60, 80, 100, 120],
+        np.arange(0, 31, 5),
+        [-4, 0, 4],
+        lambda r, angle: r < 100 or 10 < angle < 20,
+        8,
+    )
+    K, M = stiffness(mesh, STEEL, "hex8"), mass(mesh, STEEL)
+    model = CyclicModel.of(Sector.of(mesh, 12), K, M)
+    read = recipes.build_mesh(given["geometry"]["recipe"], {"n_sectors": 12})[0]["sector"]
+    right, left = facing_contacts(Sector.of(read, 12))
+    assert len(right) == len(left) == 6
+    for n in (0, 1, 6):
+        found = [one.value for one in theirs.results if one.case.nodal_diameter == n]
+        np.testing.assert_allclose(found, model.modes(n, 2).frequency, rtol=1e-6)

@@ -22,6 +22,8 @@ ANALYSIS = Analysis(
     write_files=output.write_files,
     charts=charts.charts,
     headline=output.headline,
+    answer=output.answer,
+    estimate=output.estimate,
 )
 
 __all__ = ["ANALYSIS"]

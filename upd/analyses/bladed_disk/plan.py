@@ -15,8 +15,13 @@ from upd.scene import BladedDiskScene
 BladedDiskPlan = Plan[BladedDiskScene]
 #: checks of effects left out
 CORIOLIS, DISPLACED = "Coriolis force", "initial displacements"
-# A Hermitian problem of a nodal diameter over the real one of the sector, by dofs; figures, page.
-_COMPLEX, _FILES_S = 2.0, 1.5
+# Figures, page.
+_FILES_S = 1.5
+# Bytes of the complex problem of a nodal diameter over those of the real sector: of its modes,
+# with its reduction (recorded: 3.4 at 3000 dofs, 3.6 to 3.9 at 54 000).
+_COMPLEX, _REDUCED = 2.0, 4.0
+# A damped curve, in seconds of one thread (recorded: 4 to 10), at so many unknowns.
+_CURVE_S, _UNKNOWNS = 6.0, 756.0
 
 
 def parameters(scene: BladedDiskScene) -> dict[str, Any]:
@@ -50,10 +55,12 @@ def make_plan(scene: BladedDiskScene) -> BladedDiskPlan:
     cost = CostModel(scene)
     for body, count in size.items():
         cost.dynamic_body(count["hexes"], count["nodes"], 2.0)
-        # the check solves one more, the static state half of one
-        times = int(_COMPLEX * (len(computed(scene)) + 1.5))
-        reduced = 2 * (scene.response.harmonics + 1) if damped(scene) else 0
-        cost.modes(f"{body}, modes", count["hexes"], count["nodes"], times + reduced)
+        # the check solves one more; of the harmonics, some share a nodal diameter
+        most = min(scene.response.harmonics + 1, scene.n_sectors // 2 + 1)
+        times = len(computed(scene)) + 1 + most * damped(scene)
+        cost.modes(f"{body}, modes", count["hexes"], count["nodes"], times)
+        cost.shared += _curves_s(scene, count["contact"])
+    cost.jobs = [(_REDUCED if damped(scene) else _COMPLEX) * one for one in cost.jobs]
     memory, workers = cost.side_by_side(1, 1)
     return BladedDiskPlan(
         scene,
@@ -67,6 +74,13 @@ def make_plan(scene: BladedDiskScene) -> BladedDiskPlan:
         workers,
         files_seconds=_FILES_S,
     )
+
+
+def _curves_s(scene: BladedDiskScene, contact: int) -> float:
+    """Seconds of the damped curves, of one thread."""
+    curves = 1.5 * damped(scene) + len(scene.response.ratios) * scene.wants("performance")
+    unknowns = 6 * contact * (2 * scene.response.harmonics + 1)
+    return float(curves * _CURVE_S * (unknowns / _UNKNOWNS) ** 1.5)
 
 
 def _effects(scene: BladedDiskScene) -> list[Effect]:

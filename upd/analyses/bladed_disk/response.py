@@ -2,12 +2,16 @@
 
 The wedge is a rigid body on contact points at both platforms. The centrifugal force presses it
 outwards; both faces lean towards the radius in the middle of the gap. It starts without mean
-friction.
+friction. Where all points slip, they forget, and what pushes the wedge along the axis in the mean
+over a cycle has no answer but that of its guide, a pin or the end walls of its pocket: without a
+guide it walks off, and curves under a high load stop where it begins to.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +26,11 @@ from upd.hbm import (
     rigid_damper,
     travelling_wave_response,
 )
+from upd.hbm.springs.peak import climb
+from upd.hbm.springs.response import parabola
+from upd.hbm.springs.starts import newton
+from upd.linalg.parallel import in_parallel
+from upd.linalg.select import threads
 from upd.reduction.cyclic import ReducedSector, turn
 
 FloatArray = NDArray[np.float64]
@@ -43,6 +52,8 @@ class Wedge(NamedTuple):
     k_n, k_t : float
         Stiffness of all points of a face [N/mm].
     mu : float
+    guide : float
+        Stiffness of what holds it along the axis [N/mm].
     """
 
     mass: float
@@ -52,6 +63,7 @@ class Wedge(NamedTuple):
     k_n: float
     k_t: float
     mu: float
+    guide: float = 0.0
 
     def centrifugal_force(self, speed: float) -> float:
         """F_C = m r Omega^2 [N] at a speed in rad/s."""
@@ -88,7 +100,13 @@ def gap_of(sector: ReducedSector, wedge: Wedge, f_c: float) -> WedgeGap:
     own = turn(float(middle))
     radial, across, axial = own.T
     centre = wedge.radius * radial + np.mean([end[2] for end in ends]) * axial
-    damper = rigid_damper(wedge.mass, own * wedge.inertia @ own.T, centre, f_c * radial)
+    damper = rigid_damper(
+        wedge.mass,
+        own * wedge.inertia @ own.T,
+        centre,
+        f_c * radial,
+        guide=(0.0, 0.0, wedge.guide, 0.0, 0.0, 0.0),
+    )
     lean = np.radians(wedge.angle)
     normals = [np.cos(lean) * radial + side * np.sin(lean) * across for side in (-1.0, 1.0)]
     frames = [np.tile([n, axial, np.cross(n, axial)], (p, 1, 1)) for n in normals]
@@ -180,9 +198,40 @@ class WavePerformance(NamedTuple):
     height: FloatArray
 
     @property
-    def best(self) -> int:
-        """Number of the lowest peak."""
-        return int(np.nanargmin(self.height))
+    def inside(self) -> bool:
+        """Whether a peak between the first and the last ratio is the lowest."""
+        found = np.isfinite(self.height)
+        return bool(found.any() and 0 < np.nanargmin(self.height[found]) < found.sum() - 1)
+
+    @property
+    def best(self) -> tuple[float, float]:
+        """F_C/F_E and height of the lowest peak, by a parabola of their logarithms."""
+        found = np.isfinite(self.height)
+        at, depth = parabola(np.log(self.ratio[found]), -np.log(self.height[found]))
+        return float(np.exp(at)), float(np.exp(-depth))
+
+
+def other_start(answer: FrequencyResponse, row: ArrayLike) -> float:
+    """The peak with sliders that start in the middle of what they may hold.
+
+    Points that partly stick keep the traction of their start: the change of the peak shows what
+    that leaves open.
+
+    Parameters
+    ----------
+    answer : FrequencyResponse
+        Of `wave_response`.
+    row : (r + 6,) array_like
+
+    Returns
+    -------
+    float
+        Amplitude [mm]; nan where none was found.
+    """
+    i = int(answer.amplitude(row).argmax())
+    b, f = replace(answer.balance, start="mid", slider=None), float(answer.frequency[i])
+    x = newton(b, answer.x[i], f)
+    return float("nan") if x is None else climb(b, row, x, f).amplitude
 
 
 def performance(
@@ -214,18 +263,20 @@ def performance(
     -------
     WavePerformance
     """
-    unit, kept, found = np.asarray(force, dtype=complex), tuple(harmonics), []
-    for ratio in np.asarray(ratios, dtype=float):
-        F_E = f_c / ratio
+    unit, kept = np.asarray(force, dtype=complex), tuple(harmonics)
+
+    def peak(ratio: float) -> tuple[float, float, float]:
         answer = wave_response(
             sectors,
             wedge,
             f_c,
-            force=F_E * unit,
+            force=f_c / ratio * unit,
             engine_order=engine_order,
             frequencies=frequencies,
             harmonics=kept,
         )
         f, height = answer.peak(on_sector(row)) if answer.arrived else (np.nan, np.nan)
-        found.append((float(ratio), f, height / F_E))
-    return WavePerformance(*np.array(found).T)
+        return ratio, f, height * ratio / f_c
+
+    jobs = [partial(peak, float(one)) for one in np.sort(np.asarray(ratios, dtype=float))]
+    return WavePerformance(*np.array(in_parallel(jobs, threads())).T)

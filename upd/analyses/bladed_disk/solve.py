@@ -15,6 +15,7 @@ from upd.analyses.bladed_disk.response import (
     WavePerformance,
     Wedge,
     on_sector,
+    other_start,
     performance,
     wave_response,
 )
@@ -92,8 +93,8 @@ class DampedWave(NamedTuple):
     crossing : Crossing
     sectors : dict
         Nodal diameter -> reduced sector.
-    f_c : float
-        N.
+    f_c, mass : float
+        Of the wedge, N and t.
     frequency : (k,) ndarray
         Hz.
     free, stuck : (k,) ndarray
@@ -103,22 +104,28 @@ class DampedWave(NamedTuple):
         Amplitudes at its frequencies, mm.
     peak : (2,) tuple
         Hz and mm.
+    fewer_harmonics, other_start : float
+        The peak with two harmonics less and with another start of the sliders, mm; nan where not
+        solved.
+    axial : float
+        Mean axial force of the wedge on its guide at the peak, N.
     performance : WavePerformance or None
-    best_mass : float
-        t; nan without it.
     """
 
     crossing: Crossing
     sectors: dict[int, ReducedSector]
     f_c: float
+    mass: float
     frequency: Array
     free: Array
     stuck: Array
     answer: FrequencyResponse
     damped: Array
     peak: tuple[float, float]
+    fewer_harmonics: float
+    other_start: float
+    axial: float
     performance: WavePerformance | None
-    best_mass: float
 
 
 @dataclass
@@ -199,7 +206,7 @@ def _solve(solution: BladedDiskSolution, stages: Stages) -> None:
         solution.campbell = np.stack(rows, axis=1)
         solution.crossings = _crossings(solution, family)
     if damped(scene):
-        solution.wave = _damped_wave(solution, model, stages)
+        solution.wave = _damped_wave(solution, model, family, stages)
     if scene.left_out.solves:
         with stages("effects left out", "one nodal diameter solved by itself"):
             solution.proof = _proof(solution, model, family, u)
@@ -274,7 +281,9 @@ def _proof(solution: BladedDiskSolution, model: CyclicModel, family: ModeFamily,
     )
 
 
-def _damped_wave(solution: BladedDiskSolution, model: CyclicModel, stages: Stages) -> DampedWave:
+def _damped_wave(
+    solution: BladedDiskSolution, model: CyclicModel, family: ModeFamily, stages: Stages
+) -> DampedWave:
     """Free, stuck and damped response at the crossing nearest to the operating speed."""
     scene, chosen = solution.plan.scene, solution.plan.scene.response
     if not solution.crossings:
@@ -299,6 +308,7 @@ def _damped_wave(solution: BladedDiskSolution, model: CyclicModel, stages: Stage
                 keep={"tip": tip},
                 speed=crossing.speed,
                 damping=(0.0, beta),
+                full=family.frequencies(n, scene.modes.count, crossing.speed),
             )
             for n in needed
         }
@@ -318,18 +328,42 @@ def _damped_wave(solution: BladedDiskSolution, model: CyclicModel, stages: Stage
         answer = wave_response(sectors, wedge, f_c, force=force, frequencies=frequencies, **given)
         fine = np.linspace(low, frequencies[-1], 2001)
         free, stuck = answer.free(out, fine), answer.stuck(out, fine)
-        peak = answer.peak(out)
-    curve, mass = None, float("nan")
+        amplitude, peak = np.asarray(answer.amplitude(out)), answer.peak(out)
+        fewer = float("nan")
+        if chosen.harmonics > 2:
+            given["harmonics"] = range(chosen.harmonics - 1)
+            fewer = wave_response(
+                sectors, wedge, f_c, force=force, frequencies=frequencies, **given
+            ).peak(out)[1]
+            given["harmonics"] = harmonics
+        # the axial motion of the wedge is the third of its last six
+        held = wedge.guide * float(answer.coefficients[amplitude.argmax(), -4, 0])
+        started = other_start(answer, out)
+    curve = None
     if scene.wants("performance"):
         with stages("performance", f"{len(chosen.ratios)} ratios F_C/F_E"):
-            curve = performance(
+            found = performance(
                 sectors, wedge, f_c, chosen.ratios, row, force=row, frequencies=frequencies, **given
             )
-        if np.isfinite(curve.height).any():
-            mass = curve.ratio[curve.best] * chosen.force / (wedge.radius * crossing.speed**2)
-    amplitude = np.asarray(answer.amplitude(out))
+            # the response is a point of it
+            own = f_c / chosen.force, peak[0], peak[1] / chosen.force
+            points = np.column_stack([found, own])
+            curve = WavePerformance(*points[:, points[0].argsort()])
     return DampedWave(
-        crossing, sectors, f_c, fine, free, stuck, answer, amplitude, peak, curve, float(mass)
+        crossing,
+        sectors,
+        f_c,
+        wedge.mass,
+        fine,
+        free,
+        stuck,
+        answer,
+        amplitude,
+        peak,
+        fewer,
+        started,
+        held,
+        curve,
     )
 
 
@@ -354,4 +388,5 @@ def _wedge(scene: BladedDiskScene, sector: ReducedSector) -> Wedge:
         given.normal_stiffness,
         given.tangential_stiffness,
         given.friction,
+        given.axial_stiffness,
     )

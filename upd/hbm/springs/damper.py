@@ -1,6 +1,6 @@
 """Rigid damper between the blades.
 
-Up to six dofs at its centre of mass, small rotations, held by its contacts.
+Up to six dofs at its centre of mass, small rotations, held by its contacts and by what guides it.
 """
 
 from __future__ import annotations
@@ -38,6 +38,9 @@ class RigidDamper(Shown):
     kept : tuple of int
         Dofs it may use: (0, 2, 4) moves in the plane x-z only, as half a damper does that a mirror
         plane across y cuts.
+    guide : (6,) tuple of float
+        Stiffness [N/mm, N mm] along its dofs of what guides it in the blades' frame, pins or end
+        walls. All points that slip forget: then nothing else holds its mean place.
     """
 
     mass: float
@@ -45,6 +48,7 @@ class RigidDamper(Shown):
     centre: FloatArray
     centrifugal: FloatArray
     kept: tuple[int, ...] = tuple(range(6))
+    guide: tuple[float, ...] = (0.0,) * 6
 
     @property
     def n_dof(self) -> int:
@@ -60,6 +64,11 @@ class RigidDamper(Shown):
         M = np.zeros((6, 6))
         M[:3, :3], M[3:, 3:] = self.mass * np.eye(3), self.inertia
         return M[np.ix_(self.kept, self.kept)]
+
+    @property
+    def K(self) -> FloatArray:
+        """Stiffness of what guides it (n_dof, n_dof) [N/mm, N mm]."""
+        return np.diag(np.asarray(self.guide, dtype=float)[list(self.kept)])
 
     @property
     def force(self) -> FloatArray:
@@ -94,6 +103,7 @@ def rigid_damper(
     centre: ArrayLike,
     centrifugal: ArrayLike,
     kept: Sequence[int] = tuple(range(6)),
+    guide: Sequence[float] = (0.0,) * 6,
 ) -> RigidDamper:
     """Rigid damper.
 
@@ -110,6 +120,8 @@ def rigid_damper(
         Centrifugal force through the centre [N].
     kept : sequence of int
         Dofs it keeps, rising numbers among 0 to 5 (ux, uy, uz, rx, ry, rz).
+    guide : (6,) sequence of float
+        Stiffness along its dofs of what guides it [N/mm, N mm].
 
     Returns
     -------
@@ -152,9 +164,12 @@ def rigid_damper(
         problems.append(
             f"kept = {tuple(kept)} must be rising numbers among 0 to 5 (ux, uy, uz, rx, ry, rz)"
         )
+    if len(guide) != 6 or min(guide) < 0.0:
+        problems.append(f"guide = {tuple(guide)} must be six stiffnesses, none negative")
     if problems:
         raise InputError("rigid damper: " + "; ".join(problems))
-    return RigidDamper(float(mass), I, c, F, tuple(int(k) for k in kept))
+    held = tuple(float(k) for k in guide)
+    return RigidDamper(float(mass), I, c, F, tuple(int(k) for k in kept), held)
 
 
 def contact_rows(damper: RigidDamper, positions: ArrayLike, frames: ArrayLike) -> FloatArray:
@@ -208,7 +223,7 @@ def attach(
     return (
         _block(M, damper.M),
         _block(C, none),
-        _block(K, none),
+        _block(K, damper.K),
         Contacts(np.ascontiguousarray(joined), points.law),
     )
 

@@ -421,8 +421,9 @@ def _answer(b: Balance, curve: Curve) -> FrequencyResponse:
         at = int(np.argmin(found.periodic))
         notes.append(
             f"at {astray} of {len(curve.p)} points, the first at {curve.p[at]:.6g} Hz, the "
-            "contact forces do not come back to their start: their answers are no steady state; "
-            'to fix it: start = "mid", or fewer tangents'
+            "contact forces do not come back to their start in 40 periods: they settle slowly, or "
+            'never; start = "mid" or fewer tangents settle at once, '
+            "`upd.hbm.springs.checks.creep` tells what is left"
         )
     if found.aliasing.max(initial=0.0) > ALIASING:
         notes.append(

@@ -265,7 +265,7 @@ def travelling_wave_response(
     if damper is not None and damper_rows is not None:
         near = np.concatenate([near, damper_rows], axis=2)
         far = np.concatenate([far, 0.0 * damper_rows], axis=2)
-        none = damper.M, 0.0 * damper.M, 0.0 * damper.M
+        none = damper.M, 0.0 * damper.M, damper.K
     joined = {
         d: [block_diag(*pair) for pair in zip(A, none, strict=True)] if none else A
         for d, A in kept.items()

@@ -29,3 +29,8 @@ result.plot("Interference diagram")
 
 # %%
 result.plot("Response to an engine order")
+
+# %%
+# The peak over F_C/F_E. Below the best one the wedges lift off, above it they stick.
+
+result.plot("Performance curve")
