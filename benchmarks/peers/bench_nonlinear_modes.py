@@ -40,6 +40,8 @@ SHOOTING = {-4.0: (222.9916, 2.1716), -3.8: (212.9318, 4.6632), -3.6: (207.1169,
 #: the same of m = k = 1 with k_t = .25, mu N = 1, frequency in rad/s
 JENKINS = {8.0: (1.0607723, 3.53544), 20.0: (1.0175799, 2.46503), 80.0: (1.0023186, 0.75299)}
 MILLISECONDS = 1.0
+#: way to a point, as ln of the amplitude, from which a value is read
+LONGEST = 0.05
 #: NLvib finds an option of MATLAB by its handle, Octave by its name; the amplitude of the mode is
 #: that of all harmonics there
 COMMAND = """
@@ -105,6 +107,9 @@ def rows(code: str, curve: Any, known: dict[float, Any], seconds: float) -> Iter
     """Frequency and damping ratio of a curve (amplitude, frequency, damping), and seconds."""
     a, f, zeta = (np.asarray(one) for one in curve)
     for at, (frequency, per_cent) in known.items():
+        # no value is read from a step that long
+        if np.abs(np.log(a / at)).min() > LONGEST:
+            continue
         near = (np.interp(np.log(at), np.log(a), one) for one in (f, 100.0 * zeta))
         named = zip(("frequency", "damping"), near, (frequency, per_cent), strict=True)
         for name, value, target in named:
