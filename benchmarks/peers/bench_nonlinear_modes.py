@@ -23,7 +23,16 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from upd.analyses import make_plan
+from upd.analyses.forced.linear_limits import linear_of
+from upd.analyses.forced.model import make_model
+from upd.analyses.forced.nonlinear_modes import mode_over_amplitude
+from upd.analyses.forced.statics import static_state
+from upd.analyses.forced.stiffness import face_laws
+from upd.analyses.seated.bodies import make_bodies
 from upd.hbm import NonlinearMode, contacts, nonlinear_mode
+from upd.progress import Stages, silent
+from upd.scene import load_scene
 
 # The benchmarks are no package: what they share is found by its folder.
 sys.path.append(str(Path(__file__).parent))
@@ -39,7 +48,10 @@ ENDS = {3: (1e-6, 10**-3.4), 2: (1e-6, 10**-3.2)}
 SHOOTING = {-4.0: (222.9916, 2.1716), -3.8: (212.9318, 4.6632), -3.6: (207.1169, 4.1153)}
 #: the same of m = k = 1 with k_t = .25, mu N = 1, frequency in rad/s
 JENKINS = {8.0: (1.0607723, 3.53544), 20.0: (1.0175799, 2.46503), 80.0: (1.0023186, 0.75299)}
-MILLISECONDS = 1.0
+MILLISECONDS, SECONDS = 1.0, 5.0
+RIGS = ("asymmetric-response", "symmetric-response")
+#: way to a point, as ln of the amplitude, from which a value is read
+LONGEST = 0.05
 #: NLvib finds an option of MATLAB by its handle, Octave by its name; the amplitude of the mode is
 #: that of all harmonics there
 COMMAND = """
@@ -105,6 +117,9 @@ def rows(code: str, curve: Any, known: dict[float, Any], seconds: float) -> Iter
     """Frequency and damping ratio of a curve (amplitude, frequency, damping), and seconds."""
     a, f, zeta = (np.asarray(one) for one in curve)
     for at, (frequency, per_cent) in known.items():
+        # no value is read from a step that long
+        if np.abs(np.log(a / at)).min() > LONGEST:
+            continue
         near = (np.interp(np.log(at), np.log(a), one) for one in (f, 100.0 * zeta))
         named = zip(("frequency", "damping"), near, (frequency, per_cent), strict=True)
         for name, value, target in named:
@@ -172,8 +187,33 @@ def of_nlvib() -> Iterator[Row]:
            "unit": "times"}  # fmt: skip
 
 
+def of_rig(name: str) -> Iterator[Row]:
+    """Both modes of a ready rig, once it is reduced: seconds of each, as a run solves them beside
+    each other.
+    """
+    plan: Any = make_plan(load_scene(name))
+    bodies = make_bodies(plan)
+    for stiffness, choice in plan.scene.stiffnesses.items():
+        laws = face_laws(choice, Stages(silent))
+        model = make_model(plan, bodies, laws, static_state(plan, bodies))
+        linear = linear_of(plan, model)
+        for in_phase in (True, False):
+            with threadpool_limits(1):
+                begin = time.process_time()
+                found = mode_over_amplitude(plan, model, linear, stiffness, in_phase)
+                seconds = time.process_time() - begin
+            yield {
+                "name": "time_mode",
+                "case": f"{name}, {found.case.mode}",
+                "value": seconds,
+                "unit": "s",
+                "target": SECONDS,
+                "note": f"{len(found.frequency)} points; {found.message}",
+            }
+
+
 def run() -> Iterator[Row]:
-    """Seconds a point of both benchmark modes; then the other codes."""
+    """Seconds a point of both benchmark modes, seconds of the rigs; then the other codes."""
     for number in ENDS:
         mode, seconds = ours(lambda number=number: benchmark(number))
         yield {
@@ -184,6 +224,8 @@ def run() -> Iterator[Row]:
             "target": MILLISECONDS,
             "note": f"{len(mode.amplitude)} points; {1e3 * seconds / MILLISECONDS:.2f} times it",
         }
+    for name in RIGS:
+        yield from of_rig(name)
     yield from of_tmdsimpy()
     yield from of_nlvib()
 

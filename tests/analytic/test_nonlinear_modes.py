@@ -15,6 +15,7 @@ from upd.errors import InputError
 from upd.hbm import NonlinearMode, contacts, frequency_response, nonlinear_mode
 from upd.hbm.core.fourier import harmonics
 from upd.hbm.springs.balance import assembled
+from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
 from upd.hbm.springs.nonlinear_mode import ExtendedBalance, stuck_modes
 from upd.reference.friction import jenkins_peak
 
@@ -48,7 +49,7 @@ def at(mode: NonlinearMode, amplitude: float) -> tuple[float, float]:
 def test_one_harmonic_is_the_closed_form() -> None:
     """a1 = (k_t A/pi)(th - sin(2 th)/2), b1 = (4 mu N/pi)(1 - x_c/A), th = acos(1 - 2 x_c/A)."""
     ratios = np.array([1.2, 2.0, 5.0, 20.0])
-    mode = jenkins(ratios * X_C, harmonics=(1,), samples=2**14)
+    mode = jenkins(ratios * X_C, harmonics=(1,), samples=2**15)
     assert mode.status == "complete"
     for A in ratios * X_C:
         th = np.arccos(1 - 2 * X_C / A)
@@ -56,7 +57,7 @@ def test_one_harmonic_is_the_closed_form() -> None:
         omega = np.sqrt(stiffness)
         zeta = 4 / np.pi * (1 - X_C / A) / A / (2 * omega**2)
         found = at(mode, A)
-        assert found == pytest.approx((omega, zeta), rel=2e-7)
+        assert found == pytest.approx((omega, zeta), rel=1e-7)
 
 
 def test_nine_harmonics_are_what_shooting_finds() -> None:
@@ -131,10 +132,14 @@ def test_forced_peaks_from_the_mode_and_the_linear_rest() -> None:
     """Heights of harmonic balance at a quarter, half and all of the load: .06, .25, .71 % off."""
     mode = benchmark(3, [1e-6, 1e-5, 10**-3.4])
     assert mode.largest_damping[0] == pytest.approx(0.046802, rel=1e-3)
-    known = ((0.25, 4.3205e-5, 224.009), (0.5, 4.9856e-5, 222.024), (1.0, 6.0821e-5, 217.855))
-    for load, height, hertz in known:
+    known = {
+        0.25: (4.3205e-5, 224.009, 0.0006),
+        0.5: (4.9856e-5, 222.024, 0.0025),
+        1.0: (6.0821e-5, 217.855, 0.0071),
+    }
+    for load, (height, hertz, off) in known.items():
         f, found = mode.peak(load * FORCE, Y2)
-        assert found == pytest.approx(height, rel=0.0075)
+        assert found == pytest.approx(height, rel=off + 1e-4)
         assert f == pytest.approx(hertz, rel=1e-3)
     with pytest.raises(InputError, match="beyond its amplitudes"):
         benchmark(3, [1e-6, 1e-5]).peak(FORCE, Y2)
@@ -156,9 +161,12 @@ def test_amplitude_turns_back_under_lift_off() -> None:
     assert mode.state[-1, :, 2].min() > 0.5
 
 
-@pytest.mark.parametrize("amplitude", [0.5, 3.0, 12.0])
+@pytest.mark.parametrize(
+    ("amplitude", "states"),
+    [(0.5, {STICK}), (1.6, {STICK, SLIP}), (3.0, {STICK, SLIP, LIFT}), (12.0, {STICK, SLIP, LIFT})],
+)
 @pytest.mark.parametrize("proportional", [True, False])
-def test_jacobian_by_differences(amplitude: float, proportional: bool) -> None:
+def test_jacobian_by_differences(amplitude: float, states: set[int], proportional: bool) -> None:
     """In stick, slip and with lift-off."""
     one = np.diag([1.0, 2.0])
     K = np.array([[2.0, -1.0], [-1.0, 2.0]])
@@ -180,6 +188,7 @@ def test_jacobian_by_differences(amplitude: float, proportional: bool) -> None:
     X = extended.guess(p)
     X[:-2] += 0.1 * amplitude * rng.standard_normal(len(X) - 2)
     X[-1] = 0.03
+    assert set(b.force(X[:-2]).march.state.ravel()) == states
     _, J, by_p = extended.function(X, p, True)
     assert J is not None
 
@@ -190,6 +199,12 @@ def test_jacobian_by_differences(amplitude: float, proportional: bool) -> None:
     found = np.array([difference(e) for e in np.eye(len(X))]).T
     np.testing.assert_allclose(J, found, atol=1e-7 * np.abs(J).max())
     np.testing.assert_allclose(by_p, difference(np.zeros(len(X)), 1.0), atol=1e-8)
+
+
+def test_ten_lines_at_most_show_a_mode() -> None:
+    lines = repr(jenkins([1.0, 8.0])).splitlines()
+    assert len(lines) <= 10
+    assert "damping" in lines[0]
 
 
 def test_energy_of_the_friction_is_that_of_the_damping() -> None:
@@ -255,11 +270,14 @@ def test_best_preload_is_the_closed_form() -> None:
         ({"slider": [0.1, 0.2]}, "every point along every tangent"),
         ({"static_force": [1.0, 2.0]}, "static_force has shape"),
         ({"damper_rows": np.zeros((1, 2, 6))}, "come together"),
+        ({"mode": 0}, "mode 0 is none; there are 1 to 1"),
         ({"mode": 2}, "mode 2 is none; there are 1 to 1"),
+        ({"preload": -1.0}, "preload"),
     ],
 )
 def test_faults(change: dict[str, Any], words: str) -> None:
-    points = contacts([[0.0]], [[1.0]], **JENKINS)
     given = {"mode": 1, "amplitudes": [1.0, 2.0]} | change
     with pytest.raises(InputError, match=words):
+        law = JENKINS | {name: given.pop(name) for name in ("preload",) if name in given}
+        points = contacts([[0.0]], [[1.0]], **law)
         nonlinear_mode([[1.0]], [[0.0]], [[1.0]], points, **given)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Literal, TypeVar
 
 import numpy as np
@@ -42,15 +42,6 @@ _KEPT = 3
 #: inputs that leave the reduced blades as they are
 _CHEAP = ("stiffness.", "contact.friction", "excitation.", "damper.centrifugal")
 _FRICTIONLESS = "frictionless"
-
-
-@dataclass(frozen=True)
-class FittedModel:
-    """One model and what it was made of."""
-
-    plan: ForcedPlan
-    bodies: Bodies
-    model: Model
 
 
 class ModelSource:
@@ -119,8 +110,8 @@ class ModelSource:
         why = "every value makes new blades or a new static state"
         return f"{', '.join(self.dear)}: {why}" if self.dear else ""
 
-    def at(self, z: Array) -> FittedModel:
-        """The model with moved inputs.
+    def at(self, z: Array) -> tuple[ForcedPlan, Model]:
+        """The model with moved inputs, and its plan.
 
         Parameters
         ----------
@@ -146,10 +137,10 @@ class ModelSource:
         scene = fitted_scene(self.scene, self.parameters, z)
         if scene.contact.directions != "auto":
             return ""
-        used = self.at(z).model.contacts.tangents
+        used = self.at(z)[1].contacts.tangents
         kept, self._tangents = self._tangents, None
         self._models.clear()
-        chosen = self.at(z).model.contacts.tangents
+        chosen = self.at(z)[1].contacts.tangents
         self._tangents = kept
         self._models.clear()
         return "" if used == chosen else _DIRECTIONS[used]
@@ -172,15 +163,14 @@ class ModelSource:
             )
         return replace(one, contact=contact, excitation=excitation, stiffness=stiffness)
 
-    def _model(self, scene: ForcedScene) -> FittedModel:
+    def _model(self, scene: ForcedScene) -> tuple[ForcedPlan, Model]:
         self.made += 1
         plan = replace(self._plan(scene), scene=scene)
         bodies = _remembered(self._bodies, bodies_key(plan), lambda: make_bodies(plan))
         laws = face_laws(scene.stiffnesses[self.stiffness], self._stages)
         frame = self._frame(scene)
         if frame in self._models:
-            model = _with_contact(self._models[frame], laws, scene.contact.friction)
-            return FittedModel(plan, bodies, model)
+            return plan, _with_contact(self._models[frame], laws, scene.contact.friction)
         # small matrices once the blades are reduced
         with threads_for(1) if bodies.reduced else nullcontext():
             model = make_model(plan, bodies, laws)
@@ -188,7 +178,7 @@ class ModelSource:
         if self._tangents is None and scene.contact.directions == "auto":
             # once chosen they stay: numbers would jump
             self._tangents = model.contacts.tangents if model.halved else None
-        return FittedModel(plan, bodies, model)
+        return plan, model
 
     def _frame(self, scene: ForcedScene) -> str:
         contact = replace(scene.contact, directions="auto")

@@ -28,7 +28,7 @@ from upd.analyses.forced.model import Model, balance_of, quiet, respond
 from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.cache.arrays import Journal
 from upd.errors import ConvergenceError
-from upd.fitting.models import FittedModel, ModelSource
+from upd.fitting.models import ModelSource
 from upd.fitting.parameters import VariedInput
 from upd.fitting.targets import (
     CONTACT_TOTALS,
@@ -278,7 +278,6 @@ class FitResponses:
         for line in () if journal is None else journal.lines:
             z, value, slope = (np.array(one, float) for one in line)
             self._found[z.tobytes()] = value, slope.reshape(len(value), len(z))
-        self._kept: tuple[bytes, Array, Array] | None = None
         self.friction = [_curve_at(ratio, targets) for ratio in targets.ratios]
 
     def at(self, z: Array) -> tuple[Array, Array]:
@@ -303,21 +302,16 @@ class FitResponses:
         """
         z = np.asarray(z, float)
         key = z.tobytes()
-        if self._kept is not None and self._kept[0] == key:
-            return self._kept[1], self._kept[2]
-        found = self._found.get(key)
-        if found is None:
-            found = self._solved(z)
+        if key not in self._found:
+            self._found[key] = found = self._solved(z)
             if self._journal is not None:
-                self._found[key] = found
                 self._journal.keep([z.tolist(), *(one.tolist() for one in found)])
-        self._kept = (key, *found)
-        return found
+        return self._found[key]
 
     def value(self, z: Array) -> Array:
         """(m,) without derivatives."""
         z = np.asarray(z, float)
-        return self._evaluate(z, self.source.at(z))
+        return self._evaluate(z, *self.source.at(z))
 
     def _solved(self, z: Array) -> tuple[Array, Array]:
         value = self.value(z)
@@ -337,8 +331,7 @@ class FitResponses:
         there[k] += step
         return self.value(there)
 
-    def _evaluate(self, z: Array, made: FittedModel) -> Array:
-        plan, model = made.plan, made.model
+    def _evaluate(self, z: Array, plan: ForcedPlan, model: Model) -> Array:
         parts: list[Array] = []
         with threads_for(len(model.M)):
             friction = {one.ratio: one.at(plan, model) for one in self.friction}

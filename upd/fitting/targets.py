@@ -31,8 +31,8 @@ CONTACT_TOTALS: dict[str, tuple[Side, str]] = {
 }
 #: peaks of a blade that have names
 _PEAKS = (1, 2)
-#: what a peak has, and the kind of its quantity
-_OF_PEAK = {"frequency": "frequency", "accelerance": "accelerance"}
+#: what a peak has: kinds of quantities
+_OF_PEAK = ("frequency", "accelerance")
 #: name of a peak's number -> free, stuck or with friction, its blade, number, and what of it
 PEAK_NUMBERS: dict[str, tuple[str, Side, int, str]] = {
     f"{kind}{'_' * bool(kind)}{LEFT * (side == 'left')}peak_{k}_{what}": (kind, side, k, what)
@@ -226,7 +226,7 @@ def _number(name: str, text: str) -> FitTarget:
         raise InputError(f"{'needs its' if friction else 'has no'} F_C/F_E; write {right}")
     kind = "frequency" if of in STUCK_MODES else "stiffness"
     if of in PEAK_NUMBERS:
-        kind = _OF_PEAK[PEAK_NUMBERS[of][3]]
+        kind = PEAK_NUMBERS[of][3]
     if not text:
         raise InputError(f'has no value; write {name}="377 {unit_inside(kind)}"')
     value, half = read_band(text, kind)

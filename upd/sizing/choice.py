@@ -69,6 +69,11 @@ def best_of(tried: Iterable[Tried]) -> Tried:
     return min(tried, key=lambda one: one.best.log_worst)
 
 
+def curves_of(tried: Iterable[Tried]) -> int:
+    """Whole curves that were solved for them in this call."""
+    return sum(rig.curves for one in tried for _, rig in one.rigs)
+
+
 def nominal_of(tried: Iterable[Tried]) -> Tried:
     """The nominal optimum."""
     return min(tried, key=lambda one: one.nominal.log_worst)
@@ -171,7 +176,7 @@ class ChosenDamper:
     @property
     def curves(self) -> int:
         """Whole curves that were solved in this call."""
-        return sum(rig.curves for one in self.tried for _, rig in one.rigs)
+        return curves_of(self.tried)
 
     @property
     def resumed(self) -> int:
@@ -204,7 +209,7 @@ def reaches_of(one: Tried, ranges: Ranges) -> dict[str, tuple[Span, ...]]:
     low, high = worst.f
     for of in ranges.during:
         if of.path == FORCE:
-            (first, *_), (last, *_) = of.force_ends
+            (first, _), (last, _) = of.force_ends
             lower = [
                 reached(lambda at: (worst.with_forces(at, high), c), low, low - REACH, limit)
                 for limit in limits
@@ -326,7 +331,7 @@ def _forces(found: ChosenDamper, one: InputRange) -> list[Sensitivity]:
     """Of both ends of the range of F_E, F_C as chosen."""
     worst, c = found.best.worst, found.best.best.log_centrifugal
     out = []
-    for k, (name, end, _) in enumerate(one.force_ends):
+    for k, (name, end) in enumerate(one.force_ends):
         y = []
         for step in (-SLOPE_STEP, 0.0, SLOPE_STEP):
             moved = [f + step * (i == k) for i, f in enumerate(worst.f)]

@@ -21,8 +21,6 @@ Array = NDArray[np.float64]
 #: points of a curve
 _CURVE = 301
 _SIZE = (6.4, 4.8)
-#: relative difference of F_C up to which two are one
-ALIKE = 0.03
 
 
 @dataclass(frozen=True, repr=False)

@@ -53,9 +53,9 @@ class InputRange:
         return self.path == CENTRIFUGAL or self.path in TURNING
 
     @property
-    def force_ends(self) -> tuple[tuple[str, float, float], tuple[str, float, float]]:
-        """Both ends of a range of F_E: names, values and the ways they may move."""
-        return (f"{self.path}, lowest", self.low, -1.0), (f"{self.path}, highest", self.high, 1.0)
+    def force_ends(self) -> tuple[tuple[str, float], tuple[str, float]]:
+        """Both ends of a range of F_E: names and values."""
+        return (f"{self.path}, lowest", self.low), (f"{self.path}, highest", self.high)
 
     def text(self, value: float) -> Any:
         """A value as a scene takes it."""
@@ -121,8 +121,7 @@ class Ranges:
         given = next((one for one in self.during if one.path == FORCE), None)
         if given is not None:
             return given.low, given.high
-        own = forces_of(self.scene)
-        return min(own), max(own)
+        return self.nominal_forces
 
     @property
     def nominal_forces(self) -> tuple[float, float]:

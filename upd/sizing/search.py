@@ -36,6 +36,7 @@ from upd.sizing.choice import (
     Objective,
     Tried,
     best_of,
+    curves_of,
     is_along,
     nominal_of,
     reaches_of,
@@ -167,13 +168,13 @@ def choose_damper(ranges: Ranges, objective: Objective, progress: Listener) -> C
     for _ in range(_LOOKS):
         # whole curves on the way may show another optimum
         tried = tuple(map(search.again, sorted(search.tried, key=lambda one: one.values)))
-        solved = search.curves
+        solved = curves_of(search.tried)
         best, plain = best_of(tried), nominal_of(tried)
         with search.stages("search", "how far the optimum reaches"):
             reaches = reaches_of(best, ranges)
             here = best.plain.solved(best.best.log_centrifugal)
             there = plain.worst.solved(plain.nominal.log_centrifugal)
-        if search.curves == solved:
+        if curves_of(search.tried) == solved:
             break
     return ChosenDamper(
         ranges,
@@ -240,35 +241,31 @@ class _Search:
         self.tried.append(found)
         return found.best.log_worst
 
-    @property
-    def _best(self) -> Tried:
-        return best_of(self.tried)
-
     def by_turns(self) -> None:
         """What is chosen beside F_C, one input after the other."""
         shapes = self.ranges.shapes
         place = tuple(min(max(of.nominal, of.low), of.high) for of in shapes)
         for turn in range(_TURNS if len(shapes) > 1 else 1):
-            before = self._best if self.tried else None
+            before = best_of(self.tried) if self.tried else None
             for k, shape in enumerate(shapes):
                 for value in _grid(shape) if turn == 0 else ():
                     self.at(_with(place, k, value))
                 if not self.tried:
                     continue
                 self._closer(k)
-                place = self._best.values
+                place = best_of(self.tried).values
             if before is None:
                 continue
             if len(shapes) > 1:
                 way = zip(shapes, place, before.values, strict=True)
                 self.at(tuple(min(max(2.0 * b - a, of.low), of.high) for of, b, a in way))
-                place = self._best.values
-            if before.best.log_worst - self._best.best.log_worst <= _GAIN:
+                place = best_of(self.tried).values
+            if before.best.log_worst - best_of(self.tried).best.log_worst <= _GAIN:
                 break
 
     def _closer(self, k: int) -> None:
         """Between the neighbours of the best place so far, one input moved."""
-        best, shape = self._best.values, self.ranges.shapes[k]
+        best, shape = best_of(self.tried).values, self.ranges.shapes[k]
         known = {one.values[k] for one in self.tried if is_along(one.values, best, k)}
         line = sorted(known | {shape.low, shape.high})
         here = line.index(best[k])
@@ -317,11 +314,6 @@ class _Search:
         """The optima of a place on all whole curves that are known by now."""
         best, nominal = (lowest_worst(worst, *one.ends) for worst in (one.worst, one.plain))
         return replace(one, best=best, nominal=nominal)
-
-    @property
-    def curves(self) -> int:
-        """Whole curves solved so far."""
-        return sum(rig.curves for one in self.tried for _, rig in one.rigs)
 
     def _rig(self, given: Inputs, window: tuple[float, float]) -> RigPeaks:
         words, scene = self._words(given), self._with(given)

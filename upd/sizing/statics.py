@@ -59,24 +59,8 @@ _ACROSS = [0, 2]
 CARRIES, TILTS, LEFT_LIFTS, RIGHT_LIFTS, EITHER_LIFTS, JAMS = range(len(OUTCOMES))
 
 
-@dataclass(frozen=True)
-class SceneDamper:
-    """The damper of a scene.
-
-    Attributes
-    ----------
-    section : DamperSection
-        Its faces, seen from its centre of mass.
-    mass : float
-        t.
-    """
-
-    section: DamperSection
-    mass: float
-
-
-def scene_damper(scene: AnyScene) -> SceneDamper:
-    """Faces, centre of mass and mass of the damper between two blades.
+def scene_damper(scene: AnyScene) -> tuple[DamperSection, float]:
+    """Faces of the damper between two blades, seen from its centre of mass, and its mass [t].
 
     Parameters
     ----------
@@ -98,7 +82,7 @@ def scene_damper(scene: AnyScene) -> SceneDamper:
     of: Any = scene
     material = Material(of.material.E, of.material.nu, of.damper.density or of.material.density)
     body = mass_properties(meshes["damper"], material)
-    return SceneDamper(section_of(meshes, body.centre), body.mass)
+    return section_of(meshes, body.centre), body.mass
 
 
 def section_of(meshes: Mapping[str, Mesh], centre: Array) -> DamperSection:
@@ -225,8 +209,8 @@ def damper_statics(scene: AnyScene) -> DamperStatics:
         For a scene without a damper between two blades.
     """
     of: Any = scene
-    damper = scene_damper(scene)
-    section, mu, F = damper.section, float(of.contact.friction), float(of.damper.centrifugal)
+    section, mass = scene_damper(scene)
+    mu, F = float(of.contact.friction), float(of.damper.centrifugal)
     admissible, states = _at(section, mu, F)
     known = of.uncertain.get("contact.friction")
     ends = () if known is None else (max(0.0, known.at(-1.0)), known.at(1.0))
@@ -235,8 +219,8 @@ def damper_statics(scene: AnyScene) -> DamperStatics:
         section,
         mu,
         F,
-        1e6 * damper.mass,
-        centrifugal_words(scene, damper.mass),
+        1e6 * mass,
+        centrifugal_words(scene, mass),
         friction_limits(section.left.angle, section.right.angle),
         admissible,
         tilts_from(section),

@@ -96,7 +96,7 @@ def test_elastic_dampers_stay_within_the_statics_of_rigid_ones(
     totals obey the limits of forces of faces as long as these, and act within them.
     """
     solution: SeatedSolution = request.getfixturevalue(name)
-    section = scene_damper(solution.plan.scene).section
+    section = scene_damper(solution.plan.scene)[0]
     limits = admissible_forces(section, 0.6).limits
     for phase in solution.phases.values():
         totals = solution.interface.face_forces(phase.found)[:, :, [0, 2]]
@@ -112,7 +112,7 @@ def test_moved_wedge_reaches_the_limits_of_the_rigid_one(wedge: SeatedSolution) 
     wedge rolls: forces end at the ends of its faces, N and T at the least and the greatest that
     does not tilt it.
     """
-    section = scene_damper(wedge.plan.scene).section
+    section = scene_damper(wedge.plan.scene)[0]
     limits = F_C * admissible_forces(section, 0.6).limits
     across, up = (
         wedge.interface.face_forces(wedge.phases[f"moved along {axis}"].found)[:, :, [0, 2]]

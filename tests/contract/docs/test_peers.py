@@ -51,6 +51,7 @@ def test_nonlinear_modes_without_other_codes(monkeypatch: pytest.MonkeyPatch) ->
     """Ours are measured, with the values by shooting beside them; two rows say what to install."""
     module = loaded(monkeypatch, "bench_nonlinear_modes")
     monkeypatch.setattr(module, "ROUNDS", 1)
+    monkeypatch.setattr(module, "RIGS", ())
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("UPD_TMDSIMPY", raising=False)
     rows = list(module.run())

@@ -141,11 +141,13 @@ class NonlinearMode(Shown):
         relative = self.damping / (float(np.abs(self.damping).max()) or 1.0)
         way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff([log_a, relative])))])
         fine = np.linspace(0.0, way[-1], FINE * len(way))
-        data = np.column_stack([log_a, 2.0 * np.pi * self.frequency, self.damping])
-        log_a, w0, zeta = CubicSpline(way, data)(fine).T if len(way) > 1 else data.T
         shape = self.fundamental / self.amplitude[:, None]
-        u = CubicSpline(way, shape)(fine) if len(way) > 1 else shape
-        pushed, a = u.conj() @ f, np.exp(log_a)
+        data = np.column_stack(
+            [log_a, 2.0 * np.pi * self.frequency, self.damping, shape.conj() @ f, shape @ weights]
+        )
+        data = CubicSpline(way, data)(fine) if len(way) > 1 else data
+        log_a, w0, zeta = data[:, :3].real.T
+        pushed, seen, a = data[:, 3], data[:, 4], np.exp(log_a)
         middle = w0**2 * (1.0 - 2.0 * zeta**2)
         inside = middle**2 - w0**4 + np.abs(pushed / a) ** 2
         known = inside >= 0.0
@@ -156,10 +158,11 @@ class NonlinearMode(Shown):
         low, high = 0.5 * (beside[k] + beside[k + 1]), 0.5 * (beside[k + 1] + beside[k + 2])
         for square, order in zip(squares, (slice(None), slice(None, None, -1)), strict=True):
             W = np.sqrt(np.maximum(square, 0.0))
-            A = pushed / (w0**2 - W**2 + 2j * zeta * w0 * W)
-            motion = np.abs((u @ weights) * A + self._rest(W, f, weights))
-            good = (known & (low < W) & (high > W))[order]
-            found.append((W[order][good] / (2.0 * np.pi), motion[order][good]))
+            good = np.flatnonzero(known & (low < W) & (high > W))[order]
+            W, own = W[good], w0[good]
+            A = pushed[good] / (own**2 - W**2 + 2j * zeta[good] * own * W)
+            motion = np.abs(seen[good] * A + self._rest(W, f, weights))
+            found.append((W / (2.0 * np.pi), motion))
         (f1, m1), (f2, m2) = found
         return np.concatenate([f1, f2]), np.concatenate([m1, m2])
 
