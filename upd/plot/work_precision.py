@@ -40,14 +40,14 @@ def work_precision_charts(curves: Sequence[Mapping[str, Any]]) -> list[Chart]:
     -------
     list of Chart
         For each number and case that has an error: the errors in per cent over seconds and over
-        memory. The first three numbers over seconds, with their last case (the largest load), are
-        on the sheet ``work_precision``; of a forced response, those with friction.
+        memory. The first three numbers over seconds, with their last case (the largest load), come
+        first and are on the sheet ``work_precision``; of a forced response, those with friction.
     """
     groups = _groups(curves)
     shown = _shown(list(groups))
     return [
         _chart(group, cost, axis, sheet=key in shown and cost == "seconds", columns=_NUMBERS)
-        for key, group in groups.items()
+        for key, group in sorted(groups.items(), key=lambda item: item[0] not in shown)
         for cost, axis in _COSTS
     ]
 
