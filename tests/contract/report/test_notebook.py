@@ -135,7 +135,7 @@ def test_unknown_charts_are_told(sphere: RunResult) -> None:
 
     with pytest.raises(InputError, match="no chart 'modes'; there are Contact pressure, "):
         sphere.plot("modes")
-    with pytest.raises(InputError, match="no chart of the case 'F=1 N'; there are F=200 N"):
+    with pytest.raises(InputError, match="no chart of the case 'F=1 N', did you mean 'F=200 N'"):
         sphere.plot("contact pressure", case="F=1 N")
     with pytest.raises(InputError, match="give title and case"):
         sphere.plot(ax=Figure().add_subplot())
