@@ -13,7 +13,8 @@ and the slip made in the step. Per node
 Semismooth Newton with the stabilised Jacobian [1]_ finds it in a few steps from the state before or
 from full stick; behind it stand alternating directions on Coulomb's cone [2]_, from which Newton
 starts again. Vectors are laid out component by component: normal of all nodes, then one or two
-tangential directions.
+tangential directions. Where the pressing forces f_n are given, there are these alone; the problem
+is then convex, and a search for the motion stands behind Newton under a load.
 
 References
 ----------

@@ -111,7 +111,8 @@ class CoupledSystems:
             raise np.linalg.LinAlgError("compliance is not positive definite")
         return np.asarray(L)
 
-    def _solved(self, b: FloatArray) -> FloatArray:
+    def solved(self, b: FloatArray) -> FloatArray:
+        """C^-1 b, of one column or many."""
         return np.asarray(lapack.dpotrs(self.factor, b, lower=1)[0])
 
     @cached_property
@@ -120,20 +121,10 @@ class CoupledSystems:
 
         f = W b + V p, s = A p - V'b, with A = (B'C^-1 B)^-1, V = C^-1 B A, W = C^-1 - V A^-1 V'.
         """
-        CB = self._solved(self.B)
+        CB = self.solved(self.B)
         A = np.linalg.inv(self.B.T @ CB)
         A = 0.5 * (A + A.T)
         return CB @ A, A
-
-    def stuck_forces(self, target: AskedStep) -> FloatArray:
-        """Forces with y = 0; one column or many."""
-        if target.load is None:
-            assert target.motion is not None
-            return self._solved(target.b + self.B @ target.motion)
-        V, _ = self.carried
-        # W b: what C^-1 b leaves of the load is taken back.
-        first = self._solved(target.b)
-        return np.asarray(first + V @ (target.load - self.B.T @ first))
 
     def system(self, rows: NewtonRows, by_load: bool) -> NewtonSystem:
         """The rows, factored.
@@ -152,11 +143,14 @@ class Stuck:
 
     def solve(self, rhs: FloatArray, target: AskedStep) -> Solved:
         of = self.of
-        f = of.stuck_forces(target)
         if target.load is None:
             assert target.motion is not None
+            f = of.solved(target.b + of.B @ target.motion)
             return f, target.motion, np.zeros_like(f)
         V, A = of.carried
+        # W b: what C^-1 b leaves of the load is taken back.
+        first = of.solved(target.b)
+        f = np.asarray(first + V @ (target.load - of.B.T @ first))
         return f, A @ target.load - V.T @ target.b, np.zeros_like(f)
 
     def refined(self, rhs: FloatArray, target: AskedStep) -> Solved:

@@ -159,7 +159,7 @@ class LoadSteps:
             turned=turned,
             may_fall_back=partial(_may_be_carried, solver, value if self.by_load else None)
             if fall_back
-            else _never,
+            else lambda: False,
         )
         f, y = answer.at.f.reshape(c, n), answer.at.y.reshape(c, n)
         after = CoupledHistory(
@@ -174,10 +174,6 @@ class LoadSteps:
         work = 0.5 * (at.load + after.load) @ (after.motion - at.motion) - middle @ (offset - was)
         slip_work = float((after.force[:, 1:] * (after.slip - at.slip)).sum())
         return SolvedStep(answer, after, np.asarray(offset), float(work), slip_work)
-
-
-def _never() -> bool:
-    return False
 
 
 def _turned(

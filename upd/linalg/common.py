@@ -96,13 +96,10 @@ class SignedFactor:
         Negative eigenvalues of the matrix (Sylvester's law of inertia).
     solve : callable
         Right-hand sides (n,) or (n, m) -> A^-1 rhs.
-    seconds : float
-        Wall time.
     """
 
     negative: int
     solve: Solve
-    seconds: float
 
 
 def checked_matrix(K: Any) -> csr_array:

@@ -303,7 +303,6 @@ def signed_pardiso(A: Matrix) -> SignedFactor | None:
     ConvergenceError
         When memory runs out.
     """
-    start = perf_counter()
     solver = _Pardiso(A, kind=SYMMETRIC)
     # A shifted matrix made for this call only ends here.
     del A
@@ -312,7 +311,7 @@ def signed_pardiso(A: Matrix) -> SignedFactor | None:
     positive, negative, perturbed = (int(solver.iparm[i]) for i in (21, 22, 13))
     if perturbed or positive + negative != solver.n:
         return None
-    return SignedFactor(negative, solver.solve, perf_counter() - start)
+    return SignedFactor(negative, solver.solve)
 
 
 def schur_pardiso(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Condensation:

@@ -87,7 +87,6 @@ def signed_superlu(A: Matrix) -> SignedFactor | None:
     SignedFactor or None
         None when rows were exchanged, a pivot vanished, or memory ran out.
     """
-    start = perf_counter()
     try:
         lu = _symmetric(whole(A))
     except (RuntimeError, MemoryError):
@@ -95,7 +94,7 @@ def signed_superlu(A: Matrix) -> SignedFactor | None:
     D = lu.U.diagonal()
     if not np.array_equal(lu.perm_r, lu.perm_c) or not (np.isfinite(D) & (D != 0.0)).all():
         return None
-    return SignedFactor(int((D < 0.0).sum()), lambda rhs: _solved(lu, rhs), perf_counter() - start)
+    return SignedFactor(int((D < 0.0).sum()), lambda rhs: _solved(lu, rhs))
 
 
 def factorise_superlu(K: Any) -> Factor:
@@ -133,9 +132,7 @@ def _solved(lu: SuperLU, rhs: FloatArray) -> FloatArray:
     return np.ascontiguousarray(lu.solve(rhs)) if rhs.size else np.zeros_like(rhs)
 
 
-def schur_superlu(
-    K: Any, kept: ArrayLike, *, keep_factor: bool = True, block_bytes: int = BLOCK_BYTES
-) -> Condensation:
+def schur_superlu(K: Any, kept: ArrayLike, *, keep_factor: bool = True) -> Condensation:
     """Schur complement of a matrix on some dofs, by back-substitution of K_ib in blocks of columns.
 
     Parameters
@@ -147,8 +144,6 @@ def schur_superlu(
     keep_factor : bool, default True
         Hold the factor of K_ii for `recover`; otherwise `recover` factorises once more when first
         called.
-    block_bytes : int
-        Memory of a block of columns.
 
     Returns
     -------
@@ -171,7 +166,7 @@ def schur_superlu(
     S = A[kept][:, kept].toarray()
     held: list[SuperLU] = [_lu(K_ii, inner)] if inner.size else []
     nnz = held[0].nnz // 2 if held else 0
-    step = max(1, block_bytes // (8 * max(1, len(inner))))
+    step = max(1, BLOCK_BYTES // (8 * max(1, len(inner))))
     for first in range(0, len(kept) if inner.size else 0, step):
         block = slice(first, first + step)
         S[:, block] -= K_ib.T @ held[0].solve(K_ib[:, block].toarray())
