@@ -240,11 +240,6 @@ def sample_axes(sample: Sample) -> tuple[Parameter, ...]:
     return tuple(out)
 
 
-def sample_places(sample: Sample) -> tuple[Place, ...]:
-    """The k-th value of every input together, point by point."""
-    return tuple((k,) * len(sample.inputs) for k in range(len(sample.shifts)))
-
-
 def sample_texts(scene: AnyScene, sample: Sample, axes: Sequence[Parameter]) -> list[str]:
     """The scenes of all points as TOML: first as given with its half-widths, whose run gives the
     first-order bands; then with the values drawn alone.
@@ -362,7 +357,9 @@ def plan_sweep(
         grid = tuple(places(axes))
         given = [(scene.text, settings(axes, place)) for place in grid]
     else:
-        axes, grid = sample_axes(drawn), sample_places(drawn)
+        axes = sample_axes(drawn)
+        # the k-th value of every input together, point by point
+        grid = tuple((k,) * len(axes) for k in range(len(drawn.shifts)))
         given = [(text, {}) for text in sample_texts(scene, drawn, axes)]
     code = source_digest(scene.recipe)
     limit = cache_limit()

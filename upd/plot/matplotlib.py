@@ -40,7 +40,6 @@ from upd.plot.style import (
     proportion,
     sides,
     state_colours,
-    title_of,
     with_room,
 )
 
@@ -257,7 +256,8 @@ def _titles(chart: Chart, ax: Axes) -> None:
     upwards = int(72.0 * (figure.get_figheight() * box.height + _OVER) / (_WIDE * _LETTERS))
     ax.set_xlabel(_lines(chart.x.label, across), fontsize=_LETTERS)
     ax.set_ylabel(_lines(chart.y.label, upwards), fontsize=_LETTERS)
-    title, case = title_of(chart)
+    words = chart.title, ", ".join(filter(None, (chart.case, chart.detail)))
+    title, case = (text.replace("muN", "µN") for text in words)
     whole = f"{title}: {case}" if case else title
     own_lines = case and across < len(whole) and max(len(title), len(case)) <= across
     text = f"{title}\n{case}" if own_lines else whole

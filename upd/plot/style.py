@@ -56,17 +56,6 @@ def area_colour(area: Area) -> str:
     return SHARE_COLOURS.get(area.state) or COLOURS[area.colour % len(COLOURS)]
 
 
-def title_of(chart: Chart) -> tuple[str, str]:
-    """Title and case as they are written."""
-    return _written(chart.title), _written(
-        ", ".join(part for part in (chart.case, chart.detail) if part)
-    )
-
-
-def _written(text: str) -> str:
-    return text.replace("muN", "µN")
-
-
 def plain(text: str) -> str:
     """Text matplotlib does not take for mathematics."""
     return text.replace("$", r"\$")

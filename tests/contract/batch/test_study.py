@@ -228,7 +228,7 @@ def test_command_prints_points_and_errors(
     for part in (
         "2 points",
         "2/2 points",
-        "maximum pressure",
+        "pressure",
         "Table: ",
         "Figure: ",
         "2 of 2 points ok",
