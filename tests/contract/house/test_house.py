@@ -295,7 +295,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 13984,
+    "analyses": 13298,
     "hbm": 6738,
     "contact": 4099,
     "linalg": 3182,
@@ -306,12 +306,12 @@ ROOM_LINES = {
     "sizing": 1388,
     "batch": 1578,
     "mesh": 1504,
-    "vary": 1363,
+    "vary": 1292,
     "reference": 1181,
     "cli": 1005,
     "measured": 916,
     "reduction": 1210,
-    "results": 917,
+    "results": 905,
     "fem": 914,
     "matrices": 690,
     "root": 595,
