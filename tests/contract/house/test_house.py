@@ -295,7 +295,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 13984,
+    "analyses": 13298,
     "hbm": 6456,
     "contact": 3784,
     "linalg": 3124,
@@ -306,7 +306,7 @@ ROOM_LINES = {
     "sizing": 1388,
     "batch": 1514,
     "mesh": 1427,
-    "vary": 1363,
+    "vary": 1292,
     "reference": 1181,
     "cli": 897,
     "measured": 916,
