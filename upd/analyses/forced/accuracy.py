@@ -211,6 +211,8 @@ def _parts(levels: Sequence[SolvedVariation], key: Key, own: float) -> Iterator[
     """
     for source in _SOURCES:
         mine = [one for one in levels if one.variation.source == source]
+        if source == POINTS and key[1].kind == "free":
+            continue
         found = [(one.variation, one.values[key] / own) for one in mine if key in one.values]
         whys = [one.reason for one in mine if one.reason]
         whys += [
