@@ -57,6 +57,7 @@ SCENES = (
     "asymmetric-response",
     "symmetric-seated",
     "asymmetric-seated",
+    "bladed-disk",
 )
 #: of the scenes above: what they do not offer
 REFUSED = [
