@@ -53,6 +53,7 @@ SCENES = (
     "asymmetric-response",
     "symmetric-seated",
     "asymmetric-seated",
+    "bladed-disk",
 )
 #: of the scenes above: what they do not offer
 REFUSED = [

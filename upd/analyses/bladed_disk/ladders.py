@@ -11,29 +11,23 @@ from upd.vary.ladder import Asked, Ladder, chosen_levels, counts
 from upd.vary.solve import changed
 from upd.vary.variation import Overrides, Variation
 
-#: what counts elements of a sector, and the least of it
-_COUNTS = {
-    "disk_layers": 1,
-    "shank_layers": 1,
-    "platform_layers": 1,
-    "blade_layers": 1,
-    "overhang_columns": 2,
-    "blade_columns": 1,
-    "axial": 1,
-}
+_RESPONSE: Overrides = (("want", ["response"]),)
 #: shares of the scene's own counts
 _SHARES = (0.35, 0.5, 0.7, 1.0)
 
 
 def _meshes(scene: BladedDiskScene, asked: Asked) -> Iterator[Variation]:
     """Shares of all counts of elements; the size is the cube root of the hexahedra."""
-    own = {name: n for name, n in scene.geometry.items() if name in _COUNTS}
+    kinds = "layers", "columns", "axial"
+    own = {name: n for name, n in scene.geometry.items() if name.endswith(kinds)}
     if not own:
         raise InputError("--vary mesh: geometry names no numbers of elements; give them")
     shares = chosen_levels(asked or _SHARES, lambda n: n > 0.0, "shares of the elements, above 0")
     for share in shares:
+        # an overhang has two columns at least
         given = (
-            (f"geometry.{name}", max(_COUNTS[name], round(share * n))) for name, n in own.items()
+            (f"geometry.{name}", max(1 + ("over" in name), round(share * n)))
+            for name, n in own.items()
         )
         overrides: Overrides = (("want", ["modes"]), *given)
         plans = make_plan(scene), make_plan(changed(scene, overrides))
@@ -45,13 +39,6 @@ def _meshes(scene: BladedDiskScene, asked: Asked) -> Iterator[Variation]:
 LADDERS: Mapping[str, Ladder] = {
     "mesh": Ladder(_meshes),
     "harmonics": Ladder(
-        counts(
-            "harmonics",
-            "{} harmonics",
-            "response.harmonics",
-            (1, 3, 5),
-            1,
-            (("want", ["response"]),),
-        )
+        counts("harmonics", "{} harmonics", "response.harmonics", (1, 3, 5), 1, _RESPONSE)
     ),
 }

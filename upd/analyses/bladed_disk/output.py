@@ -16,6 +16,7 @@ from upd.plot.chart import Entry
 from upd.results import NO_CASE, Case, Check, ErrorPart, Estimates, Group, Result, variable
 from upd.results import quantities as q
 from upd.results.answer_table import AnswerTable
+from upd.scene import BladedDiskScene
 
 #: what the groups of result.nc hold, their attribute ``content``
 BY_DIAMETER, CAMPBELL, CROSSINGS = "nodal diameters", "campbell", "crossings"
@@ -57,38 +58,24 @@ def answer(results: Sequence[Entry]) -> list[AnswerTable]:
     free = first[q.WAVE_FREE.name]
     of = {name: f"{one['value'] or 0.0:.4g}" for name, one in first.items()}
     order, n, mode = (free["case_fields"][k] for k in ("engine_order", "nodal_diameter", "mode"))
-    rows = [
-        (
-            "crossing",
-            f"EO {order} meets {mode} of nodal diameter {n} at {of['crossing_speed']} rpm, "
-            f"{of['crossing_frequency']} Hz ({of['crossing_margin']} % from the operating speed)",
-        ),
-        (
-            "peak at the tip",
-            f"free {of['free_amplitude']} µm, stuck {of['stuck_amplitude']} µm, damped "
-            f"{of['damped_amplitude']} µm at {of['damped_frequency']} Hz",
-        ),
-        (
-            "reduction",
-            f"{of['amplitude_reduction']} % of the free peak; F_C of a wedge is "
-            f"{of['wedge_centrifugal']} N, its guide along the axis carries {of['wedge_axial']} N",
-        ),
-    ]
+    rows = {
+        "crossing": f"EO {order} meets {mode} of nodal diameter {n} at {of['crossing_speed']} rpm, "
+        f"{of['crossing_frequency']} Hz ({of['crossing_margin']} % from the operating speed)",
+        "peak at the tip": f"free {of['free_amplitude']} µm, stuck {of['stuck_amplitude']} µm, "
+        f"damped {of['damped_amplitude']} µm at {of['damped_frequency']} Hz",
+        "reduction": f"{of['amplitude_reduction']} % of the free peak; F_C of a wedge is "
+        f"{of['wedge_centrifugal']} N, its guide along the axis carries {of['wedge_axial']} N",
+    }
     if (best := first.get(q.BEST_MASS.name)) is not None:
         height = of.get(q.BEST_MASS_PEAK.name)
         found = f"{of['best_damper_mass']} g, by its F_C alone: {height} µm"
-        rows.append(("best damper", best.get("withheld") or found))
-    change = first[q.WAVE_START.name].get("withheld") or (
-        f"changes the damped peak by {of['start_change']} %"
+        rows["best damper"] = best.get("withheld") or found
+    change = f"changes the damped peak by {of['start_change']} %"
+    rows["not unique"] = (
+        f"another start of the sliders {first[q.WAVE_START.name].get('withheld') or change}; "
+        f"contact forces still change by {of['force_creep']} % in 40 more periods"
     )
-    rows.append(
-        (
-            "not unique",
-            f"another start of the sliders {change}; contact forces still change by "
-            f"{of['force_creep']} % in 40 more periods",
-        )
-    )
-    return [AnswerTable("Damped travelling wave", ("what", "answer"), tuple(rows))]
+    return [AnswerTable("Damped travelling wave", ("what", "answer"), tuple(rows.items()))]
 
 
 def estimate(solution: BladedDiskSolution, results: Sequence[Result], stages: Any) -> Estimates:
@@ -121,7 +108,7 @@ def make_results(solution: BladedDiskSolution) -> list[Result]:
         reason = "no engine order crosses a mode up to the largest speed; raise rotation.up_to"
         results.append(q.CROSSING_SPEED.withheld(NO_CASE, reason))
     if solution.wave is not None:
-        results += _wave_results(solution.wave, scene.response.force)
+        results += _wave_results(solution.wave, scene)
     wanted = [
         ("modes", q.F_SECTOR, solution.at_rest),
         ("interference", q.F_SPINNING, solution.at_speed),
@@ -135,10 +122,12 @@ def make_results(solution: BladedDiskSolution) -> list[Result]:
     ]
 
 
-def _wave_results(wave: DampedWave, force: float) -> list[Result]:
+def _wave_results(wave: DampedWave, scene: BladedDiskScene) -> list[Result]:
     """Peaks at the tip and the best mass."""
     case, curve = _at(wave.crossing), wave.performance
     free, crept = float(wave.free.max()), float(creep(wave.answer.balance, wave.answer.x).max())
+    # the axial motion of the wedge is the third of its last six
+    walked = float(abs(wave.answer.coefficients[wave.damped.argmax(), -4, 0]))
     results = [
         q.WAVE_FREE.of(free, case),
         q.WAVE_STUCK.of(float(wave.stuck.max()), case),
@@ -146,15 +135,15 @@ def _wave_results(wave: DampedWave, force: float) -> list[Result]:
         q.WAVE_FREQUENCY.of(wave.peak[0], case),
         q.WAVE_REDUCTION.of(1.0 - wave.peak[1] / free, case),
         q.WAVE_CENTRIFUGAL.of(wave.f_c, case),
-        q.WAVE_AXIAL.of(abs(wave.axial), case),
+        q.WAVE_AXIAL.of(scene.damper.axial_stiffness * walked, case),
         q.WAVE_START.of(abs(wave.other_start / wave.peak[1] - 1.0), case)
         if np.isfinite(wave.other_start)
         else q.WAVE_START.withheld(case, "leads to no peak near by"),
         q.WAVE_CREEP.of(crept, case),
     ]
     if curve is not None and curve.inside:
-        ratio, height = curve.best
-        mass = wave.mass * ratio * force / wave.f_c
+        (ratio, height), force = curve.best, scene.response.force
+        mass = scene.damper.mass * ratio * force / wave.f_c
         results += [q.BEST_MASS.of(mass, case), q.BEST_MASS_PEAK.of(height * force, case)]
     elif curve is not None:
         reason = "the lowest peak is at an end of response.ratios; give others beyond it"

@@ -93,8 +93,8 @@ class DampedWave(NamedTuple):
     crossing : Crossing
     sectors : dict
         Nodal diameter -> reduced sector.
-    f_c, mass : float
-        Of the wedge, N and t.
+    f_c : float
+        N.
     frequency : (k,) ndarray
         Hz.
     free, stuck : (k,) ndarray
@@ -107,15 +107,12 @@ class DampedWave(NamedTuple):
     fewer_harmonics, other_start : float
         The peak with two harmonics less and with another start of the sliders, mm; nan where not
         solved.
-    axial : float
-        Mean axial force of the wedge on its guide at the peak, N.
     performance : WavePerformance or None
     """
 
     crossing: Crossing
     sectors: dict[int, ReducedSector]
     f_c: float
-    mass: float
     frequency: Array
     free: Array
     stuck: Array
@@ -124,7 +121,6 @@ class DampedWave(NamedTuple):
     peak: tuple[float, float]
     fewer_harmonics: float
     other_start: float
-    axial: float
     performance: WavePerformance | None
 
 
@@ -331,13 +327,8 @@ def _damped_wave(
         amplitude, peak = np.asarray(answer.amplitude(out)), answer.peak(out)
         fewer = float("nan")
         if chosen.harmonics > 2:
-            given["harmonics"] = range(chosen.harmonics - 1)
-            fewer = wave_response(
-                sectors, wedge, f_c, force=force, frequencies=frequencies, **given
-            ).peak(out)[1]
-            given["harmonics"] = harmonics
-        # the axial motion of the wedge is the third of its last six
-        held = wedge.guide * float(answer.coefficients[amplitude.argmax(), -4, 0])
+            less = {**given, "frequencies": frequencies, "harmonics": harmonics[:-2]}
+            fewer = wave_response(sectors, wedge, f_c, force=force, **less).peak(out)[1]
         started = other_start(answer, out)
     curve = None
     if scene.wants("performance"):
@@ -350,20 +341,7 @@ def _damped_wave(
             points = np.column_stack([found, own])
             curve = WavePerformance(*points[:, points[0].argsort()])
     return DampedWave(
-        crossing,
-        sectors,
-        f_c,
-        wedge.mass,
-        fine,
-        free,
-        stuck,
-        answer,
-        amplitude,
-        peak,
-        fewer,
-        started,
-        held,
-        curve,
+        crossing, sectors, f_c, fine, free, stuck, answer, amplitude, peak, fewer, started, curve
     )
 
 
