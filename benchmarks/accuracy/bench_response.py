@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from steady_state import steady_state
 
 from upd.analyses.forced import measures
 from upd.analyses.forced.plan import grid
@@ -19,6 +18,7 @@ from upd.hbm import FrequencyResponse, contacts, frequency_response
 from upd.hbm.core.fourier import analysis, harmonics, synthesis
 from upd.hbm.springs.friction import harmonic_force
 from upd.hbm.springs.response import parabola
+from upd.hbm.springs.time_integration import steady_state
 from upd.reference.den_hartog import den_hartog_amplitude
 from upd.reference.friction import (
     jenkins_harmonic,

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from rigs import LINES
 
-from benchmarks.steady_state import steady_state
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import peaks
 from upd.analyses.forced.curves import ForcedCurve, TimeCheck, Top
@@ -20,6 +19,7 @@ from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.solution import ForcedSolution
 from upd.errors import ConvergenceError
 from upd.hbm.faces.march import InterfaceMarch
+from upd.hbm.springs.time_integration import steady_state
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 from upd.scene.forced_contact import SIDES

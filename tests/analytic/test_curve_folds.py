@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.steady_state import steady_state
 from upd.analyses.forced.curves import ForcedCurve, PointCurve, rising
 from upd.analyses.forced.peaks import _folds
 from upd.hbm import FrequencyResponse, contacts, frequency_response
+from upd.hbm.springs.time_integration import steady_state
 
 
 def path(frequency: Any, height: Any) -> PointCurve:

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from rigs import SET_LINES, state_of
 
-from benchmarks.steady_state import steady_state
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import linear_curves, linear_peaks
@@ -30,6 +29,7 @@ from upd.hbm import FrequencyResponse
 from upd.hbm.faces.march import InterfaceMarch
 from upd.hbm.faces.state import InterfaceModel
 from upd.hbm.faces.sweep import settle
+from upd.hbm.springs.time_integration import steady_state
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 from upd.scene.forced import ExcitationChoice, HarmonicForce

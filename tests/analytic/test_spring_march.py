@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from rigs import LINES, state_of
 
-from benchmarks.steady_state import steady_state
 from upd.analyses import forced, make_plan
 from upd.analyses.forced.curves import stuck_modes_of
 from upd.analyses.forced.interface_model import by_coulomb, make_springs, spring_march
@@ -20,6 +19,7 @@ from upd.analyses.forced.solution import ForcedSolution, both_ways, sweep_maxima
 from upd.errors import InputError
 from upd.hbm.faces.march import InterfaceMarch
 from upd.hbm.faces.sweep import settle, stepped_sine
+from upd.hbm.springs.time_integration import steady_state
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 from upd.scene.forced_contact import SIDES

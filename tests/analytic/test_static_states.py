@@ -11,7 +11,6 @@ import pytest
 from rigs import LINES
 from scipy.optimize import minimize
 
-from benchmarks.steady_state import steady_state
 from upd.analyses.forced import statics
 from upd.analyses.forced.measures import static_error
 from upd.analyses.forced.model import Model, make_model, preloaded, respond
@@ -29,6 +28,7 @@ from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.contact.rigid_damper import equilibrium
 from upd.errors import InputError
 from upd.hbm import contacts, frequency_response
+from upd.hbm.springs.time_integration import steady_state
 from upd.progress import Stages
 from upd.scene import load_scene
 

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.steady_state import steady_state, wave_in_time
 from upd.errors import InputError
 from upd.hbm import (
     FrequencyResponse,
@@ -21,7 +20,9 @@ from upd.hbm import (
     nodal_diameters,
     rigid_damper,
     stability,
+    steady_state,
     travelling_wave_response,
+    wave_in_time,
 )
 from upd.hbm.springs import jacobian
 from upd.hbm.springs.waves import WaveBalance, Waves, spread_to_all

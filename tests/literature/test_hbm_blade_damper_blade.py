@@ -16,9 +16,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.steady_state import steady_state
 from upd.hbm import Contacts, FrequencyResponse, contacts, frequency_response, stability
 from upd.hbm.springs.modal import modal
+from upd.hbm.springs.time_integration import steady_state
 
 M = np.diag([1.0, 1, 1, 1, 0.1, 0.1])
 C = np.diag([20.0] * 4 + [0, 0])

@@ -8,12 +8,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.steady_state import steady_state
 from upd.hbm import Contacts, FrequencyResponse, Settings, contacts, follow, frequency_response
 from upd.hbm.core.newton import solve
 from upd.hbm.springs.coulomb import SLIP
 from upd.hbm.springs.friction import Start
 from upd.hbm.springs.sweep import from_stuck
+from upd.hbm.springs.time_integration import steady_state
 
 HZ = 1 / (2 * np.pi)
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag, eigh
 
-from benchmarks.steady_state import steady_state
 from upd.hbm import (
     Contacts,
     FrequencyResponse,
@@ -22,6 +21,7 @@ from upd.hbm import (
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.modal import modal
 from upd.hbm.springs.sweep import from_stuck, newton, static_point
+from upd.hbm.springs.time_integration import steady_state
 
 S = np.sqrt(0.5)
 #: blade dofs x, z, rotation about y of the platform, which carries the core as a rigid body 45 mm

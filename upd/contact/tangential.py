@@ -358,8 +358,9 @@ class _TangentialSolver:
                 self.box = BoxQP(inner)
             else:
                 n = self.carried.size
-                rigid = np.asarray(np.kron(np.eye(2), np.ones((n, 1))), np.float64)
-                self.disks = Coulomb(inner, rigid, np.ones(n), pressed=self.bound)
+                rigid = np.kron(np.eye(2), np.ones((n, 1)))
+                mu = np.ones(n)
+                self.disks = Coulomb(np.asarray(inner, np.float64), rigid, mu, pressed=self.bound)
 
     @property
     def n(self) -> int:

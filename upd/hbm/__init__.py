@@ -25,10 +25,13 @@ from upd.hbm.springs.peak import Peak, climb
 from upd.hbm.springs.points import Contacts, contacts
 from upd.hbm.springs.response import FrequencyResponse, frequency_response
 from upd.hbm.springs.stability import Stability, stability
+from upd.hbm.springs.time_integration import SteadyState, steady_state
 from upd.hbm.springs.waves import (
+    WaveInTime,
     all_sectors,
     nodal_diameters,
     travelling_wave_response,
+    wave_in_time,
 )
 
 __all__ = [
@@ -43,6 +46,8 @@ __all__ = [
     "Settings",
     "Stability",
     "State",
+    "SteadyState",
+    "WaveInTime",
     "all_sectors",
     "climb",
     "contact_rows",
@@ -54,5 +59,7 @@ __all__ = [
     "nonlinear_mode",
     "rigid_damper",
     "stability",
+    "steady_state",
     "travelling_wave_response",
+    "wave_in_time",
 ]

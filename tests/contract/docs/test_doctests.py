@@ -20,7 +20,7 @@ MAIN = {
         "tangential_path",
         "tilted_contact",
     ),
-    "hbm": ("contacts", "frequency_response", "rigid_damper"),
+    "hbm": ("contacts", "frequency_response", "rigid_damper", "steady_state"),
     "dynamics": ("find_peaks", "frequency_response", "tune_damping"),
     "measured": ("fit_damping", "frac", "noisy_peaks", "read_measured"),
 }

@@ -15,7 +15,7 @@ The condensed balance and its continuation serve as they are, with one complex c
 harmonic. The number of unknowns does not depend on N.
 
 A motion of all sectors may leave the travelling wave, and partial slip keeps the static traction of
-its start; `all_sectors` gives the balance of all of them.
+its start: `wave_in_time` integrates all sectors and reports how alike they move.
 
 References
 ----------
@@ -29,14 +29,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from math import gcd
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
 from upd.errors import InputError
-from upd.hbm.core.fourier import Harmonics
+from upd.hbm.core.fourier import Harmonics, to_complex
 from upd.hbm.core.fourier import harmonics as harmonics_of
 from upd.hbm.core.newton import Settings
 from upd.hbm.springs.balance import Balance
@@ -46,6 +47,7 @@ from upd.hbm.springs.jacobian import LinearPart, linear_part
 from upd.hbm.springs.modal import Modal, modal
 from upd.hbm.springs.points import Contacts
 from upd.hbm.springs.response import FrequencyResponse, GivenSystem, force_of, response_of
+from upd.hbm.springs.time_integration import SteadyState, steady_state
 from upd.linalg.parallel import threads_for
 from upd.reduction.cyclic import phase_of
 
@@ -430,3 +432,76 @@ def spread_to_all(b: WaveBalance, x: FloatArray, whole: Balance) -> FloatArray:
     rest = np.zeros(whole.rigid)
     rest[: len(a)] = N**0.5 * a
     return np.concatenate([out.ravel(), rest])
+
+
+class WaveInTime(NamedTuple):
+    """Steady motion of all sectors by time integration.
+
+    Attributes
+    ----------
+    sectors : (N,) ndarray of complex
+        First harmonic of row @ q on each sector, turned back by its phase [mm].
+    steady : SteadyState
+        Last period of all sectors.
+    """
+
+    sectors: ComplexArray
+    steady: SteadyState
+
+    @property
+    def amplitude(self) -> float:
+        """Mean amplitude of the sectors [mm]."""
+        return float(np.abs(self.sectors).mean())
+
+    @property
+    def spread(self) -> float:
+        """Largest difference of a sector from their mean, relative: 0 for a travelling wave."""
+        mean = self.sectors.mean()
+        return float(np.abs(self.sectors - mean).max() / np.abs(self.sectors).max())
+
+
+def wave_in_time(
+    answer: FrequencyResponse,
+    row: ArrayLike,
+    point: int,
+    *,
+    steps: int = 1024,
+    most_periods: int = 2000,
+    tolerance: float = 1e-6,
+) -> WaveInTime:
+    """Time integration of all sectors from a travelling wave: its height, and whether it stays.
+
+    Parameters
+    ----------
+    answer : FrequencyResponse
+        Of `travelling_wave_response`, with the matrices of all nodal diameters.
+    row : (n_dof,) array_like
+        Weighs the displacements of a sector, those of a damper last.
+    point : int
+        Number of the point of the answer.
+    steps : int
+        Least time steps per period; more are taken where sectors would fall between them.
+    most_periods, tolerance
+        As in `upd.hbm.steady_state`.
+
+    Returns
+    -------
+    WaveInTime
+    """
+    b = answer.balance
+    if not isinstance(b, WaveBalance):
+        raise InputError("wave_in_time: give an answer of travelling_wave_response")
+    N, k = b.waves.n_sectors, int(b.harmonics.dynamic[0])
+    shift = N // gcd(N, b.waves.engine_order)
+    whole = all_sectors(b)
+    steady = steady_state(
+        whole,
+        float(answer.frequency[point]),
+        spread_to_all(b, answer.x[point], whole),
+        steps=-(-steps // shift) * shift,
+        most_periods=most_periods,
+        tolerance=tolerance,
+    )
+    q = to_complex(steady.coefficients, b.harmonics)[:, 0].reshape(N, -1)
+    back = np.array([phase_of(-j * b.waves.number(k), N) for j in range(N)])
+    return WaveInTime(back * (q @ np.asarray(row, dtype=float)), steady)

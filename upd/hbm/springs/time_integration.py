@@ -12,25 +12,18 @@ H. M. Hilber, T. J. R. Hughes and R. L. Taylor, Earthquake Eng. Struct. Dyn. 5 (
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import gcd
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from upd.errors import InputError
 from upd.hbm.core.fourier import analysis, to_complex
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import normal, step
 from upd.hbm.springs.friction import Law
-from upd.hbm.springs.response import FrequencyResponse
-from upd.hbm.springs.waves import WaveBalance, all_sectors, spread_to_all
 from upd.labels import Shown
 from upd.linalg.compiled import compiled
-from upd.reduction.cyclic import phase_of
 
 FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 #: Newton steps per time step; the law is piecewise smooth, so a step that needs more is cycling
 #: between two states
 MOST_NEWTON = 30
@@ -295,76 +288,3 @@ def _load(b: Balance, steps: int) -> FloatArray:
     theta = 2 * np.pi * np.arange(steps + 1) / steps
     waves = np.exp(1j * np.outer(theta, b.harmonics.dynamic))
     return np.ascontiguousarray((waves @ b.loads).real + b.static @ b.modal.Phi)
-
-
-class WaveInTime(NamedTuple):
-    """Steady motion of all sectors by time integration.
-
-    Attributes
-    ----------
-    sectors : (N,) ndarray of complex
-        First harmonic of row @ q on each sector, turned back by its phase [mm].
-    steady : SteadyState
-        Last period of all sectors.
-    """
-
-    sectors: ComplexArray
-    steady: SteadyState
-
-    @property
-    def amplitude(self) -> float:
-        """Mean amplitude of the sectors [mm]."""
-        return float(np.abs(self.sectors).mean())
-
-    @property
-    def spread(self) -> float:
-        """Largest difference of a sector from their mean, relative: 0 for a travelling wave."""
-        mean = self.sectors.mean()
-        return float(np.abs(self.sectors - mean).max() / np.abs(self.sectors).max())
-
-
-def wave_in_time(
-    answer: FrequencyResponse,
-    row: ArrayLike,
-    point: int,
-    *,
-    steps: int = 1024,
-    most_periods: int = 2000,
-    tolerance: float = 1e-6,
-) -> WaveInTime:
-    """Time integration of all sectors from a travelling wave: its height, and whether it stays.
-
-    Parameters
-    ----------
-    answer : FrequencyResponse
-        Of `travelling_wave_response`, with the matrices of all nodal diameters.
-    row : (n_dof,) array_like
-        Weighs the displacements of a sector, those of a damper last.
-    point : int
-        Number of the point of the answer.
-    steps : int
-        Least time steps per period; more are taken where sectors would fall between them.
-    most_periods, tolerance
-        As in `steady_state`.
-
-    Returns
-    -------
-    WaveInTime
-    """
-    b = answer.balance
-    if not isinstance(b, WaveBalance):
-        raise InputError("wave_in_time: give an answer of travelling_wave_response")
-    N, k = b.waves.n_sectors, int(b.harmonics.dynamic[0])
-    shift = N // gcd(N, b.waves.engine_order)
-    whole = all_sectors(b)
-    steady = steady_state(
-        whole,
-        float(answer.frequency[point]),
-        spread_to_all(b, answer.x[point], whole),
-        steps=-(-steps // shift) * shift,
-        most_periods=most_periods,
-        tolerance=tolerance,
-    )
-    q = to_complex(steady.coefficients, b.harmonics)[:, 0].reshape(N, -1)
-    back = np.array([phase_of(-j * b.waves.number(k), N) for j in range(N)])
-    return WaveInTime(back * (q @ np.asarray(row, dtype=float)), steady)
