@@ -191,10 +191,6 @@ class Balance:
         n, shape = self._layout
         return x[:, :n].reshape(len(x), *shape).copy()
 
-    def rigid_part(self, x: FloatArray) -> FloatArray:
-        """Static rigid amplitudes (n, n_rigid) of many answers (n, n_unknown)."""
-        return x[:, self._layout[0] :]
-
     def embedded(self, x: FloatArray, old: Balance) -> FloatArray:
         """Unknowns of an answer with other harmonics, as an initial guess for this problem.
 
@@ -281,9 +277,10 @@ class Balance:
         """
         W, a = self.split(x)
         linear, c = self.linear, len(self.Psi)
+        acting = self.loads, self.u0, self.rigid_load
         F, state, DF = self.contact_terms(x, jacobian)
         residual, by_frequency = linear.residual(
-            W.reshape(c, -1), a, F.reshape(c, -1), omega, self.acting, jacobian
+            W.reshape(c, -1), a, F.reshape(c, -1), omega, acting, jacobian
         )
         if not jacobian:
             return residual, None, by_frequency
@@ -297,15 +294,9 @@ class Balance:
         slider = np.zeros((self.contacts.n_point, 2)) if self.slider is None else self.slider
         begin = (START_CODE[self.start], slider, MOST_PERIODS)
         W, law = self.split(x)[0], self.contacts.law.arrays
-        found: tuple[FloatArray, NDArray[np.int8], FloatArray] = contact_terms(
+        return contact_terms(  # type: ignore[no-any-return]
             W, self._transform, self.harmonics.static, law, begin, jacobian
         )
-        return found
-
-    @property
-    def acting(self) -> tuple[ComplexArray, FloatArray, FloatArray]:
-        """Loads as the linear part takes them: dynamic ones, static motion, on rigid modes."""
-        return self.loads, self.u0, self.rigid_load
 
     def forget_factors(self) -> None:
         """Let the factors go that corrections keep for later ones: their memory."""

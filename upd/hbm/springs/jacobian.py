@@ -104,8 +104,7 @@ class LinearPart:
         """The same system with xi [1/s] off its modal damping, C - xi M."""
         off = xi if self.modal.proportional else xi * np.eye(len(self.modal.eigenvalues))
         modal = replace(self.modal, damping=self.modal.damping - off)
-        rows = np.ascontiguousarray(np.atleast_2d(modal.damping))
-        return replace(self, modal=modal, damping=rows)
+        return replace(self, modal=modal, damping=self.damping - off)
 
     def pushes(self, f: ComplexArray) -> ComplexArray:
         """Modal forces (n_k, m) of amplitudes (n_k, c) of forces on the rows."""
@@ -310,8 +309,7 @@ class BalanceJacobian(NamedTuple):
             J[:m:size, m:n] = -of.R
             R = of.R.reshape(n_point, d1, -1)
             J[m:n, :m] = np.einsum("pdr,pdl->rpl", R, D[:, :, 0]).reshape(-1, m)
-        place = np.arange(m)
-        J[place, place] += 1.0
+        J.flat[: m * len(J) : len(J) + 1] += 1.0
         return J
 
 

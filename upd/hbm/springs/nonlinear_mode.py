@@ -151,20 +151,17 @@ class NonlinearMode(Shown):
         middle = w0**2 * (1.0 - 2.0 * zeta**2)
         inside = middle**2 - w0**4 + np.abs(pushed / a) ** 2
         known = inside >= 0.0
-        squares = [middle - s * np.sqrt(np.where(known, inside, 0.0)) for s in (1.0, -1.0)]
-        found = []
+        root = np.sqrt(np.where(known, inside, 0.0))
         # half way to the neighbours
         beside, k = [0.0, *self.stuck_omega, np.inf], self.number
         low, high = 0.5 * (beside[k] + beside[k + 1]), 0.5 * (beside[k + 1] + beside[k + 2])
-        for square, order in zip(squares, (slice(None), slice(None, None, -1)), strict=True):
-            W = np.sqrt(np.maximum(square, 0.0))
-            good = np.flatnonzero(known & (low < W) & (high > W))[order]
-            W, own = W[good], w0[good]
-            A = pushed[good] / (own**2 - W**2 + 2j * zeta[good] * own * W)
-            motion = np.abs(seen[good] * A + self._rest(W, f, weights))
-            found.append((W / (2.0 * np.pi), motion))
-        (f1, m1), (f2, m2) = found
-        return np.concatenate([f1, f2]), np.concatenate([m1, m2])
+        # up below the resonance, down above it
+        at = np.concatenate([np.arange(len(a)), np.arange(len(a))[::-1]])
+        W = np.sqrt(np.maximum(middle[at] - np.repeat([1.0, -1.0], len(a)) * root[at], 0.0))
+        good = known[at] & (low < W) & (high > W)
+        W, at = W[good], at[good]
+        A = pushed[at] / (w0[at] ** 2 - W**2 + 2j * zeta[at] * w0[at] * W)
+        return W / (2.0 * np.pi), np.abs(seen[at] * A + self._rest(W, f, weights))
 
     def peak(self, force: ArrayLike, row: ArrayLike) -> tuple[float, float]:
         """Frequency [Hz] and height [mm] of the forced peak; see `response`.
@@ -239,8 +236,7 @@ class NonlinearMode(Shown):
         """The other stuck modes under the force, linear, at W rad/s."""
         b, others = self.balance, np.arange(len(self.stuck)) != self.number
         shapes, values = self.stuck[:, others], self.stuck_omega[others] ** 2
-        c = b.modal.damping
-        lost = np.einsum("ij,ij->j", shapes, c[:, None] * shapes if c.ndim == 1 else c @ shapes)
+        lost = np.einsum("ij,ji->j", shapes, b.linear.damped(shapes.T.astype(complex)).real)
         gain = (weights @ shapes) * (f @ shapes)
         return np.asarray((gain / (values - W[:, None] ** 2 + 1j * W[:, None] * lost)).sum(axis=1))
 
@@ -338,36 +334,31 @@ def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearM
             f"nonlinear_mode: mode {mode} near {omega / (2.0 * np.pi):.6g} Hz is not found at any "
             f"amplitude below {np.exp(wanted[0]):.3g}: do the contacts carry a load at rest?"
         )
-    end = float(wanted[-1])
-    if begin == end:
-        xs, ps, status, message = first.x[None], np.array([begin]), "complete", "one amplitude"
-    else:
-        path = follow(
-            of.function,
-            (first.x, float(begin)),
-            end,
-            scale=of.scale,
-            p_scale=1.0,
-            wanted=wanted,
-            settings=s,
-        )
-        xs, ps, status, message = path.x, path.p, path.status, path.message
+    path = follow(
+        of.function,
+        (first.x, float(begin)),
+        float(wanted[-1]),
+        scale=of.scale,
+        p_scale=1.0,
+        wanted=wanted,
+        settings=s,
+    )
     # an amplitude below those asked for was only where the path began
-    reached = np.flatnonzero(ps >= wanted[0])
-    first_kept = int(reached[0]) if len(reached) else len(ps)
-    xs, ps = xs[first_kept:], ps[first_kept:]
+    kept = int(np.argmax(np.append(path.p >= wanted[0], True)))
+    xs, ps = path.x[kept:], path.p[kept:]
     x, omegas, xi = xs[:, :-2], xs[:, -2], xs[:, -1]
     found = measures(b, omegas / (2.0 * np.pi), x)
-    eta = np.array([of.fundamental(one) for one in xs]).reshape(len(xs), len(shape))
+    each = zip(xi.tolist(), omegas.tolist(), found.force, strict=True)
+    eta = [of.amplitudes(b.linear.shifted(one), F, omega, 1)[0] for one, omega, F in each]
     return NonlinearMode(
         amplitude=np.exp(ps),
         frequency=omegas / (2.0 * np.pi),
         damping=xi / (2.0 * omegas),
-        status=status,
-        message=message,
+        status=path.status,
+        message=path.message,
         state=found.state,
         energy=found.energy,
-        fundamental=eta,
+        fundamental=np.array(eta).reshape(len(xs), len(shape)),
         x=x,
         balance=b,
         stuck=stuck,
@@ -390,9 +381,9 @@ class ExtendedBalance:
 
     def __init__(self, b: Balance, shape: FloatArray, omega: float) -> None:
         self.b, self.shape, self.omega = b, shape, omega
+        self.acting = b.loads, b.u0, b.rigid_load
         self._sizes = scale_of(b)
-        c = b.modal.damping
-        self.xi = float(shape @ (c * shape if b.modal.proportional else c @ shape))
+        self.xi = float(shape @ b.linear.damped(shape[None].astype(complex))[0].real)
 
     def guess(self, p: float) -> FloatArray:
         """The stuck mode at log a = p, beside the mean motion of points that stick."""
@@ -407,17 +398,12 @@ class ExtendedBalance:
         unit = FREQUENCY_SHARE * self.omega
         return np.concatenate([self._sizes(X[:-2]), [unit, unit]])
 
-    def fundamental(self, X: FloatArray) -> ComplexArray:
-        """Modal amplitudes (m,) of the first harmonic."""
-        F = self.b.contact_terms(X[:-2], False)[0]
-        return np.asarray(self._amplitudes(self.b.linear.shifted(float(X[-1])), F, X, 1)[0])
-
-    def _amplitudes(
-        self, linear: LinearPart, F: FloatArray, X: FloatArray, harmonics: int
+    def amplitudes(
+        self, linear: LinearPart, F: FloatArray, omega: float, count: int
     ) -> ComplexArray:
-        """Modal amplitudes (harmonics, m) of the lowest harmonics above 0."""
-        f = to_complex(F.reshape(linear.rows, -1), self.b.harmonics).T[:harmonics]
-        return linear.modal.solve(linear.k[:harmonics] * float(X[-2]), -linear.pushes(f))
+        """Modal amplitudes (count, m) of the lowest harmonics above 0 under contact forces F."""
+        f = to_complex(F.reshape(linear.rows, -1), self.b.harmonics).T[:count]
+        return linear.modal.solve(linear.k[:count] * omega, -linear.pushes(f))
 
     def function(
         self, X: FloatArray, p: float, jacobian: bool
@@ -428,9 +414,9 @@ class ExtendedBalance:
         c, o = linear.rows, linear.offset
         F, state, moving = b.contact_terms(X[:-2], jacobian)
         found, by_omega = linear.residual(
-            W.reshape(c, -1), rigid, F.reshape(c, -1), omega, b.acting, jacobian
+            W.reshape(c, -1), rigid, F.reshape(c, -1), omega, self.acting, jacobian
         )
-        all_eta = self._amplitudes(linear, F, X, len(linear.k) if jacobian else 1)
+        all_eta = self.amplitudes(linear, F, omega, len(linear.k) if jacobian else 1)
         eta = all_eta[0]
         energy, phase = float((eta.conj() @ eta).real), float((self.shape @ eta).imag) / a
         amplitude = 0.5 * np.log(energy) - p if energy > 0.0 else -np.inf
@@ -449,8 +435,9 @@ class ExtendedBalance:
         by_xi = np.zeros((c, linear.size))
         by_xi[:, o::2], by_xi[:, o + 1 :: 2] = moved.real.T, -moved.imag.T
         J[: by_xi.size, n + 1] = by_xi.ravel()
-        slopes = modal.solve(one, 2.0 * omega * eta[None] - 1j * linear.damped(eta[None]))[0]
-        by_shift = modal.solve(one, 1j * omega * eta[None])[0]
+        lost = linear.damped(eta[None])[0]
+        pushes = np.array([2.0 * omega * eta - 1j * lost, 1j * omega * eta])
+        slopes, by_shift = modal.solve(w[[0, 0]], pushes)
         for row, weights, part in ((n, eta.conj() / energy, 1.0), (n + 1, self.shape / a, -1j)):
             y = part * linear.moves(modal.solve(one, weights[None].astype(complex)))[0]
             V = np.zeros((c, linear.size))

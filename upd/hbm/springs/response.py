@@ -113,7 +113,8 @@ class FrequencyResponse:
         force = self.contact_force.reshape(
             len(self.frequency), len(self.balance.Psi), self.harmonics.size
         )
-        return self.balance.displacement(self._omega, force, self.balance.rigid_part(self.x))
+        rigid = self.x[:, self.balance.size - self.balance.rigid :]
+        return self.balance.displacement(self._omega, force, rigid)
 
     def amplitude(self, row: ArrayLike, harmonic: int | None = None) -> FloatArray:
         """Amplitude of one harmonic along the path.
