@@ -358,7 +358,7 @@ class _TangentialSolver:
                 self.box = BoxQP(inner)
             else:
                 n = self.carried.size
-                rigid = np.kron(np.eye(2), np.ones((n, 1)))
+                rigid = np.asarray(np.kron(np.eye(2), np.ones((n, 1))), np.float64)
                 mu = np.ones(n)
                 self.disks = Coulomb(np.asarray(inner, np.float64), rigid, mu, pressed=self.bound)
 
