@@ -22,13 +22,12 @@ from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
-from upd.analyses.forced.linear_limits import linear_of
-from upd.analyses.forced.nonlinear_modes import mode_over_amplitude
-from upd.analyses.forced.stiffness import face_laws
 
 from upd.analyses import make_plan
+from upd.analyses.forced.curves import linear_of
 from upd.analyses.forced.model import make_model
-from upd.analyses.forced.statics import static_state
+from upd.analyses.forced.performance import mode_over_amplitude
+from upd.analyses.forced.statics import face_laws, static_state
 from upd.analyses.seated.bodies import make_bodies
 from upd.hbm import NonlinearMode, contacts, nonlinear_mode
 from upd.progress import Stages, silent

@@ -28,7 +28,7 @@ from upd.hbm import (
 )
 from upd.hbm.springs.peak import climb
 from upd.hbm.springs.response import parabola
-from upd.hbm.springs.starts import newton
+from upd.hbm.springs.sweep import newton
 from upd.linalg.parallel import in_parallel
 from upd.linalg.select import threads
 from upd.reduction.cyclic import ReducedSector, turn
