@@ -59,7 +59,7 @@ def test_main_numbers_have_a_bound_that_holds(sphere: upd.RunResult) -> None:
 
 
 def test_terminal_page_and_files_tell_them(sphere: upd.RunResult) -> None:
-    text = repr(sphere)
+    text = sphere.table()
     row = next(r for r in sphere.results if r.name == "max_pressure")
     assert row.estimated_error is not None
     assert f"MPa ±{100.0 * row.estimated_error:.2g} %" in text

@@ -141,7 +141,7 @@ def test_noise_is_estimated_and_the_intervals_are_its_own(
     off = np.abs(noisy.answers[0] - np.log(FACTORS))
     assert (off < 2.5 * noisy.known.error).all()
     assert (noisy.known.error < 0.05).all()
-    assert "(estimated)" in str(noisy) and "95 % intervals" in str(noisy)
+    assert "(estimated)" in noisy.table() and "95 % intervals" in noisy.table()
 
 
 def test_the_folder_has_page_summary_and_scene(noisy: Fit) -> None:
@@ -157,7 +157,7 @@ def test_the_folder_has_page_summary_and_scene(noisy: Fit) -> None:
         assert f"<h2>{part}</h2>" in page
     scene = load_scene(noisy.folder / "asymmetric-response-fitted.toml")
     assert scene.contact.friction == pytest.approx(noisy.value("contact.friction"))
-    assert max(map(len, str(noisy).splitlines())) <= 80
+    assert max(map(len, noisy.table().splitlines())) <= 80
 
 
 def test_a_fit_that_was_stopped_goes_on(
