@@ -73,7 +73,7 @@ def test_bounds_hold_against_finer_bodies_and_steps(wedge: upd.RunResult) -> Non
 
 def test_terminal_and_page_tell_them(wedge: upd.RunResult) -> None:
     row = next(r for r in wedge.results if r.name == "face_N")
-    assert "normal force of the face 154.68 N ±" in repr(wedge)
+    assert "normal force of the face 154.68 N ±" in wedge.table()
     parts = error_parts(row.as_dict())
     assert {source for source, *_ in parts} == {MESH, STEPS}
     assert all(half for _, _, _, half, _ in parts)

@@ -461,18 +461,18 @@ OTHERS: dict[str, tuple[str, bytes, Callable[[], object], str]] = {
         "cannot be read",
     ),
     "reduced model is text": (
-        "r.npz",
+        "r.nc",
         b"hello",
-        lambda: ReducedModel.load("r.npz"),
+        lambda: ReducedModel.load("r.nc"),
         "cannot be read",
     ),
     "matrix as reduced model": (
         "r.npz",
         b"",
         lambda: (save_npz("r.npz", csr_array(K)), ReducedModel.load("r.npz")),
-        "cannot be read",
+        "give the ending .nc",
     ),
-    "reduced model with another ending": ("r.txt", b"", lambda: ReducedModel.load("r.txt"), ".npz"),
+    "reduced model with another ending": ("r.txt", b"", lambda: ReducedModel.load("r.txt"), ".nc"),
 }
 
 

@@ -295,7 +295,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 12813,
+    "analyses": 12824,
     "hbm": 6680,
     "contact": 3785,
     "linalg": 3125,
@@ -321,7 +321,7 @@ ROOM_LINES = {
     "manual": 113,
 }
 #: totals of upd/; pages of the manual's gallery are no modules
-MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 47599, 312, 3599, 458
+MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 47610, 312, 3600, 458
 #: parameters of a function and fields of a class, outside the solver rooms
 MOST_PARAMETERS, MOST_FIELDS, SOLVER_ROOMS = 11, 20, ("hbm", "contact", "linalg")
 

@@ -239,9 +239,9 @@ def _with_companion(plan: ContactPlan) -> ContactPlan:
     want = tuple(w for w in plan.scene.want if w != "cycle" or not sheared)
     # What couples the directions is looked up in the whole compliance.
     scene = changed(plan.scene, (("want", want), ("solver.route", "condensed"), *ALONE))
-    whole, family = planned.recipe_parameters(scene, "full"), (Family(planned.COMPONENTS),)
+    whole, family = _whole_parameters(scene), (Family(planned.COMPONENTS),)
     try:
-        companion = contact_plan(scene, "full", family, effects, whole | _coarse(plan))
+        companion = contact_plan(scene, "full", family, effects, whole | _coarse(scene, whole))
     except UpdError:
         # A recipe of the user's own that cannot be coarser.
         companion = contact_plan(scene, "full", family, effects, whole)
@@ -254,12 +254,29 @@ def _with_companion(plan: ContactPlan) -> ContactPlan:
     )
 
 
-def _coarse(plan: ContactPlan) -> dict[str, int]:
+def _coarse(scene: Scene, whole: Mapping[str, Any]) -> dict[str, int]:
     """Half the elements along each edge of the contact, not fewer than it takes."""
-    fewest = _FEWEST[NODES[plan.scene.mesh.element]]
-    counts = {name: plan.parameters.get(name) for name in _DIVISIONS}
+    fewest = _FEWEST[NODES[scene.mesh.element]]
+    counts = {name: whole.get(name) for name in _DIVISIONS}
     return {
         name: max(fewest, 2 * (n // 4))
         for name, n in counts.items()
         if isinstance(n, int) and n > fewest
     }
+
+
+def _whole_parameters(scene: Scene) -> dict[str, Any]:
+    """Of the whole model at the run's spacing.
+
+    The patch is no larger than the largest load needs it.
+    """
+    parameters = planned.recipe_parameters(scene, "full")
+    if scene.sphere_radius is not None and max(scene.loads.forces) > 0.0:
+        needed = planned.auto_patch(scene)
+        if needed < float(parameters["patch"]):
+            share = needed / float(parameters["patch"])
+            parameters["patch"] = needed
+            parameters["divisions"] = 2 * round(0.5 * share * int(parameters["divisions"])) or 2
+            if scene.geometry.get("core_depth", "auto") == "auto":
+                parameters["core_depth"] = planned.auto_core_depth(scene, needed)
+    return parameters
