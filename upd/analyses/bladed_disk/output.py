@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -162,16 +163,16 @@ def check_solution(solution: BladedDiskSolution) -> list[Check]:
     if wave is not None:
         errors = [one.frequency_error for one in wave.sectors.values()]
         answer = wave.answer
-        balance, truncation = answer.energy_balance, answer.truncation.max()
-        crept = creep(answer.balance, answer.x).max()
         rows = (
             ("reduced sectors", np.max(errors), PROJECTION_LIMIT, "|reduced / full - 1|"),
-            ("energy balance", np.abs(balance).max(), 1e-3, "|power in / dissipated - 1|"),
+            ("energy balance", abs(answer.energy_balance).max(), 1e-3, "|power in / lost - 1|"),
             ("path complete", not answer.arrived, 0, "whether the damped curve stopped early"),
-            ("contact settled", crept, CREEP, "change of contact forces in 40 more periods"),
-            ("omitted harmonics", truncation, OMITTED, "motion of the contacts by them, relative"),
+            ("contact settled", creep(answer.balance, answer.x).max(), CREEP, "over 40 periods"),
+            ("omitted harmonics", answer.truncation.max(), OMITTED, "share of contact motion"),
         )
-        reduced = conditions(NO_CASE, "raise response.modes or response.harmonics", *rows)
+        *fatal, omits = conditions(NO_CASE, "raise response.modes or response.harmonics", *rows)
+        # what omitted harmonics change is an estimated error, no fault of the solution
+        reduced = [*fatal, replace(omits, fatal=False)]
     if proof is None:
         return reduced
     scene, case = solution.plan.scene, Case(nodal_diameter=proof.nodal_diameter)
