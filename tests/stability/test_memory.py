@@ -218,7 +218,7 @@ def test_what_stays_of_a_condensed_body_is_what_its_plan_says():
     stays, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     cost = CostModel(load_scene("hertz", {"solver.name": "pardiso"}))
-    cost.condensed("box", len(mesh.hexes), mesh.n_node, len(kept))
+    cost.condensed("box", {"hexes": len(mesh.hexes), "nodes": mesh.n_node}, len(kept))
     assert cost.left[0] == pytest.approx(stays, rel=0.2)
     assert cost.left[0] < 0.5 * cost.jobs[0]
 
@@ -226,7 +226,7 @@ def test_what_stays_of_a_condensed_body_is_what_its_plan_says():
 def test_multigrid_stays_with_a_condensed_body():
     cost = CostModel(load_scene("hertz", {"solver.name": "amg"}))
     for body in ("upper", "lower"):
-        cost.condensed(body, 1000, 1331, 100)
+        cost.condensed(body, {"hexes": 1000, "nodes": 1331}, 100)
     assert cost.in_a_row(keep=False) == cost.in_a_row(keep=True)
 
 

@@ -11,13 +11,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
-from upd.analyses.cost import NODES
+from upd.analyses.cost import NODES, CostModel, memory_limit
 from upd.cache.sources import key_of
 from upd.errors import InputError
 from upd.labels import number
-from upd.linalg import select
 from upd.mesh import recipes
 from upd.plot.chart import Chart, Entry
 from upd.progress import Stages
@@ -71,6 +70,11 @@ class Effect:
     check: str = ""
     switch: tuple[str, ...] = ()
     applies: bool = True
+
+    @classmethod
+    def either(cls, name: str, on: bool, why: str, off: str, **more: Any) -> Effect:
+        """An effect with why it is simulated, or why not: it then means nothing."""
+        return cls(name, on, why if on else off, **{"applies": on, **more})
 
     @property
     def word(self) -> str:
@@ -206,6 +210,34 @@ class Plan(Generic[S]):
         """True when the effect is simulated."""
         return next(e.on for e in self.effects if e.name == name)
 
+    @classmethod
+    def of(
+        cls,
+        cost: CostModel,
+        symmetry: str,
+        parameters: Mapping[str, Any],
+        effects: Iterable[Effect],
+        needs: tuple[float, int],
+        files_seconds: float,
+        **more: Any,
+    ) -> Self:
+        """The plan of a scene with what it costs; ``needs``: bytes and workers."""
+        scene: Any = cost.scene
+        memory, workers = needs
+        return cls(
+            scene,
+            parameters,
+            symmetry,
+            tuple(effects),
+            cost.size,
+            cost.solver,
+            cost.total(workers) + files_seconds,
+            memory,
+            workers,
+            files_seconds=files_seconds,
+            **more,
+        )
+
 
 @dataclass(frozen=True)
 class Needs:
@@ -227,12 +259,12 @@ class Needs:
     factors: bool = False
 
 
-def rig_needs(choice: str, plan: Plan[Any], threads: int) -> Needs:
-    """What a point of a sweep of rigs needs, and may share; its model has a choice of the scene."""
+def rig_needs(plan: Plan[Any], threads: int, *choices: str) -> Needs:
+    """What a point of a sweep of rigs needs, and may share; its model has choices of the scene."""
     del threads
     scene = plan.scene
     mesh = {"recipe": scene.recipe, "parameters": dict(plan.parameters)}
-    model = {"mesh": scene.mesh, "material": scene.material, choice: getattr(scene, choice)}
+    model = {choice: getattr(scene, choice) for choice in ("mesh", "material", *choices)}
     return Needs(key_of(mesh | model), key_of(mesh))
 
 
@@ -303,18 +335,6 @@ class Analysis:
     verdict_names: tuple[str, ...] = ()
     estimate: Callable[[Any, Sequence[Result], Stages], Estimates] | None = None
     coarsened: Callable[[Any], Overrides] | None = None
-
-
-def memory_limit(scene: AnyScene) -> float:
-    """Bytes that a run of the scene may take."""
-    return float(scene.solver.memory or select.memory_left())
-
-
-def require_memory(scene: AnyScene, needed: float) -> None:
-    """Raise InputError, in a few words, where a level needs more bytes than the scene may take."""
-    limit = memory_limit(scene)
-    if needed > limit:
-        raise InputError(f"needs {needed / 1e9:.2g} GB, there are {limit / 1e9:.2g}")
 
 
 def fitting(plan: Plan[Any], limit: float) -> str:

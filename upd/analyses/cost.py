@@ -8,6 +8,7 @@ thread.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from upd.errors import InputError
@@ -18,6 +19,8 @@ from upd.scene import AnyScene
 
 #: element -> nodes per hexahedron
 NODES = {"hex8": 8, "hex8i": 8, "hex20": 20, "hex27": 27}
+#: numbers of "nodes", "hexes" and "contact" nodes of a body
+Count = Mapping[str, int]
 
 # A hexahedron's K, and K with M, as times that of hex8's K, with the checks of its mesh.
 _K = {"hex8": 2.0, "hex8i": 4.0, "hex20": 12.0, "hex27": 22.0}
@@ -34,6 +37,11 @@ def dense_s(flops: float) -> float:
     return flops / USUAL.dense_flops
 
 
+def memory_limit(scene: AnyScene) -> float:
+    """Bytes that a run of the scene may take."""
+    return float(scene.solver.memory or select.memory_left())
+
+
 @dataclass
 class CostModel:
     """Predicted seconds and bytes of a run, added up piece by piece, and the linear solver of every
@@ -41,9 +49,12 @@ class CostModel:
     """
 
     scene: AnyScene
+    size: Mapping[str, Count] = field(default_factory=dict)
     seconds: float = 0.0
     solver: dict[str, str] = field(default_factory=dict)
     kept_bytes: float = START_BYTES
+    #: bytes that another run takes before
+    before_bytes: float = 0.0
     #: bytes of jobs of which several may run side by side
     jobs: list[float] = field(default_factory=list)
     #: of condensed bodies, by their place among the jobs: bytes that stay when their factor goes
@@ -52,30 +63,33 @@ class CostModel:
     shared: float = 0.0
 
     @property
-    def element(self) -> str:
-        """The scene's element."""
-        return str(self.scene.mesh.element)
+    def nodes(self) -> int:
+        """Of all bodies."""
+        return sum(count["nodes"] for count in self.size.values())
 
-    def solid(self, hexes: int, nodes: int) -> Solid:
+    def solid(self, count: Count) -> Solid:
         """Shape of a body of the scene."""
-        return Solid.of(hexes, nodes, NODES[self.element])
+        return Solid.of(count["hexes"], count["nodes"], NODES[self.scene.mesh.element])
 
-    def contact_body(self, hexes: int, nodes: int) -> None:
+    def _entries(self, count: Count) -> float:
+        """Of a body's K."""
+        return 3.0 * count["nodes"] * self.solid(count).entries
+
+    def contact_body(self, count: Count) -> None:
         """A body meshed, with its K."""
-        self.seconds += 0.2 + hexes * _K[self.element] / USUAL.elements
-        self.kept_bytes += 3.0 * nodes * self.solid(hexes, nodes).entries * _ENTRY
+        self.seconds += 0.2 + count["hexes"] * _K[self.scene.mesh.element] / USUAL.elements
+        self.kept_bytes += self._entries(count) * _ENTRY
 
-    def dynamic_body(self, hexes: int, nodes: int, times: float = 1.0) -> None:
+    def dynamic_body(self, count: Count, times: float = 1.0) -> None:
         """A body with its K and M."""
-        self.seconds += times * (0.1 + hexes * _K_AND_M[self.element] / USUAL.elements)
+        elements = count["hexes"] * _K_AND_M[self.scene.mesh.element]
+        self.seconds += times * (0.1 + elements / USUAL.elements)
         # M has no entries between components.
-        self.kept_bytes += 4.0 * nodes * self.solid(hexes, nodes).entries * _ENTRY
+        self.kept_bytes += self._entries(count) * _ENTRY * 4.0 / 3.0
 
-    def choice(
-        self, task: str, n_dof: int, n_kept: int, solid: Solid, *, direct: bool = False
-    ) -> Prediction:
+    def choice(self, task: str, count: Count, n_kept: int, *, direct: bool = False) -> Prediction:
         """The solver of a task, "body, what", and its cost; ``direct``: one that factorises."""
-        asked = self.scene.solver
+        asked, n_dof, solid = self.scene.solver, 3 * count["nodes"], self.solid(count)
         if asked.route == "products":
             raise InputError(
                 "solver.route: products serve the contact of two curved bodies, held node by node, "
@@ -92,99 +106,81 @@ class CostModel:
         self.solver[task] = f"{choice.name}: {choice.why}"
         return select.predict(n_dof, n_kept, choice.name, solid)
 
-    def condensed(self, task: str, hexes: int, nodes: int, n_kept: int) -> Prediction:
+    def condensed(self, task: str, count: Count, n_kept: int) -> None:
         """A body condensed onto its contact dofs."""
-        solid = self.solid(hexes, nodes)
-        found = self.choice(task, 3 * nodes, n_kept, solid)
-        self.shared += found.seconds
-        self._lets_go(task, nodes, n_kept, solid)
-        self.jobs.append(found.bytes + 3.0 * nodes * solid.entries * _COPIES)
-        return found
+        self._condensed(task, count, n_kept, self.choice(task, count, n_kept))
 
-    def _lets_go(self, task: str, nodes: int, n_kept: int, solid: Solid) -> None:
+    def _condensed(self, task: str, count: Count, n_kept: int, found: Prediction) -> None:
         """The next job lets its factor go: K of the free dofs and what is dense stay. Multigrid and
         what is learned from products keep their solver.
         """
-        if self.solver[task].startswith(("amg", select.PRODUCTS)):
-            return
-        K = 3.0 * nodes * solid.entries * _ENTRY
-        self.left[len(self.jobs)] = select.DENSE * float(n_kept) ** 2 + K
+        self.shared += found.seconds
+        if not self.solver[task].startswith(("amg", select.PRODUCTS)):
+            dense = select.DENSE * float(n_kept) ** 2
+            self.left[len(self.jobs)] = dense + self._entries(count) * _ENTRY
+        self.jobs.append(found.bytes + self._entries(count) * _COPIES)
 
-    def contact(
-        self, task: str, hexes: int, nodes: int, n_kept: int, products: int, room: float
-    ) -> Prediction:
+    def contact(self, task: str, count: Count, n_kept: int, products: int, room: float) -> None:
         """A body condensed onto its contact dofs, or seen by so many products, in ``room`` bytes
         where a way fits.
         """
-        solid, asked = self.solid(hexes, nodes), self.scene.solver
-        copies = 3.0 * nodes * solid.entries * _COPIES
+        asked = self.scene.solver
         ways = contact_routes(
-            3 * nodes,
+            3 * count["nodes"],
             n_kept,
             products,
             solver=asked.name,
             memory_limit_bytes=asked.memory,
-            solid=solid,
+            solid=self.solid(count),
         )
-        choice, found = choose_route(
-            ways, products, route=asked.route, memory_limit_bytes=room - copies
-        )
+        rest = room - self._entries(count) * _COPIES
+        choice, found = choose_route(ways, products, route=asked.route, memory_limit_bytes=rest)
         self.solver[task] = f"{choice.name}: {choice.why}"
-        self.shared += found.seconds
-        self._lets_go(task, nodes, n_kept, solid)
-        self.jobs.append(found.bytes + copies)
-        return found
+        self._condensed(task, count, n_kept, found)
 
-    def held_in_mean(self, task: str, hexes: int, nodes: int) -> None:
+    def held_in_mean(self, task: str, count: Count) -> None:
         """What a body that was condensed takes more where a weighted set holds it: another factor,
         for the displacements under six tractions over the set.
         """
         name = self.solver[task].partition(":")[0]
-        found = select.predict(3 * nodes, 0, name, self.solid(hexes, nodes))
+        found = select.predict(3 * count["nodes"], 0, name, self.solid(count))
         again = found.seconds if name == "amg" else found.substitution()
         self.shared += found.seconds + 5.0 * again
 
-    def modes(self, task: str, hexes: int, nodes: int, times: int = 1) -> None:
+    def modes(self, task: str, count: Count, times: int = 1) -> None:
         """``times`` the lowest modes of a body: its factor, Lanczos with about sixty right sides,
         and another factor that counts the modes.
         """
-        solid = self.solid(hexes, nodes)
-        found = self.choice(task, 3 * nodes, 0, solid, direct=True)
+        found = self.choice(task, count, 0, direct=True)
         # The second matrix is ordered again, but checked no more.
         one = 0.15 + 1.5 * found.seconds + 1.5 * found.factor_seconds
         one += 30.0 * found.substitution()
         self.shared += times * one
-        self.jobs += times * [2.0 * found.bytes + 3.0 * nodes * solid.entries * _COPIES]
+        self.jobs += times * [2.0 * found.bytes + self._entries(count) * _COPIES]
 
-    def reduction(self, task: str, hexes: int, nodes: int, n_kept: int, modes: int) -> None:
+    def reduction(self, task: str, count: Count, n_kept: int, modes: int) -> None:
         """A body reduced to its kept dofs and some of its modes: its Schur complement, a right side
         per kept dof, modes with these held.
         """
-        solid = self.solid(hexes, nodes)
-        found = self.choice(task, 3 * nodes, n_kept, solid, direct=True)
+        found, nodes = self.choice(task, count, n_kept, direct=True), count["nodes"]
         columns = 0.5 * n_kept * found.substitution()
         columns += dense_s(2.0 * 3.0 * nodes * float(n_kept) ** 2)
         lanczos = 0.15 + 1.5 * found.seconds + _lanczos(modes) * found.substitution()
         self.shared += found.seconds + columns + lanczos
-        self.jobs.append(
-            3.0 * found.bytes
-            + 3.0 * 24.0 * nodes * n_kept
-            + 2.0 * 3.0 * nodes * solid.entries * _COPIES
-        )
+        dense = 3.0 * 24.0 * nodes * n_kept
+        self.jobs.append(3.0 * found.bytes + dense + 2.0 * self._entries(count) * _COPIES)
 
-    def attached(self, task: str, hexes: int, nodes: int, loads: int, modes: int) -> None:
+    def attached(self, task: str, count: Count, loads: int, modes: int) -> None:
         """A body reduced to its lowest modes and its displacements under loads: the factor of both,
         in its place another that counts the modes, a right side per load.
         """
-        solid = self.solid(hexes, nodes)
-        found = self.choice(task, 3 * nodes, 0, solid, direct=True)
+        found, nodes = self.choice(task, count, 0, direct=True), count["nodes"]
         columns = 0.5 * loads * found.substitution()
         columns += dense_s(4.0 * 3.0 * nodes * float(loads) ** 2)
         columns += _lanczos(modes) * found.substitution()
         self.shared += 0.15 + 3.0 * found.seconds + columns
-        self.jobs.append(
-            found.bytes + 4.0 * 24.0 * nodes * loads + 2.0 * 3.0 * nodes * solid.entries * _COPIES
-        )
+        dense = 4.0 * 24.0 * nodes * loads
+        self.jobs.append(found.bytes + dense + 2.0 * self._entries(count) * _COPIES)
 
     @property
     def threads(self) -> int:
@@ -198,11 +194,6 @@ class CostModel:
             else 1
         )
 
-    def limit(self) -> float:
-        """Bytes that may be used."""
-        asked = self.scene.solver.memory
-        return asked if asked is not None else select.memory_left()
-
     def in_a_row(self, *, keep: bool) -> tuple[float, int]:
         """Bytes of jobs that end one after another, and how many of them may run side by side.
 
@@ -214,7 +205,9 @@ class CostModel:
         left = [one if keep else self.left.get(i, one) for i, one in enumerate(self.jobs)]
         more = sorted((a - b for a, b in zip(self.jobs, left, strict=True)), reverse=True)
         many = min(self.threads, len(self.jobs))
-        while many > 1 and self.kept_bytes + sum(left) + sum(more[:many]) > self.limit():
+        while many > 1 and self.kept_bytes + sum(left) + sum(more[:many]) > memory_limit(
+            self.scene
+        ):
             many -= 1
         return self.kept_bytes + sum(left) + sum(more[:many]), many
 
@@ -223,9 +216,11 @@ class CostModel:
         fewer where these do not fit.
         """
         each = max(self.jobs, default=0.0)
-        while workers > 1 and self.kept_bytes + min(workers, jobs) * each > self.limit():
+        while workers > 1 and self.kept_bytes + min(workers, jobs) * each > memory_limit(
+            self.scene
+        ):
             workers -= 1
-        return self.kept_bytes + min(workers, jobs) * each, workers
+        return max(self.before_bytes, self.kept_bytes + min(workers, jobs) * each), workers
 
     def total(self, workers: int) -> float:
         """Seconds by the clock, with so many workers on the jobs that may run side by side."""

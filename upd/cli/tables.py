@@ -7,7 +7,8 @@ from typing import Any
 from rich.console import Console
 from rich.text import Text
 
-from upd.analyses.base import Plan, fitting, memory_limit
+from upd.analyses.base import Plan, fitting
+from upd.analyses.cost import memory_limit
 from upd.labels import counted
 from upd.report.answer import TITLE
 from upd.report.columns import whole_table

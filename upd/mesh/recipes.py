@@ -179,7 +179,7 @@ def count(recipe: str, params: Mapping[str, Any]) -> dict[str, dict[str, int]]:
                 f"recipe {recipe!r}: count() must return body name -> {{'nodes': ..., "
                 f"'hexes': ..., 'contact': ...}}"
             )
-        return counted
+        return {body: dict(n) for body, n in counted.items()}
     meshes, _ = build_mesh(recipe, params)
     return {
         name: {"nodes": m.n_node, "hexes": m.n_hex, "contact": len(m.nodes.get("contact", ()))}

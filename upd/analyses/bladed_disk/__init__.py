@@ -5,7 +5,7 @@ Modes by nodal diameter, Campbell diagram, interference diagram.
 
 from __future__ import annotations
 
-from upd.analyses.base import Analysis
+from upd.analyses.base import Analysis, rig_needs
 from upd.analyses.bladed_disk import charts, output, plan, solve
 
 ANALYSIS = Analysis(
@@ -13,7 +13,7 @@ ANALYSIS = Analysis(
     headline_names=output.HEADLINE,
     input_checks=(),
     make_plan=plan.make_plan,
-    needs=plan.needs,
+    needs=rig_needs,
     solve=solve.solve,
     make_results=output.make_results,
     check_solution=output.check_solution,

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.base import Effect, Needs, Plan
+from upd.analyses.base import Effect, Plan
 from upd.analyses.cost import NODES, CostModel
-from upd.cache.sources import key_of
 from upd.mesh import recipes
 from upd.scene import BladedDiskScene
 
@@ -51,29 +50,17 @@ def damped(scene: BladedDiskScene) -> bool:
 def make_plan(scene: BladedDiskScene) -> BladedDiskPlan:
     """Derive the plan of ``scene``."""
     chosen = parameters(scene)
-    size = {body: dict(count) for body, count in recipes.count(scene.recipe, chosen).items()}
-    cost = CostModel(scene)
-    for body, count in size.items():
-        cost.dynamic_body(count["hexes"], count["nodes"], 2.0)
+    cost = CostModel(scene, recipes.count(scene.recipe, chosen))
+    for body, count in cost.size.items():
+        cost.dynamic_body(count, 2.0)
         # the check solves one more; of the harmonics, some share a nodal diameter
         most = min(scene.response.harmonics + 1, scene.n_sectors // 2 + 1)
         times = len(computed(scene)) + 1 + most * damped(scene)
-        cost.modes(f"{body}, modes", count["hexes"], count["nodes"], times)
+        cost.modes(f"{body}, modes", count, times)
         cost.shared += _curves_s(scene, count["contact"])
     cost.jobs = [(_REDUCED if damped(scene) else _COMPLEX) * one for one in cost.jobs]
-    memory, workers = cost.side_by_side(1, 1)
-    return BladedDiskPlan(
-        scene,
-        chosen,
-        "full",
-        tuple(_effects(scene)),
-        size,
-        cost.solver,
-        cost.total(workers) + _FILES_S,
-        memory,
-        workers,
-        files_seconds=_FILES_S,
-    )
+    needs = cost.side_by_side(1, 1)
+    return BladedDiskPlan.of(cost, "full", chosen, _effects(scene), needs, _FILES_S)
 
 
 def _curves_s(scene: BladedDiskScene, contact: int) -> float:
@@ -85,7 +72,8 @@ def _curves_s(scene: BladedDiskScene, contact: int) -> float:
 
 def _effects(scene: BladedDiskScene) -> list[Effect]:
     turns, known = rotates(scene), ", ".join(map(str, computed(scene)))
-    unasked = "no output asks for a speed"
+    unasked, either = "no output asks for a speed", Effect.either
+    off = "small" if turns else unasked
     return [
         Effect(
             "cyclic symmetry",
@@ -93,29 +81,19 @@ def _effects(scene: BladedDiskScene) -> list[Effect]:
             f"one of {scene.n_sectors} sectors; nodal diameters {known} computed, the others in "
             "the span of their modes",
         ),
-        Effect(
+        either(
             "centrifugal stiffening",
             turns,
-            "stresses at nodal diameter 0, spin softening" if turns else unasked,
-            applies=turns,
+            "stresses at nodal diameter 0, spin softening",
+            unasked,
         ),
-        Effect(DISPLACED, False, "small" if turns else unasked, DISPLACED, applies=turns),
-        Effect(CORIOLIS, False, "small" if turns else unasked, CORIOLIS, applies=turns),
-        Effect("mistuning", False, "all blades are alike", applies=True),
-        Effect(
+        Effect(DISPLACED, False, off, DISPLACED, applies=turns),
+        Effect(CORIOLIS, False, off, CORIOLIS, applies=turns),
+        Effect("mistuning", False, "all blades are alike"),
+        either(
             "friction",
             damped(scene),
-            "a rigid wedge in every gap, at the speed of the crossing"
-            if damped(scene)
-            else "no output asks for the damped response",
-            applies=damped(scene),
+            "a rigid wedge in every gap, at the speed of the crossing",
+            "no output asks for the damped response",
         ),
     ]
-
-
-def needs(plan: BladedDiskPlan, threads: int) -> Needs:
-    """What a point of a sweep with this plan needs, and may share with others."""
-    del threads
-    scene = plan.scene
-    mesh = {"recipe": scene.recipe, "parameters": dict(plan.parameters)}
-    return Needs(key_of(mesh | {"mesh": scene.mesh, "material": scene.material}), key_of(mesh))

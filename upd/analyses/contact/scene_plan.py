@@ -13,7 +13,7 @@ import numpy as np
 from upd.analyses.base import Effect
 from upd.analyses.contact import plan as planned
 from upd.analyses.contact.plan import ALONG, NORMAL, ContactPlan, Family, is_curved
-from upd.analyses.cost import NODES, START_BYTES, CostModel, dense_s
+from upd.analyses.cost import NODES, START_BYTES, CostModel, dense_s, memory_limit
 from upd.errors import InputError, UpdError
 from upd.linalg.routes import EACH, FIRST
 from upd.mesh import recipes
@@ -78,50 +78,36 @@ def contact_plan(
 
     Raises InputError when a body lacks its material.
     """
-    size = {body: dict(n) for body, n in recipes.count(scene.recipe, parameters).items()}
-    missing = sorted(set(size) - set(scene.materials))
-    spare = sorted(set(scene.materials) - set(size))
+    cost = CostModel(scene, recipes.count(scene.recipe, parameters))
+    on = {effect.name for effect in effects if effect.on}
+    missing = sorted(set(cost.size) - set(scene.materials))
+    spare = sorted(set(scene.materials) - set(cost.size))
     if missing or spare:
         raise InputError(
-            f"materials: the recipe makes the bodies {', '.join(size)}"
+            f"materials: the recipe makes the bodies {', '.join(cost.size)}"
             + (f"; {', '.join(missing)} has no material" if missing else "")
             + (f"; {', '.join(spare)} is not one of them" if spare else "")
         )
-    planned.require_held(scene, parameters, size)
+    planned.require_held(scene, parameters, cost.size)
     if recipes.counted_by_mesh(scene.recipe):
         # The mesh is there: what it lacks is reported before anything is written.
         planned.require_contact_sets(
             scene, recipes.build_mesh(scene.recipe, parameters)[0], families
         )
-    cost, on = CostModel(scene), {effect.name for effect in effects if effect.on}
     products = [(family, _products(scene, on, family)) for family in families]
-    _add_bodies(cost, scene, size, products, recipes.weighted_sets(scene.recipe, parameters))
-    _add_loads(cost, scene, size, on)
+    _add_bodies(cost, scene, products, recipes.weighted_sets(scene.recipe, parameters))
+    _add_loads(cost, scene, on)
     # The internal displacement takes the factors of all bodies again.
-    memory, workers = cost.in_a_row(keep="internal displacement" in on)
+    needs = cost.in_a_row(keep="internal displacement" in on)
     # A table row, a group of arrays and a curve per load.
     loads = len(scene.loads.normal) * (1 + len(scene.loads.tangential))
-    nodes = sum(count["nodes"] for count in size.values()) if scene.wants("fields") else 0
-    files = _FILES_S + 5e-3 * loads + _NODE_S * nodes
-    return ContactPlan(
-        scene,
-        parameters,
-        symmetry,
-        tuple(effects),
-        size,
-        cost.solver,
-        cost.total(workers) + files,
-        memory,
-        workers,
-        families,
-        files_seconds=files,
-    )
+    files = _FILES_S + 5e-3 * loads + _NODE_S * cost.nodes * scene.wants("fields")
+    return ContactPlan.of(cost, symmetry, parameters, effects, needs, files, families=families)
 
 
 def _add_bodies(
     cost: CostModel,
     scene: Scene,
-    size: Mapping[str, Mapping[str, int]],
     products: Sequence[tuple[Family, int]],
     weighted: Mapping[str, Sequence[str]],
 ) -> None:
@@ -135,22 +121,21 @@ def _add_bodies(
     weighted
         Body -> its sets with weights, which hold it in the mean.
     """
-    for count in size.values():
-        cost.contact_body(count["hexes"], count["nodes"])
+    for count in cost.size.values():
+        cost.contact_body(count)
     # what every task keeps is held at once: an equal share of the memory each
-    room = (cost.limit() - cost.kept_bytes) / (len(size) * len(products))
-    for body, count in size.items():
+    room = (memory_limit(scene) - cost.kept_bytes) / (len(cost.size) * len(products))
+    for body, count in cost.size.items():
         chosen = scene.contact.distant.get(body)
         in_mean = ("distant" if chosen is None else f"distant_{chosen}") in weighted.get(body, ())
         for family, number in products:
-            task = f"{body}, {family.label}", count["hexes"], count["nodes"]
-            n_kept = len(family.components) * count["contact"]
+            task, n_kept = f"{body}, {family.label}", len(family.components) * count["contact"]
             if is_curved(scene) and not scene.coupled and not in_mean:
-                cost.contact(*task, n_kept, number, room)
+                cost.contact(task, count, n_kept, number, room)
             else:
-                cost.condensed(*task, n_kept)
+                cost.condensed(task, count, n_kept)
         for family, _ in products if in_mean else ():
-            cost.held_in_mean(f"{body}, {family.label}", count["hexes"], count["nodes"])
+            cost.held_in_mean(f"{body}, {family.label}", count)
 
 
 # A cycle takes the products of so many loads.
@@ -182,11 +167,9 @@ _FILES_S, _NODE_S = 3.0, 3.5e-5
 _STEP_CUBES, _STEP_SQUARES, _KEPT, _CURVE_STEPS = 1.5, 20.0, 5.0, 26
 
 
-def _add_loads(
-    cost: CostModel, scene: Scene, size: Mapping[str, Mapping[str, int]], on: Collection[str]
-) -> None:
+def _add_loads(cost: CostModel, scene: Scene, on: Collection[str]) -> None:
     """Seconds and bytes of all loads, with the effects ``on``."""
-    nodes, k = sum(c["nodes"] for c in size.values()), max(c["contact"] for c in size.values())
+    nodes, k = cost.nodes, max(count["contact"] for count in cost.size.values())
     curved, n_load = is_curved(scene), len(scene.loads.normal)
     n_curve = scene.loads.curve_points * ("load curve" in on)
     # A stiffness is a slope between two more loads.

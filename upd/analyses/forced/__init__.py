@@ -6,7 +6,7 @@ Forced response by multi-harmonic balance, free, stuck and nonlinear.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial, wraps
+from functools import wraps
 from typing import TypeVar
 
 from upd.analyses.base import Analysis, rig_needs
@@ -47,7 +47,7 @@ ANALYSIS = Analysis(
     headline_names=answer.MAIN,
     input_checks=(),
     make_plan=accuracy.plan_to_accuracy,
-    needs=partial(rig_needs, "reduction"),
+    needs=lambda plan, threads: rig_needs(plan, threads, "reduction"),
     solve=accuracy.solve_to_accuracy,
     make_results=_on_one_thread(results.make_results),
     check_solution=_on_one_thread(checks.check_solution),

@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import Effect, Plan
-from upd.analyses.cost import NODES, CostModel, dense_s
+from upd.analyses.cost import NODES, CostModel, Count, dense_s
 from upd.analyses.forced.statics import check_sources, plans_to_solve
-from upd.analyses.seated.plan import centrifugal_effects
+from upd.analyses.seated.plan import centrifugal_effects, friction_effect, worn_effect
 from upd.hbm.core.fourier import harmonics, sample_count
 from upd.hbm.core.kept_factors import WORTH_KEEPING
 from upd.mesh import recipes
@@ -76,36 +76,24 @@ def make_plan(scene: ForcedScene) -> ForcedPlan:
     whole = scene.contact.model == "interface"
     if not whole:
         check_sources(scene)
-    size: dict[str, Mapping[str, int]] = {
-        body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()
-    }
-    cost, memory, workers = _whole_faces_cost(scene, size) if whole else _cost(scene, size)
+    cost = CostModel(scene, recipes.count(scene.recipe, parameters))
+    (_add_whole_faces if whole else _add_points)(cost, scene)
+    needs, files = cost.side_by_side(min(2, cost.threads), 2), _files_seconds(scene)
     solves = not whole and scene.balance.method == "balance"
-    again = _AROUND * cost.seconds * (solves and (scene.estimates or scene.left_out.solves))
-    return ForcedPlan(
-        scene,
-        parameters,
-        "full" if scene.mesh.symmetry == "full" else "half",
-        tuple(effects_of_faces(scene) if whole else effects_of_points(scene)),
-        size,
-        cost.solver,
-        cost.total(workers) + again,
-        memory,
-        workers,
-        estimate_seconds=again,
-        files_seconds=_files_seconds(scene),
-    )
+    again = _AROUND * (cost.seconds + files)
+    again *= solves and (scene.estimates or scene.left_out.solves)
+    cost.seconds += again
+    symmetry = "full" if scene.mesh.symmetry == "full" else "half"
+    effects = effects_of_faces(scene) if whole else effects_of_points(scene)
+    return ForcedPlan.of(cost, symmetry, parameters, effects, needs, files, estimate_seconds=again)
 
 
-def _whole_faces_cost(
-    scene: ForcedScene, size: Mapping[str, Mapping[str, int]]
-) -> tuple[CostModel, float, int]:
-    """As `_cost`, of both faces node by node."""
-    cost = CostModel(scene)
-    for body, count in size.items():
-        cost.dynamic_body(count["hexes"], count["nodes"])
-        cost.condensed(f"{body}, compliance", count["hexes"], count["nodes"], 3 * count["contact"])
-    m = 3.0 * (size["left"]["contact"] + size["right"]["contact"])
+def _add_whole_faces(cost: CostModel, scene: ForcedScene) -> None:
+    """Bodies and curves of both faces node by node."""
+    for body, count in cost.size.items():
+        cost.dynamic_body(count)
+        cost.condensed(f"{body}, compliance", count, 3 * count["contact"])
+    m = 3.0 * sum(cost.size[side]["contact"] for side in SIDES)
     e, curves = scene.excitation, len(scene.excitation.centrifugal_to_force)
     if scene.balance.method == "march":
         solved = 2.0 * curves * _CLOSER * math.log(e.stop / e.start)
@@ -115,10 +103,7 @@ def _whole_faces_cost(
         samples = SAMPLES if scene.balance.samples == "auto" else int(scene.balance.samples)
         moving, rows = _ITERATIONS * curves * samples * (scene.contact.friction > 0.0), _MOVING * m
         cost.seconds += moving * _MOVED_S * rows + dense_s(moving * 2.0 * rows**2 * m)
-    cost.seconds += _files_seconds(scene)
     cost.kept_bytes += _MATRICES * 8.0 * m**2
-    memory, workers = cost.side_by_side(min(2, cost.threads), 2)
-    return cost, memory, workers
 
 
 def _files_seconds(scene: ForcedScene) -> float:
@@ -136,34 +121,27 @@ def parameters_of(scene: ForcedScene) -> dict[str, Any]:
     return rig_parameters(scene, "half" if half else "full", NODES[scene.mesh.element])
 
 
-def _cost(
-    scene: ForcedScene, size: Mapping[str, Mapping[str, int]]
-) -> tuple[CostModel, float, int]:
-    """Seconds and solvers, bytes, and blades reduced side by side."""
-    cost = CostModel(scene)
+def _add_points(cost: CostModel, scene: ForcedScene) -> None:
+    """Blades reduced to springs at points, their contact stiffnesses and curves."""
     modes = scene.reduction.modes
     for side in SIDES:
-        hexes, nodes, contact = (size[side][of] for of in ("hexes", "nodes", "contact"))
-        cost.dynamic_body(hexes, nodes)
-        task = f"{side}, reduction"
+        count, task = cost.size[side], f"{side}, reduction"
+        cost.dynamic_body(count)
         if scene.contact.rule == GAUSS:
             rows, columns = scene.contact.lines(side)
-            cost.attached(task, hexes, nodes, 3 * rows * columns + 2, modes)
+            cost.attached(task, count, 3 * rows * columns + 2, modes)
         else:
-            cost.reduction(task, hexes, nodes, 3 * (contact + 2), modes)
+            cost.reduction(task, count, 3 * (count["contact"] + 2), modes)
     if scene.left_out.solves:
         # K and M of the elastic damper, once per stiffness
-        damper = size["damper"]
-        cost.dynamic_body(damper["hexes"], damper["nodes"], len(scene.stiffnesses))
+        cost.dynamic_body(cost.size["damper"], len(scene.stiffnesses))
     sources = plans_to_solve(scene)
     cost.seconds += sum(one.seconds - one.estimate_seconds - one.files_seconds for one in sources)
-    cost.seconds += _curves_seconds(scene, size)
-    cost.seconds += _files_seconds(scene)
-    memory, workers = cost.side_by_side(min(2, cost.threads), 2)
-    return cost, max([memory, *(plan.memory_bytes for plan in sources)]), workers
+    cost.seconds += _curves_seconds(scene, cost.size)
+    cost.before_bytes = max((plan.memory_bytes for plan in sources), default=0.0)
 
 
-def _curves_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
+def _curves_seconds(scene: ForcedScene, size: Mapping[str, Count]) -> float:
     """All curves of the run, and those of the performance curve."""
     e, points = scene.excitation, _points(scene, size)
     if scene.balance.method == "march":
@@ -186,7 +164,7 @@ def time_steps(scene: ForcedScene) -> int:
     return MARCH_SAMPLES if given == "auto" else int(given)
 
 
-def _step_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
+def _step_seconds(scene: ForcedScene, size: Mapping[str, Count]) -> float:
     """Seconds of a Newton step with its factors."""
     across = 3 if scene.contact.directions == "two" or scene.mesh.symmetry == "full" else 2
     highest, given = int(scene.balance.harmonics), scene.balance.samples
@@ -199,7 +177,7 @@ def _step_seconds(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> 
     return _STEP_S + (_POINT_S + _SAMPLE_S * count) * points + factors
 
 
-def _points(scene: ForcedScene, size: Mapping[str, Mapping[str, int]]) -> float:
+def _points(scene: ForcedScene, size: Mapping[str, Count]) -> float:
     """Contact points of both faces, roughly: one for itself and its mirror image."""
     total = 0.0
     for side in SIDES:
@@ -224,34 +202,25 @@ def grid(plan: ForcedPlan) -> Array:
 
 def effects_of_points(scene: ForcedScene) -> list[Effect]:
     """Of contact by springs at points."""
-    mu, b, c = scene.contact.friction, scene.balance, scene.contact
-    swept = b.method == "march"
+    b, elastic = scene.balance, ELASTIC if scene.left_out.solves else ""
     samples = "power of two by rule" if b.samples == "auto" else f"{b.samples} a period"
+    fit = "the faces fit each other"
     return [
-        _friction(mu, f"Coulomb, mu = {mu:g}; a curve stuck everywhere is answered linearly"),
+        friction_effect(scene, "; a curve stuck everywhere is answered linearly"),
         _along(scene),
-        _odd_motion(scene),
-        _excited(scene),
+        *_motion_and_excitation(scene),
         Effect("lift-off", True, "every point may open: N = max(0, k_n w)"),
         Effect("static balance", True, f"mean positions are unknowns; {_static_words(scene)}"),
-        Effect(
+        Effect.either(
             "blades spread by F_C",
-            not c.loaded,
-            f"the faces fit each other {'under F_C, worn in' if c.loaded else 'without load'}",
-            applies=not c.loaded,
+            not scene.contact.loaded,
+            f"{fit} without load",
+            f"{fit} under F_C, worn in",
         ),
         Effect("damper inertia", True, "rigid body; mass and inertia from its mesh"),
+        _harmonics(scene, f"0 to {b.harmonics}; {samples} samples", CONFIRMED),
         Effect(
-            "harmonics",
-            True,
-            "all: time integration" if swept else f"0 to {b.harmonics}; {samples} samples",
-            "" if swept else CONFIRMED,
-        ),
-        Effect(
-            "damper elasticity",
-            False,
-            "in the contact stiffness; the body moves rigidly",
-            ELASTIC if scene.left_out.solves else "",
+            "damper elasticity", False, "in the contact stiffness; the body moves rigidly", elastic
         ),
         Effect("modes above", False, f"{scene.reduction.modes} modes a blade, static remainder"),
         *centrifugal_effects(scene),
@@ -260,49 +229,35 @@ def effects_of_points(scene: ForcedScene) -> list[Effect]:
 
 def effects_of_faces(scene: ForcedScene) -> list[Effect]:
     """Of contact by all nodes of both faces."""
-    mu, c = scene.contact.friction, scene.contact
-    harmonics_of_blades = (
-        f"0 to {scene.balance.harmonics} of the blades; contact and damper in time"
-    )
+    balanced = f"0 to {scene.balance.harmonics} of the blades; contact and damper in time"
     return [
-        _friction(mu, f"Coulomb, mu = {mu:g}, both directions, every node of both faces"),
+        friction_effect(scene),
         Effect("normal and tangential coupling", True, "solved together at every step in time"),
-        _odd_motion(scene),
-        _excited(scene),
+        *_motion_and_excitation(scene),
         Effect("lift-off", True, "every node may open"),
         Effect("damper elasticity", True, "its deformation follows its forces statically"),
         Effect("damper inertia", True, "mass and inertia from its mesh"),
-        Effect(
-            "worn faces",
-            c.worn > 0.0,
-            f"worn in under F_C to {100.0 * c.worn:g} %"
-            if c.worn
-            else "flat faces that fit without load",
-            applies=c.worn > 0.0,
-        ),
+        worn_effect(scene),
         Effect("static balance", True, _static_words(scene), "static balance"),
-        Effect("harmonics", True, "all: time integration")
-        if scene.balance.method == "march"
-        else Effect("harmonics", True, harmonics_of_blades, "truncation"),
+        _harmonics(scene, balanced, "truncation"),
         *centrifugal_effects(scene),
     ]
 
 
-def _friction(mu: float, words: str) -> Effect:
-    return Effect("friction", mu > 0.0, words if mu else "mu = 0", applies=mu > 0.0)
+def _harmonics(scene: ForcedScene, balanced: str, check: str) -> Effect:
+    if scene.balance.method == "march":
+        return Effect("harmonics", True, "all: time integration")
+    return Effect("harmonics", True, balanced, check)
 
 
-def _odd_motion(scene: ForcedScene) -> Effect:
-    """Motion that the half model does not have."""
+def _motion_and_excitation(scene: ForcedScene) -> list[Effect]:
+    """Motion that the half model does not have; which blades the excitation acts on."""
+    even = "rig, load and contact are even about y = 0: an even motion excites no odd one"
     whole = scene.mesh.symmetry == "full"
-    why = "rig, load and contact are even about y = 0: an even motion excites no odd one"
-    why = "the full model" if whole else why
-    return Effect("motion odd about y = 0", whole, why, applies=whole)
-
-
-def _excited(scene: ForcedScene) -> Effect:
-    """Which blades the excitation acts on."""
-    return Effect("excitation", True, f"{excitation_of(scene.excitation).words}, along x")
+    return [
+        Effect.either("motion odd about y = 0", whole, "the full model", even),
+        Effect("excitation", True, f"{excitation_of(scene.excitation).words}, along x"),
+    ]
 
 
 def _static_words(scene: ForcedScene) -> str:
@@ -323,11 +278,8 @@ def _along(scene: ForcedScene) -> Effect:
     name, c = "sliding along the damper", scene.contact
     if c.directions == "two":
         return Effect(name, True, "slip circle: along the damper and up the slope")
-    why = (
-        "left out where it changes the stuck frequencies by less than 0.1 %"
-        if c.directions == "auto"
-        else "asked for"
-    )
+    changes = "left out where it changes the stuck frequencies by less than 0.1 %"
+    why = changes if c.directions == "auto" else "asked for"
     check = ALONG if scene.left_out.solves and scene.balance.method == "balance" else ""
     return Effect(name, False, why, check, ("contact.directions=two",), applies=c.friction > 0.0)
 

@@ -4,11 +4,10 @@ cost.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from upd.analyses.base import Effect, Plan
-from upd.analyses.cost import NODES, CostModel
+from upd.analyses.cost import NODES, CostModel, Count
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import RigScene
@@ -45,51 +44,34 @@ def make_plan(scene: RigScene) -> ModalPlan:
     found = configurations(scene)
     if not found:
         raise InputError('want: asks for no modes, reduction or response; add "free" or "glued"')
-    size = _sizes(scene, found, symmetry)
-    cost = CostModel(scene)
-    families = 2 if symmetry == "half" else 1
-    for body, count in size.items():
-        cost.dynamic_body(count["hexes"], count["nodes"])
-        cost.modes(f"{body}, modes", count["hexes"], count["nodes"], families)
-    _add_more(cost, scene, size, found[0][0])
-    memory, workers = cost.side_by_side(cost.threads, families * len(size))
-    nodes = sum(count["nodes"] for count in size.values()) if scene.wants("pictures") else 0
+    cost, families = CostModel(scene, _sizes(scene, found, symmetry)), 1 + (symmetry == "half")
+    for body, count in cost.size.items():
+        cost.dynamic_body(count)
+        cost.modes(f"{body}, modes", count, families)
+    _add_more(cost, scene, found[0][0])
+    needs = cost.side_by_side(cost.threads, families * len(cost.size))
+    nodes = cost.nodes if scene.wants("pictures") else 0
     files = _FILES_S + _PICTURES_S * (nodes > 0) + _NODE_S * nodes
     first = parameters(scene, *found[0], symmetry)
-    effects = tuple(_effects(scene, symmetry))
-    return ModalPlan(
-        scene,
-        first,
-        symmetry,
-        effects,
-        size,
-        cost.solver,
-        cost.total(workers) + files,
-        memory,
-        workers,
-        files_seconds=files,
-    )
+    return ModalPlan.of(cost, symmetry, first, _effects(scene, symmetry), needs, files)
 
 
-def _add_more(
-    cost: CostModel, scene: RigScene, size: Mapping[str, Mapping[str, int]], arrangement: str
-) -> None:
+def _add_more(cost: CostModel, scene: RigScene, arrangement: str) -> None:
     """Reduction and response, and what the modes left out would change."""
     if scene.wants("reduction"):
         whole = recipes.count(scene.recipe, parameters(scene, arrangement, "free", "full"))
         for body, count in whole.items():
-            cost.dynamic_body(count["hexes"], count["nodes"])
+            cost.dynamic_body(count)
             # patch, force and accelerometer
             kept = 3 * (count["contact"] + 2)
-            hexes, nodes, modes = count["hexes"], count["nodes"], scene.reduction.count
-            cost.reduction(f"{body}, reduction", hexes, nodes, kept, modes)
+            cost.reduction(f"{body}, reduction", count, kept, scene.reduction.count)
             if scene.wants("response") and body == "right":
                 cost.seconds += _direct_seconds(count["nodes"])
-    right = size.get(f"right, {arrangement}")
+    right = cost.size.get(f"right, {arrangement}")
     if scene.wants("response") and right is not None:
         cost.seconds += 0.3 + _direct_seconds(right["nodes"])
         if scene.left_out.solves:
-            cost.modes(f"right, {arrangement}, modes", right["hexes"], right["nodes"])
+            cost.modes(f"right, {arrangement}, modes", right)
 
 
 def _direct_seconds(nodes: int) -> float:
@@ -97,51 +79,35 @@ def _direct_seconds(nodes: int) -> float:
     return float(2.0 * _DIRECT_S * (3.0 * nodes) ** _DIRECT_POWER)
 
 
-def _sizes(
-    scene: RigScene, found: list[tuple[str, str]], symmetry: str
-) -> dict[str, Mapping[str, int]]:
-    out: dict[str, Mapping[str, int]] = {}
-    for arrangement, kind in found:
+def _sizes(scene: RigScene, found: list[tuple[str, str]], symmetry: str) -> dict[str, Count]:
+    return {
+        f"{body}, {arrangement}": count
+        for arrangement, kind in found
         for body, count in recipes.count(
             scene.recipe, parameters(scene, arrangement, kind, symmetry)
-        ).items():
-            out[f"{body}, {arrangement}"] = dict(count)
-    return out
+        ).items()
+    }
 
 
 def _effects(scene: RigScene, symmetry: str) -> list[Effect]:
     """Each with why it is simulated, and why it is not, where the scene does not ask for it."""
-    response, unasked = scene.wants("response"), "not asked for"
-    rows = [
-        (
-            "mirror families",
-            symmetry == "half",
-            "modes even and odd about y = 0, each on half the rig",
-            "asked for in the scene",
-        ),
-        ("damper", scene.wants("glued"), "glued to both platforms", "no output asks for it"),
-        (
-            "reduction",
-            scene.wants("reduction"),
-            f"{scene.reduction.words} a blade beside patch and probes",
-            unasked,
-        ),
-        ("response", response, "modal, from the modes found", unasked),
-        ("centrifugal stiffening", False, "", "the rig does not turn"),
-        (
-            "friction",
+    response, unasked, either = scene.wants("response"), "not asked for", Effect.either
+    families = "modes even and odd about y = 0, each on half the rig"
+    kept = f"{scene.reduction.words} a blade beside patch and probes"
+    linear = "free and glued are linear; the damper's contact is the forced response's"
+    return [
+        either("mirror families", symmetry == "half", families, "asked for in the scene"),
+        either("damper", scene.wants("glued"), "glued to both platforms", "no output asks for it"),
+        Effect(
+            f"modes above {scene.modes.below:g} Hz",
             False,
-            "",
-            "free and glued are linear; the damper's contact is the forced response's",
+            "in the response by their static share" if response else unasked,
+            MODES_ABOVE if response else "",
+            (f"modes.below={MORE_MODES * scene.modes.below:g} Hz",),
+            applies=response,
         ),
+        either("reduction", scene.wants("reduction"), kept, unasked),
+        either("response", response, "modal, from the modes found", unasked),
+        either("centrifugal stiffening", False, "", "the rig does not turn"),
+        either("friction", False, "", linear),
     ]
-    effects = [Effect(name, on, why if on else off, applies=on) for name, on, why, off in rows]
-    above = Effect(
-        f"modes above {scene.modes.below:g} Hz",
-        False,
-        "in the response by their static share" if response else unasked,
-        MODES_ABOVE if response else "",
-        (f"modes.below={MORE_MODES * scene.modes.below:g} Hz",),
-        applies=response,
-    )
-    return [*effects[:2], above, *effects[2:]]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -16,6 +15,7 @@ from upd.labels import number
 from upd.mesh import recipes
 from upd.scene import SeatedScene
 from upd.scene.base import rig_parameters
+from upd.scene.forced_contact import SIDES
 from upd.scene.rotation import damper_mass
 from upd.units import UNITS
 
@@ -116,22 +116,10 @@ def make_plan(scene: SeatedScene) -> SeatedPlan:
     """Derive the plan of ``scene``. Raises InputError when its parts do not fit together."""
     symmetry = "full" if scene.whole else "half"
     parameters = rig_parameters(scene, symmetry, NODES[scene.mesh.element])
-    size: dict[str, Mapping[str, int]] = {
-        body: dict(count) for body, count in recipes.count(scene.recipe, parameters).items()
-    }
-    cost, memory, workers = _cost(scene, size)
-    return SeatedPlan(
-        scene,
-        parameters,
-        symmetry,
-        tuple(_effects(scene, symmetry)),
-        size,
-        cost.solver,
-        cost.total(workers),
-        memory,
-        workers,
-        files_seconds=_FILES_S,
-    )
+    cost = CostModel(scene, recipes.count(scene.recipe, parameters))
+    _add_contact(cost, scene)
+    needs = cost.side_by_side(min(2, cost.threads), 2)
+    return SeatedPlan.of(cost, symmetry, parameters, _effects(scene, symmetry), needs, _FILES_S)
 
 
 def load_steps(scene: SeatedScene) -> int:
@@ -143,77 +131,73 @@ def load_steps(scene: SeatedScene) -> int:
     return steps
 
 
-def _cost(
-    scene: SeatedScene, size: Mapping[str, Mapping[str, int]]
-) -> tuple[CostModel, float, int]:
-    """Seconds and solvers, bytes, and blades condensed side by side."""
-    cost = CostModel(scene)
+def _add_contact(cost: CostModel, scene: SeatedScene) -> None:
+    """Bodies condensed onto their faces, and the load steps of these."""
     twice = scene.wants("stiffness") and scene.blades.held == "bases"
-    for body, count in size.items():
-        hexes, nodes = count["hexes"], count["nodes"]
-        cost.dynamic_body(hexes, nodes)
+    for body, count in cost.size.items():
+        cost.dynamic_body(count)
         # the damper's is the same on platforms held
         for _ in range(2 if twice and body != "damper" else 1):
-            cost.condensed(f"{body}, compliance", hexes, nodes, 3 * count["contact"])
-    m = 3.0 * (size["left"]["contact"] + size["right"]["contact"])
+            cost.condensed(f"{body}, compliance", count, 3 * count["contact"])
+    m = 3.0 * sum(cost.size[side]["contact"] for side in SIDES)
     calls = 1 + sum(map(len, ways(scene)))
     step = _FACTORS * 2.0 / 3.0 * (_CLOSED * m) ** 3 + _NEWTON_PASSES * m**2
     cost.seconds += dense_s(calls * _CHECKS * m**3)
     cost.seconds += load_steps(scene) * (_STEP_S + dense_s(step))
-    cost.seconds += _FILES_S
     cost.kept_bytes += _MATRICES * 8.0 * m**2
-    memory, workers = cost.side_by_side(min(2, cost.threads), 2)
-    return cost, memory, workers
 
 
 def _effects(scene: SeatedScene, symmetry: str) -> list[Effect]:
-    mu, fit, half = scene.contact.friction, scene.contact.worn, symmetry == "half"
-    bases = scene.blades.held == "bases"
+    either, unworn, band = Effect.either, scene.contact.worn < 1.0, scene.wants("band")
     return [
-        Effect(
-            "friction",
-            mu > 0.0,
-            f"Coulomb, mu = {mu:g}, both directions, every node of both faces" if mu else "mu = 0",
-            applies=mu > 0.0,
-        ),
+        friction_effect(scene),
         Effect("normal and tangential coupling", True, "solved together, along the load's path"),
         Effect("lift-off", True, "every node may open"),
         Effect("damper elasticity", True, "free body; F_C acts on its mass"),
         *centrifugal_effects(scene),
         Effect("damper's rigid motion", True, "shifts and turns follow from its balance"),
-        Effect(
+        either(
             "blades' elasticity",
-            bases,
-            "down to the clamped faces of the bases"
-            if bases
-            else "held where the platforms' sides join the blades",
+            scene.blades.held == "bases",
+            "down to the clamped faces of the bases",
+            "held where the platforms' sides join the blades",
+            applies=True,
         ),
-        Effect(
+        either(
             "motion odd about y = 0",
-            not half,
-            "load and bodies are even about it" if half else "the full model is solved",
-            applies=not half,
+            symmetry != "half",
+            "the full model is solved",
+            "load and bodies are even about it",
         ),
-        Effect(
-            WORN,
-            fit > 0.0,
-            f"worn in under F_C to {100.0 * fit:g} %"
-            if fit
-            else "flat faces that fit without load",
-            WORN if fit < 1.0 else "",
-            ("contact.fit=worn",) if fit < 1.0 else (),
+        worn_effect(
+            scene,
+            check=WORN if unworn else "",
+            switch=("contact.fit=worn",) if unworn else (),
+            applies=True,
         ),
-        Effect(
+        either(
             OTHER_WAYS,
-            scene.wants("band"),
-            "over-pressed, vibrated in, frictionless"
-            if scene.wants("band")
-            else "F_C is raised from nothing, once",
-            "" if scene.wants("band") else OTHER_WAYS,
-            applies=mu > 0.0,
+            band,
+            "over-pressed, vibrated in, frictionless",
+            "F_C is raised from nothing, once",
+            check="" if band else OTHER_WAYS,
+            applies=scene.contact.friction > 0.0,
         ),
         Effect("inertia", False, "quasi-static", applies=False),
     ]
+
+
+def friction_effect(scene: Any, how: str = ", both directions, every node of both faces") -> Effect:
+    """Coulomb friction of a forced response or a seated damper."""
+    mu = scene.contact.friction
+    return Effect.either("friction", mu > 0.0, f"Coulomb, mu = {mu:g}{how}", "mu = 0")
+
+
+def worn_effect(scene: Any, **more: Any) -> Effect:
+    """How faces fit each other node by node, of a forced response or a seated damper."""
+    worn = scene.contact.worn
+    why, off = f"worn in under F_C to {100.0 * worn:g} %", "flat faces that fit without load"
+    return Effect.either(WORN, worn > 0.0, why, off, **more)
 
 
 def centrifugal_words(scene: Any, mass: float | None) -> str:
