@@ -66,7 +66,7 @@ class Study:
     present: Callable[[Sequence[SolvedPoint]], StudyReport]
 
     def write(self, folder: Path, solved: Sequence[SolvedPoint], report: StudyReport) -> list[Path]:
-        """Write study.md, study.json (of a study with points), figures and page into ``folder``.
+        """Write study.md, study.json, figures and page into ``folder``.
 
         Returns the paths, the table first.
         """
@@ -77,8 +77,6 @@ class Study:
         for part in tables:
             lines += [f"## {part.heading}", "", *markdown_table(part), ""]
         write_text(table, "\n".join([*lines, *(f"- {note}" for note in report.notes)]) + "\n")
-        if not self.points:
-            return [table]
         content = {
             "title": self.title,
             "points": [one.as_dict() for one in solved],

@@ -121,8 +121,7 @@ def print_study_plan(console: Console, title: str, study: Study, workers: Worker
     elif workers.count > 1:
         side = counted(workers.count, "point")
         who = f"{side} at a time with {threads} each: seconds are not those of a single run"
-    what = f"{points}, {who}" if study.points else "from one set of modes, no other runs"
-    console.print(f"{title}: {what}")
+    console.print(f"{title}: {points}, {who}")
 
 
 def print_study(console: Console, result: StudyResult) -> None:
@@ -133,6 +132,6 @@ def print_study(console: Console, result: StudyResult) -> None:
         print_table(console, table)
     files = [f"{_KINDS.get(path.suffix, 'File')}: {path}" for path in result.files]
     fine = sum(not one.outcome.failure for one in result.solved)
-    many = f"{fine} of {counted(len(result.solved), 'point')} ok, " if result.solved else ""
-    for line in (*files, f"{many}{duration(result.seconds)}", *result.report.notes):
+    many = f"{fine} of {counted(len(result.solved), 'point')} ok"
+    for line in (*files, f"{many}, {duration(result.seconds)}", *result.report.notes):
         console.print(line)
