@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from upd.analyses import analysis_of, make_plan
-from upd.analyses.base import Analysis, Plan, refuse_oversize
+from upd.analyses.base import Analysis, Plan
 from upd.cache.files import json_text, write_text
 from upd.cache.folders import OwnFolder, own_folder
 from upd.cache.sources import versions
@@ -40,6 +40,7 @@ from upd.results import (
 )
 from upd.scene import AnyScene, as_scene
 from upd.scene.keys import scene_as_run
+from upd.vary.errors import estimate
 from upd.vary.inputs import input_parts
 
 log = logging.getLogger("upd")
@@ -85,7 +86,7 @@ def run(
     loaded = as_scene(scene, overrides)
     analysis = analysis_of(loaded)
     plan = make_plan(loaded)
-    refuse_oversize(plan)
+    plan.refuse_oversize()
     stages = Stages(progress)
     if out is None:
         log.info(_versions())
@@ -229,8 +230,9 @@ def _collected(
     if estimates is not None:
         results = with_estimates(results, estimates)
     else:
-        if analysis.estimate is not None and solution.plan.scene.estimates:
-            results = with_estimates(results, analysis.estimate(solution, results, stages))
+        if solution.plan.scene.estimates:
+            found = estimate(analysis.problem, solution, results, stages)
+            results = with_estimates(results, found)
         results = with_inputs(results, input_parts(analysis, solution, results, stages))
     return RunResult(
         scene=plan.scene.name,

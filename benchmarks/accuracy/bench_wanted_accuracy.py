@@ -18,14 +18,13 @@ from typing import Any
 
 import upd
 from upd.analyses.base import CHOSEN_BY_ACCURACY
-from upd.analyses.forced import accuracy as forced
-from upd.analyses.forced.accuracy import estimate
+from upd.analyses.forced.accuracy import PROBLEM, estimate
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solve import solve
 from upd.errors import ConvergenceError, InputError, UpdError
 from upd.progress import Stages
 from upd.scene import AnyScene, load_scene
-from upd.vary.wanted import Levels, LevelSearch, shares_of, solve_wanted
+from upd.vary.wanted import Levels, LevelSearch, plan_wanted, shares_of, solve_wanted
 
 Row = dict[str, Any]
 #: at this F_C/F_E most slips
@@ -84,10 +83,10 @@ def _response(
     name: str, wanted: Mapping[str, str], stiffness: str = STIFFNESSES[0]
 ) -> Iterator[Row]:
     asked = _asked(name, wanted, stiffness)
-    search, begin = LevelSearch(forced.WANTED, asked), time.process_time()
+    search, begin = LevelSearch(PROBLEM, asked), time.process_time()
     row: Row = {"name": f"accuracy of {name}-response", "case": _told(wanted), "unit": "s"}
     try:
-        solution, _ = solve_wanted(forced.WANTED, forced.plan_to_accuracy(asked), Stages())
+        solution, _ = solve_wanted(PROBLEM, plan_wanted(PROBLEM, asked), Stages())
         (effect,) = (e for e in solution.plan.effects if e.name in CHOSEN_BY_ACCURACY)
         told = f"reached: {effect.why}"
     except ConvergenceError as error:
@@ -95,7 +94,7 @@ def _response(
         solution, told = error.partial, f"missed: {error}"
     yield {**row, "value": time.process_time() - begin, "note": told}
     numbers = make_results(solution)
-    found = estimate(solution, numbers, Stages())
+    found = estimate(solution, numbers)
     wanted_shares = shares_of(found, search.accuracies)
     yield from _left(name, numbers, wanted_shares)
     levels = _levels(search, solution)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rigs import LINES
 
-from upd.analyses.forced.accuracy import WANTED
+from upd.analyses.forced.accuracy import PROBLEM, choices
 from upd.analyses.forced.again import GRADED, OFF_CONTACT, count_of, graded
 from upd.fem import Material, mass, stiffness
 from upd.linalg import modes
@@ -77,10 +77,10 @@ def test_counts_of_a_level_are_whole_and_multiply_those_of_the_scene() -> None:
 
 def test_levels_of_an_accuracy_are_graded() -> None:
     asked = _scene(accuracy={"peak_frequency": "1 %"}, left_out__solve="no")
-    (mesh,) = (one for one in WANTED.choices(asked) if one.name == "mesh")
+    (mesh,) = (one for one in choices(asked) if one.name == "mesh")
 
     def plan(level: int) -> Any:
-        return WANTED.make_plan(mesh.at(asked, level))
+        return PROBLEM.make_plan(mesh.at(asked, level))
 
     assert plan(0).scene.geometry == asked.geometry
     for level, finer in ((1, 1.5), (3, 2.5), (4, 3)):

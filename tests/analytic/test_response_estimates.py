@@ -71,7 +71,7 @@ def solved(ratio: float, **more: Any) -> Found:
     solution: Any = forced.ANALYSIS.solve(plan, Stages(silent))
     assert isinstance(solution, ForcedSolution)
     numbers = forced.ANALYSIS.make_results(solution)
-    return solution, numbers, estimate(solution, numbers, Stages(silent))
+    return solution, numbers, estimate(solution, numbers)
 
 
 @pytest.fixture(scope="module")
@@ -260,7 +260,7 @@ def test_where_a_top_leaves_the_next_motion_stands_for_harmonics(slipping: Found
     more = solve_again(run, Variant(Variation(HARMONICS, "more", size=0.6), run.plan))
     assert not more.numbers
     levels = [one for one in solution.levels if one.variation.source not in (HARMONICS, SAMPLES)]
-    found = estimate(replace(leaves, levels=levels), numbers, Stages(silent))
+    found = estimate(replace(leaves, levels=levels), numbers)
     for name, error in (("peak_2_accelerance", 0.02), ("peak_2_frequency", 0.001)):
         one = number(slipping, name)
         parts = {part.source: part for part in found[one.name, one.case]}
@@ -314,7 +314,7 @@ def test_a_level_that_fails_leaves_only_its_part(
     )
     failed = {one.of.source: solve_again(run, one) for one in variants}
     mixed = [failed.get(one.variation.source, one) for one in solution.levels]
-    again = estimate(replace(solution, levels=mixed), numbers, Stages(silent))
+    again = estimate(replace(solution, levels=mixed), numbers)
     one = number(slipping, "peak_2_accelerance")
     was, now = ({p.source: p for p in found[one.name, one.case]} for found in (estimates, again))
     for source, part in now.items():

@@ -12,7 +12,6 @@ import pytest
 from scipy.sparse import csr_array
 
 from upd.analyses import make_plan
-from upd.analyses.base import refuse_oversize
 from upd.analyses.cost import CostModel
 from upd.errors import InputError
 from upd.fem import Material, box_mesh, mass, stiffness
@@ -149,7 +148,7 @@ def test_submatrix(n):
 @pytest.mark.parametrize("free", [4e9, 24e9])
 def test_ready_scenes_fit(monkeypatch, name, free):
     monkeypatch.setattr(select, "memory_left", lambda: free)
-    refuse_oversize(make_plan(load_scene(name)))
+    make_plan(load_scene(name)).refuse_oversize()
 
 
 @pytest.mark.parametrize("parts", [0.5, 0.9])
@@ -157,8 +156,8 @@ def test_what_does_not_fit_is_refused(monkeypatch, parts):
     plan = make_plan(load_scene("hertz"))
     monkeypatch.setattr(select, "memory_left", lambda: parts * plan.memory_bytes)
     with pytest.raises(InputError, match="use a coarser mesh"):
-        refuse_oversize(plan)
-    refuse_oversize(replace(plan, memory_bytes=0.99 * parts * plan.memory_bytes))
+        plan.refuse_oversize()
+    replace(plan, memory_bytes=0.99 * parts * plan.memory_bytes).refuse_oversize()
 
 
 def test_a_refusal_names_the_size_that_fits():
@@ -172,7 +171,7 @@ def test_a_refusal_names_the_size_that_fits():
         return 3 * sum(count["nodes"] for count in made.size.values())
 
     with pytest.raises(InputError) as told:
-        refuse_oversize(plan(3))
+        plan(3).refuse_oversize()
     fit = float(re.search(r"about (\S+) dofs fit", str(told.value)).group(1))
     sizes = {refine: plan(refine) for refine in (1.0, 1.2, 1.5, 2.0)}
     fitting = [dofs(one) for one in sizes.values() if one.memory_bytes <= 4e9]
@@ -197,11 +196,11 @@ def test_a_contact_without_inner_displacements_lets_factors_go(monkeypatch):
     kept, fewer = plan("stiffness", "fields"), plan("stiffness")
     # as many as fit
     assert 1 < fewer.workers < 4
-    refuse_oversize(fewer)
+    fewer.refuse_oversize()
     # kept factors are all there in the end
     assert kept.workers == 1 and kept.memory_bytes == usual.memory_bytes
     with pytest.raises(InputError, match="use a coarser mesh"):
-        refuse_oversize(kept)
+        kept.refuse_oversize()
 
 
 @pytest.mark.skipif(not has_pardiso(), reason="SuperLU keeps K in other parts")
@@ -238,4 +237,4 @@ def test_a_rig_takes_fewer_workers_before_it_is_refused(monkeypatch):
     fewer = make_plan(load_scene("rig"))
     # as many as fit
     assert 1 < fewer.workers < 4
-    refuse_oversize(fewer)
+    fewer.refuse_oversize()

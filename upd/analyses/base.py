@@ -21,12 +21,13 @@ from upd.mesh import recipes
 from upd.plot.chart import Chart, Entry
 from upd.progress import Stages
 from upd.reference.printed import Lookup, Printed, printed_values
-from upd.results import Arrays, Case, Check, Estimates, Group, Result
+from upd.results import Arrays, Case, Check, Group, Result
 from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_label
 from upd.scene import AnyScene, load_scene, ready_scenes
 from upd.scene.base import LeftOut
-from upd.vary.variation import Overrides
+from upd.vary.variation import Overrides, Problem
+from upd.vary.wanted import plan_wanted, solve_wanted
 
 __all__ = [
     "CHOSEN_BY_ACCURACY",
@@ -37,8 +38,6 @@ __all__ = [
     "Needs",
     "Plan",
     "Resolved",
-    "chosen_by_accuracy",
-    "refuse_oversize",
 ]
 
 #: names of the effect with the levels that a run chose; the second is that of older folders
@@ -210,6 +209,34 @@ class Plan(Generic[S]):
         """True when the effect is simulated."""
         return next(e.on for e in self.effects if e.name == name)
 
+    def chosen_by_accuracy(self, why: str) -> Self:
+        """The plan with the effect that its levels were chosen, and how."""
+        return replace(self, effects=(*self.effects, Effect(CHOSEN_BY_ACCURACY[0], True, why)))
+
+    def refuse_oversize(self) -> None:
+        """Raise InputError when the plan needs more memory than there is.
+
+        Better now than after an hour, killed without a word by the system.
+        """
+        limit = memory_limit(self.scene)
+        if self.memory_bytes > limit:
+            mesh = ", ".join(
+                f"{name} {self.parameters[name]}"
+                for name in ("divisions", "refine")
+                if name in self.parameters
+            )
+            coarser = (
+                "(geometry.divisions or geometry.refine), a patch sized from the load, loads "
+                "nearer to each other, ask for less accuracy,"
+            )
+            counts = f" ({mesh})" if mesh else ""
+            raise InputError(
+                f"the mesh needs about {self.memory_bytes / 1e9:.3g} GB{counts}, there are "
+                f"{limit / 1e9:.3g} GB{fitting(self, limit)}: use a coarser mesh "
+                f"{coarser if mesh else ''}".rstrip()
+                + " or close other programs"
+            )
+
     @classmethod
     def of(
         cls,
@@ -281,16 +308,10 @@ class Analysis:
         terminal, the page, tables of sweeps and ladders.
     input_checks
         Self-checks whose failure is an error of the input.
-    make_plan
-        scene -> what is simulated and left out, size and cost. Raises InputError when parts of the
-        scene do not fit together.
+    problem
+        Its plan, solution and numbers; how its scenes are varied.
     needs
         plan, threads -> what a point of a sweep with this plan needs, and may share.
-    solve
-        plan, stages -> solution, with everything the plan calls for and the plan as run. An
-        UpdError carries what converged as ``partial``.
-    make_results
-        solution -> the numbers of a run.
     check_solution
         solution -> the self-checks of a run.
     arrays
@@ -310,9 +331,9 @@ class Analysis:
     verdict_names
         Names of the number that stands beside the outcome, the first that was reached; the first of
         ``headline`` when none.
-    estimate
-        solution, its numbers, stages -> the parts of their errors, from cheaper companions; None
-        where none are known.
+    solve_left_out
+        solution, stages: adds numbers solved again with effects that a run leaves out; None where
+        it has them already.
     coarsened
         plan as run -> what makes a scene into its cheap level: the numbers that inputs change are
         solved on it again. None where the scene itself is.
@@ -321,10 +342,8 @@ class Analysis:
     name: str
     headline_names: tuple[str, ...]
     input_checks: tuple[str, ...]
-    make_plan: Callable[[Any], Plan[Any]]
+    problem: Problem
     needs: Callable[[Any, int], Needs]
-    solve: Callable[[Any, Stages], Any]
-    make_results: Callable[[Any], list[Result]]
     check_solution: Callable[[Any], list[Check]]
     arrays: Callable[[Any], dict[str, Group]]
     sizes: Callable[[Any], dict[str, int]]
@@ -333,8 +352,33 @@ class Analysis:
     headline: Callable[[Sequence[Entry]], list[Entry]]
     answer: Callable[[Sequence[Entry]], list[AnswerTable]] | None = None
     verdict_names: tuple[str, ...] = ()
-    estimate: Callable[[Any, Sequence[Result], Stages], Estimates] | None = None
+    solve_left_out: Callable[[Any, Stages], None] | None = None
     coarsened: Callable[[Any], Overrides] | None = None
+
+    def make_plan(self, scene: AnyScene) -> Plan[Any]:
+        """What is simulated and left out, size and cost.
+
+        Raises InputError when parts of the scene do not fit together.
+        """
+        plan: Plan[Any] = plan_wanted(self.problem, scene)
+        return plan
+
+    def solve(self, plan: Plan[Any], stages: Stages) -> Any:
+        """Everything the plan calls for, with the plan as run.
+
+        An UpdError carries what converged as ``partial``.
+        """
+        solution, found = solve_wanted(self.problem, plan, stages)
+        if found is not None:
+            solution = replace(solution, estimates=found)
+        if self.solve_left_out is not None:
+            with keeping(solution):
+                self.solve_left_out(solution, stages)
+        return solution
+
+    def make_results(self, solution: Any) -> Sequence[Result]:
+        """The numbers of a run."""
+        return self.problem.make_results(solution)
 
 
 def fitting(plan: Plan[Any], limit: float) -> str:
@@ -357,36 +401,6 @@ def fitting(plan: Plan[Any], limit: float) -> str:
     factors = any(not why.partition(":")[0].endswith("amg") for why in plan.solver.values())
     fit = dofs * (limit / plan.memory_bytes) ** (0.75 if factors else 1.0)
     return f" (about {fit:.2g} dofs fit, these are {dofs:.2g})"
-
-
-def chosen_by_accuracy(plan: Any, why: str) -> Any:
-    """The plan with the effect that its levels were chosen, and how."""
-    return replace(plan, effects=(*plan.effects, Effect(CHOSEN_BY_ACCURACY[0], True, why)))
-
-
-def refuse_oversize(plan: Plan[Any]) -> None:
-    """Raise InputError when the plan needs more memory than there is.
-
-    Better now than after an hour, killed without a word by the system.
-    """
-    limit = memory_limit(plan.scene)
-    if plan.memory_bytes > limit:
-        mesh = ", ".join(
-            f"{name} {plan.parameters[name]}"
-            for name in ("divisions", "refine")
-            if name in plan.parameters
-        )
-        coarser = (
-            "(geometry.divisions or geometry.refine), a patch sized from the load, loads nearer to "
-            "each other, ask for less accuracy,"
-        )
-        counts = f" ({mesh})" if mesh else ""
-        raise InputError(
-            f"the mesh needs about {plan.memory_bytes / 1e9:.3g} GB{counts}, there are "
-            f"{limit / 1e9:.3g} GB{fitting(plan, limit)}: use a coarser mesh "
-            f"{coarser if mesh else ''}".rstrip()
-            + " or close other programs"
-        )
 
 
 # -- printed values beside the numbers of a run ----------------------------------------------------

@@ -41,6 +41,8 @@ def estimate(
     known: Estimates | None = getattr(solution, "estimates", None)
     if known is not None:
         return known
+    if problem.estimate is not None:
+        return problem.estimate(solution, numbers)
     plan, run = solution.plan, SolvedVariation(RUN, numbers, stages.elapsed())
     levels, parts = problem.levels(plan), list[Estimates]()
     solved = {
@@ -60,7 +62,6 @@ def estimate(
 
 def estimate_in_round(
     problem: Problem,
-    level_of: Callable[[Any], Variation],
     solution: Any,
     numbers: Sequence[Result],
     stages: Stages,
@@ -70,8 +71,6 @@ def estimate_in_round(
 
     Parameters
     ----------
-    level_of
-        plan -> its level, with the size of its elements in any unit.
     solution, numbers, stages
         Of the round.
     memo
@@ -80,9 +79,11 @@ def estimate_in_round(
     Returns
     -------
     Estimates or None
-        None where no level is coarser.
+        None where only another level shows them.
     """
-    level, seconds = level_of(solution.plan), stages.elapsed()
+    if problem.estimate is not None:
+        return problem.estimate(solution, numbers)
+    level, seconds = problem.level_of(solution.plan), stages.elapsed()
     samples = {} if problem.sample is None else problem.sample(solution)
     run = SolvedVariation(level, numbers, seconds, samples)
     coarser = [
@@ -93,7 +94,8 @@ def estimate_in_round(
     if all(one.variation.size != level.size for one in memo):
         memo.append(run)
     if not coarser:
-        return None
+        usual = problem.varies_lowest
+        return estimate(problem, solution, numbers, stages) if usual else None
     half = partial(half_cost, problem, solution.plan, level.source, seconds)
     found = source_estimates(level.source, run, coarser, half)
     return problem.corrected(solution, numbers, found) if problem.corrected else found

@@ -62,7 +62,8 @@ def plan_with_estimates(problem: Problem, scene: Any) -> Any:
             # what is refused is the reason that the run gives
             with suppress(InputError):
                 again += predicted_seconds(problem, plan, one)
-    return replace(plan, seconds=plan.seconds + again, estimate_seconds=again)
+    estimates = plan.estimate_seconds + again
+    return replace(plan, seconds=plan.seconds + again, estimate_seconds=estimates)
 
 
 def solve(

@@ -82,15 +82,37 @@ Levels = Mapping[str, Sequence[Variation] | str]
 
 
 @dataclass(frozen=True)
+class LevelChoice:
+    """What sets the level of one source of error where an accuracy is wanted.
+
+    Attributes
+    ----------
+    source
+        As `upd.results.ErrorPart` names it.
+    name
+        In words: "modes kept".
+    labels
+        Of its levels, cheap to expensive.
+    at
+        scene, level -> the scene on this level.
+    """
+
+    source: str
+    name: str
+    labels: Sequence[str]
+    at: Callable[[Any, int], Any]
+
+
+@dataclass(frozen=True)
 class Problem:
-    """What an analysis gives to have its scenes varied.
+    """What an analysis gives to have its scenes solved, varied, and brought to an accuracy.
 
     Attributes
     ----------
     make_plan
         scene -> its plan, without the cost of variations.
     solve, make_results
-        plan, stages -> solution; its numbers.
+        plan, stages -> solution, a dataclass with its plan; its numbers.
     bare
         scene -> overrides without what costs and shows no number.
     levels
@@ -102,13 +124,37 @@ class Problem:
     corrected
         solution, numbers of the run, the parts found -> the parts, with those that are known
         otherwise; None where none are.
+    estimate
+        solution, numbers -> the parts of their errors, of solutions that have their levels
+        themselves; None: by ``levels``.
+    choices
+        scene -> what may be chosen of it to reach an accuracy; None where none can be asked for.
+    governing
+        scene -> names of accuracies -> numbers they are asked of, as shell patterns; one accuracy
+        for all is asked of all of them. Other names stand for themselves.
+    level_of
+        plan -> its level, with the size of its elements in any unit.
+    varies_lowest
+        Whether the usual variations show the errors of the lowest level, not only another level.
+    trial
+        scene -> the scene with nothing but the numbers that govern.
+    predicted
+        scene that asks -> scenes of the rounds that its plan predicts, the last of the whole run;
+        None: the lowest levels, then the scene's own.
     """
 
     make_plan: Callable[[Any], Any]
     solve: Callable[[Any, Stages], Any]
     make_results: Callable[[Any], Sequence[Result]]
-    bare: Callable[[Any], Overrides]
-    levels: Callable[[Any], Levels]
-    finer: Callable[[Any, str, float], Overrides]
+    bare: Callable[[Any], Overrides] = lambda scene: ALONE
+    levels: Callable[[Any], Levels] = lambda plan: {}
+    finer: Callable[[Any, str, float], Overrides] = lambda plan, source, factor: ()
     sample: Callable[[Any], Samples] | None = None
     corrected: Callable[[Any, Sequence[Result], Estimates], Estimates] | None = None
+    estimate: Callable[[Any, Sequence[Result]], Estimates] | None = None
+    choices: Callable[[Any], Sequence[LevelChoice]] | None = None
+    governing: Callable[[Any], Mapping[str, str]] = lambda scene: {}
+    level_of: Callable[[Any], Variation] = lambda plan: RUN
+    varies_lowest: bool = False
+    trial: Callable[[Any], Any] = lambda scene: scene
+    predicted: Callable[[Any], Sequence[Any]] | None = None

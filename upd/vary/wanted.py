@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any
 
 from upd.errors import ConvergenceError, InputError, one_line
 from upd.progress import Stages
 from upd.results import ErrorPart, Estimates, Result
-from upd.vary.variation import Key, SolvedVariation
+from upd.vary.errors import estimate_in_round
+from upd.vary.solve import plan_with_estimates
+from upd.vary.variation import Key, Problem, SolvedVariation
 
 log = logging.getLogger(__name__)
 #: level of every choice, 0 the cheapest
@@ -28,103 +30,35 @@ Shares = Mapping[Key, Mapping[str, float]]
 _LEAST_S = 1e-3
 
 
-@dataclass(frozen=True)
-class LevelChoice:
-    """What sets the level of one source of error.
-
-    Attributes
-    ----------
-    source
-        As `upd.results.ErrorPart` names it.
-    name
-        In words: "modes kept".
-    labels
-        Of its levels, cheap to expensive.
-    at
-        scene, level -> the scene on this level.
-    """
-
-    source: str
-    name: str
-    labels: Sequence[str]
-    at: Callable[[Any, int], Any]
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What an analysis gives to have its levels chosen.
-
-    Attributes
-    ----------
-    choices
-        scene -> what may be chosen of it.
-    governing
-        Names of accuracies -> numbers they are asked of, as shell patterns; one accuracy for all is
-        asked of all of them. Other names stand for themselves.
-    make_plan
-        scene on its levels -> plan. The plan has ``asked``, the scene that asks for an accuracy.
-    solve, make_results
-        plan, stages -> solution, a dataclass with its plan; its numbers.
-    estimate
-        solution, numbers, stages of the round, what the rounds before kept -> the parts of their
-        errors; it may keep more. None where only another level shows them.
-    refuse
-        Raises InputError for a plan beyond the memory.
-    chosen
-        plan, how its levels were chosen -> plan with this effect.
-    trial
-        scene -> the scene with nothing but the numbers that govern.
-    predicted
-        scene that asks -> scenes of the rounds that its plan predicts, the last of the whole run;
-        None: the lowest levels, then the scene's own.
-    """
-
-    choices: Callable[[Any], Sequence[LevelChoice]]
-    governing: Mapping[str, str]
-    make_plan: Callable[[Any], Any]
-    solve: Callable[[Any, Stages], Any]
-    make_results: Callable[[Any], Sequence[Result]]
-    estimate: Callable[[Any, Sequence[Result], Stages, list[SolvedVariation]], Estimates | None]
-    refuse: Callable[[Any], None]
-    chosen: Callable[[Any, str], Any]
-    trial: Callable[[Any], Any] = lambda scene: scene
-    predicted: Callable[[Any], Sequence[Any]] | None = None
-
-
-def plan_wanted(wanted: Wanted, usual: Callable[[Any], Any], scene: Any) -> Any:
+def plan_wanted(problem: Problem, scene: Any) -> Any:
     """The plan of a scene; with the seconds of the rounds before where it asks for an accuracy.
-
-    Parameters
-    ----------
-    usual
-        scene -> plan of a scene that asks for none.
 
     Raises
     ------
     InputError
         When parts of the scene do not fit together.
     """
-    if scene.wanted_accuracy is None:
-        return usual(scene)
-    search = LevelSearch(wanted, scene)
-    if wanted.predicted is not None:
-        scenes, run = wanted.predicted(scene), "a run on levels like these"
+    if problem.choices is None or scene.wanted_accuracy is None:
+        return plan_with_estimates(problem, scene)
+    search = LevelSearch(problem, scene)
+    if problem.predicted is not None:
+        scenes, run = problem.predicted(scene), "a run on levels like these"
     else:
-        lowest = wanted.trial(search.scene(search.lowest))
+        lowest = problem.trial(search.scene(search.lowest))
         scenes, run = (lowest, replace(scene, accuracy=None)), "a run on the scene's own"
-    *before, plan = map(wanted.make_plan, scenes)
+    *before, plan = map(search.plan_of, scenes)
     again = sum(one.seconds - one.files_seconds for one in before)
     names = ", ".join(one.name for one in search.choices)
     why = f"rounds from the lowest levels up; predicted is {run}: {names}"
     return replace(
-        wanted.chosen(plan, why),
+        plan.chosen_by_accuracy(why),
         asked=scene,
         seconds=plan.seconds + again,
         estimate_seconds=plan.estimate_seconds + again,
     )
 
 
-def solve_wanted(wanted: Wanted, plan: Any, stages: Stages) -> tuple[Any, Estimates | None]:
+def solve_wanted(problem: Problem, plan: Any, stages: Stages) -> tuple[Any, Estimates | None]:
     """Run a plan; on levels that are shown to reach the accuracy where its scene asks for one.
 
     A number is given up where the sources without a higher level, or without one within the memory,
@@ -145,13 +79,13 @@ def solve_wanted(wanted: Wanted, plan: Any, stages: Stages) -> tuple[Any, Estima
         its numbers.
     """
     if plan.asked is None:
-        return wanted.solve(plan, stages), None
-    search = LevelSearch(wanted, plan.asked)
+        return problem.solve(plan, stages), None
+    search = LevelSearch(problem, plan.asked)
     levels, solution, found = search.lowest, None, None
     while True:
         trial = search.trial(levels)
         try:
-            wanted.refuse(trial)
+            trial.refuse_oversize()
             # its factors are the memory of the next
             solution = None
             with stages("accuracy rounds", search.text(levels)):
@@ -171,8 +105,8 @@ def solve_wanted(wanted: Wanted, plan: Any, stages: Stages) -> tuple[Any, Estima
         levels = raised
     if lack := search.lack(shares or {}):
         raise search.missed(lack, solution, found)
-    whole = search.planned(levels)
-    whole = wanted.chosen(whole, f"{search.text(levels)}; rounds: {' | '.join(search.rounds)}")
+    why = f"{search.text(levels)}; rounds: {' | '.join(search.rounds)}"
+    whole = search.planned(levels).chosen_by_accuracy(why)
     if whole.scene != trial.scene:
         solution = None
         solution, found = search.solved(whole)
@@ -193,10 +127,10 @@ class LevelSearch:
         The levels of every round, and the number farthest from its accuracy.
     """
 
-    def __init__(self, wanted: Wanted, asked: Any) -> None:
-        self.wanted, self.asked = wanted, asked
-        self.choices = wanted.choices(asked)
-        given, names = asked.wanted_accuracy, wanted.governing
+    def __init__(self, problem: Problem, asked: Any) -> None:
+        self.problem, self.asked = problem, asked
+        self.choices = problem.choices(asked) if problem.choices else ()
+        given, names = asked.wanted_accuracy, problem.governing(asked)
         self.accuracies: dict[str, float] = (
             {names.get(name, name): error for name, error in given.items()}
             if isinstance(given, Mapping)
@@ -219,23 +153,32 @@ class LevelSearch:
             scene = choice.at(scene, level)
         return scene
 
+    def plan_of(self, scene: Any) -> Any:
+        """The plan of a round."""
+        problem = self.problem
+        return (
+            plan_with_estimates(problem, scene)
+            if problem.varies_lowest
+            else problem.make_plan(scene)
+        )
+
     def planned(self, levels: Levels) -> Any:
         """The plan of the whole run."""
         if levels not in self._plans:
-            self._plans[levels] = self.wanted.make_plan(self.scene(levels))
+            self._plans[levels] = self.plan_of(self.scene(levels))
         return self._plans[levels]
 
     def trial(self, levels: Levels) -> Any:
         """The plan of the wanted numbers alone."""
         whole = self.scene(levels)
-        alone = self.wanted.trial(whole)
-        return self.planned(levels) if alone == whole else self.wanted.make_plan(alone)
+        alone = self.problem.trial(whole)
+        return self.planned(levels) if alone == whole else self.plan_of(alone)
 
     def solved(self, plan: Any) -> tuple[Any, Any]:
         """A plan's solution, and the errors of its numbers."""
         clock = Stages()
-        solution = self.wanted.solve(plan, clock)
-        numbers = self.wanted.make_results(solution)
+        solution = self.problem.solve(plan, clock)
+        numbers = self.problem.make_results(solution)
         if isinstance(self.asked.wanted_accuracy, Mapping):
             require_named(self.accuracies, numbers)
         self._withheld = {
@@ -243,7 +186,7 @@ class LevelSearch:
             for one in numbers
             if one.withheld and any(fnmatchcase(one.name, name) for name in self.accuracies)
         }
-        return solution, self.wanted.estimate(solution, numbers, clock, self._memo)
+        return solution, estimate_in_round(self.problem, solution, numbers, clock, self._memo)
 
     def raised(self, levels: Levels, shares: Shares | None) -> Levels | None:
         """The levels of the next round; None where all numbers are reached or given up.
@@ -277,7 +220,7 @@ class LevelSearch:
             return None
         higher = (*levels[:k], levels[k] + 1, *levels[k + 1 :])
         try:
-            self.wanted.refuse(self.planned(higher))
+            self.planned(higher).refuse_oversize()
         except InputError:
             return None
         return higher

@@ -14,13 +14,14 @@ from rigs import LINES
 
 import upd
 from upd.analyses import make_plan
-from upd.analyses.base import CHOSEN_BY_ACCURACY, Plan, chosen_by_accuracy, refuse_oversize
+from upd.analyses.base import CHOSEN_BY_ACCURACY, Plan
 from upd.errors import ConvergenceError, InputError
 from upd.progress import Stages
 from upd.results import Case, ErrorPart, Estimates, Result
 from upd.results.quantities import Quantity
 from upd.scene import load_scene
-from upd.vary.wanted import LevelChoice, LevelSearch, Wanted, require_named, shares_of, solve_wanted
+from upd.vary.variation import LevelChoice, Problem
+from upd.vary.wanted import LevelSearch, require_named, shares_of, solve_wanted
 
 pytestmark = pytest.mark.estimated
 
@@ -75,19 +76,17 @@ class MadeUp:
     def __init__(self) -> None:
         self.solved: list[MadeUpScene] = []
         labels = ("1", "2", "4", "8")
-        self.wanted = Wanted(
-            lambda scene: [
-                LevelChoice("mesh", "mesh", labels, lambda one, k: replace(one, mesh=k)),
-                LevelChoice("modes", "modes", labels, lambda one, k: replace(one, modes=k)),
-            ],
-            {"number": "number"},
+        self.problem = Problem(
             _plan,
             self._solve,
             lambda solution: [Result("number", CASE, 1.0, "N")],
-            self._estimate,
-            refuse_oversize,
-            chosen_by_accuracy,
-            lambda scene: replace(scene, want=("number",)),
+            estimate=self._estimate,
+            choices=lambda scene: [
+                LevelChoice("mesh", "mesh", labels, lambda one, k: replace(one, mesh=k)),
+                LevelChoice("modes", "modes", labels, lambda one, k: replace(one, modes=k)),
+            ],
+            governing=lambda scene: {"number": "number"},
+            trial=lambda scene: replace(scene, want=("number",)),
         )
 
     def _solve(self, plan: Plan[Any], stages: Stages) -> MadeUpSolution:
@@ -95,15 +94,13 @@ class MadeUp:
         return MadeUpSolution(plan)
 
     @staticmethod
-    def _estimate(
-        solution: Any, numbers: Sequence[Result], stages: Stages, memo: list[Any]
-    ) -> Estimates:
+    def _estimate(solution: Any, numbers: Sequence[Result]) -> Estimates:
         errors = _errors(solution.plan.scene)
         return {("number", CASE): tuple(ErrorPart(s, e, "") for s, e in errors.items())}
 
     def run(self, scene: MadeUpScene) -> tuple[Any, Estimates | None]:
         plan = replace(_plan(replace(scene, accuracy=None)), asked=scene)
-        return solve_wanted(self.wanted, plan, Stages())
+        return solve_wanted(self.problem, plan, Stages())
 
 
 def test_the_cheapest_levels_are_solved_whole_and_say_what_was_not_needed() -> None:
@@ -127,17 +124,17 @@ def test_a_wanted_number_that_a_run_withholds_is_not_reached() -> None:
     """Its error has no parts; the others are brought to theirs, and the run says what it lacks."""
     made = MadeUp()
     lost = Quantity("number_2", "N").withheld(CASE, "no steady motion")
-    made.wanted = replace(
-        made.wanted,
-        governing={"all": "number*"},
+    made.problem = replace(
+        made.problem,
+        governing=lambda scene: {"all": "number*"},
         make_results=lambda solution: [Result("number", CASE, 1.0, "N"), lost],
     )
     with pytest.raises(ConvergenceError, match="number_2 : no steady motion") as error:
         made.run(MadeUpScene(accuracy={"all": 0.02}))
     assert "reached are number" in str(error.value)
     assert made.solved[-1].mesh == 2
-    unwanted = replace(made.wanted, governing={"all": "number"})
-    made.wanted = unwanted
+    unwanted = replace(made.problem, governing=lambda scene: {"all": "number"})
+    made.problem = unwanted
     assert made.run(MadeUpScene(accuracy={"all": 0.02}))[1] is not None
 
 
@@ -147,15 +144,15 @@ class WithAScatteringNumber(MadeUp):
     def __init__(self) -> None:
         super().__init__()
         numbers = [Result(name, CASE, 1.0, "N") for name in ("number", "scattering")]
-        self.wanted = replace(
-            self.wanted, governing={"all": "*"}, make_results=lambda solution: numbers
+        self.problem = replace(
+            self.problem,
+            governing=lambda scene: {"all": "*"},
+            make_results=lambda solution: numbers,
         )
 
     @staticmethod
-    def _estimate(
-        solution: Any, numbers: Sequence[Result], stages: Stages, memo: list[Any]
-    ) -> Estimates:
-        parts = MadeUp._estimate(solution, numbers, stages, memo)["number", CASE]
+    def _estimate(solution: Any, numbers: Sequence[Result]) -> Estimates:
+        parts = MadeUp._estimate(solution, numbers)["number", CASE]
         lost = (*parts[:1], replace(parts[1], error=0.05))
         return {("number", CASE): parts, ("scattering", CASE): lost}
 
@@ -179,10 +176,8 @@ class WithANumberThatSettles(WithAScatteringNumber):
     """The other number no longer scatters on the finest mesh."""
 
     @staticmethod
-    def _estimate(
-        solution: Any, numbers: Sequence[Result], stages: Stages, memo: list[Any]
-    ) -> Estimates:
-        parts = MadeUp._estimate(solution, numbers, stages, memo)["number", CASE]
+    def _estimate(solution: Any, numbers: Sequence[Result]) -> Estimates:
+        parts = MadeUp._estimate(solution, numbers)["number", CASE]
         # 1/64 of it is too much as well
         lost = (*parts[:1], replace(parts[1], error=0.5))
         settled = solution.plan.scene.mesh == 3
@@ -207,7 +202,7 @@ def test_numbers_alone_are_not_solved_twice() -> None:
 def test_a_scene_without_an_accuracy_runs_as_it_is() -> None:
     made = MadeUp()
     plan = _plan(MadeUpScene())
-    assert solve_wanted(made.wanted, plan, Stages()) == (MadeUpSolution(plan), None)
+    assert solve_wanted(made.problem, plan, Stages()) == (MadeUpSolution(plan), None)
 
 
 @pytest.mark.parametrize(
@@ -250,9 +245,9 @@ def test_rounds_raise_one_source_at_a_time_until_all_is_reached(seed: int) -> No
         return dict(zip(("mesh", "modes"), found, strict=True))
 
     made = MadeUp()
-    made.wanted = replace(
-        made.wanted,
-        estimate=lambda solution, numbers, stages, memo: {
+    made.problem = replace(
+        made.problem,
+        estimate=lambda solution, numbers: {
             ("number", CASE): tuple(
                 ErrorPart(s, e, "") for s, e in errors(solution.plan.scene).items()
             )
@@ -275,7 +270,7 @@ def test_rounds_raise_one_source_at_a_time_until_all_is_reached(seed: int) -> No
 
 
 def test_the_source_that_leaves_most_for_its_seconds_is_raised() -> None:
-    search = LevelSearch(MadeUp().wanted, MadeUpScene(accuracy=0.02))
+    search = LevelSearch(MadeUp().problem, MadeUpScene(accuracy=0.02))
     key = ("number", CASE)
     # a finer mesh takes 7 s more, more modes 0.1 s
     assert search.raised((0, 0), {key: {"mesh": 5.0, "modes": 1.0}}) == (0, 1)

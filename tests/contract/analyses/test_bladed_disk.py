@@ -94,7 +94,7 @@ def test_damped_response_lies_below_the_free_one(monkeypatch: pytest.MonkeyPatch
     assert curve.height.argmin() == 1 and 20.0 < curve.best[0] < 500.0
     assert curve.best[1] <= curve.height.min()
     results = output.make_results(whole)
-    parts = output.estimate(whole, results, None)
+    parts = output.estimate(whole, results)
     assert [part[0].source for part in parts.values()] == ["harmonics"]
     told = output.answer([one.as_dict() for one in results])[0]
     assert [row[0] for row in told.rows] == [

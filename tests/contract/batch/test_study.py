@@ -6,7 +6,6 @@ import json
 import re
 import weakref
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from upd import load_scene, make_plan, run
 from upd.analyses import ladders_of
 from upd.analyses.base import Plan
 from upd.analyses.contact.ladders import parameter_points
-from upd.analyses.contact.varied import PROBLEM, WANTED, level_of
+from upd.analyses.contact.varied import PROBLEM
 from upd.batch.engine import Progress, Workers
 from upd.batch.store import PointStore
 from upd.batch.studies import plan_study, point_task, run_study, study, study_workers
@@ -25,7 +24,6 @@ from upd.errors import ConvergenceError, InputError
 from upd.linalg import select
 from upd.progress import Stages
 from upd.results import Case, Result
-from upd.vary import errors
 from upd.vary.curves import make_curves
 from upd.vary.wanted import plan_wanted, solve_wanted
 
@@ -33,7 +31,6 @@ pytestmark = pytest.mark.estimated
 
 LIGHT = {"want": ["normal"], "loads.normal": ["200 N"], "geometry.patch": "auto"}
 #: levels of made-up numbers, which have no neighbouring loads
-UNSAMPLED = partial(errors.estimate_in_round, replace(PROBLEM, sample=None), level_of)
 #: one after the other, in this process, as a single run would
 HERE = Workers(0, 0)
 
@@ -265,9 +262,8 @@ def choose(target: float, solve: Any) -> tuple[Any, Any]:
     def numbers(solved: Solved) -> list[Result]:
         return [Result("max_pressure", Case(load=200.0), solved.value, "MPa")]
 
-    wanted = replace(WANTED, solve=solve, make_results=numbers, estimate=UNSAMPLED)
-    plan = plan_wanted(wanted, wanted.make_plan, scene)
-    return solve_wanted(wanted, plan, Stages())
+    problem = replace(PROBLEM, sample=None, solve=solve, make_results=numbers)
+    return solve_wanted(problem, plan_wanted(problem, scene), Stages())
 
 
 @pytest.mark.parametrize("more", [-0.5, 0.0, 0.5])

@@ -7,15 +7,14 @@ from __future__ import annotations
 
 from upd.analyses.base import Analysis, rig_needs
 from upd.analyses.bladed_disk import charts, output, plan, solve
+from upd.vary.variation import Problem
 
 ANALYSIS = Analysis(
     name="bladed_disk",
     headline_names=output.HEADLINE,
     input_checks=(),
-    make_plan=plan.make_plan,
+    problem=Problem(plan.make_plan, solve.solve, output.make_results, estimate=output.estimate),
     needs=rig_needs,
-    solve=solve.solve,
-    make_results=output.make_results,
     check_solution=output.check_solution,
     arrays=output.arrays,
     sizes=output.sizes,
@@ -23,7 +22,6 @@ ANALYSIS = Analysis(
     charts=charts.charts,
     headline=output.headline,
     answer=output.answer,
-    estimate=output.estimate,
 )
 
 __all__ = ["ANALYSIS"]

@@ -79,9 +79,8 @@ def answer(results: Sequence[Entry]) -> list[AnswerTable]:
     return [AnswerTable("Damped travelling wave", ("what", "answer"), tuple(rows.items()))]
 
 
-def estimate(solution: BladedDiskSolution, results: Sequence[Result], stages: Any) -> Estimates:
+def estimate(solution: BladedDiskSolution, results: Sequence[Result]) -> Estimates:
     """Of the damped peak, what two harmonics less change."""
-    del stages
     wave = solution.wave
     if wave is None:
         return {}

@@ -12,17 +12,9 @@ from typing import Any
 from upd.analyses.base import Analysis
 from upd.analyses.contact import charts, checks, left_out, output, results
 from upd.analyses.contact.bodies import needs
-from upd.analyses.contact.varied import (
-    FLAT_WANTED,
-    PROBLEM,
-    WANTED,
-    coarsened,
-)
+from upd.analyses.contact.varied import PROBLEM, coarsened
 from upd.plot.chart import Chart
 from upd.results import Arrays
-from upd.vary import errors
-from upd.vary.solve import plan_with_estimates
-from upd.vary.wanted import Wanted, plan_wanted
 
 #: arrays, summary -> charts
 Charts = Callable[[Arrays, Mapping[str, Any]], list[Chart]]
@@ -33,26 +25,22 @@ _INPUT_CHECKS = (
 )
 
 
-def _analysis(
-    name: str, wanted: Wanted, headline: tuple[str, ...], make_charts: Charts, *, last: bool
-) -> Analysis:
+def _analysis(name: str, headline: tuple[str, ...], make_charts: Charts, *, last: bool) -> Analysis:
     """``last``: whether the main numbers are those of the last load, not of the first."""
     return Analysis(
         name=name,
         headline_names=headline,
         input_checks=_INPUT_CHECKS,
-        make_plan=partial(plan_wanted, wanted, partial(plan_with_estimates, PROBLEM)),
+        problem=PROBLEM,
         needs=needs,
-        solve=partial(left_out.solve, wanted),
-        make_results=results.make_results,
         check_solution=checks.check_solution,
         arrays=output.arrays,
         sizes=output.sizes,
         write_files=output.write_files,
         charts=make_charts,
         headline=partial(results.pick, names=headline, last=last),
-        estimate=partial(errors.estimate, PROBLEM),
         verdict_names=() if last else ("K_N_per_pad", "K_N_secant_raw", "approach"),
+        solve_left_out=left_out.solve,
         coarsened=coarsened,
     )
 
@@ -61,8 +49,8 @@ def _analysis(
 ANALYSES = {
     one.name: one
     for one in (
-        _analysis("hertz", WANTED, results.CURVED_HEADLINE, charts.curved_charts, last=True),
-        _analysis("flat", FLAT_WANTED, results.FLAT_HEADLINE, charts.flat_charts, last=False),
+        _analysis("hertz", results.CURVED_HEADLINE, charts.curved_charts, last=True),
+        _analysis("flat", results.FLAT_HEADLINE, charts.flat_charts, last=False),
     )
 }
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.base import Resolved, keeping
+from upd.analyses.base import Resolved
 from upd.analyses.contact import plan as planned
 from upd.analyses.contact.bodies import prepare
 from upd.analyses.contact.loading import LOAD_STEP
@@ -31,7 +31,6 @@ from upd.results import quantities as q
 from upd.scene import Scene
 from upd.vary.solve import changed
 from upd.vary.variation import Key
-from upd.vary.wanted import Wanted, solve_wanted
 
 Array = NDArray[np.float64]
 _NORMAL = ("K_N_tangent_raw",), ("approach",)
@@ -60,18 +59,12 @@ _TIPS = (
 )
 
 
-def solve(wanted: Wanted, plan: ContactPlan, stages: Stages) -> ContactSolution:
-    """Run everything the plan calls for, and numbers again with the effects it leaves out.
-
-    Errors as for `solve_wanted`; what converged so far is their ``partial``.
-    """
-    found, estimates = solve_wanted(wanted, plan, stages)
-    solution: ContactSolution = replace(found, estimates=estimates)
+def solve(solution: ContactSolution, stages: Stages) -> None:
+    """Numbers again with the effects that the plan leaves out."""
     companion = solution.plan.companion
     if companion is not None:
-        with keeping(solution), stages("effects left out", "on a coarser whole model"):
+        with stages("effects left out", "on a coarser whole model"):
             solution.left_out += _left_out(solution, companion)
-    return solution
 
 
 def _left_out(solution: ContactSolution, companion: ContactPlan) -> Iterator[Resolved]:

@@ -21,13 +21,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.base import chosen_by_accuracy, refuse_oversize
 from upd.analyses.contact.faces import rim_nodes
 from upd.analyses.contact.plan import (
     ContactPlan,
@@ -46,11 +44,17 @@ from upd.progress import Stages
 from upd.results import Case
 from upd.scene import Scene
 from upd.scene.contact import Loads
-from upd.vary.errors import estimate_in_round
 from upd.vary.orders import RADIUS, Samples
 from upd.vary.solve import MESH
-from upd.vary.variation import ALONE, COARSER, Levels, Overrides, Problem, Variation
-from upd.vary.wanted import LevelChoice, Wanted
+from upd.vary.variation import (
+    ALONE,
+    COARSER,
+    LevelChoice,
+    Levels,
+    Overrides,
+    Problem,
+    Variation,
+)
 
 #: fewest divisions of a level
 FEWEST = 4
@@ -388,22 +392,16 @@ def _values(
         return []
 
 
-PROBLEM = Problem(make_plan, solve_plan, make_results, bare, levels, finer, sample)
-
-
-def _wanted(governing: Sequence[str]) -> Wanted:
-    return Wanted(
-        choices,
-        {name: name for name in governing},
-        make_plan,
-        solve_plan,
-        make_results,
-        partial(estimate_in_round, PROBLEM, level_of),
-        refuse_oversize,
-        chosen_by_accuracy,
-        predicted=_predicted,
-    )
-
-
-#: a contact, curved or flat, whose mesh is chosen by an accuracy
-WANTED, FLAT_WANTED = _wanted(CURVED_GOVERNING), _wanted(FLAT_GOVERNING)
+PROBLEM = Problem(
+    make_plan,
+    solve_plan,
+    make_results,
+    bare,
+    levels,
+    finer,
+    sample,
+    choices=choices,
+    governing=lambda scene: {name: name for name in governing(scene)},
+    level_of=level_of,
+    predicted=_predicted,
+)

@@ -6,6 +6,7 @@ Forced response by multi-harmonic balance, free, stuck and nonlinear.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import wraps
 from typing import TypeVar
 
@@ -46,10 +47,8 @@ ANALYSIS = Analysis(
     name="forced",
     headline_names=answer.MAIN,
     input_checks=(),
-    make_plan=accuracy.plan_to_accuracy,
+    problem=replace(accuracy.PROBLEM, make_results=_on_one_thread(results.make_results)),
     needs=lambda plan, threads: rig_needs(plan, threads, "reduction"),
-    solve=accuracy.solve_to_accuracy,
-    make_results=_on_one_thread(results.make_results),
     check_solution=_on_one_thread(checks.check_solution),
     arrays=_on_one_thread(arrays.arrays),
     sizes=_sizes,
@@ -60,7 +59,6 @@ ANALYSIS = Analysis(
     answer=answer.answer,
     verdict_names=("best_peak", "reduction_of_free_peak"),
     coarsened=lambda plan: coarsened_rig(plan, ("response",), ("balance.method", "balance")),
-    estimate=accuracy.estimate,
 )
 
 __all__ = ["ANALYSIS"]

@@ -19,10 +19,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
-from upd.analyses.base import chosen_by_accuracy, refuse_oversize
 from upd.analyses.forced.again import (
     HARMONICS,
     MESH,
@@ -40,11 +38,10 @@ from upd.analyses.forced.again import (
     samples,
     with_gauss,
 )
-from upd.analyses.forced.plan import ForcedPlan, make_plan
+from upd.analyses.forced.plan import make_plan
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solution import ForcedSolution
 from upd.analyses.forced.solve import solve
-from upd.progress import Stages
 from upd.results import Case, ErrorPart, Estimates, Result
 from upd.results import quantities as q
 from upd.results.quantities import Quantity, quantity_of
@@ -52,8 +49,14 @@ from upd.scene import ForcedScene
 from upd.scene.forced_contact import GAUSS, SIDES, Side
 from upd.vary.orders import observed_order, two_level_error
 from upd.vary.solve import changed
-from upd.vary.variation import Key, Overrides, SolvedVariation, Variation
-from upd.vary.wanted import LevelChoice, Wanted, plan_wanted, solve_wanted
+from upd.vary.variation import (
+    Key,
+    LevelChoice,
+    Overrides,
+    Problem,
+    SolvedVariation,
+    Variation,
+)
 
 #: names of accuracies -> numbers they are asked of
 ASKED = {"peak_frequency": "peak_?_frequency", "peak": "peak_?_accelerance"}
@@ -115,30 +118,6 @@ def _choice(
     return LevelChoice(source, source, labels, at)
 
 
-WANTED = Wanted(
-    choices,
-    ASKED,
-    make_plan,
-    solve,
-    make_results,
-    # by the levels that the solution has itself
-    lambda solution, numbers, stages, memo: estimate(solution, numbers, stages),
-    refuse_oversize,
-    chosen_by_accuracy,
-    lambda scene: changed(scene, (("want", ("response",)), ("left_out.solve", "no"))),
-)
-
-
-#: scene -> plan, as `upd.vary.wanted.plan_wanted`
-plan_to_accuracy: Callable[[ForcedScene], ForcedPlan] = partial(plan_wanted, WANTED, make_plan)
-
-
-def solve_to_accuracy(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
-    """Run the plan, as `upd.vary.wanted.solve_wanted`."""
-    solution: ForcedSolution = solve_wanted(WANTED, plan, stages)[0]
-    return solution
-
-
 # -- errors by source ------------------------------------------------------------------------------
 
 
@@ -155,7 +134,7 @@ _LEAST = 0.5
 _BEST = (q.BEST_RATIO, q.BEST_PEAK, q.BEST_FREQUENCY, q.BEST_REDUCTION)
 
 
-def estimate(solution: ForcedSolution, numbers: Sequence[Result], stages: Stages) -> Estimates:
+def estimate(solution: ForcedSolution, numbers: Sequence[Result]) -> Estimates:
     """What every source adds to the error of the peaks, stuck frequencies and reductions.
 
     Parameters
@@ -164,10 +143,7 @@ def estimate(solution: ForcedSolution, numbers: Sequence[Result], stages: Stages
         With its levels.
     numbers
         Of the run.
-    stages
-        Of the run.
     """
-    del stages
     levels = [*solution.levels, *_integrated(solution)] if solution.levels else []
     known = {(one.name, one.case) for level in levels for one in level.numbers}
     out: dict[Key, tuple[ErrorPart, ...]] = {}
@@ -344,3 +320,14 @@ def _of_best(
         factor = abs((100.0 - one.value) / one.value)
         out = [replace(p, error=factor * p.error) for p in out]
     return tuple(out)
+
+
+PROBLEM = Problem(
+    make_plan,
+    solve,
+    make_results,
+    estimate=estimate,
+    choices=choices,
+    governing=lambda scene: ASKED,
+    trial=lambda scene: changed(scene, (("want", ("response",)), ("left_out.solve", "no"))),
+)

@@ -6,20 +6,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
-from upd.analyses.base import chosen_by_accuracy, refuse_oversize
 from upd.analyses.modal.plan import MODES_ABOVE, ModalPlan, make_plan
 from upd.analyses.modal.results import REDUCED, make_results
 from upd.analyses.modal.solve import ModalSolution, solve
-from upd.progress import Stages
 from upd.results import ErrorPart, Estimates, Result
 from upd.results.quantities import quantity_of
 from upd.scene import RigScene
-from upd.vary.errors import estimate, estimate_in_round, merged
-from upd.vary.solve import MESH, changed, coarser_rigs, plan_with_estimates, refined
-from upd.vary.variation import ALONE, Levels, Overrides, Problem, SolvedVariation, Variation
-from upd.vary.wanted import LevelChoice, Wanted, solve_wanted
+from upd.vary.errors import merged
+from upd.vary.solve import MESH, changed, coarser_rigs, refined
+from upd.vary.variation import ALONE, LevelChoice, Levels, Overrides, Problem, Variation
 
 #: source of error beside the mesh
 KEPT = "modes kept"
@@ -85,17 +81,6 @@ def _by_modes(solution: ModalSolution, numbers: Sequence[Result]) -> Estimates:
     return out
 
 
-PROBLEM = Problem(
-    make_plan,
-    solve,
-    make_results,
-    bare,
-    levels,
-    lambda plan, source, factor: refined(plan.scene, factor),
-    corrected=_corrected,
-)
-
-
 # -- an accuracy that is wanted --------------------------------------------------------------------
 
 
@@ -126,32 +111,17 @@ def level_of(plan: ModalPlan) -> Variation:
     return Variation(MESH, f"geometry.refine = {refine:.2g}", size=1.0 / refine)
 
 
-def _in_round(
-    solution: ModalSolution,
-    numbers: Sequence[Result],
-    stages: Stages,
-    memo: list[SolvedVariation],
-) -> Estimates:
-    """By the coarser meshes of the rounds before; the usual variations on the coarsest."""
-    found = estimate_in_round(PROBLEM, level_of, solution, numbers, stages, memo)
-    return estimate(PROBLEM, solution, numbers, stages) if found is None else found
-
-
-WANTED = Wanted(
-    choices,
-    {name: name for name in ("f*_free", "f*_glued", "f*_reduced")},
-    partial(plan_with_estimates, PROBLEM),
+PROBLEM = Problem(
+    make_plan,
     solve,
     make_results,
-    _in_round,
-    refuse_oversize,
-    chosen_by_accuracy,
-    lambda scene: changed(scene, (("left_out.solve", "no"),)),
+    bare,
+    levels,
+    lambda plan, source, factor: refined(plan.scene, factor),
+    corrected=_corrected,
+    choices=choices,
+    governing=lambda scene: {name: name for name in ("f*_free", "f*_glued", "f*_reduced")},
+    level_of=level_of,
+    varies_lowest=True,
+    trial=lambda scene: changed(scene, (("left_out.solve", "no"),)),
 )
-
-
-def solve_levels(plan: ModalPlan, stages: Stages) -> ModalSolution:
-    """Run the plan, on levels that reach an accuracy where its scene asks for one."""
-    solution: ModalSolution
-    solution, found = solve_wanted(WANTED, plan, stages)
-    return replace(solution, estimates=found)

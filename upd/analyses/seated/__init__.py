@@ -5,22 +5,16 @@ Coupled contact on every matching node of both faces: forces, stick and slip, st
 
 from __future__ import annotations
 
-from functools import partial
-
 from upd.analyses.base import Analysis, rig_needs
-from upd.analyses.seated import charts, checks, ladders, output, results, solve
-from upd.vary import errors
+from upd.analyses.seated import charts, checks, ladders, output, results
 from upd.vary.inputs import coarsened_rig
-from upd.vary.solve import plan_with_estimates
 
 ANALYSIS = Analysis(
     name="seated",
     headline_names=results.HEADLINE,
     input_checks=(),
-    make_plan=partial(plan_with_estimates, ladders.PROBLEM),
+    problem=ladders.PROBLEM,
     needs=lambda plan, threads: rig_needs(plan, threads, "blades"),
-    solve=solve.solve,
-    make_results=results.make_results,
     check_solution=checks.check_solution,
     arrays=output.arrays,
     sizes=output.sizes,
@@ -28,7 +22,6 @@ ANALYSIS = Analysis(
     charts=charts.charts,
     headline=results.headline,
     verdict_names=("face_N",),
-    estimate=partial(errors.estimate, ladders.PROBLEM),
     coarsened=lambda plan: coarsened_rig(plan, ("seating", "stiffness", "moved")),
 )
 

@@ -13,7 +13,7 @@ from upd.analyses.seated.solve import solve
 from upd.scene import SeatedScene
 from upd.vary.ladder import Asked, Ladder, counts, even, whole_levels
 from upd.vary.solve import MESH, coarser_rigs, refined
-from upd.vary.variation import ALONE, Levels, Overrides, Problem, Variation
+from upd.vary.variation import Levels, Overrides, Problem, Variation
 
 #: source of error beside the mesh
 STEPS = "load steps"
@@ -41,7 +41,7 @@ def _finer(plan: SeatedPlan, source: str, factor: float) -> Overrides:
     return refined(plan.scene, factor) if source == MESH else _steps(plan.scene, factor)
 
 
-PROBLEM = Problem(make_plan, solve, make_results, lambda _: ALONE, levels, _finer)
+PROBLEM = Problem(make_plan, solve, make_results, levels=levels, finer=_finer)
 
 
 # -- convergence studies --------------------------------------------------------------------------
