@@ -15,6 +15,7 @@ from upd.fem import Material, mass, stiffness
 from upd.linalg import modes
 from upd.mesh import recipes
 from upd.scene import ForcedScene, load_scene
+from upd.vary.solve import changed
 
 GAUSS = {"contact.rule": "gauss", "contact.rows": 3, "contact.columns": 2}
 
@@ -80,7 +81,7 @@ def test_levels_of_an_accuracy_are_graded() -> None:
     (mesh,) = (one for one in choices(asked) if one.name == "mesh")
 
     def plan(level: int) -> Any:
-        return PROBLEM.make_plan(mesh.at(asked, level))
+        return PROBLEM.make_plan(changed(asked, mesh.at(asked, level)))
 
     assert plan(0).scene.geometry == asked.geometry
     for level, finer in ((1, 1.5), (3, 2.5), (4, 3)):

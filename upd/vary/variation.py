@@ -25,6 +25,11 @@ POWER = 6.0
 COARSER = (2.0**0.5, 2.0, 2.0**1.5)
 
 
+def of_geometry(parameters: Mapping[str, Any]) -> Overrides:
+    """What sets these parameters of the recipe."""
+    return tuple((f"geometry.{name}", value) for name, value in parameters.items())
+
+
 @dataclass(frozen=True)
 class Variation:
     """One scene with one thing changed.
@@ -89,18 +94,29 @@ class LevelChoice:
     ----------
     source
         As `upd.results.ErrorPart` names it.
-    name
-        In words: "modes kept".
-    labels
-        Of its levels, cheap to expensive.
-    at
-        scene, level -> the scene on this level.
+    name, words
+        In words: "modes kept"; of a level, with {} for it.
+    levels
+        Cheap to expensive; None is that of the scene itself.
+    overrides
+        scene, level -> what sets it.
     """
 
     source: str
     name: str
-    labels: Sequence[str]
-    at: Callable[[Any, int], Any]
+    words: str
+    levels: Sequence[Any]
+    overrides: Callable[[Any, Any], Overrides]
+
+    @property
+    def labels(self) -> list[str]:
+        """Of its levels."""
+        return ["of the scene" if n is None else self.words.format(n) for n in self.levels]
+
+    def at(self, scene: Any, k: int) -> Overrides:
+        """What sets a level of the scene."""
+        level = self.levels[k]
+        return () if level is None else self.overrides(scene, level)
 
 
 @dataclass(frozen=True)

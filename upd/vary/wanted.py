@@ -18,7 +18,7 @@ from upd.errors import ConvergenceError, InputError, one_line
 from upd.progress import Stages
 from upd.results import ErrorPart, Estimates, Result
 from upd.vary.errors import estimate_in_round
-from upd.vary.solve import plan_with_estimates
+from upd.vary.solve import changed, plan_with_estimates
 from upd.vary.variation import Key, Problem, SolvedVariation
 
 log = logging.getLogger(__name__)
@@ -150,7 +150,7 @@ class LevelSearch:
         """The scene on these levels, which asks for no accuracy any more."""
         scene = replace(self.asked, accuracy=None)
         for choice, level in zip(self.choices, levels, strict=True):
-            scene = choice.at(scene, level)
+            scene = changed(scene, choice.at(scene, level))
         return scene
 
     def plan_of(self, scene: Any) -> Any:

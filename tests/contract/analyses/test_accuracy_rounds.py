@@ -75,15 +75,19 @@ class MadeUp:
 
     def __init__(self) -> None:
         self.solved: list[MadeUpScene] = []
-        labels = ("1", "2", "4", "8")
+        levels = (1, 2, 4, 8)
         self.problem = Problem(
             _plan,
             self._solve,
             lambda solution: [Result("number", CASE, 1.0, "N")],
             estimate=self._estimate,
             choices=lambda scene: [
-                LevelChoice("mesh", "mesh", labels, lambda one, k: replace(one, mesh=k)),
-                LevelChoice("modes", "modes", labels, lambda one, k: replace(one, modes=k)),
+                LevelChoice(
+                    "mesh", "mesh", "{}", levels, lambda _, n: (("mesh", levels.index(n)),)
+                ),
+                LevelChoice(
+                    "modes", "modes", "{}", levels, lambda _, n: (("modes", levels.index(n)),)
+                ),
             ],
             governing=lambda scene: {"number": "number"},
             trial=lambda scene: replace(scene, want=("number",)),

@@ -13,7 +13,7 @@ from upd.analyses import analysis_of
 from upd.analyses.base import Plan
 from upd.analyses.contact.bodies import held_sets
 from upd.analyses.contact.plan import is_curved
-from upd.analyses.contact.varied import edge_of, governing, level_geometry, overridden
+from upd.analyses.contact.varied import edge_of, governing, level_geometry
 from upd.linalg import select
 from upd.mesh import recipes
 from upd.scene import Scene
@@ -31,7 +31,7 @@ from upd.vary.ladder import (
 )
 from upd.vary.outcome import SolvedPoint, matching, without_failed
 from upd.vary.tables import points_table
-from upd.vary.variation import Key, Overrides, Variation
+from upd.vary.variation import Key, Overrides, Variation, of_geometry
 
 #: numbers a ladder follows beside those the analysis names first
 _NUMBERS = (
@@ -118,7 +118,7 @@ def _on_mesh(
     per_edge = 2 if element in ("hex20", "hex27") else 1
     own = level_geometry(plan.parameters, divisions, per_edge=per_edge)
     label = f"{own.get('divisions_long', divisions)} x {divisions}"
-    overrides = (*overridden(own), ("mesh.element", element), *extra)
+    overrides = (*of_geometry(own), ("mesh.element", element), *extra)
     return Variation(source, label, overrides, edge_of(plan.parameters) / divisions)
 
 
@@ -175,7 +175,7 @@ def _setups(scene: Scene, plan: Plan[Any]) -> Iterable[tuple[str, Overrides]]:
 
 
 def _lengths(values: Mapping[str, float]) -> Overrides:
-    return overridden({name: f"{value!r} mm" for name, value in values.items()})
+    return of_geometry({name: f"{value!r} mm" for name, value in values.items()})
 
 
 def _stiffnesses(scene: object, solved: Sequence[SolvedPoint], names: Sequence[str]) -> StudyReport:

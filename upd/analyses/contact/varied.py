@@ -45,7 +45,7 @@ from upd.results import Case
 from upd.scene import Scene
 from upd.scene.contact import Loads
 from upd.vary.orders import RADIUS, Samples
-from upd.vary.solve import MESH
+from upd.vary.solve import MESH, changed
 from upd.vary.variation import (
     ALONE,
     COARSER,
@@ -54,6 +54,7 @@ from upd.vary.variation import (
     Overrides,
     Problem,
     Variation,
+    of_geometry,
 )
 
 #: fewest divisions of a level
@@ -179,12 +180,7 @@ def coarsened(plan: ContactPlan) -> Overrides:
     geometry = level_geometry(plan.parameters, half[0]) if half else {}
     names = SIZED_BY_LOAD if plan.scene.sphere_radius is not None else ()
     sized = {name: "auto" for name in names if name in plan.scene.geometry}
-    return (*bare(plan.scene), *overridden(sized | geometry))
-
-
-def overridden(parameters: Mapping[str, Any]) -> Overrides:
-    """What sets these parameters of the recipe."""
-    return tuple((f"geometry.{name}", value) for name, value in parameters.items())
+    return (*bare(plan.scene), *of_geometry(sized | geometry))
 
 
 def levels(plan: ContactPlan) -> Levels:
@@ -208,7 +204,7 @@ def _coarser(plan: ContactPlan, divisions: int) -> Variation:
     label = " x ".join(
         str(geometry[key]) for key in ("divisions_long", "divisions") if key in geometry
     )
-    return Variation(MESH, f"{label} divisions", overridden(geometry), size)
+    return Variation(MESH, f"{label} divisions", of_geometry(geometry), size)
 
 
 def governing(scene: Scene) -> tuple[str, ...]:
@@ -219,21 +215,21 @@ def governing(scene: Scene) -> tuple[str, ...]:
 def choices(scene: Scene) -> list[LevelChoice]:
     """The meshes that an accuracy chooses from."""
     if is_curved(scene):
-        labels = [f"with {nodes:g} nodes along the radius" for nodes in _NODES]
-        return [LevelChoice(MESH, "mesh", labels, _curved_level)]
+        words = "with {:g} nodes along the radius"
+        return [LevelChoice(MESH, "mesh", words, _NODES, _curved_level)]
     found = _flat_levels(scene)
-    labels, scenes = [f"{n} divisions" for n in found], list(found.values())
-    return [LevelChoice(MESH, "mesh", labels, lambda _, k: scenes[k])]
+    return [LevelChoice(MESH, "mesh", "{} divisions", list(found), lambda _, n: found[n])]
 
 
 def _predicted(scene: Scene) -> list[Scene]:
     """The lowest levels up to the first that shows an order."""
-    (mesh,) = choices(scene)
-    return [mesh.at(scene, k) for k in range(min(_PREDICTED, len(mesh.labels)))]
+    (mesh,), plain = choices(scene), replace(scene, accuracy=None)
+    lowest = range(min(_PREDICTED, len(mesh.levels)))
+    return [changed(plain, mesh.at(plain, k)) for k in lowest]
 
 
-def _curved_level(scene: Scene, level: int) -> Scene:
-    """``scene`` with patch and divisions for ``level``.
+def _curved_level(scene: Scene, nodes: float) -> Overrides:
+    """Patch and divisions with so many nodes along the radius.
 
     A patch sized from the largest load, no larger than the scene's, spacing from the smallest.
     """
@@ -248,34 +244,32 @@ def _curved_level(scene: Scene, level: int) -> Scene:
     radius, patch = hertz_radius(scene, min(loads)), auto_patch(scene)
     if scene.geometry.get("patch", "auto") != "auto":
         patch = min(patch, float(scene.geometry["patch"]))
-    divisions = 2 * math.ceil(0.5 * patch / radius * _NODES[level])
+    divisions = 2 * math.ceil(0.5 * patch / radius * nodes)
     if scene.mesh.element in ("hex20", "hex27"):
         divisions = 2 * math.ceil(divisions / 4)
-    geometry = {**scene.geometry, "patch": patch, "divisions": max(4, divisions)}
+    geometry: dict[str, Any] = {"patch": patch, "divisions": max(4, divisions)}
     if recipes.has_parameter(scene.recipe, "growth"):
         # The far mesh is refined with the patch.
-        usual, ratio = float(geometry.get("growth", _GROWTH)), _GROWTH_AT / _NODES[level]
+        usual, ratio = float(scene.geometry.get("growth", _GROWTH)), _GROWTH_AT / nodes
         geometry["growth"] = round(refined_growth(usual, ratio), 4)
-    return replace(scene, geometry=geometry, accuracy=None)
+    return of_geometry(geometry)
 
 
-def _flat_levels(scene: Scene) -> dict[int, Scene]:
-    """Divisions -> the scene with a share of its own, and more."""
+def _flat_levels(scene: Scene) -> dict[int, Overrides]:
+    """Divisions -> what gives the scene a share of its own, and more."""
     if not isinstance(scene.geometry.get("divisions"), int):
         raise InputError(
             f"accuracy: the recipe {scene.recipe!r} has no divisions to choose; leave it out"
         )
     element = _ELEMENT if scene.mesh.element in ("hex8", "hex8i") else scene.mesh.element
-    mesh = replace(scene.mesh, element=element)
     wires = recipes.has_parameter(scene.recipe, "bottom_layer")
     geometry = _for_wires(scene.geometry) if wires else scene.geometry
-    plain = replace(scene, mesh=mesh, accuracy=None, geometry=geometry)
     usual, fewest = geometry["divisions"], 2 if wires else FEWEST
     shares = _SHARES_OF_WIRES if wires else _SHARES
-    found = {}
+    found: dict[int, Overrides] = {}
     for n in (max(fewest, 2 * round(0.5 * share * usual)) for share in shares):
         own = level_geometry(geometry, n, step=1 if wires else 2)
-        found[n] = replace(plain, geometry={**geometry, **own})
+        found[n] = (("mesh.element", element), ("geometry", {**geometry, **own}))
     return found
 
 
@@ -308,7 +302,7 @@ def finer(plan: ContactPlan, source: str, factor: float) -> Overrides:
     del source
     usual = plan.parameters.get("divisions", 1)
     divisions = 2 * max(1, round(0.5 * factor * int(usual)))
-    return overridden(level_geometry({"divisions": usual, **plan.parameters}, divisions))
+    return of_geometry(level_geometry({"divisions": usual, **plan.parameters}, divisions))
 
 
 # -- neighbouring loads ----------------------------------------------------------------------------

@@ -17,9 +17,8 @@ L. Eca, M. Hoekstra, J. Comput. Phys. 262 (2014) 104: the range of data as the s
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 from upd.analyses.forced.again import (
     HARMONICS,
@@ -33,7 +32,6 @@ from upd.analyses.forced.again import (
     changed_results,
     graded,
     lines_named,
-    of_geometry,
     run_curve,
     samples,
     with_gauss,
@@ -52,21 +50,21 @@ from upd.vary.solve import changed
 from upd.vary.variation import (
     Key,
     LevelChoice,
-    Overrides,
     Problem,
     SolvedVariation,
     Variation,
+    of_geometry,
 )
 
 #: names of accuracies -> numbers they are asked of
 ASKED = {"peak_frequency": "peak_?_frequency", "peak": "peak_?_accelerance"}
 #: times the elements of the coarsest graded mesh; the first level is the scene's own mesh
-_FINER = (1, 1.5, 2, 2.5, 3)
+_FINER = (None, 1.5, 2, 2.5, 3)
 #: times the samples
-_MORE_SAMPLES = (1, 2, 4, 8)
+_MORE = (None, 2, 4, 8)
 #: Gauss points up the slope in place of the scene's lines, which are the first level, and those
 #: along the damper
-_GAUSS, _COLUMNS = (0, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 2
+_GAUSS, _COLUMNS = (None, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 2
 _MODES = (5, 10, 20, 40)
 _HARMONICS = (1, 3, 5, 7, 9, 11, 13)
 
@@ -78,44 +76,19 @@ def choices(scene: ForcedScene) -> list[LevelChoice]:
     (`graded`); numbers of modes and harmonics may fall below its own. Gauss points
     stand for a face whatever its mesh, so that both errors fall, each by its own choice.
     """
-    table: dict[str, tuple[str, Sequence[float], Callable[[ForcedScene, Any], Overrides]]] = {
-        # before the mesh, which it decides the counts of
-        POINTS: ("{} Gauss points up the slope", _GAUSS, lambda _, n: with_gauss(n, _COLUMNS)),
-        MESH: ("graded x {:g}", _FINER, lambda s, n: of_geometry(graded(s, n))),
-        MODES: ("{} a blade", _MODES, lambda _, n: (("reduction.modes", n),)),
-        HARMONICS: ("to {}", _HARMONICS, lambda _, n: (("balance.harmonics", n),)),
-        SAMPLES: (
-            "x {}",
-            _MORE_SAMPLES,
-            lambda scene, n: (("balance.samples", samples(scene, n)),),
-        ),
-    }
     contact = scene.contact
-    if contact.rule == GAUSS or contact.share != "area" or lines_named(contact):
-        # Gauss points do not stand for lines that a scene names
-        del table[POINTS]
-    if scene.recipe != RECIPE:
-        del table[MESH]
-    return [_choice(source, *one) for source, one in table.items()]
-
-
-def _choice(
-    source: str,
-    words: str,
-    levels: Sequence[float],
-    overrides: Callable[[ForcedScene, Any], Overrides],
-) -> LevelChoice:
-    """Levels as overrides of the scene; the first of points, mesh and samples is its own."""
-    own = source in (POINTS, MESH, SAMPLES)
-    labels = [words.format(n) for n in levels]
-    if own:
-        labels[0] = "of the scene"
-
-    def at(scene: ForcedScene, k: int) -> ForcedScene:
-        given: ForcedScene = changed(scene, overrides(scene, levels[k]))
-        return scene if own and k == 0 else given
-
-    return LevelChoice(source, source, labels, at)
+    found = [
+        # before the mesh, which it decides the counts of
+        (POINTS, "{} Gauss points up the slope", _GAUSS, lambda _, n: with_gauss(n, _COLUMNS)),
+        (MESH, "graded x {:g}", _FINER, lambda scene, n: of_geometry(graded(scene, n))),
+        (MODES, "{} a blade", _MODES, lambda _, n: (("reduction.modes", n),)),
+        (HARMONICS, "to {}", _HARMONICS, lambda _, n: (("balance.harmonics", n),)),
+        (SAMPLES, "x {}", _MORE, lambda scene, n: (("balance.samples", samples(scene, n)),)),
+    ]
+    # Gauss points do not stand for lines that a scene names
+    fixed = contact.rule == GAUSS or contact.share != "area" or lines_named(contact)
+    without = {POINTS: fixed, MESH: scene.recipe != RECIPE}
+    return [LevelChoice(one[0], *one) for one in found if not without.get(one[0])]
 
 
 # -- errors by source ------------------------------------------------------------------------------

@@ -57,7 +57,7 @@ from upd.scene import ForcedScene
 from upd.scene.forced_contact import GAUSS, SIDES, FaceLines, FrictionChoice, Side
 from upd.scene.quantities import UNKNOWN
 from upd.vary.solve import changed
-from upd.vary.variation import Overrides, SolvedVariation, Variation
+from upd.vary.variation import Overrides, SolvedVariation, Variation, of_geometry
 
 log = logging.getLogger(__name__)
 #: first step of a climb that begins at the run's own top, over the usual one: maxima side by side
@@ -410,11 +410,6 @@ def _coarser(plan: ForcedPlan, factor: float) -> Variation:
     # it has no levels of its own
     alone = (*changes, ("accuracy", UNKNOWN)) if changes else ()
     return Variation(MESH, label, alone, size=size)
-
-
-def of_geometry(parameters: Mapping[str, Any]) -> Overrides:
-    """Parameters of a recipe as overrides."""
-    return tuple((f"geometry.{name}", value) for name, value in parameters.items())
 
 
 def lines_named(contact: FrictionChoice) -> bool:

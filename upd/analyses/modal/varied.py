@@ -5,7 +5,6 @@ full model.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from upd.analyses.modal.plan import MODES_ABOVE, ModalPlan, make_plan
 from upd.analyses.modal.results import REDUCED, make_results
@@ -86,24 +85,16 @@ def _by_modes(solution: ModalSolution, numbers: Sequence[Result]) -> Estimates:
 
 def choices(scene: RigScene) -> list[LevelChoice]:
     """What may be chosen of a rig: its refinement from its own up, and the number of modes kept."""
-    found = []
-    refine, reduction = scene.geometry.get("refine"), scene.reduction
-    if isinstance(refine, (int, float)):
-        labels = [f"x {n}" for n in _FINER]
-        found.append(LevelChoice(MESH, "elements along an edge", labels, _finer))
+    found, reduction = [], scene.reduction
+    if isinstance(scene.geometry.get("refine"), (int, float)):
+        found.append(LevelChoice(MESH, "elements along an edge", "x {}", _FINER, refined))
     if scene.wants("reduction") and reduction.below is None and reduction.error is None:
-        labels = [f"{n} a blade" for n in _MODES]
-        found.append(LevelChoice(KEPT, "modes kept", labels, _with_modes))
+        found.append(
+            LevelChoice(
+                KEPT, "modes kept", "{} a blade", _MODES, lambda _, n: (("reduction.modes", n),)
+            )
+        )
     return found
-
-
-def _finer(scene: RigScene, level: int) -> RigScene:
-    refine = _FINER[level] * float(scene.geometry["refine"])
-    return replace(scene, geometry={**scene.geometry, "refine": refine})
-
-
-def _with_modes(scene: RigScene, level: int) -> RigScene:
-    return replace(scene, reduction=replace(scene.reduction, modes=_MODES[level]))
 
 
 def level_of(plan: ModalPlan) -> Variation:
