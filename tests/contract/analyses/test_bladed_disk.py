@@ -95,7 +95,8 @@ def test_damped_response_lies_below_the_free_one(monkeypatch: pytest.MonkeyPatch
     assert curve.best[1] <= curve.height.min()
     results = output.make_results(whole)
     parts = output.estimate(whole, results)
-    assert [part[0].source for part in parts.values()] == ["harmonics"]
+    ((part,),) = parts.values()
+    assert part.source == "harmonics" and 0.0 < part.error < 0.2
     told = output.answer([one.as_dict() for one in results])[0]
     assert [row[0] for row in told.rows] == [
         *("crossing", "peak at the tip", "reduction", "best damper", "not unique")
@@ -104,14 +105,13 @@ def test_damped_response_lies_below_the_free_one(monkeypatch: pytest.MonkeyPatch
     # the stuck blade is stiffer than the free one
     assert found.frequency[found.stuck.argmax()] > found.frequency[found.free.argmax()]
     checks = {check.name: check for check in output.check_solution(whole)}
-    assert checks["omitted harmonics"].passed and checks["energy balance"].passed
+    assert checks["energy balance"].passed
     assert checks["path complete"].passed and checks["contact settled"].passed
     assert 0.0 < checks["contact settled"].value < 0.01
-    cut = {"truncation": found.answer.truncation + 0.2, "status": "stopped"}
-    spoiled = found._replace(answer=replace(found.answer, **cut))
+    spoiled = found._replace(answer=replace(found.answer, status="stopped"))
     monkeypatch.setattr(marches, "MOST_PERIODS", 1)
     checks = {c.name: c for c in output.check_solution(replace(whole, wave=spoiled))}
-    for name in ("omitted harmonics", "path complete", "contact settled"):
+    for name in ("path complete", "contact settled"):
         assert not checks[name].passed
 
 

@@ -12,7 +12,9 @@ import upd
 from upd.analyses import make_plan
 from upd.analyses.seated.ladders import PROBLEM, STEPS, levels
 from upd.analyses.seated.plan import make_plan as bare_plan
+from upd.analyses.seated.varied import edges
 from upd.errors import InputError
+from upd.progress import Stages
 from upd.report.tables import budget_table, error_parts
 from upd.scene import load_scene
 from upd.vary.solve import MESH, varied_plan
@@ -55,7 +57,7 @@ def wedge() -> upd.RunResult:
 
 
 def test_bounds_hold_against_finer_bodies_and_steps(wedge: upd.RunResult) -> None:
-    """Elastic numbers: nearly all bounded, none by far missed or out of all proportion."""
+    """Elastic numbers: all bounded but one, that nearly; none out of all proportion."""
     fine = upd.run("symmetric-seated", overrides=WEDGE | FINE)
     known = {(r.name, r.case): r.value for r in fine.results}
     mine = [one for one in wedge.results if is_elastic(one)]
@@ -65,10 +67,10 @@ def test_bounds_hold_against_finer_bodies_and_steps(wedge: upd.RunResult) -> Non
         true = abs(known[one.name, one.case] / one.value - 1.0)
         assert one.estimated_error is not None, one.name
         held += true <= one.estimated_error
-        assert true <= 1.5 * one.estimated_error, one.name
+        assert true <= 1.25 * one.estimated_error, one.name
         assert one.estimated_error < 0.6, one.name
         assert [part.source for part in one.parts] == [MESH, STEPS]
-    assert held >= 0.85 * len(mine)
+    assert held >= len(mine) - 1
 
 
 def test_terminal_and_page_tell_them(wedge: upd.RunResult) -> None:
@@ -122,6 +124,23 @@ def test_a_rig_that_cannot_be_coarser_says_so(monkeypatch: pytest.MonkeyPatch) -
     assert "cannot be meshed coarser" in found[MESH]
 
 
+def test_shares_of_a_face_are_known_to_a_row_of_nodes() -> None:
+    """Two rows of 6 elements touch, a quarter of the face. The edge lies between two rows: one of
+    one and a half. No ladder of meshes makes that smaller.
+    """
+    counts = {"geometry.patch_along_y": 16, "geometry.patch_along_slope": 6}
+    scene = load_scene("symmetric-seated", SMALL | counts)
+    spacing, found = edges(PROBLEM.solve(bare_plan(scene), Stages())), upd.run(scene)
+    rows = {(r.name, r.case): r for r in found.results}
+    assert rows["closed_share", "raised, left"].value == pytest.approx(25.0)
+    for key, error in spacing.items():
+        if key[0] != "slip_share" and key[1].side == "left":
+            assert error == pytest.approx(2.0 / 3.0)
+        assert rows[key].parts[0].error >= error
+    # all nodes slip on every level: the levels alone say that nothing is open
+    assert "one spacing of nodes" in rows["slip_share", "raised, left"].parts[0].basis
+
+
 def test_rounding_is_no_number() -> None:
     """The damper on pads is carried along by a blade that moves up: no loss, no stiffness."""
     pads = {
@@ -135,4 +154,5 @@ def test_rounding_is_no_number() -> None:
     found = upd.run("asymmetric-seated", overrides=pads)
     row = next(r for r in found.results if r.name == "friction_energy")
     assert abs(row.value) < 1e-9
-    assert row.estimated_error is None or row.estimated_error > 0.5
+    assert row.estimated_error is None
+    assert row.parts[0].basis.startswith("not estimated: zero but for rounding")

@@ -10,6 +10,7 @@ from functools import partial
 from upd.analyses.seated.plan import SeatedPlan, make_plan
 from upd.analyses.seated.results import make_results
 from upd.analyses.seated.solve import solve
+from upd.analyses.seated.varied import corrected
 from upd.scene import SeatedScene
 from upd.vary.ladder import Asked, Ladder, counts, even, whole_levels
 from upd.vary.solve import MESH, coarser_rigs, refined
@@ -41,7 +42,7 @@ def _finer(plan: SeatedPlan, source: str, factor: float) -> Overrides:
     return refined(plan.scene, factor) if source == MESH else _steps(plan.scene, factor)
 
 
-PROBLEM = Problem(make_plan, solve, make_results, levels=levels, finer=_finer)
+PROBLEM = Problem(make_plan, solve, make_results, levels=levels, finer=_finer, corrected=corrected)
 
 
 # -- convergence studies --------------------------------------------------------------------------
