@@ -12,7 +12,7 @@ import pytest
 
 import upd
 from upd.analyses import modal
-from upd.analyses.modal.ladders import DIMENSIONS, MODES_ONLY
+from upd.analyses.modal.varied import DIMENSIONS, MODES_ONLY
 from upd.batch.engine import Batch, Workers, run_points
 from upd.batch.store import PointStore
 from upd.batch.studies import plan_study, point_task, run_study
@@ -205,7 +205,7 @@ def test_sensitivity_of_a_cantilever(tmp_path: Path, monkeypatch: pytest.MonkeyP
     """
     scene = upd.load_scene("rig", CHEAP)
     two = {name: DIMENSIONS[name] for name in ("core_length", "shank_tx")}
-    monkeypatch.setattr("upd.analyses.modal.ladders.DIMENSIONS", two)
+    monkeypatch.setattr("upd.analyses.modal.varied.DIMENSIONS", two)
     study, core = plan_study(scene, "dimensions"), float(scene.geometry["core_length"])
     chosen = [
         Variation("core_length", label, (*MODES_ONLY, ("geometry.core_length", f"{length!r} mm")))

@@ -49,9 +49,7 @@ def _analysis(name: str) -> Analysis:
 
 def ladders_of(scene: AnyScene) -> Mapping[str, Ladder]:
     """What a convergence study of the scene can vary, by name."""
-    name = _NAMES[scene.analysis]
-    package = _PACKAGES.get(name, name)
-    offered: Mapping[str, Ladder] = import_module(f"upd.analyses.{package}.ladders").LADDERS
+    offered = analysis_of(scene).ladders
     return {vary: ladder for vary, ladder in offered.items() if ladder.applies(scene)}
 
 

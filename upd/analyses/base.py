@@ -26,6 +26,7 @@ from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_label
 from upd.scene import AnyScene, load_scene, ready_scenes
 from upd.scene.base import LeftOut
+from upd.vary.ladder import Ladder
 from upd.vary.variation import Overrides, Problem
 from upd.vary.wanted import plan_wanted, solve_wanted
 
@@ -325,6 +326,8 @@ class Analysis:
         important first.
     headline
         results as in summary.json -> the 5 to 8 an engineer asks for first.
+    ladders
+        What a convergence study can vary, by name.
     answer
         results as in summary.json -> the tables that are the answer, the most important first;
         None where the terminal lists ``headline`` instead.
@@ -350,6 +353,7 @@ class Analysis:
     write_files: Callable[[Any, Path], None]
     charts: Callable[[Arrays, Mapping[str, Any]], list[Chart]]
     headline: Callable[[Sequence[Entry]], list[Entry]]
+    ladders: Mapping[str, Ladder]
     answer: Callable[[Sequence[Entry]], list[AnswerTable]] | None = None
     verdict_names: tuple[str, ...] = ()
     solve_left_out: Callable[[Any, Stages], None] | None = None

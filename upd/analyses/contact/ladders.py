@@ -9,11 +9,10 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from upd.analyses import analysis_of
 from upd.analyses.base import Plan
 from upd.analyses.contact.bodies import held_sets
 from upd.analyses.contact.plan import is_curved
-from upd.analyses.contact.varied import edge_of, governing, level_geometry
+from upd.analyses.contact.varied import PROBLEM, edge_of, governing, level_geometry
 from upd.linalg import select
 from upd.mesh import recipes
 from upd.scene import Scene
@@ -32,6 +31,7 @@ from upd.vary.ladder import (
 from upd.vary.outcome import SolvedPoint, matching, without_failed
 from upd.vary.tables import points_table
 from upd.vary.variation import Key, Overrides, Variation, of_geometry
+from upd.vary.wanted import plan_wanted
 
 #: numbers a ladder follows beside those the analysis names first
 _NUMBERS = (
@@ -79,7 +79,7 @@ def _on_meshes(make: Maker, applies: Callable[[Scene], bool] = lambda scene: Tru
     """Variations on meshes of so many divisions across the patch: even numbers."""
 
     def variations(scene: Scene, asked: Asked) -> Iterable[Variation]:
-        plan = analysis_of(scene).make_plan(scene)
+        plan = plan_wanted(PROBLEM, scene)
         divisions = whole_levels(asked, 4, "even numbers of divisions", step=2) or _usual(plan)
         return dict.fromkeys(make(plan, divisions))
 
@@ -151,7 +151,7 @@ def parameter_points(scene: Scene, asked: Asked = None) -> list[Variation]:
     the scene leaves the mesh to an accuracy.
     """
     no_levels(asked, "a parameter study changes one parameter at a time")
-    plan = analysis_of(scene).make_plan(scene)
+    plan = plan_wanted(PROBLEM, scene)
     return [
         Variation("parameters", label, overrides, 1.0) for label, overrides in _setups(scene, plan)
     ]

@@ -17,6 +17,7 @@ from upd.analyses.forced import (
     arrays,
     charts,
     checks,
+    ladders,
     results,
 )
 from upd.analyses.forced.solution import ForcedSolution
@@ -56,6 +57,7 @@ ANALYSIS = Analysis(
     write_files=lambda solution, folder: None,
     charts=charts.charts,
     headline=answer.headline,
+    ladders=ladders.LADDERS,
     answer=answer.answer,
     verdict_names=("best_peak", "reduction_of_free_peak"),
     coarsened=lambda plan: coarsened_rig(plan, ("response",), ("balance.method", "balance")),

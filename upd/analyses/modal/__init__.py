@@ -21,6 +21,7 @@ ANALYSIS = Analysis(
     write_files=output.write_files,
     charts=charts.charts,
     headline=results.headline,
+    ladders=varied.LADDERS,
     coarsened=lambda plan: coarsened_rig(plan, ("free", "glued", "response")),
 )
 

@@ -21,6 +21,7 @@ ANALYSIS = Analysis(
     write_files=output.write_files,
     charts=charts.charts,
     headline=results.headline,
+    ladders=ladders.LADDERS,
     verdict_names=("face_N",),
     coarsened=lambda plan: coarsened_rig(plan, ("seating", "stiffness", "moved")),
 )
