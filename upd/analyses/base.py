@@ -20,7 +20,7 @@ from upd.labels import number
 from upd.mesh import recipes
 from upd.plot.chart import Chart, Entry
 from upd.progress import Stages
-from upd.reference.printed import Lookup, Printed, printed_values
+from upd.reference.printed import Lookup, printed_values
 from upd.results import Arrays, Case, Check, Group, Result
 from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_label
@@ -96,8 +96,6 @@ class Resolved:
         The number without the effect and with it, at one level; NaN when that was not solved.
     remedy
         What to do when it matters.
-    note
-        What the change does not cover.
     over
         What the change is a part of, in place of the number without the effect; with its name.
     """
@@ -109,25 +107,23 @@ class Resolved:
     included: float
     unit: str
     remedy: str = ""
-    note: str = ""
     over: tuple[float, str] | None = None
 
     def check(self, limits: LeftOut, remedy: str = "") -> Check:
         """Its check against the scene's limits; ``remedy`` where it has none of its own."""
-        without, included, note = self.without, self.included, self.note
+        without, included, note = self.without, self.included, ""
         change = abs(included / without - 1.0) if without else math.inf
         if self.over is not None:
             whole, name = self.over
             change = abs(included - without) / whole if whole else math.inf
-            note = note or f"part of the {name}"
+            note = f" (part of the {name})"
         after = number(included, self.unit) if math.isfinite(included) else "a value not found"
-        statement = f"change of {number_label(self.quantity)}, {number(without)} to {after}"
         return Check(
             self.effect,
             self.case,
             change,
             limits.limit(self.unit),
-            statement + (f" ({note})" if note else ""),
+            f"change of {number_label(self.quantity)}, {number(without)} to {after}{note}",
             self.remedy or remedy,
             fatal=False,
             quantity=self.quantity,
@@ -429,28 +425,21 @@ def printed_of(scene: AnyScene) -> Lookup:
     same = ready is not None and (
         _bodies(scene) == _bodies(ready) and _elastic(scene) == _elastic(ready)
     )
-    return look_up if same else nothing_printed
-
-
-def nothing_printed(name: str, case: Mapping[str, Any]) -> tuple[Printed, ...]:
-    """Look up nothing."""
-    del name, case
-    return ()
+    return look_up if same else lambda name, case: ()
 
 
 def ready_scene(scene: AnyScene) -> Any:
     """The ready scene of the same kind, recipe and arrangement; None when there is none."""
-    return _ready(type(scene).__name__, scene.recipe, getattr(scene, "arrangement", ""))
+    return next((one for one in _ready() if _kind(one) == _kind(scene)), None)
 
 
 @cache
-def _ready(kind: str, recipe: str, arrangement: str) -> Any:
-    for name in ready_scenes():
-        scene = load_scene(name)
-        mine = (type(scene).__name__, scene.recipe, getattr(scene, "arrangement", ""))
-        if mine == (kind, recipe, arrangement):
-            return scene
-    return None
+def _ready() -> list[AnyScene]:
+    return [load_scene(name) for name in ready_scenes()]
+
+
+def _kind(scene: AnyScene) -> tuple[str, str, str]:
+    return type(scene).__name__, scene.recipe, getattr(scene, "arrangement", "")
 
 
 def _elastic(scene: AnyScene) -> dict[str, tuple[float, ...]]:
@@ -491,14 +480,13 @@ def with_printed(results: Iterable[Result], printed: Lookup) -> list[Result]:
     printed
         Printed values of the scene, from `printed_of`.
     """
-    return [_with_printed(result, printed) for result in results]
-
-
-def _with_printed(result: Result, printed: Lookup) -> Result:
-    found = printed(result.name, result.case.given())
-    # Several values have no order that could be the run's.
-    if len(found) != 1:
-        return result
-    if result.reference is None:
-        return replace(result, reference=found[0].value, source=found[0].source, exact=False)
-    return replace(result, printed_error=found[0].value / result.reference - 1.0)
+    out = []
+    for one in results:
+        found = printed(one.name, one.case.given())
+        # Several values have no order that could be the run's.
+        if len(found) == 1 and one.reference is None:
+            one = replace(one, reference=found[0].value, source=found[0].source, exact=False)
+        elif len(found) == 1 and one.reference is not None:
+            one = replace(one, printed_error=found[0].value / one.reference - 1.0)
+        out.append(one)
+    return out

@@ -98,6 +98,13 @@ def choices(scene: ForcedScene) -> list[LevelChoice]:
 _SOURCES = (MESH, MODES, POINTS, HARMONICS, SAMPLES, TIME)
 #: factor of safety of three levels that show an order
 _SAFETY = 1.25
+#: source -> factor on the range of its levels, and how that bounds its error
+_RANGES = {
+    # the rule is of second order: a quarter of the change remains
+    SAMPLES: (_SAFETY / (1.0 - 0.25), f"change with {{}}, order 2, factor {_SAFETY:g}"),
+    MODES: (1.0, "change from {}: what more modes change is less"),
+    TIME: (1.0, "the highest motion that stays; {}"),
+}
 #: order of frequencies on fine meshes: twice the exponent of displacements at a re-entrant edge of
 #: 270 degrees (M. L. Williams, J. Appl. Mech. 19, 1952, 526)
 _ORDER = 2.0 * 0.5445
@@ -202,19 +209,12 @@ def bound(source: str, found: Sequence[tuple[Variation, float]]) -> tuple[float,
     if source == MESH:
         error, words = _of_meshes(found)
         return error, f"against {names}: {words}"
-    if source == SAMPLES:
-        # the rule is of second order: a quarter of the change remains
-        error = _SAFETY * spread / (1.0 - 0.25)
-        return error, f"change with {names}, order 2, factor {_SAFETY:g}"
-    if source == MODES:
-        return spread, f"change from {names}: what more modes change is less"
-    if source == TIME:
-        return spread, f"the highest motion that stays; {names}"
     if source == POINTS:
         # of an error C h^p, p >= 1, levels from the size s to S >= 1 show at least the part S - s
         sizes = [1.0, *(one.size for one, _ in found)]
         return spread / (max(sizes) - min(sizes)), f"range with {names}, order 1"
-    return _SAFETY * spread, f"range with {names}, factor {_SAFETY:g}"
+    factor, basis = _RANGES.get(source, (_SAFETY, f"range with {{}}, factor {_SAFETY:g}"))
+    return factor * spread, basis.format(names)
 
 
 def _of_meshes(found: Sequence[tuple[Variation, float]]) -> tuple[float, str]:

@@ -14,7 +14,7 @@ the finest mesh of the faces.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -146,12 +146,6 @@ def _notes(scene: ForcedScene) -> Iterator[str]:
         )
 
 
-def response_title(scene: ForcedScene, vary: str) -> str:
-    """Title of a ladder, with the load it is run at."""
-    ratio = min(scene.excitation.centrifugal_to_force)
-    return f"what accuracy costs, {vary}, F_C/F_E {ratio:g}"
-
-
 # -- springs and whole faces -----------------------------------------------------------------------
 
 
@@ -256,22 +250,27 @@ def _contact_report(
     """Numbers of every level and their changes from the finest faces, whatever the contact is
     called.
     """
-    return finest_report(scene, [_without_stiffness(one) for one in solved], names)
+
+    def nameless(one: SolvedPoint) -> SolvedPoint:
+        results = (replace(r, case=replace(r.case, stiffness="")) for r in one.outcome.results)
+        return replace(one, outcome=replace(one.outcome, results=tuple(results)))
+
+    return finest_report(scene, [nameless(one) for one in solved], names)
 
 
-def _without_stiffness(one: SolvedPoint) -> SolvedPoint:
-    results = (replace(r, case=replace(r.case, stiffness="")) for r in one.outcome.results)
-    return replace(one, outcome=replace(one.outcome, results=tuple(results)))
+def _titled(words: str) -> Callable[[ForcedScene, str], str]:
+    """Titles with the load of a ladder."""
+
+    def title(scene: ForcedScene, vary: str) -> str:
+        return f"{words.format(vary)}, F_C/F_E {min(scene.excitation.centrifugal_to_force):g}"
+
+    return title
 
 
-def _contact_title(scene: ForcedScene, vary: str) -> str:
-    del vary
-    return f"springs and whole faces, F_C/F_E {min(scene.excitation.centrifugal_to_force):g}"
-
-
+_title = _titled("what accuracy costs, {}")
 _march = partial(_base, method="march")
-_on_levels = partial(Ladder, follow=_NUMBERS, report=finest_report, title=response_title)
-_on_meshes = partial(Ladder, follow=_NUMBERS, notes=_notes, title=response_title)
+_on_levels = partial(Ladder, follow=_NUMBERS, report=finest_report, title=_title)
+_on_meshes = partial(Ladder, follow=_NUMBERS, notes=_notes, title=_title)
 _counts = partial(counts, base=_base, offset=1)
 
 LADDERS: Mapping[str, Ladder] = {
@@ -292,6 +291,10 @@ LADDERS: Mapping[str, Ladder] = {
     ),
     "contacts": _on_levels(_contact_points),
     "contact": Ladder(
-        whole_faces_points, _NUMBERS, _contact_report, notes=_contact_notes, title=_contact_title
+        whole_faces_points,
+        _NUMBERS,
+        _contact_report,
+        _contact_notes,
+        _titled("springs and whole faces"),
     ),
 }
