@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
+from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
 from typing import Any, Generic, Self, TypeVar
@@ -335,7 +336,7 @@ class Analysis:
         it has them already.
     coarsened
         plan as run -> what makes a scene into its cheap level: the numbers that inputs change are
-        solved on it again. None where the scene itself is.
+        solved on it again.
     """
 
     name: str
@@ -353,7 +354,7 @@ class Analysis:
     answer: Callable[[Sequence[Entry]], list[AnswerTable]] | None = None
     verdict_names: tuple[str, ...] = ()
     solve_left_out: Callable[[Any, Stages], None] | None = None
-    coarsened: Callable[[Any], Overrides] | None = None
+    coarsened: Callable[[Any], Overrides] = lambda plan: ()
 
     def make_plan(self, scene: AnyScene) -> Plan[Any]:
         """What is simulated and left out, size and cost.
@@ -375,6 +376,10 @@ class Analysis:
             with keeping(solution):
                 self.solve_left_out(solution, stages)
         return solution
+
+    def is_main(self, one: Result) -> bool:
+        """Whether it is a number an engineer asks for first."""
+        return not one.withheld and any(fnmatchcase(one.name, p) for p in self.headline_names)
 
     def make_results(self, solution: Any) -> Sequence[Result]:
         """The numbers of a run."""

@@ -41,23 +41,19 @@ def estimate(
     known: Estimates | None = getattr(solution, "estimates", None)
     if known is not None:
         return known
-    if problem.estimate is not None:
-        return problem.estimate(solution, numbers)
     plan, run = solution.plan, SolvedVariation(RUN, numbers, stages.elapsed())
-    levels, parts = problem.levels(plan), list[Estimates]()
     solved = {
-        source: [] if isinstance(found, str) else solve(problem, plan.scene, found, stages)
-        for source, found in levels.items()
+        source: solve(problem, plan.scene, found, stages)
+        for source, found in problem.levels(plan).items()
     }
-    if any(solved.values()) and problem.sample is not None:
+    if any(one.numbers for levels in solved.values() for one in levels) and problem.sample:
         with stages("error estimates", "neighbouring loads"):
             run = replace(run, samples=problem.sample(solution))
-    for source, found in levels.items():
-        reason = found if isinstance(found, str) else ""
+    parts = list[Estimates]()
+    for source, levels in solved.items():
         half = partial(half_cost, problem, plan, source, run.seconds)
-        parts.append(source_estimates(source, run, solved[source], half, reason))
-    found_all = merged(*parts)
-    return problem.corrected(solution, numbers, found_all) if problem.corrected else found_all
+        parts.append(source_estimates(source, run, levels, half))
+    return problem.corrected(solution, numbers, merged(*parts))
 
 
 def estimate_in_round(
@@ -81,8 +77,6 @@ def estimate_in_round(
     Estimates or None
         None where only another level shows them.
     """
-    if problem.estimate is not None:
-        return problem.estimate(solution, numbers)
     level, seconds = problem.level_of(solution.plan), stages.elapsed()
     samples = {} if problem.sample is None else problem.sample(solution)
     run = SolvedVariation(level, numbers, seconds, samples)
@@ -94,11 +88,10 @@ def estimate_in_round(
     if all(one.variation.size != level.size for one in memo):
         memo.append(run)
     if not coarser:
-        usual = problem.varies_lowest
-        return estimate(problem, solution, numbers, stages) if usual else None
+        return estimate(problem, solution, numbers, stages) if problem.varies_lowest else None
     half = partial(half_cost, problem, solution.plan, level.source, seconds)
     found = source_estimates(level.source, run, coarser, half)
-    return problem.corrected(solution, numbers, found) if problem.corrected else found
+    return problem.corrected(solution, numbers, found)
 
 
 def source_estimates(
@@ -106,7 +99,6 @@ def source_estimates(
     run: SolvedVariation,
     levels: Sequence[SolvedVariation],
     half: Callable[[float], float],
-    reason: str = "",
 ) -> Estimates:
     """What one source adds to the errors of a run's numbers.
 
@@ -115,12 +107,10 @@ def source_estimates(
     source
         Name of it.
     levels
-        Its variations, the finest of coarser ones first.
+        Its variations, the finest of coarser ones first; or why there are none.
     half
         Order of convergence -> seconds that a level with half the error adds. InputError where
         there is no such level.
-    reason
-        Why it has no variations.
 
     Returns
     -------
@@ -128,7 +118,7 @@ def source_estimates(
         A part for every number of the run; NaN with its reason where no variation has the number.
     """
     known = [one for one in levels if not one.reason]
-    faults = "; ".join(one.reason for one in levels if one.reason) if levels else reason
+    faults = "; ".join(one.reason for one in levels if one.reason)
     seconds = math.fsum(one.seconds for one in known)
     seconds_of_half = cache(partial(_or_reason, half))
     out: dict[Key, tuple[ErrorPart, ...]] = {}

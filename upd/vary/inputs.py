@@ -15,7 +15,6 @@ from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from fnmatch import fnmatchcase
 from typing import Any
 
 from upd.errors import UpdError, one_line
@@ -64,7 +63,7 @@ def input_parts(
     plan = solution.plan
     if not plan.scene.uncertain:
         return {}
-    main = [one for one in numbers if is_main(analysis, one)]
+    main = [one for one in numbers if analysis.is_main(one)]
     out: dict[Key, tuple[InputPart, ...]] = {(one.name, one.case): () for one in main}
     for ends in input_ends(plan.scene):
         of = ends[0]
@@ -82,21 +81,13 @@ def input_parts(
     return out
 
 
-def is_main(analysis: Any, number: Result) -> bool:
-    """Whether it is a number an engineer asks for first."""
-    return not number.withheld and any(
-        fnmatchcase(number.name, pattern) for pattern in analysis.headline_names
-    )
-
-
 def input_ends(scene: Any) -> list[Ends]:
     """Every input known within limits, with the scene at both ends of its interval."""
-    data = tomllib.loads(scene.text)
-
-    def at(one: Uncertainty, shift: float) -> Any:
-        return load_scene(put_back(data, one.steps, one.at(shift)))
-
-    return [(one, at(one, -1.0), at(one, 1.0)) for one in scene.uncertain.values()]
+    data, out = tomllib.loads(scene.text), list[Ends]()
+    for one in scene.uncertain.values():
+        low, high = (load_scene(put_back(data, one.steps, one.at(end))) for end in (-1.0, 1.0))
+        out.append((one, low, high))
+    return out
 
 
 def with_input_cost(analysis: Any, plan: Any) -> Any:
@@ -110,15 +101,10 @@ def with_input_cost(analysis: Any, plan: Any) -> Any:
     else:
         # what is refused is not solved either
         with suppress(UpdError):
-            cheap = analysis.make_plan(_cheap(analysis, plan, ends[0][1]))
+            cheap = analysis.make_plan(changed(ends[0][1], analysis.coarsened(plan)))
             seconds = cheap.seconds - cheap.files_seconds
     seconds *= 2.0 * len(ends)
     return replace(plan, seconds=plan.seconds + seconds, input_seconds=seconds)
-
-
-def _cheap(analysis: Any, plan: Any, scene: Any) -> Any:
-    """The scene on its cheap level."""
-    return scene if analysis.coarsened is None else changed(scene, analysis.coarsened(plan))
 
 
 def coarsened_rig(plan: Any, wanted: tuple[str, ...], *more: tuple[str, Any]) -> Overrides:
@@ -141,7 +127,7 @@ def _solved_at_ends(
     analysis: Any, plan: Any, numbers: Sequence[Result], ends: Ends
 ) -> tuple[dict[Key, float], str]:
     """Half of the relative change between both ends of an interval, each solved again, and how."""
-    plans = [analysis.make_plan(_cheap(analysis, plan, scene)) for scene in ends[1:]]
+    plans = [analysis.make_plan(changed(scene, analysis.coarsened(plan))) for scene in ends[1:]]
     sides = [
         [r for r in analysis.make_results(analysis.solve(each, Stages())) if not r.withheld]
         for each in plans

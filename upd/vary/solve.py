@@ -15,7 +15,7 @@ from upd.mesh import recipes
 from upd.progress import Stages
 from upd.results import Result
 from upd.vary.orders import Samples
-from upd.vary.variation import POWER, Overrides, Problem, SolvedVariation, Variation
+from upd.vary.variation import POWER, RUN, Overrides, Problem, SolvedVariation, Variation
 
 log = logging.getLogger(__name__)
 #: source of error of all analyses
@@ -67,9 +67,13 @@ def plan_with_estimates(problem: Problem, scene: Any) -> Any:
 
 
 def solve(
-    problem: Problem, scene: Any, variations: Sequence[Variation], stages: Stages
+    problem: Problem, scene: Any, variations: Sequence[Variation] | str, stages: Stages
 ) -> list[SolvedVariation]:
-    """Solve the variations of a scene, one after the other; a fault becomes its reason."""
+    """Solve the variations of a scene, one after the other; a fault, or why there are none, becomes
+    a reason.
+    """
+    if isinstance(variations, str):
+        return [SolvedVariation(RUN, reason=variations)]
     done = []
     for one in variations:
         begin = perf_counter()

@@ -139,12 +139,9 @@ class Problem:
         solution -> its numbers at neighbouring loads; None where those show nothing.
     corrected
         solution, numbers of the run, the parts found -> the parts, with those that are known
-        otherwise; None where none are.
-    estimate
-        solution, numbers -> the parts of their errors, of solutions that have their levels
-        themselves; None: by ``levels``.
+        otherwise: all of a solution that has its levels itself.
     choices
-        scene -> what may be chosen of it to reach an accuracy; None where none can be asked for.
+        scene -> what may be chosen of it to reach an accuracy.
     governing
         scene -> names of accuracies -> numbers they are asked of, as shell patterns; one accuracy
         for all is asked of all of them. Other names stand for themselves.
@@ -155,8 +152,8 @@ class Problem:
     trial
         scene -> the scene with nothing but the numbers that govern.
     predicted
-        scene that asks -> scenes of the rounds that its plan predicts, the last of the whole run;
-        None: the lowest levels, then the scene's own.
+        How many of the lowest levels a plan predicts, the last for the whole run; 0: the lowest,
+        then the scene's own.
     """
 
     make_plan: Callable[[Any], Any]
@@ -166,11 +163,10 @@ class Problem:
     levels: Callable[[Any], Levels] = lambda plan: {}
     finer: Callable[[Any, str, float], Overrides] = lambda plan, source, factor: ()
     sample: Callable[[Any], Samples] | None = None
-    corrected: Callable[[Any, Sequence[Result], Estimates], Estimates] | None = None
-    estimate: Callable[[Any, Sequence[Result]], Estimates] | None = None
-    choices: Callable[[Any], Sequence[LevelChoice]] | None = None
+    corrected: Callable[[Any, Sequence[Result], Estimates], Estimates] = lambda s, r, found: found
+    choices: Callable[[Any], Sequence[LevelChoice]] = lambda scene: ()
     governing: Callable[[Any], Mapping[str, str]] = lambda scene: {}
     level_of: Callable[[Any], Variation] = lambda plan: RUN
     varies_lowest: bool = False
     trial: Callable[[Any], Any] = lambda scene: scene
-    predicted: Callable[[Any], Sequence[Any]] | None = None
+    predicted: int = 0

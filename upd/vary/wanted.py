@@ -12,6 +12,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
+from functools import partial
 from typing import Any
 
 from upd.errors import ConvergenceError, InputError, one_line
@@ -38,14 +39,15 @@ def plan_wanted(problem: Problem, scene: Any) -> Any:
     InputError
         When parts of the scene do not fit together.
     """
-    if problem.choices is None or scene.wanted_accuracy is None:
+    if scene.wanted_accuracy is None:
         return plan_with_estimates(problem, scene)
     search = LevelSearch(problem, scene)
-    if problem.predicted is not None:
-        scenes, run = problem.predicted(scene), "a run on levels like these"
+    if problem.predicted:
+        known = range(min(problem.predicted, len(search.choices[0].levels)))
+        scenes, run = [search.scene((k,)) for k in known], "a run on levels like these"
     else:
         lowest = problem.trial(search.scene(search.lowest))
-        scenes, run = (lowest, replace(scene, accuracy=None)), "a run on the scene's own"
+        scenes, run = [lowest, replace(scene, accuracy=None)], "a run on the scene's own"
     *before, plan = map(search.plan_of, scenes)
     again = sum(one.seconds - one.files_seconds for one in before)
     names = ", ".join(one.name for one in search.choices)
@@ -123,13 +125,18 @@ class LevelSearch:
     ----------
     choices, accuracies
         What may be chosen; names of numbers, as shell patterns -> largest error wanted of them.
+    lowest, plan_of
+        The cheapest levels; scene on its levels -> plan.
     rounds
         The levels of every round, and the number farthest from its accuracy.
     """
 
     def __init__(self, problem: Problem, asked: Any) -> None:
         self.problem, self.asked = problem, asked
-        self.choices = problem.choices(asked) if problem.choices else ()
+        self.choices = problem.choices(asked)
+        self.lowest: Levels = (0,) * len(self.choices)
+        with_variations = partial(plan_with_estimates, problem)
+        self.plan_of = with_variations if problem.varies_lowest else problem.make_plan
         given, names = asked.wanted_accuracy, problem.governing(asked)
         self.accuracies: dict[str, float] = (
             {names.get(name, name): error for name, error in given.items()}
@@ -141,26 +148,12 @@ class LevelSearch:
         self._plans: dict[Levels, Any] = {}
         self._withheld: dict[Key, str] = {}
 
-    @property
-    def lowest(self) -> Levels:
-        """The cheapest levels."""
-        return (0,) * len(self.choices)
-
     def scene(self, levels: Levels) -> Any:
         """The scene on these levels, which asks for no accuracy any more."""
         scene = replace(self.asked, accuracy=None)
         for choice, level in zip(self.choices, levels, strict=True):
             scene = changed(scene, choice.at(scene, level))
         return scene
-
-    def plan_of(self, scene: Any) -> Any:
-        """The plan of a round."""
-        problem = self.problem
-        return (
-            plan_with_estimates(problem, scene)
-            if problem.varies_lowest
-            else problem.make_plan(scene)
-        )
 
     def planned(self, levels: Levels) -> Any:
         """The plan of the whole run."""
@@ -216,7 +209,7 @@ class LevelSearch:
 
     def _higher(self, levels: Levels, k: int) -> Levels | None:
         """The levels with a choice one higher; None where there is none, or it does not fit."""
-        if levels[k] + 1 == len(self.choices[k].labels):
+        if levels[k] + 1 == len(self.choices[k].levels):
             return None
         higher = (*levels[:k], levels[k] + 1, *levels[k + 1 :])
         try:

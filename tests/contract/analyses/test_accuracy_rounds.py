@@ -80,7 +80,7 @@ class MadeUp:
             _plan,
             self._solve,
             lambda solution: [Result("number", CASE, 1.0, "N")],
-            estimate=self._estimate,
+            corrected=lambda solution, numbers, found: self._estimate(solution, numbers),
             choices=lambda scene: [
                 LevelChoice(
                     "mesh", "mesh", "{}", levels, lambda _, n: (("mesh", levels.index(n)),)
@@ -90,6 +90,7 @@ class MadeUp:
                 ),
             ],
             governing=lambda scene: {"number": "number"},
+            varies_lowest=True,
             trial=lambda scene: replace(scene, want=("number",)),
         )
 
@@ -251,7 +252,7 @@ def test_rounds_raise_one_source_at_a_time_until_all_is_reached(seed: int) -> No
     made = MadeUp()
     made.problem = replace(
         made.problem,
-        estimate=lambda solution, numbers: {
+        corrected=lambda solution, numbers, found: {
             ("number", CASE): tuple(
                 ErrorPart(s, e, "") for s, e in errors(solution.plan.scene).items()
             )

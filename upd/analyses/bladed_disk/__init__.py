@@ -13,7 +13,12 @@ ANALYSIS = Analysis(
     name="bladed_disk",
     headline_names=output.HEADLINE,
     input_checks=(),
-    problem=Problem(plan.make_plan, solve.solve, output.make_results, estimate=output.estimate),
+    problem=Problem(
+        plan.make_plan,
+        solve.solve,
+        output.make_results,
+        corrected=lambda solution, numbers, found: output.estimate(solution, numbers),
+    ),
     needs=rig_needs,
     check_solution=output.check_solution,
     arrays=output.arrays,

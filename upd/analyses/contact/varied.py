@@ -45,7 +45,7 @@ from upd.results import Case
 from upd.scene import Scene
 from upd.scene.contact import Loads
 from upd.vary.orders import RADIUS, Samples
-from upd.vary.solve import MESH, changed
+from upd.vary.solve import MESH
 from upd.vary.variation import (
     ALONE,
     COARSER,
@@ -221,13 +221,6 @@ def choices(scene: Scene) -> list[LevelChoice]:
     return [LevelChoice(MESH, "mesh", "{} divisions", list(found), lambda _, n: found[n])]
 
 
-def _predicted(scene: Scene) -> list[Scene]:
-    """The lowest levels up to the first that shows an order."""
-    (mesh,), plain = choices(scene), replace(scene, accuracy=None)
-    lowest = range(min(_PREDICTED, len(mesh.levels)))
-    return [changed(plain, mesh.at(plain, k)) for k in lowest]
-
-
 def _curved_level(scene: Scene, nodes: float) -> Overrides:
     """Patch and divisions with so many nodes along the radius.
 
@@ -397,5 +390,5 @@ PROBLEM = Problem(
     choices=choices,
     governing=lambda scene: {name: name for name in governing(scene)},
     level_of=level_of,
-    predicted=_predicted,
+    predicted=_PREDICTED,
 )

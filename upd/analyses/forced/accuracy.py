@@ -299,8 +299,9 @@ PROBLEM = Problem(
     make_plan,
     solve,
     make_results,
-    estimate=estimate,
+    corrected=lambda solution, numbers, found: estimate(solution, numbers),
     choices=choices,
     governing=lambda scene: ASKED,
+    varies_lowest=True,
     trial=lambda scene: changed(scene, (("want", ("response",)), ("left_out.solve", "no"))),
 )
