@@ -112,21 +112,18 @@ def _of_recipe(recipe: str, overrides: Sequence[str], element: str | None) -> Me
         else:
             table[name] = value
     if element is not None:
-        problems += _element_problem(element, recipe, known)
+        if element not in NODES:
+            problems.append(f"--element {element}: is not known; write one of {', '.join(NODES)}")
+        elif "element_nodes" not in known:
+            problems.append(
+                f"--element: the recipe {recipe!r} has no parameter 'element_nodes'; leave it out"
+            )
         table["element_nodes"] = NODES.get(element, 8)
     given, more = geometry_parameters(table, known)
     problems += [problem.removeprefix("geometry.") for problem in more]
     if problems:
         raise InputError("\n".join(f"{recipe}: {problem}" for problem in problems))
     return MeshRequest(Path(recipe).stem, recipe, given)
-
-
-def _element_problem(element: str, recipe: str, known: Sequence[str]) -> list[str]:
-    if element not in NODES:
-        return [f"--element {element}: is not known; write one of {', '.join(NODES)}"]
-    if "element_nodes" not in known:
-        return [f"--element: the recipe {recipe!r} has no parameter 'element_nodes'; leave it out"]
-    return []
 
 
 def _of_scene(what: str, overrides: Sequence[str], element: str | None) -> MeshRequest:

@@ -466,14 +466,17 @@ def meshed(scene: ForcedScene) -> tuple[str, ...]:
     return (*OFF_CONTACT, *(key for key in GRADED if on and key.startswith(on)))
 
 
+def _rounded(scene: ForcedScene, key: str, count: float) -> int:
+    """A number of elements up to one that the recipe allows."""
+    field = recipes.parameters(scene.recipe).__dataclass_fields__[key]
+    step = 2 if field.metadata["bounds"].even else 1
+    # up to rounding in the product
+    return step * max(1, math.ceil(round(count / step, 9)))
+
+
 def times(scene: ForcedScene, factor: float) -> dict[str, int]:
     """So many times the counts, rounded up to those the recipe allows, as its parameters."""
-    known = recipes.parameters(scene.recipe).__dataclass_fields__
-    out = {}
-    for key in meshed(scene):
-        step = 2 if known[key].metadata["bounds"].even else 1
-        out[key] = step * max(1, math.ceil(factor * count_of(scene, key) / step))
-    return out
+    return {key: _rounded(scene, key, factor * count_of(scene, key)) for key in meshed(scene)}
 
 
 def graded(scene: ForcedScene, factor: float) -> dict[str, Any]:
@@ -507,10 +510,8 @@ def graded(scene: ForcedScene, factor: float) -> dict[str, Any]:
     order = 1 if NODES[scene.mesh.element] == 8 else 2
     out: dict[str, Any] = {}
     for key in meshed(scene):
-        step = 2 if known[key].metadata["bounds"].even else 1
         own = count_of(scene, key) / int(known[key].default)
-        # up to rounding in the product
-        out[key] = step * max(1, math.ceil(round(factor * GRADED[key] * own / step, 9)))
+        out[key] = _rounded(scene, key, factor * GRADED[key] * own)
     for name, n in (("growth", _OUTSIDE), ("growth_inside", _INSIDE)):
         ends = _GROWTH ** (n - 1) * factor ** (order / _EDGE - 1.0)
         out[name] = ends ** (1.0 / (factor * n - 1.0))

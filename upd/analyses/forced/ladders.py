@@ -37,7 +37,7 @@ from upd.vary.ladder import (
     refinements,
 )
 from upd.vary.outcome import SolvedPoint
-from upd.vary.variation import Overrides, Variation
+from upd.vary.variation import Overrides, Variation, of_geometry
 
 #: numbers a ladder follows beside those the analysis names first: where the model changes, the
 #: stuck frequencies
@@ -196,8 +196,7 @@ def whole_faces_points(scene: ForcedScene, asked: Asked = None) -> list[Variatio
         made.append(Variation(SPRINGS, name, overrides, 1.0))
     for mesh in _meshes(scene, asked):
         slope, along = list(mesh.values())[:2]
-        geometry = ((f"geometry.{k}", n) for k, n in mesh.items())
-        overrides = (*base, *_of_faces(scene), *geometry)
+        overrides = (*base, *_of_faces(scene), *of_geometry(mesh))
         made.append(Variation(INTERFACE, f"{slope} x {along}", overrides, 1.0))
     return made
 

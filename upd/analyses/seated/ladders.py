@@ -14,7 +14,7 @@ from upd.analyses.seated.varied import corrected
 from upd.scene import SeatedScene
 from upd.vary.ladder import Asked, Ladder, counts, even, whole_levels
 from upd.vary.solve import MESH, coarser_rigs, refined
-from upd.vary.variation import Levels, Overrides, Problem, Variation
+from upd.vary.variation import Levels, Overrides, Problem, Variation, of_geometry
 
 #: source of error beside the mesh
 STEPS = "load steps"
@@ -66,8 +66,7 @@ def _meshes(scene: SeatedScene, asked: Asked, *, all_elements: bool) -> Iterator
     for element in ("hex8", "hex8i") if all_elements else (scene.mesh.element,):
         for n in whole_levels(asked, 2) or _SLOPE:
             counted = {slope: n} | {key: even(scene.geometry[key] * n / usual) for key in others}
-            geometry = tuple((f"geometry.{key}", value) for key, value in counted.items())
-            overrides = (*_BASE, *geometry, ("mesh.element", element))
+            overrides = (*_BASE, *of_geometry(counted), ("mesh.element", element))
             yield Variation(element, f"{n} elements up the patch", overrides, 1.0 / n)
 
 
