@@ -57,7 +57,7 @@ def predicted_seconds(problem: Problem, plan: Any, variation: Variation) -> floa
 def plan_with_estimates(problem: Problem, scene: Any) -> Any:
     """The plan of a scene with what its variations cost. Raises InputError as ``make_plan``."""
     plan, again = problem.make_plan(scene), 0.0
-    for found in problem.levels(plan).values():
+    for found in problem.levels(plan).values() if scene.estimates else ():
         for one in () if isinstance(found, str) else found:
             # what is refused is the reason that the run gives
             with suppress(InputError):

@@ -186,13 +186,10 @@ def coarsened(plan: ContactPlan) -> Overrides:
 def levels(plan: ContactPlan) -> Levels:
     """The coarser meshes that the errors of the plan's numbers are estimated with.
 
-    None where the scene wants none, and for a recipe without divisions.
+    None for a recipe without divisions.
     """
-    scene = plan.scene
-    if not scene.estimates:
-        return {}
     # Neighbouring loads show on half the divisions what the dearest level would.
-    ratios = COARSER[1:] if has_neighbours(scene) else COARSER
+    ratios = COARSER[1:] if has_neighbours(plan.scene) else COARSER
     known = isinstance(plan.parameters.get("divisions"), int)
     why = _COARSEST.format(FEWEST + 2) if known else _NO_DIVISIONS
     return {MESH: [_coarser(plan, n) for n in coarser_divisions(plan, ratios)] or why}

@@ -44,10 +44,7 @@ def levels(plan: ModalPlan) -> Levels:
     the spacing of nodes: corners and clamped edges let the frequencies of both fall with the same
     order, below the formal one of either. Of linear elements coarser rigs.
     """
-    scene = plan.scene
-    if not scene.estimates:
-        return {}
-    if scene.mesh.element in _QUADRATIC:
+    if plan.scene.mesh.element in _QUADRATIC:
         label = "elements hex8i on the same hexahedra"
         return {MESH: [Variation(MESH, label, (("mesh.element", "hex8i"),), _BETWEEN)]}
     return {MESH: coarser_rigs(PROBLEM, plan)}

@@ -22,10 +22,7 @@ STEPS = "load steps"
 
 def levels(plan: SeatedPlan) -> Levels:
     """Coarser rigs, faces and bodies alike, and half the load steps."""
-    scene = plan.scene
-    if not scene.estimates:
-        return {}
-    half = Variation(STEPS, "half the load steps", _steps(scene, 0.5), 2.0)
+    half = Variation(STEPS, "half the load steps", _steps(plan.scene, 0.5), 2.0)
     return {MESH: coarser_rigs(PROBLEM, plan), STEPS: [half]}
 
 
