@@ -6,7 +6,7 @@ Modes by nodal diameter, Campbell diagram, interference diagram.
 from __future__ import annotations
 
 from upd.analyses.base import Analysis, rig_needs
-from upd.analyses.bladed_disk import charts, ladders, output, plan, solve
+from upd.analyses.bladed_disk import charts, output, plan, solve
 from upd.vary.variation import Problem
 
 ANALYSIS = Analysis(
@@ -26,7 +26,7 @@ ANALYSIS = Analysis(
     write_files=output.write_files,
     charts=charts.charts,
     headline=output.headline,
-    ladders=ladders.LADDERS,
+    ladders=plan.LADDERS,
     answer=output.answer,
 )
 

@@ -1,15 +1,22 @@
-"""Plan of a bladed disk: one sector, which nodal diameters are computed, effects, size and cost."""
+"""Plan of a bladed disk: one sector, which nodal diameters are computed, effects, size and cost;
+what a convergence study varies.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from upd.analyses.base import Effect, Plan
 from upd.analyses.cost import NODES, CostModel
+from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import BladedDiskScene
+from upd.vary.ladder import Asked, Ladder, chosen_levels, counts
+from upd.vary.solve import changed
+from upd.vary.variation import Overrides, Variation
 
 BladedDiskPlan = Plan[BladedDiskScene]
 #: checks of effects left out
@@ -97,3 +104,39 @@ def _effects(scene: BladedDiskScene) -> list[Effect]:
             "no output asks for the damped response",
         ),
     ]
+
+
+# -- convergence studies: counts of elements, harmonics --------------------------------------------
+
+
+_RESPONSE: Overrides = (("want", ["response"]),)
+#: shares of the scene's own counts
+_SHARES = (0.35, 0.5, 0.7, 1.0)
+
+
+def _meshes(scene: BladedDiskScene, asked: Asked) -> Iterator[Variation]:
+    """Shares of all counts of elements; the size is the cube root of the hexahedra."""
+    kinds = "layers", "columns", "axial"
+    own = {name: n for name, n in scene.geometry.items() if name.endswith(kinds)}
+    if not own:
+        raise InputError("--vary mesh: geometry names no numbers of elements; give them")
+    shares = chosen_levels(asked or _SHARES, lambda n: n > 0.0, "shares of the elements, above 0")
+    for share in shares:
+        # an overhang has two columns at least
+        given = (
+            (f"geometry.{name}", max(1 + ("over" in name), round(share * n)))
+            for name, n in own.items()
+        )
+        overrides: Overrides = (("want", ["modes"]), *given)
+        plans = make_plan(scene), make_plan(changed(scene, overrides))
+        hexes = [sum(body["hexes"] for body in one.size.values()) for one in plans]
+        size = (hexes[0] / hexes[1]) ** (1.0 / 3.0)
+        yield Variation("mesh", f"{share:g} of the elements along edges", overrides, size)
+
+
+LADDERS: Mapping[str, Ladder] = {
+    "mesh": Ladder(_meshes),
+    "harmonics": Ladder(
+        counts("harmonics", "{} harmonics", "response.harmonics", (1, 3, 5), 1, _RESPONSE)
+    ),
+}
