@@ -370,7 +370,8 @@ class Analysis:
         An UpdError carries what converged as ``partial``.
         """
         solution, found = solve_wanted(self.problem, plan, stages)
-        if found is not None:
+        # a solution that has its levels itself finds them again
+        if found is not None and hasattr(solution, "estimates"):
             solution = replace(solution, estimates=found)
         if self.solve_left_out is not None:
             with keeping(solution):

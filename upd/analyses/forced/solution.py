@@ -61,7 +61,7 @@ from upd.hbm.faces.sweep import RecordedPeriod, period_of_sweep, stepped_sine
 from upd.linalg.parallel import threads_for
 from upd.mesh import IntArray
 from upd.progress import Stages
-from upd.results import Case, Estimates, Result
+from upd.results import Case, Result
 from upd.scene.forced_contact import SIDES, Side
 from upd.vary.variation import SolvedVariation
 
@@ -144,7 +144,6 @@ class ForcedSolution:
     omissions: list[Resolved] = field(default_factory=list)
     levels: list[SolvedVariation] = field(default_factory=list)
     effects: list[Result] = field(default_factory=list)
-    estimates: Estimates | None = None
 
     @property
     def order(self) -> int:
