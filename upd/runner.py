@@ -40,7 +40,6 @@ from upd.results import (
 )
 from upd.scene import AnyScene, as_scene
 from upd.scene.keys import scene_as_run
-from upd.vary.errors import estimate
 from upd.vary.inputs import input_parts
 
 log = logging.getLogger("upd")
@@ -231,8 +230,7 @@ def _collected(
         results = with_estimates(results, estimates)
     else:
         if solution.plan.scene.estimates:
-            found = estimate(analysis.problem, solution, results, stages)
-            results = with_estimates(results, found)
+            results = with_estimates(results, analysis.estimate(solution, results, stages))
         results = with_inputs(results, input_parts(analysis, solution, results, stages))
     return RunResult(
         scene=plan.scene.name,

@@ -15,7 +15,6 @@ from typing import Any
 from upd.analyses import analysis_of, make_plan
 from upd.progress import Stages
 from upd.scene import load_scene
-from upd.vary.errors import estimate
 
 SCENES = ("hertz", "symmetric", "asymmetric", "rig", "symmetric-response", "asymmetric-response")
 #: per cent of the run without them
@@ -46,7 +45,7 @@ def run(scenes: Sequence[str] = SCENES) -> Iterator[dict[str, Any]]:
         stages = Stages(clock)
         analysis = analysis_of(scene)
         solution = analysis.solve(make_plan(scene), stages)
-        estimate(analysis.problem, solution, analysis.make_results(solution), stages)
+        analysis.estimate(solution, analysis.make_results(solution), stages)
         rest = time.process_time() - begin - clock.inside
         yield {
             "name": "estimates over the rest",

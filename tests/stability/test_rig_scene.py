@@ -232,3 +232,6 @@ def test_sensitivity_of_a_cantilever(tmp_path: Path, monkeypatch: pytest.MonkeyP
         one.rows for one in study.present([solved[0], solved[2], other]).tables
     ]
     assert "changes the elements" in why
+    lost = replace(solved[0], outcome=replace(solved[0].outcome, failure="no memory", results=()))
+    without = study.present([lost, *solved[1:-2]])
+    assert not without.found and without.tables[0].rows[0] == ("as given", "no memory")

@@ -27,6 +27,7 @@ from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_label
 from upd.scene import AnyScene, load_scene, ready_scenes
 from upd.scene.base import LeftOut
+from upd.vary import errors
 from upd.vary.ladder import Ladder
 from upd.vary.variation import Overrides, Problem
 from upd.vary.wanted import plan_wanted, solve_wanted
@@ -377,6 +378,10 @@ class Analysis:
             with keeping(solution):
                 self.solve_left_out(solution, stages)
         return solution
+
+    def estimate(self, solution: Any, results: Sequence[Result], stages: Stages) -> Estimates:
+        """The parts of the errors of a run's numbers."""
+        return errors.estimate(self.problem, solution, results, stages)
 
     def is_main(self, one: Result) -> bool:
         """Whether it is a number an engineer asks for first."""

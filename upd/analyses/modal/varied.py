@@ -188,7 +188,10 @@ def _dimension_report(
 ) -> StudyReport:
     """A row for the frequencies in Hz, then one for each dimension: d ln f / d ln p."""
     del scene, names
-    given = {one.point.label: one for one in solved}[_AS_GIVEN]
+    given, title = {one.point.label: one for one in solved}[_AS_GIVEN], "d ln f / d ln p"
+    if given.outcome.failure:
+        failed = tuple((one.point.label, one.outcome.failure) for one in solved)
+        return StudyReport((AnswerTable(title, ("dimension", "failure"), failed),), found=False)
     frequencies = {key: f for key, f in given.values.items() if key[0].endswith(_OF_MODES)}
     rows = [(f"{_AS_GIVEN}, Hz", *(f"{f:.2f}" for f in frequencies.values()))]
     found = False
@@ -204,8 +207,7 @@ def _dimension_report(
         rows.append((one.point.label, *shown))
         found = found or not why
     heads = ("dimension", *(f"# {name.replace('_', ' ')}" for name, _ in frequencies))
-    table = AnswerTable("d ln f / d ln p", heads, tuple(rows))
-    return StudyReport((table,), found)
+    return StudyReport((AnswerTable(title, heads, tuple(rows)),), found)
 
 
 _COUNTS = counts(
