@@ -22,7 +22,7 @@ from upd.mesh import recipes
 from upd.plot.chart import Chart, Entry
 from upd.progress import Stages
 from upd.reference.printed import Lookup, printed_values
-from upd.results import Arrays, Case, Check, Group, Result
+from upd.results import Arrays, Case, Check, Estimates, Group, Result
 from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_label
 from upd.scene import AnyScene, load_scene, ready_scenes
