@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Generic, Self, TypeVar
 
-from upd.analyses.cost import NODES, CostModel, memory_limit
+from upd.analyses.cost import CostModel, memory_limit
 from upd.cache.sources import key_of
 from upd.errors import InputError
 from upd.labels import number
@@ -31,17 +31,6 @@ from upd.vary import errors
 from upd.vary.ladder import Ladder
 from upd.vary.variation import Overrides, Problem
 from upd.vary.wanted import plan_wanted, solve_wanted
-
-__all__ = [
-    "CHOSEN_BY_ACCURACY",
-    "COPIES",
-    "NODES",
-    "Analysis",
-    "Effect",
-    "Needs",
-    "Plan",
-    "Resolved",
-]
 
 #: names of the effect with the levels that a run chose; the second is that of older folders
 CHOSEN_BY_ACCURACY = ("levels chosen by accuracy", "mesh chosen by accuracy")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from upd.analyses import make_plan
-from upd.analyses.base import NODES
+from upd.analyses.cost import NODES
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.recipe_modules import READY, is_file

@@ -29,5 +29,3 @@ ANALYSIS = Analysis(
     ladders=plan.LADDERS,
     answer=output.answer,
 )
-
-__all__ = ["ANALYSIS"]

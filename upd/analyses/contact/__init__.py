@@ -54,5 +54,3 @@ ANALYSES = {
         _analysis("flat", results.FLAT_HEADLINE, charts.flat_charts, last=False),
     )
 }
-
-__all__ = ["ANALYSES"]

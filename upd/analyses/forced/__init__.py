@@ -62,5 +62,3 @@ ANALYSIS = Analysis(
     verdict_names=("best_peak", "reduction_of_free_peak"),
     coarsened=lambda plan: coarsened_rig(plan, ("response",), ("balance.method", "balance")),
 )
-
-__all__ = ["ANALYSIS"]

@@ -24,5 +24,3 @@ ANALYSIS = Analysis(
     ladders=varied.LADDERS,
     coarsened=lambda plan: coarsened_rig(plan, ("free", "glued", "response")),
 )
-
-__all__ = ["ANALYSIS"]

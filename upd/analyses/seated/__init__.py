@@ -25,5 +25,3 @@ ANALYSIS = Analysis(
     verdict_names=("face_N",),
     coarsened=lambda plan: coarsened_rig(plan, ("seating", "stiffness", "moved")),
 )
-
-__all__ = ["ANALYSIS"]
