@@ -109,6 +109,28 @@ def test_class_names_are_unique() -> None:
     )
 
 
+def constants(tree: ast.Module) -> Iterator[tuple[str, ast.stmt]]:
+    """Names in capitals that a module assigns at its top."""
+    for node in tree.body:
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        for target in targets:
+            for one in getattr(target, "elts", [target]):
+                if isinstance(one, ast.Name) and one.id.isupper():
+                    yield one.id, node
+
+
+def test_constants_are_given_once() -> None:
+    """Of two in one module the first would silently have the value of the second."""
+    found = []
+    for path in modules("upd", "geometry"):
+        names: dict[str, ast.stmt] = {}
+        for name, node in constants(parsed(path)):
+            if name in names:
+                found.append(f"{place(path, node)} {name} again")
+            names[name] = node
+    none_of(found)
+
+
 def bound_in(init: Path) -> dict[str, str]:
     """Names that a package's __init__ binds to something other than its own modules -> where."""
     package = ".".join(init.parent.relative_to(ROOT).parts)

@@ -36,7 +36,7 @@ from upd.results import quantities as q
 from upd.scene.forced_contact import SIDES, Side
 
 #: points of a path from one end, before that from the other is taken
-MOST_POINTS = 600
+MOST_PATH_POINTS = 600
 
 
 class RatioPoint(NamedTuple):
@@ -125,7 +125,7 @@ def peaks_at(
     force, e = plan.scene.damper.centrifugal / ratio, plan.scene
     span = np.linspace(e.excitation.start, e.excitation.stop, SWEEP_POINTS)
     sweep = fine_grid(plan, model, force, span)
-    settings = replace(LONG_STEPS, most_points=MOST_POINTS)
+    settings = replace(LONG_STEPS, most_points=MOST_PATH_POINTS)
     given = {"harmonics": range(harmonics + 1), "settings": settings} | dict(changes or {})
     found: dict[tuple[Side, int], CurvePeak] = {}
     up_to = -math.inf
@@ -320,8 +320,8 @@ def performance_arrays(found: Performance) -> dict[str, Any]:
 
 #: amplitudes over that of the first slip: from sticking to slipping everywhere
 SPAN = (0.5, 100.0)
-#: of the path, at least and at most
-POINTS, MOST_POINTS = 40, 400
+#: of the path, at least and at most: the ready symmetric damper's in phase takes 726, as it opens
+POINTS, MOST_MODE_POINTS = 40, 800
 #: metres in a millimetre
 _M = 1e-3
 
@@ -387,7 +387,7 @@ def mode_over_amplitude(
         harmonics=numbers,
         samples=b.samples,
         start=scene.balance.slider,
-        settings=replace(LONG_STEPS, most_points=MOST_POINTS),
+        settings=replace(LONG_STEPS, most_points=MOST_MODE_POINTS),
     )
     square = (2.0 * np.pi * found.frequency) ** 2
     shares = found.state.mean(axis=1)
