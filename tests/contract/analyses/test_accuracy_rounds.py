@@ -46,6 +46,7 @@ class MadeUpScene:
     lost: str = ""
     worse: float = 1.0
     solver: MadeUpSolver = field(default_factory=MadeUpSolver)
+    estimates: bool = True
 
     @property
     def wanted_accuracy(self) -> Any:
