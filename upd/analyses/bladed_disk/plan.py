@@ -61,7 +61,7 @@ def make_plan(scene: BladedDiskScene) -> BladedDiskPlan:
         cost.modes(f"{body}, modes", count["hexes"], count["nodes"], times)
         cost.shared += _curves_s(scene, count["contact"])
     cost.jobs = [(_REDUCED if damped(scene) else _COMPLEX) * one for one in cost.jobs]
-    memory, workers = cost.side_by_side(1, 1)
+    memory, workers = cost.side_by_side(cost.threads, len(computed(scene)))
     return BladedDiskPlan(
         scene,
         chosen,
