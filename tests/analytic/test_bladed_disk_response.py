@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -85,9 +88,10 @@ def test_the_limit_of_many_samples(
 def test_the_best_wedge_lies_between_free_and_stuck(sectors: dict[int, ReducedSector]) -> None:
     force, row = tip(sectors)
     f = np.linspace(505.0, 535.0, 31)
-    given = {"force": force, "engine_order": ORDER, "frequencies": f, "harmonics": (0, 1)}
-    found = performance(sectors, WEDGE, F_C, [600.0, 60.0, 20.0], row, **given)
-    fixed = wave_response(sectors, WEDGE, F_C, **given | {"force": 0.1 * force})
+    given: dict[str, Any] = {"engine_order": ORDER, "frequencies": f, "harmonics": (0, 1)}
+    solve = partial(wave_response, sectors, WEDGE, F_C, **given)
+    found = performance(solve, F_C, [600.0, 60.0, 20.0], row, force)
+    fixed = solve(force=0.1 * force)
     stuck = fixed.stuck(on_sector(row), f).max() / 0.1
     assert found.height[-1] == pytest.approx(stuck, rel=0.02)
     ratio, lowest = found.best

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,7 +31,7 @@ from upd.errors import ConvergenceError, InputError, MeshError
 from upd.labels import Shown
 from upd.linalg.common import EPS, FloatArray, IntArray, Solve
 from upd.linalg.hermitian import ComplexArray, HermitianModes, hermitian_factor, hermitian_modes
-from upd.linalg.parallel import threads_for
+from upd.linalg.parallel import in_parallel, threads_for
 from upd.mesh import Mesh
 
 #: Largest offset of a node from its partner, relative to the distance of neighbours on the face.
@@ -344,7 +344,9 @@ class ModeFamily(Shown):
     spin: CyclicMatrix | None
 
     @classmethod
-    def of(cls, model: CyclicModel, nodal_diameters: Sequence[int], count: int) -> ModeFamily:
+    def of(
+        cls, model: CyclicModel, nodal_diameters: Sequence[int], count: int, workers: int = 1
+    ) -> ModeFamily:
         """From modes at rest of some nodal diameters and how the speed begins to change them.
 
         The change is K_n^-1 (K_sigma - M_P) X, by the same factor, twice.
@@ -355,18 +357,21 @@ class ModeFamily(Shown):
         nodal_diameters : sequence of int
         count : int
             Modes each.
+        workers : int
+            Nodal diameters at a time.
         """
-        basis: list[FloatArray] = []
-        for n in nodal_diameters:
+
+        def blocks(n: int) -> list[FloatArray]:
             solve = model.factor(n)
-            X = hermitian_modes(model.stiffness(n), model.M.at(n), count, solve).shapes
-            blocks = [X]
+            found = [hermitian_modes(model.stiffness(n), model.M.at(n), count, solve).shapes]
             if model.spin is not None:
                 for _ in range(2):
-                    blocks.append(solve(model.spin.at(n) @ blocks[-1]))
-            for block in blocks:
-                basis += [block.real, block.imag] if np.iscomplexobj(block) else [block]
-        V = _independent(np.hstack(basis))
+                    found.append(solve(model.spin.at(n) @ found[-1]))
+            X = np.hstack(found)
+            return [X.real, X.imag] if np.iscomplexobj(X) else [X]
+
+        basis = in_parallel([partial(blocks, n) for n in nodal_diameters], workers)
+        V = _independent(np.hstack([part for parts in basis for part in parts]))
         spin = None if model.spin is None else model.spin.projected(V)
         return cls(model.K.projected(V), model.M.projected(V), spin)
 

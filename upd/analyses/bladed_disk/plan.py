@@ -66,7 +66,7 @@ def make_plan(scene: BladedDiskScene) -> BladedDiskPlan:
         cost.modes(f"{body}, modes", count, times)
         cost.shared += _curves_s(scene, count["contact"])
     cost.jobs = [(_REDUCED if damped(scene) else _COMPLEX) * one for one in cost.jobs]
-    needs = cost.side_by_side(1, 1)
+    needs = cost.side_by_side(cost.threads, len(computed(scene)))
     return BladedDiskPlan.of(cost, "full", chosen, _effects(scene), needs, _FILES_S)
 
 

@@ -9,7 +9,7 @@ guide it walks off, and curves under a high load stop where it begins to.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -235,23 +235,20 @@ def other_start(answer: FrequencyResponse, row: ArrayLike) -> float:
 
 
 def performance(
-    sectors: Mapping[int, ReducedSector],
-    wedge: Wedge,
+    solve: Callable[..., FrequencyResponse],
     f_c: float,
     ratios: ArrayLike,
     row: ArrayLike,
-    *,
     force: ArrayLike,
-    engine_order: int,
-    frequencies: ArrayLike,
-    harmonics: Iterable[int] = range(4),
 ) -> WavePerformance:
     """The peak over F_C/F_E at one centrifugal force, which scales the answer with the load.
 
     Parameters
     ----------
-    sectors, wedge, f_c, engine_order, frequencies, harmonics
-        As in `wave_response`.
+    solve : callable
+        `wave_response` with all but its ``force``.
+    f_c : float
+        Centrifugal force of the wedge [N].
     ratios : (n,) array_like
         F_C over the excitation.
     row : (r,) array_like
@@ -263,18 +260,10 @@ def performance(
     -------
     WavePerformance
     """
-    unit, kept = np.asarray(force, dtype=complex), tuple(harmonics)
+    unit = np.asarray(force, dtype=complex)
 
     def peak(ratio: float) -> tuple[float, float, float]:
-        answer = wave_response(
-            sectors,
-            wedge,
-            f_c,
-            force=f_c / ratio * unit,
-            engine_order=engine_order,
-            frequencies=frequencies,
-            harmonics=kept,
-        )
+        answer = solve(force=f_c / ratio * unit)
         f, height = answer.peak(on_sector(row)) if answer.arrived else (np.nan, np.nan)
         return ratio, f, height * ratio / f_c
 

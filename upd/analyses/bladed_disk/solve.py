@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,8 @@ from upd.fem.rotation import (
     stress_stiffness,
 )
 from upd.hbm import FrequencyResponse, nodal_diameters
+from upd.linalg.parallel import in_parallel
+from upd.linalg.select import threads
 from upd.mesh import Mesh, recipes
 from upd.progress import Stages
 from upd.reduction.cyclic import (
@@ -191,7 +194,7 @@ def _solve(solution: BladedDiskSolution, stages: Stages) -> None:
             model = CyclicModel.of(sector, K, M, csr_array(stress - plane_mass(M)))
     known = computed(scene)
     with stages("modes", f"nodal diameters {', '.join(map(str, known))}"):
-        family = ModeFamily.of(model, known, count + 2)
+        family = ModeFamily.of(model, known, count + 2, plan.workers)
         solution.at_rest = _by_diameter(family, model, count, 0.0)
     if not rotates(scene):
         return
@@ -296,8 +299,9 @@ def _damped_wave(
     beta = 2.0 * chosen.damping / (2.0 * np.pi * crossing.frequency)
     needed = nodal_diameters(scene.n_sectors, crossing.engine_order, harmonics)
     with stages("reduction", f"nodal diameters {', '.join(map(str, needed))}"):
-        sectors = {
-            n: reduce_sector(
+        jobs = [
+            partial(
+                reduce_sector,
                 model,
                 n,
                 n_modes=chosen.modes,
@@ -307,35 +311,35 @@ def _damped_wave(
                 full=family.frequencies(n, scene.modes.count, crossing.speed),
             )
             for n in needed
-        }
+        ]
+        sectors = dict(zip(needed, in_parallel(jobs, solution.plan.workers), strict=True))
     one = sectors[crossing.nodal_diameter]
     x, y, _ = mesh.points[tip[0]]
     row = np.array([-y, x, 0.0]) / np.hypot(x, y) @ one.rows["tip"]
     wedge = _wedge(scene, one)
     f_c = wedge.centrifugal_force(crossing.speed)
     low = 0.97 * crossing.frequency
-    given: dict[str, Any] = {"engine_order": crossing.engine_order, "harmonics": harmonics}
+    solved = partial(wave_response, sectors, wedge, f_c, engine_order=crossing.engine_order)
     with stages("response", f"EO {crossing.engine_order}, {chosen.points} frequencies"):
         force, out = chosen.force * row, on_sector(row)
-        probe = wave_response(sectors, wedge, f_c, force=force, frequencies=[low], **given)
+        probe = solved(force=force, frequencies=[low], harmonics=harmonics)
         wide = np.linspace(low, 2.0 * low, 4001)
         top = float(wide[probe.stuck(out, wide).argmax()])
         frequencies = np.linspace(low, 1.03 * top, chosen.points)
-        answer = wave_response(sectors, wedge, f_c, force=force, frequencies=frequencies, **given)
+        curve_of = partial(solved, frequencies=frequencies, harmonics=harmonics)
+        curves = [partial(curve_of, force=force)]
+        if chosen.harmonics > 2:
+            curves.append(partial(curves[0], harmonics=harmonics[:-2]))
+        answer, *less = in_parallel(curves, threads())
         fine = np.linspace(low, frequencies[-1], 2001)
         free, stuck = answer.free(out, fine), answer.stuck(out, fine)
         amplitude, peak = np.asarray(answer.amplitude(out)), answer.peak(out)
-        fewer = float("nan")
-        if chosen.harmonics > 2:
-            less = {**given, "frequencies": frequencies, "harmonics": harmonics[:-2]}
-            fewer = wave_response(sectors, wedge, f_c, force=force, **less).peak(out)[1]
+        fewer = less[0].peak(out)[1] if less else float("nan")
         started = other_start(answer, out)
     curve = None
     if scene.wants("performance"):
         with stages("performance", f"{len(chosen.ratios)} ratios F_C/F_E"):
-            found = performance(
-                sectors, wedge, f_c, chosen.ratios, row, force=row, frequencies=frequencies, **given
-            )
+            found = performance(curve_of, f_c, chosen.ratios, row, row)
             # the response is a point of it
             own = f_c / chosen.force, peak[0], peak[1] / chosen.force
             points = np.column_stack([found, own])
