@@ -33,7 +33,7 @@ from upd.linalg.common import FloatArray, checked_vectors, log
 from upd.linalg.conjugate import UNSEEN, block_conjugate_gradients, conjugate_gradients
 from upd.linalg.nodes import STRONG, aggregates, near_neighbours, padded, places, positions
 from upd.linalg.schur import Solved
-from upd.linalg.smoothers import Smoother, block_rows
+from upd.linalg.smoothers import Smoother, in_order
 from upd.linalg.sweeps import WIDTH, Single, symmetric_product, width_of
 from upd.linalg.symmetric import Matrix, Symmetric
 
@@ -185,9 +185,10 @@ def hierarchy(A: Any, modes: FloatArray | None, points: FloatArray | None = None
     for one in fine:
         B = bsr_array(one.A)
         smoother = Smoother(B)
-        P = one.P.astype(np.float32)
-        if smoother.order is not None:
-            P = block_rows(bsr_array(P), smoother.order[::3] // 3)
+        if smoother.order is None:
+            P = one.P.astype(np.float32)
+        else:
+            P = in_order(bsr_array(one.P), smoother.order[::3] // 3)
         levels.append(AggregationLevel(smoother, P, P.T.tocsr() if P.format == "csr" else P.T))
         one.A = one.P = one.R = None
     return Hierarchy(levels, last.A.toarray(), np.any(last.B != 0.0, axis=1), A.shape[0])
