@@ -388,7 +388,7 @@ EYE, GAP = np.eye(2), np.zeros(2)
         ((-EYE, GAP, {"load": 1.0}), "check the sign"),
         ((np.ones((2, 3)), GAP, {"load": 1.0}), r"shape \(2, 3\): it must be \(n, n\)"),
         ((np.zeros((0, 0)), np.zeros(0), {"load": 1.0}), "n >= 1"),
-        ((EYE, np.zeros(3), {"load": 1.0}), "2 rows and gap 3 values"),
+        ((EYE, np.zeros(3), {"load": 1.0}), r"gap has shape \(3,\): it must be \(2,\)"),
         ((EYE, np.zeros((2, 1)), {"load": 1.0}), r"gap has shape \(2, 1\)"),
         (("stiff", GAP, {"load": 1.0}), "compliance is not an array of numbers"),
         (([[1.0], [1.0, 2.0]], GAP, {"load": 1.0}), "compliance is not an array of numbers"),

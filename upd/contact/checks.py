@@ -52,8 +52,10 @@ class Problems:
             raise InputError(f"{self.where}: " + " | ".join(self.found))
 
 
-def numbers(problems: Problems, name: str, values: ArrayLike) -> FloatArray | None:
-    """Float copy of an array, if it holds finite numbers.
+def numbers(
+    problems: Problems, name: str, values: ArrayLike, *shapes: tuple[int | str, ...]
+) -> FloatArray | None:
+    """Float copy of an array, if it holds finite numbers and has one of the shapes.
 
     Parameters
     ----------
@@ -62,7 +64,8 @@ def numbers(problems: Problems, name: str, values: ArrayLike) -> FloatArray | No
     name : str
         Name of the array in the message.
     values : array_like
-        Any shape.
+    shapes : tuple of int or str
+        Allowed shapes; a name stands for any number from 1 on. None given: any shape.
 
     Returns
     -------
@@ -80,16 +83,31 @@ def numbers(problems: Problems, name: str, values: ArrayLike) -> FloatArray | No
         f"{name} holds {bad} values that are NaN or infinite: correct the step that made them.",
     ):
         return None
+    wanted = " or ".join(str(shape).replace("'", "") for shape in shapes)
+    fits = not shapes or any(
+        len(shape) == array.ndim
+        and all(
+            have == n or (have > 0 and isinstance(n, str))
+            for n, have in zip(shape, array.shape, strict=False)
+        )
+        for shape in shapes
+    )
+    if problems.add(not fits, f"{name} has shape {array.shape}: it must be {wanted}."):
+        return None
     return array
 
 
-def one_of(problems: Problems, **given: ArrayLike | None) -> tuple[str, FloatArray] | None:
+def one_of(
+    problems: Problems, *shapes: tuple[int | str, ...], **given: ArrayLike | None
+) -> tuple[str, FloatArray] | None:
     """Name and numbers of the one argument of two that is not None.
 
     Parameters
     ----------
     problems : Problems
         Receives the message when both or none are given, or what is given is no numbers.
+    shapes
+        As for `numbers`.
     given
         Both arguments by their names.
     """
@@ -98,7 +116,7 @@ def one_of(problems: Problems, **given: ArrayLike | None) -> tuple[str, FloatArr
         return None
     value = given[names[0]]
     assert value is not None
-    values = numbers(problems, names[0], value)
+    values = numbers(problems, names[0], value, *shapes)
     return None if values is None else (names[0], values)
 
 
@@ -213,24 +231,3 @@ def proven_factor(problems: Problems, C: FloatArray) -> FloatArray | None:
     ):
         return None
     return np.asarray(L)
-
-
-def unit_response(problems: Problems, C: FloatArray) -> FloatArray:
-    """Solve C x = e, which also proves C positive definite.
-
-    Parameters
-    ----------
-    problems : Problems
-        Receives the message when C is not positive definite to working precision.
-    C : (n, n) ndarray
-        Compliance [mm/N], as `compliance_matrix` returns it.
-
-    Returns
-    -------
-    (n,) ndarray
-        C^-1 e [N/mm]; ones when a problem was noted.
-    """
-    L = proven_factor(problems, C)
-    if L is None:
-        return np.ones(len(C))
-    return np.asarray(lapack.dpotrs(L, np.ones(len(C)), lower=1)[0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -142,15 +142,8 @@ class ContactLaw(Shown):
             When the axes are not orthonormal and right-handed, or the shapes differ.
         """
         problems = Problems("contact points placed")
-        o, A = numbers(problems, "origin", origin), numbers(problems, "axes", axes)
-        problems.add(
-            o is not None and o.shape != (3,),
-            f"origin has shape {None if o is None else o.shape}: it must be (3,).",
-        )
-        if A is not None and not problems.add(
-            A.shape != (3, 3),
-            f"axes has shape {A.shape}: it must be (3, 3), one unit vector per row.",
-        ):
+        o, A = numbers(problems, "origin", origin, (3,)), numbers(problems, "axes", axes, (3, 3))
+        if A is not None:
             skew = float(np.abs(A @ A.T - np.eye(3)).max())
             problems.add(
                 skew > np.sqrt(EPS),
@@ -162,19 +155,8 @@ class ContactLaw(Shown):
             )
         problems.raise_any()
         assert o is not None and A is not None
-        kept = {
-            "k_n": self.k_n,
-            "k_t": self.k_t,
-            "preload": self.preload,
-            "area": self.area,
-            "source_tilt": self.source_tilt,
-        }
-        return ContactLaw(
-            position=o + self.position @ A,
-            normal=self.normal @ A,
-            tangents=self.tangents @ A,
-            **kept,
-        )
+        position, normal, tangents = o + self.position @ A, self.normal @ A, self.tangents @ A
+        return replace(self, position=position, normal=normal, tangents=tangents)
 
     def to_arrays(self) -> dict[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]]:
         """The points as arrays for result.nc.
@@ -209,7 +191,7 @@ class ContactLaw(Shown):
         """
         problems = Problems("contact points from arrays")
         found: dict[str, FloatArray] = {}
-        sizes = {"tangent": 2, "component": 3}
+        sizes: dict[str, int | str] = {"tangent": 2, "component": 3}
         for name, (dims, _) in _FORMAT.items():
             given = arrays.get(_PREFIX + name)
             if given is None:
@@ -219,20 +201,12 @@ class ContactLaw(Shown):
                     "points were written to.",
                 )
                 continue
-            array = numbers(
-                problems, _PREFIX + name, given[1] if isinstance(given, tuple) else given
-            )
-            if array is None:
-                continue
-            if array.ndim and "contact_point" in dims:
-                sizes.setdefault("contact_point", array.shape[0])
-            wanted = tuple(sizes.get(dim, 0) for dim in dims)
-            problems.add(
-                array.shape != wanted,
-                f"{_PREFIX}{name} has shape {array.shape}: it must be {wanted}, dimensions "
-                f"{', '.join(dims)}.",
-            )
-            found[name] = array
+            wanted = tuple(sizes.get(dim, dim) for dim in dims)
+            given = given[1] if isinstance(given, tuple) else given
+            array = numbers(problems, _PREFIX + name, given, wanted)
+            if array is not None:
+                sizes.update(zip(dims, array.shape, strict=True))
+                found[name] = array
         problems.raise_any()
         return cls(**found)
 
@@ -312,30 +286,22 @@ def contact_points(
     [-0.2, 0.0]
     """
     problems = Problems("contact points")
-    X, K = (
-        numbers(problems, "positions", positions),
-        numbers(problems, "tangential_stiffness", tangential_stiffness),
-    )
+    X = numbers(problems, "positions", positions, ("n", 2), ("n", 3))
+    n = "n" if X is None else len(X)
+    K = _not_negative(problems, "tangential_stiffness", tangential_stiffness, (n, 2))
     named = {"areas": areas, "normal_force": normal_force, "normal_stiffness": normal_stiffness}
-    given = {name: numbers(problems, name, values) for name, values in named.items()}
+    given = [_not_negative(problems, name, values, (n,)) for name, values in named.items()]
     for name, count in (("rows", rows), ("columns", columns)):
         whole = isinstance(count, (int, np.integer)) and not isinstance(count, bool)
         problems.add(not whole or count < 1, f"{name} is {count!r}: give a whole number >= 1.")
     problems.add(
         weight not in get_args(Weight), f'weight is {weight!r}: take "stiffness" or "area".'
     )
-    groups: list[NDArray[np.int64]] = []
-    if X is not None and not problems.add(
-        X.ndim != 2 or X.shape[-1] not in (2, 3) or len(X) == 0,
-        f"positions has shape {X.shape}: it must be (n, 2) or (n, 3), n >= 1.",
-    ):
-        given["tangential_stiffness"] = K
-        _check_fields(problems, len(X), given)
-        groups = _check_patches(problems, len(X), patches)
+    groups = [] if X is None else _check_patches(problems, len(X), patches)
     problems.raise_any()
     assert X is not None and K is not None
     place = np.column_stack([X, np.zeros(len(X))]) if X.shape[1] == 2 else X
-    area, force, k_n = (np.asarray(given[name]) for name in named)
+    area, force, k_n = (np.asarray(one) for one in given)
     nodal = _Nodal(place, area, force, k_n, K)
     cells = [nodal.cells(group, rows, columns, weight) for group in groups]
     law = {name: np.concatenate([cell[name] for cell in cells]) for name in cells[0]}
@@ -354,19 +320,16 @@ def contact_points(
     )
 
 
-def _check_fields(problems: Problems, n: int, given: Mapping[str, FloatArray | None]) -> None:
-    for name, array in given.items():
-        wanted = (n, 2) if name == "tangential_stiffness" else (n,)
-        if array is None or problems.add(
-            array.shape != wanted, f"{name} has shape {array.shape}: {n} positions need {wanted}."
-        ):
-            continue
-        negative = int(np.count_nonzero(array < 0))
-        problems.add(
-            negative > 0,
-            f"{name} is negative at {negative} places: forces press, areas and stiffnesses "
-            "are >= 0.",
-        )
+def _not_negative(
+    problems: Problems, name: str, values: ArrayLike, shape: tuple[int | str, ...]
+) -> FloatArray | None:
+    array = numbers(problems, name, values, shape)
+    negative = 0 if array is None else int(np.count_nonzero(array < 0))
+    problems.add(
+        negative > 0,
+        f"{name} is negative at {negative} places: forces press, areas and stiffnesses are >= 0.",
+    )
+    return array
 
 
 def _check_patches(

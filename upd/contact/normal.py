@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import lapack
 
 from upd.contact.checks import (
     Problems,
@@ -15,7 +16,7 @@ from upd.contact.checks import (
     node_mask,
     numbers,
     one_load,
-    unit_response,
+    proven_factor,
 )
 from upd.contact.qp import FREE, LOWER, BoxQP, FloatArray, Method, State
 from upd.labels import Shown
@@ -190,20 +191,10 @@ class _NormalSolver:
 
     def __init__(self, problems: Problems, compliance: ArrayLike, gap: ArrayLike) -> None:
         C = compliance_matrix(problems, compliance)
-        h = numbers(problems, "gap", gap)
+        h = numbers(problems, "gap", gap, ("n" if C is None else len(C),))
         if C is not None:
-            self.unit = unit_response(problems, C)
+            self.factor = proven_factor(problems, C)
             self.qp = BoxQP(C)
-        if h is not None:
-            problems.add(
-                h.ndim != 1 or h.size == 0,
-                f"gap has shape {h.shape}: it must be (n,), one value per contact node.",
-            )
-            problems.add(
-                C is not None and h.ndim == 1 and len(C) != h.size,
-                f"compliance has {0 if C is None else len(C)} rows and gap {h.size} "
-                "values: both need one per contact node.",
-            )
         self.gap = np.zeros(0) if h is None else h
         self.n = self.gap.size
         # Measured from the closest pair of nodes, so that a common offset of all gaps costs no
@@ -269,7 +260,8 @@ class _NormalSolver:
 
         Too large rather than too small, free of units.
         """
-        foundation = float(self.unit.sum()) / self.n
+        unit = lapack.dpotrs(self.factor, np.ones(self.n), lower=1)[0]
+        foundation = float(unit.sum()) / self.n
         order = np.sort(self.h)
         # Load carried when the foundation reaches each gap in turn.
         carried = foundation * (

@@ -15,7 +15,7 @@ from upd.contact.checks import (
     few_threads,
     numbers,
     one_of,
-    unit_response,
+    proven_factor,
 )
 from upd.contact.coulomb import Coulomb
 from upd.contact.coulomb_conditions import Iterate
@@ -323,14 +323,11 @@ class _TangentialSolver:
 
     def __init__(self, problems: Problems, compliance: ArrayLike, limit: ArrayLike) -> None:
         C = compliance_matrix(problems, compliance)
-        s = numbers(problems, "limit", limit)
+        s = numbers(problems, "limit", limit, ("n",))
         self.directions, self.limit = 1, np.zeros(0)
         if C is not None:
-            unit_response(problems, C)
-        if s is None or problems.add(
-            s.ndim != 1 or s.size == 0,
-            f"limit has shape {s.shape}: it must be (n,), one value per contact node.",
-        ):
+            proven_factor(problems, C)
+        if s is None:
             return
         self.limit = s
         negative = np.flatnonzero(s < 0)
@@ -414,12 +411,7 @@ class _TangentialSolver:
                 np.zeros(size), np.zeros(size), np.zeros(self.n, dtype=np.int8)
             )
         for name, wanted in (("slip", size), ("force", size), ("state", self.n)):
-            array = numbers(problems, f"history.{name}", getattr(history, name))
-            if array is not None:
-                problems.add(
-                    array.shape != (wanted,),
-                    f"history.{name} has shape {array.shape}: this contact needs ({wanted},).",
-                )
+            numbers(problems, f"history.{name}", getattr(history, name), (wanted,))
         return history
 
     def step(self, value: FloatArray, by_load: bool, at: TangentialHistory) -> TangentialContact:
