@@ -122,10 +122,8 @@ def one_of(
 
 def one_load(problems: Problems, name: str, value: float | None) -> float:
     """One number, of a load not below zero; 0 for None and where a problem was noted."""
-    array = numbers(problems, name, np.asarray(0.0 if value is None else value))
-    if array is None or problems.add(
-        array.size != 1, f"{name} must be one number, it has {array.size} values."
-    ):
+    array = numbers(problems, name, 0.0 if value is None else value, (), (1,))
+    if array is None:
         return 0.0
     number = float(array.reshape(()))
     problems.add(

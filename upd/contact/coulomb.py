@@ -290,13 +290,9 @@ class Coulomb(CoulombConditions):
         )
         if near is None:
             return None
-        forces = at.f.reshape(c, n)
-        if forces[:, rows.is_open & near.rows.is_open].any():
+        if at.f.reshape(c, n)[:, rows.is_open & near.rows.is_open].any():
             return None
-        left = rows.rhs - np.einsum("nij,jn->ni", rows.P, forces)
-        left -= np.einsum("nij,jn->ni", rows.Q, self._misfit(step, at).reshape(c, n))
-        missing = None if step.load is None else step.load - self.B.T @ at.f
-        found = near.step(rows, left, missing, self.rho.T)
+        found = near.step(rows, *self._left(step, at, rows), self.rho.T)
         if found is None:
             return None
         f, s = at.f + found[0], at.s + found[1]
@@ -306,23 +302,23 @@ class Coulomb(CoulombConditions):
     def _chord(self, step: AskedStep, at: Iterate, rows: NewtonRows) -> Iterate | None:
         """A step of Newton with the kept factor, where the same nodes are open, stuck and slipping:
         the directions of slip alone have moved. None where others are.
-
-        The rows of `at` leave r = rhs - P f - Q y; the kept P, Q and the equilibrium give the step
-        that takes it away, P' df + Q' (y + dy) = r + Q' y with C df - B ds = dy.
         """
-        kept, (n, c) = self._serving(step, rows), (self.n, self.c)
-        if kept is None:
+        kept = self._serving(step, rows)
+        if kept is None or at.f.reshape(self.c, self.n)[:, rows.is_open].any():
             return None
-        if at.f.reshape(c, n)[:, rows.is_open].any():
-            return None
-        y = self._misfit(step, at)
-        by_node, forces = y.reshape(c, n), at.f.reshape(c, n)
-        left = rows.rhs - np.einsum("nij,jn->ni", rows.P, forces)
-        left += np.einsum("nij,jn->ni", kept.rows.Q - rows.Q, by_node)
-        missing = None if step.load is None else step.load - self.B.T @ at.f
-        still = np.zeros_like(at.s) if step.load is None else None
-        df, ds, new = kept.solve(left.T.ravel(), AskedStep(-y, missing, still))
-        return Iterate(at.f + df, at.s + ds, new)
+        left, missing = self._left(step, at, rows)
+        still = np.zeros_like(at.s) if missing is None else None
+        df, ds, dy = kept.solve(left.T.ravel(), AskedStep(np.zeros_like(at.f), missing, still))
+        return Iterate(at.f + df, at.s + ds, self._misfit(step, at) + dy)
+
+    def _left(
+        self, step: AskedStep, at: Iterate, rows: NewtonRows
+    ) -> tuple[FloatArray, FloatArray | None]:
+        """What an iterate leaves of the rows, (n, c), and of the load."""
+        f, y = (v.reshape(self.c, self.n) for v in (at.f, self._misfit(step, at)))
+        left = rows.rhs - np.einsum("nij,jn->ni", rows.P, f)
+        left -= np.einsum("nij,jn->ni", rows.Q, y)
+        return left, None if step.load is None else step.load - self.B.T @ at.f
 
     # -- linear algebra ----------------------------------------------------------------------------
 

@@ -112,6 +112,27 @@ class CoupledContact(Shown):
             assert path is not None
             return _march(self._solver, self._gap, path, self.history, True)
 
+    def friction_loss(self, before: CoupledHistory) -> FloatArray:
+        """Work that friction took in each step.
+
+        By the mean tractions of a step over its slips: the work of all forces balances with it;
+        the traction after the step alone is off by the step's share.
+
+        Parameters
+        ----------
+        before : CoupledHistory
+            State before the first step.
+
+        Returns
+        -------
+        (k,) ndarray
+            N mm.
+        """
+        tractions = np.concatenate((before.force[None, :, 1:], self.force[..., 1:]))
+        slips = np.concatenate((before.slip[None], self.slip))
+        mean = 0.5 * (tractions[1:] + tractions[:-1])
+        return np.asarray((mean * np.diff(slips, axis=0)).sum(axis=(1, 2)))
+
     def fork(self) -> CoupledContact:
         """The same answers, to `go_on` from beside these: in another thread, for another history.
 

@@ -221,13 +221,13 @@ class ClosedSystem:
         return self.q**3 / 3.0 > _PASS * len(self.of.C) ** 2 + _CALLS
 
     def turned(self, right: FloatArray) -> FloatArray:
-        """Q of the closed rows (q, columns), in place."""
+        """Q of the closed rows (q,) or (q, columns), in place."""
         old = [right[at] for at in self.place]
         for j in range(self.of.first, self.of.c):
             row = np.zeros_like(old[j])
             for i in range(self.of.c):
                 if self.Q[:, j, i].any():
-                    row += self.Q[:, j, i, None] * old[i]
+                    row += (self.Q[:, j, i] * old[i].T).T
             right[self.place[j]] = row
         return right
 
@@ -267,12 +267,10 @@ class ClosedSystem:
     def _asked(self, rhs: FloatArray, target: AskedStep) -> FloatArray:
         """Right-hand sides (q,) of the closed rows: Q (b + B s) + rhs."""
         known = target.b if target.motion is None else target.b + self.of.B @ target.motion
-        right = known[self.dofs]
-        old = [right[at].copy() for at in self.place]
+        right = self.turned(known[self.dofs])
         for j in range(self.of.first, self.of.c):
-            value = sum((self.Q[:, j, i] * old[i].T).T for i in range(self.of.c))
-            right[self.place[j]] = value + rhs[j * self.of.n + self.nodes[self.slips]]
-        return np.asarray(right)
+            right[self.place[j]] += rhs[j * self.of.n + self.nodes[self.slips]]
+        return right
 
     def _step(self, right: FloatArray, target: AskedStep) -> tuple[FloatArray, FloatArray]:
         q = self.q

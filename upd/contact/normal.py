@@ -171,10 +171,8 @@ def normal_curve(
     with few_threads(gap):
         problems = Problems("normal curve")
         solver = _NormalSolver(problems, compliance, gap)
-        values = numbers(problems, "loads", np.asarray(loads))
-        if values is not None and not problems.add(
-            values.ndim != 1, f"loads has shape {values.shape}: it must be one-dimensional."
-        ):
+        values = numbers(problems, "loads", loads, ("k",), (0,))
+        if values is not None:
             one_load(problems, "load", float(values.min(initial=0.0)))
         problems.raise_any()
         assert values is not None

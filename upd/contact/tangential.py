@@ -376,16 +376,14 @@ class _TangentialSolver:
         Problems are noted for a wrong shape and for gross slip.
         """
         names = ("loads", "displacements") if steps else ("load", "displacement")
-        found = one_of(problems, **dict(zip(names, (load, displacement), strict=True)))
+        one: tuple[int, ...] = () if self.directions == 1 else (2,)
+        shapes = [("k", *one), (0, *one)] if steps else [one]
+        given = dict(zip(names, (load, displacement), strict=True))
+        found = one_of(problems, *shapes, **given)
         if found is None:
             return np.zeros(0)
         name, values = found
-        shape: tuple[int, ...] = () if self.directions == 1 else (2,)
-        wanted = f"{'k, ' if steps else ''}{'2' if self.directions == 2 else ''}".rstrip(", ")
-        wrong = values.shape[1:] != shape or values.ndim == 0 if steps else values.shape != shape
-        kind = "directions" if self.directions == 2 else "direction"
-        message = f"{name} has shape {values.shape}: {self.directions} {kind} need ({wanted})."
-        if problems.add(wrong, message) or load is None or problems.found:
+        if load is None or problems.found:
             return values
         size = np.atleast_1d(
             np.abs(values) if self.directions == 1 else np.hypot(values[..., 0], values[..., 1])

@@ -166,7 +166,13 @@ def tilted_contact(
                 "no moment.",
             )
             problems.raise_any()
-            return _unloaded(h)
+            approach, none = float(h.min()), np.zeros(2)
+            message = (
+                "The load is zero: the bodies touch without force and without tilt at the smallest "
+                f"gap, approach {approach:g} mm."
+            )
+            normal = apart(h, approach, "no load", message)
+            return TiltedContact(normal, none, none, "no load", message, np.zeros((3, 3)))
         face = _supporting_face(problems, sides, T, M / F, tilts)
         problems.raise_any()
         return _solve(C, h, T, F, M, mask, face, sum(free))
@@ -231,16 +237,6 @@ def _supporting_face(
         return _Face(nodes, np.zeros((2, 0)), tilts)
     normal = sides[0, :2]
     return _Face(nodes, np.array([[-normal[1]], [normal[0]]]), normal[:, None])
-
-
-def _unloaded(h: FloatArray) -> TiltedContact:
-    approach = float(h.min())
-    message = (
-        "The load is zero: the bodies touch without force and without tilt at the smallest "
-        f"gap, approach {approach:g} mm."
-    )
-    normal = apart(h, approach, "no load", message)
-    return TiltedContact(normal, np.zeros(2), np.zeros(2), "no load", message, np.zeros((3, 3)))
 
 
 def _solve(

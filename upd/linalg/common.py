@@ -42,8 +42,6 @@ class Condensation(Shown):
         u_b (k,) or (k, m) -> u (n,) or (n, m) with u_i = -K_ii^-1 K_ib u_b.
     solver : str
         Name of the solver that ran.
-    seconds : float
-        Wall time.
     factor_nnz : int
         Non-zeros of one triangle of the factor.
     peak_bytes : int
@@ -53,7 +51,6 @@ class Condensation(Shown):
     S: FloatArray
     recover: Solve
     solver: str
-    seconds: float
     factor_nnz: int
     peak_bytes: int
 
@@ -68,8 +65,6 @@ class Factor:
         Right-hand sides (n,) or (n, m) -> K^-1 rhs of the same shape.
     solver : str
         Name of the solver that ran.
-    seconds : float
-        Wall time.
     factor_nnz : int
         Non-zeros of one triangle of the factor.
     peak_bytes : int
@@ -78,7 +73,6 @@ class Factor:
 
     solve: Solve
     solver: str
-    seconds: float
     factor_nnz: int
     peak_bytes: int
 

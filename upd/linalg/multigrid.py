@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -228,7 +227,6 @@ class MultigridSolver:
         points: ArrayLike | None = None,
         max_iterations: int = MAX_ITERATIONS,
     ) -> None:
-        begin = perf_counter()
         n = K.shape[0]
         self._K = K
         modes = None
@@ -244,7 +242,6 @@ class MultigridSolver:
         self._cycle = hierarchy(blocks, B, at)
         self._max_iterations = max_iterations
         self._lowest = UNSEEN
-        self.seconds = perf_counter() - begin
         log.info("multigrid of %d dofs: levels %s", n, self._cycle.sizes)
 
     def _product(self, x: FloatArray) -> FloatArray:

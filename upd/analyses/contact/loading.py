@@ -72,11 +72,8 @@ def tangential_compliance(
     of one.
     """
     pick = np.ix_(loaded, loaded)
-
-    def one(i: int, j: int) -> Array:
-        return (model.compliance(i, j) if body is None else model.body_compliance(body, i, j))[pick]
-
-    return np.block([[one(i, j) for j in components] for i in components])
+    rows = [[model.compliance(i, j, body)[pick] for j in components] for i in components]
+    return np.block(rows)
 
 
 # -- tangential force over displacement ------------------------------------------------------------
@@ -293,7 +290,7 @@ def pressed_by(model: ContactModel, body: Body, force: Array) -> float:
     """
     f = force[:, 0]
     moved = sum(
-        (model.body_compliance(body, NORMAL, c) @ force[:, k] for k, c in enumerate(COMPONENTS)),
+        (model.compliance(NORMAL, c, body) @ force[:, k] for k, c in enumerate(COMPONENTS)),
         np.zeros(len(f)),
     )
     return float(f @ moved) / float(f.sum())
@@ -377,9 +374,5 @@ def coupled_loop(
     shares, quarter = np.concatenate([shares, shares[quarter:]]), len(shares)
     found = base.found.go_on(load=_loads(base, peak * shares, unit))
     d = np.insert((found.displacement[:, 1:3] - base.motion[1:3]) @ unit, 0, 0.0)
-    shear = np.concatenate([base.force[None, :, 1:], found.force[..., 1:]])
-    slip = np.concatenate([base.found.slip[-1:], found.slip])
-    mean = 0.5 * (shear[1:] + shear[:-1])
-    work = (mean * np.diff(slip, axis=0)).sum(axis=(1, 2))
-    T = np.insert(peak * shares, 0, 0.0)
-    return closed_loop(case, normal, T, d, float(work[quarter:].sum()), quarter)
+    work = float(found.friction_loss(base.found.history)[quarter:].sum())
+    return closed_loop(case, normal, np.insert(peak * shares, 0, 0.0), d, work, quarter)

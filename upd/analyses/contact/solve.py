@@ -147,7 +147,7 @@ def press(
         show_normal(model, loads)
 
     def compliance() -> Array:
-        return model.compliance(NORMAL) if body is None else model.body_compliance(body, NORMAL)
+        return model.compliance(NORMAL, body=body)
 
     if arms.size:
         found, free = [], (0 not in plan.mirrors, 1 not in plan.mirrors)
