@@ -154,8 +154,10 @@ def node_mask(problems: Problems, start: ArrayLike | None, n: int) -> BoolArray 
     return mask
 
 
-def compliance_matrix(problems: Problems, values: ArrayLike) -> FloatArray | None:
-    """Symmetric part of a compliance that is square, symmetric and positive on the diagonal.
+def compliance_matrix(
+    problems: Problems, values: ArrayLike
+) -> tuple[FloatArray | None, FloatArray | None]:
+    """A compliance that is square, symmetric and positive definite, and its factor.
 
     Parameters
     ----------
@@ -166,17 +168,20 @@ def compliance_matrix(problems: Problems, values: ArrayLike) -> FloatArray | Non
 
     Returns
     -------
-    (n, n) ndarray or None
-        (C + C') / 2; None when a problem was noted.
+    C : (n, n) ndarray or None
+        Its symmetric part; None when a problem was noted.
+    L : (n, n) ndarray or None
+        Lower triangle of C = L L', what is above it is not used; None where C is not positive
+        definite to working precision.
     """
     C = numbers(problems, "compliance", values)
     if C is None:
-        return None
+        return None, None
     if problems.add(
         C.ndim != 2 or C.shape[0] != C.shape[-1] or C.size == 0,
         f"compliance has shape {C.shape}: it must be (n, n), n >= 1.",
     ):
-        return None
+        return None, None
     scale = float(np.abs(C).max())
     skew = float(np.abs(C - C.T).max())
     # Rounding of a condensation leaves far less than half the digits; more than that is a mistake
@@ -187,7 +192,7 @@ def compliance_matrix(problems: Problems, values: ArrayLike) -> FloatArray | Non
         f"{skew / scale if scale else 0.0:.1e} of max |C|): "
         "check the dof order and that both bodies use the same nodes.",
     ):
-        return None
+        return None, None
     dead = np.flatnonzero(np.diagonal(C) <= 0)
     if problems.add(
         dead.size > 0,
@@ -195,37 +200,20 @@ def compliance_matrix(problems: Problems, values: ArrayLike) -> FloatArray | Non
         f"first at row {dead[0] if dead.size else 0}. "
         "Drop dofs fixed by symmetry and check the sign.",
     ):
-        return None
-    return np.asarray((C + C.T) / 2)
-
-
-def proven_factor(problems: Problems, C: FloatArray) -> FloatArray | None:
-    """L of C = L L', which also proves C positive definite.
-
-    Parameters
-    ----------
-    problems : Problems
-        Receives the message when C is not positive definite to working precision.
-    C : (n, n) ndarray
-        Compliance [mm/N], as `compliance_matrix` returns it.
-
-    Returns
-    -------
-    (n, n) ndarray or None
-        Lower triangle, what is above it is not used; None when a problem was noted.
-    """
+        return None, None
+    C = np.asarray((C + C.T) / 2)
     remedy = "Hold the bodies (no rigid motion) and merge coincident contact nodes."
     message = f"compliance is not positive definite to working precision: {{}}. {remedy}"
     L, info = lapack.dpotrf(C.T, lower=1, clean=0)
     if problems.add(
         info != 0, message.format(f"its Cholesky factorisation breaks down at row {info - 1}")
     ):
-        return None
+        return C, None
     pivot = np.diagonal(L) ** 2 / np.diagonal(C)
     worst = int(np.argmin(pivot))
     if problems.add(
         bool(pivot[worst] <= len(C) * EPS),
         message.format(f"row {worst} depends on the rows before it"),
     ):
-        return None
-    return np.asarray(L)
+        return C, None
+    return C, np.asarray(L)

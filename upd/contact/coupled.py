@@ -13,7 +13,6 @@ from upd.contact.checks import (
     few_threads,
     numbers,
     one_of,
-    proven_factor,
 )
 from upd.contact.coulomb import Coulomb
 from upd.contact.coulomb_conditions import CoupledStep, Iterate, carries
@@ -110,7 +109,8 @@ class CoupledContact(Shown):
             path = _path(problems, self._solver, load, displacement, offset)
             problems.raise_any()
             assert path is not None
-            return _march(self._solver, self._gap, path, self.history, True)
+            march = LoadSteps(self._solver, self._gap, load is not None)
+            return _march(march, path, self.history, True)
 
     def friction_loss(self, before: CoupledHistory) -> FloatArray:
         """Work that friction took in each step.
@@ -241,17 +241,8 @@ def coupled_contact(
         path = _path(problems, solver, load, displacement, offset)
         problems.raise_any()
         assert solver is not None and path is not None
-        at = _start(solver, h, history)
-        return _march(solver, h, path, at, history is not None)
-
-
-@dataclass(frozen=True)
-class _Path:
-    """Load or displacement (k, r) and offset (k, c n) after each step."""
-
-    values: FloatArray
-    offsets: FloatArray
-    by_load: bool
+        march = LoadSteps(solver, h, load is not None)
+        return _march(march, path, _start(solver, h, history), history is not None)
 
 
 def _solver(
@@ -261,10 +252,9 @@ def _solver(
     friction: ArrayLike,
     columns: ArrayLike | None,
 ) -> tuple[Coulomb | None, FloatArray]:
-    C = compliance_matrix(problems, compliance)
+    C, L = compliance_matrix(problems, compliance)
     h = numbers(problems, "gap", gap, ("n",))
     mu = numbers(problems, "friction", friction, (), ("n" if h is None else h.size,))
-    L = None if C is None else proven_factor(problems, C)
     if h is None or mu is None or C is None:
         return None, np.zeros(0)
     n = h.size
@@ -296,7 +286,8 @@ def _path(
     load: ArrayLike | None,
     displacement: ArrayLike | None,
     offset: ArrayLike | None,
-) -> _Path | None:
+) -> tuple[FloatArray, FloatArray] | None:
+    """Load or displacement (k, r) and offset (k, c n) after each step."""
     r, m = ("r", "c n") if solver is None else (solver.B.shape[1], len(solver.C))
     found = one_of(problems, (r,), ("k", r), load=load, displacement=displacement)
     given = None if offset is None else numbers(problems, "offset", offset, (m,), ("k", m))
@@ -310,10 +301,9 @@ def _path(
     ):
         return None
     steps = max(len(np.atleast_2d(values)), len(np.atleast_2d(offsets)))
-    return _Path(
+    return (
         np.broadcast_to(values, (steps, values.shape[-1])),
         np.broadcast_to(offsets, (steps, offsets.shape[-1])),
-        load is not None,
     )
 
 
@@ -337,26 +327,23 @@ def _start(solver: Coulomb, h: FloatArray, history: CoupledHistory | None) -> Co
 
 
 def _march(
-    solver: Coulomb, h: FloatArray, path: _Path, history: CoupledHistory, warm: bool
+    march: LoadSteps, path: tuple[FloatArray, FloatArray], history: CoupledHistory, warm: bool
 ) -> CoupledContact:
-    march = LoadSteps(solver, h, path.by_load)
-    solved: list[SolvedStep] = []
-    at = Reached(history, offset_of(solver, h, history), history.load, warm)
-    for number, (value, offset) in enumerate(zip(path.values, path.offsets, strict=True)):
+    solver, solved = march.solver, list[SolvedStep]()
+    at = Reached(history, offset_of(solver, march.h, history), history.load, warm)
+    for number, (value, offset) in enumerate(zip(*path, strict=True)):
         one = march.step(at, value, offset)
-        if path.by_load and not one.answer.converged:
+        if march.by_load and not one.answer.converged:
             raise ConvergenceError(_not_carried(solver, value, number, one.answer))
         solved.append(one)
         at = one.reached
-    return _collected(solver, h, path, solved)
+    return _collected(march, solved)
 
 
-def _collected(
-    solver: Coulomb, h: FloatArray, path: _Path, solved: list[SolvedStep]
-) -> CoupledContact:
+def _collected(march: LoadSteps, solved: list[SolvedStep]) -> CoupledContact:
     answers, after = [one.answer for one in solved], [one.reached.history for one in solved]
     bad = [k for k, a in enumerate(answers) if not a.converged]
-    locking = solver.holds_itself
+    locking = march.solver.holds_itself
     message = f"{len(after)} load steps solved."
     if bad:
         message = (
@@ -384,9 +371,9 @@ def _collected(
         status="not converged" if bad else "converged",
         message=message,
         history=after[-1],
-        _solver=solver,
+        _solver=march.solver,
         _last=answers[-1].at,
-        _gap=h,
+        _gap=march.h,
     )
 
 

@@ -25,7 +25,6 @@ _FORMAT: dict[str, tuple[tuple[str, ...], str]] = {
     "k_t": (("contact_point", "tangent"), "N/mm"),
     "preload": (("contact_point",), "N"),
     "area": (("contact_point",), "mm2"),
-    "source_tilt": (("tangent",), "N mm"),
 }
 _PREFIX = "law_"
 
@@ -50,8 +49,6 @@ class ContactLaw(Shown):
         Normal forces [N].
     area : (m,) ndarray
         Areas [mm2].
-    source_tilt : (2,) ndarray
-        Tilt stiffness of the nodal field the points came from [N mm], see `tilt_stiffness`.
 
     Examples
     --------
@@ -66,8 +63,6 @@ class ContactLaw(Shown):
     ... )
     >>> law.n_point
     2
-    >>> law.tilt_stiffness().tolist()
-    [200.0, 0.0]
     >>> placed = law.placed(origin=[10.0, 0.0, 0.0], axes=[[0, 1, 0], [0, 0, 1], [1, 0, 0]])
     >>> placed.position.tolist()
     [[10.0, -1.0, 0.0], [10.0, 1.0, 0.0]]
@@ -82,45 +77,11 @@ class ContactLaw(Shown):
     k_t: FloatArray
     preload: FloatArray
     area: FloatArray
-    source_tilt: FloatArray
 
     @property
     def n_point(self) -> int:
         """Number of contact points, m."""
         return len(self.k_n)
-
-    def tilt_stiffness(self) -> FloatArray:
-        """Tilt stiffness of the normal springs about both tangents.
-
-        Sum of k_n x_i^2 over the points, x the distances along each tangent from the centre of k_n;
-        for points of one plane with common tangents.
-
-        Returns
-        -------
-        (2,) ndarray
-            Tilt stiffness per radian [N mm]; 0 without normal stiffness.
-        """
-        along = np.einsum("mj,ij->mi", self.position, self.tangents[0])
-        return _second_moments(along, self.k_n)
-
-    def tilt_error(self) -> FloatArray:
-        """Tilt stiffness of the points relative to that of the nodal field, minus one.
-
-        One row or column has no tilt stiffness of its own (-1), r equal cells on a uniform field
-        lose 1 / r^2.
-
-        Returns
-        -------
-        (2,) ndarray
-            Relative error, <= 0 with weight "stiffness"; 0 where the nodal field has no tilt
-            stiffness.
-        """
-        own = self.tilt_stiffness()
-        return np.where(
-            self.source_tilt > 0.0,
-            own / np.where(self.source_tilt > 0.0, self.source_tilt, 1.0) - 1.0,
-            0.0,
-        )
 
     def placed(self, origin: ArrayLike, axes: ArrayLike) -> ContactLaw:
         """The same points in other axes.
@@ -279,11 +240,6 @@ def contact_points(
     [[0.5, 0.0, 0.0], [2.5, 0.0, 0.0]]
     >>> law.preload.tolist(), law.k_n.tolist()
     ([3.0, 3.0], [200.0, 200.0])
-
-    Two points of four lose a fifth of the tilt stiffness:
-
-    >>> law.tilt_error().round(3).tolist()
-    [-0.2, 0.0]
     """
     problems = Problems("contact points")
     X = numbers(problems, "positions", positions, ("n", 2), ("n", 3))
@@ -315,7 +271,6 @@ def contact_points(
     return ContactLaw(
         normal=normal,
         tangents=tangents,
-        source_tilt=_second_moments(place[:, :2], nodal.k_n),
         **law,
     )
 
@@ -433,11 +388,3 @@ def _centroids(share: FloatArray, x: FloatArray, weights: Sequence[FloatArray]) 
         position[now] = (part[now] / total[now, None]) @ x
         todo &= ~now
     return position
-
-
-def _second_moments(x: FloatArray, weight: FloatArray) -> FloatArray:
-    """(2,) second moments of the weight about its centroid along the columns of x (n, 2)."""
-    total = float(weight.sum())
-    if not total > 0:
-        return np.zeros(2)
-    return np.asarray(weight @ (x - weight @ x / total) ** 2)

@@ -16,7 +16,6 @@ from upd.contact.checks import (
     node_mask,
     numbers,
     one_load,
-    proven_factor,
 )
 from upd.contact.qp import FREE, LOWER, BoxQP, FloatArray, Method, State
 from upd.labels import Shown
@@ -188,10 +187,9 @@ class _NormalSolver:
     """Checked compliance and gap, ready for many loads."""
 
     def __init__(self, problems: Problems, compliance: ArrayLike, gap: ArrayLike) -> None:
-        C = compliance_matrix(problems, compliance)
+        C, self.factor = compliance_matrix(problems, compliance)
         h = numbers(problems, "gap", gap, ("n" if C is None else len(C),))
         if C is not None:
-            self.factor = proven_factor(problems, C)
             self.qp = BoxQP(C)
         self.gap = np.zeros(0) if h is None else h
         self.n = self.gap.size

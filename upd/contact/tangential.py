@@ -15,7 +15,6 @@ from upd.contact.checks import (
     few_threads,
     numbers,
     one_of,
-    proven_factor,
 )
 from upd.contact.coulomb import Coulomb
 from upd.contact.coulomb_conditions import Iterate
@@ -322,11 +321,9 @@ class _TangentialSolver:
     """
 
     def __init__(self, problems: Problems, compliance: ArrayLike, limit: ArrayLike) -> None:
-        C = compliance_matrix(problems, compliance)
+        C, L = compliance_matrix(problems, compliance)
         s = numbers(problems, "limit", limit, ("n",))
         self.directions, self.limit = 1, np.zeros(0)
-        if C is not None:
-            proven_factor(problems, C)
         if s is None:
             return
         self.limit = s
@@ -350,14 +347,15 @@ class _TangentialSolver:
         self.total = float(s.sum())
         self.C = C
         if self.carried.size:
-            inner = C if self.carried.size == s.size else C[np.ix_(self.dofs, self.dofs)]
+            inner = C
+            if self.carried.size < s.size:
+                inner, L = C[np.ix_(self.dofs, self.dofs)], None
             if self.directions == 1:
                 self.box = BoxQP(inner)
             else:
                 n = self.carried.size
                 rigid = np.asarray(np.kron(np.eye(2), np.ones((n, 1))), np.float64)
-                mu = np.ones(n)
-                self.disks = Coulomb(np.asarray(inner, np.float64), rigid, mu, pressed=self.bound)
+                self.disks = Coulomb(inner, rigid, np.ones(n), L, self.bound)
 
     @property
     def n(self) -> int:

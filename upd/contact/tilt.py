@@ -23,7 +23,6 @@ from upd.contact.checks import (
     node_mask,
     numbers,
     one_load,
-    proven_factor,
 )
 from upd.contact.normal import NormalContact, apart
 from upd.contact.qp import FREE, HALF_THE_DIGITS, LOWER, BoxQP, FloatArray
@@ -140,14 +139,11 @@ def tilted_contact(
     """
     with few_threads(gap):
         problems = Problems("contact with tilt")
-        C = compliance_matrix(problems, compliance)
+        C, _ = compliance_matrix(problems, compliance)
         n = "n" if C is None else len(C)
         h, T = numbers(problems, "gap", gap, (n,)), numbers(problems, "arms", arms, (n, 2))
         F, M = one_load(problems, "load", load), numbers(problems, "moment", moment, (2,))
-        given = None
-        if C is not None:
-            proven_factor(problems, C)
-            given = node_mask(problems, start, len(C))
+        given = None if C is None else node_mask(problems, start, len(C))
         problems.raise_any()
         assert C is not None and h is not None and T is not None and M is not None
         mask = np.ones(len(C), dtype=bool) if given is None or not given.any() else given

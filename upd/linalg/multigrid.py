@@ -285,8 +285,8 @@ class MultigridSolver:
             ]
         return found
 
-    def __call__(self, rhs: FloatArray, accuracy: float, start: FloatArray | None = None) -> Solved:
-        """K^-1 rhs to a relative error in energy, from ``start``.
+    def __call__(self, rhs: FloatArray, accuracy: float) -> Solved:
+        """K^-1 rhs to a relative error in energy.
 
         Raises ConvergenceError where it is not reached.
         """
@@ -297,7 +297,6 @@ class MultigridSolver:
             accuracy=accuracy,
             max_iterations=self._max_iterations,
             lowest=self._lowest,
-            start=start,
         )
         self._lowest = found.lowest
         return Solved(found.x, float(found.error), found.iterations)

@@ -42,7 +42,7 @@ def _lu(A: csr_array, numbers: IntArray) -> SuperLU:
     Raises ConvergenceError.
     """
     try:
-        lu = _symmetric(A)
+        lu = symmetric_lu(A)
     except MemoryError as error:
         raise ConvergenceError(
             f"SuperLU: not enough memory for {A.shape[0]} dofs: use solver 'pardiso' or 'amg'."
@@ -59,8 +59,22 @@ def _lu(A: csr_array, numbers: IntArray) -> SuperLU:
     return lu
 
 
-def _symmetric(A: csr_array) -> SuperLU:
-    """Factor with the diagonal as pivots. Raises RuntimeError or MemoryError."""
+def symmetric_lu(A: csr_array) -> SuperLU:
+    """Factor of a real symmetric or Hermitian matrix with the diagonal as pivots.
+
+    Parameters
+    ----------
+    A : (n, n) csr_array
+
+    Returns
+    -------
+    SuperLU
+
+    Raises
+    ------
+    RuntimeError, MemoryError
+        As SciPy's.
+    """
     C = csc_array(A)
     C.indices, C.indptr = C.indices.astype(np.int32), C.indptr.astype(np.int32)
     with warnings.catch_warnings():
@@ -87,7 +101,7 @@ def signed_superlu(A: Matrix) -> SignedFactor | None:
         None when rows were exchanged, a pivot vanished, or memory ran out.
     """
     try:
-        lu = _symmetric(whole(A))
+        lu = symmetric_lu(whole(A))
     except (RuntimeError, MemoryError):
         return None
     D = lu.U.diagonal()
