@@ -5,8 +5,8 @@ import pytest
 
 from upd.contact.bordered import Bordered
 from upd.contact.coulomb import Coulomb
-from upd.contact.coulomb_conditions import Iterate
-from upd.contact.coupled_systems import AskedStep, ClosedSystem, Stuck
+from upd.contact.coulomb_conditions import AskedStep, Iterate
+from upd.contact.coupled_systems import ClosedSystem, Stuck
 
 
 def contact(seed: int, c: int) -> tuple[Coulomb, np.random.Generator]:
@@ -39,7 +39,7 @@ def test_the_closed_system_solves_the_rows(seed: int, c: int, by_load: bool) -> 
             None if by_load else np.add.outer(s, np.zeros(columns)),
         )
         rhs = np.add.outer(rows.rhs.T.ravel(), np.zeros(columns))
-        system = ClosedSystem(solver.systems, rows, by_load)
+        system = ClosedSystem(solver, rows, by_load)
         solved = (system.solve,) if columns else (system.solve, system.refined)
         for f, motion, y in (way(rhs, target) for way in solved):
             size = np.abs(f).max()
@@ -84,7 +84,7 @@ def test_a_factor_with_a_border_solves_other_rows(seed: int, c: int, by_load: bo
     opened = before.is_open != rows.is_open
     assert np.flatnonzero(opened).tolist() == [0, 20]
     assert (before.relaxed != rows.relaxed).any(axis=1)[[0, 6, 20, 21]].all()
-    bordered = Bordered(ClosedSystem(solver.systems, before, by_load))
+    bordered = Bordered(ClosedSystem(solver, before, by_load))
     assert bordered.changed(rows) == 2 * c + 2 * (c - 1)
     rho = np.column_stack((solver.rho_n, *[solver.rho_t] * (c - 1)))
     weight = np.where(rows.relaxed, 1.0, rho)
@@ -113,7 +113,7 @@ def test_everything_stuck(by_load: bool) -> None:
     solver, rng = contact(0, 3)
     b, p = 1e-6 * rng.standard_normal(24), rng.standard_normal(4)
     target = AskedStep(b, p if by_load else None, None if by_load else 1e-6 * p)
-    system = solver.systems.system(solver._stuck(), by_load)
+    system = solver._system(solver._stuck(), by_load)
     assert isinstance(system, Stuck)
     f, s, _ = system.refined(np.zeros(24), target)
     np.testing.assert_allclose(solver.C @ f, solver.B @ s + b, atol=1e-12 * solver.C.max())
@@ -129,11 +129,11 @@ def test_what_carries_nothing_is_refused() -> None:
     rows = solver._rows(Iterate(f, np.zeros(4), np.zeros(24)))
     assert rows.is_open.sum() == 7
     with pytest.raises(np.linalg.LinAlgError, match="carries the load"):
-        solver.systems.system(rows, True)
+        solver._system(rows, True)
     # two nodes that slip freely cannot hold the shifts either
     free = Coulomb(solver.C, np.kron(np.eye(3), np.ones((8, 1))), np.zeros(8))
     f = np.concatenate((np.ones(8), 1e3 * rng.standard_normal(16)))
     rows = free._rows(Iterate(f, np.zeros(3), np.zeros(24)))
     assert rows.relaxed[:, 1:].all()
     with pytest.raises(np.linalg.LinAlgError):
-        ClosedSystem(free.systems, rows, True)
+        ClosedSystem(free, rows, True)

@@ -388,13 +388,13 @@ EYE, GAP = np.eye(2), np.zeros(2)
         ((-EYE, GAP, {"load": 1.0}), "check the sign"),
         ((np.ones((2, 3)), GAP, {"load": 1.0}), r"shape \(2, 3\): it must be \(n, n\)"),
         ((np.zeros((0, 0)), np.zeros(0), {"load": 1.0}), "n >= 1"),
-        ((EYE, np.zeros(3), {"load": 1.0}), "2 rows and gap 3 values"),
+        ((EYE, np.zeros(3), {"load": 1.0}), r"gap has shape \(3,\): it must be \(2,\)"),
         ((EYE, np.zeros((2, 1)), {"load": 1.0}), r"gap has shape \(2, 1\)"),
         (("stiff", GAP, {"load": 1.0}), "compliance is not an array of numbers"),
         (([[1.0], [1.0, 2.0]], GAP, {"load": 1.0}), "compliance is not an array of numbers"),
         ((EYE, GAP, {"load": 1.0, "start": [1, 0]}), "start must be a bool mask"),
         ((EYE, GAP, {"load": 1.0, "start": [True]}), r"start must be a bool mask of shape \(2,\)"),
-        ((EYE, GAP, {"load": [1.0, 2.0]}), "load must be one number"),
+        ((EYE, GAP, {"load": [1.0, 2.0]}), r"load has shape \(2,\)"),
     ],
 )
 def test_normal_input_faults(arguments: tuple[Any, Any, dict[str, Any]], message: str) -> None:
@@ -414,8 +414,8 @@ def test_normal_input_faults(arguments: tuple[Any, Any, dict[str, Any]], message
         ((EYE, [1.0, -1.0], {"load": 0.5}), "limit is negative at 1 nodes"),
         ((EYE, [1.0, np.nan], {"load": 0.5}), "limit holds 1 values that are NaN"),
         ((EYE, [1.0, 1.0, 1.0], {"load": 0.5}), "2 rows for 3 limits.*x dofs first"),
-        ((EYE, [1.0], {"load": 0.5}), r"load has shape \(\): 2 directions need \(2\)"),
-        ((EYE, [1.0, 1.0], {"load": [0.5, 0.5]}), r"load has shape \(2,\): 1 direction need \(\)"),
+        ((EYE, [1.0], {"load": 0.5}), r"load has shape \(\): it must be \(2,\)"),
+        ((EYE, [1.0, 1.0], {"load": [0.5, 0.5]}), r"load has shape \(2,\): it must be \(\)"),
         ((EYE, [1.0, 1.0], {"displacement": np.nan}), "displacement holds 1 values that are NaN"),
         ((np.array([[1.0, 2.0], [2.0, 1.0]]), [1.0, 1.0], {"load": 0.5}), "not positive definite"),
         (
@@ -448,11 +448,11 @@ def test_all_faults_at_once() -> None:
 
 def test_curve_and_path_shapes() -> None:
     assert normal_curve(EYE, GAP, []) == []
-    with pytest.raises(InputError, match="one-dimensional"):
+    with pytest.raises(InputError, match=r"loads has shape \(2, 2\)"):
         normal_curve(EYE, GAP, np.ones((2, 2)))
     with pytest.raises(InputError, match="cannot pull"):
         normal_curve(EYE, GAP, [1.0, -1.0])
-    with pytest.raises(InputError, match=r"loads has shape \(3,\): 2 directions need \(k, 2\)"):
+    with pytest.raises(InputError, match=r"loads has shape \(3,\): it must be \(k, 2\)"):
         tangential_path(EYE, [1.0], loads=np.zeros(3))
     empty = tangential_path(EYE, [1.0, 1.0], loads=[])
     assert empty.load.shape == (0,) and empty.status == "converged" and not empty.history.slip.any()

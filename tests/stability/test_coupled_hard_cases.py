@@ -256,7 +256,7 @@ def test_histories_of_others_are_refused() -> None:
     wrong: list[tuple[Any, str]] = [
         (found, "history is a CoupledContact"),
         (replace(found.history, slip=np.zeros((3, 2))), "slip has shape"),
-        (replace(found.history, gap=np.array([np.nan, 0.0])), "gap is not finite"),
+        (replace(found.history, gap=np.array([np.nan, 0.0])), "gap holds 1 values that are NaN"),
     ]
     for history, says in wrong:
         with pytest.raises(InputError, match=says):

@@ -10,7 +10,7 @@ from scipy.sparse import bsr_array, csr_array
 
 from upd.fem import Material, box_mesh, rigid_body_modes, stiffness
 from upd.linalg import amg_solve
-from upd.linalg.smoothers import Smoother, find_cross_lines, find_lines, in_line_order
+from upd.linalg.smoothers import Smoother, find_cross_lines, find_lines, in_order
 from upd.linalg.sweeps import WIDTH
 
 
@@ -83,12 +83,11 @@ def test_rows_in_another_order() -> None:
     M *= half + half.T
     A = bsr_array(csr_array(M).tobsr(blocksize=(3, 3)))
     order = rng.permutation(n)
-    pointers, columns, blocks = in_line_order(A.indptr, A.indices, A.data, order)
-    for first, end in pairwise(pointers):
-        assert (np.diff(columns[first:end]) > 0).all()
+    found = in_order(A, order, order)
+    for first, end in pairwise(found.indptr):
+        assert (np.diff(found.indices[first:end]) > 0).all()
     dofs = (3 * order[:, None] + np.arange(3)).ravel()
-    found = bsr_array((blocks, columns, pointers), shape=M.shape).toarray()
-    np.testing.assert_array_equal(found, M[np.ix_(dofs, dofs)].astype(np.float32))
+    np.testing.assert_array_equal(found.toarray(), M[np.ix_(dofs, dofs)].astype(np.float32))
 
 
 def test_cross_lines_follow_the_other_long_edges() -> None:

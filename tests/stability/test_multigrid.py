@@ -194,17 +194,6 @@ def test_conjugate_gradients_tell_why_they_stop() -> None:
         run(np.where(np.arange(400) == 7, -1.0, 1.0 + 1e-13 * d))
 
 
-def test_a_start_is_taken_up() -> None:
-    K, modes, free = clamped()
-    solver = MultigridSolver(K, modes, layout=free)
-    rhs = np.random.default_rng(5).standard_normal(K.shape[0])
-    first = solver(rhs, 1e-4)
-    again = solver(rhs, 1e-9, first.x)
-    cold = solver(rhs, 1e-9)
-    assert again.iterations < cold.iterations
-    assert np.abs(again.x - cold.x).max() < 1e-8 * np.abs(cold.x).max()
-
-
 def test_a_block_gives_what_its_columns_give() -> None:
     """Dependent columns, a column of zeros, sizes twelve powers of ten apart, more than a block."""
     K, modes, free = clamped(aspect=3.0)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack, lu_factor, lu_solve
 
 from upd.contact.checks import EPS
-from upd.contact.coupled_systems import ClosedSystem, NewtonRows
+from upd.contact.coulomb_conditions import NewtonRows
+from upd.contact.coupled_systems import ClosedSystem
 from upd.linalg.gmres import gmres
 
 FloatArray = NDArray[np.float64]

@@ -52,8 +52,10 @@ class Problems:
             raise InputError(f"{self.where}: " + " | ".join(self.found))
 
 
-def numbers(problems: Problems, name: str, values: ArrayLike) -> FloatArray | None:
-    """Float copy of an array, if it holds finite numbers.
+def numbers(
+    problems: Problems, name: str, values: ArrayLike, *shapes: tuple[int | str, ...]
+) -> FloatArray | None:
+    """Float copy of an array, if it holds finite numbers and has one of the shapes.
 
     Parameters
     ----------
@@ -62,7 +64,8 @@ def numbers(problems: Problems, name: str, values: ArrayLike) -> FloatArray | No
     name : str
         Name of the array in the message.
     values : array_like
-        Any shape.
+    shapes : tuple of int or str
+        Allowed shapes; a name stands for any number from 1 on. None given: any shape.
 
     Returns
     -------
@@ -80,16 +83,31 @@ def numbers(problems: Problems, name: str, values: ArrayLike) -> FloatArray | No
         f"{name} holds {bad} values that are NaN or infinite: correct the step that made them.",
     ):
         return None
+    wanted = " or ".join(str(shape).replace("'", "") for shape in shapes)
+    fits = not shapes or any(
+        len(shape) == array.ndim
+        and all(
+            have == n or (have > 0 and isinstance(n, str))
+            for n, have in zip(shape, array.shape, strict=False)
+        )
+        for shape in shapes
+    )
+    if problems.add(not fits, f"{name} has shape {array.shape}: it must be {wanted}."):
+        return None
     return array
 
 
-def one_of(problems: Problems, **given: ArrayLike | None) -> tuple[str, FloatArray] | None:
+def one_of(
+    problems: Problems, *shapes: tuple[int | str, ...], **given: ArrayLike | None
+) -> tuple[str, FloatArray] | None:
     """Name and numbers of the one argument of two that is not None.
 
     Parameters
     ----------
     problems : Problems
         Receives the message when both or none are given, or what is given is no numbers.
+    shapes
+        As for `numbers`.
     given
         Both arguments by their names.
     """
@@ -98,16 +116,14 @@ def one_of(problems: Problems, **given: ArrayLike | None) -> tuple[str, FloatArr
         return None
     value = given[names[0]]
     assert value is not None
-    values = numbers(problems, names[0], value)
+    values = numbers(problems, names[0], value, *shapes)
     return None if values is None else (names[0], values)
 
 
 def one_load(problems: Problems, name: str, value: float | None) -> float:
     """One number, of a load not below zero; 0 for None and where a problem was noted."""
-    array = numbers(problems, name, np.asarray(0.0 if value is None else value))
-    if array is None or problems.add(
-        array.size != 1, f"{name} must be one number, it has {array.size} values."
-    ):
+    array = numbers(problems, name, 0.0 if value is None else value, (), (1,))
+    if array is None:
         return 0.0
     number = float(array.reshape(()))
     problems.add(
@@ -138,8 +154,10 @@ def node_mask(problems: Problems, start: ArrayLike | None, n: int) -> BoolArray 
     return mask
 
 
-def compliance_matrix(problems: Problems, values: ArrayLike) -> FloatArray | None:
-    """Symmetric part of a compliance that is square, symmetric and positive on the diagonal.
+def compliance_matrix(
+    problems: Problems, values: ArrayLike
+) -> tuple[FloatArray | None, FloatArray | None]:
+    """A compliance that is square, symmetric and positive definite, and its factor.
 
     Parameters
     ----------
@@ -150,17 +168,20 @@ def compliance_matrix(problems: Problems, values: ArrayLike) -> FloatArray | Non
 
     Returns
     -------
-    (n, n) ndarray or None
-        (C + C') / 2; None when a problem was noted.
+    C : (n, n) ndarray or None
+        Its symmetric part; None when a problem was noted.
+    L : (n, n) ndarray or None
+        Lower triangle of C = L L', what is above it is not used; None where C is not positive
+        definite to working precision.
     """
     C = numbers(problems, "compliance", values)
     if C is None:
-        return None
+        return None, None
     if problems.add(
         C.ndim != 2 or C.shape[0] != C.shape[-1] or C.size == 0,
         f"compliance has shape {C.shape}: it must be (n, n), n >= 1.",
     ):
-        return None
+        return None, None
     scale = float(np.abs(C).max())
     skew = float(np.abs(C - C.T).max())
     # Rounding of a condensation leaves far less than half the digits; more than that is a mistake
@@ -171,7 +192,7 @@ def compliance_matrix(problems: Problems, values: ArrayLike) -> FloatArray | Non
         f"{skew / scale if scale else 0.0:.1e} of max |C|): "
         "check the dof order and that both bodies use the same nodes.",
     ):
-        return None
+        return None, None
     dead = np.flatnonzero(np.diagonal(C) <= 0)
     if problems.add(
         dead.size > 0,
@@ -179,58 +200,20 @@ def compliance_matrix(problems: Problems, values: ArrayLike) -> FloatArray | Non
         f"first at row {dead[0] if dead.size else 0}. "
         "Drop dofs fixed by symmetry and check the sign.",
     ):
-        return None
-    return np.asarray((C + C.T) / 2)
-
-
-def proven_factor(problems: Problems, C: FloatArray) -> FloatArray | None:
-    """L of C = L L', which also proves C positive definite.
-
-    Parameters
-    ----------
-    problems : Problems
-        Receives the message when C is not positive definite to working precision.
-    C : (n, n) ndarray
-        Compliance [mm/N], as `compliance_matrix` returns it.
-
-    Returns
-    -------
-    (n, n) ndarray or None
-        Lower triangle, what is above it is not used; None when a problem was noted.
-    """
+        return None, None
+    C = np.asarray((C + C.T) / 2)
     remedy = "Hold the bodies (no rigid motion) and merge coincident contact nodes."
     message = f"compliance is not positive definite to working precision: {{}}. {remedy}"
     L, info = lapack.dpotrf(C.T, lower=1, clean=0)
     if problems.add(
         info != 0, message.format(f"its Cholesky factorisation breaks down at row {info - 1}")
     ):
-        return None
+        return C, None
     pivot = np.diagonal(L) ** 2 / np.diagonal(C)
     worst = int(np.argmin(pivot))
     if problems.add(
         bool(pivot[worst] <= len(C) * EPS),
         message.format(f"row {worst} depends on the rows before it"),
     ):
-        return None
-    return np.asarray(L)
-
-
-def unit_response(problems: Problems, C: FloatArray) -> FloatArray:
-    """Solve C x = e, which also proves C positive definite.
-
-    Parameters
-    ----------
-    problems : Problems
-        Receives the message when C is not positive definite to working precision.
-    C : (n, n) ndarray
-        Compliance [mm/N], as `compliance_matrix` returns it.
-
-    Returns
-    -------
-    (n,) ndarray
-        C^-1 e [N/mm]; ones when a problem was noted.
-    """
-    L = proven_factor(problems, C)
-    if L is None:
-        return np.ones(len(C))
-    return np.asarray(lapack.dpotrs(L, np.ones(len(C)), lower=1)[0])
+        return C, None
+    return C, np.asarray(L)

@@ -38,12 +38,14 @@ from scipy.optimize import linprog
 from upd.contact.bordered import Bordered
 from upd.contact.checks import EPS
 from upd.contact.coulomb_conditions import (
+    AskedStep,
     CoulombConditions,
     CoupledStep,
     FloatArray,
     Iterate,
+    NewtonRows,
 )
-from upd.contact.coupled_systems import AskedStep, ClosedSystem, NewtonRows, NewtonSystem
+from upd.contact.coupled_systems import ClosedSystem, NewtonSystem, Stuck
 from upd.contact.qp import BoxQP
 from upd.errors import ConvergenceError
 
@@ -75,6 +77,7 @@ class Coulomb(CoulombConditions):
 
     def twin(self) -> Coulomb:
         """The same contact with what is kept between iterates of its own: for another thread."""
+        _ = self.carried  # found once for all
         out = copy(self)
         out._forget()
         return out
@@ -140,9 +143,9 @@ class Coulomb(CoulombConditions):
             return replace(best, iterations=used)
         log.info("coupled contact: Newton did not converge in %d steps, the fallback runs", used)
         if not self.mu.any():
-            answer = self._frictionless(step, start, used)
+            answer = self._frictionless(step, start)
             if answer.converged:
-                return replace(answer, method="fallback")
+                return replace(answer, iterations=used + answer.iterations, method="fallback")
         convex = self.pressed is not None and load is not None
         answer = self._by_motion(step) if convex else self._by_multipliers(step, start)
         used += answer.iterations
@@ -174,7 +177,7 @@ class Coulomb(CoulombConditions):
             best = answer if best is None or answer.residual < best.residual else best
             if answer.converged:
                 best = answer
-                if answer.residual <= fine or self.pressed is not None:
+                if answer.residual <= fine:
                     break
             rows = self._rows(at)
             if hold and rows.relaxed.all():
@@ -235,7 +238,7 @@ class Coulomb(CoulombConditions):
 
         Its residual is judged as that of every answer.
         """
-        if start is None or step.load is None or self.pressed is not None:
+        if start is None or step.load is None:
             return None
         before = self.B.T @ start.f
         size = float(before @ before)
@@ -290,13 +293,9 @@ class Coulomb(CoulombConditions):
         )
         if near is None:
             return None
-        forces = at.f.reshape(c, n)
-        if forces[:, rows.is_open & near.rows.is_open].any():
+        if at.f.reshape(c, n)[:, rows.is_open & near.rows.is_open].any():
             return None
-        left = rows.rhs - np.einsum("nij,jn->ni", rows.P, forces)
-        left -= np.einsum("nij,jn->ni", rows.Q, self._misfit(step, at).reshape(c, n))
-        missing = None if step.load is None else step.load - self.B.T @ at.f
-        found = near.step(rows, left, missing, self.rho.T)
+        found = near.step(rows, *self._left(step, at, rows), self.rho.T)
         if found is None:
             return None
         f, s = at.f + found[0], at.s + found[1]
@@ -306,23 +305,23 @@ class Coulomb(CoulombConditions):
     def _chord(self, step: AskedStep, at: Iterate, rows: NewtonRows) -> Iterate | None:
         """A step of Newton with the kept factor, where the same nodes are open, stuck and slipping:
         the directions of slip alone have moved. None where others are.
-
-        The rows of `at` leave r = rhs - P f - Q y; the kept P, Q and the equilibrium give the step
-        that takes it away, P' df + Q' (y + dy) = r + Q' y with C df - B ds = dy.
         """
-        kept, (n, c) = self._serving(step, rows), (self.n, self.c)
-        if kept is None:
+        kept = self._serving(step, rows)
+        if kept is None or at.f.reshape(self.c, self.n)[:, rows.is_open].any():
             return None
-        if at.f.reshape(c, n)[:, rows.is_open].any():
-            return None
-        y = self._misfit(step, at)
-        by_node, forces = y.reshape(c, n), at.f.reshape(c, n)
-        left = rows.rhs - np.einsum("nij,jn->ni", rows.P, forces)
-        left += np.einsum("nij,jn->ni", kept.rows.Q - rows.Q, by_node)
-        missing = None if step.load is None else step.load - self.B.T @ at.f
-        still = np.zeros_like(at.s) if step.load is None else None
-        df, ds, new = kept.solve(left.T.ravel(), AskedStep(-y, missing, still))
-        return Iterate(at.f + df, at.s + ds, new)
+        left, missing = self._left(step, at, rows)
+        still = np.zeros_like(at.s) if missing is None else None
+        df, ds, dy = kept.solve(left.T.ravel(), AskedStep(np.zeros_like(at.f), missing, still))
+        return Iterate(at.f + df, at.s + ds, self._misfit(step, at) + dy)
+
+    def _left(
+        self, step: AskedStep, at: Iterate, rows: NewtonRows
+    ) -> tuple[FloatArray, FloatArray | None]:
+        """What an iterate leaves of the rows, (n, c), and of the load."""
+        f, y = (v.reshape(self.c, self.n) for v in (at.f, self._misfit(step, at)))
+        left = rows.rhs - np.einsum("nij,jn->ni", rows.P, f)
+        left -= np.einsum("nij,jn->ni", rows.Q, y)
+        return left, None if step.load is None else step.load - self.B.T @ at.f
 
     # -- linear algebra ----------------------------------------------------------------------------
 
@@ -333,9 +332,16 @@ class Coulomb(CoulombConditions):
             return None
         return kept if kept.rows.same_states(rows) else None
 
+    def _system(self, rows: NewtonRows, by_load: bool) -> NewtonSystem:
+        """The rows, factored.
+
+        Raises LinAlgError where the states carry no load.
+        """
+        return (ClosedSystem if rows.relaxed.any() else Stuck)(self, rows, by_load)
+
     def _linear(self, step: AskedStep, rows: NewtonRows) -> Iterate:
         """The new iterate: P f + Q (C f - B s - b) = rhs."""
-        self._kept = system = self.systems.system(rows, step.load is not None)
+        self._kept = system = self._system(rows, step.load is not None)
         closed = isinstance(system, ClosedSystem)
         if isinstance(system, ClosedSystem) and system.dear:
             self._bordered = [*self._bordered, Bordered(system)][-KEPT:]
@@ -348,7 +354,7 @@ class Coulomb(CoulombConditions):
         """
         rows, r = self._rows(at), self.B.shape[1]
         zero = np.zeros((len(self.C), r))
-        return self.systems.system(rows, False).solve(zero, AskedStep(zero, None, np.eye(r)))[0]
+        return self._system(rows, False).solve(zero, AskedStep(zero, None, np.eye(r)))[0]
 
     # -- fallback ----------------------------------------------------------------------------------
 
@@ -370,7 +376,7 @@ class Coulomb(CoulombConditions):
         best = self._newton(step, start, 1)
         if step.load is None:
             return best
-        _, A = self.systems.carried
+        _, A = self.carried
         try:
             s, used = best.at.s if start is None else start.s, 0
             at: Iterate | None = None
@@ -390,9 +396,7 @@ class Coulomb(CoulombConditions):
                 s = pulled.motion - soft @ (self.B.T @ at.f)
                 # Fewer nodes than motions may carry the load: then the springs alone end it, for
                 # Newton's system under the load is singular.
-                answer = self._judged(step, Iterate(at.f, s, at.y), 0)
-                if not answer.converged:
-                    answer = self._newton(step, answer.at, NEWTON_STEPS)
+                answer = self._ended(step, Iterate(at.f, s, at.y))
                 used += answer.iterations
                 best = answer if answer.residual < best.residual else best
                 if answer.converged or not inner.converged:
@@ -420,7 +424,7 @@ class Coulomb(CoulombConditions):
             own = at.f @ (0.5 * (at.y + self.B @ at.s - step.b))
             return float(at.s @ (self.B.T @ at.f - p) - own)
 
-        at = self.solve(step.b, motion=self.systems.carried[1] @ p).at
+        at = self.solve(step.b, motion=self.carried[1] @ p).at
         for used in range(1, MOTION_STEPS + 1):
             missing = p - self.B.T @ at.f
             K = self.B.T @ self.derivative(at)
@@ -438,7 +442,7 @@ class Coulomb(CoulombConditions):
                 break
         return answer
 
-    def _frictionless(self, step: AskedStep, start: Iterate | None, used: int) -> CoupledStep:
+    def _frictionless(self, step: AskedStep, start: Iterate | None) -> CoupledStep:
         """Without friction the forces are the one answer of a box QP, which is proven to end."""
         n, s = self.n, np.zeros(self.B.shape[1]) if start is None else start.s
         # forces and moments differ by a length; what moves no normal stays as it is
@@ -456,14 +460,17 @@ class Coulomb(CoulombConditions):
             )
         except ConvergenceError:
             # nothing carries the load, or the least squares ran out of steps
-            return self._judged(step, self._linear(step, self._stuck()), used)
+            return self._judged(step, self._linear(step, self._stuck()), 0)
         s = s.copy() if step.motion is None else step.motion
         if step.motion is None:
             s[moved] = found.motion / size[moved]
         forces = np.concatenate((found.x, np.zeros(len(self.C) - n)))
-        at = Iterate(forces, s, self.C @ forces - self.B @ s - step.b)
-        answer = self._judged(step, at, used)
         # Newton removes the rest of rounding, where a motion is not free.
+        return self._ended(step, Iterate(forces, s, self.C @ forces - self.B @ s - step.b))
+
+    def _ended(self, step: AskedStep, at: Iterate) -> CoupledStep:
+        """An iterate that answers, or where Newton leads from it."""
+        answer = self._judged(step, at, 0)
         return answer if answer.converged else self._newton(step, at, NEWTON_STEPS)
 
     def _fallback(self, step: AskedStep) -> CoupledStep:
@@ -496,10 +503,7 @@ class Coulomb(CoulombConditions):
                 v += f - z
             used += batch
             batch = min(2 * batch, FALLBACK_STEPS // 10)
-            at = Iterate(z, s, -sigma * v - self._shift(sigma * v))
-            answer = self._judged(step, at, 0)
-            if not answer.converged:
-                answer = self._newton(step, at, NEWTON_STEPS)
+            answer = self._ended(step, Iterate(z, s, -sigma * v - self._shift(sigma * v)))
             used += answer.iterations
             best = answer if best is None or answer.residual < best.residual else best
             if answer.converged:

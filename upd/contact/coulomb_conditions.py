@@ -19,17 +19,49 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 from scipy.optimize import linprog
 
 from upd.contact.checks import EPS
-from upd.contact.coupled_systems import AskedStep, CoupledSystems, NewtonRows
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 OPEN, STICK, SLIP = 0, 1, 2
 #: Sides of the polygons inside Coulomb's disks, for the question whether a contact can hold itself.
 _SIDES = 16
+
+
+@dataclass(frozen=True)
+class NewtonRows:
+    """One Newton system per node: P f + Q (C f - B s - b) = rhs, (n, c, c) and (n, c).
+
+    `relaxed` (n, c) marks the rows that are not simply y = 0, `is_open` (n,) nodes that are open.
+    """
+
+    P: FloatArray
+    Q: FloatArray
+    rhs: FloatArray
+    relaxed: BoolArray
+    is_open: BoolArray
+
+    def same_states(self, other: NewtonRows) -> bool:
+        """Whether other rows have the same nodes open, stuck and slipping."""
+        return np.array_equal(self.relaxed, other.relaxed) and np.array_equal(
+            self.is_open, other.is_open
+        )
+
+
+@dataclass(frozen=True)
+class AskedStep:
+    """What a step asks for: b (m,), and load p (r,) or motion s (r,); columns of them for
+    derivatives.
+    """
+
+    b: FloatArray
+    load: FloatArray | None
+    motion: FloatArray | None
 
 
 @dataclass(frozen=True)
@@ -80,7 +112,7 @@ class CoulombConditions:
     mu : (n,) ndarray
         Friction.
     proven : (m, m) ndarray, optional
-        L of C = L L' where it is known.
+        L of C = L L' where it is known, what is above its diagonal is not used.
     pressed : (n,) ndarray, optional
         Normal forces, above zero, where they are given: all c components are then tangential.
     """
@@ -95,8 +127,7 @@ class CoulombConditions:
         self.n = len(self.mu)
         #: first tangential component
         self.first = 1 if self.pressed is None else 0
-        self.systems = CoupledSystems(self.C, self.B, self.n, self.first, self.proven)
-        self.c = self.systems.c
+        self.c = len(self.C) // self.n
         diagonal = np.diagonal(self.C).reshape(self.c, self.n)
         # Weights of displacements against forces: one over the node's own compliance. Any positive
         # value is exact.
@@ -109,6 +140,31 @@ class CoulombConditions:
     def holds_itself(self) -> bool:
         """Whether forces within friction can balance without any load."""
         return self_locking(self.B, self.mu)
+
+    @cached_property
+    def factor(self) -> FloatArray:
+        """L of C = L L', (m, m), in its lower triangle."""
+        if self.proven is not None:
+            return self.proven
+        L, info = lapack.dpotrf(self.C.T, lower=1, clean=0)
+        if info != 0:
+            raise np.linalg.LinAlgError("compliance is not positive definite")
+        return np.asarray(L)
+
+    def solved(self, b: FloatArray) -> FloatArray:
+        """C^-1 b, of one column or many."""
+        return np.asarray(lapack.dpotrs(self.factor, b, lower=1)[0])
+
+    @cached_property
+    def carried(self) -> tuple[FloatArray, FloatArray]:
+        """V (m, r) and A (r, r): everything stuck, under a load p,
+
+        f = W b + V p, s = A p - V'b, with A = (B'C^-1 B)^-1, V = C^-1 B A, W = C^-1 - V A^-1 V'.
+        """
+        CB = self.solved(self.B)
+        A = np.linalg.inv(self.B.T @ CB)
+        A = 0.5 * (A + A.T)
+        return CB @ A, A
 
     def states(self, at: Iterate) -> IntArray:
         """OPEN, STICK or SLIP of every node."""

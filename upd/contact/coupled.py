@@ -13,11 +13,10 @@ from upd.contact.checks import (
     few_threads,
     numbers,
     one_of,
-    proven_factor,
 )
 from upd.contact.coulomb import Coulomb
 from upd.contact.coulomb_conditions import CoupledStep, Iterate, carries
-from upd.contact.load_steps import CoupledHistory, LoadSteps, SolvedStep, offset_of
+from upd.contact.load_steps import CoupledHistory, LoadSteps, Reached, SolvedStep, offset_of
 from upd.errors import ConvergenceError, InputError
 from upd.labels import Shown
 
@@ -110,7 +109,29 @@ class CoupledContact(Shown):
             path = _path(problems, self._solver, load, displacement, offset)
             problems.raise_any()
             assert path is not None
-            return _march(self._solver, self._gap, path, self.history, True)
+            march = LoadSteps(self._solver, self._gap, load is not None)
+            return _march(march, path, self.history, True)
+
+    def friction_loss(self, before: CoupledHistory) -> FloatArray:
+        """Work that friction took in each step.
+
+        By the mean tractions of a step over its slips: the work of all forces balances with it;
+        the traction after the step alone is off by the step's share.
+
+        Parameters
+        ----------
+        before : CoupledHistory
+            State before the first step.
+
+        Returns
+        -------
+        (k,) ndarray
+            N mm.
+        """
+        tractions = np.concatenate((before.force[None, :, 1:], self.force[..., 1:]))
+        slips = np.concatenate((before.slip[None], self.slip))
+        mean = 0.5 * (tractions[1:] + tractions[:-1])
+        return np.asarray((mean * np.diff(slips, axis=0)).sum(axis=(1, 2)))
 
     def fork(self) -> CoupledContact:
         """The same answers, to `go_on` from beside these: in another thread, for another history.
@@ -220,17 +241,8 @@ def coupled_contact(
         path = _path(problems, solver, load, displacement, offset)
         problems.raise_any()
         assert solver is not None and path is not None
-        at = _start(solver, h, history)
-        return _march(solver, h, path, at, history is not None)
-
-
-@dataclass(frozen=True)
-class _Path:
-    """Load or displacement (k, r) and offset (k, c n) after each step."""
-
-    values: FloatArray
-    offsets: FloatArray
-    by_load: bool
+        march = LoadSteps(solver, h, load is not None)
+        return _march(march, path, _start(solver, h, history), history is not None)
 
 
 def _solver(
@@ -240,32 +252,23 @@ def _solver(
     friction: ArrayLike,
     columns: ArrayLike | None,
 ) -> tuple[Coulomb | None, FloatArray]:
-    C = compliance_matrix(problems, compliance)
-    h, mu = numbers(problems, "gap", gap), numbers(problems, "friction", friction)
-    L = None if C is None else proven_factor(problems, C)
+    C, L = compliance_matrix(problems, compliance)
+    h = numbers(problems, "gap", gap, ("n",))
+    mu = numbers(problems, "friction", friction, (), ("n" if h is None else h.size,))
     if h is None or mu is None or C is None:
         return None, np.zeros(0)
-    if problems.add(h.ndim != 1 or h.size == 0, f"gap has shape {h.shape}: it must be (n,)."):
-        return None, h
     n = h.size
     problems.add(
         len(C) not in (2 * n, 3 * n),
         f"compliance has {len(C)} rows for {n} gaps: it needs 2n or 3n, normal of all nodes first.",
-    )
-    problems.add(
-        mu.shape not in ((), (n,)), f"friction has shape {mu.shape}: give a number or ({n},)."
     )
     problems.add(bool((mu < 0.0).any()), "friction is negative: give coefficients >= 0.")
     if problems.found:
         return None, h
     B = np.kron(np.eye(len(C) // n), np.ones((n, 1)))
     if columns is not None:
-        given = numbers(problems, "columns", columns)
-        if given is None or problems.add(
-            given.ndim != 2 or given.shape[0] != len(C) or given.shape[1] == 0,
-            f"columns has shape {None if given is None else given.shape}: it must be "
-            f"({len(C)}, r), r >= 1.",
-        ):
+        given = numbers(problems, "columns", columns, (len(C), "r"))
+        if given is None:
             return None, h
         problems.add(
             np.linalg.matrix_rank(given / np.abs(given).max(axis=0, initial=1e-300))
@@ -283,121 +286,64 @@ def _path(
     load: ArrayLike | None,
     displacement: ArrayLike | None,
     offset: ArrayLike | None,
-) -> _Path | None:
-    values = _targets(problems, solver, load, displacement)
-    offsets = _offsets(problems, solver, values, offset)
-    if values is None or offsets is None:
+) -> tuple[FloatArray, FloatArray] | None:
+    """Load or displacement (k, r) and offset (k, c n) after each step."""
+    r, m = ("r", "c n") if solver is None else (solver.B.shape[1], len(solver.C))
+    found = one_of(problems, (r,), ("k", r), load=load, displacement=displacement)
+    given = None if offset is None else numbers(problems, "offset", offset, (m,), ("k", m))
+    if solver is None or found is None or (offset is not None and given is None):
+        return None
+    values, offsets = found[1], np.zeros(len(solver.C)) if given is None else given
+    if problems.add(
+        offsets.ndim == values.ndim == 2 and len(offsets) != len(values),
+        f"offset has {len(offsets)} steps, load or displacement {len(values)}: give as many, or "
+        "one row that holds in all of them.",
+    ):
         return None
     steps = max(len(np.atleast_2d(values)), len(np.atleast_2d(offsets)))
-    return _Path(
+    return (
         np.broadcast_to(values, (steps, values.shape[-1])),
         np.broadcast_to(offsets, (steps, offsets.shape[-1])),
-        load is not None,
     )
-
-
-def _targets(
-    problems: Problems,
-    solver: Coulomb | None,
-    load: ArrayLike | None,
-    displacement: ArrayLike | None,
-) -> FloatArray | None:
-    found = one_of(problems, load=load, displacement=displacement)
-    if found is None or solver is None:
-        return None
-    name, values = found
-    r = solver.B.shape[1]
-    if problems.add(
-        values.ndim not in (1, 2) or values.shape[-1] != r or values.size == 0,
-        f"{name} has shape {values.shape}: it must be ({r},) or (k, {r}).",
-    ):
-        return None
-    return values
-
-
-def _offsets(
-    problems: Problems,
-    solver: Coulomb | None,
-    values: FloatArray | None,
-    offset: ArrayLike | None,
-) -> FloatArray | None:
-    given = None if offset is None else numbers(problems, "offset", offset)
-    if solver is None:
-        return None
-    m = len(solver.C)
-    if offset is None:
-        return np.zeros(m)
-    if given is None or problems.add(
-        given.ndim not in (1, 2) or given.shape[-1] != m or given.size == 0,
-        f"offset has shape {None if given is None else given.shape}: it must be ({m},) or "
-        f"(k, {m}), normal of all nodes first.",
-    ):
-        return None
-    if values is not None and problems.add(
-        given.ndim == values.ndim == 2 and len(given) != len(values),
-        f"offset has {len(given)} steps, load or displacement "
-        f"{len(np.atleast_2d(values))}: give as many, or one row that holds in all of them.",
-    ):
-        return None
-    return given
 
 
 def _start(solver: Coulomb, h: FloatArray, history: CoupledHistory | None) -> CoupledHistory:
     n, c, r = solver.n, solver.c, solver.B.shape[1]
+    none = np.zeros((n, c - 1))
+    fresh = CoupledHistory(np.zeros((n, c)), none, h, np.zeros(r), none, np.zeros(r))
     if history is None:
-        none = np.zeros((n, c - 1))
-        return CoupledHistory(np.zeros((n, c)), none, h, np.zeros(r), none, np.zeros(r))
-    wanted = {
-        "force": (n, c),
-        "slip": (n, c - 1),
-        "gap": (n,),
-        "motion": (r,),
-        "step": (n, c - 1),
-        "load": (r,),
-    }
+        return fresh
     if not isinstance(history, CoupledHistory):
         raise InputError(
             f"coupled contact: history is a {type(history).__name__}: give the attribute "
             "`history` of an earlier result."
         )
-    for name, shape in wanted.items():
-        value = np.asarray(getattr(history, name))
-        if value.shape != shape:
-            raise InputError(
-                f"coupled contact: the history's {name} has shape {value.shape}, this contact has "
-                f"{shape}: give the history of the same contact."
-            )
-        if not np.isfinite(value).all():
-            raise InputError(f"coupled contact: the history's {name} is not finite.")
+    problems = Problems("coupled contact")
+    for name, like in vars(fresh).items():
+        numbers(problems, f"history.{name}", getattr(history, name), like.shape)
+    problems.add(bool(problems.found), "give the history of the same contact.")
+    problems.raise_any()
     return history
 
 
 def _march(
-    solver: Coulomb,
-    h: FloatArray,
-    path: _Path,
-    at: CoupledHistory,
-    warm: bool,
+    march: LoadSteps, path: tuple[FloatArray, FloatArray], history: CoupledHistory, warm: bool
 ) -> CoupledContact:
-    march = LoadSteps(solver, h, path.by_load)
-    solved: list[SolvedStep] = []
-    before: CoupledHistory | None = None
-    was = offset_of(solver, h, at)
-    for number, (value, offset) in enumerate(zip(path.values, path.offsets, strict=True)):
-        one = march.step(at, before, was, value, offset, warm or number > 0)
-        if path.by_load and not one.answer.converged:
+    solver, solved = march.solver, list[SolvedStep]()
+    at = Reached(history, offset_of(solver, march.h, history), history.load, warm)
+    for number, (value, offset) in enumerate(zip(*path, strict=True)):
+        one = march.step(at, value, offset)
+        if march.by_load and not one.answer.converged:
             raise ConvergenceError(_not_carried(solver, value, number, one.answer))
         solved.append(one)
-        before, at, was = at, one.after, one.offset
-    return _collected(solver, h, path, solved)
+        at = one.reached
+    return _collected(march, solved)
 
 
-def _collected(
-    solver: Coulomb, h: FloatArray, path: _Path, solved: list[SolvedStep]
-) -> CoupledContact:
-    answers, after = [one.answer for one in solved], [one.after for one in solved]
+def _collected(march: LoadSteps, solved: list[SolvedStep]) -> CoupledContact:
+    answers, after = [one.answer for one in solved], [one.reached.history for one in solved]
     bad = [k for k, a in enumerate(answers) if not a.converged]
-    locking = solver.holds_itself
+    locking = march.solver.holds_itself
     message = f"{len(after)} load steps solved."
     if bad:
         message = (
@@ -425,9 +371,9 @@ def _collected(
         status="not converged" if bad else "converged",
         message=message,
         history=after[-1],
-        _solver=solver,
+        _solver=march.solver,
         _last=answers[-1].at,
-        _gap=h,
+        _gap=march.h,
     )
 
 

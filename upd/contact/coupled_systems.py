@@ -6,15 +6,12 @@ closed dofs alone, dense.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack, lu_solve
 
 from upd.contact.checks import EPS
+from upd.contact.coulomb_conditions import AskedStep, CoulombConditions, NewtonRows
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -23,122 +20,19 @@ BoolArray = NDArray[np.bool_]
 NOT_CARRIED = "nothing touches and carries the load"
 #: A product of a matrix with a vector waits for memory and costs so much more, for weighing only.
 _PASS = 10.0
+#: Operations that a factor takes in the time of the many small calls of a step by another's factor.
+_CALLS = 1e7
 #: Refinements behind the factor of C; each gains the digits that its condition leaves.
 _REFINED = 2
-
-
-@dataclass(frozen=True)
-class NewtonRows:
-    """One Newton system per node: P f + Q (C f - B s - b) = rhs, (n, c, c) and (n, c).
-
-    `relaxed` (n, c) marks the rows that are not simply y = 0, `is_open` (n,) nodes that are open.
-    """
-
-    P: FloatArray
-    Q: FloatArray
-    rhs: FloatArray
-    relaxed: BoolArray
-    is_open: BoolArray
-
-    def same_states(self, other: NewtonRows) -> bool:
-        """Whether other rows have the same nodes open, stuck and slipping."""
-        return np.array_equal(self.relaxed, other.relaxed) and np.array_equal(
-            self.is_open, other.is_open
-        )
-
-
-@dataclass(frozen=True)
-class AskedStep:
-    """What a step asks for: b (m,), and load p (r,) or motion s (r,); columns of them for
-    derivatives.
-    """
-
-    b: FloatArray
-    load: FloatArray | None
-    motion: FloatArray | None
 
 
 Solved = tuple[FloatArray, FloatArray, FloatArray]
 
 
-class NewtonSystem(Protocol):
-    """Newton's rows, factored; by_load: the load is given, not the motion."""
-
-    rows: NewtonRows
-    by_load: bool
-
-    def solve(self, rhs: FloatArray, target: AskedStep) -> Solved:
-        """f, s and y for rhs (m,) or (m, columns)."""
-
-    def refined(self, rhs: FloatArray, target: AskedStep) -> Solved:
-        """The same for one column, to rounding."""
-
-
-@dataclass
-class CoupledSystems:
-    """C, B and what is kept of them.
-
-    Parameters
-    ----------
-    C : (m, m) ndarray
-        Compliance, symmetric positive definite, m = c n.
-    B : (m, r) ndarray
-        Rigid columns.
-    n : int
-        Nodes.
-    first : int
-        First tangential component: 0 where no other is unknown.
-    proven : (m, m) ndarray, optional
-        L of C = L L' where it is known, what is above its diagonal is not used.
-    """
-
-    C: FloatArray
-    B: FloatArray
-    n: int
-    first: int
-    proven: FloatArray | None = None
-
-    def __post_init__(self) -> None:
-        self.c = len(self.C) // self.n
-
-    @cached_property
-    def factor(self) -> FloatArray:
-        """L of C = L L', (m, m), in its lower triangle."""
-        if self.proven is not None:
-            return self.proven
-        L, info = lapack.dpotrf(self.C.T, lower=1, clean=0)
-        if info != 0:
-            raise np.linalg.LinAlgError("compliance is not positive definite")
-        return np.asarray(L)
-
-    def solved(self, b: FloatArray) -> FloatArray:
-        """C^-1 b, of one column or many."""
-        return np.asarray(lapack.dpotrs(self.factor, b, lower=1)[0])
-
-    @cached_property
-    def carried(self) -> tuple[FloatArray, FloatArray]:
-        """V (m, r) and A (r, r): everything stuck, under a load p,
-
-        f = W b + V p, s = A p - V'b, with A = (B'C^-1 B)^-1, V = C^-1 B A, W = C^-1 - V A^-1 V'.
-        """
-        CB = self.solved(self.B)
-        A = np.linalg.inv(self.B.T @ CB)
-        A = 0.5 * (A + A.T)
-        return CB @ A, A
-
-    def system(self, rows: NewtonRows, by_load: bool) -> NewtonSystem:
-        """The rows, factored.
-
-        Raises LinAlgError where the states carry no load.
-        """
-        made = ClosedSystem if rows.relaxed.any() else Stuck
-        return made(self, rows, by_load)
-
-
 class Stuck:
     """Everything sticks: y = 0."""
 
-    def __init__(self, of: CoupledSystems, rows: NewtonRows, by_load: bool) -> None:
+    def __init__(self, of: CoulombConditions, rows: NewtonRows, by_load: bool) -> None:
         self.of, self.rows, self.by_load = of, rows, by_load
 
     def solve(self, rhs: FloatArray, target: AskedStep) -> Solved:
@@ -167,7 +61,7 @@ class Stuck:
 class ClosedSystem:
     """The forces of the closed dofs and the rigid motion, dense: the open forces are zero."""
 
-    def __init__(self, of: CoupledSystems, rows: NewtonRows, by_load: bool) -> None:
+    def __init__(self, of: CoulombConditions, rows: NewtonRows, by_load: bool) -> None:
         self.of, self.rows, self.by_load = of, rows, by_load
         nodes = np.flatnonzero(~rows.is_open)
         self.nodes, r = nodes, of.B.shape[1] if by_load else 0
@@ -215,17 +109,17 @@ class ClosedSystem:
 
     @property
     def dear(self) -> bool:
-        """Whether another factor costs more than a product with all of C."""
-        return self.q**3 / 3.0 > _PASS * len(self.of.C) ** 2
+        """Whether another factor costs more than a step by this one."""
+        return self.q**3 / 3.0 > _PASS * len(self.of.C) ** 2 + _CALLS
 
     def turned(self, right: FloatArray) -> FloatArray:
-        """Q of the closed rows (q, columns), in place."""
+        """Q of the closed rows (q,) or (q, columns), in place."""
         old = [right[at] for at in self.place]
         for j in range(self.of.first, self.of.c):
             row = np.zeros_like(old[j])
             for i in range(self.of.c):
                 if self.Q[:, j, i].any():
-                    row += self.Q[:, j, i, None] * old[i]
+                    row += (self.Q[:, j, i] * old[i].T).T
             right[self.place[j]] = row
         return right
 
@@ -265,12 +159,10 @@ class ClosedSystem:
     def _asked(self, rhs: FloatArray, target: AskedStep) -> FloatArray:
         """Right-hand sides (q,) of the closed rows: Q (b + B s) + rhs."""
         known = target.b if target.motion is None else target.b + self.of.B @ target.motion
-        right = known[self.dofs]
-        old = [right[at].copy() for at in self.place]
+        right = self.turned(known[self.dofs])
         for j in range(self.of.first, self.of.c):
-            value = sum((self.Q[:, j, i] * old[i].T).T for i in range(self.of.c))
-            right[self.place[j]] = value + rhs[j * self.of.n + self.nodes[self.slips]]
-        return np.asarray(right)
+            right[self.place[j]] += rhs[j * self.of.n + self.nodes[self.slips]]
+        return right
 
     def _step(self, right: FloatArray, target: AskedStep) -> tuple[FloatArray, FloatArray]:
         q = self.q
@@ -284,3 +176,8 @@ class ClosedSystem:
             assert target.motion is not None
             return f, target.motion
         return f, (found[q:].T * self.unit).T
+
+
+#: Newton's rows, factored; `solve` gives f, s and y for rhs (m,) or (m, columns), `refined` the
+#: same for one column, to rounding
+NewtonSystem = Stuck | ClosedSystem

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -25,7 +25,6 @@ _FORMAT: dict[str, tuple[tuple[str, ...], str]] = {
     "k_t": (("contact_point", "tangent"), "N/mm"),
     "preload": (("contact_point",), "N"),
     "area": (("contact_point",), "mm2"),
-    "source_tilt": (("tangent",), "N mm"),
 }
 _PREFIX = "law_"
 
@@ -50,8 +49,6 @@ class ContactLaw(Shown):
         Normal forces [N].
     area : (m,) ndarray
         Areas [mm2].
-    source_tilt : (2,) ndarray
-        Tilt stiffness of the nodal field the points came from [N mm], see `tilt_stiffness`.
 
     Examples
     --------
@@ -66,8 +63,6 @@ class ContactLaw(Shown):
     ... )
     >>> law.n_point
     2
-    >>> law.tilt_stiffness().tolist()
-    [200.0, 0.0]
     >>> placed = law.placed(origin=[10.0, 0.0, 0.0], axes=[[0, 1, 0], [0, 0, 1], [1, 0, 0]])
     >>> placed.position.tolist()
     [[10.0, -1.0, 0.0], [10.0, 1.0, 0.0]]
@@ -82,45 +77,11 @@ class ContactLaw(Shown):
     k_t: FloatArray
     preload: FloatArray
     area: FloatArray
-    source_tilt: FloatArray
 
     @property
     def n_point(self) -> int:
         """Number of contact points, m."""
         return len(self.k_n)
-
-    def tilt_stiffness(self) -> FloatArray:
-        """Tilt stiffness of the normal springs about both tangents.
-
-        Sum of k_n x_i^2 over the points, x the distances along each tangent from the centre of k_n;
-        for points of one plane with common tangents.
-
-        Returns
-        -------
-        (2,) ndarray
-            Tilt stiffness per radian [N mm]; 0 without normal stiffness.
-        """
-        along = np.einsum("mj,ij->mi", self.position, self.tangents[0])
-        return _second_moments(along, self.k_n)
-
-    def tilt_error(self) -> FloatArray:
-        """Tilt stiffness of the points relative to that of the nodal field, minus one.
-
-        One row or column has no tilt stiffness of its own (-1), r equal cells on a uniform field
-        lose 1 / r^2.
-
-        Returns
-        -------
-        (2,) ndarray
-            Relative error, <= 0 with weight "stiffness"; 0 where the nodal field has no tilt
-            stiffness.
-        """
-        own = self.tilt_stiffness()
-        return np.where(
-            self.source_tilt > 0.0,
-            own / np.where(self.source_tilt > 0.0, self.source_tilt, 1.0) - 1.0,
-            0.0,
-        )
 
     def placed(self, origin: ArrayLike, axes: ArrayLike) -> ContactLaw:
         """The same points in other axes.
@@ -142,15 +103,8 @@ class ContactLaw(Shown):
             When the axes are not orthonormal and right-handed, or the shapes differ.
         """
         problems = Problems("contact points placed")
-        o, A = numbers(problems, "origin", origin), numbers(problems, "axes", axes)
-        problems.add(
-            o is not None and o.shape != (3,),
-            f"origin has shape {None if o is None else o.shape}: it must be (3,).",
-        )
-        if A is not None and not problems.add(
-            A.shape != (3, 3),
-            f"axes has shape {A.shape}: it must be (3, 3), one unit vector per row.",
-        ):
+        o, A = numbers(problems, "origin", origin, (3,)), numbers(problems, "axes", axes, (3, 3))
+        if A is not None:
             skew = float(np.abs(A @ A.T - np.eye(3)).max())
             problems.add(
                 skew > np.sqrt(EPS),
@@ -162,19 +116,8 @@ class ContactLaw(Shown):
             )
         problems.raise_any()
         assert o is not None and A is not None
-        kept = {
-            "k_n": self.k_n,
-            "k_t": self.k_t,
-            "preload": self.preload,
-            "area": self.area,
-            "source_tilt": self.source_tilt,
-        }
-        return ContactLaw(
-            position=o + self.position @ A,
-            normal=self.normal @ A,
-            tangents=self.tangents @ A,
-            **kept,
-        )
+        position, normal, tangents = o + self.position @ A, self.normal @ A, self.tangents @ A
+        return replace(self, position=position, normal=normal, tangents=tangents)
 
     def to_arrays(self) -> dict[str, tuple[tuple[str, ...], FloatArray, dict[str, str]]]:
         """The points as arrays for result.nc.
@@ -209,7 +152,7 @@ class ContactLaw(Shown):
         """
         problems = Problems("contact points from arrays")
         found: dict[str, FloatArray] = {}
-        sizes = {"tangent": 2, "component": 3}
+        sizes: dict[str, int | str] = {"tangent": 2, "component": 3}
         for name, (dims, _) in _FORMAT.items():
             given = arrays.get(_PREFIX + name)
             if given is None:
@@ -219,20 +162,12 @@ class ContactLaw(Shown):
                     "points were written to.",
                 )
                 continue
-            array = numbers(
-                problems, _PREFIX + name, given[1] if isinstance(given, tuple) else given
-            )
-            if array is None:
-                continue
-            if array.ndim and "contact_point" in dims:
-                sizes.setdefault("contact_point", array.shape[0])
-            wanted = tuple(sizes.get(dim, 0) for dim in dims)
-            problems.add(
-                array.shape != wanted,
-                f"{_PREFIX}{name} has shape {array.shape}: it must be {wanted}, dimensions "
-                f"{', '.join(dims)}.",
-            )
-            found[name] = array
+            wanted = tuple(sizes.get(dim, dim) for dim in dims)
+            given = given[1] if isinstance(given, tuple) else given
+            array = numbers(problems, _PREFIX + name, given, wanted)
+            if array is not None:
+                sizes.update(zip(dims, array.shape, strict=True))
+                found[name] = array
         problems.raise_any()
         return cls(**found)
 
@@ -305,37 +240,24 @@ def contact_points(
     [[0.5, 0.0, 0.0], [2.5, 0.0, 0.0]]
     >>> law.preload.tolist(), law.k_n.tolist()
     ([3.0, 3.0], [200.0, 200.0])
-
-    Two points of four lose a fifth of the tilt stiffness:
-
-    >>> law.tilt_error().round(3).tolist()
-    [-0.2, 0.0]
     """
     problems = Problems("contact points")
-    X, K = (
-        numbers(problems, "positions", positions),
-        numbers(problems, "tangential_stiffness", tangential_stiffness),
-    )
+    X = numbers(problems, "positions", positions, ("n", 2), ("n", 3))
+    n = "n" if X is None else len(X)
+    K = _not_negative(problems, "tangential_stiffness", tangential_stiffness, (n, 2))
     named = {"areas": areas, "normal_force": normal_force, "normal_stiffness": normal_stiffness}
-    given = {name: numbers(problems, name, values) for name, values in named.items()}
+    given = [_not_negative(problems, name, values, (n,)) for name, values in named.items()]
     for name, count in (("rows", rows), ("columns", columns)):
         whole = isinstance(count, (int, np.integer)) and not isinstance(count, bool)
         problems.add(not whole or count < 1, f"{name} is {count!r}: give a whole number >= 1.")
     problems.add(
         weight not in get_args(Weight), f'weight is {weight!r}: take "stiffness" or "area".'
     )
-    groups: list[NDArray[np.int64]] = []
-    if X is not None and not problems.add(
-        X.ndim != 2 or X.shape[-1] not in (2, 3) or len(X) == 0,
-        f"positions has shape {X.shape}: it must be (n, 2) or (n, 3), n >= 1.",
-    ):
-        given["tangential_stiffness"] = K
-        _check_fields(problems, len(X), given)
-        groups = _check_patches(problems, len(X), patches)
+    groups = [] if X is None else _check_patches(problems, len(X), patches)
     problems.raise_any()
     assert X is not None and K is not None
     place = np.column_stack([X, np.zeros(len(X))]) if X.shape[1] == 2 else X
-    area, force, k_n = (np.asarray(given[name]) for name in named)
+    area, force, k_n = (np.asarray(one) for one in given)
     nodal = _Nodal(place, area, force, k_n, K)
     cells = [nodal.cells(group, rows, columns, weight) for group in groups]
     law = {name: np.concatenate([cell[name] for cell in cells]) for name in cells[0]}
@@ -349,24 +271,20 @@ def contact_points(
     return ContactLaw(
         normal=normal,
         tangents=tangents,
-        source_tilt=_second_moments(place[:, :2], nodal.k_n),
         **law,
     )
 
 
-def _check_fields(problems: Problems, n: int, given: Mapping[str, FloatArray | None]) -> None:
-    for name, array in given.items():
-        wanted = (n, 2) if name == "tangential_stiffness" else (n,)
-        if array is None or problems.add(
-            array.shape != wanted, f"{name} has shape {array.shape}: {n} positions need {wanted}."
-        ):
-            continue
-        negative = int(np.count_nonzero(array < 0))
-        problems.add(
-            negative > 0,
-            f"{name} is negative at {negative} places: forces press, areas and stiffnesses "
-            "are >= 0.",
-        )
+def _not_negative(
+    problems: Problems, name: str, values: ArrayLike, shape: tuple[int | str, ...]
+) -> FloatArray | None:
+    array = numbers(problems, name, values, shape)
+    negative = 0 if array is None else int(np.count_nonzero(array < 0))
+    problems.add(
+        negative > 0,
+        f"{name} is negative at {negative} places: forces press, areas and stiffnesses are >= 0.",
+    )
+    return array
 
 
 def _check_patches(
@@ -470,11 +388,3 @@ def _centroids(share: FloatArray, x: FloatArray, weights: Sequence[FloatArray]) 
         position[now] = (part[now] / total[now, None]) @ x
         todo &= ~now
     return position
-
-
-def _second_moments(x: FloatArray, weight: FloatArray) -> FloatArray:
-    """(2,) second moments of the weight about its centroid along the columns of x (n, 2)."""
-    total = float(weight.sum())
-    if not total > 0:
-        return np.zeros(2)
-    return np.asarray(weight @ (x - weight @ x / total) ** 2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,13 +46,23 @@ class CoupledHistory(Shown):
     load: FloatArray
 
 
+class Reached(NamedTuple):
+    """Where a load step starts: history and offset (c n,), the load (r,) that the step before it
+    added, and whether the state may start Newton.
+    """
+
+    history: CoupledHistory
+    offset: FloatArray
+    came: FloatArray
+    warm: bool
+
+
 @dataclass(frozen=True)
 class SolvedStep:
-    """A load step with the history and the offset after it, work and friction work of it, N mm."""
+    """A load step with what it reached, its work and its friction work, N mm."""
 
     answer: CoupledStep
-    after: CoupledHistory
-    offset: FloatArray
+    reached: Reached
     work: float
     slip_work: float
 
@@ -69,120 +79,84 @@ class LoadSteps:
     h: FloatArray
     by_load: bool
 
-    def step(
-        self,
-        at: CoupledHistory,
-        before: CoupledHistory | None,
-        was: FloatArray,
-        value: FloatArray,
-        offset: FloatArray,
-        warm: bool,
-    ) -> SolvedStep:
-        """From a state (and the one before it) with offset `was` to load or motion and offset.
-
-        Parameters
-        ----------
-        was, offset
-            (c n,) mm.
-        value
-            (r,) load or motion, N or mm.
-        warm
-            Whether the state may start Newton.
-        """
-        start = self._start(at) if warm else None
-        turned = self.by_load and warm and _turned(self.solver, before, at, value)
-        one = self._tried(at, was, value, offset, start, turned, fall_back=False)
+    def step(self, at: Reached, value: FloatArray, offset: FloatArray) -> SolvedStep:
+        """To a load or motion (r,), N or mm, and an offset (c n,), mm."""
+        one = self._tried(at, value, offset)
         parts = 1
         while not one.answer.converged and self.solver.mu.any() and 2 * parts <= _PARTS:
             parts *= 2
-            near = self._near(at, before, was, value, offset, warm, parts)
+            near = self._near(at, value, offset, parts)
             if near is not None:
-                again = self._tried(at, was, value, offset, near, False, fall_back=False)
+                again = self._tried(at, value, offset, near)
                 one = again if again.answer.converged else one
-        if not one.answer.converged:
-            one = self._tried(at, was, value, offset, start, turned, fall_back=True)
-        return one
+        return one if one.answer.converged else self._tried(at, value, offset, fall_back=True)
 
     def _near(
-        self,
-        at: CoupledHistory,
-        before: CoupledHistory | None,
-        was: FloatArray,
-        value: FloatArray,
-        offset: FloatArray,
-        warm: bool,
-        parts: int,
+        self, first: Reached, value: FloatArray, offset: FloatArray, parts: int
     ) -> Iterate | None:
         """Where the step ends in even parts, as a start for the whole; None when a part fails."""
-        first, start = at, at.load if self.by_load else at.motion
+        at, start = first, first.history.load if self.by_load else first.history.motion
         for share in np.arange(1, parts + 1) / parts:
             to = start + share * (value - start)
-            turned = self.by_load and warm and _turned(self.solver, before, at, to)
-            one = self._tried(
-                at,
-                was,
-                to,
-                was + share * (offset - was),
-                self._start(at) if warm else None,
-                turned,
-                fall_back=False,
-            )
+            one = self._tried(at, to, first.offset + share * (offset - first.offset))
             if not one.answer.converged:
                 return None
-            before, at, warm = at, one.after, True
-        y = np.concatenate((at.gap, -(at.slip - first.slip).T.ravel()))
-        return Iterate(at.force.T.ravel(), at.motion, y)
-
-    @staticmethod
-    def _start(at: CoupledHistory) -> Iterate:
-        y = np.concatenate((at.gap, -at.step.T.ravel()))
-        return Iterate(at.force.T.ravel(), at.motion, y)
+            at = one.reached
+        return _iterate(at.history, at.history.slip - first.history.slip)
 
     def _tried(
         self,
-        at: CoupledHistory,
-        was: FloatArray,
+        at: Reached,
         value: FloatArray,
         offset: FloatArray,
-        start: Iterate | None,
-        turned: bool,
+        near: Iterate | None = None,
         *,
-        fall_back: bool,
+        fall_back: bool = False,
     ) -> SolvedStep:
-        solver = self.solver
-        n, c = solver.n, solver.c
+        """The step from the state it starts from, or from an iterate near the answer."""
+        solver, old = self.solver, at.history
+        load, motion = (value, None) if self.by_load else (None, value)
+        start, turned = near, False
+        if near is None and at.warm:
+            start = _iterate(old, old.step)
+            turned = load is not None and _turned(solver, at, load)
         answer = solver.solve(
-            -np.concatenate((self.h, at.slip.T.ravel())) - offset,
-            load=value if self.by_load else None,
-            motion=None if self.by_load else value,
+            -np.concatenate((self.h, old.slip.T.ravel())) - offset,
+            load=load,
+            motion=motion,
             start=start,
             turned=turned,
-            may_fall_back=partial(_may_be_carried, solver, value if self.by_load else None)
-            if fall_back
-            else lambda: False,
+            may_fall_back=lambda: (
+                fall_back and (load is None or carries(solver.B, solver.mu, load))
+            ),
         )
-        f, y = answer.at.f.reshape(c, n), answer.at.y.reshape(c, n)
-        after = CoupledHistory(
+        f, y = (v.reshape(solver.c, solver.n) for v in (answer.at.f, answer.at.y))
+        new = CoupledHistory(
             f.T.copy(),
-            at.slip - y[1:].T,
+            old.slip - y[1:].T,
             y[0].copy(),
             answer.at.s,
             -y[1:].T,
             solver.B.T @ answer.at.f,
         )
-        middle = 0.5 * (at.force + after.force).T.ravel()
-        work = 0.5 * (at.load + after.load) @ (after.motion - at.motion) - middle @ (offset - was)
-        slip_work = float((after.force[:, 1:] * (after.slip - at.slip)).sum())
-        return SolvedStep(answer, after, np.asarray(offset), float(work), slip_work)
+        middle = 0.5 * (old.force + new.force).T.ravel()
+        work = 0.5 * (old.load + new.load) @ (new.motion - old.motion)
+        work -= middle @ (offset - at.offset)
+        slip_work = float((new.force[:, 1:] * (new.slip - old.slip)).sum())
+        reached = Reached(new, offset, new.load - old.load, True)
+        return SolvedStep(answer, reached, float(work), slip_work)
 
 
-def _turned(
-    solver: Coulomb, before: CoupledHistory | None, at: CoupledHistory, load: FloatArray
-) -> bool:
+def _iterate(at: CoupledHistory, slip: FloatArray) -> Iterate:
+    """A state as a start of Newton, with the slip (n, c - 1) on the way to it."""
+    y = np.concatenate((at.gap, -slip.T.ravel()))
+    return Iterate(at.force.T.ravel(), at.motion, y)
+
+
+def _turned(solver: Coulomb, at: Reached, load: FloatArray) -> bool:
     """Whether the load turns back on its way; at the start of a call, whether it goes back."""
     size = np.abs(solver.B).max(axis=0)
-    came = (at.load if before is None else at.load - before.load) / size
-    return bool(came @ ((load - at.load) / size) < 0.0)
+    return bool((at.came / size) @ ((load - at.history.load) / size) < 0.0)
 
 
 def offset_of(solver: Coulomb, h: FloatArray, at: CoupledHistory) -> FloatArray:
@@ -197,7 +171,3 @@ def offset_of(solver: Coulomb, h: FloatArray, at: CoupledHistory) -> FloatArray:
     """
     w = np.concatenate((h - at.gap, at.slip.T.ravel()))
     return np.asarray(solver.B @ at.motion - solver.C @ at.force.T.ravel() - w)
-
-
-def _may_be_carried(solver: Coulomb, load: FloatArray | None) -> bool:
-    return load is None or carries(solver.B, solver.mu, load)

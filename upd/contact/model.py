@@ -304,8 +304,8 @@ class ContactModel:
         """Approach at which the unloaded bodies touch [mm]; negative where the meshes overlap."""
         return float(self.gap.min())
 
-    def compliance(self, row: int, column: int | None = None) -> Array:
-        """Sum of both bodies' compliance at the multipliers, P' (C1 + C2) P.
+    def compliance(self, row: int, column: int | None = None, body: Body | None = None) -> Array:
+        """Compliance at the multipliers, P' (C1 + C2) P.
 
         Parameters
         ----------
@@ -313,6 +313,8 @@ class ContactModel:
             Component of the relative displacement (0, 1, 2 for x, y, z).
         column : int, optional
             Component of the forces; None takes `row`.
+        body : Body, optional
+            The share of one body; None: both.
 
         Returns
         -------
@@ -321,29 +323,8 @@ class ContactModel:
         """
         # Forces are equal and opposite, so relative displacements add up for every pair of
         # components.
-        return self._at_multipliers(
-            self.upper.compliance(row, column) + self.lower.compliance(row, column)
-        )
-
-    def body_compliance(self, body: Body, row: int, column: int | None = None) -> Array:
-        """One body's share of the compliance at the multipliers.
-
-        Parameters
-        ----------
-        body : Body
-        row : int
-            Component of the displacement (0, 1, 2 for x, y, z).
-        column : int, optional
-            Component of the forces; None takes `row`.
-
-        Returns
-        -------
-        (n, n) ndarray
-            Compliance [mm/N].
-        """
-        return self._at_multipliers(body.compliance(row, column))
-
-    def _at_multipliers(self, C: Array) -> Array:
+        first, *others = (self.upper, self.lower) if body is None else (body,)
+        C = sum((one.compliance(row, column) for one in others), first.compliance(row, column))
         P = self.multipliers.spread
         return C if P.shape[0] == P.shape[1] else np.asarray(P.T @ (P.T @ C.T).T)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import lapack
 
 from upd.contact.checks import (
     Problems,
@@ -15,7 +16,6 @@ from upd.contact.checks import (
     node_mask,
     numbers,
     one_load,
-    unit_response,
 )
 from upd.contact.qp import FREE, LOWER, BoxQP, FloatArray, Method, State
 from upd.labels import Shown
@@ -170,10 +170,8 @@ def normal_curve(
     with few_threads(gap):
         problems = Problems("normal curve")
         solver = _NormalSolver(problems, compliance, gap)
-        values = numbers(problems, "loads", np.asarray(loads))
-        if values is not None and not problems.add(
-            values.ndim != 1, f"loads has shape {values.shape}: it must be one-dimensional."
-        ):
+        values = numbers(problems, "loads", loads, ("k",), (0,))
+        if values is not None:
             one_load(problems, "load", float(values.min(initial=0.0)))
         problems.raise_any()
         assert values is not None
@@ -189,21 +187,10 @@ class _NormalSolver:
     """Checked compliance and gap, ready for many loads."""
 
     def __init__(self, problems: Problems, compliance: ArrayLike, gap: ArrayLike) -> None:
-        C = compliance_matrix(problems, compliance)
-        h = numbers(problems, "gap", gap)
+        C, self.factor = compliance_matrix(problems, compliance)
+        h = numbers(problems, "gap", gap, ("n" if C is None else len(C),))
         if C is not None:
-            self.unit = unit_response(problems, C)
             self.qp = BoxQP(C)
-        if h is not None:
-            problems.add(
-                h.ndim != 1 or h.size == 0,
-                f"gap has shape {h.shape}: it must be (n,), one value per contact node.",
-            )
-            problems.add(
-                C is not None and h.ndim == 1 and len(C) != h.size,
-                f"compliance has {0 if C is None else len(C)} rows and gap {h.size} "
-                "values: both need one per contact node.",
-            )
         self.gap = np.zeros(0) if h is None else h
         self.n = self.gap.size
         # Measured from the closest pair of nodes, so that a common offset of all gaps costs no
@@ -269,7 +256,8 @@ class _NormalSolver:
 
         Too large rather than too small, free of units.
         """
-        foundation = float(self.unit.sum()) / self.n
+        unit = lapack.dpotrs(self.factor, np.ones(self.n), lower=1)[0]
+        foundation = float(unit.sum()) / self.n
         order = np.sort(self.h)
         # Load carried when the foundation reaches each gap in turn.
         carried = foundation * (

@@ -69,16 +69,18 @@ class Patch:
     @property
     def X(self) -> Array:
         """Lattice lines of the whole patch in x [mm]."""
-        if self.quads is not None:
-            return self._images()[1][:, 0]
-        return _mirror_lines(self.x) if self.mirrored[0] else self.x
+        return self._lines(0)
 
     @property
     def Y(self) -> Array:
         """Lattice lines of the whole patch in y [mm]."""
+        return self._lines(1)
+
+    def _lines(self, axis: int) -> Array:
         if self.quads is not None:
-            return self._images()[1][:, 1]
-        return _mirror_lines(self.y) if self.mirrored[1] else self.y
+            return self._images()[1][:, axis]
+        own = (self.x, self.y)[axis]
+        return np.concatenate([-own[:0:-1], own]) if self.mirrored[axis] else own
 
     @property
     def spacing(self) -> float:
@@ -196,10 +198,6 @@ class Patch:
         return place, xy, share, quads
 
 
-def _mirror_lines(lines: Array) -> Array:
-    return np.concatenate([-lines[:0:-1], lines])
-
-
 def make_patch(
     points: Array,
     weights: Array,
@@ -289,8 +287,6 @@ class ContactMeasures:
         Largest pressure at a node [MPa].
     mean_pressure : float
         F / area [MPa].
-    n_contact : int
-        Number of nodes in contact on the whole patch.
     area_resolution : float or None
         What the lattice leaves open of a located area [mm2].
     """
@@ -302,7 +298,6 @@ class ContactMeasures:
     area_nodes: float
     max_pressure: float
     mean_pressure: float
-    n_contact: int
     area_resolution: float | None = None
 
 
@@ -334,7 +329,7 @@ def measure(
     contact = force > 0.0
     total = float(force.sum())
     if not total > 0.0:
-        return ContactMeasures(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
+        return ContactMeasures(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     share, points = (force / total).ravel(), patch.points()
     away = points - share @ points
     mxx, myy = (float(m) for m in share @ away**2)
@@ -349,7 +344,6 @@ def measure(
         area_nodes=area_nodes,
         max_pressure=float((force / weights if pressure is None else pressure).max()),
         mean_pressure=total / float(area),
-        n_contact=int(contact.sum()),
         area_resolution=located.resolution if located else None,
     )
 

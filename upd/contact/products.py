@@ -197,6 +197,14 @@ def learning(body: Body, components: Sequence[int]) -> LearnedCompliance | None:
     return None
 
 
+def learners(
+    model: ContactModel, components: Sequence[int]
+) -> list[tuple[Body, LearnedCompliance]]:
+    """The bodies whose compliance for these components is learned, with it."""
+    bodies = (model.upper, model.lower)
+    return [(b, found) for b in bodies if (found := learning(b, components)) is not None]
+
+
 def _spread(model: ContactModel, body: Body, components: Sequence[int], force: Array) -> Array:
     """Forces (n_component n, ...) at the multipliers as those at the body's kept dofs."""
     family = next(f for f in body.condensed if set(components) <= set(f))
@@ -227,31 +235,9 @@ def unknown(model: ContactModel, components: Sequence[int], force: Array) -> Arr
     """
     shares = [
         found.unknown(_spread(model, body, components, force))
-        for body in (model.upper, model.lower)
-        if (found := learning(body, components)) is not None
+        for body, found in learners(model, components)
     ]
     return np.asarray(np.max([np.zeros(force.shape[1]), *shares], axis=0))
-
-
-def show(
-    model: ContactModel, components: Sequence[int], force: Array, limits: ArrayLike = 0.0
-) -> None:
-    """Products of each body that learns, for what it does not know.
-
-    Parameters
-    ----------
-    model : ContactModel
-    components : sequence of int
-        Of the forces.
-    force : (n_component n,) or (n_component n, m) ndarray
-        N at the multipliers.
-    limits : (m,) array_like
-        Shares of the forces that may be unknown.
-    """
-    for body in (model.upper, model.lower):
-        found = learning(body, components)
-        if found is not None:
-            found.learn(_spread(model, body, components, force), limits)
 
 
 def energy_error(model: ContactModel, components: Sequence[int], force: Array) -> float:
@@ -271,10 +257,7 @@ def energy_error(model: ContactModel, components: Sequence[int], force: Array) -
         From the products of both bodies alone; zero for condensed ones.
     """
     squares, energy = 0.0, 0.0
-    for body in (model.upper, model.lower):
-        found = learning(body, components)
-        if found is None:
-            continue
+    for body, found in learners(model, components):
         f = _spread(model, body, components, force)
         own = float(f @ (found.compliance() @ f))
         energy += own
@@ -311,8 +294,7 @@ def settled(
     ConvergenceError
         Where a body does not learn any more and forces are still unknown.
     """
-    learns = [b for b in (model.upper, model.lower) if learning(b, components) is not None]
-    last = np.inf
+    learns, last = learners(model, components), np.inf
     while True:
         answer = solve()
         if not learns:
@@ -324,9 +306,10 @@ def settled(
         share = float(over.max(initial=0.0))
         if not share > 1.0:
             return answer
-        before = _products(learns, components)
-        show(model, components, F[:, over > 1.0], limits[over > 1.0])
-        if _products(learns, components) == before:
+        before = sum(one.products for _, one in learns)
+        for body, one in learns:
+            one.learn(_spread(model, body, components, F[:, over > 1.0]), limits[over > 1.0])
+        if sum(one.products for _, one in learns) == before:
             raise ConvergenceError(
                 f"contact by products: {before} products do not settle the forces, of which "
                 f"{share * KNOWN:.1e} are unknown, {last * KNOWN:.1e} before the last product: "
@@ -335,11 +318,6 @@ def settled(
             )
         last = share
         log.info("contact by products: %d products, %.1e unknown", before, share * KNOWN)
-
-
-def _products(bodies: Sequence[Body], components: Sequence[int]) -> int:
-    found = (learning(body, components) for body in bodies)
-    return sum(one.products for one in found if one is not None)
 
 
 def normal_contact_by_products(
@@ -375,7 +353,6 @@ def normal_contact_by_products(
     InputError, ConvergenceError
         As for `normal_contact`, and where a product does not converge.
     """
-    z = (2,)
     gaps = model.gap if gap is None else gap
 
     def solve() -> NormalContact:
@@ -386,4 +363,4 @@ def normal_contact_by_products(
         if answer.rates is not None:
             yield answer.rates, KNOWN_STIFFNESS
 
-    return settled(model, z, solve, forces)
+    return settled(model, (2,), solve, forces)

@@ -263,33 +263,33 @@ class BoxQP:
         Motions that the set does not resist stay as in `near`. None when resultants are asked for
         and no node is free.
         """
-        free = state == FREE
-        self._prepare(free)
+        self._prepare(state == FREE)
         x = np.zeros(self.n)
         for side, bound in ((LOWER, box.lower), (UPPER, box.upper)):
             held = state == side
             x[held] = bound[held]
-        q = box.h + self.product(x) if x.any() else box.h
-        index = self._index
-        if box.motion is not None:
-            s = box.motion
-        elif index.size:
-            s = near
-        else:
+        if box.motion is None and not self._index.size:
             return None
-        if index.size:
-            y = self._released(q[index])
-            if box.load is not None:
-                held_load = self._resultants(x)
-                freed = np.array([(b * y).sum() for b in self.B[index].T])
-                s = s + self._motion(box.load - held_load + freed - self._stiffness @ s)
-            x[index] = self._unit @ s - y
-        return self._judged(box, x, s)
+        s = near if box.motion is None else box.motion
+        start = (box.h + self.product(x) if x.any() else box.h) - self.B @ s
+        return self._corrected(box, x, s, start)
 
-    def _judged(self, box: _Box, x: FloatArray, s: FloatArray) -> _Step:
-        """The residual of these very forces and motion, with its rounding level."""
-        residual = box.h + self.product(x) - self.B @ s
-        return _Step(x, residual, s, self._tolerance(box, x, s))
+    def _corrected(self, box: _Box, x: FloatArray, s: FloatArray, residual: FloatArray) -> _Step:
+        """One solve with the factor at hand: no residual at free nodes, and the resultants; with
+        the residual that it leaves and its rounding level n eps (|h| + |B||s| + |C||x|).
+        """
+        index, x, more = self._index, x.copy(), np.zeros(self.B.shape[1])
+        if index.size:
+            y = self._released(residual[index])
+            if box.load is not None:
+                freed = np.array([(b * y).sum() for b in self.B[index].T])
+                more = self._motion(box.load - self._resultants(x) + freed)
+            x[index] += self._unit @ more - y
+        s = s + more
+        rigid = np.abs(self.B) @ np.abs(s)
+        terms = np.abs(box.h) + rigid + self._row * float(np.abs(x).sum())
+        left = box.h + self.product(x) - self.B @ s
+        return _Step(x, left, s, np.asarray(self._rounding * terms))
 
     def _refined(self, box: _Box, step: _Step | None, state: State) -> _Step | None:
         """Iterative refinement of a step.
@@ -300,24 +300,7 @@ class BoxQP:
         if step is None or self._solved(box, step, state):
             return step
         self._prepare(state == FREE)
-        index = self._index
-        if not index.size:
-            return step
-        x = step.x.copy()
-        y = self._released(step.residual[index])
-        more = np.zeros(self.B.shape[1])
-        if box.load is not None:
-            freed = np.array([(b * y).sum() for b in self.B[index].T])
-            more = self._motion(box.load - self._resultants(x) + freed)
-        x[index] += self._unit @ more - y
-        return self._judged(box, x, step.motion + more)
-
-    def _tolerance(self, box: _Box, x: FloatArray, s: FloatArray) -> FloatArray:
-        """Rounding level n eps (|h| + |B||s| + |C||x|) of the residual, node by node."""
-        rigid = np.abs(self.B) @ np.abs(s)
-        return np.asarray(
-            self._rounding * (np.abs(box.h) + rigid + self._row * float(np.abs(x).sum()))
-        )
+        return self._corrected(box, step.x, step.motion, step.residual)
 
     def _bound_tolerance(self, step: _Step) -> FloatArray:
         """Rounding level of x.

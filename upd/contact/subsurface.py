@@ -129,18 +129,13 @@ def _cells(field: Array) -> Array:
 
 def _paired(x: Array, y: Array, cells: Sequence[Array]) -> tuple[Array, Array, list[Array]]:
     """Cells twice as large with the same forces; an odd last one is paired with an empty one."""
-    wide = [_lines_of_pairs(lines) for lines in (x, y)]
+    wide = [v[0] + 2.0 * float(v[1] - v[0]) * np.arange(len(v) // 2 + 1) for v in (x, y)]
     out = []
     for cell in cells:
         n, m = cell.shape
         even = np.pad(cell, ((0, n % 2), (0, m % 2)))
         out.append(even.reshape((n + 1) // 2, 2, (m + 1) // 2, 2).mean(axis=(1, 3)))
     return wide[0], wide[1], out
-
-
-def _lines_of_pairs(lines: Array) -> Array:
-    step = float(lines[1] - lines[0])
-    return np.asarray(lines[0] + 2.0 * step * np.arange(len(lines) // 2 + 1))
 
 
 def _search(x: Array, y: Array, cells: Sequence[Array], nu: float) -> tuple[float, Array]:

@@ -15,7 +15,6 @@ from upd.contact.checks import (
     few_threads,
     numbers,
     one_of,
-    unit_response,
 )
 from upd.contact.coulomb import Coulomb
 from upd.contact.coulomb_conditions import Iterate
@@ -322,15 +321,10 @@ class _TangentialSolver:
     """
 
     def __init__(self, problems: Problems, compliance: ArrayLike, limit: ArrayLike) -> None:
-        C = compliance_matrix(problems, compliance)
-        s = numbers(problems, "limit", limit)
+        C, L = compliance_matrix(problems, compliance)
+        s = numbers(problems, "limit", limit, ("n",))
         self.directions, self.limit = 1, np.zeros(0)
-        if C is not None:
-            unit_response(problems, C)
-        if s is None or problems.add(
-            s.ndim != 1 or s.size == 0,
-            f"limit has shape {s.shape}: it must be (n,), one value per contact node.",
-        ):
+        if s is None:
             return
         self.limit = s
         negative = np.flatnonzero(s < 0)
@@ -353,14 +347,15 @@ class _TangentialSolver:
         self.total = float(s.sum())
         self.C = C
         if self.carried.size:
-            inner = C if self.carried.size == s.size else C[np.ix_(self.dofs, self.dofs)]
+            inner = C
+            if self.carried.size < s.size:
+                inner, L = C[np.ix_(self.dofs, self.dofs)], None
             if self.directions == 1:
                 self.box = BoxQP(inner)
             else:
                 n = self.carried.size
                 rigid = np.asarray(np.kron(np.eye(2), np.ones((n, 1))), np.float64)
-                mu = np.ones(n)
-                self.disks = Coulomb(np.asarray(inner, np.float64), rigid, mu, pressed=self.bound)
+                self.disks = Coulomb(inner, rigid, np.ones(n), L, self.bound)
 
     @property
     def n(self) -> int:
@@ -379,16 +374,14 @@ class _TangentialSolver:
         Problems are noted for a wrong shape and for gross slip.
         """
         names = ("loads", "displacements") if steps else ("load", "displacement")
-        found = one_of(problems, **dict(zip(names, (load, displacement), strict=True)))
+        one: tuple[int, ...] = () if self.directions == 1 else (2,)
+        shapes = [("k", *one), (0, *one)] if steps else [one]
+        given = dict(zip(names, (load, displacement), strict=True))
+        found = one_of(problems, *shapes, **given)
         if found is None:
             return np.zeros(0)
         name, values = found
-        shape: tuple[int, ...] = () if self.directions == 1 else (2,)
-        wanted = f"{'k, ' if steps else ''}{'2' if self.directions == 2 else ''}".rstrip(", ")
-        wrong = values.shape[1:] != shape or values.ndim == 0 if steps else values.shape != shape
-        kind = "directions" if self.directions == 2 else "direction"
-        message = f"{name} has shape {values.shape}: {self.directions} {kind} need ({wanted})."
-        if problems.add(wrong, message) or load is None or problems.found:
+        if load is None or problems.found:
             return values
         size = np.atleast_1d(
             np.abs(values) if self.directions == 1 else np.hypot(values[..., 0], values[..., 1])
@@ -414,12 +407,7 @@ class _TangentialSolver:
                 np.zeros(size), np.zeros(size), np.zeros(self.n, dtype=np.int8)
             )
         for name, wanted in (("slip", size), ("force", size), ("state", self.n)):
-            array = numbers(problems, f"history.{name}", getattr(history, name))
-            if array is not None:
-                problems.add(
-                    array.shape != (wanted,),
-                    f"history.{name} has shape {array.shape}: this contact needs ({wanted},).",
-                )
+            numbers(problems, f"history.{name}", getattr(history, name), (wanted,))
         return history
 
     def step(self, value: FloatArray, by_load: bool, at: TangentialHistory) -> TangentialContact:

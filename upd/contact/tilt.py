@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import lapack, solve_triangular
 from scipy.spatial import ConvexHull
 
 from upd.contact.checks import (
@@ -24,11 +23,9 @@ from upd.contact.checks import (
     node_mask,
     numbers,
     one_load,
-    unit_response,
 )
 from upd.contact.normal import NormalContact, apart
 from upd.contact.qp import FREE, HALF_THE_DIGITS, LOWER, BoxQP, FloatArray
-from upd.errors import ConvergenceError
 from upd.labels import Shown
 from upd.linalg.least_distance import least_distance
 
@@ -142,21 +139,11 @@ def tilted_contact(
     """
     with few_threads(gap):
         problems = Problems("contact with tilt")
-        C, h, T = (
-            compliance_matrix(problems, compliance),
-            numbers(problems, "gap", gap),
-            numbers(problems, "arms", arms),
-        )
-        F, M = one_load(problems, "load", load), numbers(problems, "moment", moment)
-        problems.add(
-            M is not None and M.shape != (2,),
-            f"moment has shape {None if M is None else M.shape}: it must be (2,).",
-        )
-        given = None
-        if C is not None:
-            unit_response(problems, C)
-            _check_shapes(problems, len(C), h, T)
-            given = node_mask(problems, start, len(C))
+        C, _ = compliance_matrix(problems, compliance)
+        n = "n" if C is None else len(C)
+        h, T = numbers(problems, "gap", gap, (n,)), numbers(problems, "arms", arms, (n, 2))
+        F, M = one_load(problems, "load", load), numbers(problems, "moment", moment, (2,))
+        given = None if C is None else node_mask(problems, start, len(C))
         problems.raise_any()
         assert C is not None and h is not None and T is not None and M is not None
         mask = np.ones(len(C), dtype=bool) if given is None or not given.any() else given
@@ -175,21 +162,16 @@ def tilted_contact(
                 "no moment.",
             )
             problems.raise_any()
-            return _unloaded(h)
+            approach, none = float(h.min()), np.zeros(2)
+            message = (
+                "The load is zero: the bodies touch without force and without tilt at the smallest "
+                f"gap, approach {approach:g} mm."
+            )
+            normal = apart(h, approach, "no load", message)
+            return TiltedContact(normal, none, none, "no load", message, np.zeros((3, 3)))
         face = _supporting_face(problems, sides, T, M / F, tilts)
         problems.raise_any()
         return _solve(C, h, T, F, M, mask, face, sum(free))
-
-
-def _check_shapes(problems: Problems, n: int, h: FloatArray | None, T: FloatArray | None) -> None:
-    problems.add(
-        h is not None and h.shape != (n,),
-        f"gap has shape {None if h is None else h.shape}: the compliance needs ({n},).",
-    )
-    problems.add(
-        T is not None and T.shape != (n, 2),
-        f"arms has shape {None if T is None else T.shape}: the compliance needs ({n}, 2).",
-    )
 
 
 @dataclass(frozen=True)
@@ -253,16 +235,6 @@ def _supporting_face(
     return _Face(nodes, np.array([[-normal[1]], [normal[0]]]), normal[:, None])
 
 
-def _unloaded(h: FloatArray) -> TiltedContact:
-    approach = float(h.min())
-    message = (
-        "The load is zero: the bodies touch without force and without tilt at the smallest "
-        f"gap, approach {approach:g} mm."
-    )
-    normal = apart(h, approach, "no load", message)
-    return TiltedContact(normal, np.zeros(2), np.zeros(2), "no load", message, np.zeros((3, 3)))
-
-
 def _solve(
     C: FloatArray,
     h: FloatArray,
@@ -300,7 +272,10 @@ def _solve(
         more = _least_opening(arms[off] @ face.across, residual[off])
         tilt, residual = tilt + face.across @ more, residual - arms @ face.across @ more
     residual[S] = answer.residual
-    K = _stiffness(C, contact, T)
+    # the nodes that carry lie on the face: its rigid motions are theirs, about the load point
+    turned = np.eye(1 + len(size), 3)
+    turned[0, 1:], turned[1:, 1:] = M / F, size[:, None] * face.along.T
+    K = turned.T @ answer.stiffness @ turned
     unique = bool(
         np.linalg.matrix_rank(T[contact] - T[contact].mean(axis=0), tol=HALF_THE_DIGITS * np.ptp(T))
         == n_free
@@ -328,20 +303,6 @@ def _solve(
         )
     status = "converged" if unique else "tilt not unique"
     return TiltedContact(normal, tilt, T.T @ force - M, status, message, K)
-
-
-def _stiffness(C: FloatArray, contact: NDArray[np.bool_], T: FloatArray) -> FloatArray:
-    """E' C_AA^-1 E of the nodes in contact, E = [e T]: stiffness of (approach, tilt)."""
-    E = np.column_stack([np.ones(int(contact.sum())), T[contact]])
-    index = np.flatnonzero(contact)
-    factor, info = lapack.dpotrf(C[np.ix_(index, index)].T, lower=1)
-    if info != 0:
-        raise ConvergenceError(
-            f"compliance of the {index.size} nodes in contact is not positive definite to "
-            "working precision."
-        )
-    half = solve_triangular(factor, E, lower=True, check_finite=False)
-    return np.asarray(half.T @ half)
 
 
 def _least_opening(arms: FloatArray, gap: FloatArray) -> FloatArray:

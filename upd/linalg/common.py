@@ -42,8 +42,6 @@ class Condensation(Shown):
         u_b (k,) or (k, m) -> u (n,) or (n, m) with u_i = -K_ii^-1 K_ib u_b.
     solver : str
         Name of the solver that ran.
-    seconds : float
-        Wall time.
     factor_nnz : int
         Non-zeros of one triangle of the factor.
     peak_bytes : int
@@ -53,7 +51,6 @@ class Condensation(Shown):
     S: FloatArray
     recover: Solve
     solver: str
-    seconds: float
     factor_nnz: int
     peak_bytes: int
 
@@ -68,8 +65,6 @@ class Factor:
         Right-hand sides (n,) or (n, m) -> K^-1 rhs of the same shape.
     solver : str
         Name of the solver that ran.
-    seconds : float
-        Wall time.
     factor_nnz : int
         Non-zeros of one triangle of the factor.
     peak_bytes : int
@@ -78,7 +73,6 @@ class Factor:
 
     solve: Solve
     solver: str
-    seconds: float
     factor_nnz: int
     peak_bytes: int
 
@@ -124,35 +118,9 @@ def checked_matrix(K: Any) -> csr_array:
             f"A stiffness is a square matrix, this one has shape {shape}: pass rows and "
             "columns of the same dofs."
         )
-    if np.iscomplexobj(K):
-        raise InputError(
-            "The stiffness is complex; these solvers are for real symmetric matrices: pass "
-            "its real part."
-        )
     if _CHECKED in getattr(K, "__dict__", {}):
         return K  # type: ignore[no-any-return]
-    A = csr_array(K, dtype=np.float64)
-    if not A.has_canonical_format:
-        # A copy, because summing duplicates in place would change the caller's matrix.
-        A = A.copy()
-        A.sum_duplicates()
-    bad = ~np.isfinite(A.data)
-    if bad.any():
-        row = int(np.searchsorted(A.indptr, np.argmax(bad), side="right")) - 1
-        raise InputError(
-            f"The stiffness has {bad.sum()} entries that are not finite, the first in row "
-            f"{row}: check mesh and material."
-        )
-    # An entry is a sum over at most as many elements as its row has entries, rounded in another
-    # order below the diagonal.
-    terms = int(np.diff(A.indptr).max())
-    size = max(float(A.data.max(initial=0.0)), -float(A.data.min(initial=0.0)))
-    largest, row, column = largest_skew(A)
-    if largest > 4 * terms * EPS * size:
-        raise InputError(
-            f"The stiffness is not symmetric: K - K' is {largest:.2e} in ({row}, {column}), "
-            f"max|K| is {size:.2e}."
-        )
+    A = symmetric_csr(K, "stiffness")
     diagonal = A.diagonal()
     if not (diagonal > 0.0).all():
         dof = int(np.argmin(diagonal))
@@ -163,6 +131,54 @@ def checked_matrix(K: Any) -> csr_array:
         )
     # A new object on the caller's arrays: the mark is on nothing that he could change the shape of.
     vars(A)[_CHECKED] = True
+    return A
+
+
+def symmetric_csr(K: Any, name: str) -> csr_array:
+    """A real symmetric matrix as a float64 CSR array with sorted indices.
+
+    Parameters
+    ----------
+    K : (n, n) sparse array or array_like
+    name : str
+        What the message calls it.
+
+    Returns
+    -------
+    (n, n) csr_array
+
+    Raises
+    ------
+    InputError
+        When it is complex, not finite or not symmetric.
+    """
+    if np.iscomplexobj(K):
+        raise InputError(
+            f"The {name} is complex; these solvers are for real symmetric matrices: pass its real "
+            "part."
+        )
+    A = csr_array(K, dtype=np.float64)
+    if not A.has_canonical_format:
+        # A copy, because summing duplicates in place would change the caller's matrix.
+        A = A.copy()
+        A.sum_duplicates()
+    bad = ~np.isfinite(A.data)
+    if bad.any():
+        row = int(np.searchsorted(A.indptr, np.argmax(bad), side="right")) - 1
+        raise InputError(
+            f"The {name} has {bad.sum()} entries that are not finite, the first in row {row}: "
+            "check mesh and material."
+        )
+    # An entry is a sum over at most as many elements as its row has entries, rounded in another
+    # order below the diagonal.
+    terms = int(np.diff(A.indptr).max())
+    size = max(float(A.data.max(initial=0.0)), -float(A.data.min(initial=0.0)))
+    largest, row, column = largest_skew(A)
+    if largest > 4 * terms * EPS * size:
+        raise InputError(
+            f"The {name} is not symmetric: its entry ({row}, {column}) and that across the "
+            f"diagonal differ by {largest:.2e}, its largest entry is {size:.2e}."
+        )
     return A
 
 

@@ -71,7 +71,6 @@ def conjugate_gradients(
     accuracy: float,
     max_iterations: int,
     lowest: LowestRitz = UNSEEN,
-    start: FloatArray | None = None,
 ) -> Iterated:
     """Solve K x = b until the bound of the relative error in energy is small enough.
 
@@ -93,8 +92,6 @@ def conjugate_gradients(
     max_iterations : int
     lowest : LowestRitz
         Known so far.
-    start : (n,) ndarray, optional
-        First x; None starts from zero.
 
     Returns
     -------
@@ -114,11 +111,8 @@ def conjugate_gradients(
        from the coefficients) and 6.6 (the norm of its residual).
     .. [3] B. N. Parlett, The Symmetric Eigenvalue Problem, theorem 4.5.1 (an eigenvalue within it).
     """
-    x = np.zeros(len(rhs)) if start is None else start.copy()
-    if not rhs.any():
-        return Iterated(np.zeros(len(rhs)), np.zeros(()), 0, lowest)
+    x, r = np.zeros(len(rhs)), rhs.copy()
     count, before = 0, np.inf
-    r = rhs - product(x) if start is not None else rhs.copy()
     while True:
         z = precondition(r)
         rz = float(r @ z)

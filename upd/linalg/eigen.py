@@ -479,7 +479,7 @@ def _better_shift(found: Modes, sigma: float) -> float:
     # rigid motion.
     seen = found.eigenvalue[found.eigenvalue > _SEEN * abs(sigma)]
     if not seen.size:
-        return _SEEN * sigma if found.first_elastic is not None else sigma
+        return _SEEN * sigma if found.n_rigid < len(found.frequency) else sigma
     first = float(seen[0])
     return sigma if -10.0 * first <= sigma <= -0.01 * first else -first
 

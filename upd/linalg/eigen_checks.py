@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.sparse import csr_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.labels import Shown
-from upd.linalg.common import EPS, FloatArray, largest_skew
+from upd.linalg.common import EPS, FloatArray, symmetric_csr
+from upd.linalg.lanczos import orthonormal
 from upd.linalg.symmetric import Matrix, Symmetric
 
 
@@ -71,12 +71,6 @@ class Modes(Shown):
         out: FloatArray = (2.0 * np.pi * self.frequency) ** 2
         return out
 
-    @property
-    def first_elastic(self) -> float | None:
-        """Smallest eigenvalue that is no rigid motion, (rad/s)^2; None when there is none."""
-        elastic = self.eigenvalue[self.n_rigid :]
-        return float(elastic[0]) if elastic.size else None
-
     def with_proof(self, shown: str, missed: int) -> Modes:
         """The same, with how it was looked for missing modes, and how many are missing."""
         if not missed:
@@ -114,30 +108,13 @@ def checked_mass(M: Any, n: int) -> Matrix:
         raise InputError(
             f"M is {getattr(M, 'shape', None)}, K is {(n, n)}: give both on the same dofs."
         )
-    if isinstance(M, Symmetric):
-        _refuse_no_mass(M.diagonal())
-        return M
-    if np.iscomplexobj(M):
-        raise InputError("M is complex: give a real mass matrix.")
-    A = csr_array(M, dtype=np.float64)
-    if not A.has_canonical_format:
-        A = A.copy()
-        A.sum_duplicates()
-    if not np.isfinite(A.data).all():
-        raise InputError("M has entries that are not finite: check mesh and density.")
-    size = float(np.abs(A.data).max(initial=0.0))
-    skew, _, _ = largest_skew(A)
-    if skew > 4 * max(1, int(np.diff(A.indptr).max())) * EPS * size:
-        raise InputError(f"M is not symmetric: max|M - M'| is {skew:.2e}, max|M| {size:.2e}.")
-    _refuse_no_mass(A.diagonal())
-    return A
-
-
-def _refuse_no_mass(diagonal: FloatArray) -> None:
+    A = M if isinstance(M, Symmetric) else symmetric_csr(M, "mass")
+    diagonal = A.diagonal()
     if not diagonal.any() or (diagonal < 0.0).any():
         raise InputError(
             "M has a negative diagonal entry, or no mass at all: give densities above zero."
         )
+    return A
 
 
 def ritz(
@@ -172,7 +149,9 @@ def ritz(
     ----------
     .. [1] B. N. Parlett, The Symmetric Eigenvalue Problem, ch. 11.
     """
-    Q = _m_orthonormal(M, _m_orthonormal(M, X))
+    Q, _, _ = orthonormal(X, M @ X)
+    # again: the first pass squared the condition
+    Q, _, _ = orthonormal(Q, M @ Q)
     KQ = K @ Q
     value, Y = eigh(Q.T @ KQ)
     X = Q @ Y
@@ -181,21 +160,6 @@ def ritz(
     top = np.abs(X).argmax(axis=0)
     X *= np.where(X[top, np.arange(X.shape[1])] < 0.0, -1.0, 1.0)
     return _measured(K, M, X, value, solver, sigma, K.diagonal() if size is None else size)
-
-
-def _m_orthonormal(M: Matrix, X: FloatArray) -> FloatArray:
-    """Basis of the span of X (n, m) with Q'MQ = 1, by the eigenvectors of its Gram matrix.
-
-    Called twice for full precision.
-    """
-    gram = X.T @ (M @ X)
-    scale = np.sqrt(np.diag(gram))
-    X, scale = X[:, scale > 0.0] / scale[scale > 0.0], scale[scale > 0.0]
-    gram = X.T @ (M @ X)
-    size, V = eigh(0.5 * (gram + gram.T))
-    keep = size > np.sqrt(EPS) * size[-1]
-    out: FloatArray = X @ (V[:, keep] / np.sqrt(size[keep]))
-    return out
 
 
 def _measured(

@@ -11,14 +11,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.sparse import csc_array, csr_array, triu
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+from scipy.sparse import csr_array, triu
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from upd.errors import ConvergenceError
 from upd.linalg.common import FloatArray, Solve, inner_free_error
 from upd.linalg.pardiso import hermitian_pardiso
 from upd.linalg.schur import factorise
 from upd.linalg.select import has_pardiso
+from upd.linalg.superlu import symmetric_lu
 
 ComplexArray = NDArray[np.complex128]
 #: Up to here the dense eigenproblem is as quick.
@@ -69,12 +70,7 @@ def hermitian_factor(K: csr_array) -> Solve:
         upper = csr_array(triu(K, format="csr"))
         upper.sort_indices()
         return hermitian_pardiso(upper)
-    lu = splu(
-        csc_array(K),
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
+    lu = symmetric_lu(K)
     if not (lu.U.diagonal().real > 0.0).all():
         raise inner_free_error(None, np.arange(K.shape[0]), "SuperLU")
     return lambda rhs: np.asarray(lu.solve(np.asarray(rhs, dtype=np.complex128)))

@@ -81,7 +81,7 @@ def block_lanczos(
     n, b = start.shape
     room = min(max(3 * count + 3 * b, 6 * b), n)
     V, H = np.zeros((n, room + b), order="F"), np.zeros((room + b, room + b))
-    block, M_block, _ = _orthonormal(start, M @ start)
+    block, M_block, _ = orthonormal(start, M @ start)
     m = 0
     for step in range(1, max_blocks + 1):
         new = slice(m, m + block.shape[1])
@@ -102,7 +102,7 @@ def block_lanczos(
             MU = M @ U
         H[:m, new], H[new, :m] = C, C.T
         H[new, new] = 0.5 * (C[new] + C[new].T)
-        block, M_block, B = _orthonormal(U, MU, size)
+        block, M_block, B = orthonormal(U, MU, size)
         theta, Y = (a[..., ::-1] for a in eigh(H[:m, :m]))
         k = min(count, m)
         residual = np.linalg.norm(B @ Y[new, :k], axis=0) if block.shape[1] else np.zeros(k)
@@ -120,12 +120,23 @@ def block_lanczos(
     raise AssertionError("the loop returns")
 
 
-def _orthonormal(
+def orthonormal(
     U: FloatArray, MU: FloatArray, size: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """V (n, r), M V and B (r, b) with U = V B and V'MV = 1.
+    """V with U = V B and V'MV = 1.
 
-    Directions that are rounding of columns of M norm `size` (b,) leave.
+    Parameters
+    ----------
+    U, MU : (n, b) ndarray
+        Columns, and their products with M.
+    size : (b,) ndarray, optional
+        M norms of the columns before what is left of them was made: directions that are rounding
+        of it leave.
+
+    Returns
+    -------
+    V, MV : (n, r) ndarray
+    B : (r, b) ndarray
     """
     own = np.sqrt(np.maximum(np.einsum("ij,ij->j", U, MU), 0.0))
     # The rest after cancelling all but eps of a column is noise, not a direction.

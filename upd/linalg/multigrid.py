@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -33,7 +32,7 @@ from upd.linalg.common import FloatArray, checked_vectors, log
 from upd.linalg.conjugate import UNSEEN, block_conjugate_gradients, conjugate_gradients
 from upd.linalg.nodes import STRONG, aggregates, near_neighbours, padded, places, positions
 from upd.linalg.schur import Solved
-from upd.linalg.smoothers import Smoother, block_rows
+from upd.linalg.smoothers import Smoother, in_order
 from upd.linalg.sweeps import WIDTH, Single, symmetric_product, width_of
 from upd.linalg.symmetric import Matrix, Symmetric
 
@@ -185,9 +184,10 @@ def hierarchy(A: Any, modes: FloatArray | None, points: FloatArray | None = None
     for one in fine:
         B = bsr_array(one.A)
         smoother = Smoother(B)
-        P = one.P.astype(np.float32)
-        if smoother.order is not None:
-            P = block_rows(bsr_array(P), smoother.order[::3] // 3)
+        if smoother.order is None:
+            P = one.P.astype(np.float32)
+        else:
+            P = in_order(bsr_array(one.P), smoother.order[::3] // 3)
         levels.append(AggregationLevel(smoother, P, P.T.tocsr() if P.format == "csr" else P.T))
         one.A = one.P = one.R = None
     return Hierarchy(levels, last.A.toarray(), np.any(last.B != 0.0, axis=1), A.shape[0])
@@ -227,7 +227,6 @@ class MultigridSolver:
         points: ArrayLike | None = None,
         max_iterations: int = MAX_ITERATIONS,
     ) -> None:
-        begin = perf_counter()
         n = K.shape[0]
         self._K = K
         modes = None
@@ -243,7 +242,6 @@ class MultigridSolver:
         self._cycle = hierarchy(blocks, B, at)
         self._max_iterations = max_iterations
         self._lowest = UNSEEN
-        self.seconds = perf_counter() - begin
         log.info("multigrid of %d dofs: levels %s", n, self._cycle.sizes)
 
     def _product(self, x: FloatArray) -> FloatArray:
@@ -287,8 +285,8 @@ class MultigridSolver:
             ]
         return found
 
-    def __call__(self, rhs: FloatArray, accuracy: float, start: FloatArray | None = None) -> Solved:
-        """K^-1 rhs to a relative error in energy, from ``start``.
+    def __call__(self, rhs: FloatArray, accuracy: float) -> Solved:
+        """K^-1 rhs to a relative error in energy.
 
         Raises ConvergenceError where it is not reached.
         """
@@ -299,7 +297,6 @@ class MultigridSolver:
             accuracy=accuracy,
             max_iterations=self._max_iterations,
             lowest=self._lowest,
-            start=start,
         )
         self._lowest = found.lowest
         return Solved(found.x, float(found.error), found.iterations)

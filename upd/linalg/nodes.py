@@ -27,14 +27,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import bsr_matrix, csr_array, csr_matrix
 
 from upd.errors import InputError
 from upd.linalg.common import EPS, FloatArray, IntArray
-from upd.linalg.compiled import compiled
-from upd.linalg.sweeps import Index
-from upd.linalg.symmetric import Matrix, Symmetric, submatrix_of, whole
+from upd.linalg.symmetric import Matrix, whole
 
 #: entries above this share of the root of the product of the diagonals are strong, on the first
 #: level that this decides: the one below near neighbours
@@ -77,21 +75,23 @@ def padded(
         B[place] = modes
     if not (n_padded % 3 == 0 and (whole_blocks or whole_nodes(n, modes))):
         return csr_matrix(whole(K)).tobsr(blocksize=(1, 1)), B
+    A = csr_array(whole(K))
     order = np.argsort(place, kind="stable")
     if not np.array_equal(order, np.arange(n)):
-        K = submatrix_of(csr_array(whole(K))[order][:, order].tocsr(), np.arange(n))
-    U = (K if isinstance(K, Symmetric) else Symmetric.of(csr_array(K))).upper
-    rising, nodes = place[order], n_padded // 3
-    first = np.searchsorted(rising, 3 * np.arange(nodes + 1))
-    pointers = count_blocks(U.indptr, U.indices, rising, first, nodes)
-    small = np.int32 if pointers[-1] < np.iinfo(np.int32).max else np.int64
-    columns, blocks = np.empty(pointers[-1], small), np.zeros((int(pointers[-1]), 3, 3))
-    fill_blocks(U.indptr, U.indices, U.data, rising, first, pointers, columns, blocks)
-    missing = np.setdiff1d(np.arange(n_padded), rising)
-    on = np.flatnonzero(columns == np.repeat(np.arange(nodes), np.diff(pointers)))
-    blocks[on[missing // 3], missing % 3, missing % 3] = float(np.median(K.diagonal()))
+        A = csr_array(A[order][:, order])
+    rising = place[order]
+    ends = np.zeros(n_padded + 1, A.indptr.dtype)
+    ends[rising + 1] = np.diff(A.indptr)
+    columns = rising.astype(A.indices.dtype)[A.indices]
     shape = (n_padded, n_padded)
-    return bsr_matrix((blocks, columns, pointers.astype(small)), shape=shape), B
+    found = csr_matrix((A.data, columns, np.cumsum(ends, dtype=ends.dtype)), shape=shape)
+    blocks = found.tobsr(blocksize=(3, 3))
+    blocks.sort_indices()
+    missing = np.setdiff1d(np.arange(n_padded), rising)
+    nodes = np.repeat(np.arange(n_padded // 3), np.diff(blocks.indptr))
+    on = np.flatnonzero(blocks.indices == nodes)
+    blocks.data[on[missing // 3], missing % 3, missing % 3] = float(np.median(K.diagonal()))
+    return blocks, B
 
 
 def whole_nodes(n: int, B: FloatArray | None) -> bool:
@@ -186,86 +186,6 @@ def places(n: int, layout: ArrayLike | None) -> tuple[IntArray, int]:
     others = int((~nodal).sum())
     place[~nodal] = 3 * len(nodes) + np.arange(others)
     return place, 3 * (len(nodes) + -(-others // 3))
-
-
-@compiled
-def count_blocks(indptr: Index, indices: Index, place: Index, first: Index, n: int) -> Index:
-    """Row pointers of a whole symmetric matrix in blocks of 3, from its upper triangle.
-
-    Parameters
-    ----------
-    indptr, indices : ndarray
-        Upper triangle in compressed rows.
-    place : ndarray of int
-        Where each dof goes among the blocks' rows, rising.
-    first : (n + 1,) ndarray of int
-        First dof of each block row.
-    n : int
-        Block rows.
-
-    Returns
-    -------
-    (n + 1,) ndarray of int
-    """
-    counts = np.zeros(n + 1, np.int64)
-    seen = np.full(n, -1, np.int64)
-    for node in range(n):
-        seen[node] = node
-        counts[node + 1] += 1
-        for row in range(first[node], first[node + 1]):
-            for k in range(indptr[row], indptr[row + 1]):
-                other = place[indices[k]] // 3
-                if seen[other] != node:
-                    seen[other] = node
-                    counts[node + 1] += 1
-                    counts[other + 1] += 1
-    return np.cumsum(counts)
-
-
-@compiled
-def fill_blocks(
-    indptr: Index,
-    indices: Index,
-    data: NDArray[np.float64],
-    place: Index,
-    first: Index,
-    pointers: Index,
-    columns: Index,
-    blocks: NDArray[np.float64],
-) -> None:
-    """Block columns and blocks of the whole matrix that `count_blocks` counted.
-
-    Parameters
-    ----------
-    indptr, indices, data, place, first
-        As for `count_blocks`, with the values.
-    pointers : (n + 1,) ndarray of int
-        Its row pointers.
-    columns, blocks : (m,), (m, 3, 3) ndarray
-        Filled; `blocks` come as zeros.
-    """
-    n = len(pointers) - 1
-    cursor = pointers[:-1].copy()
-    seen = np.full(n, -1, np.int64)
-    upper, lower = np.empty(n, np.int64), np.empty(n, np.int64)
-    for node in range(n):
-        seen[node] = node
-        upper[node] = lower[node] = cursor[node]
-        columns[cursor[node]] = node
-        cursor[node] += 1
-        for row in range(first[node], first[node + 1]):
-            a = place[row] % 3
-            for k in range(indptr[row], indptr[row + 1]):
-                column = place[indices[k]]
-                other, b = column // 3, column % 3
-                if seen[other] != node:
-                    seen[other] = node
-                    upper[other], lower[other] = cursor[node], cursor[other]
-                    columns[cursor[node]], columns[cursor[other]] = other, node
-                    cursor[node] += 1
-                    cursor[other] += 1
-                blocks[upper[other], a, b] = data[k]
-                blocks[lower[other], b, a] = data[k]
 
 
 def aggregates(A: bsr_matrix, near: csr_matrix, points: FloatArray) -> csr_matrix:

@@ -138,12 +138,9 @@ class Solver(Protocol):
     Attributes
     ----------
     name : str
-    seconds : float
-        Of its set-up.
     """
 
     name: str
-    seconds: float
 
     def __call__(self, rhs: FloatArray, accuracy: float) -> Solved:
         """K^-1 rhs to a relative error in energy.
@@ -178,7 +175,6 @@ class DirectSolver:
         self._K = K
         self._factor = factorise(K, solver=name)
         self.name = self._factor.solver
-        self.seconds = self._factor.seconds
 
     def __call__(self, rhs: FloatArray, accuracy: float) -> Solved:
         """K^-1 rhs; raises ConvergenceError where the relative error in energy is larger."""

@@ -22,10 +22,8 @@ References
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from scipy.sparse import bsr_array
+from scipy.sparse import bsr_array, csr_array
 
 from upd.errors import ConvergenceError
 from upd.linalg.common import EPS, FloatArray, IntArray
@@ -61,7 +59,8 @@ class Smoother:
         if size == 3:
             nodes, starts = find_lines(A)
             self.order = (3 * nodes[:, None] + np.arange(3)).ravel()
-        self._A = indptr, indices, data = in_line_order(A.indptr, A.indices, A.data, nodes)
+        self._A = in_order(A, nodes, nodes)
+        indptr, indices, data = self._A.indptr, self._A.indices, self._A.data
         row = np.repeat(np.arange(n), np.diff(indptr))
         own = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
         begin, end = (np.asarray(bounds, np.int64) for bounds in (indptr[:-1], indptr[1:]))
@@ -98,8 +97,7 @@ class Smoother:
 
     def residual(self, b: Single, x: Single) -> Single:
         """b - A x, both in the smoother's order."""
-        indptr, indices, data = self._A
-        found: Single = b - bsr_array((data, indices, indptr), shape=(len(b), len(b))) @ x
+        found: Single = b - self._A @ x
         return found
 
 
@@ -154,24 +152,27 @@ def _inverses(blocks: FloatArray) -> FloatArray:
     return found
 
 
-def block_rows(M: bsr_array, order: IntArray) -> bsr_array:
-    """Block rows of a matrix in another order.
+def in_order(A: bsr_array, rows: IntArray, columns: IntArray | None = None) -> bsr_array:
+    """Rows, and columns, of a matrix of blocks in another order, in single precision.
 
     Parameters
     ----------
-    M : bsr_array
-    order : (n,) ndarray of int
+    A : bsr_array
+    rows, columns : (n,) ndarray of int
+        Columns of a row then rise; None: they stay.
 
     Returns
     -------
     bsr_array
     """
-    counts = np.diff(M.indptr)[order]
-    pointers = np.concatenate([[0], np.cumsum(counts)]).astype(M.indptr.dtype)
-    taken = np.arange(pointers[-1]) + np.repeat(M.indptr[order] - pointers[:-1], counts)
-    return bsr_array(
-        (M.data[taken], M.indices[taken], pointers), shape=M.shape, blocksize=M.blocksize
-    )
+    # blocks by their numbers, from 1: a zero would be no entry
+    shape = tuple(np.array(A.shape) // A.blocksize)
+    at = csr_array((np.arange(1, len(A.indices) + 1), A.indices, A.indptr), shape=shape)[rows]
+    if columns is not None:
+        at = csr_array(at[:, columns])
+        at.sort_indices()
+    blocks = A.data.astype(np.float32)[at.data - 1]
+    return bsr_array((blocks, at.indices, at.indptr), shape=A.shape)
 
 
 def find_lines(A: bsr_array) -> tuple[IntArray, IntArray]:
@@ -316,44 +317,3 @@ def _in_order(beside: Index, indptr: Index, indices: Index) -> tuple[Index, Inde
             before, end = end, after
     starts[lines] = n
     return order, starts[: lines + 1].copy()
-
-
-@compiled
-def in_line_order(
-    indptr: Index, indices: Index, data: Any, order: Index
-) -> tuple[Index, Index, Single]:
-    """Rows and columns of a symmetric matrix of blocks in another order, in single precision.
-
-    Row by row of A in the new order, which is column by column: so the columns of each row come
-    in their order, and a column's blocks are those of the row, transposed.
-
-    Parameters
-    ----------
-    indptr, indices, data : (n + 1,), (m,), (m, b, b) ndarray
-        In compressed rows.
-    order : (n,) ndarray of int
-
-    Returns
-    -------
-    indptr, indices, data : ndarray
-        Columns of a row rise.
-    """
-    n, size = len(order), data.shape[1]
-    place = np.empty(n, indices.dtype)
-    pointers, columns = np.empty_like(indptr), np.empty_like(indices)
-    blocks = np.empty(data.shape, np.float32)
-    pointers[0] = 0
-    for at in range(n):
-        place[order[at]] = at
-        pointers[at + 1] = pointers[at] + indptr[order[at] + 1] - indptr[order[at]]
-    free = pointers[:-1].copy()
-    for at in range(n):
-        row = order[at]
-        for k in range(indptr[row], indptr[row + 1]):
-            to = place[indices[k]]
-            columns[free[to]] = at
-            for a in range(size):
-                for b in range(size):
-                    blocks[free[to], a, b] = data[k, b, a]
-            free[to] += 1
-    return pointers, columns, blocks

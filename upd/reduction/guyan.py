@@ -46,7 +46,7 @@ class Condensed(Condensation):
         N/mm, symmetric positive definite stiffness at the kept dofs; loads elsewhere are zero.
     recover : callable
         u_kept (k,) or (k, m) -> u (n,) or (n, m), all dofs of K, by one back-substitution.
-    solver, seconds
+    solver
         As of `Condensation`.
     factor_nnz, peak_bytes : int
         Size of the factorisation (0 with multigrid: not known).
@@ -206,7 +206,7 @@ def _by_multigrid(
         )
 
     found.C.flags.writeable = False
-    return Condensed(S, recover, "amg", found.seconds, 0, 0, A.shape[0], [found.C])
+    return Condensed(S, recover, "amg", 0, 0, A.shape[0], [found.C])
 
 
 def inverse_definite(S: FloatArray) -> FloatArray:
@@ -385,4 +385,4 @@ def _revived(
     n_dof, nnz, peak = (int(v) for v in arrays["sizes"])
     C = arrays["C"]
     C.flags.writeable = False
-    return Condensed(arrays["S"], recover, str(arrays["solver"]), 0.0, nnz, peak, n_dof, [C])
+    return Condensed(arrays["S"], recover, str(arrays["solver"]), nnz, peak, n_dof, [C])

@@ -98,7 +98,7 @@ class LearnedCompliance:
         if start.shape != (k, k):
             raise InputError(f"The approximate compliance is {start.shape}: give ({k}, {k}).")
         self.n_dof = n_dof
-        self.solver, self.seconds = solver.name, solver.seconds
+        self.solver = solver.name
         self._P, self._Z, self._Y = (np.zeros((k, 0)) for _ in range(3))
         self._fields: list[FloatArray] = []
         self._errors: list[float] = []

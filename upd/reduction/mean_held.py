@@ -153,9 +153,7 @@ def condense_held_in_mean(
         moved: FloatArray = u - R @ np.linalg.solve(mean.T, W.T @ u)
         return moved
 
-    return Condensed(
-        S, recover, found.solver, found.seconds, found.factor_nnz, found.peak_bytes, n, [C]
-    )
+    return Condensed(S, recover, found.solver, found.factor_nnz, found.peak_bytes, n, [C])
 
 
 def _support(R: FloatArray, candidates: IntArray) -> IntArray:

@@ -266,7 +266,7 @@ def _misfit(divisions: int) -> float:
     f = normal_contact(model.compliance(NORMAL), model.gap, load=2.0).force
 
     def surface(body: Any) -> np.ndarray:
-        u = np.column_stack([body.side * (model.body_compliance(body, k, 2) @ f) for k in range(3)])
+        u = np.column_stack([body.side * (model.compliance(k, 2, body) @ f) for k in range(3)])
         return np.asarray(body.mesh.points[body.contact[model.multipliers.nodes]] + u)
 
     upper, lower = surface(model.upper), surface(model.lower)

@@ -305,7 +305,6 @@ def law() -> dict[str, Any]:
         k_t=np.ones((2, 2)),
         preload=one,
         area=one,
-        source_tilt=np.ones(2),
     )
     return dict(found.to_arrays())
 

@@ -34,7 +34,7 @@ from upd.contact.products import (
     centre,
     energy_error,
     half_space_start,
-    learning,
+    learners,
     normal_contact_by_products,
 )
 from upd.errors import MeshError
@@ -275,17 +275,14 @@ def pressed(
 
 def learns(model: ContactModel) -> bool:
     """Whether a body's compliance is learned."""
-    bodies = (model.upper, model.lower)
-    return any(learning(b, family) is not None for b in bodies for family in b.condensed)
+    return any(learners(model, family) for family in model.upper.condensed)
 
 
 def product_checks(
     model: ContactModel, case: Case, components: Sequence[int], force: Array
 ) -> list[Check]:
     """The bound of the error that products leave in the forces (n_component n,) of a case."""
-    found = [
-        one for b in (model.upper, model.lower) if (one := learning(b, components)) is not None
-    ]
+    found = [one for _, one in learners(model, components)]
     if not found or not force.any():
         return []
     products = ", ".join(

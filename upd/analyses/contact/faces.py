@@ -141,7 +141,6 @@ def measured(solution: ContactSolution, answer: NormalContact, load: float) -> C
         sum(float(k.area()[f > 0.0].sum()) for k, f in zip(faces, forces, strict=True)),
         float(pressure.max()),
         load / located.area if located.area else 0.0,
-        sum(int((f > 0.0).sum()) for f in forces),
         located.resolution,
     )
 

@@ -165,7 +165,7 @@ def displaced_gap(model: ContactModel, force: Array) -> Array:
     slope = np.zeros((len(force), 2))
     places = model.multipliers.nodes
     pushed = {
-        b.name: b.side * (model.body_compliance(b, NORMAL) @ force)
+        b.name: b.side * (model.compliance(NORMAL, body=b) @ force)
         for b in (model.upper, model.lower)
     }
     height = 0.5 * sum(

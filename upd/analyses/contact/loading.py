@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,6 @@ from upd.contact.coulomb_conditions import STICK
 from upd.contact.coupled import CoupledContact, coupled_contact
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import NormalContact
-from upd.contact.tangential import TangentialPath
 from upd.errors import ConvergenceError
 from upd.results import Case
 
@@ -72,11 +70,8 @@ def tangential_compliance(
     of one.
     """
     pick = np.ix_(loaded, loaded)
-
-    def one(i: int, j: int) -> Array:
-        return (model.compliance(i, j) if body is None else model.body_compliance(body, i, j))[pick]
-
-    return np.block([[one(i, j) for j in components] for i in components])
+    rows = [[model.compliance(i, j, body)[pick] for j in components] for i in components]
+    return np.block(rows)
 
 
 # -- tangential force over displacement ------------------------------------------------------------
@@ -144,38 +139,15 @@ class Sheared:
     terms: Array | float = 0.0
 
 
-def load_history(values: Array, unit: Array) -> Array:
-    """(n_step,) loads along one component, or (n_step, 2) along ``unit`` (2,)."""
-    return np.outer(values, unit) if len(unit) == 2 else values
-
-
-def along(path: TangentialPath, unit: Array, copies: int) -> tuple[Array, Array]:
-    """Load of the whole contact in N and displacement in mm along ``unit`` (1 or 2,), from zero
-    on.
+def cycle_shares(steps: int, loops: int) -> tuple[Array, int]:
+    """Loads of a cycle over its peak, the first loading and so many loops, and how many of them are
+    before the last loop.
     """
-    load, moved = (
-        np.asarray(v).reshape(len(path.load), len(unit)) @ unit
-        for v in (path.load, path.displacement)
-    )
-    return np.insert(copies * load, 0, 0.0), np.insert(moved, 0, 0.0)
-
-
-def cycle_shares(steps: int) -> tuple[Array, int]:
-    """Loads of a cycle over its peak, and how many of them are the first loading."""
     quarter = max(2, steps // 5)
     half = (steps - quarter) // 2
-    legs: list[Any] = [
-        np.linspace(0.0, 1.0, quarter + 1),
-        np.linspace(1.0, -1.0, half + 1),
-        np.linspace(-1.0, 1.0, half + 1),
-    ]
-    return np.concatenate([leg[1:] for leg in legs]), quarter
-
-
-def closed_loop(case: Case, normal: Case, T: Array, d: Array, work: float, begin: int) -> LoadPath:
-    """The path of a cycle whose closed loop begins at a step; ``work`` of slip over it, N mm."""
-    area = abs(float(np.trapezoid(T[begin:], d[begin:])))
-    return LoadPath(case, normal, T, d, True, work, area)
+    back, forth = np.linspace(1.0, -1.0, half + 1)[1:], np.linspace(-1.0, 1.0, half + 1)[1:]
+    first = np.linspace(0.0, 1.0, quarter + 1)[1:]
+    return np.concatenate([first, *(back, forth) * loops]), quarter + 2 * half * (loops - 1)
 
 
 # -- normal and tangential contact at once ---------------------------------------------------------
@@ -293,7 +265,7 @@ def pressed_by(model: ContactModel, body: Body, force: Array) -> float:
     """
     f = force[:, 0]
     moved = sum(
-        (model.body_compliance(body, NORMAL, c) @ force[:, k] for k, c in enumerate(COMPONENTS)),
+        (model.compliance(NORMAL, c, body) @ force[:, k] for k, c in enumerate(COMPONENTS)),
         np.zeros(len(f)),
     )
     return float(f @ moved) / float(f.sum())
@@ -331,7 +303,7 @@ def shear_nodes(model: ContactModel, friction: float, state: CoupledState) -> Sh
     )
 
 
-def _loads(base: CoupledState, values: Array, unit: Array) -> Array:
+def loads_along(base: CoupledState, values: Array, unit: Array) -> Array:
     """The normal load of a state with tangential ones (k,) in N along ``unit`` (2,)."""
     out = np.zeros((len(values), len(base.motion)))
     out[:, 0] = base.found.load[-1, 0]
@@ -354,7 +326,7 @@ def sheared(
     now, states = base, []
     for T in values:
         try:
-            found = now.found.go_on(load=_loads(base, np.array([T]), unit))
+            found = now.found.go_on(load=loads_along(base, np.array([T]), unit))
         except ConvergenceError:
             if needed >= T:
                 raise
@@ -363,23 +335,3 @@ def sheared(
         states.append(now)
     start = base.motion[1:3]
     return states, np.array([(one.motion[1:3] - start) @ unit for one in states])
-
-
-def coupled_loop(
-    case: Case, normal: Case, base: CoupledState, *, peak: float, steps: int, unit: Array
-) -> LoadPath:
-    """First loading to ``peak`` in N, then +peak -> -peak -> +peak twice, the normal load kept.
-
-    The first of both loops does not close: shear settles what the pressure left, and the approach
-    with it. Friction's work of the second, by the mean tractions of each step.
-    """
-    shares, quarter = cycle_shares(steps)
-    shares, quarter = np.concatenate([shares, shares[quarter:]]), len(shares)
-    found = base.found.go_on(load=_loads(base, peak * shares, unit))
-    d = np.insert((found.displacement[:, 1:3] - base.motion[1:3]) @ unit, 0, 0.0)
-    shear = np.concatenate([base.force[None, :, 1:], found.force[..., 1:]])
-    slip = np.concatenate([base.found.slip[-1:], found.slip])
-    mean = 0.5 * (shear[1:] + shear[:-1])
-    work = (mean * np.diff(slip, axis=0)).sum(axis=(1, 2))
-    T = np.insert(peak * shares, 0, 0.0)
-    return closed_loop(case, normal, T, d, float(work[quarter:].sum()), quarter)

@@ -202,7 +202,7 @@ def _of_faces(solution: ContactSolution, case: NormalCase) -> list[Result]:
             # f . (h + C f - d e) = 0, so the approach is the sum of the bodies' energies over the
             # load (and of the gaps closed).
             f, total = answer.force, float(answer.force.sum())
-            taken = float(f @ model.body_compliance(body, NORMAL) @ f) / total if total else 0.0
+            taken = float(f @ model.compliance(NORMAL, body=body) @ f) / total if total else 0.0
         else:
             taken = pressed_by(model, body, case.state.force)
         out.append(q.APPROACH_OF.of(taken, at, n=body.name))

@@ -147,7 +147,7 @@ def press(
         show_normal(model, loads)
 
     def compliance() -> Array:
-        return model.compliance(NORMAL) if body is None else model.body_compliance(body, NORMAL)
+        return model.compliance(NORMAL, body=body)
 
     if arms.size:
         found, free = [], (0 not in plan.mirrors, 1 not in plan.mirrors)
@@ -266,6 +266,9 @@ def _sheared(solution: ContactSolution, case: NormalCase, direction: float, shar
 class Frozen:
     """Tangential loads along a direction that leave the normal forces as they are."""
 
+    #: of a cycle
+    loops = 1
+
     def __init__(self, solution: ContactSolution, case: NormalCase, direction: float) -> None:
         scene, force = solution.plan.scene, case.solution.force
         self.solution, self.case, self.direction = solution, case, direction
@@ -323,14 +326,24 @@ class Frozen:
                 of[body.name] = self._moved(C)[1]
         return self._moved(self.compliance)[1], of
 
-    def march(self, ratios: Array) -> Marched:
-        """Shares of mu N one after the other.
+    def _path(self, shares: Array) -> TangentialPath:
+        """Shares of mu N one after the other, from no slip."""
+        values = shares * self.total
+        loads = np.outer(values, self.unit) if len(self.unit) == 2 else values
+        return tangential_path(self.compliance, self.limit, loads=loads)
 
-        ``history``: before the first; None starts from no slip.
+    def _along(self, path: TangentialPath) -> tuple[Array, Array]:
+        """Load of the whole contact in N and displacement in mm along the direction, from zero
+        on.
         """
-        loads = loading.load_history(ratios * self.total, self.unit)
-        path = tangential_path(self.compliance, self.limit, loads=loads)
-        return *loading.along(path, self.unit, self.copies), partial(self._at, path)
+        shape = len(path.load), len(self.unit)
+        load, moved = (v.reshape(shape) @ self.unit for v in (path.load, path.displacement))
+        return np.insert(self.copies * load, 0, 0.0), np.insert(moved, 0, 0.0)
+
+    def march(self, ratios: Array) -> Marched:
+        """Shares of mu N one after the other."""
+        path = self._path(ratios)
+        return *self._along(path), partial(self._at, path)
 
     def _at(self, path: TangentialPath, k: int, ratio: float) -> TangentialCase:
         before = path.slip[k - 1] if k else np.zeros(len(self.compliance))
@@ -343,21 +356,20 @@ class Frozen:
         K = np.atleast_2d(path.stiffness[k])
         return self._found(ratio, float(d @ self.unit), K, fields, nodes)
 
-    def cycle(self, case: Case) -> loading.LoadPath:
-        """The full cycle, first loading and the closed loop.
-
-        ``history``: before the first step; None starts from no slip.
+    def loop(self, shares: Array) -> tuple[Array, Array, Array]:
+        """Load in N and displacement in mm along the direction, from zero on, and the work of slip
+        in each step, N mm.
         """
-        path, quarter = self._cycle_path()
-        T, d = loading.along(path, self.unit, self.copies)
-        work = self.copies * float(np.sum(path.slip_work[quarter:]))
-        return loading.closed_loop(case, self.case.case, T, d, work, quarter)
+        path = self._path(shares)
+        return *self._along(path), self.copies * path.slip_work
 
-    def _cycle_path(self) -> tuple[TangentialPath, int]:
-        shares, quarter = loading.cycle_shares(self.loads.cycle_steps)
-        values = loading.load_history(self.loads.cycle_amplitude * self.total * shares, self.unit)
-        path = tangential_path(self.compliance, self.limit, loads=values)
-        return path, quarter
+    def cycle(self, case: Case) -> loading.LoadPath:
+        """First loading to +T*, then closed loops +T* -> -T* -> +T*, of which the last counts."""
+        shares, begin = loading.cycle_shares(self.loads.cycle_steps, self.loops)
+        T, d, work = self.loop(self.loads.cycle_amplitude * shares)
+        area = abs(float(np.trapezoid(T[begin:], d[begin:])))
+        slip_work = float(work[begin:].sum())
+        return loading.LoadPath(case, self.case.case, T, d, True, slip_work, area)
 
     def learn(self) -> None:
         """Show bodies that learn the tractions of every tangential load and of the cycle.
@@ -393,7 +405,8 @@ class Frozen:
         for ratio in scene.loads.tangential if scene.wants("tangential") else ():
             settled(model, self.components, partial(single, ratio * self.total * self.unit), both)
         if scene.wants("cycle"):
-            shown(lambda: self._cycle_path()[0].force.T)
+            shares, _ = loading.cycle_shares(self.loads.cycle_steps, self.loops)
+            shown(lambda: self._path(self.loads.cycle_amplitude * shares).force.T)
 
     def _spread(self, values: Array) -> Array:
         """(n, 1 or 2) of values at the loaded nodes."""
@@ -404,6 +417,9 @@ class Frozen:
 
 class _Coupled(Frozen):
     """The same with normal and tangential contact at once: the pressure follows the shear."""
+
+    #: the first does not close: shear settles what the pressure left, and the approach with it
+    loops = 2
 
     def __init__(self, solution: ContactSolution, case: NormalCase, direction: float) -> None:
         super().__init__(solution, case, direction)
@@ -438,9 +454,9 @@ class _Coupled(Frozen):
         fields = state.force[:, 1:], slip
         return self._found(ratio, float(moved[k]), state.shear_stiffness, fields, nodes, state)
 
-    def cycle(self, case: Case) -> loading.LoadPath:
-        """The full cycle; friction remembers the normal load."""
-        peak, steps = self.loads.cycle_amplitude * self.total, self.loads.cycle_steps
-        return loading.coupled_loop(
-            case, self.case.case, self.state, peak=peak, steps=steps, unit=self.unit
-        )
+    def loop(self, shares: Array) -> tuple[Array, Array, Array]:
+        """The same; friction remembers the normal load."""
+        values, before = shares * self.total, self.state.found.history
+        found = self.state.found.go_on(load=loading.loads_along(self.state, values, self.unit))
+        moved = (found.displacement[:, 1:3] - before.motion[1:3]) @ self.unit
+        return np.insert(values, 0, 0.0), np.insert(moved, 0, 0.0), found.friction_loss(before)

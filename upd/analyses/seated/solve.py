@@ -57,16 +57,8 @@ class Phase(Way):
 
     @property
     def friction_loss(self) -> Array:
-        """(k,) N mm that friction took in each step of the model: mean tractions over their slips.
-
-        The mean over a step is what the work of all forces balances with; the traction after the
-        step alone is off by the step's share.
-        """
-        before, found = self.before, self.found
-        tractions = np.concatenate((before.force[None, :, 1:], found.force[..., 1:]))
-        slips = np.concatenate((before.slip[None], found.slip))
-        mean = 0.5 * (tractions[1:] + tractions[:-1])
-        return np.asarray((mean * np.diff(slips, axis=0)).sum(axis=(1, 2)))
+        """(k,) N mm that friction took in each step of the model."""
+        return self.found.friction_loss(self.before)
 
 
 @dataclass
