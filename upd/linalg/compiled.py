@@ -41,6 +41,11 @@ def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     return compiled(function, forceinline=True)
 
 
+def joined(function: Callable[..., Any]) -> Callable[..., Any]:
+    """As `inlined`, for long functions: they are not compiled by themselves as well."""
+    return compiled(function, inline="always")
+
+
 def compiled(function: Callable[..., Any], **more: Any) -> Callable[..., Any]:
     """The function compiled by numba, cached on disk.
 
