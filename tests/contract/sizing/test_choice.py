@@ -299,7 +299,7 @@ def test_a_grid_of_one_of_several(
         for_=FORCE,
         overrides=TOY,
     ).found
-    grid = runs.check_by_grid(one, 2, tmp_path / "grid", workers=0)
+    grid = runs.check_by_grid(one, 3, tmp_path / "grid", workers=0)
     assert grid.path == "damper.centrifugal"
     assert runs.grid_scene(one).contact.friction == pytest.approx(one.best.values[0])
     told = [math.exp(one.best.worst.solved(math.log(F_C))) for F_C in grid.values]
