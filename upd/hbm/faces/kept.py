@@ -446,8 +446,6 @@ def given_blades(  # type: ignore[no-untyped-def]
     f, y, state = np.empty(3 * n), np.empty(3 * n), np.empty(n, np.int64)
     node, before = (f, y, state), (np.empty(3 * n), np.empty(3 * n), np.empty(n, np.int64))
     z, b, pull = np.empty(r), np.empty(r), np.empty(r)
-    # a bare 0 is a type of its own: all that takes it would be compiled once more
-    one = np.int64(0)
     for j in range(first, N):
         for i in range(r):
             z[i] = s[0, i] + s[1, i]
@@ -466,7 +464,8 @@ def given_blades(  # type: ignore[no-untyped-def]
             fetch_row(F, max(j - 1, 0), before[0])
             fetch_row(Y, max(j - 1, 0), before[1])
             fetch_row(S, max(j - 1, 0), before[2])
-            used = solve_sample(j, x0, bases, one, law, node, before, known, past, scratch)
+            # a bare 0 is a type of its own: all that takes it would be compiled once more
+            used = solve_sample(j, x0, bases, np.int64(0), law, node, before, known, past, scratch)
             if used < 0:
                 return j
             put_row(f, F, j)
