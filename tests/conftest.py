@@ -28,9 +28,12 @@ settings.load_profile("same")
 #: Workers of a plain ``pytest``. More need more memory than a laptop has; ``pytest -n 8`` is
 #: obeyed.
 WORKERS = 2
-#: Files of tens of seconds: begun first, no worker is left with one of them at the end.
+#: Files that compile most loops, of the faces and of the springs: one begins each worker, so that
+#: none compiles what the other does.
+COMPILING = ("test_interface_balance", "test_choice")
+#: Files of tens of seconds: begun then, no worker is left with one of them at the end.
 LONG = {
-    *("test_choice", "test_readme", "test_fit", "test_measured_fit", "test_sweep_faults"),
+    *("test_readme", "test_fit", "test_measured_fit", "test_sweep_faults"),
     *("test_default_estimates", "test_response_estimates", "test_input_effects", "test_answer"),
     *("test_study_faults", "test_scene_studies", "test_report", "test_report_browser"),
     *("test_interface_march", "test_forced_scene", "test_contact_left_out", "test_doctests"),
@@ -83,9 +86,10 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Workers take the long files first."""
+    """Workers take the files that compile first, then the long ones."""
+    order = {name: k for k, name in enumerate(COMPILING)} | dict.fromkeys(LONG, len(COMPILING))
     if "PYTEST_XDIST_WORKER" in os.environ:
-        items.sort(key=lambda item: item.path.stem not in LONG)
+        items.sort(key=lambda item: order.get(item.path.stem, len(order)))
 
 
 def pytest_configure(config: pytest.Config) -> None:

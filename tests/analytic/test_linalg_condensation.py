@@ -148,7 +148,7 @@ def test_compliance_is_computed_once_and_protected():
     C = found.compliance()
     assert found.compliance() is C
     assert np.array_equal(C, C.T)
-    np.testing.assert_allclose(C @ found.S, np.eye(found.n_kept), atol=1e-11)
+    np.testing.assert_allclose(C @ found.S, np.eye(len(C)), atol=1e-11)
     with pytest.raises(ValueError, match="read-only"):
         C[0, 0] = 1.0
 

@@ -280,11 +280,11 @@ def no_figures(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Path]]:
 
 @pytest.mark.usefixtures("no_figures")
 def test_mutated_scenes_are_answered_or_refused(tmp_path: Path) -> None:
-    count = fuzz(300, 30, 4, SEED, tmp_path)
-    assert count["refused"] + count["planned"] >= 300
-    assert count["run"] == 30, count
+    count = fuzz(150, 15, 2, SEED, tmp_path)
+    assert count["refused"] + count["planned"] >= 150
+    assert count["run"] == 15, count
     # The set is worth nothing when all of it is refused, or nothing is.
-    assert count["refused"] > 60 and count.get("ok", 0) > 5, count
+    assert count["refused"] > 30 and count.get("ok", 0) > 2, count
 
 
 @pytest.mark.full

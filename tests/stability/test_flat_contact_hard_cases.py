@@ -203,7 +203,7 @@ def test_a_distant_set_of_one_node_is_refused() -> None:
         free = np.setdiff1d(np.arange(3 * mesh.n_node), (3 * nodes[:, None] + np.arange(3)).ravel())
         kept = np.searchsorted(free, 3 * mesh.nodes["z1"] + 2)
         if holds:
-            assert condense(K[free][:, free], kept).n_kept == 16
+            assert len(condense(K[free][:, free], kept).S) == 16
         else:
             with pytest.raises(ConvergenceError, match="floats"):
                 condense(K[free][:, free], kept)

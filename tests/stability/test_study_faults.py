@@ -91,6 +91,9 @@ def test_ladder_gives_the_same_numbers_whoever_solves_it(
     processes = {one.outcome.where for one in found.solved}
     assert f":{os.getpid()}" not in {where[where.index(":") :] for where in processes}
     assert len(processes) == (len(LEVELS) if "workers" in who else 2)
+    # nothing is taken from other points: a study measures
+    assert not any(one.outcome.shared for one in found.solved)
+    assert found.solved[0].outcome.memory_mb > 50.0
     assert not active_children()
 
 

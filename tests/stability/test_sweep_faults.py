@@ -21,6 +21,7 @@ from typing import Any
 import pytest
 
 from upd import load_scene
+from upd.batch import engine
 from upd.batch import store as point_store
 from upd.batch.engine import ATTEMPTS, Job, Progress, dispatch
 from upd.batch.point import OTHER_CODE, Task, solve_task
@@ -47,9 +48,7 @@ count = sphere_block.count
 
 
 def build(params: sphere_block.SphereBlock):
-    once, mended = Path({once!r}), Path({mended!r})
-    if params.radius > 5.9 and not mended.exists() or params.radius > 5.5 and not once.exists():
-        once.touch()
+    if params.radius > 5.5 and not Path({mended!r}).exists():
         os.kill(os.getpid(), signal.SIGKILL)
     return sphere_block.build(params)
 """
@@ -76,15 +75,11 @@ def quiet(tmp_path_factory: pytest.TempPathFactory) -> list[list[str]]:
 
 
 def deadly(tmp_path: Path) -> dict[str, Any]:
-    """A scene whose recipe kills its process.
-
-    Above 5.5 mm radius the first time, above 5.9 mm until the file "mended" is there.
+    """A scene whose recipe kills its process above 5.5 mm radius until the file "mended" is
+    there.
     """
     recipe = tmp_path / "deadly.py"
-    recipe.write_text(
-        RECIPE.format(once=str(tmp_path / "once"), mended=str(tmp_path / "mended")),
-        encoding="utf-8",
-    )
+    recipe.write_text(RECIPE.format(mended=str(tmp_path / "mended")), encoding="utf-8")
     return {**TINY, "geometry.recipe": str(recipe)}
 
 
@@ -109,22 +104,23 @@ def test_worker_killed_in_mid_sweep_loses_nothing(tmp_path: Path, quiet: list[li
     assert not active_children()
 
 
-def test_points_that_kill_their_workers(tmp_path: Path) -> None:
-    """Killed once: run again.
+def test_a_point_that_kills_its_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A row, tried again by the next call; the others as if nothing had happened.
 
-    Killed always: a row, tried again by the next call. The others: as if nothing had happened.
+    One that is killed once: `test_worker_killed_in_mid_sweep_loses_nothing`.
     """
-    vary = ["geometry.radius=5 mm,5.8 mm,6 mm"]
+    # every attempt starts a process
+    monkeypatch.setattr(engine, "ATTEMPTS", 2)
+    vary = ["geometry.radius=5 mm,6 mm"]
     scene = deadly(tmp_path)
     found = sweep("hertz", vary, overrides=scene, out=tmp_path / "s", workers=1)
-    assert (tmp_path / "once").exists()
-    assert found.failed == [2]
-    assert f"killed {ATTEMPTS} times" in found.outcomes[2].failure
-    assert "--workers" in table(tmp_path / "s")[3][-2]
-    assert len(list((tmp_path / "s" / "points").iterdir())) == 2
+    assert found.failed == [1]
+    assert "killed 2 times" in found.outcomes[1].failure
+    assert "--workers" in table(tmp_path / "s")[2][-2]
+    assert len(list((tmp_path / "s" / "points").iterdir())) == 1
     (tmp_path / "mended").touch()
     again = sweep("hertz", vary, overrides=scene, out=tmp_path / "s", workers=0)
-    assert sorted(again.plan.kept) == [0, 1]
+    assert sorted(again.plan.kept) == [0]
     assert not again.failed
 
 
@@ -271,9 +267,7 @@ def test_cluster_with_a_worker_killed_gives_the_same_table(
 def test_cluster_that_goes_away_is_told_and_what_was_solved_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from upd.batch import engine as module
-
-    monkeypatch.setattr(module, "PATIENCE_S", 1.0)
+    monkeypatch.setattr(engine, "PATIENCE_S", 1.0)
     with cluster(tmp_path, 1) as (address, workers):
 
         def kill(progress: Progress) -> None:
@@ -300,9 +294,7 @@ def test_cluster_that_goes_away_is_told_and_what_was_solved_is_kept(
 def test_bad_cluster_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, address: str, told: str
 ) -> None:
-    from upd.batch import engine as module
-
-    monkeypatch.setattr(module, "PATIENCE_S", 1.0)
+    monkeypatch.setattr(engine, "PATIENCE_S", 1.0)
     with pytest.raises(InputError, match=told):
         sweep("hertz", VARY, overrides=TINY, out=tmp_path, cluster=address)
 

@@ -259,7 +259,7 @@ def run_study(
     planned: Study,
     folder: Path,
     *,
-    workers: Workers | None = None,
+    workers: Workers,
     watch: Watcher | None = None,
 ) -> StudyResult:
     """Solve the points that ``folder`` does not hold yet, and leave the study's tables and figures
@@ -271,7 +271,7 @@ def run_study(
     Parameters
     ----------
     workers
-        From `study_workers`; None: one fresh process after the other.
+        From `study_workers`.
 
     Raises
     ------
@@ -281,14 +281,13 @@ def run_study(
         Disk full, cluster gone: what was there stays.
     """
     begin = time.perf_counter()
-    who = Workers(threads=0, fresh=True) if workers is None else workers
     store = PointStore(folder, "study")
     code = source_digest(scene.recipe)
     points = planned.points
-    tasks = [point_task(point, scene, who.threads, code) for point in points]
+    tasks = [point_task(point, scene, workers.threads, code) for point in points]
     with store.sole():
         known = store.finished(tasks)
-        batch = Batch(tasks, who, known, lambda k: f"{points[k].source} {points[k].label}")
+        batch = Batch(tasks, workers, known, lambda k: f"{points[k].source} {points[k].label}")
         outcomes = run_points(batch, store, watch=watch)
         solved = tuple(
             SolvedPoint(point, outcome) for point, outcome in zip(points, outcomes, strict=True)

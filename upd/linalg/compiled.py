@@ -16,7 +16,7 @@ import re
 import shutil
 import sys
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -30,15 +30,6 @@ _FunctionCache: Any = FunctionCache
 
 _ROOT = Path(__file__).resolve().parents[2]
 _IMPORT = re.compile(r"^\s*(?:from|import) (upd[\w.]*)", re.MULTILINE)
-
-
-def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-    """As `compiled`, built into every compiled function that calls it.
-
-    For what takes less than some hundred nanoseconds: a call counts references to every array it is
-    given, one atomic instruction each way.
-    """
-    return compiled(function, forceinline=True)
 
 
 def compiled(function: Callable[..., Any], **more: Any) -> Callable[..., Any]:
@@ -67,6 +58,14 @@ def compiled(function: Callable[..., Any], **more: Any) -> Callable[..., Any]:
     finally:
         options.CACHE_DIR = usual
     return cast("Callable[..., Any]", made)
+
+
+#: `compiled`, and built into every compiled function that calls it: for what takes less than some
+#: hundred nanoseconds, as a call counts references to every array it is given, one atomic
+#: instruction each way
+inlined = partial(compiled, forceinline=True)
+#: the same for long functions: they are not compiled by themselves as well
+joined = partial(compiled, inline="always")
 
 
 class _Kept(_FunctionCache):  # type: ignore[misc]

@@ -22,6 +22,10 @@ from upd.errors import InputError
 from upd.labels import Shown
 from upd.mesh import IntArray
 
+_Reader = Callable[[Path], Any]
+#: of a path, a matrix and its title
+_Writer = Callable[[Path, csr_array, str], object]
+
 COMPONENTS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
 _HARWELL_BOEING = (".hb", ".rsa", ".rua", ".matrix", ".hbmat")
 #: comments at the begin of a Matrix Market file, and numbers that scipy reads as others
@@ -119,8 +123,9 @@ def write_matrix(path: Path | str, A: Any, *, title: str = "upd") -> Path:
     """
     path = Path(path)
     matrix = checked(A, str(path))
+    write = _format(path)[1]
     with _readable(path, "written"):
-        _writer(path)(path, matrix, title)
+        write(path, matrix, title)
     return path
 
 
@@ -143,9 +148,9 @@ def read_matrix(path: Path | str) -> csr_array:
         For a file that is not there, is damaged, or holds another kind of matrix.
     """
     path = Path(path)
-    reader = _reader(path)
+    read = _format(path)[0]
     with _readable(path, "read"):
-        found = reader(path)
+        found = read(path)
     return checked(found, str(path))
 
 
@@ -329,17 +334,8 @@ def checked(A: Any, name: str) -> csr_array:
     return csr_array(0.5 * (matrix + matrix.T)) if skew.nnz else matrix
 
 
-def _writer(path: Path) -> Callable[[Path, csr_array, str], object]:
-    ending = _ending(path)
-    if ending == ".mtx":
-        # A file object, because mmwrite adds its own ending to a name.
-        return _write_market
-    if ending == ".npz":
-        return lambda p, A, _: save_npz(p, A)
-    return lambda p, A, _: hb_write(p, csc_array(A))
-
-
 def _write_market(path: Path, A: csr_array, title: str) -> None:
+    # a file object: mmwrite adds its own ending to a name
     with path.open("wb") as file:
         mmwrite(file, A.tocoo(), comment=title, field="real", precision=17, symmetry="symmetric")
 
@@ -369,23 +365,19 @@ def _read_market(path: Path) -> Any:
     return mmread(path, spmatrix=False)
 
 
-def _reader(path: Path) -> Callable[[Path], Any]:
-    ending = _ending(path)
-    if ending == ".mtx":
-        return _read_market
-    if ending == ".npz":
-        return load_npz
-    return _read_harwell_boeing
-
-
-def _ending(path: Path) -> str:
+def _format(path: Path) -> tuple[_Reader, _Writer]:
+    """What reads and writes files of an ending. Raises InputError for one that is not known."""
     ending = path.suffix.lower()
-    if ending not in (".mtx", ".npz", *_HARWELL_BOEING):
-        raise InputError(
-            f"{path}: matrices are .mtx (Matrix Market), .npz or Harwell-Boeing "
-            f"({', '.join(_HARWELL_BOEING)})."
-        )
-    return ending
+    if ending == ".mtx":
+        return _read_market, _write_market
+    if ending == ".npz":
+        return load_npz, lambda p, A, _: save_npz(p, A)
+    if ending in _HARWELL_BOEING:
+        return _read_harwell_boeing, lambda p, A, _: hb_write(p, csc_array(A))
+    raise InputError(
+        f"{path}: matrices are .mtx (Matrix Market), .npz or Harwell-Boeing "
+        f"({', '.join(_HARWELL_BOEING)})."
+    )
 
 
 @contextmanager
@@ -401,22 +393,6 @@ def _readable(path: Path, verb: str) -> Iterator[None]:
 
 
 # -- Harwell-Boeing --------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class _Header:
-    """The first four lines.
-
-    Type, shape, entries, lines of each section, characters per number of each, lines of the
-    right-hand side.
-    """
-
-    kind: str
-    shape: tuple[int, int]
-    nnz: int
-    lines: tuple[int, int, int]
-    widths: tuple[int, int, int]
-    right_hand_side: int
 
 
 def _read_harwell_boeing(path: Path) -> csr_array:
@@ -448,37 +424,38 @@ def _read_harwell_boeing(path: Path) -> csr_array:
     """
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         head = [file.readline().rstrip("\r\n") for _ in range(4)]
-        header = _header(head)
+        symmetric, (m, n, nnz), lines, widths = _header(head)
+        right = lines.pop()
         # A line for the right-hand side's own format follows when there is one.
-        if header.right_hand_side > 0:
+        if right > 0:
             file.readline()
-        sections = [[file.readline() for _ in range(count)] for count in header.lines]
+        sections = [[file.readline() for _ in range(count)] for count in lines]
         rest = sum(1 for line in file if line.strip())
-    if rest < header.right_hand_side:
+    if rest < right:
         raise ValueError(
-            f"{rest} lines of the right-hand side are left, {header.right_hand_side} are "
-            "announced: lines are missing"
+            f"{rest} lines of the right-hand side are left, {right} are announced: lines are "
+            "missing"
         )
-    m, n = header.shape
-    pointers = _numbers(sections[0], header.widths[0], n + 1).astype(np.int64) - 1
-    rows = _numbers(sections[1], header.widths[1], header.nnz).astype(np.int64) - 1
-    values = _numbers(sections[2], header.widths[2], header.nnz)
+    *places, values = (
+        _numbers(*one) for one in zip(sections, widths, (n + 1, nnz, nnz), strict=True)
+    )
+    pointers, rows = (one.astype(np.int64) - 1 for one in places)
     if (
         len(pointers) != n + 1
-        or len(rows) != header.nnz
-        or len(values) != header.nnz
+        or len(rows) != nnz
+        or len(values) != nnz
         or pointers[0] != 0
-        or pointers[-1] != header.nnz
+        or pointers[-1] != nnz
     ):
         raise ValueError(
             f"{len(pointers)} pointers, {len(rows)} row numbers, {len(values)} values do "
-            f"not fit {header.nnz} entries of {header.shape}"
+            f"not fit {nnz} entries of {(m, n)}"
         )
     if (np.diff(pointers) < 0).any() or rows.min(initial=0) < 0 or rows.max(initial=0) >= m:
         raise ValueError("pointers that fall, or row numbers outside the matrix")
     A = csc_array((values, rows, pointers), shape=(m, n))
     A.sum_duplicates()
-    if header.kind[1] == "S":
+    if symmetric:
         # Either triangle may be stored; its mirror image less the diagonal completes it.
         both = tril(A, -1).nnz and tril(A.T, -1).nnz
         if not both:
@@ -486,7 +463,10 @@ def _read_harwell_boeing(path: Path) -> csr_array:
     return csr_array(A)
 
 
-def _header(head: list[str]) -> _Header:
+def _header(head: list[str]) -> tuple[bool, list[int], list[int], list[int]]:
+    """Of the first four lines: whether the matrix is symmetric; its rows, columns and entries;
+    lines of each section, then of the right-hand side; characters per number of each section.
+    """
     counts = [int(word) for word in head[1].split()]
     words = head[2].split()
     if len(counts) < 4 or len(words) < 4 or not re.fullmatch(r"[A-Za-z]{3}", words[0]):
@@ -507,15 +487,7 @@ def _header(head: list[str]) -> _Header:
         raise ValueError(
             f"formats {head[3].strip()!r}: three of the kind (8I10) or (3E25.16) are expected"
         )
-    shape, right = (int(words[1]), int(words[2])), counts[4] if len(counts) > 4 else 0
-    return _Header(
-        kind,
-        shape,
-        int(words[3]),
-        (counts[1], counts[2], counts[3]),
-        (widths[0], widths[1], widths[2]),
-        right,
-    )
+    return kind[1] == "S", [int(word) for word in words[1:4]], [*counts[1:], 0][:4], widths
 
 
 def _numbers(lines: list[str], width: int, count: int) -> NDArray[np.float64]:

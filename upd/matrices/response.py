@@ -22,7 +22,7 @@ Units are those of the matrices: N/mm and t give mm, N and Hz.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
@@ -236,7 +236,7 @@ def forced_response(
     n = model.K.shape[0]
     orders = hbm.harmonics(harmonics).numbers
     f = np.atleast_1d(np.asarray(frequencies, dtype=float))
-    rows = _Rows.collected(model.dofs, n, problems)
+    rows = _Rows(model.dofs, n, problems)
     closing = [rows.motion("joint", j.closing) for j in joints]
     sliding = _sliding(joints, rows, problems)
     constant = rows.motion("static_force", static_force or {})
@@ -327,12 +327,7 @@ class _Rows:
     dofs: DofMap | None
     n: int
     problems: list[str]
-    seen: set[int]
-
-    @classmethod
-    def collected(cls, dofs: DofMap | None, n: int, problems: list[str]) -> _Rows:
-        """None used yet."""
-        return cls(dofs, n, problems, set())
+    seen: set[int] = field(default_factory=set)
 
     @property
     def used(self) -> NDArray[np.int64]:

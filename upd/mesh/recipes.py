@@ -38,46 +38,40 @@ def load_meshes(where: Path, key: str) -> dict[str, Mesh] | None:
     arrays = load_arrays(path)
     if arrays is None:
         return None
+    bodies: dict[str, dict[str, Any]] = {}
     try:
-        return _meshes(arrays)
+        for label, one in arrays.items():
+            body, kind, *name = json.loads(label)
+            mine = bodies.setdefault(body, {kind: {} for kind in _SETS})
+            if name:
+                mine[kind][name[0]] = one.astype(_SETS[kind], copy=False)
+            else:
+                mine[kind] = one.astype(np.int64 if kind == "hexes" else np.float64, copy=False)
+        meshes = {body: Mesh(**mine) for body, mine in bodies.items()}
+        for mesh in meshes.values():
+            if (
+                mesh.points.ndim != 2
+                or mesh.hexes.ndim != 2
+                or (mesh.hexes.size and not 0 <= mesh.hexes.min() <= mesh.hexes.max() < mesh.n_node)
+            ):
+                raise ValueError("the arrays are not those of a mesh")
     except (KeyError, ValueError, TypeError, IndexError) as problem:
         unreadable(path, problem)
         return None
+    return meshes
 
 
 def save_meshes(where: Path, key: str, meshes: Mapping[str, Mesh]) -> None:
-    """Keep `meshes` under `key`; where the folder cannot be written, only a log line."""
-    save_arrays(where / f"{key}.npz", _arrays(meshes))
+    """Keep `meshes` under `key`; where the folder cannot be written, only a log line.
 
-
-def _arrays(meshes: Mapping[str, Mesh]) -> dict[str, NDArray[np.generic]]:
-    """Arrays under body, kind and name as JSON, so that any name of a body or a set will do."""
+    Arrays under body, kind and name as JSON, so that any name of a body or a set will do.
+    """
     arrays: dict[tuple[str, ...], NDArray[np.generic]] = {}
     for body, mesh in meshes.items():
         arrays |= {(body, "points"): mesh.points, (body, "hexes"): mesh.hexes}
         for kind in _SETS:
             arrays |= {(body, kind, name): one for name, one in getattr(mesh, kind).items()}
-    return {json.dumps(key): one for key, one in arrays.items()}
-
-
-def _meshes(arrays: Mapping[str, NDArray[np.generic]]) -> dict[str, Mesh]:
-    bodies: dict[str, dict[str, Any]] = {}
-    for key, one in arrays.items():
-        body, kind, *name = json.loads(key)
-        mine = bodies.setdefault(body, {kind: {} for kind in _SETS})
-        if name:
-            mine[kind][name[0]] = one.astype(_SETS[kind], copy=False)
-        else:
-            mine[kind] = one.astype(np.int64 if kind == "hexes" else np.float64, copy=False)
-    meshes = {body: Mesh(**mine) for body, mine in bodies.items()}
-    for mesh in meshes.values():
-        if (
-            mesh.points.ndim != 2
-            or mesh.hexes.ndim != 2
-            or (mesh.hexes.size and not 0 <= mesh.hexes.min() <= mesh.hexes.max() < mesh.n_node)
-        ):
-            raise ValueError("the arrays are not those of a mesh")
-    return meshes
+    save_arrays(where / f"{key}.npz", {json.dumps(label): one for label, one in arrays.items()})
 
 
 log = logging.getLogger(__name__)

@@ -57,11 +57,6 @@ class Condensed(Condensation):
     n_dof: int = 0
     _compliance: list[FloatArray] = field(default_factory=list, repr=False)
 
-    @property
-    def n_kept(self) -> int:
-        """k."""
-        return len(self.S)
-
     def compliance(self) -> FloatArray:
         """Compliance at the kept dofs; computed once, by Cholesky.
 

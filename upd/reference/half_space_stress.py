@@ -23,9 +23,6 @@ from numpy.typing import ArrayLike
 
 from upd.reference._checks import FloatArray, elastic, not_negative, positive, require
 
-#: the corner's share of a derivative: X, Y, z, rho -> array
-_Corner = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
-
 
 def love_rectangle_stress(
     x: ArrayLike, y: ArrayLike, z: ArrayLike, half_x: float, half_y: float, p: float, nu: float
@@ -70,18 +67,22 @@ def love_rectangle_stress(
     >>> [round(float(stress[k, k]), 3) for k in range(3)]
     [-80.0, -80.0, -100.0]
     """
-    at = _Corners("love_rectangle_stress", x, y, z, half_x, half_y, nu)
-    bulk, depth = 1.0 - 2.0 * nu, at.z
-    V_xx, V_yy, V_z = at(_V_xx), at(_V_yy), at(_V_z)
+    total, X, Y, depth, rho = _corners("love_rectangle_stress", x, y, z, half_x, half_y, nu)
+    bulk, ring_x, ring_y = 1.0 - 2.0 * nu, rho * (X**2 + depth**2), rho * (Y**2 + depth**2)
+    V_xx, V_yy = total(-X * Y / ring_x), total(-Y * X / ring_y)
+    V_z = total(-np.arctan2(X * Y, depth * rho))
+    # atan(Y / X) - atan(z Y / (X rho)) in one angle
+    chi_xx = total(np.arctan2(X * Y * (rho - depth), X**2 * rho + depth * Y**2))
+    chi_yy = total(np.arctan2(Y * X * (rho - depth), Y**2 * rho + depth * X**2))
     return _tensor(
         p,
-        2.0 * nu * V_z - bulk * at(_chi_xx) - depth * V_xx,
-        2.0 * nu * V_z - bulk * at(_chi_yy) - depth * V_yy,
+        2.0 * nu * V_z - bulk * chi_xx - depth * V_xx,
+        2.0 * nu * V_z - bulk * chi_yy - depth * V_yy,
         # V is harmonic
         V_z + depth * (V_xx + V_yy),
-        -bulk * at(_chi_xy) - depth * at(_V_xy),
-        -depth * at(_V_xz),
-        -depth * at(_V_yz),
+        -bulk * total(np.log(rho + depth)) - depth * total(1.0 / rho),
+        -depth * total(-depth * Y / ring_x),
+        -depth * total(-depth * X / ring_y),
     )
 
 
@@ -129,16 +130,20 @@ def cerruti_rectangle_stress(
     >>> round(float(stress[0, 2]), 3)
     -100.0
     """
-    at = _Corners("cerruti_rectangle_stress", x, y, z, half_x, half_y, nu)
-    depth, V_x = at.z, at(_V_x)
+    total, X, Y, depth, rho = _corners("cerruti_rectangle_stress", x, y, z, half_x, half_y, nu)
+    x_line, below = X**2 + depth**2, rho + depth
+    log_x = np.arcsinh(Y / np.hypot(X, depth))
+    V_x, V_y = total(log_x), total(np.arcsinh(X / np.hypot(Y, depth)))
+    chi_xxx = total(Y / rho * (depth / x_line - 1.0 / below))
+    omega_xyy = total(-Y / below)
     return _tensor(
         q,
-        2.0 * (1.0 + nu) * V_x + 2.0 * nu * at(_omega_xxx) - depth * at(_chi_xxx),
-        2.0 * nu * (V_x + at(_omega_xyy)) - depth * at(_chi_xyy),
-        -depth * at(_V_xz),
-        at(_V_y) + 2.0 * nu * at(_omega_xxy) - depth * at(_chi_xxy),
-        at(_V_z) - depth * at(_V_xx),
-        -depth * at(_V_xy),
+        2.0 * (1.0 + nu) * V_x + 2.0 * nu * total(Y / below - log_x) - depth * chi_xxx,
+        2.0 * nu * (V_x + omega_xyy) - depth * total(Y / (rho * below)),
+        -depth * total(-depth * Y / (rho * x_line)),
+        V_y + 2.0 * nu * total(-X / below) - depth * total(X / (rho * below)),
+        total(-np.arctan2(X * Y, depth * rho)) - depth * total(-X * Y / (rho * x_line)),
+        -depth * total(1.0 / rho),
     )
 
 
@@ -158,41 +163,34 @@ def von_mises(stress: ArrayLike) -> FloatArray:
     return np.asarray(np.sqrt(1.5 * (deviator**2).sum(axis=(-2, -1))))
 
 
-class _Corners:
-    """A derivative at positions: its corner shares summed with their signs."""
+def _corners(
+    where: str, x: ArrayLike, y: ArrayLike, z: ArrayLike, half_x: float, half_y: float, nu: float
+) -> tuple[Callable[[FloatArray], FloatArray], FloatArray, FloatArray, FloatArray, FloatArray]:
+    """What sums corner shares (4, ...) of a derivative with their signs; X, Y from the corners,
+    depths, and distances rho from the corners.
 
-    def __init__(
-        self,
-        where: str,
-        x: ArrayLike,
-        y: ArrayLike,
-        z: ArrayLike,
-        half_x: float,
-        half_y: float,
-        nu: float,
-    ) -> None:
-        positive(where, half_x=half_x, half_y=half_y)
-        not_negative(where, z=z)
-        elastic(where, 1.0, nu)
-        px, py, self.z = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (x, y, z)))
-        on_edge = (np.abs(px) == half_x) | (np.abs(py) == half_y)
-        require(
-            ~(on_edge & (self.z == 0.0)),
-            where,
-            "stresses on the edges of the rectangle are unbounded or not one value",
-            "take points beside them or below the surface",
-        )
-        self.corners = []
-        for sx in (1.0, -1.0):
-            for sy in (1.0, -1.0):
-                X, Y = px + sx * half_x, py + sy * half_y
-                self.corners.append((sx * sy, X, Y, np.sqrt(X**2 + Y**2 + self.z**2)))
+    Terms that are the same at both ends of an edge cancel in the sum and are left out of the
+    shares, so that nothing is lost where rho + Y is small.
+    """
+    positive(where, half_x=half_x, half_y=half_y)
+    not_negative(where, z=z)
+    elastic(where, 1.0, nu)
+    px, py, depth = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (x, y, z)))
+    on_edge = (np.abs(px) == half_x) | (np.abs(py) == half_y)
+    require(
+        ~(on_edge & (depth == 0.0)),
+        where,
+        "stresses on the edges of the rectangle are unbounded or not one value",
+        "take points beside them or below the surface",
+    )
+    signs = [(sx, sy) for sx in (1.0, -1.0) for sy in (1.0, -1.0)]
+    X = np.stack([px + sx * half_x for sx, _ in signs])
+    Y = np.stack([py + sy * half_y for _, sy in signs])
 
-    def __call__(self, share: _Corner) -> FloatArray:
-        out = np.zeros(self.z.shape)
-        for sign, X, Y, rho in self.corners:
-            out += sign * share(X, Y, self.z, rho)
-        return out
+    def total(shares: FloatArray) -> FloatArray:
+        return np.asarray(sum(sx * sy * one for (sx, sy), one in zip(signs, shares, strict=True)))
+
+    return total, X, Y, depth, np.sqrt(X**2 + Y**2 + depth**2)
 
 
 def _tensor(scale: float, *components: FloatArray) -> FloatArray:
@@ -202,76 +200,3 @@ def _tensor(scale: float, *components: FloatArray) -> FloatArray:
     for (i, j), component in zip(places, components, strict=True):
         out[..., i, j] = out[..., j, i] = component
     return scale / (2.0 * np.pi) * out
-
-
-# Corner shares of the derivatives. Terms that are the same at both ends of an edge cancel in the
-# sum and are left out, so that nothing is lost where rho + Y is small.
-
-
-def _V_x(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    return np.asarray(np.arcsinh(Y / np.hypot(X, z)))
-
-
-def _V_y(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    return _V_x(Y, X, z, rho)
-
-
-def _V_z(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    return np.asarray(-np.arctan2(X * Y, z * rho))
-
-
-def _V_xx(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    return -X * Y / (rho * (X**2 + z**2))
-
-
-def _V_yy(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    return _V_xx(Y, X, z, rho)
-
-
-def _V_xy(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    return 1.0 / rho
-
-
-def _V_xz(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    return -z * Y / (rho * (X**2 + z**2))
-
-
-def _V_yz(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    return _V_xz(Y, X, z, rho)
-
-
-def _chi_xx(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    # atan(Y / X) - atan(z Y / (X rho)) in one angle
-    return np.asarray(np.arctan2(X * Y * (rho - z), X**2 * rho + z * Y**2))
-
-
-def _chi_yy(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    return _chi_xx(Y, X, z, rho)
-
-
-def _chi_xy(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    return np.asarray(np.log(rho + z))
-
-
-def _chi_xxx(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    return Y / rho * (z / (X**2 + z**2) - 1.0 / (rho + z))
-
-
-def _chi_xxy(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    return X / (rho * (rho + z))
-
-
-def _chi_xyy(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    return Y / (rho * (rho + z))
-
-
-def _omega_xxx(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    return Y / (rho + z) - _V_x(X, Y, z, rho)
-
-
-def _omega_xxy(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    return -X / (rho + z)
-
-
-def _omega_xyy(X: FloatArray, Y: FloatArray, z: FloatArray, rho: FloatArray) -> FloatArray:
-    return -Y / (rho + z)

@@ -79,6 +79,7 @@ _UNITS = {
     "area": "mm2",
     "max_pressure": "MPa",
     "mean_pressure": "MPa",
+    "tangent_stiffness": "N/mm",
 }
 # (numerical method, Hertz formulae, difference) as printed, lengths turned into mm
 _PRINTED = {
@@ -107,29 +108,26 @@ _REMARKS = {
 }
 
 
-def _hertz_rows() -> dict[float, dict[str, ThesisValue]]:
-    rows: dict[float, dict[str, ThesisValue]] = {}
-    for (table, load), entries in _PRINTED.items():
-        exact = exact_hertz(load)
-        rows[load] = {
-            name: ThesisValue(
-                table,
-                name,
-                load,
-                _UNITS[name],
-                *printed,
-                exact=getattr(exact, name),
-                remark=_REMARKS.get((table, name), ""),
-            )
-            for name, printed in entries.items()
-        }
-    return rows
+def _row(
+    table: str, name: str, load: float, printed: tuple[float, float, float], remark: str = ""
+) -> ThesisValue:
+    """A row with its result, theory and difference as printed."""
+    exact = getattr(exact_hertz(load), name)
+    return ThesisValue(table, name, load, _UNITS[name], *printed, exact, remark)
 
 
 #: Tables VII and VIII: load (N) -> name -> row, with the printed theory, the printed difference and
 #: the error against the exact value
 THESIS_HERTZ_ROWS: Mapping[float, Mapping[str, ThesisValue]] = MappingProxyType(
-    {k: MappingProxyType(v) for k, v in _hertz_rows().items()}
+    {
+        load: MappingProxyType(
+            {
+                name: _row(table, name, load, printed, _REMARKS.get((table, name), ""))
+                for name, printed in entries.items()
+            }
+        )
+        for (table, load), entries in _PRINTED.items()
+    }
 )
 #: Tables VII and VIII, numerical method only: load (N) -> name -> value; the names are the fields
 #: of HertzPoint
@@ -141,67 +139,33 @@ THESIS_HERTZ: Mapping[float, Mapping[str, float]] = MappingProxyType(
 )
 
 
-def _compression_row(
-    load: float, theory: float, corrected: float, difference: float
-) -> ThesisValue:
-    remark = (
-        "corrected for the bodies beyond depth 3a; 23 % of a half-space's own displacement is "
-        "beyond it too, so not comparable with Hertz"
-    )
-    return ThesisValue(
-        "IX",
-        "approach",
-        load,
-        "mm",
-        corrected,
-        theory,
-        difference,
-        exact_hertz(load).approach,
-        remark,
-    )
-
-
+_CORRECTED = (
+    "corrected for the bodies beyond depth 3a; 23 % of a half-space's own displacement is "
+    "beyond it too, so not comparable with Hertz"
+)
 #: Table IX: load (N) -> approach with the bulk compliance removed (value) and before (theory)
 THESIS_COMPRESSION: Mapping[float, ThesisValue] = MappingProxyType(
     {
-        50.0: _compression_row(50.0, 2.80e-3, 2.60e-3, -0.0714),
-        200.0: _compression_row(200.0, 7.09e-3, 6.50e-3, -0.0832),
+        50.0: _row("IX", "approach", 50.0, (2.60e-3, 2.80e-3, -0.0714), _CORRECTED),
+        200.0: _row("IX", "approach", 200.0, (6.50e-3, 7.09e-3, -0.0832), _CORRECTED),
     }
 )
-
-
-def _stiffness_row(
-    load: float, theory: float, corrected: float, difference: float, remark: str
-) -> ThesisValue:
-    return ThesisValue(
-        "X",
-        "tangent_stiffness",
-        load,
-        "N/mm",
-        corrected,
-        theory,
-        difference,
-        exact_hertz(load).tangent_stiffness,
-        remark,
-    )
-
-
 #: Table X: load (N) -> normal stiffness with the corrected approach (value) and without (theory),
 #: as printed; its unit "um" read as N/mm
 THESIS_STIFFNESS: Mapping[float, ThesisValue] = MappingProxyType(
     {
-        50.0: _stiffness_row(
+        50.0: _row(
+            "X",
+            "tangent_stiffness",
             50.0,
-            2.8e4,
-            3.3e4,
-            0.15,
+            (3.3e4, 2.8e4, 0.15),
             "3.3/2.8 is +17.9 %; 1.5 F/d of Table IX gives 2.68e4 and 2.88e4",
         ),
-        200.0: _stiffness_row(
+        200.0: _row(
+            "X",
+            "tangent_stiffness",
             200.0,
-            7.09e4,
-            6.50e4,
-            0.0832,
+            (6.50e4, 7.09e4, 0.0832),
             "a copy of Table IX; 1.5 F/d of Table IX gives 4.23e4 and 4.62e4",
         ),
     }

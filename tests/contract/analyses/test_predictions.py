@@ -54,13 +54,13 @@ def test_factor_of_an_elongated_body_is_smaller() -> None:
 
 @pytest.mark.parametrize("scene", ["hertz", "symmetric"])
 def test_many_loads_are_planned_in_linear_time(scene: str) -> None:
-    """20 000 loads took minutes: each was compared with all others."""
+    """Each was compared with all others: 20 000 loads took minutes, 5 000 ten seconds."""
     begin = time.process_time()
     plan = make_plan(
-        load_scene(scene, {"loads.normal": [f"{50 + k * 0.001:.3f} N" for k in range(20_000)]})
+        load_scene(scene, {"loads.normal": [f"{50 + k * 0.001:.3f} N" for k in range(5_000)]})
     )
-    assert time.process_time() - begin < 15.0
-    assert plan.seconds > 1000.0
+    assert time.process_time() - begin < 5.0
+    assert plan.seconds > 250.0
 
 
 @pytest.mark.parametrize(

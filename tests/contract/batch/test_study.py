@@ -110,21 +110,6 @@ def test_failing_point_is_a_row_with_its_reason(tmp_path: Path) -> None:
     assert "patch rim" in (tmp_path / "study.md").read_text(encoding="utf-8")
 
 
-def test_point_in_a_process_of_its_own_gives_the_same(tmp_path: Path) -> None:
-    scene = load_scene("hertz", LIGHT)
-    planned = plan_study(scene, "mesh", (8, 12))
-    inside = run_study(scene, planned, tmp_path / "a", workers=HERE)
-    outside = run_study(scene, planned, tmp_path / "b")
-    for one, other in zip(inside.solved, outside.solved, strict=True):
-        assert other.values == pytest.approx(one.values, rel=1e-9)
-    assert outside.solved[0].outcome.memory_mb > 50.0
-    assert len({one.outcome.where for one in outside.solved}) == 2, (
-        "a fresh process for every point"
-    )
-    # Nothing is taken from other points: a study measures.
-    assert not any(one.outcome.shared for one in (*inside.solved, *outside.solved))
-
-
 def test_study_is_a_function_of_the_package(tmp_path: Path) -> None:
     import upd
 

@@ -41,7 +41,7 @@ from upd.hbm.faces.step import (
     put_row,
     slip_rows,
 )
-from upd.linalg.compiled import compiled, inlined
+from upd.linalg.compiled import compiled, inlined, joined
 
 #: a chord step must take at least this share of the misfit away; it only weighs costs
 CONTRACTS = 0.75
@@ -71,7 +71,7 @@ def kept_inverses(samples: int, n: int) -> tuple[np.ndarray, np.ndarray]:
     return np.full((samples, n), -1), np.empty((samples, rows**2 if rows > FEW else 0))
 
 
-@inlined
+@joined
 def solve_sample(  # type: ignore[no-untyped-def]
     sample, x0, bases, one, law, node, before, known, past, scratch
 ):
@@ -464,7 +464,8 @@ def given_blades(  # type: ignore[no-untyped-def]
             fetch_row(F, max(j - 1, 0), before[0])
             fetch_row(Y, max(j - 1, 0), before[1])
             fetch_row(S, max(j - 1, 0), before[2])
-            used = solve_sample(j, x0, bases, 0, law, node, before, known, past, scratch)
+            # a bare 0 is a type of its own: all that takes it would be compiled once more
+            used = solve_sample(j, x0, bases, np.int64(0), law, node, before, known, past, scratch)
             if used < 0:
                 return j
             put_row(f, F, j)

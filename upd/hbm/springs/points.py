@@ -138,7 +138,8 @@ def _spread(value: ArrayLike, n: int, name: str, problems: list[str]) -> FloatAr
     if array.shape not in ((), (1,), (n,)):
         problems.append(f"{name} has shape {array.shape}; give one number or {n}")
         return np.ones(n)
-    return np.ascontiguousarray(np.broadcast_to(array, (n,)))
+    # a copy: arrays that cannot be written are types of their own for compiled code
+    return np.broadcast_to(array, (n,)).copy()
 
 
 def frictionless(points: Contacts) -> Contacts:
