@@ -10,17 +10,16 @@ import json
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, get_type_hints
 
+from pydantic import TypeAdapter, ValidationError, create_model
+
+from upd.analyses.base import Effect
 from upd.cache.folders import plain_name
 from upd.errors import InputError
-from upd.results import (
-    Arrays,
-    Case,
-    read_netcdf,
-)
+from upd.results import Arrays, Case, Check, ErrorPart, InputPart, Result, read_netcdf
 
 _LOG_LINE = re.compile(r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$")
 _VERSIONS = "versions: "
@@ -222,7 +221,7 @@ def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
 
 
 def _summary(folder: Path) -> dict[str, Any]:
-    return read_json(folder / "summary.json", Summary, "run")[0]
+    return read_json(folder / "summary.json", _SUMMARY, "run")[0]
 
 
 def _text(path: Path, missing: list[str]) -> str:
@@ -262,99 +261,67 @@ def _log(text: str) -> tuple[LogLine, ...]:
 # ---------------------------------------------------------------- JSON files, checked once
 
 
-@dataclass
-class _EffectEntry:
-    name: str
-    on: bool
-    why: str
-    verdict: str
-    applies: bool = True
+def _many(kind: type[Any], **others: Any) -> Any:
+    """Schema of a list of what summary.json has of a dataclass: its fields, of which a number may
+    be null, and others in their place or beside them.
+    """
+    hints, many = get_type_hints(kind), list
+    own = {
+        f.name: (
+            float | None if hints[f.name] is float else hints[f.name],
+            ... if f.default is MISSING else f.default,
+        )
+        for f in fields(kind)
+    }
+    model: Any = create_model(kind.__name__, **own | others)
+    return many[model]
 
 
-@dataclass
-class _CheckEntry:
-    name: str
-    case: str
-    case_fields: Case
-    value: float | None
-    limit: float | None
-    says: str
-    verdict: Literal["passed", "warning", "failed"]
-    remedy: str = ""
-    fatal: bool = True
-    quantity: str = ""
-    without: float | None = None
-    included: float | None = None
-
-
-@dataclass
-class _ErrorPartEntry:
-    source: str
-    error: float | None
-    basis: str
-    half_cost_s: float | None = None
-    companion_s: float | None = None
-    half_why: str = ""
-
-
-@dataclass
-class _InputPartEntry:
-    path: str
-    half_width: float | None
-    share: float | None
-    change: float | None
-    basis: str
-
-
-@dataclass
-class _NumberEntry:
-    name: str
-    case: str
-    case_fields: Case
-    value: float | None
-    unit: str
-    reference: float | None
-    source: str = ""
-    error: float | None = None
-    thesis_error: float | None = None
-    estimated_error: float | None = None
-    error_parts: list[_ErrorPartEntry] = field(default_factory=list)
-    input_error: float | None = None
-    input_parts: list[_InputPartEntry] = field(default_factory=list)
-    withheld: str = ""
-
-
-@dataclass
-class _Size:
-    symmetry: str = ""
-    n_dof: dict[str, int] = field(default_factory=dict)
-    n_pairs: int | None = None
-    analysis: str = ""
-    n_hex: dict[str, int] = field(default_factory=dict)
-    mesh: dict[str, Any] = field(default_factory=dict)
-    solver: dict[str, Any] = field(default_factory=dict)
-
-
-@dataclass
-class _Cost:
-    total_s: float
-    peak_rss_mb: float
-    stages: dict[str, float] = field(default_factory=dict)
-
-
-@dataclass
-class Summary:
-    """What summary.json must have; there may be more."""
-
-    scene: str
-    title: str
-    status: str
-    effects: list[_EffectEntry]
-    checks: list[_CheckEntry]
-    size: _Size
-    cost: _Cost
-    results: list[_NumberEntry]
-    result_nc_sha256: str = ""
+_TEXT, _FREE = (str, ...), (dict, {})
+_CASE = {"case": _TEXT, "case_fields": (Case, ...)}
+_NUMBER, _MAYBE = (float | None, ...), (float | None, None)
+#: what summary.json must have; there may be more
+_SUMMARY: Any = create_model(
+    "Summary",
+    scene=_TEXT,
+    title=_TEXT,
+    status=_TEXT,
+    effects=(_many(Effect, verdict=_TEXT), ...),
+    checks=(_many(Check, **_CASE, verdict=(Literal["passed", "warning", "failed"], ...)), ...),
+    size=(
+        create_model(
+            "Size",
+            symmetry=(str, ""),
+            n_dof=(dict[str, int], {}),
+            n_pairs=(int | None, None),
+            analysis=(str, ""),
+            n_hex=(dict[str, int], {}),
+            mesh=_FREE,
+            solver=_FREE,
+        ),
+        ...,
+    ),
+    cost=(
+        create_model(
+            "Cost", total_s=(float, ...), peak_rss_mb=(float, ...), stages=(dict[str, float], {})
+        ),
+        ...,
+    ),
+    results=(
+        _many(
+            Result,
+            **_CASE,
+            reference=_NUMBER,
+            error=_MAYBE,
+            thesis_error=_MAYBE,
+            error_parts=(_many(ErrorPart), []),
+            input_error=_MAYBE,
+            input_parts=(_many(InputPart, share=_NUMBER), []),
+        ),
+        ...,
+    ),
+    result_nc_sha256=(str, ""),
+)
 
 
 def read_json(path: Path, schema: type[Kept], kind: Kind) -> tuple[dict[str, Any], Kept]:
@@ -375,9 +342,6 @@ def read_json(path: Path, schema: type[Kept], kind: Kind) -> tuple[dict[str, Any
     InputError
         When there is none, or something of it is missing or of another kind.
     """
-    # pydantic is slow to import: only when a folder is read
-    from pydantic import TypeAdapter, ValidationError
-
     try:
         text = path.read_text("utf-8")
         found = json.loads(text)

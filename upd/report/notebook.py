@@ -5,10 +5,9 @@ Text, table, figure of the main curves, xarray.
 
 from __future__ import annotations
 
-import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +17,7 @@ from upd.report.answer import AnswerLine, Written, answer, short_answer
 from upd.report.columns import text_width
 from upd.report.folder import read_run
 from upd.report.tables import analysis_charts, answer_tables, main_numbers
-from upd.results import FAILED, OK, Case, Check, Result, outcome_of, read_result
+from upd.results import FAILED, OK, Case, Check, Result, from_json, outcome_of, read_result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -229,8 +228,6 @@ def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Cha
 
 # -- read back from its folder --------------------------------------------------------------------
 
-_CASE, _CHECK = (frozenset(f.name for f in fields(one)) for one in (Case, Check))
-
 
 def load(folder: str | Path) -> RunResult:
     """The result of a finished run, from its folder.
@@ -259,7 +256,7 @@ def load(folder: str | Path) -> RunResult:
         status=summary["status"],
         results=tuple(read_result(entry, _case(entry)) for entry in summary["results"]),
         effects=tuple(dict(effect) for effect in summary["effects"]),
-        checks=tuple(_check(entry) for entry in summary["checks"]),
+        checks=tuple(from_json(Check, entry, case=_case(entry)) for entry in summary["checks"]),
         size=summary["size"],
         cost=summary["cost"],
         # A file has no slash in the name of a group.
@@ -271,14 +268,5 @@ def load(folder: str | Path) -> RunResult:
 
 def _case(entry: Entry) -> Case:
     """The case from its fields; of unknown fields, from its words."""
-    given = entry["case_fields"]
-    case = Case(**{key: value for key, value in given.items() if key in _CASE})
+    case = from_json(Case, entry["case_fields"])
     return case if case.label == entry["case"] else Case(name=entry["case"])
-
-
-def _check(entry: Entry) -> Check:
-    """The check that `Check.as_dict` wrote, which has null for what is no number."""
-    given = {key: value for key, value in entry.items() if key in _CHECK}
-    numbers = ("value", "limit", *(["included"] * bool(entry.get("quantity"))))
-    found = {key: math.nan if entry.get(key) is None else entry[key] for key in numbers}
-    return Check(**given | found | {"case": _case(entry)})

@@ -23,7 +23,7 @@ from upd.labels import (
     unit_label,
 )
 from upd.plot.chart import Chart, Entry
-from upd.results import Arrays, read_part, worst_check, worst_checks
+from upd.results import Arrays, ErrorPart, from_json, worst_check, worst_checks
 from upd.results.answer_table import AnswerTable
 from upd.results.quantities import CLOSED_FORM_ERROR, number_label, number_title
 from upd.results.sampled import SampledNumber
@@ -218,7 +218,7 @@ def error_parts(entry: Entry) -> list[tuple[str, float | None, float | None, str
             part["source"],
             part["error"],
             part["error"] / total if total and part["error"] is not None else None,
-            read_part(part).half_words,
+            from_json(ErrorPart, part).half_words,
             part["basis"],
         )
         for part in entry.get("error_parts", ())

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from upd.labels import check_words
 from upd.results.case import Case
-from upd.results.number import Result
+from upd.results.number import Result, as_json
 from upd.results.quantities import number_label
 
 OK, WARNED, FAILED = "ok", "ok with warnings", "failed"
@@ -103,11 +103,7 @@ class Check:
 
     def as_dict(self) -> dict[str, Any]:
         """The check as it stands in summary.json."""
-        data = asdict(self) | {"case": self.case.label, "verdict": self.verdict}
-        # JSON has no NaN and no infinity.
-        for name in ("value", "without", "included"):
-            if data[name] is not None and not math.isfinite(data[name]):
-                data[name] = None
+        data = as_json(self, case=self.case.label, verdict=self.verdict)
         if not self.quantity:
             for name in ("quantity", "without", "included"):
                 del data[name]
