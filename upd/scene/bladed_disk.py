@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
 from upd.scene import quantities as q
-from upd.scene.base import STRICT, MaterialData, MeshChoice, SceneBase, unreachable_accuracy
+from upd.scene.base import MaterialData, MeshChoice, SceneBase, Table, unreachable_accuracy
 
 #: Outputs a bladed disk can ask for.
 BLADED_DISK_WANTS = ("modes", "campbell", "interference", "response", "performance")
@@ -17,7 +17,7 @@ BladedDiskWant = Annotated[str, q.one_of(BLADED_DISK_WANTS), q.Example('"modes"'
 
 
 @dataclass(frozen=True)
-class SectorModesChoice:
+class SectorModesChoice(Table):
     """Modes of every nodal diameter.
 
     Attributes
@@ -29,13 +29,12 @@ class SectorModesChoice:
         others. Cost: a factorisation and an eigenvalue problem each.
     """
 
-    __pydantic_config__ = STRICT
     count: Annotated[int, q.at_least(1)] = 6
     computed: Annotated[int, q.at_least(2)] = 4
 
 
 @dataclass(frozen=True)
-class SpinChoice:
+class SpinChoice(Table):
     """Speed and excitation.
 
     Attributes
@@ -51,7 +50,6 @@ class SpinChoice:
         Speeds of the Campbell diagram. Cost: small.
     """
 
-    __pydantic_config__ = STRICT
     speed: q.Speed
     up_to: q.Ratio = 1.2
     engine_orders: Annotated[tuple[Annotated[int, q.at_least(0)], ...], q.FILLED] = (1, 2, 3, 4)
@@ -59,7 +57,7 @@ class SpinChoice:
 
 
 @dataclass(frozen=True)
-class WedgeChoice:
+class WedgeChoice(Table):
     """The wedge in every gap between platforms, a rigid body; F_C = m r w^2 at each speed.
 
     Attributes
@@ -77,7 +75,6 @@ class WedgeChoice:
         off that slips on all its faces. From 10 to 1000 N/mm it changes no peak by .1 %.
     """
 
-    __pydantic_config__ = STRICT
     mass: q.Mass = 1e-5
     angle: Annotated[float, q.quantity("angle"), q.Example('"25 deg"')] = 25.0
     normal_stiffness: Annotated[float, q.quantity("stiffness"), q.positive] = 2e4
@@ -87,7 +84,7 @@ class WedgeChoice:
 
 
 @dataclass(frozen=True)
-class WaveChoice:
+class WaveChoice(Table):
     """Response to the engine order of the crossing nearest to the operating speed.
 
     Attributes
@@ -108,7 +105,6 @@ class WaveChoice:
         F_C/F_E of the performance curve, beside that of the response. Cost: a curve each.
     """
 
-    __pydantic_config__ = STRICT
     force: q.Force = 1.0
     damping: q.Share = 0.002
     harmonics: Annotated[int, q.at_least(1)] = 3

@@ -10,10 +10,10 @@ from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import quantities as q
 from upd.scene.base import (
-    STRICT,
     MaterialData,
     Rotation,
     SceneBase,
+    Table,
     repeated,
 )
 
@@ -44,7 +44,7 @@ Coupling = Literal["uncoupled", "coupled"]
 
 
 @dataclass(frozen=True)
-class ContactData:
+class ContactData(Table):
     """Coulomb friction and what the solver may assume.
 
     Attributes
@@ -76,7 +76,6 @@ class ContactData:
         materials' part of the coupling, that of the bodies' shape is an effect left out.
     """
 
-    __pydantic_config__ = STRICT
     friction: q.Coefficient = 0.0
     directions: Literal[1, 2] = 1
     tilt: Literal["held", "free"] = "held"
@@ -132,7 +131,7 @@ class Loads(Rotation):
 
 
 @dataclass(frozen=True)
-class LawChoice:
+class LawChoice(Table):
     """Contact points for a dynamic model: rows (along y) x columns (along x) per patch.
 
     Attributes
@@ -149,7 +148,6 @@ class LawChoice:
         lower body is elastic itself (keeping it in the springs would count it twice).
     """
 
-    __pydantic_config__ = STRICT
     rows: Annotated[int, q.at_least(1)] = 4
     columns: Annotated[int, q.at_least(1)] = 6
     weight: Literal["stiffness", "area"] = "stiffness"

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from upd.scene import quantities as q
 from upd.scene.base import (
-    STRICT,
     DamperChoice,
     MeshChoice,
     RigBase,
+    Table,
     repeated,
     rig_problems,
     unreachable_accuracy,
@@ -76,7 +76,7 @@ Samples = Annotated[
 
 
 @dataclass(frozen=True)
-class BladeReduction:
+class BladeReduction(Table):
     """Reduction of the blades.
 
     Attributes
@@ -86,12 +86,11 @@ class BladeReduction:
         small, a mode is a dof of the reduced model.
     """
 
-    __pydantic_config__ = STRICT
     modes: Annotated[int, q.not_negative] = 10
 
 
 @dataclass(frozen=True)
-class HarmonicForce:
+class HarmonicForce(Table):
     """A force along x at mid-core of a blade, a F_E cos(k 2 pi f t + phase).
 
     Attributes
@@ -106,7 +105,6 @@ class HarmonicForce:
         k, its frequency as a multiple of that of the sweep.
     """
 
-    __pydantic_config__ = STRICT
     blade: Side = "right"
     amplitude: q.Ratio = 1.0
     phase: q.Phase = 0.0
@@ -114,7 +112,7 @@ class HarmonicForce:
 
 
 @dataclass(frozen=True)
-class ExcitationChoice:
+class ExcitationChoice(Table):
     """Harmonic forces at mid-core of the blades, swept between two frequencies.
 
     Attributes
@@ -138,7 +136,6 @@ class ExcitationChoice:
         fitted to the measured free curves, beyond their band that of the nearest.
     """
 
-    __pydantic_config__ = STRICT
     centrifugal_to_force: q.Ratios = (194.0,)
     force: tuple[q.Force, ...] = ()
     start: q.Frequency = 280.0
@@ -158,7 +155,7 @@ class ExcitationChoice:
 
 
 @dataclass(frozen=True)
-class BalanceChoice:
+class BalanceChoice(Table):
     """Harmonic balance, or time integration in its place.
 
     Attributes
@@ -176,7 +173,6 @@ class BalanceChoice:
         Start position of the sliders, within what friction allows.
     """
 
-    __pydantic_config__ = STRICT
     method: Literal["balance", "march"] = "balance"
     harmonics: HarmonicNumber = 7
     samples: Samples = "auto"
@@ -184,7 +180,7 @@ class BalanceChoice:
 
 
 @dataclass(frozen=True)
-class PerformanceChoice:
+class PerformanceChoice(Table):
     """F_C/F_E of the performance curve, evenly spread on a logarithmic axis.
 
     Attributes
@@ -198,7 +194,6 @@ class PerformanceChoice:
         slips.
     """
 
-    __pydantic_config__ = STRICT
     lowest: q.Ratio = 5.0
     highest: q.Ratio = 1000.0
     points: Annotated[int, q.at_least(3)] = 12

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator
 
 from upd.errors import InputError
 from upd.scene import quantities as q
-from upd.scene.base import STRICT, FaceFriction, Fit
+from upd.scene.base import FaceFriction, Fit, Table
 from upd.units import parse_quantity
 
 Stiffness = Annotated[float, q.quantity("stiffness"), q.positive, q.Example('"1e6 N/mm"')]
@@ -85,7 +85,7 @@ Lines = Annotated[
 
 
 @dataclass(frozen=True)
-class FaceLines:
+class FaceLines(Table):
     """Lattice lines of one face that replace those of the scene.
 
     Attributes
@@ -94,7 +94,6 @@ class FaceLines:
         As in [contact], for this face; those of [contact] when None.
     """
 
-    __pydantic_config__ = STRICT
     rows: Lines = None
     columns: Lines = None
 
@@ -171,7 +170,7 @@ class FrictionChoice(FaceFriction):
 
 
 @dataclass(frozen=True)
-class FaceStiffness:
+class FaceStiffness(Table):
     """Contact stiffness of one face.
 
     Attributes
@@ -180,13 +179,12 @@ class FaceStiffness:
         Normal and tangential, total of the face.
     """
 
-    __pydantic_config__ = STRICT
     K_N: Stiffness
     K_T: Stiffness
 
 
 @dataclass(frozen=True)
-class StiffnessChoice:
+class StiffnessChoice(Table):
     """Contact stiffness of both faces: totals, or from a contact analysis.
 
     Attributes
@@ -207,7 +205,6 @@ class StiffnessChoice:
         contact run (scene only).
     """
 
-    __pydantic_config__ = STRICT
     K_N: Stiffness | None = None
     K_T: Stiffness | None = None
     left: FaceStiffness | None = None

@@ -17,7 +17,7 @@ from upd.measured.curve import QUANTITIES, AskedCurve, CurveLabel, MeasuredCurve
 from upd.measured.damping import DampingFit, fit_damping
 from upd.measured.read import MOST_TOLD, found_in, read_measured
 from upd.scene import quantities as q
-from upd.scene.base import STRICT
+from upd.scene.base import Table
 from upd.units import UNITS
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ ResponseUnit = Annotated[str, q.one_of(_UNITS), q.Example('"(m/s2)/N"')]
 
 
 @dataclass(frozen=True)
-class MeasuredChoice:
+class MeasuredChoice(Table):
     """A measured frequency response, drawn over the computed ones and compared with them.
 
     Attributes
@@ -55,7 +55,6 @@ class MeasuredChoice:
         SHA-256 of the file, which a run writes into its own scene: another file is then refused.
     """
 
-    __pydantic_config__ = STRICT
     file: Annotated[str, q.Noted(bounds="a .csv, text or .nc file"), q.Example('"free.csv"')]
     blade: Literal["right", "left"] = "right"
     state: Literal["free", "stuck"] | None = None

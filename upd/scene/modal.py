@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
 from upd.scene import quantities as q
-from upd.scene.base import STRICT, MeshChoice, RigBase, repeated, rig_problems
+from upd.scene.base import MeshChoice, RigBase, Table, repeated, rig_problems
 from upd.scene.measured import FROM_MEASURED, UNTIL_READ, MeasuredChoice, measured_problems
 
 #: Outputs a rig scene can ask for.
@@ -18,7 +18,7 @@ ModalWant = Annotated[str, q.one_of(MODAL_WANTS), q.Example('"free"', '"glued"')
 
 
 @dataclass(frozen=True)
-class ModesChoice:
+class ModesChoice(Table):
     """Modes below a frequency, for one or both arrangements of the platforms.
 
     Attributes
@@ -29,7 +29,6 @@ class ModesChoice:
         Which sides of the platforms face each other. Cost: each is meshed and solved.
     """
 
-    __pydantic_config__ = STRICT
     below: q.Frequency = 1100.0
     arrangements: Annotated[tuple[Literal["symmetric", "asymmetric"], ...], q.FILLED] = (
         "symmetric",
@@ -37,7 +36,7 @@ class ModesChoice:
 
 
 @dataclass(frozen=True)
-class ReductionChoice:
+class ReductionChoice(Table):
     """Fixed-interface modes kept per blade, beside all patch, force and accelerometer dofs.
 
     Attributes
@@ -52,7 +51,6 @@ class ReductionChoice:
         error, instead of their number. Cost: the blade's own modes are found as well.
     """
 
-    __pydantic_config__ = STRICT
     modes: Annotated[int, q.not_negative] | None = None
     below: q.Frequency | None = None
     error: q.Share | None = None
@@ -75,7 +73,7 @@ class ReductionChoice:
 
 
 @dataclass(frozen=True)
-class ResponseChoice:
+class ResponseChoice(Table):
     """Linear frequency response between two frequencies.
 
     Attributes
@@ -91,7 +89,6 @@ class ResponseChoice:
         Free peak accelerance that the damping ratio is tuned to instead, (m/s2)/N.
     """
 
-    __pydantic_config__ = STRICT
     start: q.Frequency = 200.0
     stop: q.Frequency = 600.0
     points: Annotated[int, q.at_least(10)] = 2000

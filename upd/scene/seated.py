@@ -8,11 +8,11 @@ from typing import Annotated, Literal
 
 from upd.scene import quantities as q
 from upd.scene.base import (
-    STRICT,
     DamperChoice,
     FaceFriction,
     Fit,
     RigBase,
+    Table,
     repeated,
     rig_problems,
     unreachable_accuracy,
@@ -48,7 +48,7 @@ class SeatedContact(FaceFriction):
 
 
 @dataclass(frozen=True)
-class BladesChoice:
+class BladesChoice(Table):
     """What of the blades is elastic.
 
     Attributes
@@ -58,12 +58,11 @@ class BladesChoice:
         sides join the blades, as blocks are.
     """
 
-    __pydantic_config__ = STRICT
     held: Literal["bases", "platforms"] = "bases"
 
 
 @dataclass(frozen=True)
-class SeatingChoice:
+class SeatingChoice(Table):
     """How F_C is raised, lowered and raised again, and other ways of loading for the band.
 
     Attributes
@@ -83,7 +82,6 @@ class SeatingChoice:
         three quarters. Cost: seconds grow in proportion.
     """
 
-    __pydantic_config__ = STRICT
     steps: Annotated[int, q.at_least(2)] = 20
     lowest: q.Share = 0.1
     over: Over = 1.5
@@ -93,7 +91,7 @@ class SeatingChoice:
 
 
 @dataclass(frozen=True)
-class MovedChoice:
+class MovedChoice(Table):
     """How the right blade is moved after the seating, F_C kept.
 
     Attributes
@@ -109,7 +107,6 @@ class MovedChoice:
         Load steps from the middle to the amplitude. Cost: seconds grow in proportion.
     """
 
-    __pydantic_config__ = STRICT
     directions: Annotated[tuple[Literal["x", "y", "z"], ...], q.FILLED] = ("x", "z")
     amplitude: Way = 0.05
     cycles: Annotated[int, q.at_least(1)] = 2
