@@ -277,7 +277,8 @@ def _many(kind: type[Any], **others: Any) -> Any:
     return many[model]
 
 
-_TEXT, _FREE = (str, ...), (dict, {})
+_TEXT: Any = (str, ...)
+_FREE: Any = (dict[str, Any], {})
 _CASE = {"case": _TEXT, "case_fields": (Case, ...)}
 _NUMBER, _MAYBE = (float | None, ...), (float | None, None)
 #: what summary.json must have; there may be more

@@ -163,6 +163,8 @@ class SceneBase(Table):
 
     #: whether masses count
     moves: ClassVar[bool] = True
+    #: tables that only this kind of scene has
+    only: ClassVar[tuple[str, ...]] = ()
 
     name: q.Name
     title: str = ""
@@ -196,6 +198,16 @@ class SceneBase(Table):
     def wants(self, *names: str) -> bool:
         """True when at least one of the outputs is asked for."""
         return any(name in self.want for name in names)
+
+    def derived(self, data: Mapping[str, Any]) -> Any:
+        """The scene with what follows from other keys as numbers, `data` as they were read. Raises
+        InputError whose arguments are the problems.
+        """
+        return self
+
+    def problems(self) -> Iterator[str]:
+        """What does not fit together."""
+        yield from ()
 
 
 def repeated(path: str, values: Sequence[float | str]) -> list[str]:
@@ -309,10 +321,14 @@ def rig_parameters(scene: Any, symmetry: str, element_nodes: int) -> dict[str, A
     }
 
 
+#: the problem of a yield stress where no contact is checked
+YIELD_CHECKED = "material.yield_stress: is checked in a contact scene, body by body; remove it here"
+
+
 def rig_problems(scene: RigBase) -> Iterator[str]:
     """What of material, mesh and solver does not fit the rig."""
     if scene.material.yield_stress is not None:
-        yield "material.yield_stress: is checked in a contact scene, body by body; remove it here"
+        yield YIELD_CHECKED
     if scene.mesh.symmetry == "quarter":
         yield 'mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"'
     if scene.solver.name == "amg":

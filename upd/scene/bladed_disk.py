@@ -9,7 +9,14 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
 from upd.scene import quantities as q
-from upd.scene.base import MaterialData, MeshChoice, SceneBase, Table, unreachable_accuracy
+from upd.scene.base import (
+    YIELD_CHECKED,
+    MaterialData,
+    MeshChoice,
+    SceneBase,
+    Table,
+    unreachable_accuracy,
+)
 
 #: Outputs a bladed disk can ask for.
 BLADED_DISK_WANTS = ("modes", "campbell", "interference", "response", "performance")
@@ -149,15 +156,14 @@ class BladedDiskScene(SceneBase):
         """Number of blades."""
         return int(self.geometry["n_sectors"])
 
-
-def bladed_disk_problems(scene: BladedDiskScene) -> Iterator[str]:
-    """What does not fit together."""
-    if scene.mesh.element == "hex8i":
-        yield 'mesh.element: hex8i has no stress stiffness; use "hex20", "hex27" or "hex8"'
-    if scene.mesh.symmetry not in ("auto", "full"):
-        yield 'mesh.symmetry: a sector has no mirror plane; use "full" or "auto"'
-    if scene.material.yield_stress is not None:
-        yield "material.yield_stress: is checked in a contact scene, body by body; remove it here"
-    if scene.solver.name == "amg":
-        yield 'solver.name: modes need a direct solver; use "auto", "pardiso" or "superlu"'
-    yield from unreachable_accuracy(scene, "a bladed disk", "the numbers of elements")
+    def problems(self) -> Iterator[str]:
+        """What does not fit together."""
+        if self.mesh.element == "hex8i":
+            yield 'mesh.element: hex8i has no stress stiffness; use "hex20", "hex27" or "hex8"'
+        if self.mesh.symmetry not in ("auto", "full"):
+            yield 'mesh.symmetry: a sector has no mirror plane; use "full" or "auto"'
+        if self.material.yield_stress is not None:
+            yield YIELD_CHECKED
+        if self.solver.name == "amg":
+            yield 'solver.name: modes need a direct solver; use "auto", "pardiso" or "superlu"'
+        yield from unreachable_accuracy(self, "a bladed disk", "the numbers of elements")

@@ -168,21 +168,29 @@ def measured_problems(measured: Mapping[str, MeasuredChoice]) -> Iterator[str]:
             yield f"{where}.file: {path.name}: and {len(faults) - MOST_TOLD} more"
 
 
-def fitted_modes(measured: Mapping[str, MeasuredChoice], table: str) -> tuple[FittedMode, ...]:
-    """Damping ratios of both blades' modes from the measured free curves.
+def fitted_modes(
+    measured: Mapping[str, MeasuredChoice], data: Mapping[str, Any], table: str
+) -> tuple[FittedMode, ...]:
+    """Damping ratios of both blades' modes from the measured free curves, where the scene asks for
+    them.
 
     Parameters
     ----------
     measured
         Name -> choice.
+    data
+        The scene's tables.
     table
-        Of the scene that asks for them.
+        Of the scene that may ask for them.
 
     Raises
     ------
     InputError
         Without a free curve, or where one cannot be fitted.
     """
+    # damaged files are found with the other problems
+    if data.get(table, {}).get("damping") != FROM_MEASURED or any(measured_problems(measured)):
+        return ()
     out: list[FittedMode] = []
     for name, one in measured.items():
         if one.state != "free":

@@ -5,12 +5,19 @@ bases.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Annotated, ClassVar, Literal
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, ClassVar, Literal
 
 from upd.scene import quantities as q
 from upd.scene.base import MeshChoice, RigBase, Table, repeated, rig_problems
-from upd.scene.measured import FROM_MEASURED, UNTIL_READ, MeasuredChoice, measured_problems
+from upd.scene.measured import (
+    FROM_MEASURED,
+    UNTIL_READ,
+    MeasuredChoice,
+    fitted_modes,
+    main_ratio,
+    measured_problems,
+)
 
 #: Outputs a rig scene can ask for.
 MODAL_WANTS = ("free", "glued", "reduction", "response", "pictures", "matrices")
@@ -123,30 +130,38 @@ class ModalScene(RigBase):
     response: ResponseChoice = field(default_factory=ResponseChoice)
     measured: Mapping[q.Name, MeasuredChoice] = field(default_factory=dict)
 
+    def derived(self, data: Mapping[str, Any]) -> ModalScene:
+        """With damping from measured curves."""
+        fitted = fitted_modes(self.measured, data, "response")
+        if not fitted:
+            return self
+        return replace(self, response=replace(self.response, damping=main_ratio(fitted)))
 
-def modal_problems(scene: ModalScene) -> Iterator[str]:
-    """What does not fit together."""
-    response, below = scene.response, scene.modes.below
-    given = [
-        name for name in ("modes", "below", "error") if getattr(scene.reduction, name) is not None
-    ]
-    yield from repeated("modes.arrangements", scene.modes.arrangements)
-    yield from measured_problems(scene.measured)
-    yield from rig_problems(scene)
-    stop = f"response.stop, {response.stop:g} Hz"
-    if not response.start < response.stop:
-        yield f"response.start: {response.start:g} Hz is not below {stop}"
-    if scene.wants("response") and below < response.stop:
-        yield f"modes.below: {below:g} Hz is below {stop}; the response needs its modes"
-    if scene.measured and not scene.wants("response"):
-        yield 'measured: nothing is computed beside it; add "response" to want'
-    for name, one in scene.measured.items():
-        if one.centrifugal_to_force is not None:
-            yield (
-                f"measured.{name}: centrifugal_to_force: a rig has no friction; give state, or "
-                'make it a forced response (analysis = "forced response")'
-            )
-    if len(given) > 1:
-        yield f"reduction: {' and '.join(given)} are given; give one of modes, below, error"
-    if scene.wants("matrices") and not scene.wants("reduction"):
-        yield "want: 'matrices' needs \"reduction\" too"
+    def problems(self) -> Iterator[str]:
+        """What does not fit together."""
+        response, below = self.response, self.modes.below
+        given = [
+            name
+            for name in ("modes", "below", "error")
+            if getattr(self.reduction, name) is not None
+        ]
+        yield from repeated("modes.arrangements", self.modes.arrangements)
+        yield from measured_problems(self.measured)
+        yield from rig_problems(self)
+        stop = f"response.stop, {response.stop:g} Hz"
+        if not response.start < response.stop:
+            yield f"response.start: {response.start:g} Hz is not below {stop}"
+        if self.wants("response") and below < response.stop:
+            yield f"modes.below: {below:g} Hz is below {stop}; the response needs its modes"
+        if self.measured and not self.wants("response"):
+            yield 'measured: nothing is computed beside it; add "response" to want'
+        for name, one in self.measured.items():
+            if one.centrifugal_to_force is not None:
+                yield (
+                    f"measured.{name}: centrifugal_to_force: a rig has no friction; give state, or "
+                    'make it a forced response (analysis = "forced response")'
+                )
+        if len(given) > 1:
+            yield f"reduction: {' and '.join(given)} are given; give one of modes, below, error"
+        if self.wants("matrices") and not self.wants("reduction"):
+            yield "want: 'matrices' needs \"reduction\" too"
