@@ -52,8 +52,10 @@ def _static_face(side: str, value: Any) -> Any:
 Static = Annotated[
     Any,
     BeforeValidator(_static),
-    q.Noted(bounds=f"{', '.join(STATES)}, or T/N or N and T of the left and the right face"),
-    q.Example('"frictionless"'),
+    q.Example(
+        '"frictionless"',
+        bounds=f"{', '.join(STATES)}, or T/N or N and T of the left and the right face",
+    ),
 ]
 
 
@@ -79,8 +81,7 @@ def _lines(value: Any) -> Any:
 Lines = Annotated[
     Any,
     BeforeValidator(_lines),
-    q.Noted(bounds="all, a number of groups, or a list of line numbers from 0"),
-    q.Example('"all"'),
+    q.Example('"all"', bounds="all, a number of groups, or a list of line numbers from 0"),
 ]
 
 

@@ -24,7 +24,7 @@ from upd.mesh.fields import bounds_of
 from upd.mesh.recipe_modules import READY
 from upd.scene.base import INSIDE
 from upd.scene.quantities import (
-    Noted,
+    Example,
     Rule,
     hint_at,
     hints,
@@ -378,7 +378,7 @@ def _bounds(hint: Any) -> str:
     choices = [str(c) for n in noted if get_origin(n) is Literal for c in get_args(n)]
     out += [", ".join(choices)] if choices else []
     out += [f"{whole}{n.bounds}" for n in noted if isinstance(n, Rule)]
-    out += [n.bounds for n in noted if isinstance(n, Noted) and n.bounds]
+    out += [n.bounds for n in noted if isinstance(n, Example) and n.bounds]
     return "; ".join(out)
 
 

@@ -55,7 +55,7 @@ class MeasuredChoice(Table):
         SHA-256 of the file, which a run writes into its own scene: another file is then refused.
     """
 
-    file: Annotated[str, q.Noted(bounds="a .csv, text or .nc file"), q.Example('"free.csv"')]
+    file: Annotated[str, q.Example('"free.csv"', bounds="a .csv, text or .nc file")]
     blade: Literal["right", "left"] = "right"
     state: Literal["free", "stuck"] | None = None
     centrifugal_to_force: q.Ratio | None = None

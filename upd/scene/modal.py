@@ -100,7 +100,7 @@ class ResponseChoice(Table):
     stop: q.Frequency = 600.0
     points: Annotated[int, q.at_least(10)] = 2000
     damping: Annotated[q.Share, q.or_from(FROM_MEASURED, UNTIL_READ)] = 0.005
-    peak: Annotated[float, q.positive, q.Noted("(m/s2)/N"), q.Example("120.0")] | None = None
+    peak: Annotated[float, q.positive, q.Example("120.0", kind="(m/s2)/N")] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

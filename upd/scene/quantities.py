@@ -21,13 +21,20 @@ Steps = tuple[str | int, ...]
 
 
 class Example:
-    """Values that would do, as TOML: what the message about a bad one proposes.
+    """What would do, and what a reference of the keys says of a value whose own validator reads it.
 
-    Several are the items of a list of such values.
+    Parameters
+    ----------
+    values
+        As TOML: what the message about a bad one proposes; several are the items of a list.
+    kind
+        Of quantity, as in `upd.units.UNITS`; or the unit of a bare number.
+    bounds
+        In a few words.
     """
 
-    def __init__(self, *values: str) -> None:
-        self.values = values
+    def __init__(self, *values: str, kind: str = "", bounds: str = "") -> None:
+        self.values, self.kind, self.bounds = values, kind, bounds
 
 
 @dataclass(frozen=True)
@@ -65,22 +72,6 @@ class Uncertainty:
         moved = self.value + shift * self.half_width
         # a fraction has no unit
         return moved if self.kind == "fraction" else quantity_text(moved, self.kind)
-
-
-@dataclass(frozen=True)
-class Noted:
-    """Unit and bounds, for a reference of the keys, of a value whose own validator reads it.
-
-    Attributes
-    ----------
-    kind
-        Of quantity, as in `upd.units.UNITS`; or the unit of a bare number.
-    bounds
-        In a few words.
-    """
-
-    kind: str = ""
-    bounds: str = ""
 
 
 @dataclass(frozen=True)
@@ -221,8 +212,7 @@ def _force_or_equilibrium(value: Any) -> Any:
 NormalLoad = Annotated[
     float | str,
     BeforeValidator(_force_or_equilibrium),
-    Noted("force", f">= 0, or {', '.join(EQUILIBRIA)}"),
-    Example('"50 N"', '"200 N"'),
+    Example('"50 N"', '"200 N"', kind="force", bounds=f">= 0, or {', '.join(EQUILIBRIA)}"),
 ]
 
 
@@ -241,8 +231,7 @@ def _direction(value: Any) -> Any:
 Direction = Annotated[
     float,
     BeforeValidator(_direction),
-    Noted("angle", "an angle, x or y"),
-    Example('"x"', '"30 deg"'),
+    Example('"x"', '"30 deg"', kind="angle", bounds="an angle, x or y"),
 ]
 Phase = Annotated[float, quantity("angle"), Example('"180 deg"')]
 Length = Annotated[float, quantity("length"), Example('"5 mm"')]
@@ -305,8 +294,9 @@ def _wanted_share(value: Any, of: str = "") -> float:
 Accuracy = Annotated[
     Any,
     BeforeValidator(_accuracy),
-    Noted(bounds=f'"{UNKNOWN}"; between 0 and 1; or a table of these by the names of numbers'),
-    Example('"1 %"'),
+    Example(
+        '"1 %"', bounds=f'"{UNKNOWN}"; between 0 and 1; or a table of these by the names of numbers'
+    ),
 ]
 
 
@@ -374,5 +364,5 @@ def notes(hint: Any) -> Iterator[Any]:
 
 def quantity_kind(hint: Any) -> str:
     """Kind of the quantity, or the unit of a bare number; "" of what is none."""
-    readers = (n.kind for n in notes(hint) if isinstance(n, (QuantityReader, Noted)) and n.kind)
+    readers = (n.kind for n in notes(hint) if isinstance(n, (QuantityReader, Example)) and n.kind)
     return next(readers, "")
