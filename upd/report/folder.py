@@ -118,15 +118,10 @@ class RunFolder:
         return plain_name(self.path)
 
     @property
-    def versions(self) -> dict[str, str]:
-        """Package -> version, as the run wrote them into its log."""
-        for line in self.log:
-            if line.text.startswith(_VERSIONS):
-                pairs = (
-                    entry.rpartition(" ") for entry in line.text.removeprefix(_VERSIONS).split(", ")
-                )
-                return {package: version for package, _, version in pairs}
-        return {}
+    def versions(self) -> str:
+        """Packages with their versions, as the run wrote them into its log."""
+        found = (line.text for line in self.log if line.text.startswith(_VERSIONS))
+        return next(found, "")
 
     @property
     def started(self) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from upd.errors import ConvergenceError, InputError, did_you_mean
-from upd.report.answer import AnswerLine, Written, answer, short_answer
+from upd.report.answer import AnswerLine, answer, short_answer
 from upd.report.columns import text_width
 from upd.report.folder import read_run
 from upd.report.tables import analysis_charts, answer_tables, main_numbers
@@ -175,7 +175,7 @@ class RunResult:
         """Its answer as the terminal prints it, in lines of ``width`` characters; with all numbers,
         checks and sources of errors when ``full``.
         """
-        return answer(self.summary(), width, Written(self.folder, self.faults), full=full)
+        return answer(self.summary(), width, self.folder, self.faults, full=full)
 
     def __repr__(self) -> str:
         return "\n".join(short_answer(self.summary(), text_width(), self.folder))

@@ -10,7 +10,7 @@ from typing import Any
 from upd.labels import sentence
 from upd.plot.surface import read_surface
 from upd.report.folder import RunFolder, read_run
-from upd.report.page import Section, Verdict, make_panels, page_text, versions_text, write_page
+from upd.report.page import Section, Verdict, make_panels, page_text, write_page
 from upd.report.tables import (
     all_numbers,
     analysis_charts,
@@ -44,7 +44,7 @@ def write_run_report(folder: Path) -> Path:
         run.summary["title"] or run.summary["scene"],
         run_sections(run, surfaces),
         verdict=verdict(run.summary),
-        footer=f"Run folder {run.name}{started}. {versions_text(run.versions)}".rstrip(),
+        footer=f"Run folder {run.name}{started}. {sentence(run.versions)}".rstrip(),
         surfaces=surfaces,
     )
     return write_page(run.path / "report.html", html)
