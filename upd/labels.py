@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from typing import Any
 
@@ -72,6 +72,13 @@ def counted(count: int, what: str) -> str:
     """1 point, 2 points, 3 meshes."""
     plural = "es" if what.endswith("sh") else "s"
     return f"{count} {what}{plural if count != 1 else ''}"
+
+
+def listed(items: Iterable[str], most: int | None, form: str = "{}") -> str:
+    """Items, each once, the first ``most`` by name, in a text; nothing of none."""
+    found = [item for item in dict.fromkeys(items) if item]
+    more = [f"and {len(found) - most} more"] if most and len(found) > most else []
+    return form.format("; ".join([*found[:most], *more])) if found else ""
 
 
 def file_name(title: str) -> str:

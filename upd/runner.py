@@ -90,11 +90,10 @@ def run(
     if out is None:
         log.info(_versions())
         return _solved(_Run(analysis, stages, None, None), plan)
-    own = _take_folder(Path(out), numbered)
+    own, handler = _begin(Path(out), numbered, loaded)
     if own.replaces:
         for seconds in (None, 0.0):
             progress("folder", f"replaces the earlier run in {own.place}", seconds)
-    handler = _begin(own, loaded)
     log.info(_versions())
     # matplotlib takes a while to import: meanwhile the solver computes.
     threading.Thread(target=import_module, args=("upd.plot.matplotlib",), daemon=True).start()
@@ -105,7 +104,8 @@ def run(
     except BaseException as error:
         if report:
             _leave_report(own, None, stages)
-        if own.replaces and not _whole(own, error):
+        complete = isinstance(error, UpdError) and error.result is not None
+        if own.replaces and not (complete and (own.path / "result.nc").exists()):
             # Half a run takes the place of none that was whole.
             stays = own.step_aside()
             progress("folder", f"the earlier run in {stays} stays; this one: {own.place}", 0.0)
@@ -116,12 +116,6 @@ def run(
                 error.result = replace(error.result, folder=place)
         raise
     return replace(result, folder=_end(own, handler))
-
-
-def _whole(own: OwnFolder, error: BaseException) -> bool:
-    """Whether a run that failed still left all its numbers."""
-    complete = isinstance(error, UpdError) and error.result is not None
-    return complete and (own.path / "result.nc").exists()
 
 
 def _versions() -> str:
@@ -331,25 +325,25 @@ def _size(analysis: Analysis, plan: Plan[Any], solution: Any) -> dict[str, Any]:
     return size if solution is None else size | analysis.sizes(solution)
 
 
-def _take_folder(place: Path, numbered: bool) -> OwnFolder:
+def _begin(place: Path, numbered: bool, scene: AnyScene) -> tuple[OwnFolder, logging.Handler]:
+    """Take a folder, write the scene and open the log."""
+    own = None
     try:
-        return own_folder(place, check=check_replaceable, ours=is_run_file, number=numbered)
-    except OSError as error:
-        raise _unwritable(place, error) from None
-
-
-def _begin(own: OwnFolder, scene: AnyScene) -> logging.Handler:
-    """Write the scene and open the log."""
-    try:
+        own = own_folder(place, check=check_replaceable, ours=is_run_file, number=numbered)
         write_text(own.path / "scene.toml", scene_as_run(scene))
         handler = _RunLog(own.path / "run.log", mode="w", encoding="utf-8")
     except OSError as error:
-        own.drop()
-        raise _unwritable(own.place, error) from None
+        if own is not None:
+            place = own.place
+            own.drop()
+        raise InputError(
+            f"the run folder {place} cannot be written ({one_line(error)}): choose another with "
+            "--out"
+        ) from None
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(name)s: %(message)s"))
     log.addHandler(handler)
     log.setLevel(logging.INFO)
-    return handler
+    return own, handler
 
 
 def _end(own: OwnFolder, handler: logging.Handler) -> Path:
@@ -357,12 +351,6 @@ def _end(own: OwnFolder, handler: logging.Handler) -> Path:
     log.removeHandler(handler)
     handler.close()
     return own.move_in()
-
-
-def _unwritable(place: Path, error: OSError) -> InputError:
-    return InputError(
-        f"the run folder {place} cannot be written ({one_line(error)}): choose another with --out"
-    )
 
 
 class _RunLog(logging.FileHandler):

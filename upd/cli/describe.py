@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from importlib import resources
 from itertools import groupby
 from pathlib import Path
@@ -37,40 +37,28 @@ UNCERTAINTY = '"VALUE +- HALF-WIDTH" or "VALUE +- 10 %"'
 _EXAMPLES = Path(str(resources.files("upd"))) / "scenes" / "examples"
 
 
-@dataclass(frozen=True)
-class Described:
-    """A scene or a recipe with its keys.
-
-    Attributes
-    ----------
-    params
-        The recipe's own object.
+def described(
+    what: str, overrides: Sequence[str] = ()
+) -> tuple[str, list[SceneKey], tuple[str, Any]]:
+    """Title and keys of a scene or a recipe, the recipe with its own object. Raises InputError for
+    what is neither.
     """
-
-    title: str
-    keys: list[SceneKey]
-    recipe: str
-    params: Any
-
-
-def described(what: str, overrides: Sequence[str] = ()) -> Described:
-    """The keys of a scene or a recipe. Raises InputError for what is neither."""
     if what in READY or is_file(what):
         if overrides:
             raise InputError("--set is for scenes: leave it out of a recipe")
-        return Described(f"Recipe {what}", recipe_keys(what), what, recipes.made(what, {}))
+        return f"Recipe {what}", recipe_keys(what), (what, recipes.made(what, {}))
     scene = load_scene(what, overrides)
     title = f"Scene {scene.name}: {scene.title}" if scene.title else f"Scene {scene.name}"
-    return Described(title, scene_keys(scene) + absent_keys(scene), scene.recipe, params_of(scene))
+    return title, scene_keys(scene) + absent_keys(scene), (scene.recipe, params_of(scene))
 
 
-def print_keys(console: Console, found: Described, asked: str) -> None:
+def print_keys(console: Console, title: str, keys: Sequence[SceneKey], asked: str) -> None:
     """All keys as tables, those of a table that was asked for, or one key in full."""
-    chosen = chosen_keys(found.keys, asked) if asked else found.keys
+    chosen = chosen_keys(keys, asked) if asked else keys
     if asked and len(chosen) == 1:
         _print_one(console, chosen[0])
         return
-    console.print(Text(found.title, "bold"))
+    console.print(Text(title, "bold"))
     for steps, mine in groupby(chosen, key=lambda k: k.steps[:-1]):
         console.print(_table(".".join(steps), list(mine)))
     example = f"upd describe SCENE KEY, for example {chosen[-1].path}"
@@ -121,13 +109,13 @@ def _print_one(console: Console, key: SceneKey) -> None:
     console.print(out)
 
 
-def write_drawing(found: Described, path: Path) -> Path:
+def write_drawing(recipe: str, params: Any, path: Path) -> Path:
     """Draw the geometry with its dimensions. Raises InputError for a place that is no .png file."""
     check_ending(path, "--drawing", ".png")
     # matplotlib takes a while to import
     from upd.plot.drawing import draw_sections
 
-    meshes, views = recipes.drawing(found.recipe, asdict(found.params))
+    meshes, views = recipes.drawing(recipe, asdict(params))
     with placed_file(path) as temporary:
         draw_sections(meshes, views).savefig(temporary, format="png")
     return path

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from upd.analyses.meshing import MeshRequest
 from upd.cache.files import placed_file
-from upd.cli.describe import Described, print_keys
+from upd.cli.describe import print_keys
 from upd.cli.tables import print_table
 from upd.cli.terminal import check_ending
 from upd.errors import InputError
@@ -169,6 +169,5 @@ def _print_pairs(
 
 def print_parameters(console: Console, request: MeshRequest) -> None:
     """The parameters of a recipe."""
-    recipe, params = request.recipe, request.parameters
-    found = Described(f"Parameters of {recipe}", recipe_keys(recipe, params), recipe, params)
-    print_keys(console, found, "")
+    keys = recipe_keys(request.recipe, request.parameters)
+    print_keys(console, f"Parameters of {request.recipe}", keys, "")

@@ -14,6 +14,7 @@ from upd.labels import (
     check_number,
     check_words,
     effect_word,
+    listed,
     number,
     percent,
     percent_of,
@@ -328,25 +329,14 @@ def warnings(
     out = []
     for name, mine in failed.items():
         worst = worst_check(mine)
-        cases = _in_brackets(_listed([worst["case"], *(c["case"] for c in mine)], most))
+        cases = listed([worst["case"], *(c["case"] for c in mine)], most, " ({})")
         remedy = f". {sentence(worst['remedy'], '')}" if worst.get("remedy") else ""
         out.append(sentence(f"{name}{cases}: {check_words(worst)}{remedy}"))
     for reason, numbers in lost.items():
-        names = _listed([number_label(entry["name"]) for entry in numbers], most)
-        cases = _in_brackets(_listed([entry["case"] for entry in numbers], most))
+        names = listed([number_label(entry["name"]) for entry in numbers], most)
+        cases = listed([entry["case"] for entry in numbers], most, " ({})")
         out.append(sentence(f"{names}{cases}: not reached, {reason}"))
     return out
-
-
-def _listed(items: Iterable[str], most: int | None) -> str:
-    """Items, each once."""
-    found = [item for item in dict.fromkeys(items) if item]
-    more = [f"and {len(found) - most} more"] if most and len(found) > most else []
-    return "; ".join([*found[:most], *more])
-
-
-def _in_brackets(text: str) -> str:
-    return f" ({text})" if text else ""
 
 
 # ---------------------------------------------------------------- charts

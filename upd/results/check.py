@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from upd.labels import check_words
+from upd.labels import check_words, listed
 from upd.results.case import Case
 from upd.results.number import Result, as_json
 from upd.results.quantities import number_label
@@ -49,14 +49,7 @@ def warnings_of(checks: Sequence[Check], results: Sequence[Result]) -> list[str]
     for one in results:
         if one.withheld:
             found.setdefault(f"{number_label(one.name)} not reached", []).append(one.case.label)
-    return [name + (f" ({_some(cases)})" if any(cases) else "") for name, cases in found.items()]
-
-
-def _some(labels: Sequence[str], most: int = 2) -> str:
-    """The first labels, each once, and how many more there are."""
-    labels = list(dict.fromkeys(labels))
-    shown = "; ".join(label for label in labels[:most] if label)
-    return shown + (f"; and {len(labels) - most} more" if len(labels) > most else "")
+    return [name + listed(cases, 2, " ({})") for name, cases in found.items()]
 
 
 def outcome_of(status: str) -> str:

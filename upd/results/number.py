@@ -76,11 +76,6 @@ class ErrorPart:
         return math.isfinite(self.error)
 
 
-def largest(parts: Iterable[ErrorPart]) -> ErrorPart:
-    """The part that adds most."""
-    return max(parts, key=lambda part: part.error if part.known else -math.inf)
-
-
 @dataclass(frozen=True)
 class InputPart:
     """What the half-width of one input does to a number, to first order.
