@@ -67,36 +67,23 @@ def regenerate(
     with stages("pairs", ", ".join(meshes)):
         pairs = check_pairs(meshes)
     for path in files:
-        for part, bodies in _parts(path, meshes, split=split).items():
+        parts: dict[Path, Mapping[str, Mesh]] = {path: meshes}
+        if split:
+            named = ((f"{path.stem}-{body}{path.suffix}", body) for body in meshes)
+            parts = {path.with_name(name): {body: meshes[body]} for name, body in named}
+        for part, bodies in parts.items():
             with stages("write", str(part)):
                 write_mesh(bodies, part)
     if picture is not None:
-        with stages("picture", str(picture)):
-            _draw(request, meshes, picture)
+        # matplotlib takes a while to import
+        from upd.plot.pictures import draw_meshes
+
+        with stages("picture", str(picture)), placed_file(picture) as temporary:
+            draw_meshes(meshes, request.name).savefig(temporary, format="png")
     console.print(_configuration(request, cached))
     _print_shapes(console, meshes)
     _print_pairs(console, pairs, meshes, request.parameters)
     return meshes
-
-
-def _parts(
-    path: Path, meshes: Mapping[str, Mesh], *, split: bool
-) -> dict[Path, Mapping[str, Mesh]]:
-    """Files and the bodies in each."""
-    if not split:
-        return {path: meshes}
-    return {
-        path.with_name(f"{path.stem}-{body}{path.suffix}"): {body: mesh}
-        for body, mesh in meshes.items()
-    }
-
-
-def _draw(request: MeshRequest, meshes: Mapping[str, Mesh], path: Path) -> None:
-    # matplotlib takes a while to import
-    from upd.plot.pictures import draw_meshes
-
-    with placed_file(path) as temporary:
-        draw_meshes(meshes, request.name).savefig(temporary, format="png")
 
 
 def _configuration(request: MeshRequest, cached: bool) -> str:

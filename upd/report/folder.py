@@ -191,6 +191,11 @@ def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
     summary = _summary(folder)
     missing: list[str] = []
     scene = _text(folder / "scene.toml", missing)
+    tables: dict[str, Any] = {}
+    try:
+        tables = tomllib.loads(scene)
+    except tomllib.TOMLDecodeError as problem:
+        missing.append(f"scene.toml: is not TOML ({problem})")
     arrays: Arrays = {}
     if (folder / "result.nc").exists():
         try:
@@ -206,11 +211,15 @@ def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
     missing += [f"{f.name}: is no PNG file" for name, f in pictures.items() if name not in figures]
     return RunFolder(
         path=folder,
-        summary=summary | {"scene_file": _tables(scene, missing)},
+        summary=summary | {"scene_file": tables},
         arrays=arrays,
         figures=figures,
         scene=scene,
-        log=_log(_text(folder / "run.log", missing)),
+        log=tuple(
+            LogLine(m["time"].partition(",")[0], m["level"], m["where"], m["text"])
+            for m in map(_LOG_LINE.match, _text(folder / "run.log", missing).splitlines())
+            if m
+        ),
         missing=tuple(missing),
     )
 
@@ -236,21 +245,6 @@ def is_png(path: Path) -> bool:
             return file.read(len(_PNG)) == _PNG
     except OSError:
         return False
-
-
-def _tables(text: str, missing: list[str]) -> dict[str, Any]:
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as problem:
-        missing.append(f"scene.toml: is not TOML ({problem})")
-        return {}
-
-
-def _log(text: str) -> tuple[LogLine, ...]:
-    found = (_LOG_LINE.match(line) for line in text.splitlines())
-    return tuple(
-        LogLine(m["time"].partition(",")[0], m["level"], m["where"], m["text"]) for m in found if m
-    )
 
 
 # ---------------------------------------------------------------- JSON files, checked once

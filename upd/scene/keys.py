@@ -333,21 +333,15 @@ def _geometry(scene: Any, given: Mapping[str, Any]) -> Iterator[SceneKey]:
         if key.name not in values:
             # what another table chooses: the elements of the mesh, its symmetry
             continue
-        auto = values[key.name] == "auto"
+        value = values[key.name]
+        # what a file could give: "auto" is given or not at all
+        plain = isinstance(value, (str, int)) or (isinstance(value, float) and math.isfinite(value))
         yield replace(
             key,
-            value='"auto"' if auto else key.value,
+            value='"auto"' if value == "auto" else key.value,
             given=key.name in given,
-            writable=_writable(values[key.name]),
-            uncertain=key.kind in UNITS,
+            writable=plain and value != "auto",
         )
-
-
-def _writable(value: Any) -> bool:
-    """Whether a file could give the parameter of a recipe; "auto" is given or not at all."""
-    if isinstance(value, float):
-        return math.isfinite(value)
-    return isinstance(value, (str, int)) and value != "auto"
 
 
 def _bounds(hint: Any) -> str:
