@@ -19,6 +19,7 @@ from pydantic import TypeAdapter, ValidationError, create_model
 from upd.analyses.base import Effect
 from upd.cache.folders import plain_name
 from upd.errors import InputError
+from upd.labels import sentence
 from upd.results import Arrays, Case, Check, ErrorPart, InputPart, Result, read_netcdf
 
 _LOG_LINE = re.compile(r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$")
@@ -114,19 +115,12 @@ class RunFolder:
     missing: tuple[str, ...]
 
     @property
-    def name(self) -> str:
-        return plain_name(self.path)
-
-    @property
-    def versions(self) -> str:
-        """Packages with their versions, as the run wrote them into its log."""
+    def origin(self) -> str:
+        """Its name, when the run began and with which packages, by its log."""
         found = (line.text for line in self.log if line.text.startswith(_VERSIONS))
-        return next(found, "")
-
-    @property
-    def started(self) -> str:
-        """When the run began, by its log."""
-        return self.log[0].time if self.log else ""
+        versions = sentence(next(found, ""))
+        started = f", run on {self.log[0].time}" if self.log else ""
+        return f"Run folder {plain_name(self.path)}{started}. {versions}".rstrip()
 
 
 def is_run_file(entry: Path) -> bool:

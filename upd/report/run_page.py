@@ -39,12 +39,11 @@ def write_run_report(folder: Path) -> Path:
     """
     run = read_run(folder)
     surfaces = run_surfaces(run)
-    started = f", run on {run.started}" if run.started else ""
     html = page_text(
         run.summary["title"] or run.summary["scene"],
         run_sections(run, surfaces),
         verdict=verdict(run.summary),
-        footer=f"Run folder {run.name}{started}. {sentence(run.versions)}".rstrip(),
+        footer=run.origin,
         surfaces=surfaces,
     )
     return write_page(run.path / "report.html", html)

@@ -250,6 +250,9 @@ class FaceFriction(Table):
     ----------
     friction
         Coulomb's coefficient.
+    fit
+        How well the faces fit each other: "new" (flat, they touch everywhere without load), "worn"
+        (worn in under F_C, which then presses evenly), or a number between, 0 new to 1 worn.
     """
 
     friction: q.Coefficient = 0.6

@@ -10,7 +10,6 @@ from upd.scene import quantities as q
 from upd.scene.base import (
     DamperChoice,
     FaceFriction,
-    Fit,
     RigBase,
     Table,
     repeated,
@@ -30,20 +29,6 @@ Over = Annotated[float, q.must(lambda v: v > 1.0, "is not above 1", "> 1"), q.Ex
 whole_quarters = q.must(
     lambda v: v >= 4 and v % 4 == 0, "is not 4, 8, 12 and so on", "4, 8, 12 and so on"
 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class SeatedContact(FaceFriction):
-    """Coulomb friction on every matching node of both faces.
-
-    Attributes
-    ----------
-    fit
-        How well the faces fit each other: "new" (flat, they touch everywhere without load), "worn"
-        (worn in under F_C, which then presses evenly), or a number between, 0 new to 1 worn.
-    """
-
-    fit: Fit = "new"
 
 
 @dataclass(frozen=True)
@@ -134,7 +119,7 @@ class SeatedScene(RigBase):
     want: Annotated[tuple[SeatedWant, ...], q.FILLED]
     blades: BladesChoice = field(default_factory=BladesChoice)
     damper: DamperChoice = field(default_factory=DamperChoice)
-    contact: SeatedContact = field(default_factory=SeatedContact)
+    contact: FaceFriction = field(default_factory=FaceFriction)
     seating: SeatingChoice = field(default_factory=SeatingChoice)
     moved: MovedChoice = field(default_factory=MovedChoice)
 
