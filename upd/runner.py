@@ -24,20 +24,10 @@ from upd.report import write_report
 from upd.report.files import write_curves, write_figures
 from upd.report.folder import check_replaceable, is_run_file
 from upd.report.notebook import RunResult
-from upd.results import (
-    DIGEST,
-    FAILED,
-    Check,
-    Estimates,
-    Result,
-    file_digest,
-    status_of,
-    with_estimates,
-    with_fault,
-    with_inputs,
-    worst_check,
-    write_netcdf,
-)
+from upd.results import Check, Estimates, Result, write_netcdf
+from upd.results.check import FAILED, status_of, with_fault, worst_check
+from upd.results.netcdf import DIGEST, file_digest
+from upd.results.number import with_estimates, with_inputs
 from upd.scene import AnyScene, as_scene
 from upd.scene.keys import scene_as_run
 from upd.vary.inputs import input_parts

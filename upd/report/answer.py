@@ -32,8 +32,8 @@ from upd.report.tables import (
     stage_table,
     warnings,
 )
-from upd.results import FAILED, WARNED, outcome_of, worst_check
 from upd.results.answer_table import AnswerTable
+from upd.results.check import FAILED, WARNED, outcome_of, worst_check
 from upd.results.quantities import number_label, quantity_of
 
 #: lines that fit on a screen

@@ -17,7 +17,9 @@ from upd.report.answer import AnswerLine, answer, short_answer
 from upd.report.columns import text_width
 from upd.report.folder import read_run
 from upd.report.tables import analysis_charts, answer_tables, main_numbers
-from upd.results import FAILED, OK, Case, Check, Result, from_json, outcome_of, read_result
+from upd.results import Case, Check, Result
+from upd.results.check import FAILED, OK, outcome_of
+from upd.results.number import from_json, read_result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

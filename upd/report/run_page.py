@@ -23,8 +23,8 @@ from upd.report.tables import (
     stage_table,
     warnings,
 )
-from upd.results import FAILED, outcome_of
 from upd.results.answer_table import AnswerTable
+from upd.results.check import FAILED, outcome_of
 
 log = logging.getLogger("upd.report")
 

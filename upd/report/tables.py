@@ -24,8 +24,10 @@ from upd.labels import (
     unit_label,
 )
 from upd.plot.chart import Chart, Entry
-from upd.results import Arrays, ErrorPart, from_json, worst_check, worst_checks
+from upd.results import Arrays, ErrorPart
 from upd.results.answer_table import AnswerTable
+from upd.results.check import worst_check, worst_checks
+from upd.results.number import from_json
 from upd.results.quantities import CLOSED_FORM_ERROR, number_label, number_title
 from upd.results.sampled import SampledNumber
 

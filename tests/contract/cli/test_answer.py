@@ -21,15 +21,9 @@ from upd.report.answer import LINES
 from upd.report.columns import fitting, folded_head, whole_table
 from upd.report.notebook import RunResult, headline
 from upd.report.tables import MOST_NOTES, warnings
-from upd.results import (
-    NO_CASE,
-    Case,
-    Check,
-    Result,
-    outcome_of,
-    status_of,
-)
+from upd.results import NO_CASE, Case, Check, Result
 from upd.results.answer_table import AnswerTable
+from upd.results.check import outcome_of, status_of
 from upd.results.quantities import Quantity
 from upd.scene import ready_scenes
 

@@ -22,7 +22,7 @@ from upd.report import notebook
 from upd.report.folder import read_run
 from upd.report.notebook import RunResult
 from upd.report.tables import analysis_charts
-from upd.results import status_of
+from upd.results.check import status_of
 from upd.results.quantities import number_label
 
 

@@ -31,7 +31,8 @@ from upd.report.folder import RunFolder, read_run
 from upd.report.page import fitting
 from upd.report.run_page import run_surfaces
 from upd.report.tables import all_numbers, analysis_charts, filled, main_numbers, warnings
-from upd.results import Case, worst_checks
+from upd.results import Case
+from upd.results.check import worst_checks
 from upd.results.quantities import number_label
 
 TITLE = 'Hertz <script>alert("x")</script> & </script><!-- "quoted"'
