@@ -8,7 +8,7 @@ import re
 import types
 import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, is_dataclass
+from dataclasses import MISSING, Field, dataclass, field, is_dataclass
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import AfterValidator, BeforeValidator
@@ -76,15 +76,27 @@ class Uncertainty:
 
 @dataclass(frozen=True)
 class QuantityReader:
-    """Number or text with a unit -> number in mm, N, MPa, t, s."""
+    """Number or text with a unit -> number in mm, N, MPa, t, s.
+
+    Attributes
+    ----------
+    words
+        That may stand in its place -> what they mean.
+    others
+        What a message about anything else says of them.
+    """
 
     kind: str
+    words: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    others: str = ""
 
     def __call__(self, value: Any) -> Any:
+        if isinstance(value, str) and value in self.words:
+            return self.words[value]
         try:
             return parse_quantity(value, self.kind)
         except InputError as error:
-            raise ValueError(str(error)) from None
+            raise ValueError(f"{error}{self.others}") from None
 
 
 @dataclass(frozen=True)
@@ -191,47 +203,30 @@ Centrifugal = Annotated[Force, or_from(FROM_SPEED, "0 N")]
 #: Forces that the equilibrium of a damper under centrifugal force gives, by the share of friction
 #: it mobilises.
 EQUILIBRIA = ("opposing", "frictionless", "reversed")
-
-
-def _force_or_equilibrium(value: Any) -> Any:
-    if isinstance(value, str) and value in EQUILIBRIA:
-        return value
-    try:
-        number = parse_quantity(value, "force")
-    except InputError as error:
-        known = ", ".join(repr(e) for e in EQUILIBRIA)
-        raise ValueError(
-            f"{error}; or one of {known} (equilibrium under loads.centrifugal)"
-        ) from None
-    if number < 0.0:
-        raise ValueError(f"{number:g} {_PULLS}")
-    return number
-
-
 #: A normal force in N, or the name of an equilibrium.
 NormalLoad = Annotated[
     float | str,
-    BeforeValidator(_force_or_equilibrium),
-    Example('"50 N"', '"200 N"', kind="force", bounds=f">= 0, or {', '.join(EQUILIBRIA)}"),
+    BeforeValidator(
+        QuantityReader(
+            "force",
+            {name: name for name in EQUILIBRIA},
+            f"; or one of {', '.join(map(repr, EQUILIBRIA))} (equilibrium under loads.centrifugal)",
+        )
+    ),
+    must(lambda v: isinstance(v, str) or v >= 0.0, _PULLS, f">= 0, or {', '.join(EQUILIBRIA)}"),
+    Example('"50 N"', '"200 N"'),
 ]
-
-
-def _direction(value: Any) -> Any:
-    if value in ("x", "y"):
-        return {"x": 0.0, "y": 90.0}[value]
-    try:
-        return parse_quantity(value, "angle")
-    except InputError as error:
-        raise ValueError(
-            f'{error}; or "x" (along the longer edge of the patch), "y" (across it)'
-        ) from None
-
-
 #: Direction of a tangential load in degrees from the patch's x.
 Direction = Annotated[
     float,
-    BeforeValidator(_direction),
-    Example('"x"', '"30 deg"', kind="angle", bounds="an angle, x or y"),
+    BeforeValidator(
+        QuantityReader(
+            "angle",
+            {"x": 0.0, "y": 90.0},
+            '; or "x" (along the longer edge of the patch), "y" (across it)',
+        )
+    ),
+    Example('"x"', '"30 deg"', bounds="an angle, x or y"),
 ]
 Phase = Annotated[float, quantity("angle"), Example('"180 deg"')]
 Length = Annotated[float, quantity("length"), Example('"5 mm"')]
