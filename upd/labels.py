@@ -58,11 +58,6 @@ def check_words(check: Mapping[str, Any]) -> str:
     return f"{check['says']} = {value} (limit {limit})"
 
 
-def effect_word(effect: Mapping[str, Any]) -> str:
-    """Whether an effect of summary.json was simulated: yes, no, or n/a where the scene has none."""
-    return "yes" if effect["on"] else "no" if effect.get("applies", True) else "n/a"
-
-
 def sentence(words: str, end: str = ".") -> str:
     """Words as a sentence: a capital first; nothing of none."""
     return f"{words[:1].upper()}{words[1:]}{end}" if words else ""

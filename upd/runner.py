@@ -25,7 +25,7 @@ from upd.report.files import write_curves, write_figures
 from upd.report.folder import check_replaceable, is_run_file
 from upd.report.notebook import RunResult
 from upd.results import Check, Estimates, Result, write_netcdf
-from upd.results.check import FAILED, status_of, with_fault, worst_check
+from upd.results.check import FAILED, OK, WARNED, status_of, worst_check
 from upd.results.netcdf import DIGEST, file_digest
 from upd.results.number import with_estimates, with_inputs
 from upd.scene import AnyScene, as_scene
@@ -129,9 +129,8 @@ def _with_fault(result: RunResult, fault: str, folder: Path) -> RunResult:
     """The result with a fault of its pictures in its status, in summary.json too where the disk
     takes it.
     """
-    result = replace(
-        result, status=with_fault(result.status, fault), faults=(*result.faults, fault)
-    )
+    status = f"{WARNED}: {fault}" if result.status == OK else f"{result.status}; {fault}"
+    result = replace(result, status=status, faults=(*result.faults, fault))
     with suppress(OSError):
         _write_summary(result, folder)
     return result
@@ -228,7 +227,8 @@ def _collected(
         arrays=arrays,
         folder=run.place,
         scene_text=scene_as_run(plan.scene),
-    ).with_cost(stages.cost())
+        cost=stages.cost(),
+    )
 
 
 def _leave(run: _Run, result: RunResult, solution: Any) -> tuple[RunResult, str]:
@@ -271,7 +271,7 @@ def _leave(run: _Run, result: RunResult, solution: Any) -> tuple[RunResult, str]
     except Exception as error:
         log.exception("figures were not written")
         result = _with_fault(result, f"figures not written ({one_line(error)})", folder)
-    result = result.with_cost(stages.cost())
+    result = replace(result, cost=stages.cost())
     with suppress(OSError):
         # The one written first has all but the seconds of the files.
         _write_summary(result, folder)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -66,10 +66,6 @@ class RunResult:
     def outcome(self) -> str:
         """ "ok", "ok with warnings" or "failed"; `status` names the reasons."""
         return outcome_of(self.status)
-
-    def with_cost(self, cost: Mapping[str, Any]) -> RunResult:
-        """The same result with what it cost."""
-        return replace(self, cost=cost)
 
     def value(self, name: str, case: str | Case | None = None) -> float:
         """The number ``name`` of ``case``, its label or itself (the only one when None).

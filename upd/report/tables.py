@@ -10,10 +10,10 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from upd.analyses import analysis_named
+from upd.analyses.base import Effect
 from upd.labels import (
     check_number,
     check_words,
-    effect_word,
     listed,
     number,
     percent,
@@ -190,7 +190,7 @@ def effects_table(effects: Sequence[Mapping[str, Any]]) -> AnswerTable:
     """What was simulated and what was not, with the checks of it."""
     columns = {
         "effect": [str(e["name"]) for e in effects],
-        "simulated": [effect_word(e) for e in effects],
+        "simulated": [from_json(Effect, e).word for e in effects],
         "why": [str(e["why"]) for e in effects],
         "check": [str(e.get("verdict") or "").partition(":")[0] for e in effects],
     }

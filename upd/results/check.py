@@ -35,11 +35,6 @@ def status_of(checks: Sequence[Check], results: Sequence[Result]) -> str:
     return f"{WARNED}: " + "; ".join(warnings) if warnings else OK
 
 
-def with_fault(status: str, fault: str) -> str:
-    """A status with what went wrong with the pictures of a run."""
-    return f"{WARNED}: {fault}" if status == OK else f"{status}; {fault}"
-
-
 def warnings_of(checks: Sequence[Check], results: Sequence[Result]) -> list[str]:
     """What did not pass and what was not reached, one sentence per name with its cases."""
     found: dict[str, list[str]] = {}
