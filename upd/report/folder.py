@@ -83,16 +83,6 @@ _MOST = 4
 
 
 @dataclass(frozen=True)
-class LogLine:
-    """One line of run.log."""
-
-    time: str
-    level: str
-    where: str
-    text: str
-
-
-@dataclass(frozen=True)
 class RunFolder:
     """Content of a run folder.
 
@@ -102,6 +92,8 @@ class RunFolder:
         Summary.json, with the scene file's tables under "scene_file".
     figures
         Name without ending -> PNG file, in alphabetical order.
+    log
+        Lines of run.log with their time, level, where and text.
     missing
         Files that could not be read, each with the reason.
     """
@@ -111,15 +103,15 @@ class RunFolder:
     arrays: Arrays
     figures: Mapping[str, Path]
     scene: str
-    log: tuple[LogLine, ...]
+    log: tuple[re.Match[str], ...]
     missing: tuple[str, ...]
 
     @property
     def origin(self) -> str:
         """Its name, when the run began and with which packages, by its log."""
-        found = (line.text for line in self.log if line.text.startswith(_VERSIONS))
+        found = (line["text"] for line in self.log if line["text"].startswith(_VERSIONS))
         versions = sentence(next(found, ""))
-        started = f", run on {self.log[0].time}" if self.log else ""
+        started = f", run on {self.log[0]['time'].partition(',')[0]}" if self.log else ""
         return f"Run folder {plain_name(self.path)}{started}. {versions}".rstrip()
 
 
@@ -203,17 +195,14 @@ def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
     pictures = {f.stem: f for f in sorted(folder.glob("*.png"))}
     figures = {name: f for name, f in pictures.items() if is_png(f)}
     missing += [f"{f.name}: is no PNG file" for name, f in pictures.items() if name not in figures]
+    log = _text(folder / "run.log", missing).splitlines()
     return RunFolder(
         path=folder,
         summary=summary | {"scene_file": tables},
         arrays=arrays,
         figures=figures,
         scene=scene,
-        log=tuple(
-            LogLine(m["time"].partition(",")[0], m["level"], m["where"], m["text"])
-            for m in map(_LOG_LINE.match, _text(folder / "run.log", missing).splitlines())
-            if m
-        ),
+        log=tuple(filter(None, map(_LOG_LINE.match, log))),
         missing=tuple(missing),
     )
 

@@ -130,10 +130,10 @@ def page_warnings(run: RunFolder) -> list[str]:
     checks, status = run.summary["checks"], run.summary["status"]
     found = warnings(checks, run.summary["results"])
     for line in run.log:
-        known = line.text == status or (checks and line.where.startswith(_SOLVER))
-        if line.level in ("WARNING", "ERROR", "CRITICAL") and not known:
-            ours = line.where.startswith(_OURS)
-            found.append(sentence(line.text, "") if ours else f"{line.where}: {line.text}")
+        level, where, text = line["level"], line["where"], line["text"]
+        known = text == status or (checks and where.startswith(_SOLVER))
+        if level in ("WARNING", "ERROR", "CRITICAL") and not known:
+            found.append(sentence(text, "") if where.startswith(_OURS) else f"{where}: {text}")
     return list(dict.fromkeys([*found, *run.missing]))
 
 
