@@ -9,14 +9,8 @@ from typing import Annotated, Any, ClassVar, Literal
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import quantities as q
-from upd.scene.base import (
-    MaterialData,
-    Rotation,
-    SceneBase,
-    Table,
-    repeated,
-)
-from upd.scene.rotation import refuse, rotation_problems, volume_of
+from upd.scene.base import MaterialData, Rotation, SceneBase, Table, repeated
+from upd.scene.rotation import rotation_problems, volume_of
 
 #: body whose density is the damper's
 _DAMPER = "damper"
@@ -222,7 +216,8 @@ class Scene(SceneBase):
         problems = rotation_problems("loads", loads, data.get("loads", {}))
         if not problems and loads.speed is None and mass is not None:
             problems = ["loads.mass: counts for F_C = m r w^2 only; add radius and speed"]
-        refuse(problems)
+        if problems:
+            raise InputError(*problems)
         if loads.speed is None or loads.radius is None:
             return self
         if mass is None:

@@ -424,15 +424,8 @@ def comment(key: SceneKey) -> list[str]:
     facts = "; ".join(fact for fact in (key.unit, key.bounds) if fact)
     # a sign and its number stay on one line
     facts = re.sub(r"([<>]=?) ", "\\1\u00a0", facts)
-    text = " ".join(
-        part
-        for part in (
-            key.meaning,
-            f"({facts})" if facts else "",
-            "" if key.cost == "none" else f"Cost: {key.cost}.",
-        )
-        if part
-    )
+    cost = "" if key.cost == _NONE else f"Cost: {key.cost}."
+    text = " ".join(filter(None, (key.meaning, facts and f"({facts})", cost)))
     lines = wrap(text, _WIDTH, initial_indent="# ", subsequent_indent="# ")
     return [line.replace("\u00a0", " ") for line in lines]
 

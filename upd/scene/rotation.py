@@ -36,7 +36,8 @@ def with_damper(scene: Any, data: Mapping[str, Any], more: Sequence[str] = ()) -
     problems = rotation_problems("damper", damper, data.get("damper", {}))
     if damper.mass is not None and damper.density is not None:
         problems.append("damper: mass and density are both given; give one")
-    refuse([*problems, *more])
+    if problems := [*problems, *more]:
+        raise InputError(*problems)
     density, centrifugal = damper.density or scene.material.density, damper.centrifugal
     if damper.mass is not None or damper.speed is not None:
         volume = volume_of(scene)
@@ -44,12 +45,6 @@ def with_damper(scene: Any, data: Mapping[str, Any], more: Sequence[str] = ()) -
         if damper.speed is not None and damper.radius is not None:
             centrifugal = density * volume * damper.radius * damper.speed**2
     return replace(scene, damper=replace(damper, density=density, centrifugal=centrifugal))
-
-
-def refuse(problems: Sequence[str]) -> None:
-    """Raise InputError whose arguments are the problems, where there are any."""
-    if problems:
-        raise InputError(*problems)
 
 
 def rotation_problems(table: str, values: Rotation, given: Mapping[str, Any]) -> list[str]:
