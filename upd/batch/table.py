@@ -17,8 +17,7 @@ from upd.analyses import analysis_of
 from upd.batch.plan import Place
 from upd.errors import InputError
 from upd.plot.sweep_charts import Column, Parameter
-from upd.results import Case, Result
-from upd.results.case import shared_label
+from upd.results import Case, Result, shared_label
 from upd.scene import AnyScene
 from upd.vary.outcome import Outcome
 

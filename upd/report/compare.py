@@ -17,9 +17,8 @@ from upd.report.folder import RunFolder, read_run
 from upd.report.page import Section, make_panels, page_text, write_page
 from upd.report.run_page import verdict
 from upd.report.tables import analysis_charts, filled, main_numbers
-from upd.results import Case
+from upd.results import Case, shared_label
 from upd.results.answer_table import AnswerTable
-from upd.results.case import shared_label
 from upd.results.quantities import F_N, number_label
 
 

@@ -10,8 +10,7 @@ from functools import cached_property
 from typing import Any
 
 from upd.cache.files import json_text
-from upd.results import Result
-from upd.results.number import read_result
+from upd.results.number import Result, read_result
 from upd.vary.variation import Key, Variation
 
 
