@@ -7,18 +7,19 @@ from dataclasses import asdict
 from importlib import resources
 from itertools import groupby
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from upd.cache.files import placed_file
+from upd.cli.tables import print_table
 from upd.cli.terminal import check_ending
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.recipe_modules import READY, is_file
+from upd.results.answer_table import AnswerTable
 from upd.scene import load_scene
 from upd.scene.keys import (
     SceneKey,
@@ -60,31 +61,21 @@ def print_keys(console: Console, title: str, keys: Sequence[SceneKey], asked: st
         return
     console.print(Text(title, "bold"))
     for steps, mine in groupby(chosen, key=lambda k: k.steps[:-1]):
-        console.print(_table(".".join(steps), list(mine)))
+        heads = ("key", "value", "unit", "bounds", "what it is")
+        rows = tuple((k.name, _value(k), k.unit, k.bounds, _meaning(k)) for k in mine)
+        print_table(console, AnswerTable(f"[{'.'.join(steps)}]" if steps else "", heads, rows))
     example = f"upd describe SCENE KEY, for example {chosen[-1].path}"
     console.print(Text(f"A key in full: {example}.", "dim"))
 
 
-def _table(name: str, keys: Sequence[SceneKey]) -> Table:
-    title = Text(f"[{name}]", "bold") if name else None
-    out = Table(box=SIMPLE_HEAD, title=title, title_justify="left", padding=(0, 1, 0, 0))
-    out.add_column("key", no_wrap=True)
-    out.add_column("value", overflow="fold", max_width=28)
-    out.add_column("unit", no_wrap=True)
-    out.add_column("bounds", overflow="fold", max_width=30)
-    out.add_column("what it is", overflow="fold", ratio=1)
-    for key in keys:
-        changed = key.value and key.value != key.default != "must be given"
-        value = f"{key.value} (default {key.default})" if changed else key.value or key.default
-        cost = "" if key.cost == "none" else f" Cost: {key.cost}."
-        out.add_row(
-            Text(key.name),
-            Text(value, "bold" if changed else ""),
-            key.unit,
-            Text(key.bounds),
-            Text.assemble(key.meaning, (cost, "dim")),
-        )
-    return out
+def _value(key: SceneKey) -> str:
+    """The value of a key, with the default where it has another."""
+    changed = key.value and key.value != key.default != "must be given"
+    return f"{key.value} (default {key.default})" if changed else key.value or key.default
+
+
+def _meaning(key: SceneKey) -> str:
+    return key.meaning if key.cost == "none" else f"{key.meaning} Cost: {key.cost}."
 
 
 def _print_one(console: Console, key: SceneKey) -> None:
@@ -100,13 +91,11 @@ def _print_one(console: Console, key: SceneKey) -> None:
         "cost": key.cost,
     }
     console.print(Text(key.path, "bold"))
-    out = Table.grid(padding=(0, 2, 0, 0))
-    out.add_column(style="dim", no_wrap=True)
-    out.add_column(overflow="fold")
     for head, text in texts.items():
-        if text:
-            out.add_row(head, Text(text))
-    console.print(out)
+        for line in wrap(
+            text, console.width, initial_indent=f"{head:13}", subsequent_indent=" " * 13
+        ):
+            console.print(Text(line))
 
 
 def write_drawing(recipe: str, params: Any, path: Path) -> Path:
