@@ -10,7 +10,6 @@ from rich.console import Console
 
 from upd.analyses.meshing import MeshRequest
 from upd.cache.files import placed_file
-from upd.cli.describe import print_keys
 from upd.cli.tables import print_table
 from upd.cli.terminal import check_ending
 from upd.errors import InputError
@@ -152,9 +151,3 @@ def _print_pairs(
     )
     heads = ("bodies", "node sets", "#pairs", "#largest offset, mm", "#largest gap, mm")
     print_table(console, AnswerTable("Pairs of contact nodes", heads, rows))
-
-
-def print_parameters(console: Console, request: MeshRequest) -> None:
-    """The parameters of a recipe."""
-    keys = recipe_keys(request.recipe, request.parameters)
-    print_keys(console, f"Parameters of {request.recipe}", keys, "")

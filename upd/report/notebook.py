@@ -16,7 +16,7 @@ from upd.errors import ConvergenceError, InputError, did_you_mean
 from upd.report.answer import AnswerLine, answer, short_answer
 from upd.report.columns import text_width
 from upd.report.folder import read_run
-from upd.report.tables import analysis_charts, answer_tables, main_numbers
+from upd.report.tables import analysis_charts, answer_tables
 from upd.results import Case, Check, Result
 from upd.results.check import FAILED, OK, outcome_of
 from upd.results.number import from_json, read_result
@@ -192,11 +192,6 @@ class RunResult:
             colour={OK: "#1a7f37", FAILED: "#b42318"}.get(self.outcome, "#9a6700"),
             passed=sum(check.passed for check in self.checks),
         )
-
-
-def headline(result: RunResult) -> list[Entry]:
-    """The numbers an engineer asks for first."""
-    return main_numbers(result.size, [r.as_dict() for r in result.results])
 
 
 def charts(result: RunResult) -> list[Chart]:
