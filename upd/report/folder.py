@@ -11,6 +11,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_type_hints
 
@@ -208,7 +209,7 @@ def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
 
 
 def _summary(folder: Path) -> dict[str, Any]:
-    return read_json(folder / "summary.json", _SUMMARY, "run")[0]
+    return read_json(folder / "summary.json", _summary_schema(), "run")[0]
 
 
 def _text(path: Path, missing: list[str]) -> str:
@@ -249,52 +250,50 @@ def _many(kind: type[Any], **others: Any) -> Any:
     return many[model]
 
 
-_TEXT: Any = (str, ...)
-_FREE: Any = (dict[str, Any], {})
-_CASE = {"case": _TEXT, "case_fields": (Case, ...)}
-_NUMBER, _MAYBE = (float | None, ...), (float | None, None)
-#: what summary.json must have; there may be more
-_SUMMARY: Any = create_model(
-    "Summary",
-    scene=_TEXT,
-    title=_TEXT,
-    status=_TEXT,
-    effects=(_many(Effect, verdict=_TEXT), ...),
-    checks=(_many(Check, **_CASE, verdict=(Literal["passed", "warning", "failed"], ...)), ...),
-    size=(
-        create_model(
-            "Size",
-            symmetry=(str, ""),
-            n_dof=(dict[str, int], {}),
-            n_pairs=(int | None, None),
-            analysis=(str, ""),
-            n_hex=(dict[str, int], {}),
-            mesh=_FREE,
-            solver=_FREE,
+@cache
+def _summary_schema() -> Any:
+    """What summary.json must have; there may be more."""
+    text: Any = (str, ...)
+    free: Any = (dict[str, Any], {})
+    case = {"case": text, "case_fields": (Case, ...)}
+    number, maybe = (float | None, ...), (float | None, None)
+    size = create_model(
+        "Size",
+        symmetry=(str, ""),
+        n_dof=(dict[str, int], {}),
+        n_pairs=(int | None, None),
+        analysis=(str, ""),
+        n_hex=(dict[str, int], {}),
+        mesh=free,
+        solver=free,
+    )
+    cost = create_model(
+        "Cost", total_s=(float, ...), peak_rss_mb=(float, ...), stages=(dict[str, float], {})
+    )
+    return create_model(
+        "Summary",
+        scene=text,
+        title=text,
+        status=text,
+        effects=(_many(Effect, verdict=text), ...),
+        checks=(_many(Check, **case, verdict=(Literal["passed", "warning", "failed"], ...)), ...),
+        size=(size, ...),
+        cost=(cost, ...),
+        results=(
+            _many(
+                Result,
+                **case,
+                reference=number,
+                error=maybe,
+                thesis_error=maybe,
+                error_parts=(_many(ErrorPart), []),
+                input_error=maybe,
+                input_parts=(_many(InputPart, share=number), []),
+            ),
+            ...,
         ),
-        ...,
-    ),
-    cost=(
-        create_model(
-            "Cost", total_s=(float, ...), peak_rss_mb=(float, ...), stages=(dict[str, float], {})
-        ),
-        ...,
-    ),
-    results=(
-        _many(
-            Result,
-            **_CASE,
-            reference=_NUMBER,
-            error=_MAYBE,
-            thesis_error=_MAYBE,
-            error_parts=(_many(ErrorPart), []),
-            input_error=_MAYBE,
-            input_parts=(_many(InputPart, share=_NUMBER), []),
-        ),
-        ...,
-    ),
-    result_nc_sha256=(str, ""),
-)
+        result_nc_sha256=(str, ""),
+    )
 
 
 def read_json(path: Path, schema: type[Kept], kind: Kind) -> tuple[dict[str, Any], Kept]:

@@ -24,7 +24,7 @@ def as_json(one: Any, **others: Any) -> dict[str, Any]:
 
 def from_json(kind: type[Kept], data: Mapping[str, Any], **others: Any) -> Kept:
     """What `as_json` wrote, with some fields of its own; null is NaN where a number must be, and
-    what is no field is left out.
+    what is no field is omitted.
     """
     known: Any = fields(kind)  # type: ignore[arg-type]
     found = {

@@ -21,7 +21,7 @@ Steps = tuple[str | int, ...]
 
 
 class Example:
-    """What would do, and what a reference of the keys says of a value whose own validator reads it.
+    """What would do, and what a reference of the keys has of a value whose own validator reads it.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class QuantityReader:
     words
         That may stand in its place -> what they mean.
     others
-        What a message about anything else says of them.
+        What a message about anything else adds about them.
     """
 
     kind: str

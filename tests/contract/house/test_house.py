@@ -301,7 +301,7 @@ ROOM_LINES = {
     "linalg": 3125,
     "scene": 2238,
     "plot": 1525,
-    "report": 1911,
+    "report": 1910,
     "fitting": 1526,
     "sizing": 1375,
     "batch": 1515,
