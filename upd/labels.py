@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from typing import Any
 
@@ -58,11 +58,6 @@ def check_words(check: Mapping[str, Any]) -> str:
     return f"{check['says']} = {value} (limit {limit})"
 
 
-def effect_word(effect: Mapping[str, Any]) -> str:
-    """Whether an effect of summary.json was simulated: yes, no, or n/a where the scene has none."""
-    return "yes" if effect["on"] else "no" if effect.get("applies", True) else "n/a"
-
-
 def sentence(words: str, end: str = ".") -> str:
     """Words as a sentence: a capital first; nothing of none."""
     return f"{words[:1].upper()}{words[1:]}{end}" if words else ""
@@ -72,6 +67,13 @@ def counted(count: int, what: str) -> str:
     """1 point, 2 points, 3 meshes."""
     plural = "es" if what.endswith("sh") else "s"
     return f"{count} {what}{plural if count != 1 else ''}"
+
+
+def listed(items: Iterable[str], most: int | None, form: str = "{}") -> str:
+    """Items, each once, the first ``most`` by name, in a text; nothing of none."""
+    found = [item for item in dict.fromkeys(items) if item]
+    more = [f"and {len(found) - most} more"] if most and len(found) > most else []
+    return form.format("; ".join([*found[:most], *more])) if found else ""
 
 
 def file_name(title: str) -> str:

@@ -18,6 +18,9 @@ log = logging.getLogger("upd")
 #: Called with (stage, detail, seconds since the stage began, or None when it begins).
 Listener = Callable[[str, str, float | None], None]
 
+#: seconds between two samples of the memory
+_PERIOD_S = 0.05
+
 
 def silent(stage: str, detail: str, seconds: float | None) -> None:
     """The listener that does nothing."""
@@ -29,8 +32,13 @@ class Stages:
     def __init__(self, listener: Listener = silent) -> None:
         self._listener = listener
         self._start = time.perf_counter()
-        self._memory = _PeakMemory()
         self.seconds: dict[str, float] = {}
+        self._peak, self._stop = [_resident_mb()], threading.Event()
+        # the thread does not know this object: it ends when nobody asks any more
+        threading.Thread(target=_watch, args=(self._peak, self._stop), daemon=True).start()
+
+    def __del__(self) -> None:
+        self._stop.set()
 
     @contextmanager
     def __call__(self, stage: str, detail: str = "") -> Iterator[None]:
@@ -52,36 +60,18 @@ class Stages:
 
     def cost(self) -> dict[str, float | dict[str, float]]:
         """Seconds per stage, their total by the clock, and the largest resident memory during this
-        run in MB.
+        run in MB: sampled on Linux (the kernel's own peak counts earlier runs), else the process's
+        peak.
         """
         return {
             "stages": {k: round(v, 4) for k, v in self.seconds.items()},
             "total_s": round(self.elapsed(), 4),
-            "peak_rss_mb": round(self._memory.peak_mb(), 1),
+            "peak_rss_mb": round(max(*self._peak, _resident_mb()), 1),
         }
 
 
-class _PeakMemory:
-    """Largest resident set since creation.
-
-    Sampled on Linux (the kernel's own peak counts earlier runs), else the process's peak.
-    """
-
-    def __init__(self, period_s: float = 0.05) -> None:
-        self._peak, self._stop = [_resident_mb()], threading.Event()
-        # the thread does not know this object: it ends when nobody asks any more
-        watch = (self._peak, self._stop, period_s)
-        threading.Thread(target=_watch, args=watch, daemon=True).start()
-
-    def peak_mb(self) -> float:
-        return max(*self._peak, _resident_mb())
-
-    def __del__(self) -> None:
-        self._stop.set()
-
-
-def _watch(peak: list[float], stop: threading.Event, period_s: float) -> None:
-    while not stop.wait(period_s):
+def _watch(peak: list[float], stop: threading.Event) -> None:
+    while not stop.wait(_PERIOD_S):
         peak[0] = max(peak[0], _resident_mb())
 
 

@@ -24,20 +24,10 @@ from upd.report import write_report
 from upd.report.files import write_curves, write_figures
 from upd.report.folder import check_replaceable, is_run_file
 from upd.report.notebook import RunResult
-from upd.results import (
-    DIGEST,
-    FAILED,
-    Check,
-    Estimates,
-    Result,
-    file_digest,
-    status_of,
-    with_estimates,
-    with_fault,
-    with_inputs,
-    worst_check,
-    write_netcdf,
-)
+from upd.results import Check, Estimates, Result, write_netcdf
+from upd.results.check import FAILED, OK, WARNED, status_of, worst_check
+from upd.results.netcdf import DIGEST, file_digest
+from upd.results.number import with_estimates, with_inputs
 from upd.scene import AnyScene, as_scene
 from upd.scene.keys import scene_as_run
 from upd.vary.inputs import input_parts
@@ -90,11 +80,10 @@ def run(
     if out is None:
         log.info(_versions())
         return _solved(_Run(analysis, stages, None, None), plan)
-    own = _take_folder(Path(out), numbered)
+    own, handler = _begin(Path(out), numbered, loaded)
     if own.replaces:
         for seconds in (None, 0.0):
             progress("folder", f"replaces the earlier run in {own.place}", seconds)
-    handler = _begin(own, loaded)
     log.info(_versions())
     # matplotlib takes a while to import: meanwhile the solver computes.
     threading.Thread(target=import_module, args=("upd.plot.matplotlib",), daemon=True).start()
@@ -105,7 +94,8 @@ def run(
     except BaseException as error:
         if report:
             _leave_report(own, None, stages)
-        if own.replaces and not _whole(own, error):
+        complete = isinstance(error, UpdError) and error.result is not None
+        if own.replaces and not (complete and (own.path / "result.nc").exists()):
             # Half a run takes the place of none that was whole.
             stays = own.step_aside()
             progress("folder", f"the earlier run in {stays} stays; this one: {own.place}", 0.0)
@@ -116,12 +106,6 @@ def run(
                 error.result = replace(error.result, folder=place)
         raise
     return replace(result, folder=_end(own, handler))
-
-
-def _whole(own: OwnFolder, error: BaseException) -> bool:
-    """Whether a run that failed still left all its numbers."""
-    complete = isinstance(error, UpdError) and error.result is not None
-    return complete and (own.path / "result.nc").exists()
 
 
 def _versions() -> str:
@@ -145,9 +129,8 @@ def _with_fault(result: RunResult, fault: str, folder: Path) -> RunResult:
     """The result with a fault of its pictures in its status, in summary.json too where the disk
     takes it.
     """
-    result = replace(
-        result, status=with_fault(result.status, fault), faults=(*result.faults, fault)
-    )
+    status = f"{WARNED}: {fault}" if result.status == OK else f"{result.status}; {fault}"
+    result = replace(result, status=status, faults=(*result.faults, fault))
     with suppress(OSError):
         _write_summary(result, folder)
     return result
@@ -244,7 +227,8 @@ def _collected(
         arrays=arrays,
         folder=run.place,
         scene_text=scene_as_run(plan.scene),
-    ).with_cost(stages.cost())
+        cost=stages.cost(),
+    )
 
 
 def _leave(run: _Run, result: RunResult, solution: Any) -> tuple[RunResult, str]:
@@ -287,7 +271,7 @@ def _leave(run: _Run, result: RunResult, solution: Any) -> tuple[RunResult, str]
     except Exception as error:
         log.exception("figures were not written")
         result = _with_fault(result, f"figures not written ({one_line(error)})", folder)
-    result = result.with_cost(stages.cost())
+    result = replace(result, cost=stages.cost())
     with suppress(OSError):
         # The one written first has all but the seconds of the files.
         _write_summary(result, folder)
@@ -331,25 +315,25 @@ def _size(analysis: Analysis, plan: Plan[Any], solution: Any) -> dict[str, Any]:
     return size if solution is None else size | analysis.sizes(solution)
 
 
-def _take_folder(place: Path, numbered: bool) -> OwnFolder:
+def _begin(place: Path, numbered: bool, scene: AnyScene) -> tuple[OwnFolder, logging.Handler]:
+    """Take a folder, write the scene and open the log."""
+    own = None
     try:
-        return own_folder(place, check=check_replaceable, ours=is_run_file, number=numbered)
-    except OSError as error:
-        raise _unwritable(place, error) from None
-
-
-def _begin(own: OwnFolder, scene: AnyScene) -> logging.Handler:
-    """Write the scene and open the log."""
-    try:
+        own = own_folder(place, check=check_replaceable, ours=is_run_file, number=numbered)
         write_text(own.path / "scene.toml", scene_as_run(scene))
         handler = _RunLog(own.path / "run.log", mode="w", encoding="utf-8")
     except OSError as error:
-        own.drop()
-        raise _unwritable(own.place, error) from None
+        if own is not None:
+            place = own.place
+            own.drop()
+        raise InputError(
+            f"the run folder {place} cannot be written ({one_line(error)}): choose another with "
+            "--out"
+        ) from None
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(name)s: %(message)s"))
     log.addHandler(handler)
     log.setLevel(logging.INFO)
-    return handler
+    return own, handler
 
 
 def _end(own: OwnFolder, handler: logging.Handler) -> Path:
@@ -357,12 +341,6 @@ def _end(own: OwnFolder, handler: logging.Handler) -> Path:
     log.removeHandler(handler)
     handler.close()
     return own.move_in()
-
-
-def _unwritable(place: Path, error: OSError) -> InputError:
-    return InputError(
-        f"the run folder {place} cannot be written ({one_line(error)}): choose another with --out"
-    )
 
 
 class _RunLog(logging.FileHandler):

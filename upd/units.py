@@ -62,7 +62,12 @@ def parse_quantity(value: Any, kind: str) -> float:
                 f"{value} has no unit: write it as text with one of {known}, for example "
                 f'"{value} {next(iter(table))}"'
             )
-        number, unit = _float(value), ""
+        unit = ""
+        try:
+            number = float(value)
+        except OverflowError:
+            # whole numbers of more than 308 digits are no floats
+            number = math.inf
     else:
         parts = number_and_unit(value)
         if parts is None:
@@ -139,11 +144,3 @@ def quantity_text(value: float, kind: str) -> str:
         if parse_quantity(text if unit else float(text), kind) == value:
             return text
     return f"{value!r} {inside}".rstrip()
-
-
-def _float(value: float) -> float:
-    """Whole numbers of more than 308 digits are no floats."""
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf

@@ -15,7 +15,8 @@ from upd.analyses.contact.scene_plan import make_plan
 from upd.analyses.contact.varied import PROBLEM
 from upd.errors import InputError
 from upd.progress import Stages
-from upd.results import Case, ErrorPart, Result, with_estimates, with_parts
+from upd.results import Case, ErrorPart, Result, with_parts
+from upd.results.number import with_estimates
 from upd.scene import load_scene
 from upd.vary.errors import half_cost, merged, source_estimates
 from upd.vary.orders import estimate_error, fitted_error

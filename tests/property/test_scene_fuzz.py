@@ -22,7 +22,7 @@ import pytest
 
 from upd import load_scene, make_plan, run
 from upd.errors import UpdError
-from upd.results import OK
+from upd.results.check import OK
 from upd.scene import ready_scenes
 
 SEED = 20240

@@ -16,7 +16,8 @@ from upd.analyses import forced
 from upd.analyses.forced import model as paths
 from upd.batch.studies import plan_study
 from upd.errors import ConvergenceError, InputError
-from upd.report.notebook import RunResult, charts, headline
+from upd.report.notebook import RunResult, charts
+from upd.report.tables import main_numbers
 from upd.results import Case, Result, read_netcdf
 from upd.scene import load_scene
 from upd.vary.curves import finest_curves
@@ -124,11 +125,16 @@ def test_static_forces_are_those_of_the_wedge(weak: RunResult) -> None:
 
 
 def test_page_shows_the_loss_per_cycle_at_the_peak(weak: RunResult) -> None:
-    assert "friction_energy" in {row["name"] for row in headline(weak)}
+    assert "friction_energy" in {
+        row["name"] for row in main_numbers(weak.size, weak.summary()["results"])
+    }
 
 
 def test_main_numbers_are_those_of_the_curve_with_friction(weak: RunResult) -> None:
-    found = {row["name"]: row["case_fields"] for row in headline(weak)}
+    found = {
+        row["name"]: row["case_fields"]
+        for row in main_numbers(weak.size, weak.summary()["results"])
+    }
     # The sweep from 430 Hz has no free peak; those of the stuck curve are left to the stuck
     # frequencies.
     names = [

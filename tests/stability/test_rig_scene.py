@@ -18,7 +18,8 @@ from upd.batch.store import PointStore
 from upd.batch.studies import plan_study, point_task, run_study
 from upd.errors import InputError, UpdError
 from upd.reduction import ReducedModel
-from upd.report.notebook import RunResult, charts, headline
+from upd.report.notebook import RunResult, charts
+from upd.report.tables import main_numbers
 from upd.results import Case, read_netcdf
 from upd.vary.outcome import SolvedPoint
 from upd.vary.variation import Variation
@@ -148,7 +149,7 @@ def test_cases_are_data_and_come_back_from_the_file(whole: RunResult) -> None:
 
 def test_main_numbers_are_the_lowest_frequencies_and_the_peak() -> None:
     result = run(want=["free", "glued", "reduction", "response"])
-    assert [row["name"] for row in headline(result)] == [
+    assert [row["name"] for row in main_numbers(result.size, result.summary()["results"])] == [
         "f1_free",
         "f2_free",
         "f1_glued",

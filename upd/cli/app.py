@@ -191,11 +191,14 @@ def mesh(
         Show the parameters with unit, default and bounds, and stop: nothing is meshed.
     """
     from upd.analyses.meshing import mesh_request
-    from upd.cli.mesh import mesh_files, print_parameters, regenerate
+    from upd.cli.describe import print_keys
+    from upd.cli.mesh import mesh_files, regenerate
+    from upd.scene.keys import recipe_keys
 
     request = mesh_request(scene, set or [], **asdict(configuration))
     if list:
-        print_parameters(terminal.console, request)
+        keys = recipe_keys(request.recipe, request.parameters)
+        print_keys(terminal.console, f"Parameters of {request.recipe}", keys, "")
         return
     terminal.check_ending(picture, "--picture", ".png")
     place = Path("runs") / f"mesh-{request.name}"
@@ -486,10 +489,10 @@ def describe(
     """
     from upd.cli.describe import described, print_keys, write_drawing
 
-    found = described(what, set or [])
-    print_keys(terminal.console, found, key)
+    title, keys, geometry = described(what, set or [])
+    print_keys(terminal.console, title, keys, key)
     if drawing is not None:
-        terminal.console.print(f"Drawing: {write_drawing(found, drawing)}")
+        terminal.console.print(f"Drawing: {write_drawing(*geometry, drawing)}")
 
 
 @app.command

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from importlib import resources
 from itertools import groupby
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from upd.cache.files import placed_file
+from upd.cli.tables import print_table
 from upd.cli.terminal import check_ending
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.recipe_modules import READY, is_file
+from upd.results.answer_table import AnswerTable
 from upd.scene import load_scene
 from upd.scene.keys import (
     SceneKey,
@@ -37,66 +38,44 @@ UNCERTAINTY = '"VALUE +- HALF-WIDTH" or "VALUE +- 10 %"'
 _EXAMPLES = Path(str(resources.files("upd"))) / "scenes" / "examples"
 
 
-@dataclass(frozen=True)
-class Described:
-    """A scene or a recipe with its keys.
-
-    Attributes
-    ----------
-    params
-        The recipe's own object.
+def described(
+    what: str, overrides: Sequence[str] = ()
+) -> tuple[str, list[SceneKey], tuple[str, Any]]:
+    """Title and keys of a scene or a recipe, the recipe with its own object. Raises InputError for
+    what is neither.
     """
-
-    title: str
-    keys: list[SceneKey]
-    recipe: str
-    params: Any
-
-
-def described(what: str, overrides: Sequence[str] = ()) -> Described:
-    """The keys of a scene or a recipe. Raises InputError for what is neither."""
     if what in READY or is_file(what):
         if overrides:
             raise InputError("--set is for scenes: leave it out of a recipe")
-        return Described(f"Recipe {what}", recipe_keys(what), what, recipes.made(what, {}))
+        return f"Recipe {what}", recipe_keys(what), (what, recipes.made(what, {}))
     scene = load_scene(what, overrides)
     title = f"Scene {scene.name}: {scene.title}" if scene.title else f"Scene {scene.name}"
-    return Described(title, scene_keys(scene) + absent_keys(scene), scene.recipe, params_of(scene))
+    return title, scene_keys(scene) + absent_keys(scene), (scene.recipe, params_of(scene))
 
 
-def print_keys(console: Console, found: Described, asked: str) -> None:
+def print_keys(console: Console, title: str, keys: Sequence[SceneKey], asked: str) -> None:
     """All keys as tables, those of a table that was asked for, or one key in full."""
-    chosen = chosen_keys(found.keys, asked) if asked else found.keys
+    chosen = chosen_keys(keys, asked) if asked else keys
     if asked and len(chosen) == 1:
         _print_one(console, chosen[0])
         return
-    console.print(Text(found.title, "bold"))
+    console.print(Text(title, "bold"))
     for steps, mine in groupby(chosen, key=lambda k: k.steps[:-1]):
-        console.print(_table(".".join(steps), list(mine)))
+        heads = ("key", "value", "unit", "bounds", "what it is")
+        rows = tuple((k.name, _value(k), k.unit, k.bounds, _meaning(k)) for k in mine)
+        print_table(console, AnswerTable(f"[{'.'.join(steps)}]" if steps else "", heads, rows))
     example = f"upd describe SCENE KEY, for example {chosen[-1].path}"
     console.print(Text(f"A key in full: {example}.", "dim"))
 
 
-def _table(name: str, keys: Sequence[SceneKey]) -> Table:
-    title = Text(f"[{name}]", "bold") if name else None
-    out = Table(box=SIMPLE_HEAD, title=title, title_justify="left", padding=(0, 1, 0, 0))
-    out.add_column("key", no_wrap=True)
-    out.add_column("value", overflow="fold", max_width=28)
-    out.add_column("unit", no_wrap=True)
-    out.add_column("bounds", overflow="fold", max_width=30)
-    out.add_column("what it is", overflow="fold", ratio=1)
-    for key in keys:
-        changed = key.value and key.value != key.default != "must be given"
-        value = f"{key.value} (default {key.default})" if changed else key.value or key.default
-        cost = "" if key.cost == "none" else f" Cost: {key.cost}."
-        out.add_row(
-            Text(key.name),
-            Text(value, "bold" if changed else ""),
-            key.unit,
-            Text(key.bounds),
-            Text.assemble(key.meaning, (cost, "dim")),
-        )
-    return out
+def _value(key: SceneKey) -> str:
+    """The value of a key, with the default where it has another."""
+    changed = key.value and key.value != key.default != "must be given"
+    return f"{key.value} (default {key.default})" if changed else key.value or key.default
+
+
+def _meaning(key: SceneKey) -> str:
+    return key.meaning if key.cost == "none" else f"{key.meaning} Cost: {key.cost}."
 
 
 def _print_one(console: Console, key: SceneKey) -> None:
@@ -112,22 +91,20 @@ def _print_one(console: Console, key: SceneKey) -> None:
         "cost": key.cost,
     }
     console.print(Text(key.path, "bold"))
-    out = Table.grid(padding=(0, 2, 0, 0))
-    out.add_column(style="dim", no_wrap=True)
-    out.add_column(overflow="fold")
     for head, text in texts.items():
-        if text:
-            out.add_row(head, Text(text))
-    console.print(out)
+        for line in wrap(
+            text, console.width, initial_indent=f"{head:13}", subsequent_indent=" " * 13
+        ):
+            console.print(Text(line))
 
 
-def write_drawing(found: Described, path: Path) -> Path:
+def write_drawing(recipe: str, params: Any, path: Path) -> Path:
     """Draw the geometry with its dimensions. Raises InputError for a place that is no .png file."""
     check_ending(path, "--drawing", ".png")
     # matplotlib takes a while to import
     from upd.plot.drawing import draw_sections
 
-    meshes, views = recipes.drawing(found.recipe, asdict(found.params))
+    meshes, views = recipes.drawing(recipe, asdict(params))
     with placed_file(path) as temporary:
         draw_sections(meshes, views).savefig(temporary, format="png")
     return path

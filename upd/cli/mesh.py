@@ -10,7 +10,6 @@ from rich.console import Console
 
 from upd.analyses.meshing import MeshRequest
 from upd.cache.files import placed_file
-from upd.cli.describe import Described, print_keys
 from upd.cli.tables import print_table
 from upd.cli.terminal import check_ending
 from upd.errors import InputError
@@ -67,36 +66,23 @@ def regenerate(
     with stages("pairs", ", ".join(meshes)):
         pairs = check_pairs(meshes)
     for path in files:
-        for part, bodies in _parts(path, meshes, split=split).items():
+        parts: dict[Path, Mapping[str, Mesh]] = {path: meshes}
+        if split:
+            named = ((f"{path.stem}-{body}{path.suffix}", body) for body in meshes)
+            parts = {path.with_name(name): {body: meshes[body]} for name, body in named}
+        for part, bodies in parts.items():
             with stages("write", str(part)):
                 write_mesh(bodies, part)
     if picture is not None:
-        with stages("picture", str(picture)):
-            _draw(request, meshes, picture)
+        # matplotlib takes a while to import
+        from upd.plot.pictures import draw_meshes
+
+        with stages("picture", str(picture)), placed_file(picture) as temporary:
+            draw_meshes(meshes, request.name).savefig(temporary, format="png")
     console.print(_configuration(request, cached))
     _print_shapes(console, meshes)
     _print_pairs(console, pairs, meshes, request.parameters)
     return meshes
-
-
-def _parts(
-    path: Path, meshes: Mapping[str, Mesh], *, split: bool
-) -> dict[Path, Mapping[str, Mesh]]:
-    """Files and the bodies in each."""
-    if not split:
-        return {path: meshes}
-    return {
-        path.with_name(f"{path.stem}-{body}{path.suffix}"): {body: mesh}
-        for body, mesh in meshes.items()
-    }
-
-
-def _draw(request: MeshRequest, meshes: Mapping[str, Mesh], path: Path) -> None:
-    # matplotlib takes a while to import
-    from upd.plot.pictures import draw_meshes
-
-    with placed_file(path) as temporary:
-        draw_meshes(meshes, request.name).savefig(temporary, format="png")
 
 
 def _configuration(request: MeshRequest, cached: bool) -> str:
@@ -165,10 +151,3 @@ def _print_pairs(
     )
     heads = ("bodies", "node sets", "#pairs", "#largest offset, mm", "#largest gap, mm")
     print_table(console, AnswerTable("Pairs of contact nodes", heads, rows))
-
-
-def print_parameters(console: Console, request: MeshRequest) -> None:
-    """The parameters of a recipe."""
-    recipe, params = request.recipe, request.parameters
-    found = Described(f"Parameters of {recipe}", recipe_keys(recipe, params), recipe, params)
-    print_keys(console, found, "")

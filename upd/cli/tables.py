@@ -13,8 +13,8 @@ from upd.labels import counted
 from upd.report.answer import TITLE
 from upd.report.columns import whole_table
 from upd.report.notebook import RunResult
-from upd.results import FAILED, OK, WARNED
 from upd.results.answer_table import AnswerTable
+from upd.results.check import FAILED, OK, WARNED
 
 #: mood of a line -> how it looks
 _STYLES = {OK: "green", WARNED: "yellow", FAILED: "red", TITLE: "bold"}

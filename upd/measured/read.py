@@ -34,7 +34,7 @@ from upd.measured.curve import (
     the_one,
 )
 from upd.measured.text import read_text
-from upd.results import open_netcdf
+from upd.results.netcdf import open_netcdf
 from upd.units import UNITS, unit_factor
 
 _AXIS = "frequency"

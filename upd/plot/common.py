@@ -5,16 +5,14 @@ Maps of pressure and contact state, circles, magnitudes of complex variables.
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.plot.chart import STATES, Array, Axis, Map, Trace
 from upd.results import Arrays, Case, Group, Variable
+from upd.results.number import from_json
 
 UM = 1e3
-_CASE = frozenset(f.name for f in fields(Case))
 
 
 def with_content(arrays: Arrays, *contents: str) -> list[Group]:
@@ -24,7 +22,7 @@ def with_content(arrays: Arrays, *contents: str) -> list[Group]:
 
 def case_of(group: Group) -> Case:
     """The case a group belongs to, from its attributes."""
-    return Case(**{key: value for key, value in group.attributes.items() if key in _CASE})
+    return from_json(Case, group.attributes)
 
 
 def scalar(group: Group, name: str) -> float | None:

@@ -82,7 +82,9 @@ def _draw(
         if isinstance(mark, Length):
             _length(ax, mark, scale)
         else:
-            _opening(ax, mark, scale)
+            (low, high), wide = _turns(mark), 2.0 * _RADIUS * scale
+            arc = Arc(mark.vertex, wide, wide, theta1=low, theta2=high, color=_INK, linewidth=0.7)
+            ax.add_patch(arc)
         _write(ax, _label(mark, scale))
     ax.set_aspect("equal")
     ax.set_axis_off()
@@ -228,8 +230,3 @@ def _turns(mark: Opening) -> tuple[float, float]:
         math.degrees(math.atan2(*(np.array(p) - vertex)[::-1])) for p in (mark.one, mark.two)
     )
     return (high, low + 360.0) if high - low > 180.0 else (low, high)
-
-
-def _opening(ax: Axes, mark: Opening, scale: float) -> None:
-    (low, high), wide = _turns(mark), 2.0 * _RADIUS * scale
-    ax.add_patch(Arc(mark.vertex, wide, wide, theta1=low, theta2=high, color=_INK, linewidth=0.7))

@@ -15,7 +15,6 @@ from typing import Any, Literal
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -363,7 +362,7 @@ def _draw_maps(chart: Chart, ax: Axes) -> None:
     """Maps with the colour bar they share."""
     low, high = colour_range(chart.maps)
     for k, m in enumerate(chart.maps):
-        drawn = _states(m, ax) if m.states else _field(m, low, high, ax)
+        drawn = _cells(m, low, high, ax)
         # Axes for a colour bar cost as much as the map: states of a compact map stand in the
         # legend. One value everywhere has no scale.
         if k == 0 and (is_wide(chart) if m.states else low < high):
@@ -372,19 +371,16 @@ def _draw_maps(chart: Chart, ax: Axes) -> None:
                 bar.set_ticks(list(range(len(m.states))), labels=[plain(s) for s in m.states])
 
 
-def _states(m: Map, ax: Axes) -> Any:
-    n = len(m.states)
-    colours = ListedColormap(state_colours(m))
-    # Between many cells the lines would take more room than the cells.
-    edges: dict[str, Any] = {"edgecolors": "w", "lw": 0.2} if max(m.z.shape) <= _FEW_CELLS else {}
-    return ax.pcolormesh(
-        m.x, m.y, m.z.T, cmap=colours, vmin=-0.5, vmax=n - 0.5, shading="nearest", **edges
-    )
-
-
-def _field(m: Map, low: float, high: float, ax: Axes) -> ScalarMappable:
-    z = np.ma.masked_invalid(m.z.T)
-    return ax.pcolormesh(m.x, m.y, z, cmap="viridis", vmin=low, vmax=high, shading="nearest")
+def _cells(m: Map, low: float, high: float, ax: Axes) -> Any:
+    """A cell for every value of a map."""
+    style: dict[str, Any] = {"cmap": "viridis", "vmin": low, "vmax": high}
+    if m.states:
+        ends = {"vmin": -0.5, "vmax": len(m.states) - 0.5}
+        style = {"cmap": ListedColormap(state_colours(m))} | ends
+        if max(m.z.shape) <= _FEW_CELLS:
+            # Between many cells the lines would take more room than the cells.
+            style |= {"edgecolors": "w", "lw": 0.2}
+    return ax.pcolormesh(m.x, m.y, np.ma.masked_invalid(m.z.T), shading="nearest", **style)
 
 
 def _bar(drawn: Any, chart: Chart, axis: Axis, ax: Axes) -> Any:

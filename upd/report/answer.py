@@ -15,7 +15,7 @@ from upd.analyses import analysis_named
 from upd.analyses.base import CHOSEN_BY_ACCURACY
 from upd.labels import check_number, number, percent, percent_of, plus_minus, shown
 from upd.plot.chart import Entry
-from upd.report.columns import SHORT, whole_table
+from upd.report.columns import SHORT, whole_table, wrapped
 from upd.report.tables import (
     MAIN,
     MOST_NOTES,
@@ -32,8 +32,8 @@ from upd.report.tables import (
     stage_table,
     warnings,
 )
-from upd.results import FAILED, WARNED, outcome_of, worst_check
 from upd.results.answer_table import AnswerTable
+from upd.results.check import FAILED, WARNED, outcome_of, worst_check
 from upd.results.quantities import number_label, quantity_of
 
 #: lines that fit on a screen
@@ -51,18 +51,13 @@ class AnswerLine(NamedTuple):
     mood: str = ""
 
 
-class Written(NamedTuple):
-    """Where the files of a run are, and what went wrong with its pictures."""
-
-    folder: Path | None = None
-    faults: Sequence[str] = ()
-
-
-_NOWHERE = Written()
-
-
 def answer(
-    summary: Mapping[str, Any], width: int, written: Written = _NOWHERE, *, full: bool = False
+    summary: Mapping[str, Any],
+    width: int,
+    folder: Path | None = None,
+    faults: Sequence[str] = (),
+    *,
+    full: bool = False,
 ) -> list[AnswerLine]:
     """The answer of a run in lines of ``width`` characters (paths may be longer).
 
@@ -70,11 +65,13 @@ def answer(
     ----------
     summary
         As in summary.json.
+    folder, faults
+        Where the files of the run are, and what went wrong with its pictures.
     full
         With all numbers, effects, checks, sources of errors, sizes and stages.
     """
     size, entries = summary["size"], summary["results"]
-    lines, end = _verdict(summary, width), _end(summary, width, written, full=full)
+    lines, end = _verdict(summary, width), _end(summary, width, folder, faults, full=full)
     analysis = analysis_named(str(size.get("analysis", "")))
     own = analysis is not None and analysis.answer is not None
     tables = answer_tables(size, entries) if own or not full else []
@@ -164,22 +161,25 @@ def _most_important(summary: Mapping[str, Any]) -> Entry | None:
 
 
 def _end(
-    summary: Mapping[str, Any], width: int, written: Written, *, full: bool
+    summary: Mapping[str, Any],
+    width: int,
+    folder: Path | None,
+    faults: Sequence[str],
+    *,
+    full: bool,
 ) -> list[AnswerLine]:
     """Chosen levels, sources of the main error, checks, cost and files; at last what warns."""
     lines = [AnswerLine("")]
     for text in (_accuracy(summary), _budget(summary), _checked(summary), _cost(summary)):
         lines += _wrapped(text, width)
-    folder = written.folder
-    page = folder / "report.html" if folder is not None else None
+    has_page = folder is not None and (folder / "report.html").is_file()
     if folder is not None:
         lines.append(AnswerLine(f"Run folder: {folder}"))
-    if has_page := page is not None and page.is_file():
-        lines.append(AnswerLine(f"Report: {page}"))
+        lines += [AnswerLine(f"Report: {folder / 'report.html'}")] * has_page
     if outcome_of(summary["status"]) == FAILED:
         return lines
     named = None if full else 2
-    notes = [*written.faults, *warnings(summary["checks"], summary["results"], named)]
+    notes = [*faults, *warnings(summary["checks"], summary["results"], named)]
     most = len(notes) if full else MOST_NOTES
     for note in notes[:most]:
         lines += _wrapped(f"Warning: {note}", width, WARNED)
@@ -240,7 +240,4 @@ def _cost(summary: Mapping[str, Any]) -> str:
 
 def _wrapped(text: str, width: int, mood: str = "") -> list[AnswerLine]:
     """A text on as many lines as it needs."""
-    lines = textwrap.wrap(
-        text, width, subsequent_indent="  ", break_on_hyphens=False, break_long_words=False
-    )
-    return [AnswerLine(line, mood) for line in lines]
+    return [AnswerLine(line, mood) for line in wrapped(text, width)]

@@ -5,7 +5,6 @@ shows.
 from __future__ import annotations
 
 import json
-import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -17,7 +16,7 @@ from upd.cache.files import whole_files
 from upd.cache.sources import versions
 from upd.errors import InputError, one_line
 from upd.plot.chart import Chart
-from upd.report.columns import SHORT, whole_table
+from upd.report.columns import SHORT, whole_table, wrapped
 from upd.report.page import Section, Verdict, image_uri, make_panels, page_text, versions_text
 from upd.results.answer_table import AnswerTable
 from upd.scene import AnyScene
@@ -25,26 +24,6 @@ from upd.scene.keys import scene_as_run
 
 #: characters of a line of an answer: a terminal of 80 columns shows it whole
 WIDTH = 79
-
-
-def wrapped(text: str, indent: str = "  ") -> list[str]:
-    """A sentence as a terminal shows it, its further lines indented by two more.
-
-    Parameters
-    ----------
-    text
-        Without indentation.
-    indent
-        Of its first line.
-    """
-    return textwrap.wrap(
-        text,
-        WIDTH,
-        initial_indent=indent,
-        subsequent_indent="  " + indent,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
 
 
 @dataclass(frozen=True, repr=False)
@@ -174,13 +153,13 @@ class FigureAnswer(ABC):
 
     def table(self) -> str:
         """Its verdict, all its tables and its notes as text."""
-        lines = wrapped(self.verdict, "")
+        lines = wrapped(self.verdict, WIDTH)
         for table in self.tables:
             if table.rows:
                 rows = [f"  {line}" for line in whole_table(table, WIDTH - 2)]
-                lines += ["", f"{table.heading}:", *rows, *wrapped(table.note)]
+                lines += ["", f"{table.heading}:", *rows, *wrapped(table.note, WIDTH, "  ")]
         lines += [""] * bool(self.notes)
-        return "\n".join([*lines, *(line for note in self.notes for line in wrapped(note, ""))])
+        return "\n".join([*lines, *(line for note in self.notes for line in wrapped(note, WIDTH))])
 
     def __repr__(self) -> str:
         lines = self.table().splitlines()

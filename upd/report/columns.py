@@ -44,6 +44,20 @@ def text_width() -> int:
     return max(_LEAST_WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
 
 
+def wrapped(text: str, width: int, indent: str = "") -> list[str]:
+    """A text on lines of ``width`` characters, its further lines indented by two more; words and
+    paths stay whole.
+    """
+    return textwrap.wrap(
+        text,
+        width,
+        initial_indent=indent,
+        subsequent_indent="  " + indent,
+        break_on_hyphens=False,
+        break_long_words=False,
+    )
+
+
 def folded_head(words: str, least: int = 8) -> str:
     """A head on as many lines as keep its column narrow, at most three."""
     width = max(least, *map(len, words.split()))

@@ -266,9 +266,8 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
     out: dict[str, str] = {}
     for key, value in table.items():
         path = f"{prefix}{key}"
-        out |= _flat(value, f"{path}.") if isinstance(value, Mapping) else {path: _plain(value)}
+        if isinstance(value, Mapping):
+            out |= _flat(value, f"{path}.")
+        else:
+            out[path] = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
     return out
-
-
-def _plain(value: Any) -> str:
-    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)

@@ -125,15 +125,13 @@ def _tables(group: Group) -> Iterator[tuple[str, list[Column]]]:
             (f"{axis} [{group[axis].units}]", at.ravel())
             for axis, at in zip(_PLACES, lines, strict=True)
         ]
-        yield "map", places + [column for name, v in maps.items() for column in _on_map(name, v)]
-
-
-def _on_map(name: str, variable: Variable) -> Iterator[Column]:
-    """The columns of a map, one for each of its components."""
-    unit = f" [{variable.units}]" if variable.units else ""
-    parts = variable.data.reshape(variable.data.shape[0] * variable.data.shape[1], -1).T
-    for k, part in enumerate(parts):
-        yield f"{name}{f' {k + 1}' if len(parts) > 1 else ''}{unit}", part
+        for name, v in maps.items():
+            unit = f" [{v.units}]" if v.units else ""
+            # a column for each of its components
+            parts = v.data.reshape(v.data.shape[0] * v.data.shape[1], -1).T
+            numbers = [f" {k + 1}" for k in range(len(parts))] if len(parts) > 1 else [""]
+            places += [(f"{name}{k}{unit}", part) for k, part in zip(numbers, parts, strict=True)]
+        yield "map", places
 
 
 def _columns(name: str, variable: Variable, dimension: str) -> Iterator[Column]:

@@ -10,17 +10,18 @@ import json
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass, fields
+from functools import cache
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, get_type_hints
 
+from pydantic import TypeAdapter, ValidationError, create_model
+
+from upd.analyses.base import Effect
 from upd.cache.folders import plain_name
 from upd.errors import InputError
-from upd.results import (
-    Arrays,
-    Case,
-    read_netcdf,
-)
+from upd.labels import sentence
+from upd.results import Arrays, Case, Check, ErrorPart, InputPart, Result, read_netcdf
 
 _LOG_LINE = re.compile(r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$")
 _VERSIONS = "versions: "
@@ -83,16 +84,6 @@ _MOST = 4
 
 
 @dataclass(frozen=True)
-class LogLine:
-    """One line of run.log."""
-
-    time: str
-    level: str
-    where: str
-    text: str
-
-
-@dataclass(frozen=True)
 class RunFolder:
     """Content of a run folder.
 
@@ -102,6 +93,8 @@ class RunFolder:
         Summary.json, with the scene file's tables under "scene_file".
     figures
         Name without ending -> PNG file, in alphabetical order.
+    log
+        Lines of run.log with their time, level, where and text.
     missing
         Files that could not be read, each with the reason.
     """
@@ -111,28 +104,16 @@ class RunFolder:
     arrays: Arrays
     figures: Mapping[str, Path]
     scene: str
-    log: tuple[LogLine, ...]
+    log: tuple[re.Match[str], ...]
     missing: tuple[str, ...]
 
     @property
-    def name(self) -> str:
-        return plain_name(self.path)
-
-    @property
-    def versions(self) -> dict[str, str]:
-        """Package -> version, as the run wrote them into its log."""
-        for line in self.log:
-            if line.text.startswith(_VERSIONS):
-                pairs = (
-                    entry.rpartition(" ") for entry in line.text.removeprefix(_VERSIONS).split(", ")
-                )
-                return {package: version for package, _, version in pairs}
-        return {}
-
-    @property
-    def started(self) -> str:
-        """When the run began, by its log."""
-        return self.log[0].time if self.log else ""
+    def origin(self) -> str:
+        """Its name, when the run began and with which packages, by its log."""
+        found = (line["text"] for line in self.log if line["text"].startswith(_VERSIONS))
+        versions = sentence(next(found, ""))
+        started = f", run on {self.log[0]['time'].partition(',')[0]}" if self.log else ""
+        return f"Run folder {plain_name(self.path)}{started}. {versions}".rstrip()
 
 
 def is_run_file(entry: Path) -> bool:
@@ -197,6 +178,11 @@ def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
     summary = _summary(folder)
     missing: list[str] = []
     scene = _text(folder / "scene.toml", missing)
+    tables: dict[str, Any] = {}
+    try:
+        tables = tomllib.loads(scene)
+    except tomllib.TOMLDecodeError as problem:
+        missing.append(f"scene.toml: is not TOML ({problem})")
     arrays: Arrays = {}
     if (folder / "result.nc").exists():
         try:
@@ -210,19 +196,20 @@ def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
     pictures = {f.stem: f for f in sorted(folder.glob("*.png"))}
     figures = {name: f for name, f in pictures.items() if is_png(f)}
     missing += [f"{f.name}: is no PNG file" for name, f in pictures.items() if name not in figures]
+    log = _text(folder / "run.log", missing).splitlines()
     return RunFolder(
         path=folder,
-        summary=summary | {"scene_file": _tables(scene, missing)},
+        summary=summary | {"scene_file": tables},
         arrays=arrays,
         figures=figures,
         scene=scene,
-        log=_log(_text(folder / "run.log", missing)),
+        log=tuple(filter(None, map(_LOG_LINE.match, log))),
         missing=tuple(missing),
     )
 
 
 def _summary(folder: Path) -> dict[str, Any]:
-    return read_json(folder / "summary.json", Summary, "run")[0]
+    return read_json(folder / "summary.json", _summary_schema(), "run")[0]
 
 
 def _text(path: Path, missing: list[str]) -> str:
@@ -244,117 +231,69 @@ def is_png(path: Path) -> bool:
         return False
 
 
-def _tables(text: str, missing: list[str]) -> dict[str, Any]:
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as problem:
-        missing.append(f"scene.toml: is not TOML ({problem})")
-        return {}
-
-
-def _log(text: str) -> tuple[LogLine, ...]:
-    found = (_LOG_LINE.match(line) for line in text.splitlines())
-    return tuple(
-        LogLine(m["time"].partition(",")[0], m["level"], m["where"], m["text"]) for m in found if m
-    )
-
-
 # ---------------------------------------------------------------- JSON files, checked once
 
 
-@dataclass
-class _EffectEntry:
-    name: str
-    on: bool
-    why: str
-    verdict: str
-    applies: bool = True
+def _many(kind: type[Any], **others: Any) -> Any:
+    """Schema of a list of what summary.json has of a dataclass: its fields, of which a number may
+    be null, and others in their place or beside them.
+    """
+    hints, many = get_type_hints(kind), list
+    own = {
+        f.name: (
+            float | None if hints[f.name] is float else hints[f.name],
+            ... if f.default is MISSING else f.default,
+        )
+        for f in fields(kind)
+    }
+    model: Any = create_model(kind.__name__, **own | others)
+    return many[model]
 
 
-@dataclass
-class _CheckEntry:
-    name: str
-    case: str
-    case_fields: Case
-    value: float | None
-    limit: float | None
-    says: str
-    verdict: Literal["passed", "warning", "failed"]
-    remedy: str = ""
-    fatal: bool = True
-    quantity: str = ""
-    without: float | None = None
-    included: float | None = None
-
-
-@dataclass
-class _ErrorPartEntry:
-    source: str
-    error: float | None
-    basis: str
-    half_cost_s: float | None = None
-    companion_s: float | None = None
-    half_why: str = ""
-
-
-@dataclass
-class _InputPartEntry:
-    path: str
-    half_width: float | None
-    share: float | None
-    change: float | None
-    basis: str
-
-
-@dataclass
-class _NumberEntry:
-    name: str
-    case: str
-    case_fields: Case
-    value: float | None
-    unit: str
-    reference: float | None
-    source: str = ""
-    error: float | None = None
-    thesis_error: float | None = None
-    estimated_error: float | None = None
-    error_parts: list[_ErrorPartEntry] = field(default_factory=list)
-    input_error: float | None = None
-    input_parts: list[_InputPartEntry] = field(default_factory=list)
-    withheld: str = ""
-
-
-@dataclass
-class _Size:
-    symmetry: str = ""
-    n_dof: dict[str, int] = field(default_factory=dict)
-    n_pairs: int | None = None
-    analysis: str = ""
-    n_hex: dict[str, int] = field(default_factory=dict)
-    mesh: dict[str, Any] = field(default_factory=dict)
-    solver: dict[str, Any] = field(default_factory=dict)
-
-
-@dataclass
-class _Cost:
-    total_s: float
-    peak_rss_mb: float
-    stages: dict[str, float] = field(default_factory=dict)
-
-
-@dataclass
-class Summary:
+@cache
+def _summary_schema() -> Any:
     """What summary.json must have; there may be more."""
-
-    scene: str
-    title: str
-    status: str
-    effects: list[_EffectEntry]
-    checks: list[_CheckEntry]
-    size: _Size
-    cost: _Cost
-    results: list[_NumberEntry]
-    result_nc_sha256: str = ""
+    text: Any = (str, ...)
+    free: Any = (dict[str, Any], {})
+    case = {"case": text, "case_fields": (Case, ...)}
+    number, maybe = (float | None, ...), (float | None, None)
+    size = create_model(
+        "Size",
+        symmetry=(str, ""),
+        n_dof=(dict[str, int], {}),
+        n_pairs=(int | None, None),
+        analysis=(str, ""),
+        n_hex=(dict[str, int], {}),
+        mesh=free,
+        solver=free,
+    )
+    cost = create_model(
+        "Cost", total_s=(float, ...), peak_rss_mb=(float, ...), stages=(dict[str, float], {})
+    )
+    return create_model(
+        "Summary",
+        scene=text,
+        title=text,
+        status=text,
+        effects=(_many(Effect, verdict=text), ...),
+        checks=(_many(Check, **case, verdict=(Literal["passed", "warning", "failed"], ...)), ...),
+        size=(size, ...),
+        cost=(cost, ...),
+        results=(
+            _many(
+                Result,
+                **case,
+                reference=number,
+                error=maybe,
+                thesis_error=maybe,
+                error_parts=(_many(ErrorPart), []),
+                input_error=maybe,
+                input_parts=(_many(InputPart, share=number), []),
+            ),
+            ...,
+        ),
+        result_nc_sha256=(str, ""),
+    )
 
 
 def read_json(path: Path, schema: type[Kept], kind: Kind) -> tuple[dict[str, Any], Kept]:
@@ -375,9 +314,6 @@ def read_json(path: Path, schema: type[Kept], kind: Kind) -> tuple[dict[str, Any
     InputError
         When there is none, or something of it is missing or of another kind.
     """
-    # pydantic is slow to import: only when a folder is read
-    from pydantic import TypeAdapter, ValidationError
-
     try:
         text = path.read_text("utf-8")
         found = json.loads(text)

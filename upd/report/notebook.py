@@ -5,20 +5,21 @@ Text, table, figure of the main curves, xarray.
 
 from __future__ import annotations
 
-import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from upd.errors import ConvergenceError, InputError, did_you_mean
-from upd.report.answer import AnswerLine, Written, answer, short_answer
+from upd.report.answer import AnswerLine, answer, short_answer
 from upd.report.columns import text_width
 from upd.report.folder import read_run
-from upd.report.tables import analysis_charts, answer_tables, main_numbers
-from upd.results import FAILED, OK, Case, Check, Result, outcome_of, read_result
+from upd.report.tables import analysis_charts, answer_tables
+from upd.results import Case, Check, Result
+from upd.results.check import FAILED, OK, outcome_of
+from upd.results.number import from_json, read_result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,10 +66,6 @@ class RunResult:
     def outcome(self) -> str:
         """ "ok", "ok with warnings" or "failed"; `status` names the reasons."""
         return outcome_of(self.status)
-
-    def with_cost(self, cost: Mapping[str, Any]) -> RunResult:
-        """The same result with what it cost."""
-        return replace(self, cost=cost)
 
     def value(self, name: str, case: str | Case | None = None) -> float:
         """The number ``name`` of ``case``, its label or itself (the only one when None).
@@ -176,7 +173,7 @@ class RunResult:
         """Its answer as the terminal prints it, in lines of ``width`` characters; with all numbers,
         checks and sources of errors when ``full``.
         """
-        return answer(self.summary(), width, Written(self.folder, self.faults), full=full)
+        return answer(self.summary(), width, self.folder, self.faults, full=full)
 
     def __repr__(self) -> str:
         return "\n".join(short_answer(self.summary(), text_width(), self.folder))
@@ -195,11 +192,6 @@ class RunResult:
             colour={OK: "#1a7f37", FAILED: "#b42318"}.get(self.outcome, "#9a6700"),
             passed=sum(check.passed for check in self.checks),
         )
-
-
-def headline(result: RunResult) -> list[Entry]:
-    """The numbers an engineer asks for first."""
-    return main_numbers(result.size, [r.as_dict() for r in result.results])
 
 
 def charts(result: RunResult) -> list[Chart]:
@@ -229,8 +221,6 @@ def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Cha
 
 # -- read back from its folder --------------------------------------------------------------------
 
-_CASE, _CHECK = (frozenset(f.name for f in fields(one)) for one in (Case, Check))
-
 
 def load(folder: str | Path) -> RunResult:
     """The result of a finished run, from its folder.
@@ -259,7 +249,7 @@ def load(folder: str | Path) -> RunResult:
         status=summary["status"],
         results=tuple(read_result(entry, _case(entry)) for entry in summary["results"]),
         effects=tuple(dict(effect) for effect in summary["effects"]),
-        checks=tuple(_check(entry) for entry in summary["checks"]),
+        checks=tuple(from_json(Check, entry, case=_case(entry)) for entry in summary["checks"]),
         size=summary["size"],
         cost=summary["cost"],
         # A file has no slash in the name of a group.
@@ -271,14 +261,5 @@ def load(folder: str | Path) -> RunResult:
 
 def _case(entry: Entry) -> Case:
     """The case from its fields; of unknown fields, from its words."""
-    given = entry["case_fields"]
-    case = Case(**{key: value for key, value in given.items() if key in _CASE})
+    case = from_json(Case, entry["case_fields"])
     return case if case.label == entry["case"] else Case(name=entry["case"])
-
-
-def _check(entry: Entry) -> Check:
-    """The check that `Check.as_dict` wrote, which has null for what is no number."""
-    given = {key: value for key, value in entry.items() if key in _CHECK}
-    numbers = ("value", "limit", *(["included"] * bool(entry.get("quantity"))))
-    found = {key: math.nan if entry.get(key) is None else entry[key] for key in numbers}
-    return Check(**given | found | {"case": _case(entry)})

@@ -305,11 +305,8 @@ def image_uri(png: bytes) -> str:
         with Image.open(io.BytesIO(png)) as image:
             image.thumbnail((_WIDTH, image.height))
             image.save(out, "WEBP", quality=80)
+        kind, data = "webp", out.getvalue()
     except (OSError, SyntaxError):
         # Damaged: the browser shows what there is of it.
-        return _uri("png", png)
-    return _uri("webp", out.getvalue())
-
-
-def _uri(kind: str, data: bytes) -> str:
+        kind, data = "png", png
     return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"

@@ -10,7 +10,7 @@ from typing import Any
 from upd.labels import sentence
 from upd.plot.surface import read_surface
 from upd.report.folder import RunFolder, read_run
-from upd.report.page import Section, Verdict, make_panels, page_text, versions_text, write_page
+from upd.report.page import Section, Verdict, make_panels, page_text, write_page
 from upd.report.tables import (
     all_numbers,
     analysis_charts,
@@ -23,8 +23,8 @@ from upd.report.tables import (
     stage_table,
     warnings,
 )
-from upd.results import FAILED, outcome_of
 from upd.results.answer_table import AnswerTable
+from upd.results.check import FAILED, outcome_of
 
 log = logging.getLogger("upd.report")
 
@@ -39,12 +39,11 @@ def write_run_report(folder: Path) -> Path:
     """
     run = read_run(folder)
     surfaces = run_surfaces(run)
-    started = f", run on {run.started}" if run.started else ""
     html = page_text(
         run.summary["title"] or run.summary["scene"],
         run_sections(run, surfaces),
         verdict=verdict(run.summary),
-        footer=f"Run folder {run.name}{started}. {versions_text(run.versions)}".rstrip(),
+        footer=run.origin,
         surfaces=surfaces,
     )
     return write_page(run.path / "report.html", html)
@@ -131,10 +130,10 @@ def page_warnings(run: RunFolder) -> list[str]:
     checks, status = run.summary["checks"], run.summary["status"]
     found = warnings(checks, run.summary["results"])
     for line in run.log:
-        known = line.text == status or (checks and line.where.startswith(_SOLVER))
-        if line.level in ("WARNING", "ERROR", "CRITICAL") and not known:
-            ours = line.where.startswith(_OURS)
-            found.append(sentence(line.text, "") if ours else f"{line.where}: {line.text}")
+        level, where, text = line["level"], line["where"], line["text"]
+        known = text == status or (checks and where.startswith(_SOLVER))
+        if level in ("WARNING", "ERROR", "CRITICAL") and not known:
+            found.append(sentence(text, "") if where.startswith(_OURS) else f"{where}: {text}")
     return list(dict.fromkeys([*found, *run.missing]))
 
 

@@ -10,10 +10,11 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from upd.analyses import analysis_named
+from upd.analyses.base import Effect
 from upd.labels import (
     check_number,
     check_words,
-    effect_word,
+    listed,
     number,
     percent,
     percent_of,
@@ -23,8 +24,10 @@ from upd.labels import (
     unit_label,
 )
 from upd.plot.chart import Chart, Entry
-from upd.results import Arrays, read_part, worst_check, worst_checks
+from upd.results import Arrays, ErrorPart
 from upd.results.answer_table import AnswerTable
+from upd.results.check import worst_check, worst_checks
+from upd.results.number import from_json
 from upd.results.quantities import CLOSED_FORM_ERROR, number_label, number_title
 from upd.results.sampled import SampledNumber
 
@@ -187,7 +190,7 @@ def effects_table(effects: Sequence[Mapping[str, Any]]) -> AnswerTable:
     """What was simulated and what was not, with the checks of it."""
     columns = {
         "effect": [str(e["name"]) for e in effects],
-        "simulated": [effect_word(e) for e in effects],
+        "simulated": [from_json(Effect, e).word for e in effects],
         "why": [str(e["why"]) for e in effects],
         "check": [str(e.get("verdict") or "").partition(":")[0] for e in effects],
     }
@@ -218,7 +221,7 @@ def error_parts(entry: Entry) -> list[tuple[str, float | None, float | None, str
             part["source"],
             part["error"],
             part["error"] / total if total and part["error"] is not None else None,
-            read_part(part).half_words,
+            from_json(ErrorPart, part).half_words,
             part["basis"],
         )
         for part in entry.get("error_parts", ())
@@ -328,25 +331,14 @@ def warnings(
     out = []
     for name, mine in failed.items():
         worst = worst_check(mine)
-        cases = _in_brackets(_listed([worst["case"], *(c["case"] for c in mine)], most))
+        cases = listed([worst["case"], *(c["case"] for c in mine)], most, " ({})")
         remedy = f". {sentence(worst['remedy'], '')}" if worst.get("remedy") else ""
         out.append(sentence(f"{name}{cases}: {check_words(worst)}{remedy}"))
     for reason, numbers in lost.items():
-        names = _listed([number_label(entry["name"]) for entry in numbers], most)
-        cases = _in_brackets(_listed([entry["case"] for entry in numbers], most))
+        names = listed([number_label(entry["name"]) for entry in numbers], most)
+        cases = listed([entry["case"] for entry in numbers], most, " ({})")
         out.append(sentence(f"{names}{cases}: not reached, {reason}"))
     return out
-
-
-def _listed(items: Iterable[str], most: int | None) -> str:
-    """Items, each once."""
-    found = [item for item in dict.fromkeys(items) if item]
-    more = [f"and {len(found) - most} more"] if most and len(found) > most else []
-    return "; ".join([*found[:most], *more])
-
-
-def _in_brackets(text: str) -> str:
-    return f" ({text})" if text else ""
 
 
 # ---------------------------------------------------------------- charts

@@ -1,47 +1,12 @@
 """What a run leaves behind: cases, numbers with their errors, checks, and arrays in one file."""
 
 from upd.results.case import NO_CASE, Case, shared_label
-from upd.results.check import (
-    FAILED,
-    OK,
-    WARNED,
-    Check,
-    outcome_of,
-    status_of,
-    with_fault,
-    worst_check,
-    worst_checks,
-)
-from upd.results.netcdf import (
-    DIGEST,
-    Arrays,
-    Group,
-    Variable,
-    file_digest,
-    open_netcdf,
-    read_netcdf,
-    variable,
-    write_netcdf,
-)
-from upd.results.number import (
-    ErrorPart,
-    Estimates,
-    InputPart,
-    InputParts,
-    Result,
-    read_part,
-    read_result,
-    with_estimates,
-    with_inputs,
-    with_parts,
-)
+from upd.results.check import Check
+from upd.results.netcdf import Arrays, Group, Variable, read_netcdf, variable, write_netcdf
+from upd.results.number import ErrorPart, Estimates, InputPart, Result, with_parts
 
 __all__ = [
-    "DIGEST",
-    "FAILED",
     "NO_CASE",
-    "OK",
-    "WARNED",
     "Arrays",
     "Case",
     "Check",
@@ -49,23 +14,11 @@ __all__ = [
     "Estimates",
     "Group",
     "InputPart",
-    "InputParts",
     "Result",
     "Variable",
-    "file_digest",
-    "open_netcdf",
-    "outcome_of",
     "read_netcdf",
-    "read_part",
-    "read_result",
     "shared_label",
-    "status_of",
     "variable",
-    "with_estimates",
-    "with_fault",
-    "with_inputs",
     "with_parts",
-    "worst_check",
-    "worst_checks",
     "write_netcdf",
 ]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
-from upd.labels import check_words
+from upd.labels import check_words, listed
 from upd.results.case import Case
-from upd.results.number import Result
+from upd.results.number import Result, as_json
 from upd.results.quantities import number_label
 
 OK, WARNED, FAILED = "ok", "ok with warnings", "failed"
@@ -35,11 +35,6 @@ def status_of(checks: Sequence[Check], results: Sequence[Result]) -> str:
     return f"{WARNED}: " + "; ".join(warnings) if warnings else OK
 
 
-def with_fault(status: str, fault: str) -> str:
-    """A status with what went wrong with the pictures of a run."""
-    return f"{WARNED}: {fault}" if status == OK else f"{status}; {fault}"
-
-
 def warnings_of(checks: Sequence[Check], results: Sequence[Result]) -> list[str]:
     """What did not pass and what was not reached, one sentence per name with its cases."""
     found: dict[str, list[str]] = {}
@@ -49,14 +44,7 @@ def warnings_of(checks: Sequence[Check], results: Sequence[Result]) -> list[str]
     for one in results:
         if one.withheld:
             found.setdefault(f"{number_label(one.name)} not reached", []).append(one.case.label)
-    return [name + (f" ({_some(cases)})" if any(cases) else "") for name, cases in found.items()]
-
-
-def _some(labels: Sequence[str], most: int = 2) -> str:
-    """The first labels, each once, and how many more there are."""
-    labels = list(dict.fromkeys(labels))
-    shown = "; ".join(label for label in labels[:most] if label)
-    return shown + (f"; and {len(labels) - most} more" if len(labels) > most else "")
+    return [name + listed(cases, 2, " ({})") for name, cases in found.items()]
 
 
 def outcome_of(status: str) -> str:
@@ -103,11 +91,7 @@ class Check:
 
     def as_dict(self) -> dict[str, Any]:
         """The check as it stands in summary.json."""
-        data = asdict(self) | {"case": self.case.label, "verdict": self.verdict}
-        # JSON has no NaN and no infinity.
-        for name in ("value", "without", "included"):
-            if data[name] is not None and not math.isfinite(data[name]):
-                data[name] = None
+        data = as_json(self, case=self.case.label, verdict=self.verdict)
         if not self.quantity:
             for name in ("quantity", "without", "included"):
                 del data[name]

@@ -91,16 +91,12 @@ def write_netcdf(path: Path, arrays: Arrays) -> None:
             for key, value in variables.attributes.items():
                 group.attrs[key] = np.int8(value) if isinstance(value, bool) else value
             for key, one in variables.items():
-                _write_variable(group, key, one)
-
-
-def _write_variable(group: Any, name: str, one: Variable) -> None:
-    for dim, length in zip(one.dims, one.data.shape, strict=True):
-        if dim not in group.dimensions:
-            group.dimensions[dim] = length
-    variable = group.create_variable(name, one.dims, one.data.dtype, data=one.data)
-    for key, text in one.attributes.items():
-        variable.attrs[key] = text
+                for dim, length in zip(one.dims, one.data.shape, strict=True):
+                    if dim not in group.dimensions:
+                        group.dimensions[dim] = length
+                made = group.create_variable(key, one.dims, one.data.dtype, data=one.data)
+                for word, text in one.attributes.items():
+                    made.attrs[word] = text
 
 
 def file_digest(path: Path) -> str:

@@ -4,10 +4,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, TypeVar
 
 from upd.results.case import Case
+
+Kept = TypeVar("Kept")
+
+
+def as_json(one: Any, **others: Any) -> dict[str, Any]:
+    """The fields of a part or a check as summary.json has them, with some of its own: what is not
+    finite is null.
+    """
+    return {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in (asdict(one) | others).items()
+    }
+
+
+def from_json(kind: type[Kept], data: Mapping[str, Any], **others: Any) -> Kept:
+    """What `as_json` wrote, with some fields of its own; null is NaN where a number must be, and
+    what is no field is omitted.
+    """
+    known: Any = fields(kind)  # type: ignore[arg-type]
+    found = {
+        f.name: math.nan if data[f.name] is None and f.type == "float" else data[f.name]
+        for f in known
+        if f.name in data
+    }
+    return kind(**found | others)
 
 
 @dataclass(frozen=True)
@@ -50,15 +75,6 @@ class ErrorPart:
         """Whether it was found."""
         return math.isfinite(self.error)
 
-    def as_dict(self) -> dict[str, Any]:
-        """The part as it stands in summary.json; an error that was not found is null."""
-        return asdict(self) | {"error": self.error if self.known else None}
-
-
-def largest(parts: Iterable[ErrorPart]) -> ErrorPart:
-    """The part that adds most."""
-    return max(parts, key=lambda part: part.error if part.known else -math.inf)
-
 
 @dataclass(frozen=True)
 class InputPart:
@@ -91,27 +107,6 @@ class InputPart:
     def known(self) -> bool:
         """Whether it was found."""
         return math.isfinite(self.change)
-
-    def as_dict(self) -> dict[str, Any]:
-        """The part as it stands in summary.json; what was not found is null."""
-        return {
-            "path": self.path,
-            "half_width": self.half_width if math.isfinite(self.half_width) else None,
-            "share": self.share if self.known else None,
-            "change": self.change if self.known else None,
-            "basis": self.basis,
-        }
-
-
-def read_input_part(data: Mapping[str, Any]) -> InputPart:
-    """The part that `InputPart.as_dict` wrote."""
-    half, change = data["half_width"], data["change"]
-    return InputPart(
-        str(data["path"]),
-        math.inf if half is None else float(half),
-        math.nan if change is None else float(change),
-        str(data["basis"]),
-    )
 
 
 #: name and case of a number -> what the inputs known within limits do to it
@@ -196,8 +191,12 @@ class Result:
         }
         known = {
             "estimated_error": self.estimated_error,
-            "error_parts": [part.as_dict() for part in self.parts] or None,
-            "input_parts": [part.as_dict() for part in self.inputs] or None,
+            "error_parts": list(map(as_json, self.parts)) or None,
+            "input_parts": [
+                as_json(one) | {"share": abs(one.change) if one.known else None}
+                for one in self.inputs
+            ]
+            or None,
             "withheld": self.withheld or None,
         }
         return (
@@ -228,28 +227,15 @@ def with_parts(result: Result, parts: Iterable[ErrorPart]) -> Result:
     )
 
 
-def read_part(data: Mapping[str, Any]) -> ErrorPart:
-    """The part that `ErrorPart.as_dict` wrote."""
-    error = data["error"]
-    return ErrorPart(**{**data, "error": math.nan if error is None else error})
-
-
 def read_result(data: Mapping[str, Any], case: Case | None = None) -> Result:
     """The number that `Result.as_dict` wrote, of the case that its fields give where none is."""
-    value = data["value"]
-    return Result(
-        data["name"],
-        Case(**data["case_fields"]) if case is None else case,
-        math.nan if value is None else value,
-        data["unit"],
-        data["reference"],
-        data.get("source", ""),
-        data.get("thesis_error"),
-        data.get("estimated_error"),
-        data.get("exact", True),
-        data.get("withheld", ""),
-        tuple(map(read_part, data.get("error_parts", ()))),
-        tuple(map(read_input_part, data.get("input_parts", ()))),
+    return from_json(
+        Result,
+        data,
+        case=Case(**data["case_fields"]) if case is None else case,
+        printed_error=data.get("thesis_error"),
+        parts=tuple(from_json(ErrorPart, one) for one in data.get("error_parts", ())),
+        inputs=tuple(from_json(InputPart, one) for one in data.get("input_parts", ())),
     )
 
 

@@ -13,11 +13,16 @@ from upd.scene import quantities as q
 #: fields of a scene that no file gives: its text with the values alone, its uncertain inputs, and
 #: damping fitted to measured curves
 INSIDE = ("text", "uncertain", "fitted")
-STRICT = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
+
+
+class Table:
+    """Base of all tables of a scene: no other keys, no number that is not finite."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
 
 
 @dataclass(frozen=True)
-class MaterialData:
+class MaterialData(Table):
     """Elastic constants of one body.
 
     Attributes
@@ -33,7 +38,6 @@ class MaterialData:
         small.
     """
 
-    __pydantic_config__ = STRICT
     E: q.Stress
     nu: q.Poisson
     density: q.Density = 7.8e-9
@@ -41,7 +45,7 @@ class MaterialData:
 
 
 @dataclass(frozen=True)
-class MeshChoice:
+class MeshChoice(Table):
     """Element family and mirror symmetry.
 
     Attributes
@@ -55,13 +59,12 @@ class MeshChoice:
         effects share. Cost: each mirror plane halves the dofs.
     """
 
-    __pydantic_config__ = STRICT
     element: Literal["hex8", "hex8i", "hex20", "hex27"] = "hex8i"
     symmetry: Literal["auto", "full", "half", "quarter"] = "auto"
 
 
 @dataclass(frozen=True)
-class SolverChoice:
+class SolverChoice(Table):
     """Linear solver and the memory it may use.
 
     Attributes
@@ -80,14 +83,13 @@ class SolverChoice:
         machine. Cost: less memory takes more seconds.
     """
 
-    __pydantic_config__ = STRICT
     name: Literal["auto", "pardiso", "superlu", "amg"] = "auto"
     route: Literal["auto", "condensed", "products"] = "auto"
     memory: q.Memory | None = None
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class LeftOut(Table):
     """Largest relative change of a number by an effect left out before the run warns.
 
     Attributes
@@ -104,7 +106,6 @@ class LeftOut:
         Largest change of peak amplitudes.
     """
 
-    __pydantic_config__ = STRICT
     solve: Literal["yes", "no"] = "yes"
     stiffness: q.Share = 0.05
     frequency: q.Share = 0.01
@@ -121,7 +122,7 @@ class LeftOut:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rotation:
+class Rotation(Table):
     """The centrifugal force on a damper, F_C, or what gives it: F_C = m r w^2.
 
     Attributes
@@ -132,7 +133,6 @@ class Rotation:
         Of the rotation.
     """
 
-    __pydantic_config__ = STRICT
     centrifugal: q.Centrifugal | None = None
     mass: q.Mass | None = None
     radius: q.Radius | None = None
@@ -140,7 +140,7 @@ class Rotation:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SceneBase:
+class SceneBase(Table):
     """What every scene has. ``geometry`` holds the recipe's name under "recipe" and its parameters
     beside it, in mm.
 
@@ -161,9 +161,10 @@ class SceneBase:
         The recipe and its parameters.
     """
 
-    __pydantic_config__ = STRICT
     #: whether masses count
     moves: ClassVar[bool] = True
+    #: tables that only this kind of scene has
+    only: ClassVar[tuple[str, ...]] = ()
 
     name: q.Name
     title: str = ""
@@ -197,6 +198,16 @@ class SceneBase:
     def wants(self, *names: str) -> bool:
         """True when at least one of the outputs is asked for."""
         return any(name in self.want for name in names)
+
+    def derived(self, data: Mapping[str, Any]) -> Any:
+        """The scene with what follows from other keys as numbers, `data` as they were read. Raises
+        InputError whose arguments are the problems.
+        """
+        return self
+
+    def problems(self) -> Iterator[str]:
+        """What does not fit together."""
+        yield from ()
 
 
 def repeated(path: str, values: Sequence[float | str]) -> list[str]:
@@ -232,16 +243,18 @@ Fit = Annotated[
 
 
 @dataclass(frozen=True, kw_only=True)
-class FaceFriction:
+class FaceFriction(Table):
     """Coulomb friction on both faces of the damper, and their fit.
 
     Attributes
     ----------
     friction
         Coulomb's coefficient.
+    fit
+        How well the faces fit each other: "new" (flat, they touch everywhere without load), "worn"
+        (worn in under F_C, which then presses evenly), or a number between, 0 new to 1 worn.
     """
 
-    __pydantic_config__ = STRICT
     friction: q.Coefficient = 0.6
     fit: Fit = "new"
 
@@ -311,10 +324,14 @@ def rig_parameters(scene: Any, symmetry: str, element_nodes: int) -> dict[str, A
     }
 
 
+#: the problem of a yield stress where no contact is checked
+YIELD_CHECKED = "material.yield_stress: is checked in a contact scene, body by body; remove it here"
+
+
 def rig_problems(scene: RigBase) -> Iterator[str]:
     """What of material, mesh and solver does not fit the rig."""
     if scene.material.yield_stress is not None:
-        yield "material.yield_stress: is checked in a contact scene, body by body; remove it here"
+        yield YIELD_CHECKED
     if scene.mesh.symmetry == "quarter":
         yield 'mesh.symmetry: the rig has one mirror plane; use "half", "full" or "auto"'
     if scene.solver.name == "amg":

@@ -9,7 +9,14 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
 from upd.scene import quantities as q
-from upd.scene.base import STRICT, MaterialData, MeshChoice, SceneBase, unreachable_accuracy
+from upd.scene.base import (
+    YIELD_CHECKED,
+    MaterialData,
+    MeshChoice,
+    SceneBase,
+    Table,
+    unreachable_accuracy,
+)
 
 #: Outputs a bladed disk can ask for.
 BLADED_DISK_WANTS = ("modes", "campbell", "interference", "response", "performance")
@@ -17,7 +24,7 @@ BladedDiskWant = Annotated[str, q.one_of(BLADED_DISK_WANTS), q.Example('"modes"'
 
 
 @dataclass(frozen=True)
-class SectorModesChoice:
+class SectorModesChoice(Table):
     """Modes of every nodal diameter.
 
     Attributes
@@ -29,13 +36,12 @@ class SectorModesChoice:
         others. Cost: a factorisation and an eigenvalue problem each.
     """
 
-    __pydantic_config__ = STRICT
     count: Annotated[int, q.at_least(1)] = 6
     computed: Annotated[int, q.at_least(2)] = 4
 
 
 @dataclass(frozen=True)
-class SpinChoice:
+class SpinChoice(Table):
     """Speed and excitation.
 
     Attributes
@@ -51,7 +57,6 @@ class SpinChoice:
         Speeds of the Campbell diagram. Cost: small.
     """
 
-    __pydantic_config__ = STRICT
     speed: q.Speed
     up_to: q.Ratio = 1.2
     engine_orders: Annotated[tuple[Annotated[int, q.at_least(0)], ...], q.FILLED] = (1, 2, 3, 4)
@@ -59,7 +64,7 @@ class SpinChoice:
 
 
 @dataclass(frozen=True)
-class WedgeChoice:
+class WedgeChoice(Table):
     """The wedge in every gap between platforms, a rigid body; F_C = m r w^2 at each speed.
 
     Attributes
@@ -77,7 +82,6 @@ class WedgeChoice:
         off that slips on all its faces. From 10 to 1000 N/mm it changes no peak by .1 %.
     """
 
-    __pydantic_config__ = STRICT
     mass: q.Mass = 1e-5
     angle: Annotated[float, q.quantity("angle"), q.Example('"25 deg"')] = 25.0
     normal_stiffness: Annotated[float, q.quantity("stiffness"), q.positive] = 2e4
@@ -87,7 +91,7 @@ class WedgeChoice:
 
 
 @dataclass(frozen=True)
-class WaveChoice:
+class WaveChoice(Table):
     """Response to the engine order of the crossing nearest to the operating speed.
 
     Attributes
@@ -108,7 +112,6 @@ class WaveChoice:
         F_C/F_E of the performance curve, beside that of the response. Cost: a curve each.
     """
 
-    __pydantic_config__ = STRICT
     force: q.Force = 1.0
     damping: q.Share = 0.002
     harmonics: Annotated[int, q.at_least(1)] = 3
@@ -153,15 +156,14 @@ class BladedDiskScene(SceneBase):
         """Number of blades."""
         return int(self.geometry["n_sectors"])
 
-
-def bladed_disk_problems(scene: BladedDiskScene) -> Iterator[str]:
-    """What does not fit together."""
-    if scene.mesh.element == "hex8i":
-        yield 'mesh.element: hex8i has no stress stiffness; use "hex20", "hex27" or "hex8"'
-    if scene.mesh.symmetry not in ("auto", "full"):
-        yield 'mesh.symmetry: a sector has no mirror plane; use "full" or "auto"'
-    if scene.material.yield_stress is not None:
-        yield "material.yield_stress: is checked in a contact scene, body by body; remove it here"
-    if scene.solver.name == "amg":
-        yield 'solver.name: modes need a direct solver; use "auto", "pardiso" or "superlu"'
-    yield from unreachable_accuracy(scene, "a bladed disk", "the numbers of elements")
+    def problems(self) -> Iterator[str]:
+        """What does not fit together."""
+        if self.mesh.element == "hex8i":
+            yield 'mesh.element: hex8i has no stress stiffness; use "hex20", "hex27" or "hex8"'
+        if self.mesh.symmetry not in ("auto", "full"):
+            yield 'mesh.symmetry: a sector has no mirror plane; use "full" or "auto"'
+        if self.material.yield_stress is not None:
+            yield YIELD_CHECKED
+        if self.solver.name == "amg":
+            yield 'solver.name: modes need a direct solver; use "auto", "pardiso" or "superlu"'
+        yield from unreachable_accuracy(self, "a bladed disk", "the numbers of elements")

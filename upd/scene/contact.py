@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Annotated, ClassVar, Literal
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, ClassVar, Literal
 
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import quantities as q
-from upd.scene.base import (
-    STRICT,
-    MaterialData,
-    Rotation,
-    SceneBase,
-    repeated,
-)
+from upd.scene.base import MaterialData, Rotation, SceneBase, Table, repeated
+from upd.scene.rotation import rotation_problems, volume_of
 
+#: body whose density is the damper's
+_DAMPER = "damper"
 #: Outputs a scene can ask for.
 WANTS = (
     "normal",
@@ -44,7 +41,7 @@ Coupling = Literal["uncoupled", "coupled"]
 
 
 @dataclass(frozen=True)
-class ContactData:
+class ContactData(Table):
     """Coulomb friction and what the solver may assume.
 
     Attributes
@@ -76,7 +73,6 @@ class ContactData:
         materials' part of the coupling, that of the bodies' shape is an effect left out.
     """
 
-    __pydantic_config__ = STRICT
     friction: q.Coefficient = 0.0
     directions: Literal[1, 2] = 1
     tilt: Literal["held", "free"] = "held"
@@ -132,7 +128,7 @@ class Loads(Rotation):
 
 
 @dataclass(frozen=True)
-class LawChoice:
+class LawChoice(Table):
     """Contact points for a dynamic model: rows (along y) x columns (along x) per patch.
 
     Attributes
@@ -149,7 +145,6 @@ class LawChoice:
         lower body is elastic itself (keeping it in the springs would count it twice).
     """
 
-    __pydantic_config__ = STRICT
     rows: Annotated[int, q.at_least(1)] = 4
     columns: Annotated[int, q.at_least(1)] = 6
     weight: Literal["stiffness", "area"] = "stiffness"
@@ -215,62 +210,81 @@ class Scene(SceneBase):
             return None
         return float(self.geometry["radius"])
 
+    def derived(self, data: Mapping[str, Any]) -> Scene:
+        """With F_C as a number."""
+        loads, mass = self.loads, self.loads.mass
+        problems = rotation_problems("loads", loads, data.get("loads", {}))
+        if not problems and loads.speed is None and mass is not None:
+            problems = ["loads.mass: counts for F_C = m r w^2 only; add radius and speed"]
+        if problems:
+            raise InputError(*problems)
+        if loads.speed is None or loads.radius is None:
+            return self
+        if mass is None:
+            material = self.materials.get(_DAMPER)
+            if material is None:
+                raise InputError("loads.mass: is missing; give the damper's mass")
+            mass = material.density * volume_of(self)
+        force = mass * loads.radius * loads.speed**2
+        return replace(self, loads=replace(loads, centrifugal=force))
+
+    def problems(self) -> Iterator[str]:
+        """What does not fit together."""
+        loads, contact = self.loads, self.contact
+        yield from repeated("loads.normal", loads.normal)
+        yield from repeated("loads.tangential", loads.tangential)
+        if self.wanted_accuracy is None and self.geometry.get("divisions") == "auto":
+            yield 'geometry.divisions: "auto" needs an accuracy, for example "1 %"'
+        try:
+            kind = self.analysis
+        except InputError:
+            # a problem of geometry.recipe, found there
+            return
+        if kind not in CONTACT_WANTS:
+            known = ", ".join(CONTACT_WANTS)
+            yield f"geometry.recipe: its ANALYSIS is {kind!r}; write one of {known}, rig"
+            return
+        known = ", ".join(CONTACT_WANTS[kind])
+        for w in self.want:
+            if w not in CONTACT_WANTS[kind]:
+                yield f"want: {w!r} is no output of a {kind}; choose among {known}"
+        word = next((v for v in loads.normal if isinstance(v, str)), "")
+        if kind == "flat contact":
+            yield from repeated(
+                "loads.directions", [f"{d % 360.0:g} deg" for d in loads.directions]
+            )
+            if word and loads.centrifugal == 0.0:
+                yield (
+                    f"loads.centrifugal: 0 N presses nothing together, so {word!r} has no answer; "
+                    'give the force at speed, for example "350 N"'
+                )
+            if 0.0 in loads.normal:
+                yield "loads.normal: 0 N presses nothing together; give a positive force"
+            if loads.curve_to == 0.0:
+                yield "loads.curve_to: 0 N gives no curve; give a positive force"
+            if word and loads.centrifugal is None:
+                yield (
+                    f"loads.normal: {word!r} needs loads.centrifugal, the centrifugal force on the "
+                    "damper"
+                )
+        else:
+            only_flat = {
+                "loads.centrifugal": loads.centrifugal is not None,
+                "loads.speed": loads.speed is not None,
+                "loads.directions": loads.directions != (0.0,),
+                "loads.curve_to": loads.curve_to is not None,
+                "contact.tilt": contact.tilt != "held",
+                "contact.load_point": contact.load_point is not None,
+                "contact.distant": bool(contact.distant),
+                "law": self.law != LawChoice(),
+            }
+            if word:
+                yield f"loads.normal: {word!r} is for flat damper faces; give a force with its unit"
+            for where, given in only_flat.items():
+                if given:
+                    yield f"{where}: has no meaning for a {kind}; remove it"
+
 
 def friction_on(scene: Scene) -> bool:
     """True when an output needs friction and there is some."""
     return scene.contact.friction > 0.0 and scene.wants(*FRICTION_WANTS)
-
-
-def contact_problems(scene: Scene) -> Iterator[str]:
-    """What does not fit together."""
-    loads, contact = scene.loads, scene.contact
-    yield from repeated("loads.normal", loads.normal)
-    yield from repeated("loads.tangential", loads.tangential)
-    if scene.wanted_accuracy is None and scene.geometry.get("divisions") == "auto":
-        yield 'geometry.divisions: "auto" needs an accuracy, for example "1 %"'
-    try:
-        kind = scene.analysis
-    except InputError:
-        # a problem of geometry.recipe, found there
-        return
-    if kind not in CONTACT_WANTS:
-        known = ", ".join(CONTACT_WANTS)
-        yield f"geometry.recipe: its ANALYSIS is {kind!r}; write one of {known}, rig"
-        return
-    known = ", ".join(CONTACT_WANTS[kind])
-    for w in scene.want:
-        if w not in CONTACT_WANTS[kind]:
-            yield f"want: {w!r} is no output of a {kind}; choose among {known}"
-    word = next((v for v in loads.normal if isinstance(v, str)), "")
-    if kind == "flat contact":
-        yield from repeated("loads.directions", [f"{d % 360.0:g} deg" for d in loads.directions])
-        if word and loads.centrifugal == 0.0:
-            yield (
-                f"loads.centrifugal: 0 N presses nothing together, so {word!r} has no answer; "
-                'give the force at speed, for example "350 N"'
-            )
-        if 0.0 in loads.normal:
-            yield "loads.normal: 0 N presses nothing together; give a positive force"
-        if loads.curve_to == 0.0:
-            yield "loads.curve_to: 0 N gives no curve; give a positive force"
-        if word and loads.centrifugal is None:
-            yield (
-                f"loads.normal: {word!r} needs loads.centrifugal, the centrifugal force on the "
-                "damper"
-            )
-    else:
-        only_flat = {
-            "loads.centrifugal": loads.centrifugal is not None,
-            "loads.speed": loads.speed is not None,
-            "loads.directions": loads.directions != (0.0,),
-            "loads.curve_to": loads.curve_to is not None,
-            "contact.tilt": contact.tilt != "held",
-            "contact.load_point": contact.load_point is not None,
-            "contact.distant": bool(contact.distant),
-            "law": scene.law != LawChoice(),
-        }
-        if word:
-            yield f"loads.normal: {word!r} is for flat damper faces; give a force with its unit"
-        for where, given in only_flat.items():
-            if given:
-                yield f"{where}: has no meaning for a {kind}; remove it"

@@ -9,18 +9,18 @@ import cmath
 import math
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upd.scene import quantities as q
 from upd.scene.base import (
-    STRICT,
     DamperChoice,
     MeshChoice,
     RigBase,
+    Table,
     repeated,
     rig_problems,
     unreachable_accuracy,
@@ -31,9 +31,12 @@ from upd.scene.measured import (
     UNTIL_READ,
     FittedMode,
     MeasuredChoice,
+    fitted_modes,
+    main_ratio,
     measured_problems,
     modal_ratios,
 )
+from upd.scene.rotation import with_damper
 
 #: Outputs a forced response can give.
 FORCED_WANTS = (
@@ -49,8 +52,6 @@ FORCED_WANTS = (
 ForcedWant = Annotated[str, q.one_of(FORCED_WANTS), q.Example('"response"', '"contact_state"')]
 #: the analysis these scenes ask for
 FORCED = "forced response"
-#: tables that only a forced response has
-FORCED_ONLY = ("damper", "excitation", "balance", "performance", "stiffness")
 
 Array = NDArray[np.float64]
 
@@ -76,7 +77,7 @@ Samples = Annotated[
 
 
 @dataclass(frozen=True)
-class BladeReduction:
+class BladeReduction(Table):
     """Reduction of the blades.
 
     Attributes
@@ -86,12 +87,11 @@ class BladeReduction:
         small, a mode is a dof of the reduced model.
     """
 
-    __pydantic_config__ = STRICT
     modes: Annotated[int, q.not_negative] = 10
 
 
 @dataclass(frozen=True)
-class HarmonicForce:
+class HarmonicForce(Table):
     """A force along x at mid-core of a blade, a F_E cos(k 2 pi f t + phase).
 
     Attributes
@@ -106,7 +106,6 @@ class HarmonicForce:
         k, its frequency as a multiple of that of the sweep.
     """
 
-    __pydantic_config__ = STRICT
     blade: Side = "right"
     amplitude: q.Ratio = 1.0
     phase: q.Phase = 0.0
@@ -114,7 +113,7 @@ class HarmonicForce:
 
 
 @dataclass(frozen=True)
-class ExcitationChoice:
+class ExcitationChoice(Table):
     """Harmonic forces at mid-core of the blades, swept between two frequencies.
 
     Attributes
@@ -138,7 +137,6 @@ class ExcitationChoice:
         fitted to the measured free curves, beyond their band that of the nearest.
     """
 
-    __pydantic_config__ = STRICT
     centrifugal_to_force: q.Ratios = (194.0,)
     force: tuple[q.Force, ...] = ()
     start: q.Frequency = 280.0
@@ -158,7 +156,7 @@ class ExcitationChoice:
 
 
 @dataclass(frozen=True)
-class BalanceChoice:
+class BalanceChoice(Table):
     """Harmonic balance, or time integration in its place.
 
     Attributes
@@ -176,7 +174,6 @@ class BalanceChoice:
         Start position of the sliders, within what friction allows.
     """
 
-    __pydantic_config__ = STRICT
     method: Literal["balance", "march"] = "balance"
     harmonics: HarmonicNumber = 7
     samples: Samples = "auto"
@@ -184,7 +181,7 @@ class BalanceChoice:
 
 
 @dataclass(frozen=True)
-class PerformanceChoice:
+class PerformanceChoice(Table):
     """F_C/F_E of the performance curve, evenly spread on a logarithmic axis.
 
     Attributes
@@ -198,7 +195,6 @@ class PerformanceChoice:
         slips.
     """
 
-    __pydantic_config__ = STRICT
     lowest: q.Ratio = 5.0
     highest: q.Ratio = 1000.0
     points: Annotated[int, q.at_least(3)] = 12
@@ -228,6 +224,14 @@ class ForcedScene(RigBase):
     measured
         Measured responses by name.
     """
+
+    only: ClassVar[tuple[str, ...]] = (
+        "damper",
+        "excitation",
+        "balance",
+        "performance",
+        "stiffness",
+    )
 
     analysis: Literal["forced response"]
     want: Annotated[tuple[ForcedWant, ...], q.FILLED]
@@ -268,6 +272,66 @@ class ForcedScene(RigBase):
         """Harmonics of the balance, the static one included."""
         return range(self.balance.harmonics + 1)
 
+    def derived(self, data: Mapping[str, Any]) -> ForcedScene:
+        """With F_C, density of the damper, force ratios and damping as numbers."""
+        e, problems = self.excitation, []
+        wanted = data.get("excitation", {}).get("centrifugal_to_force")
+        if e.force and wanted not in (None, q.FROM_FORCE):
+            problems.append(
+                "excitation: force and centrifugal_to_force are both given; give one, or "
+                f'centrifugal_to_force = "{q.FROM_FORCE}"'
+            )
+        if wanted == q.FROM_FORCE and not e.force:
+            problems.append(
+                f'excitation.centrifugal_to_force: "{q.FROM_FORCE}" needs excitation.force'
+            )
+        if 0.0 in e.force:
+            problems.append("excitation.force: 0 N excites nothing; give a positive force")
+        changed: ForcedScene = with_damper(self, data, problems)
+        fitted = fitted_modes(self.measured, data, "excitation")
+        if fitted:
+            changed, e = replace(changed, fitted=fitted), replace(e, damping=main_ratio(fitted))
+        ratios = tuple(changed.damper.centrifugal / force for force in e.force)
+        e = replace(e, centrifugal_to_force=ratios or e.centrifugal_to_force)
+        return replace(changed, excitation=e)
+
+    def problems(self) -> Iterator[str]:
+        """What does not fit together."""
+        e, b, known = self.excitation, self.balance, ", ".join(self.stiffness)
+        springs = self.contact.model == "springs"
+        yield from repeated("excitation.centrifugal_to_force", e.centrifugal_to_force)
+        if not e.start < e.stop:
+            yield f"excitation.start: {e.start:g} Hz is not below excitation.stop, {e.stop:g} Hz"
+        if self.damper.centrifugal <= 0.0:
+            yield (
+                "damper.centrifugal: 0 N leaves the damper loose and the excitation F_C / ratio "
+                "without size; give a positive force"
+            )
+        highest = max(b.harmonics, e.highest_harmonic)
+        if b.samples != "auto" and b.samples <= 2 * highest:
+            yield (
+                f"balance.samples: {b.samples} cannot carry harmonic {highest}; take more than "
+                f"{2 * highest}"
+            )
+        if not combined_forces(e):
+            yield "excitation.forces: cancel each other; give forces that excite something"
+        elif (springs or b.method == "balance") and b.harmonics < e.highest_harmonic:
+            yield (
+                f"balance.harmonics: {b.harmonics} do not carry the force in harmonic "
+                f"{e.highest_harmonic}; write {e.highest_harmonic} or more"
+            )
+        if self.performance.lowest >= self.performance.highest:
+            yield "performance.lowest: is not below performance.highest"
+        for name in self.contact.stiffness:
+            if name not in self.stiffness:
+                yield f"contact.stiffness: there is no table [stiffness.{name}]; known: {known}"
+        yield from (_springs_problems if springs else _whole_faces_problems)(self)
+        yield from rig_problems(self)
+        yield from measured_problems(self.measured)
+        yield from _static_problems(self)
+        for name, s in self.stiffness.items():
+            yield from _stiffness_problems(f"stiffness.{name}", s, self.arrangement)
+
 
 def combined_forces(e: ExcitationChoice) -> dict[tuple[Side, int], complex]:
     """Complex amplitudes over F_E by blade and harmonic, those of one place and harmonic added;
@@ -285,44 +349,6 @@ def combined_forces(e: ExcitationChoice) -> dict[tuple[Side, int], complex]:
 
 
 # -- what does not fit together --------------------------------------------------------------------
-
-
-def forced_problems(scene: ForcedScene) -> Iterator[str]:
-    """What does not fit together."""
-    e, b, known = scene.excitation, scene.balance, ", ".join(scene.stiffness)
-    springs = scene.contact.model == "springs"
-    yield from repeated("excitation.centrifugal_to_force", e.centrifugal_to_force)
-    if not e.start < e.stop:
-        yield f"excitation.start: {e.start:g} Hz is not below excitation.stop, {e.stop:g} Hz"
-    if scene.damper.centrifugal <= 0.0:
-        yield (
-            "damper.centrifugal: 0 N leaves the damper loose and the excitation F_C / ratio "
-            "without size; give a positive force"
-        )
-    highest = max(b.harmonics, e.highest_harmonic)
-    if b.samples != "auto" and b.samples <= 2 * highest:
-        yield (
-            f"balance.samples: {b.samples} cannot carry harmonic {highest}; take more than "
-            f"{2 * highest}"
-        )
-    if not combined_forces(e):
-        yield "excitation.forces: cancel each other; give forces that excite something"
-    elif (springs or b.method == "balance") and b.harmonics < e.highest_harmonic:
-        yield (
-            f"balance.harmonics: {b.harmonics} do not carry the force in harmonic "
-            f"{e.highest_harmonic}; write {e.highest_harmonic} or more"
-        )
-    if scene.performance.lowest >= scene.performance.highest:
-        yield "performance.lowest: is not below performance.highest"
-    for name in scene.contact.stiffness:
-        if name not in scene.stiffness:
-            yield f"contact.stiffness: there is no table [stiffness.{name}]; known: {known}"
-    yield from (_springs_problems if springs else _whole_faces_problems)(scene)
-    yield from rig_problems(scene)
-    yield from measured_problems(scene.measured)
-    yield from _static_problems(scene)
-    for name, s in scene.stiffness.items():
-        yield from _stiffness_problems(f"stiffness.{name}", s, scene.arrangement)
 
 
 def _springs_problems(scene: ForcedScene) -> Iterator[str]:

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator
 
 from upd.errors import InputError
 from upd.scene import quantities as q
-from upd.scene.base import STRICT, FaceFriction, Fit
+from upd.scene.base import FaceFriction, Fit, Table
 from upd.units import parse_quantity
 
 Stiffness = Annotated[float, q.quantity("stiffness"), q.positive, q.Example('"1e6 N/mm"')]
@@ -52,8 +52,10 @@ def _static_face(side: str, value: Any) -> Any:
 Static = Annotated[
     Any,
     BeforeValidator(_static),
-    q.Noted(bounds=f"{', '.join(STATES)}, or T/N or N and T of the left and the right face"),
-    q.Example('"frictionless"'),
+    q.Example(
+        '"frictionless"',
+        bounds=f"{', '.join(STATES)}, or T/N or N and T of the left and the right face",
+    ),
 ]
 
 
@@ -79,13 +81,12 @@ def _lines(value: Any) -> Any:
 Lines = Annotated[
     Any,
     BeforeValidator(_lines),
-    q.Noted(bounds="all, a number of groups, or a list of line numbers from 0"),
-    q.Example('"all"'),
+    q.Example('"all"', bounds="all, a number of groups, or a list of line numbers from 0"),
 ]
 
 
 @dataclass(frozen=True)
-class FaceLines:
+class FaceLines(Table):
     """Lattice lines of one face that replace those of the scene.
 
     Attributes
@@ -94,7 +95,6 @@ class FaceLines:
         As in [contact], for this face; those of [contact] when None.
     """
 
-    __pydantic_config__ = STRICT
     rows: Lines = None
     columns: Lines = None
 
@@ -171,7 +171,7 @@ class FrictionChoice(FaceFriction):
 
 
 @dataclass(frozen=True)
-class FaceStiffness:
+class FaceStiffness(Table):
     """Contact stiffness of one face.
 
     Attributes
@@ -180,13 +180,12 @@ class FaceStiffness:
         Normal and tangential, total of the face.
     """
 
-    __pydantic_config__ = STRICT
     K_N: Stiffness
     K_T: Stiffness
 
 
 @dataclass(frozen=True)
-class StiffnessChoice:
+class StiffnessChoice(Table):
     """Contact stiffness of both faces: totals, or from a contact analysis.
 
     Attributes
@@ -207,7 +206,6 @@ class StiffnessChoice:
         contact run (scene only).
     """
 
-    __pydantic_config__ = STRICT
     K_N: Stiffness | None = None
     K_T: Stiffness | None = None
     left: FaceStiffness | None = None

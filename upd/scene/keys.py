@@ -24,7 +24,7 @@ from upd.mesh.fields import bounds_of
 from upd.mesh.recipe_modules import READY
 from upd.scene.base import INSIDE
 from upd.scene.quantities import (
-    Noted,
+    Example,
     Rule,
     hint_at,
     hints,
@@ -160,30 +160,12 @@ def recipe_keys(recipe: str, params: Any = None, path: Steps = ()) -> list[Scene
     path
         Tables in front of every name: of a scene, "geometry".
     """
-    cls = recipes.parameters(recipe)
-    texts, types = entries(cls), hints(cls)
     made = recipes.made(recipe, {}) if params is None else params
-    out = []
-    for f in fields(cls):
-        if not f.init:
-            continue
-        meaning, cost = _parted(texts.get(f.name, ""))
-        # the unit has a column of its own
-        meaning = _UNIT.sub("", meaning)
-        kind, value = str(f.metadata.get("quantity") or ""), getattr(made, f.name)
-        out.append(
-            SceneKey(
-                (*path, f.name),
-                meaning,
-                kind,
-                _MUST if f.default is MISSING else _text(f.default, kind),
-                bounds_of(f, types[f.name]),
-                cost,
-                _text(value, kind),
-                value != f.default,
-            )
-        )
-    return out
+    # the unit has a column of its own
+    return [
+        replace(key, meaning=_UNIT.sub("", key.meaning), given=key.value != key.default)
+        for key in _walk(recipes.parameters(recipe), made, None, path, {})
+    ]
 
 
 def params_of(scene: Any) -> Any:
@@ -298,7 +280,7 @@ def _walk(cls: type[Any], value: Any, usual: Any, path: Steps, given: Any) -> It
     """
     texts, types = entries(cls), hints(cls)
     tables: list[Iterator[SceneKey]] = []
-    known = [f for f in fields(cls) if f.name not in INSIDE]
+    known = [f for f in fields(cls) if f.init and f.name not in INSIDE]
     for f in sorted(known, key=lambda f: (f.name in _LAST, not must_be_given(f))):
         here = getattr(value, f.name) if value is not None else None
         mine = given.get(f.name, {}) if isinstance(given, Mapping) else {}
@@ -316,15 +298,16 @@ def _walk(cls: type[Any], value: Any, usual: Any, path: Steps, given: Any) -> It
                 own = mine.get(name, {}) if isinstance(mine, Mapping) else {}
                 tables.append(_walk(item, one, None, (*where, name), own))
         else:
-            kind = quantity_kind(hint)
-            meaning, cost = _parted(texts.get(f.name, ""))
+            # of a recipe's parameter its field has them
+            kind = str(f.metadata.get("quantity") or quantity_kind(hint))
+            meaning, _, cost = texts.get(f.name, "").replace("``", "").partition("Cost:")
             yield SceneKey(
                 where,
-                meaning,
+                meaning.strip(),
                 kind,
                 _MUST if default is MISSING else _text(default, kind),
-                _bounds(hint),
-                cost,
+                bounds_of(f, hint) or _bounds(hint),
+                cost.strip().rstrip(".") or _NONE,
                 "" if value is None else _text(here, kind),
                 isinstance(given, Mapping) and f.name in given,
                 uncertain=kind in UNITS and is_input(where),
@@ -350,21 +333,15 @@ def _geometry(scene: Any, given: Mapping[str, Any]) -> Iterator[SceneKey]:
         if key.name not in values:
             # what another table chooses: the elements of the mesh, its symmetry
             continue
-        auto = values[key.name] == "auto"
+        value = values[key.name]
+        # what a file could give: "auto" is given or not at all
+        plain = isinstance(value, (str, int)) or (isinstance(value, float) and math.isfinite(value))
         yield replace(
             key,
-            value='"auto"' if auto else key.value,
+            value='"auto"' if value == "auto" else key.value,
             given=key.name in given,
-            writable=_writable(values[key.name]),
-            uncertain=key.kind in UNITS,
+            writable=plain and value != "auto",
         )
-
-
-def _writable(value: Any) -> bool:
-    """Whether a file could give the parameter of a recipe; "auto" is given or not at all."""
-    if isinstance(value, float):
-        return math.isfinite(value)
-    return isinstance(value, (str, int)) and value != "auto"
 
 
 def _bounds(hint: Any) -> str:
@@ -378,14 +355,8 @@ def _bounds(hint: Any) -> str:
     choices = [str(c) for n in noted if get_origin(n) is Literal for c in get_args(n)]
     out += [", ".join(choices)] if choices else []
     out += [f"{whole}{n.bounds}" for n in noted if isinstance(n, Rule)]
-    out += [n.bounds for n in noted if isinstance(n, Noted) and n.bounds]
+    out += [n.bounds for n in noted if isinstance(n, Example) and n.bounds]
     return "; ".join(out)
-
-
-def _parted(entry: str) -> tuple[str, str]:
-    """Meaning and effect on cost."""
-    meaning, _, cost = entry.replace("``", "").partition("Cost:")
-    return meaning.strip(), cost.strip().rstrip(".") or _NONE
 
 
 def _text(value: Any, kind: str) -> str:
@@ -453,15 +424,8 @@ def comment(key: SceneKey) -> list[str]:
     facts = "; ".join(fact for fact in (key.unit, key.bounds) if fact)
     # a sign and its number stay on one line
     facts = re.sub(r"([<>]=?) ", "\\1\u00a0", facts)
-    text = " ".join(
-        part
-        for part in (
-            key.meaning,
-            f"({facts})" if facts else "",
-            "" if key.cost == "none" else f"Cost: {key.cost}.",
-        )
-        if part
-    )
+    cost = "" if key.cost == _NONE else f"Cost: {key.cost}."
+    text = " ".join(filter(None, (key.meaning, facts and f"({facts})", cost)))
     lines = wrap(text, _WIDTH, initial_indent="# ", subsequent_indent="# ")
     return [line.replace("\u00a0", " ") for line in lines]
 

@@ -17,7 +17,7 @@ from upd.measured.curve import QUANTITIES, AskedCurve, CurveLabel, MeasuredCurve
 from upd.measured.damping import DampingFit, fit_damping
 from upd.measured.read import MOST_TOLD, found_in, read_measured
 from upd.scene import quantities as q
-from upd.scene.base import STRICT
+from upd.scene.base import Table
 from upd.units import UNITS
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ ResponseUnit = Annotated[str, q.one_of(_UNITS), q.Example('"(m/s2)/N"')]
 
 
 @dataclass(frozen=True)
-class MeasuredChoice:
+class MeasuredChoice(Table):
     """A measured frequency response, drawn over the computed ones and compared with them.
 
     Attributes
@@ -55,8 +55,7 @@ class MeasuredChoice:
         SHA-256 of the file, which a run writes into its own scene: another file is then refused.
     """
 
-    __pydantic_config__ = STRICT
-    file: Annotated[str, q.Noted(bounds="a .csv, text or .nc file"), q.Example('"free.csv"')]
+    file: Annotated[str, q.Example('"free.csv"', bounds="a .csv, text or .nc file")]
     blade: Literal["right", "left"] = "right"
     state: Literal["free", "stuck"] | None = None
     centrifugal_to_force: q.Ratio | None = None
@@ -169,21 +168,29 @@ def measured_problems(measured: Mapping[str, MeasuredChoice]) -> Iterator[str]:
             yield f"{where}.file: {path.name}: and {len(faults) - MOST_TOLD} more"
 
 
-def fitted_modes(measured: Mapping[str, MeasuredChoice], table: str) -> tuple[FittedMode, ...]:
-    """Damping ratios of both blades' modes from the measured free curves.
+def fitted_modes(
+    measured: Mapping[str, MeasuredChoice], data: Mapping[str, Any], table: str
+) -> tuple[FittedMode, ...]:
+    """Damping ratios of both blades' modes from the measured free curves, where the scene asks for
+    them.
 
     Parameters
     ----------
     measured
         Name -> choice.
+    data
+        The scene's tables.
     table
-        Of the scene that asks for them.
+        Of the scene that may ask for them.
 
     Raises
     ------
     InputError
         Without a free curve, or where one cannot be fitted.
     """
+    # damaged files are found with the other problems
+    if data.get(table, {}).get("damping") != FROM_MEASURED or any(measured_problems(measured)):
+        return ()
     out: list[FittedMode] = []
     for name, one in measured.items():
         if one.state != "free":

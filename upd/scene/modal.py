@@ -5,12 +5,19 @@ bases.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Annotated, ClassVar, Literal
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, ClassVar, Literal
 
 from upd.scene import quantities as q
-from upd.scene.base import STRICT, MeshChoice, RigBase, repeated, rig_problems
-from upd.scene.measured import FROM_MEASURED, UNTIL_READ, MeasuredChoice, measured_problems
+from upd.scene.base import MeshChoice, RigBase, Table, repeated, rig_problems
+from upd.scene.measured import (
+    FROM_MEASURED,
+    UNTIL_READ,
+    MeasuredChoice,
+    fitted_modes,
+    main_ratio,
+    measured_problems,
+)
 
 #: Outputs a rig scene can ask for.
 MODAL_WANTS = ("free", "glued", "reduction", "response", "pictures", "matrices")
@@ -18,7 +25,7 @@ ModalWant = Annotated[str, q.one_of(MODAL_WANTS), q.Example('"free"', '"glued"')
 
 
 @dataclass(frozen=True)
-class ModesChoice:
+class ModesChoice(Table):
     """Modes below a frequency, for one or both arrangements of the platforms.
 
     Attributes
@@ -29,7 +36,6 @@ class ModesChoice:
         Which sides of the platforms face each other. Cost: each is meshed and solved.
     """
 
-    __pydantic_config__ = STRICT
     below: q.Frequency = 1100.0
     arrangements: Annotated[tuple[Literal["symmetric", "asymmetric"], ...], q.FILLED] = (
         "symmetric",
@@ -37,7 +43,7 @@ class ModesChoice:
 
 
 @dataclass(frozen=True)
-class ReductionChoice:
+class ReductionChoice(Table):
     """Fixed-interface modes kept per blade, beside all patch, force and accelerometer dofs.
 
     Attributes
@@ -52,7 +58,6 @@ class ReductionChoice:
         error, instead of their number. Cost: the blade's own modes are found as well.
     """
 
-    __pydantic_config__ = STRICT
     modes: Annotated[int, q.not_negative] | None = None
     below: q.Frequency | None = None
     error: q.Share | None = None
@@ -75,7 +80,7 @@ class ReductionChoice:
 
 
 @dataclass(frozen=True)
-class ResponseChoice:
+class ResponseChoice(Table):
     """Linear frequency response between two frequencies.
 
     Attributes
@@ -91,12 +96,11 @@ class ResponseChoice:
         Free peak accelerance that the damping ratio is tuned to instead, (m/s2)/N.
     """
 
-    __pydantic_config__ = STRICT
     start: q.Frequency = 200.0
     stop: q.Frequency = 600.0
     points: Annotated[int, q.at_least(10)] = 2000
     damping: Annotated[q.Share, q.or_from(FROM_MEASURED, UNTIL_READ)] = 0.005
-    peak: Annotated[float, q.positive, q.Noted("(m/s2)/N"), q.Example("120.0")] | None = None
+    peak: Annotated[float, q.positive, q.Example("120.0", kind="(m/s2)/N")] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,30 +130,38 @@ class ModalScene(RigBase):
     response: ResponseChoice = field(default_factory=ResponseChoice)
     measured: Mapping[q.Name, MeasuredChoice] = field(default_factory=dict)
 
+    def derived(self, data: Mapping[str, Any]) -> ModalScene:
+        """With damping from measured curves."""
+        fitted = fitted_modes(self.measured, data, "response")
+        if not fitted:
+            return self
+        return replace(self, response=replace(self.response, damping=main_ratio(fitted)))
 
-def modal_problems(scene: ModalScene) -> Iterator[str]:
-    """What does not fit together."""
-    response, below = scene.response, scene.modes.below
-    given = [
-        name for name in ("modes", "below", "error") if getattr(scene.reduction, name) is not None
-    ]
-    yield from repeated("modes.arrangements", scene.modes.arrangements)
-    yield from measured_problems(scene.measured)
-    yield from rig_problems(scene)
-    stop = f"response.stop, {response.stop:g} Hz"
-    if not response.start < response.stop:
-        yield f"response.start: {response.start:g} Hz is not below {stop}"
-    if scene.wants("response") and below < response.stop:
-        yield f"modes.below: {below:g} Hz is below {stop}; the response needs its modes"
-    if scene.measured and not scene.wants("response"):
-        yield 'measured: nothing is computed beside it; add "response" to want'
-    for name, one in scene.measured.items():
-        if one.centrifugal_to_force is not None:
-            yield (
-                f"measured.{name}: centrifugal_to_force: a rig has no friction; give state, or "
-                'make it a forced response (analysis = "forced response")'
-            )
-    if len(given) > 1:
-        yield f"reduction: {' and '.join(given)} are given; give one of modes, below, error"
-    if scene.wants("matrices") and not scene.wants("reduction"):
-        yield "want: 'matrices' needs \"reduction\" too"
+    def problems(self) -> Iterator[str]:
+        """What does not fit together."""
+        response, below = self.response, self.modes.below
+        given = [
+            name
+            for name in ("modes", "below", "error")
+            if getattr(self.reduction, name) is not None
+        ]
+        yield from repeated("modes.arrangements", self.modes.arrangements)
+        yield from measured_problems(self.measured)
+        yield from rig_problems(self)
+        stop = f"response.stop, {response.stop:g} Hz"
+        if not response.start < response.stop:
+            yield f"response.start: {response.start:g} Hz is not below {stop}"
+        if self.wants("response") and below < response.stop:
+            yield f"modes.below: {below:g} Hz is below {stop}; the response needs its modes"
+        if self.measured and not self.wants("response"):
+            yield 'measured: nothing is computed beside it; add "response" to want'
+        for name, one in self.measured.items():
+            if one.centrifugal_to_force is not None:
+                yield (
+                    f"measured.{name}: centrifugal_to_force: a rig has no friction; give state, or "
+                    'make it a forced response (analysis = "forced response")'
+                )
+        if len(given) > 1:
+            yield f"reduction: {' and '.join(given)} are given; give one of modes, below, error"
+        if self.wants("matrices") and not self.wants("reduction"):
+            yield "want: 'matrices' needs \"reduction\" too"

@@ -8,7 +8,7 @@ import re
 import types
 import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, is_dataclass
+from dataclasses import MISSING, Field, dataclass, field, is_dataclass
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import AfterValidator, BeforeValidator
@@ -21,13 +21,20 @@ Steps = tuple[str | int, ...]
 
 
 class Example:
-    """Values that would do, as TOML: what the message about a bad one proposes.
+    """What would do, and what a reference of the keys has of a value whose own validator reads it.
 
-    Several are the items of a list of such values.
+    Parameters
+    ----------
+    values
+        As TOML: what the message about a bad one proposes; several are the items of a list.
+    kind
+        Of quantity, as in `upd.units.UNITS`; or the unit of a bare number.
+    bounds
+        In a few words.
     """
 
-    def __init__(self, *values: str) -> None:
-        self.values = values
+    def __init__(self, *values: str, kind: str = "", bounds: str = "") -> None:
+        self.values, self.kind, self.bounds = values, kind, bounds
 
 
 @dataclass(frozen=True)
@@ -68,32 +75,28 @@ class Uncertainty:
 
 
 @dataclass(frozen=True)
-class Noted:
-    """Unit and bounds, for a reference of the keys, of a value whose own validator reads it.
+class QuantityReader:
+    """Number or text with a unit -> number in mm, N, MPa, t, s.
 
     Attributes
     ----------
-    kind
-        Of quantity, as in `upd.units.UNITS`; or the unit of a bare number.
-    bounds
-        In a few words.
+    words
+        That may stand in its place -> what they mean.
+    others
+        What a message about anything else adds about them.
     """
 
-    kind: str = ""
-    bounds: str = ""
-
-
-@dataclass(frozen=True)
-class QuantityReader:
-    """Number or text with a unit -> number in mm, N, MPa, t, s."""
-
     kind: str
+    words: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    others: str = ""
 
     def __call__(self, value: Any) -> Any:
+        if isinstance(value, str) and value in self.words:
+            return self.words[value]
         try:
             return parse_quantity(value, self.kind)
         except InputError as error:
-            raise ValueError(str(error)) from None
+            raise ValueError(f"{error}{self.others}") from None
 
 
 @dataclass(frozen=True)
@@ -200,49 +203,30 @@ Centrifugal = Annotated[Force, or_from(FROM_SPEED, "0 N")]
 #: Forces that the equilibrium of a damper under centrifugal force gives, by the share of friction
 #: it mobilises.
 EQUILIBRIA = ("opposing", "frictionless", "reversed")
-
-
-def _force_or_equilibrium(value: Any) -> Any:
-    if isinstance(value, str) and value in EQUILIBRIA:
-        return value
-    try:
-        number = parse_quantity(value, "force")
-    except InputError as error:
-        known = ", ".join(repr(e) for e in EQUILIBRIA)
-        raise ValueError(
-            f"{error}; or one of {known} (equilibrium under loads.centrifugal)"
-        ) from None
-    if number < 0.0:
-        raise ValueError(f"{number:g} {_PULLS}")
-    return number
-
-
 #: A normal force in N, or the name of an equilibrium.
 NormalLoad = Annotated[
     float | str,
-    BeforeValidator(_force_or_equilibrium),
-    Noted("force", f">= 0, or {', '.join(EQUILIBRIA)}"),
+    BeforeValidator(
+        QuantityReader(
+            "force",
+            {name: name for name in EQUILIBRIA},
+            f"; or one of {', '.join(map(repr, EQUILIBRIA))} (equilibrium under loads.centrifugal)",
+        )
+    ),
+    must(lambda v: isinstance(v, str) or v >= 0.0, _PULLS, f">= 0, or {', '.join(EQUILIBRIA)}"),
     Example('"50 N"', '"200 N"'),
 ]
-
-
-def _direction(value: Any) -> Any:
-    if value in ("x", "y"):
-        return {"x": 0.0, "y": 90.0}[value]
-    try:
-        return parse_quantity(value, "angle")
-    except InputError as error:
-        raise ValueError(
-            f'{error}; or "x" (along the longer edge of the patch), "y" (across it)'
-        ) from None
-
-
 #: Direction of a tangential load in degrees from the patch's x.
 Direction = Annotated[
     float,
-    BeforeValidator(_direction),
-    Noted("angle", "an angle, x or y"),
-    Example('"x"', '"30 deg"'),
+    BeforeValidator(
+        QuantityReader(
+            "angle",
+            {"x": 0.0, "y": 90.0},
+            '; or "x" (along the longer edge of the patch), "y" (across it)',
+        )
+    ),
+    Example('"x"', '"30 deg"', bounds="an angle, x or y"),
 ]
 Phase = Annotated[float, quantity("angle"), Example('"180 deg"')]
 Length = Annotated[float, quantity("length"), Example('"5 mm"')]
@@ -305,8 +289,9 @@ def _wanted_share(value: Any, of: str = "") -> float:
 Accuracy = Annotated[
     Any,
     BeforeValidator(_accuracy),
-    Noted(bounds=f'"{UNKNOWN}"; between 0 and 1; or a table of these by the names of numbers'),
-    Example('"1 %"'),
+    Example(
+        '"1 %"', bounds=f'"{UNKNOWN}"; between 0 and 1; or a table of these by the names of numbers'
+    ),
 ]
 
 
@@ -374,5 +359,5 @@ def notes(hint: Any) -> Iterator[Any]:
 
 def quantity_kind(hint: Any) -> str:
     """Kind of the quantity, or the unit of a bare number; "" of what is none."""
-    readers = (n.kind for n in notes(hint) if isinstance(n, (QuantityReader, Noted)) and n.kind)
+    readers = (n.kind for n in notes(hint) if isinstance(n, (QuantityReader, Example)) and n.kind)
     return next(readers, "")

@@ -6,14 +6,15 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import types
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import MISSING, Field, fields, replace
+from dataclasses import MISSING, Field, fields, is_dataclass, replace
 from datetime import date, datetime, time
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import tomli_w
 from pydantic import TypeAdapter, ValidationError
@@ -22,15 +23,14 @@ from upd.errors import InputError, did_you_mean
 from upd.mesh import recipes
 from upd.mesh.recipe_modules import is_file
 from upd.scene.base import INSIDE, SceneBase
-from upd.scene.bladed_disk import BladedDiskScene, bladed_disk_problems
-from upd.scene.contact import Scene, contact_problems
-from upd.scene.forced import FORCED, FORCED_ONLY, ForcedScene, forced_problems
+from upd.scene.bladed_disk import BladedDiskScene
+from upd.scene.contact import Scene
+from upd.scene.forced import FORCED, ForcedScene
 from upd.scene.measured import note_files
-from upd.scene.modal import ModalScene, modal_problems
-from upd.scene.rotation import DERIVED
-from upd.scene.seated import SEATED, SEATED_ONLY, SeatedScene, seated_problems
-from upd.scene.sentences import sentence
-from upd.scene.toml import plain, read_overrides
+from upd.scene.modal import ModalScene
+from upd.scene.quantities import Example, hint_at, hints, must_be_given, path_of, without_notes
+from upd.scene.seated import SEATED, SeatedScene
+from upd.scene.toml import plain, read_overrides, toml_value
 from upd.scene.uncertain import taken_out, uncertainties
 from upd.units import parse_quantity
 
@@ -49,18 +49,18 @@ CHOSEN_BY_MESH = {
 _MOST = 100_000
 #: Letters before and after what a very long problem leaves out.
 _HALF = 300
-#: Class of a scene -> what does not fit together in it.
-_PROBLEMS: dict[type[AnyScene], Callable[[Any], Iterable[str]]] = {
-    Scene: contact_problems,
-    ModalScene: modal_problems,
-    ForcedScene: forced_problems,
-    SeatedScene: seated_problems,
-    BladedDiskScene: bladed_disk_problems,
-}
-#: Analyses that a scene names, its class, and the tables that only it has.
-_NAMED: dict[str, tuple[type[AnyScene], tuple[str, ...]]] = {
-    SEATED: (SeatedScene, SEATED_ONLY),
-    FORCED: (ForcedScene, FORCED_ONLY),
+#: the classes of scenes that name their analysis
+_NAMED: dict[str, type[AnyScene]] = {SEATED: SeatedScene, FORCED: ForcedScene}
+#: pydantic's kinds of errors, or how they begin -> what a value is not
+_NOT = {
+    "tuple": "list",
+    "dict": "table",
+    "mapping": "table",
+    "dataclass": "table",
+    "string": "text",
+    "int": "whole number",
+    "float": "number",
+    "finite_number": "finite number",
 }
 #: pydantic's validator of a class of scenes, compiled once: that takes longer than reading a scene
 _adapter: Callable[..., TypeAdapter[Any]] = cache(TypeAdapter)
@@ -238,7 +238,7 @@ def _validate(data: dict[str, Any]) -> tuple[AnyScene | None, list[str]]:
     """The scene of tables whose paths are absolute, or every problem of it."""
     analyses = _analyses(data)
     kind = _kind(data, analyses)
-    between_blades = any(kind is named for named, _ in _NAMED.values())
+    between_blades = kind in _NAMED.values()
     own = {k: v for k, v in data.items() if k not in INSIDE}
     problems = [f"{k}: not a key of a scene" for k in data if k not in own]
     problems += [
@@ -270,10 +270,10 @@ def _validate(data: dict[str, Any]) -> tuple[AnyScene | None, list[str]]:
     if not problems:
         scene = replace(scene, geometry={"recipe": recipe, **parameters})
         try:
-            scene = DERIVED[kind](scene, own)
+            scene = scene.derived(own)
         except InputError as error:
             wrong = list(error.args)
-    problems += wrong or _PROBLEMS[kind](scene)
+    problems += wrong or scene.problems()
     if problems:
         return None, problems
     if parameters.get("divisions") == "auto":
@@ -311,9 +311,9 @@ def _kind(data: Mapping[str, Any], analyses: Sequence[str]) -> type[AnyScene]:
         return BladedDiskScene
     named = data.get("analysis")
     if isinstance(named, str) and named in _NAMED:
-        return _NAMED[named][0]
-    for kind, tables in _NAMED.values():
-        if any(table in data for table in tables):
+        return _NAMED[named]
+    for kind in _NAMED.values():
+        if any(table in data for table in kind.only):
             return kind
     if "analysis" in data:
         return ForcedScene
@@ -403,3 +403,113 @@ def never(value: Any) -> str:
     if isinstance(value, int) and abs(value) > _MOST:
         return f"is more than the largest whole number of a scene, {_MOST}; give a smaller one"
     return ""
+
+
+# -- what is wrong with a value and what to write instead, from pydantic's errors ------------------
+
+
+def sentence(error: Any, scene: type[Any]) -> str:
+    """One problem of a scene: its path in the file, what is wrong, and what to write instead."""
+    # pydantic marks an error of a table's key by one more step
+    location = tuple(step for step in error["loc"] if step != "[key]")
+    return f"{path_of(location) or 'scene'}: {_fault(error, location, scene)}"
+
+
+def _fault(error: Any, location: Sequence[Any], scene: type[Any]) -> str:
+    kind, value = error["type"], error["input"]
+    if kind == "value_error":
+        return str(error["msg"]).removeprefix("Value error, ")
+    if kind == "unexpected_keyword_argument":
+        known = _keys(hint_at(scene, location[:-1])) or _keys(scene)
+        others = f"known here: {', '.join(known)}"
+        return f"unknown key{did_you_mean(location[-1], known, others)}"
+    if kind in ("missing", "missing_argument"):
+        return f"is missing{_addition(location, scene)}"
+    wanted = hint_at(scene, location)
+    example = _example(wanted, _default(location, scene))
+    if kind == "too_long":
+        return f"has {len(value)} values; write {example}"
+    if kind == "literal_error":
+        return _other_choice(
+            value, Literal[FORCED, SEATED] if location == ("analysis",) else wanted
+        )
+    what = next((word for begin, word in _NOT.items() if kind.startswith(begin)), "")
+    quotes = ", quotes included" if '"' in example and isinstance(value, str) else ""
+    quotes = ", without quotes" if kind.startswith(("int", "float")) else quotes
+    fault = f"is no {what}" if what else "does not fit here"
+    return f"{value!r} {fault}; write for example {example}{quotes}"
+
+
+def _addition(location: Sequence[Any], scene: type[Any]) -> str:
+    """The remedy for a key or an item that is missing."""
+    if location == ("analysis",):
+        name = SEATED if scene is SeatedScene else FORCED
+        return (
+            f'; add analysis = "{name}", or remove the tables that only it has '
+            f"({', '.join(scene.only)})"
+        )
+    if isinstance(location[-1], int):
+        return f"; write {_example(hint_at(scene, location[:-1]))}"
+    return f"; add for example {location[-1]} = {_example(hint_at(scene, location))}"
+
+
+def _other_choice(value: Any, wanted: Any) -> str:
+    choices = [toml_value(choice) for choice in get_args(without_notes(wanted))]
+    if len(choices) == 1:
+        return f"{value!r} is not known; write {choices[0]}"
+    near = difflib.get_close_matches(toml_value(value), choices, 1)
+    meant = f", did you mean {near[0]}?" if near else ""
+    return f"{value!r} is none of its values{meant}; write one of {', '.join(choices)}"
+
+
+def _default(location: Sequence[Any], scene: type[Any]) -> Any:
+    """The default of a key, None when it has none."""
+    table = without_notes(hint_at(scene, location[:-1]))
+    if not location or not is_dataclass(table):
+        return None
+    found = next((f.default for f in fields(table) if f.name == location[-1]), None)
+    return None if found is MISSING else found
+
+
+def _keys(wanted: Any) -> list[str]:
+    """Keys of the table at a place; none when its keys are free."""
+    cls = without_notes(wanted)
+    return [f.name for f in fields(cls) if f.name not in INSIDE] if is_dataclass(cls) else []
+
+
+def _example(wanted: Any, default: Any = None) -> str:
+    """TOML that would do."""
+    return _items(wanted, default)[0]
+
+
+def _items(wanted: Any, default: Any = None) -> tuple[str, ...]:
+    """TOML of one or more values that would do."""
+    origin, inside = get_origin(wanted), get_args(wanted)
+    if origin is Annotated:
+        given = next((note for note in wanted.__metadata__ if isinstance(note, Example)), None)
+        return given.values if given else _items(inside[0], default)
+    if origin in (Union, types.UnionType):
+        return _items(next(kind for kind in inside if kind is not type(None)), default)
+    if origin is Literal:
+        return tuple(map(toml_value, inside))
+    if origin is tuple:
+        items = _items(inside[0]) if inside[-1] is Ellipsis else [_example(kind) for kind in inside]
+        return (f"[{', '.join(items)}]",)
+    if origin is Mapping:
+        return (f"{{ key = {_example(inside[1])} }}",)
+    if is_dataclass(wanted):
+        return (_table(wanted),)
+    usual = {int: "12", float: "0.5", str: '"text"'}
+    plain = isinstance(default, (int, float, str)) and not isinstance(default, bool) and default
+    return (toml_value(default) if plain else usual.get(wanted, '"text"'),)
+
+
+def _table(cls: Any) -> str:
+    """An inline table with the keys that must be there, or with the first one."""
+    known: tuple[Field[Any], ...] = fields(cls)
+    needed = [f for f in known if must_be_given(f)]
+    keys = [
+        f"{f.name} = {_example(hints(cls)[f.name], None if f.default is MISSING else f.default)}"
+        for f in needed or known[:1]
+    ]
+    return f"{{ {', '.join(keys)} }}"

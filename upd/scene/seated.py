@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from upd.scene import quantities as q
 from upd.scene.base import (
-    STRICT,
     DamperChoice,
     FaceFriction,
-    Fit,
     RigBase,
+    Table,
     repeated,
     rig_problems,
     unreachable_accuracy,
 )
+from upd.scene.rotation import with_damper
 
 #: Outputs of a seated damper.
 SEATED_WANTS = ("seating", "stiffness", "band", "moved")
 SeatedWant = Annotated[str, q.one_of(SEATED_WANTS), q.Example('"seating"', '"stiffness"')]
 #: the analysis these scenes ask for
 SEATED = "seated damper"
-#: tables that only this scene has
-SEATED_ONLY = ("seating", "moved", "blades")
 
 Way = Annotated[float, q.quantity("length"), q.positive, q.Example('"20 um"')]
 Over = Annotated[float, q.must(lambda v: v > 1.0, "is not above 1", "> 1"), q.Example("1.5")]
@@ -33,22 +31,8 @@ whole_quarters = q.must(
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class SeatedContact(FaceFriction):
-    """Coulomb friction on every matching node of both faces.
-
-    Attributes
-    ----------
-    fit
-        How well the faces fit each other: "new" (flat, they touch everywhere without load), "worn"
-        (worn in under F_C, which then presses evenly), or a number between, 0 new to 1 worn.
-    """
-
-    fit: Fit = "new"
-
-
 @dataclass(frozen=True)
-class BladesChoice:
+class BladesChoice(Table):
     """What of the blades is elastic.
 
     Attributes
@@ -58,12 +42,11 @@ class BladesChoice:
         sides join the blades, as blocks are.
     """
 
-    __pydantic_config__ = STRICT
     held: Literal["bases", "platforms"] = "bases"
 
 
 @dataclass(frozen=True)
-class SeatingChoice:
+class SeatingChoice(Table):
     """How F_C is raised, lowered and raised again, and other ways of loading for the band.
 
     Attributes
@@ -83,7 +66,6 @@ class SeatingChoice:
         three quarters. Cost: seconds grow in proportion.
     """
 
-    __pydantic_config__ = STRICT
     steps: Annotated[int, q.at_least(2)] = 20
     lowest: q.Share = 0.1
     over: Over = 1.5
@@ -93,7 +75,7 @@ class SeatingChoice:
 
 
 @dataclass(frozen=True)
-class MovedChoice:
+class MovedChoice(Table):
     """How the right blade is moved after the seating, F_C kept.
 
     Attributes
@@ -109,7 +91,6 @@ class MovedChoice:
         Load steps from the middle to the amplitude. Cost: seconds grow in proportion.
     """
 
-    __pydantic_config__ = STRICT
     directions: Annotated[tuple[Literal["x", "y", "z"], ...], q.FILLED] = ("x", "z")
     amplitude: Way = 0.05
     cycles: Annotated[int, q.at_least(1)] = 2
@@ -132,11 +113,13 @@ class SeatedScene(RigBase):
         What distinguishes this scene from the rig's others.
     """
 
+    only: ClassVar[tuple[str, ...]] = ("seating", "moved", "blades")
+
     analysis: Literal["seated damper"]
     want: Annotated[tuple[SeatedWant, ...], q.FILLED]
     blades: BladesChoice = field(default_factory=BladesChoice)
     damper: DamperChoice = field(default_factory=DamperChoice)
-    contact: SeatedContact = field(default_factory=SeatedContact)
+    contact: FaceFriction = field(default_factory=FaceFriction)
     seating: SeatingChoice = field(default_factory=SeatingChoice)
     moved: MovedChoice = field(default_factory=MovedChoice)
 
@@ -146,23 +129,26 @@ class SeatedScene(RigBase):
         along = self.wants("moved") and "y" in self.moved.directions
         return self.mesh.symmetry == "full" or (self.mesh.symmetry == "auto" and along)
 
+    def derived(self, data: Mapping[str, Any]) -> SeatedScene:
+        """With density and F_C of the damper as numbers."""
+        return with_damper(self, data)  # type: ignore[no-any-return]
 
-def seated_problems(scene: SeatedScene) -> Iterator[str]:
-    """What does not fit together."""
-    directions = scene.moved.directions
-    levels = "geometry.refine, geometry.patch_along_slope or pad_along_slope"
-    yield from repeated("moved.directions", directions)
-    yield from rig_problems(scene)
-    yield from unreachable_accuracy(scene, "a seated damper", levels)
-    if scene.damper.centrifugal <= 0.0:
-        yield "damper.centrifugal: 0 N leaves the damper loose; give a positive force"
-    if scene.mesh.element not in ("hex8", "hex8i"):
-        yield (
-            f"mesh.element: the seated damper needs faces of four nodes, not those of "
-            f'"{scene.mesh.element}"; use "hex8i"'
-        )
-    if scene.mesh.symmetry == "half" and "y" in directions:
-        yield (
-            'moved.directions: a motion along "y" is not symmetric; set mesh.symmetry = "auto" or '
-            '"full"'
-        )
+    def problems(self) -> Iterator[str]:
+        """What does not fit together."""
+        directions = self.moved.directions
+        levels = "geometry.refine, geometry.patch_along_slope or pad_along_slope"
+        yield from repeated("moved.directions", directions)
+        yield from rig_problems(self)
+        yield from unreachable_accuracy(self, "a seated damper", levels)
+        if self.damper.centrifugal <= 0.0:
+            yield "damper.centrifugal: 0 N leaves the damper loose; give a positive force"
+        if self.mesh.element not in ("hex8", "hex8i"):
+            yield (
+                f"mesh.element: the seated damper needs faces of four nodes, not those of "
+                f'"{self.mesh.element}"; use "hex8i"'
+            )
+        if self.mesh.symmetry == "half" and "y" in directions:
+            yield (
+                'moved.directions: a motion along "y" is not symmetric; set mesh.symmetry = "auto" '
+                'or "full"'
+            )

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from upd.errors import InputError
@@ -35,28 +34,20 @@ _BAND = re.compile(
 )
 
 
-@dataclass(frozen=True)
-class GivenBand:
-    """A quantity of a scene's data with what stands after its +-."""
-
-    steps: Steps
-    given: str
-    value: Any
-    unit: str
-    band: str
-    rest: str
+#: place of a quantity in a scene's data, its value alone, and the parts of its text
+Band = tuple[Steps, Any, re.Match[str]]
 
 
-def taken_out(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[GivenBand]]:
+def taken_out(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Band]]:
     """A scene's data with the values alone, and what stood after their +-.
 
     Only what begins with a number is read so: a title may say +- too.
     """
-    found: list[GivenBand] = []
+    found: list[Band] = []
     return _without(data, (), found), found
 
 
-def _without(node: Any, steps: Steps, found: list[GivenBand]) -> Any:
+def _without(node: Any, steps: Steps, found: list[Band]) -> Any:
     if isinstance(node, Mapping):
         return {key: _without(value, (*steps, str(key)), found) for key, value in node.items()}
     if isinstance(node, list):
@@ -67,14 +58,14 @@ def _without(node: Any, steps: Steps, found: list[GivenBand]) -> Any:
     text, unit = match["value"], match["unit"]
     number = int(text) if text.isdigit() else float(text)
     value: Any = f"{text} {unit}" if unit else number
-    found.append(GivenBand(steps, node.strip(), value, unit, match["band"] or "", match["rest"]))
+    found.append((steps, value, match))
     return value
 
 
 def uncertainties(
     scene: Any,
     data: dict[str, Any],
-    bands: list[GivenBand],
+    bands: list[Band],
     recipe: str,
     problems_of: Callable[[dict[str, Any]], list[str]],
 ) -> tuple[dict[str, Uncertainty], list[str]]:
@@ -95,48 +86,48 @@ def uncertainties(
     """
     out: dict[str, Uncertainty] = {}
     problems: list[str] = []
-    for one in bands:
-        path = path_of(one.steps)
+    for steps, given, parts in bands:
+        path, text = path_of(steps), parts.string.strip()
         try:
-            kind = input_kind(scene, recipe, one.steps)
+            kind = input_kind(scene, recipe, steps)
             if not kind:
                 raise InputError(
                     "is no physical quantity known within limits, but chosen; to fix it: write it "
                     "without +-"
                 )
-            value = parse_quantity(one.value, kind)
-            half = _half_width(one, kind, value)
-            found = Uncertainty(path, value, half, one.given, kind, one.steps)
+            value = parse_quantity(given, kind)
+            found = Uncertainty(path, value, _half_width(parts, kind, value), text, kind, steps)
             _check_ends(found, data, problems_of)
             out[path] = found
         except InputError as error:
-            problems.append(f"{path}: {one.given!r}: {error}")
+            problems.append(f"{path}: {text!r}: {error}")
     return out, problems
 
 
-def _half_width(one: GivenBand, kind: str, value: float) -> float:
+def _half_width(parts: re.Match[str], kind: str, value: float) -> float:
     """What stands after +-, in the unit inside."""
-    example = f'"{one.given.partition("+")[0].partition(chr(0xB1))[0].strip()} +- 10 %"'
-    if not one.band:
+    given, unit, rest = f"{parts['value']} {parts['unit']}".strip(), parts["unit"], parts["rest"]
+    example = f'"{given} +- 10 %"'
+    if not parts["band"]:
         raise InputError(f"no number stands after +-; to fix it: write for example {example}")
-    number = float(one.band)
+    number = float(parts["band"])
     if not number > 0.0:
         raise InputError(
             f"the half-width {number:g} is not above 0; to fix it: write for example {example}"
         )
-    if one.rest == "%" and one.unit != "%":
+    if rest == "%" and unit != "%":
         # of the value
         half = 0.01 * number * abs(value)
         if not value:
             raise InputError("a share of 0 is 0; to fix it: write the half-width with its unit")
-    elif not one.rest and one.unit:
+    elif not rest and unit:
         raise InputError(
-            f"the half-width {number:g} has no unit; to fix it: write +- {number:g} {one.unit}, or "
+            f"the half-width {number:g} has no unit; to fix it: write +- {number:g} {unit}, or "
             f"a share of the value, +- {number:g} %"
         )
     else:
         try:
-            half = parse_quantity(f"{one.band} {one.rest}".strip(), kind)
+            half = parse_quantity(f"{parts['band']} {rest}".strip(), kind)
         except InputError as error:
             raise InputError(f"the half-width: {error}") from None
     return half
@@ -165,7 +156,7 @@ def read_band(text: str, kind: str) -> tuple[float, float | None]:
     # the first step stands for the table that every quantity of a scene has
     data, bands = taken_out({"": {"": text}})
     value = parse_quantity(data[""][""], kind)
-    return value, _half_width(bands[0], kind, value) if bands else None
+    return value, _half_width(bands[0][2], kind, value) if bands else None
 
 
 def _check_ends(

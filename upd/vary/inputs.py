@@ -20,7 +20,7 @@ from typing import Any
 from upd.errors import UpdError, one_line
 from upd.mesh import recipes
 from upd.progress import Stages
-from upd.results import InputPart, InputParts, Result
+from upd.results.number import InputPart, InputParts, Result
 from upd.scene import load_scene
 from upd.scene.quantities import Uncertainty
 from upd.scene.toml import put_back

@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Any
 
 from upd.cache.files import json_text
-from upd.results import Result, read_result
+from upd.results.number import Result, read_result
 from upd.vary.variation import Key, Variation
 
 

@@ -6,15 +6,8 @@ from dataclasses import replace
 import pytest
 
 from upd.analyses.base import Resolved
-from upd.results import (
-    NO_CASE,
-    Case,
-    Check,
-    Result,
-    outcome_of,
-    status_of,
-)
-from upd.results.check import warnings_of
+from upd.results import NO_CASE, Case, Check, Result
+from upd.results.check import outcome_of, status_of, warnings_of
 from upd.results.quantities import PEAK_FREQUENCY
 from upd.scene.base import LeftOut
 

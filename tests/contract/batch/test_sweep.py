@@ -25,7 +25,8 @@ from upd.cache.arrays import Store, active
 from upd.cli import main
 from upd.errors import InputError
 from upd.reduction.guyan import stored_condensation
-from upd.results import Case, Result, shared_label
+from upd.results import Case, Result
+from upd.results.case import shared_label
 from upd.vary.outcome import Outcome, read_outcome
 
 SCENE = {

@@ -19,17 +19,11 @@ from upd import cli
 from upd.cli.tables import print_result, print_table
 from upd.report.answer import LINES
 from upd.report.columns import fitting, folded_head, whole_table
-from upd.report.notebook import RunResult, headline
-from upd.report.tables import MOST_NOTES, warnings
-from upd.results import (
-    NO_CASE,
-    Case,
-    Check,
-    Result,
-    outcome_of,
-    status_of,
-)
+from upd.report.notebook import RunResult
+from upd.report.tables import MOST_NOTES, main_numbers, warnings
+from upd.results import NO_CASE, Case, Check, Result
 from upd.results.answer_table import AnswerTable
+from upd.results.check import outcome_of, status_of
 from upd.results.quantities import Quantity
 from upd.scene import ready_scenes
 
@@ -147,7 +141,7 @@ def test_a_ready_scene_fits_on_a_screen(
 def test_main_numbers_stand_in_it_whole(scene: str, toy: Callable[[str], RunResult]) -> None:
     result = toy(scene)
     text = str(result.answer(120))
-    for entry in headline(result):
+    for entry in main_numbers(result.size, result.summary()["results"]):
         if not entry.get("withheld"):
             assert f"{entry['value']:.5g}".rstrip("0") in text or f"{entry['value']:.4e}" in text
 

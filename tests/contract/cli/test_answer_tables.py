@@ -16,8 +16,9 @@ from upd.cli.tables import print_result
 from upd.report.columns import whole_table
 from upd.report.notebook import RunResult
 from upd.report.tables import answer_tables, warnings
-from upd.results import NO_CASE, Case, Check, Result, status_of
+from upd.results import NO_CASE, Case, Check, Result
 from upd.results.answer_table import AnswerTable
+from upd.results.check import status_of
 from upd.results.quantities import Quantity, number_label
 
 PEAKS = AnswerTable(

@@ -21,8 +21,8 @@ from upd.errors import InputError
 from upd.report import notebook
 from upd.report.folder import read_run
 from upd.report.notebook import RunResult
-from upd.report.tables import analysis_charts
-from upd.results import status_of
+from upd.report.tables import analysis_charts, main_numbers
+from upd.results.check import status_of
 from upd.results.quantities import number_label
 
 
@@ -85,7 +85,7 @@ def test_table_escapes_what_a_scene_can_hold(sphere: RunResult) -> None:
     for word in ("<script", "<b>x", "<i>"):
         assert word not in table
     assert "&lt;script&gt;" in table
-    for entry in notebook.headline(sphere):
+    for entry in main_numbers(sphere.size, sphere.summary()["results"]):
         assert number_label(entry["name"]) in unescape(table)
     assert "µm" in table
 

@@ -99,9 +99,9 @@ def test_describe_tells_it(capsys: pytest.CaptureFixture[str]) -> None:
     """A key that may carry it says so, a choice does not, and a value shows it."""
     from rich.console import Console
 
-    found = described(RIG, ["contact.friction=0.6 +- 0.1"])
+    title, keys, _ = described(RIG, ["contact.friction=0.6 +- 0.1"])
     for key, expected in (("contact.friction", True), ("excitation.points", False)):
-        print_keys(Console(width=200), found, key)
+        print_keys(Console(width=200), title, keys, key)
         told = capsys.readouterr().out
         assert ("uncertainty" in told) is expected
         assert ("0.6 +- 0.1" in told) is expected
