@@ -28,7 +28,7 @@ class Derived(NamedTuple):
 def harmonic_force(
     law: Law, X: Array, E: Array, Q: Array, *, start: Start = "zero", slider: Array | None = None
 ) -> Derived:
-    """As `upd.hbm.springs.friction.harmonic_force`, with the derivative of the discrete march."""
+    """Coefficients of `upd.hbm.springs.friction.march`, with the derivative of the discrete march."""
     n_point, rows, size = X.shape
     w, n = np.ascontiguousarray(X @ E.T), len(E)
     force, weighed = np.zeros((n_point, rows, n)), np.zeros((n_point, rows, n))

@@ -11,7 +11,6 @@ import pytest
 
 import upd.hbm.core.kept_factors as kept_factors
 import upd.hbm.faces.corrector as corrector
-import upd.hbm.faces.corrector as steps
 import upd.hbm.faces.equations as module
 import upd.hbm.faces.newton as linear
 from upd.analyses import make_plan
@@ -134,15 +133,15 @@ def test_one_direction_is_that_of_the_derivative() -> None:
 def test_curve_by_few_directions_is_that_by_derivatives(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same answers to the corrections' tolerance, from fewer derivatives."""
     formed, found, frequencies = [], [], [436.0, 440.0, 444.0, 446.0]
-    factored = steps.PlaneMatrix.factored
+    factored = linear.InterfaceEvaluation.factored
     for many in (10**6, 1):
         count: list[int] = []
 
-        def told(one: Any, count: list[int] = count) -> Any:
+        def told(one: Any, border: Any, count: list[int] = count) -> Any:
             count.append(1)
-            return factored(one)
+            return factored(one, border)
 
-        monkeypatch.setattr(steps.PlaneMatrix, "factored", told)
+        monkeypatch.setattr(linear.InterfaceEvaluation, "factored", told)
         monkeypatch.setattr(corrector, "MANY", many)
         # factors of so few unknowns are quick; here they are to be kept all the same
         monkeypatch.setattr(kept_factors, "SOLUTIONS", 4.0)
@@ -168,7 +167,7 @@ def test_steps_that_grow_near_a_known_point_end(
         sizes.append(1e-9 * 2.0 ** len(sizes))
         return np.eye(1, len(residual) + 1, 0)[0] * sizes[-1]
 
-    monkeypatch.setattr(steps.NewtonSteps, "next", grown)
+    monkeypatch.setattr(corrector.PlaneSteps, "next", grown)
     of = corrector.InterfaceCorrector(e, Settings(tolerance=1e-12), 1.0)
     known = of._factors(evaluate(e, x, w), of.across(1.0, x), of.scale(x))
     assert known is not None

@@ -188,7 +188,7 @@ def test_jacobian_by_differences(amplitude: float, states: set[int], proportiona
     X = extended.guess(p)
     X[:-2] += 0.1 * amplitude * rng.standard_normal(len(X) - 2)
     X[-1] = 0.03
-    assert set(b.force(X[:-2]).march.state.ravel()) == states
+    assert set(b.period(X[:-2]).state.ravel()) == states
     _, J, by_p = extended.function(X, p, True)
     assert J is not None
 

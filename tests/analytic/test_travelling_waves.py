@@ -24,6 +24,7 @@ from upd.hbm import (
     travelling_wave_response,
     wave_in_time,
 )
+from upd.hbm.core.newton import Border
 from upd.hbm.springs import jacobian
 from upd.hbm.springs.waves import WaveBalance, Waves, spread_to_all
 
@@ -351,7 +352,7 @@ def test_jacobian_and_all_sectors(proportional: bool) -> None:
         D, border, right = 0.5 + rng.uniform(size=len(at)), *rng.normal(size=(2, len(at) + 1))
         A = np.block([[J.matrix() * D, 0.3 * slope[:, None]], [border[None]]])
         for kind in (jacobian.EveryPoint, jacobian.Eliminated):
-            z = kind(J, slope, D, 0.3, border).solve(right[:-1], float(right[-1]))
+            z = kind(J, Border(slope, D, 0.3, border)).solve(right[:-1], float(right[-1]))
             np.testing.assert_allclose(A @ z, right, atol=1e-7 * np.abs(z).max())
     assert seen == {0, 1, 2}
 

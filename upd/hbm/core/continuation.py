@@ -23,8 +23,10 @@ from numpy.typing import NDArray
 from upd.hbm.core.newton import (
     EPS,
     ROUNDING,
+    Border,
     FloatArray,
     Function,
+    Problem,
     Scale,
     Settings,
     Solution,
@@ -139,11 +141,8 @@ def follow(
     Path
     """
     s = settings or Settings()
-    state = (
-        start
-        if isinstance(start, State)
-        else begin(function, start[0], start[1], scale, p_scale, s, end)
-    )
+    problem = Problem(function, scale, p_scale, s)
+    state = start if isinstance(start, State) else begin(problem, *start, end)
     marks = np.unique(np.append(np.asarray([] if wanted is None else wanted, dtype=float), end))
     rest = 0
     xs, ps, counts = [state.x], [state.p], [0]
@@ -153,7 +152,7 @@ def follow(
         if (end - state.p) * state.direction <= 0:
             status, message = "complete", f"reached p = {end:.9g} in {len(ps)} points"
             break
-        found, state = advance(function, state, scale, p_scale, s, marks)
+        found, state = advance(problem, state, marks)
         if found is None:
             message = (
                 f"stopped at p = {state.p:.9g}: no convergence with the smallest step; refine "
@@ -195,28 +194,16 @@ def follow(
     return Path(np.array(xs), np.array(ps), iterations, state, status, message)
 
 
-def begin(
-    function: Function,
-    x: FloatArray,
-    p: float,
-    scale: Scale,
-    p_scale: float,
-    settings: Settings,
-    end: float = np.inf,
-) -> State:
+def begin(problem: Problem, x: FloatArray, p: float, end: float = np.inf) -> State:
     """State at a solved point (x, p), towards larger p, or towards an end.
 
     Parameters
     ----------
-    function, scale
-        As in `follow`.
+    problem : Problem
     x : (n,) ndarray
         Unknowns of the point.
     p : float
         Its parameter.
-    p_scale : float
-        Size of the parameter.
-    settings : Settings
     end : float
         Value of the parameter to go to.
 
@@ -224,22 +211,16 @@ def begin(
     -------
     State
     """
-    D = scale(x)
-    _, J, dp = function(x, p, True)
+    _, J, dp = problem.function(x, p, True)
     direction = 1.0 if end >= p else -1.0
     normal = np.zeros(len(x) + 1)
     normal[-1] = direction
-    lu = bordered_factors(J, dp, D, p_scale, normal)
-    return State(x, p, lu.tangent(), settings.first_step, direction, lu.sign)
+    lu = bordered_factors(J, Border(dp, problem.scale(x), problem.p_scale, normal))
+    return State(x, p, lu.tangent(), problem.settings.first_step, direction, lu.sign)
 
 
 def advance(
-    function: Function,
-    state: State,
-    scale: Scale,
-    p_scale: float,
-    settings: Settings,
-    marks: FloatArray | None = None,
+    problem: Problem, state: State, marks: FloatArray | None = None
 ) -> tuple[Solution | None, State]:
     """One accepted step, round corners too, or None when even the smallest fails.
 
@@ -249,13 +230,9 @@ def advance(
 
     Parameters
     ----------
-    function, scale
-        As in `follow`.
+    problem : Problem
     state : State
         Where the path stands.
-    p_scale : float
-        Size of the parameter.
-    settings : Settings
     marks : (k,) ndarray, optional
         Values of the parameter that are hit exactly.
 
@@ -265,19 +242,16 @@ def advance(
     state : State
         The next state; the same one when the step fails.
     """
-    step = _PathStep(function, state, scale, p_scale, settings)
-    found = step.taken(np.zeros(0) if marks is None else marks)
+    found = _PathStep(problem, state).taken(np.zeros(0) if marks is None else marks)
     return (None, state) if found is None else found
 
 
 class _PathStep:
     """Steps from a state, in its scaled coordinates."""
 
-    def __init__(
-        self, function: Function, state: State, scale: Scale, p_scale: float, settings: Settings
-    ) -> None:
-        self.function, self.state, self.scale = function, state, scale
-        self.p_scale, self.s, self.D = p_scale, settings, scale(state.x)
+    def __init__(self, problem: Problem, state: State) -> None:
+        self.problem, self.state, self.D = problem, state, problem.scale(state.x)
+        self.p_scale, self.s = problem.p_scale, problem.settings
 
     def taken(self, marks: FloatArray) -> tuple[Solution, State] | None:
         """The first step that is good, of shorter and shorter ones."""
@@ -330,15 +304,15 @@ class _PathStep:
         s, state = self.s, self.state
         reach = 4 * s.smallest_step
         while reach <= s.kink_step:
-            _, J, dp = self.function(*self._along(state.tangent, reach), True)
+            _, J, dp = self.problem.function(*self._along(state.tangent, reach), True)
             lu = None
             if finite_jacobian(J):
-                lu = bordered_factors(J, dp, self.D, self.p_scale, state.tangent)
+                lu = bordered_factors(J, Border(dp, self.D, self.p_scale, state.tangent))
             if lu is not None and not lu.singular:
                 tangent = lu.tangent() * (lu.sign * state.sign)
                 if tangent @ state.tangent < np.cos(s.angle):
                     guess, p = self._along(tangent, reach)
-                    found = correct(self.function, guess, p, self.D, self.p_scale, tangent, s)
+                    found = correct(self.problem, guess, p, self.D, tangent)
                     near = self._distance(found, state.x, state.p) <= STRAY * reach
                     # a tangent of the other sign runs back on the piece the path came from
                     if near and found.tangent is not None and found.sign == state.sign:
@@ -372,7 +346,7 @@ class _PathStep:
 
     def _corrected(self, x: FloatArray, p: float, normal: FloatArray, most: float) -> Solution:
         """The solution in the plane through a point, or none when it strays farther than `most`."""
-        found = correct(self.function, x, p, self.D, self.p_scale, normal, self.s)
+        found = correct(self.problem, x, p, self.D, normal)
         return found if self._distance(found, x, p) <= most else found._replace(tangent=None)
 
     def _along(self, direction: FloatArray, length: float) -> tuple[FloatArray, float]:
@@ -400,7 +374,7 @@ class _PathStep:
         """A solution, and the state there with its tangent to one side."""
         assert found.tangent is not None
         tangent = side * found.tangent
-        tangent[:-1] = tangent[:-1] * self.D / self.scale(found.x)
+        tangent[:-1] = tangent[:-1] * self.D / self.problem.scale(found.x)
         tangent /= np.linalg.norm(tangent)
         direction = self.state.direction
         return found, State(found.x, found.p, tangent, step, direction, side * found.sign)

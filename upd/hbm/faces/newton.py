@@ -24,6 +24,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.hbm.core.newton import Border, BorderedFactors, WholeMatrix
 from upd.hbm.faces.equations import ContactPeriod, IntArray, InterfaceEquations
 from upd.hbm.faces.jacobian import VERGE, factor_period, invert_period, march_directions
 from upd.hbm.faces.state import FloatArray
@@ -274,6 +275,14 @@ class InterfaceEvaluation:
         out[:, slip] = found[:, first:-1] @ memory.T
         formed[:, own] = self._with_blades(out, dx, dw)
         return formed
+
+    def product(self, x: FloatArray) -> FloatArray:
+        """Derivative in a direction of the unknowns (u,), without the others."""
+        return self.in_direction(x, 0.0)
+
+    def factored(self, border: Border) -> BorderedFactors:
+        """Factors of the derivative with a border."""
+        return WholeMatrix(self.jacobian, border)
 
     def in_direction(self, dx: FloatArray, dw: float) -> FloatArray:
         """Derivative in one direction, without the others.

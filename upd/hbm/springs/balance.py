@@ -25,10 +25,8 @@ from upd.hbm.springs.damper import RigidDamper, attach
 from upd.hbm.springs.friction import (
     MOST_PERIODS,
     START_CODE,
-    Harmonic,
     March,
     Start,
-    harmonic_force,
     march,
 )
 from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart, linear_part
@@ -208,8 +206,8 @@ class Balance:
         W, a = old.split(x)
         return np.concatenate([embed(W, old.harmonics, self.harmonics).ravel(), a])
 
-    def force(self, x: FloatArray) -> Harmonic:
-        """Contact forces of one answer.
+    def period(self, x: FloatArray) -> March:
+        """One period of the contact forces of one answer.
 
         Parameters
         ----------
@@ -218,10 +216,14 @@ class Balance:
 
         Returns
         -------
-        Harmonic
+        March
         """
-        law, W = self.contacts.law, self.split(x)[0]
-        return harmonic_force(law, W, self.E, self.Q, start=self.start, slider=self.slider)
+        w = np.ascontiguousarray(self.split(x)[0] @ self.E.T)
+        return march(self.contacts.law, w, self.E, start=self.start, slider=self.slider)
+
+    def force(self, x: FloatArray) -> FloatArray:
+        """Coefficients (n_point, 1 + d, size) of the contact forces of one answer [N]."""
+        return self.period(x).coefficients(self.Q)
 
     def marched(self, W: FloatArray, E: FloatArray, most: int = MOST_PERIODS) -> March:
         """Contact forces of many motions in one march.
@@ -340,7 +342,7 @@ class Balance:
         float
         """
         (W, a), o, c = self.split(x), self.harmonics.offset, len(self.Psi)
-        F, w = self.force(x).force.reshape(c, -1), W.reshape(c, -1)
+        F, w = self.force(x).reshape(c, -1), W.reshape(c, -1)
         residual = self.linearised(x, omega, False)[0]
         off = np.abs(residual[: W.size].reshape(c, -1))
         u = self.linear.moves(self.amplitudes(np.zeros_like(F), omega))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -268,12 +268,13 @@ def portions(n: int) -> list[slice]:
     return [slice(i, i + PORTION) for i in range(0, n, PORTION)]
 
 
-class Measures(NamedTuple):
+@dataclass(frozen=True)
+class Measures:
     """What is measured on n solved points.
 
     Attributes
     ----------
-    displacement, force : (n, n_point, 1 + d, size) ndarray
+    contact_displacement, contact_force : (n, n_point, 1 + d, size) ndarray
         Coefficients of the relative displacements [mm] and of the contact forces [N].
     state : (n, n_point, 3) ndarray
         Shares of the cycle in stick, slip, lift-off.
@@ -285,8 +286,8 @@ class Measures(NamedTuple):
         What harmonics left out and twice the samples would change, relative.
     """
 
-    displacement: FloatArray
-    force: FloatArray
+    contact_displacement: FloatArray
+    contact_force: FloatArray
     state: FloatArray
     energy: FloatArray
     periodic: NDArray[np.bool_]

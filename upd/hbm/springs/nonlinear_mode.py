@@ -28,7 +28,7 @@ from upd.errors import InputError
 from upd.hbm.core.continuation import follow
 from upd.hbm.core.fourier import harmonics as harmonics_of
 from upd.hbm.core.fourier import to_complex
-from upd.hbm.core.newton import Settings, solve
+from upd.hbm.core.newton import Problem, Settings
 from upd.hbm.springs import response
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.checks import measures
@@ -325,7 +325,7 @@ def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearM
     of = ExtendedBalance(b, shape, omega)
     begin = wanted[0]
     for _ in range(HALVINGS):
-        first = solve(of.function, of.guess(begin), begin, of.scale, s)
+        first = Problem(of.function, of.scale, settings=s).solve(of.guess(begin), begin)
         if first.tangent is not None:
             break
         begin -= np.log(2.0)
@@ -348,7 +348,7 @@ def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearM
     xs, ps = path.x[kept:], path.p[kept:]
     x, omegas, xi = xs[:, :-2], xs[:, -2], xs[:, -1]
     found = measures(b, omegas / (2.0 * np.pi), x)
-    each = zip(xi.tolist(), omegas.tolist(), found.force, strict=True)
+    each = zip(xi.tolist(), omegas.tolist(), found.contact_force, strict=True)
     eta = [of.amplitudes(b.linear.shifted(one), F, omega, 1)[0] for one, omega, F in each]
     return NonlinearMode(
         amplitude=np.exp(ps),

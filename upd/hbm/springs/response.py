@@ -18,7 +18,7 @@ from upd.errors import InputError
 from upd.hbm.core.fourier import Harmonics, harmonics, to_complex
 from upd.hbm.core.newton import Settings
 from upd.hbm.springs.balance import Balance, assembled
-from upd.hbm.springs.checks import measures
+from upd.hbm.springs.checks import Measures, measures
 from upd.hbm.springs.damper import RigidDamper
 from upd.hbm.springs.friction import Start
 from upd.hbm.springs.peak import climb
@@ -38,8 +38,8 @@ ALIASING = 1e-2
 Status = Literal["complete", "not periodic", "stopped", "step limit"]
 
 
-@dataclass(frozen=True)
-class FrequencyResponse:
+@dataclass(frozen=True, kw_only=True)
+class FrequencyResponse(Measures):
     """Steady forced response along the solution path.
 
     n points, in order of the path: frequencies repeat or turn back at folds. Coefficients are
@@ -80,16 +80,9 @@ class FrequencyResponse:
     balance: Balance
     frequency: FloatArray
     x: FloatArray
-    contact_displacement: FloatArray
-    contact_force: FloatArray
-    state: FloatArray
-    energy: FloatArray
     linear: NDArray[np.bool_]
-    truncation: FloatArray
-    aliasing: FloatArray
     status: Status
     message: str
-    periodic: NDArray[np.bool_]
 
     def __repr__(self) -> str:
         """Its end and its size, without the arrays."""
@@ -434,19 +427,13 @@ def _answer(b: Balance, curve: Curve) -> FrequencyResponse:
     for note in notes:
         log.warning(note)
     return FrequencyResponse(
+        **vars(found),
         balance=b,
         frequency=curve.p,
         x=curve.x,
-        contact_displacement=found.displacement,
-        contact_force=found.force,
-        state=found.state,
-        energy=found.energy,
         linear=curve.exact,
-        truncation=found.truncation,
-        aliasing=found.aliasing,
         status=cast(Status, status),
         message="; ".join([curve.message, *notes]),
-        periodic=found.periodic,
     )
 
 

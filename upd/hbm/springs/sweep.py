@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from upd.hbm.core.continuation import Path, follow
 from upd.hbm.core.fourier import harmonics
-from upd.hbm.core.newton import Settings, solve
+from upd.hbm.core.newton import Problem, Settings
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.checks import separated, sticking_preload, stuck_points
 from upd.hbm.springs.residuals import (
@@ -302,7 +302,7 @@ def newton(
         None when it does not converge.
     """
     patient = replace(settings or Settings(), iterations=PATIENCE)
-    found = solve(over_frequency(b), x, frequency, scale_of(b), patient)
+    found = Problem(over_frequency(b), scale_of(b), settings=patient).solve(x, frequency)
     return found.x if found.tangent is not None else None
 
 
@@ -398,6 +398,6 @@ def sliders(b: Balance, x: FloatArray) -> FloatArray:
     rest = b.with_loads(1.0, 0.0).with_sliders("zero")
     out, d = np.zeros((b.contacts.n_point, 2)), b.contacts.tangents
     if b.harmonics.static:
-        T = rest.force(x).force[:, 1:, 0]
+        T = rest.force(x)[:, 1:, 0]
         out[:, :d] = b.split(x)[0][:, 1:, 0] - T / b.contacts.law.k_t[:, None]
     return out

@@ -269,16 +269,16 @@ def _initial(b: Balance, omega: float, x: FloatArray) -> tuple[FloatArray, ...]:
 
     At t = 0 of the harmonic answer.
     """
-    found = b.force(x)
-    size = b.harmonics.size
-    q = b.displacement(np.array([omega]), found.force.reshape(1, -1, size), b.split(x)[1][None])[0]
+    found, size = b.period(x), b.harmonics.size
+    force = found.coefficients(b.Q).reshape(1, -1, size)
+    q = b.displacement(np.array([omega]), force, b.split(x)[1][None])[0]
     eta = np.linalg.solve(b.modal.Phi, q)
     k, amplitude = b.harmonics.dynamic, to_complex(eta, b.harmonics)
     mean = eta[:, 0] if b.harmonics.static else np.zeros(len(eta))
     displacement = mean + amplitude.real.sum(axis=1)
     velocity = (1j * omega * k * amplitude).real.sum(axis=1)
     acceleration = (-((omega * k) ** 2) * amplitude).real.sum(axis=1)
-    force = np.ascontiguousarray(found.march.force[:, :, 0])
+    force = np.ascontiguousarray(found.force[:, :, 0])
     T = np.zeros((len(force), 2))
     T[:, : b.contacts.tangents] = force[:, 1:]
     return displacement, velocity, acceleration, b.Psi @ displacement, force.ravel(), T
