@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from upd.hbm import contacts
 from upd.hbm.core.fourier import analysis, harmonics, synthesis
-from upd.hbm.springs.friction import march
+from upd.hbm.springs.points import march
 from upd.reference.friction import jenkins_harmonic
 from upd.vary.orders import estimate_error
 

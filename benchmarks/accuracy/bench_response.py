@@ -16,7 +16,7 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.plan import grid
 from upd.hbm import FrequencyResponse, contacts, frequency_response
 from upd.hbm.core.fourier import analysis, harmonics, synthesis
-from upd.hbm.springs.friction import march
+from upd.hbm.springs.points import march
 from upd.hbm.springs.response import parabola
 from upd.hbm.springs.time_integration import steady_state
 from upd.reference.den_hartog import den_hartog_amplitude

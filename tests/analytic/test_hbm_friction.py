@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from upd.errors import InputError
 from upd.hbm.core.fourier import analysis, harmonics, sample_count, synthesis
 from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
-from upd.hbm.springs.friction import Law, March, Start, march
-from upd.hbm.springs.points import contacts
+from upd.hbm.springs.points import Law, March, Start, contacts, march
 from upd.reference.friction import jenkins_harmonic, jenkins_loop_area
 
 FloatArray = NDArray[np.float64]

@@ -11,7 +11,7 @@ import pytest
 from upd.hbm import Contacts, FrequencyResponse, Settings, contacts, follow, frequency_response
 from upd.hbm.core.newton import Problem
 from upd.hbm.springs.coulomb import SLIP
-from upd.hbm.springs.friction import Start
+from upd.hbm.springs.points import Start
 from upd.hbm.springs.sweep import from_stuck
 from upd.hbm.springs.time_integration import steady_state
 

@@ -84,14 +84,11 @@ class KeptFactors:
         BorderedFactors
         """
         same = len(self.sizes) == len(border.normal)
-        if not same or self.factors is None or self.factors.singular or self._dear:
+        dear = self._newest * max(self._uses, 1) > self._spent
+        if not same or self.factors is None or self.factors.singular or dear:
             return self.renewed(J, border, unknowns)
         self._uses, self._newest = self._uses + 1, 0.0
         return _Near(self, J, border, unknowns)
-
-    @property
-    def _dear(self) -> bool:
-        return self._newest * max(self._uses, 1) > self._spent
 
     def renewed(self, J: KeptJacobian, border: Border, unknowns: int) -> BorderedFactors:
         """Factors of the matrix, kept from now on; parameters as of `near`."""

@@ -145,8 +145,6 @@ class Solution(NamedTuple):
         Scaled tangent, None when the corrector failed.
     iterations : int
         Newton iterations.
-    ratio : float
-        Smallest over largest pivot.
     sign : float
         Sign of the bordered determinant.
     """
@@ -155,7 +153,6 @@ class Solution(NamedTuple):
     p: float
     tangent: FloatArray | None
     iterations: int
-    ratio: float
     sign: float = 0.0
 
 
@@ -329,14 +326,8 @@ def correct(
             r, _, _ = function(x_new, p_new, False)
             rest = lu.solve(-r, 0.0)
             if _solved(rest, correction, lu.ratio, s):
-                return Solution(
-                    x_new + rest[:-1] * D,
-                    p_new + float(rest[-1]) * p_scale,
-                    lu.tangent(),
-                    count + 1,
-                    lu.ratio,
-                    lu.sign,
-                )
+                x, p = x_new + rest[:-1] * D, p_new + float(rest[-1]) * p_scale
+                return Solution(x, p, lu.tangent(), count + 1, lu.sign)
             shrinks = float(np.linalg.norm(rest)) / float(np.linalg.norm(correction))
             if factor == 1 and shrinks <= CHORD:
                 x, p, correction = x_new, p_new, rest
@@ -345,9 +336,9 @@ def correct(
             else:
                 factor /= 2
         else:
-            return Solution(x, p, None, count, 0.0)
+            return Solution(x, p, None, count)
         x, p = x_new, p_new
-    return Solution(x, p, None, s.iterations, 0.0)
+    return Solution(x, p, None, s.iterations)
 
 
 def _solved(rest: FloatArray, correction: FloatArray, ratio: float, s: Settings) -> bool:

@@ -44,7 +44,7 @@ class KnownFactors:
 
     def suits(self, found: InterfaceEvaluation) -> bool:
         """Whether the equations of another point have the same unknowns and the same form."""
-        return len(self.D) == len(found.x) and found.like(self.of)
+        return len(self.D) == len(found.x) and np.array_equal(found.good, self.of.good)
 
 
 class PlaneSteps:
@@ -289,7 +289,8 @@ class InterfaceCorrector:
         moving = max(float(np.abs(q[1:]).max()), least)
         size = np.full(q.shape, moving)
         size[0] = max(moving, still)
-        face = max(float(np.abs(e.model.shapes @ q[1:].T).max()), least * e.largest)
+        shapes = e.model.shapes
+        face = max(float(np.abs(shapes @ q[1:].T).max()), least * float(np.abs(shapes).max()))
         reach = np.abs(e.model.columns).max(axis=0)
         damper = np.tile(face * rigid.size**0.5 / reach, 3)
         return np.concatenate(

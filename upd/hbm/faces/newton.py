@@ -49,8 +49,6 @@ class PeriodDerivative:
     period : ContactPeriod
     state : (N, n) ndarray of int
         Its states, with the verges.
-    w : float
-        rad/s.
 
     Attributes
     ----------
@@ -64,10 +62,8 @@ class PeriodDerivative:
         that direction, whatever it has slipped along it.
     """
 
-    def __init__(
-        self, e: InterfaceEquations, period: ContactPeriod, state: IntArray, w: float
-    ) -> None:
-        model, step, n = e.model, e.step(w), e.model.n
+    def __init__(self, e: InterfaceEquations, period: ContactPeriod, state: IntArray) -> None:
+        model, step, n = e.model, e.step(period.w), e.model.n
         self.e, self.step, self.state = e, step, state
         m, r = e.shape[1], len(model.load)
         on = np.flatnonzero((state != STICK).any(axis=0))
@@ -219,18 +215,17 @@ class InterfaceEvaluation:
         self,
         e: InterfaceEquations,
         x: FloatArray,
-        w: float,
         period: ContactPeriod,
         past: FloatArray | None,
     ) -> None:
-        self.e, self.x, self.w, self.period = e, x, w, period
-        q, rigid, slip = e.split(x)
-        h, m = e.shape
+        self.e, self.x, self.period = e, x, period
+        slip, (h, m) = period.slip_before, e.shape
         along = np.zeros((2, e.model.n)) if past is None else slips_for_good(e, period)
         state = period.state if past is None else _with_verges(e, period, slip != past, along)
         self.state = state
-        ends = e.joined(np.zeros((h, m)), rigid - period.rigid, slip - period.slip)[h * m :]
-        self.residual = np.concatenate([e.misfit(period, q, w).ravel(), ends])
+        left = period.rigid_before - period.rigid, slip - period.slip
+        ends = e.joined(np.zeros((h, m)), *left)[h * m :]
+        self.residual = np.concatenate([e.misfit(period).ravel(), ends])
         #: nodes that slip out of the way for good, numbered among those that may, and that way
         mine = along[:, e.mobile]
         self.good = np.flatnonzero(mine.any(axis=0))
@@ -242,18 +237,13 @@ class InterfaceEvaluation:
     @cached_property
     def linear(self) -> PeriodDerivative:
         """The period's derivative: its systems are formed where something is asked of it."""
-        return PeriodDerivative(self.e, self.period, self.state, self.w)
+        return PeriodDerivative(self.e, self.period, self.state)
 
     @cached_property
     def slips(self) -> IntArray:
         """Unknowns of the slips of nodes that move among those that may."""
-        h, m = self.e.shape
-        first = h * m + 3 * len(self.e.model.load)
-        return np.asarray(first + np.searchsorted(self.e.tangents, self.linear.moved))
-
-    def like(self, other: InterfaceEvaluation) -> bool:
-        """Whether the equations of both have the same form: the same nodes held to a way."""
-        return np.array_equal(self.good, other.good)
+        e = self.e
+        return np.asarray(e.others + np.searchsorted(e.tangents, self.linear.moved))
 
     @cached_property
     def derivative(self) -> FloatArray:
@@ -313,9 +303,8 @@ class InterfaceEvaluation:
 
     def _with_blades(self, out: FloatArray, dx: FloatArray, dw: FloatArray) -> FloatArray:
         """What the period takes from the residual, overwritten, and all else of the residual."""
-        e, w = self.e, self.w
+        e, w, q = self.e, self.period.w, self.period.q
         h, m = e.shape
-        q = self.x[: h * m].reshape(h, m)
         alpha, beta = e.stiffness(w)
         change = dx[: h * m].reshape(h, m, -1)
         blades = alpha[:, :, None] * change
@@ -387,7 +376,7 @@ def evaluate(
     moving = period.moving
     if (moving & ~e.mobile).any():
         raise StrangerMovesError(moving)
-    return InterfaceEvaluation(e, x, w, period, past)
+    return InterfaceEvaluation(e, x, period, past)
 
 
 def slips_for_good(e: InterfaceEquations, period: ContactPeriod) -> FloatArray:

@@ -10,7 +10,6 @@ is (1 + d) n_point (2 H + 1) + n_rigid, whatever the size of K.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -20,18 +19,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
-from upd.hbm.core.fourier import Harmonics, analysis, embed, sample_count, synthesis, to_complex
-from upd.hbm.springs.damper import RigidDamper, attach
-from upd.hbm.springs.friction import (
+from upd.hbm.core.fourier import Harmonics, analysis, embed, synthesis, to_complex
+from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart, real_part
+from upd.hbm.springs.modal import Modal
+from upd.hbm.springs.points import (
     MOST_PERIODS,
     START_CODE,
+    Contacts,
     March,
     Start,
     march,
+    stuck_constant,
+    stuck_stiffness,
 )
-from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart, linear_part
-from upd.hbm.springs.modal import Modal, modal
-from upd.hbm.springs.points import Contacts, frictionless, stuck_constant, stuck_stiffness
 from upd.hbm.springs.terms import contact_terms
 
 FloatArray = NDArray[np.float64]
@@ -310,7 +310,13 @@ class Balance:
         """The linear system as the contacts see it."""
         # loads, preload and sliders may change in copies: none of them enters
         h = self.harmonics
-        return linear_part(self.modal, self.Psi, self.G0, self._rigid_rows, h.dynamic, h.offset)
+        R = np.ascontiguousarray(self._rigid_rows[:, : self.rigid])
+        return LinearPart(*self._each_harmonic, self.G0, R, h.dynamic.astype(float), h.offset)
+
+    @property
+    def _each_harmonic(self) -> tuple[Modal, FloatArray]:
+        """The linear system and the rows on its modes, for all harmonics above 0."""
+        return self.modal, self.Psi
 
     @cached_property
     def _transform(self) -> tuple[FloatArray, ...]:
@@ -439,21 +445,16 @@ class Balance:
         return found[:c], found[c:]
 
     def _linear(self, omega: float, k: FloatArray, mean: FloatArray, a: FloatArray) -> FloatArray:
-        c, o = len(self.Psi), self.harmonics.offset
         at = np.asarray(self.harmonics.dynamic * omega, dtype=float)
         try:
-            w = _sprung(self.linear.modal, self.linear.Psi, at, self.loads, k).T
+            w = _sprung(self.linear.modal, self.linear.Psi, at, self.loads, k)
         except np.linalg.LinAlgError:
             raise InputError(
                 f"frequency_response: no damping at a resonance of the sticking contacts, "
                 f"{omega / (2.0 * np.pi):.6g} Hz: the response has no bound; give damping, or "
                 "leave this frequency out"
             ) from None
-        X = np.zeros((c, self.harmonics.size))
-        X[:, o::2], X[:, o + 1 :: 2] = w.real, -w.imag
-        if self.harmonics.static:
-            X[:, 0] = mean
-        return np.concatenate([X.ravel(), a])
+        return np.concatenate([real_part(w, mean, self.harmonics.offset).ravel(), a])
 
     def linear_displacement(
         self, omega: FloatArray, stuck: bool, harmonic: int | None = None
@@ -596,57 +597,3 @@ def _sprung(
     """Motion (n, c) of rows on springs k (c,) at w (n,) rad/s under modal loads (n, m)."""
     G, u = modal.receptance(Psi, w, loads)
     return np.asarray(np.linalg.solve(np.eye(len(k)) + G * k, u[..., None])[..., 0])
-
-
-def assembled(
-    M: FloatArray,
-    C: FloatArray,
-    K: FloatArray,
-    contacts: Contacts,
-    force: Mapping[int, ComplexArray],
-    static: FloatArray,
-    h: Harmonics,
-    *,
-    joined_to: tuple[RigidDamper, FloatArray] | None = None,
-    samples: int | None = None,
-    start: Start = "zero",
-    slider: FloatArray | None = None,
-    fast_exits: bool = True,
-) -> Balance:
-    """The condensed problem of a system, with a damper where one is given.
-
-    Parameters
-    ----------
-    M, C, K : (n, n) ndarray
-        Mass [t], damping [N s/mm] and stiffness [N/mm].
-    contacts : Contacts
-    force : mapping
-        Harmonic number -> (n,) complex amplitude [N].
-    static : (n,) ndarray
-        [N]
-    h : Harmonics
-    joined_to : (RigidDamper, (n_point, 1 + d, n_dof of the damper) ndarray), optional
-        A damper, whose dofs and centrifugal force are appended, and its share of the rows.
-    samples : int, optional
-        Samples per period; by rule when None.
-    start, slider
-        As `upd.hbm.springs.response.frequency_response` takes them, sliders (n_point, 2).
-    fast_exits : bool
-        Leave the tangents out where there is no friction.
-
-    Returns
-    -------
-    Balance
-    """
-    if joined_to is not None:
-        damper, rows = joined_to
-        M, C, K, contacts = attach(M, C, K, contacts, damper, rows)
-        static = np.concatenate([static, damper.force])
-        force = {k: np.concatenate([v, np.zeros(damper.n_dof)]) for k, v in force.items()}
-    if fast_exits and contacts.tangents and not np.any(contacts.law.mu):
-        contacts = frictionless(contacts)
-    dynamic = np.zeros((len(h.dynamic), len(static)), dtype=complex)
-    for k, amplitude in force.items():
-        dynamic[h.place(k)] = amplitude
-    count = sample_count(h, samples)
-    return Balance(modal(M, C, K), contacts, h, count, static, dynamic, start, slider)

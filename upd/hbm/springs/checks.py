@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from upd.hbm.core.fourier import Harmonics, analysis, harmonics, synthesis, to_complex
+from upd.hbm.core.fourier import analysis, harmonics, synthesis, to_complex
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
-from upd.hbm.springs.friction import MOST_PERIODS, March
-from upd.hbm.springs.points import stuck_stiffness
+from upd.hbm.springs.points import MOST_PERIODS, March, stuck_stiffness
 
 FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
@@ -147,11 +146,6 @@ def _stuck_forces(b: Balance, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     return force[:, 0], np.sqrt((force[:, 1:] ** 2).sum(axis=1))
 
 
-def missing(h: Harmonics) -> Harmonics:
-    """Harmonics that are not in the set, from 0 up to twice its highest plus three."""
-    return harmonics(k for k in range(2 * h.highest + 4) if k not in h.numbers)
-
-
 def truncation(
     b: Balance, frequency: FloatArray, x: FloatArray, marched: March | None = None
 ) -> FloatArray:
@@ -172,7 +166,9 @@ def truncation(
     (n,) ndarray
         Relative to the contact motion.
     """
-    rest = missing(b.harmonics)
+    kept = b.harmonics
+    # from 0 up to twice the highest plus three
+    rest = harmonics(k for k in range(2 * kept.highest + 4) if k not in kept.numbers)
     enough = b.samples > 2 * rest.highest
     Q = analysis(rest, b.samples if enough else 4 * rest.highest)
     E = b.E if enough else synthesis(b.harmonics, Q.shape[1])

@@ -26,7 +26,8 @@ inverse of a matrix, SIAM Review 31 (1989), for the low rank.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -55,12 +56,6 @@ class LinearPart:
         The linear system, or one for each harmonic above 0.
     Psi : (c, m) ndarray, or (n_k, c, m) of complex
         Rows of the contacts on its modes.
-    transposed : (m, c) ndarray, or (n_k, m, c) of complex
-        Their conjugate transpose.
-    damping : (1, m) or (m, m) ndarray
-        Modal damping, one row where it is diagonal.
-    basis : (c, r) ndarray or None
-        Orthonormal basis U of the columns of Psi where r < c.
     G0 : (c, c) ndarray
         Static compliance [mm/N].
     R : (c, n_rigid) ndarray
@@ -75,14 +70,30 @@ class LinearPart:
 
     modal: Modal
     Psi: FloatArray
-    transposed: FloatArray
-    damping: FloatArray
-    basis: FloatArray | None
     G0: FloatArray
     R: FloatArray
     k: FloatArray
     offset: int
-    kept: KeptFactors
+    kept: KeptFactors = field(default_factory=KeptFactors)
+
+    @cached_property
+    def transposed(self) -> FloatArray:
+        """Conjugate transpose of the rows, (m, c) or (n_k, m, c)."""
+        return np.ascontiguousarray(np.swapaxes(self.Psi.conj(), -1, -2))
+
+    @cached_property
+    def damping(self) -> FloatArray:
+        """Modal damping (m, m), or one row (1, m) where it is diagonal."""
+        return np.ascontiguousarray(np.atleast_2d(self.modal.damping))
+
+    @cached_property
+    def basis(self) -> FloatArray | None:
+        """Orthonormal basis (c, r) of the columns of real rows where r < c."""
+        if not self.symmetric:
+            return None
+        U, size, _ = np.linalg.svd(self.Psi, full_matrices=False)
+        rank = int(np.count_nonzero(size > max(self.Psi.shape) * EPS * size.max(initial=0.0)))
+        return np.ascontiguousarray(U[:, :rank]) if 0 < rank < len(self.Psi) else None
 
     @property
     def size(self) -> int:
@@ -102,8 +113,7 @@ class LinearPart:
     def shifted(self, xi: float) -> LinearPart:
         """The same system with xi [1/s] off its modal damping, C - xi M."""
         off = xi if self.modal.proportional else xi * np.eye(len(self.modal.eigenvalues))
-        modal = replace(self.modal, damping=self.modal.damping - off)
-        return replace(self, modal=modal, damping=self.damping - off)
+        return replace(self, modal=replace(self.modal, damping=self.modal.damping - off))
 
     def pushes(self, f: ComplexArray) -> ComplexArray:
         """Modal forces (n_k, m) of amplitudes (n_k, c) of forces on the rows."""
@@ -142,56 +152,14 @@ class LinearPart:
         (loads, u0, rigid_load), o, w = acting, self.offset, self.k * omega
         eta = self.modal.solve(w, loads - self.pushes(_complex_part(F, o)))
         mean = u0 - self.G0 @ F[:, 0] + self.R @ a
-        left = W - _real_part(self.moves(eta), mean, o)
+        left = W - real_part(self.moves(eta), mean, o)
         below = self.R.T @ F[:, 0] - rigid_load if o else a
         by_omega = np.zeros(W.size + len(a))
         if slopes:
             slope = self.modal.solve(w, 2.0 * w[:, None] * eta - 1j * self.damped(eta))
             moved = self.moves(self.k[:, None] * slope)
-            by_omega[: W.size] = -_real_part(moved, np.zeros(self.rows), o).ravel()
+            by_omega[: W.size] = -real_part(moved, np.zeros(self.rows), o).ravel()
         return np.concatenate([left.ravel(), below]), by_omega
-
-
-def linear_part(
-    modal: Modal,
-    Psi: FloatArray,
-    G0: FloatArray,
-    R: FloatArray,
-    k: NDArray[np.int64],
-    offset: int,
-) -> LinearPart:
-    """The linear part of a balance.
-
-    Parameters
-    ----------
-    modal, Psi, G0, R
-        As in `LinearPart`.
-    k : (n_k,) ndarray of int
-        Harmonics above 0.
-    offset : int
-        Coefficients before theirs.
-
-    Returns
-    -------
-    LinearPart
-    """
-    basis = None
-    if Psi.ndim == 2:
-        U, size, _ = np.linalg.svd(Psi, full_matrices=False)
-        rank = int(np.count_nonzero(size > max(Psi.shape) * EPS * size.max(initial=0.0)))
-        basis = np.ascontiguousarray(U[:, :rank]) if 0 < rank < len(Psi) else None
-    return LinearPart(
-        modal,
-        Psi,
-        np.ascontiguousarray(np.swapaxes(Psi.conj(), -1, -2)),
-        np.ascontiguousarray(np.atleast_2d(modal.damping)),
-        basis,
-        G0,
-        np.ascontiguousarray(R if offset else R[:, :0]),
-        k.astype(float),
-        offset,
-        KeptFactors(),
-    )
 
 
 class BalanceJacobian(NamedTuple):
@@ -321,7 +289,7 @@ def _complex_part(X: FloatArray, o: int) -> ComplexArray:
     return np.asarray((X[:, o::2] - 1j * X[:, o + 1 :: 2]).T)
 
 
-def _real_part(X: ComplexArray, static: FloatArray, o: int) -> FloatArray:
+def real_part(X: ComplexArray, static: FloatArray, o: int) -> FloatArray:
     """Coefficients (c, size) of amplitudes (n_k, c) and a mean (c,)."""
     out = np.empty((X.shape[1], o + 2 * len(X)))
     out[:, o::2], out[:, o + 1 :: 2] = X.real.T, -X.imag.T
@@ -420,7 +388,7 @@ class Eliminated(CondensedFactors):
         self.V = scaled[s] / D[:n].reshape(c, size)[s]
         # the border on the held points is one on the forces of the others
         q = np.einsum("ks,ksm->km", _complex_part(self.V, of.offset).conj(), self.across)
-        by_force = _real_part(-q.conj(), -(self.V[:, 0] @ self.across0), of.offset)
+        by_force = real_part(-q.conj(), -(self.V[:, 0] @ self.across0), of.offset)
         column, share, self.moved_by_p = self._reduced(self.dp, self.dp_rigid)
         border_rigid = normal[n:-1] + D[n:] * (self.V[:, 0] @ self.by_rigid)
         across = np.concatenate([scaled[m].T.ravel(), border_rigid])

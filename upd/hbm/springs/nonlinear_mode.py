@@ -33,9 +33,8 @@ from upd.hbm.springs import response
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.checks import measures
 from upd.hbm.springs.damper import RigidDamper
-from upd.hbm.springs.friction import Start
-from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart
-from upd.hbm.springs.points import Contacts, stuck_stiffness
+from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart, real_part
+from upd.hbm.springs.points import Contacts, Start, stuck_stiffness
 from upd.hbm.springs.residuals import FREQUENCY_SHARE, scale_of
 from upd.labels import Shown
 from upd.linalg.parallel import threads_for
@@ -432,8 +431,7 @@ class ExtendedBalance:
         J[:n, n] = by_omega
         # xi acts on each harmonic as i k omega eta_k, a force
         moved = linear.moves(modal.solve(w, -1j * w[:, None] * all_eta))
-        by_xi = np.zeros((c, linear.size))
-        by_xi[:, o::2], by_xi[:, o + 1 :: 2] = moved.real.T, -moved.imag.T
+        by_xi = real_part(moved, np.zeros(c), o)
         J[: by_xi.size, n + 1] = by_xi.ravel()
         lost = linear.damped(eta[None])[0]
         pushes = np.array([2.0 * omega * eta - 1j * lost, 1j * omega * eta])

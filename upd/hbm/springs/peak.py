@@ -170,7 +170,7 @@ def _between(problem: Problem, measure: _Measure, base: State, reach: float) -> 
     Root of the slope, or its jump where a contact changes state.
     """
     D, p_scale = problem.scale(base.x), problem.p_scale
-    best = [Solution(base.x, base.p, base.tangent, 0, 0.0)]
+    best = [Solution(base.x, base.p, base.tangent, 0)]
 
     def slope(share: float) -> float:
         way, along = share * reach, base.tangent

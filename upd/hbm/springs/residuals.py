@@ -103,7 +103,7 @@ def scale_of(b: Balance, least: FloatArray | None = None) -> Scale:
     return _sized(b, least, kappa)
 
 
-def sizes_of(b: Balance, least: FloatArray | None = None) -> Scale:
+def sizes_of(b: Balance) -> Scale:
     """Sizes of the unknowns.
 
     The largest mean displacement, the largest dynamic one and the rigid amplitudes, each measured
@@ -112,19 +112,19 @@ def sizes_of(b: Balance, least: FloatArray | None = None) -> Scale:
     Parameters
     ----------
     b : Balance
-    least : (n_unknown,) ndarray, optional
-        An answer of typical size, as in `scale_of`.
 
     Returns
     -------
     callable
         x (n_unknown,) -> sizes (n_unknown,).
     """
-    return _sized(b, least, np.zeros(0))
+    return _sized(b, None, np.zeros(0))
 
 
 def _sized(b: Balance, least: FloatArray | None, kappa: FloatArray) -> Scale:
-    o, floor, rigid = b.harmonics.offset, _least(b, least), b.rigid
+    o, rigid = b.harmonics.offset, b.rigid
+    # the motion below which the unit stays: that of a typical answer, or one that does not matter
+    floor = _floor(b) if least is None else float(np.abs(b.split(least)[0]).max())
     # the mean is a difference of static terms: below their rounding, as the tolerance magnifies it,
     # it is not resolved
     resolved = STATIC_SHARE * float(np.abs(b.u0).max(initial=0.0))
@@ -166,11 +166,6 @@ def _units(W, kappa, o, floor, resolved, rigid_rows, rigid):  # type: ignore[no-
                 place += 1
     D[place:] = still / rigid_rows
     return D
-
-
-def _least(b: Balance, least: FloatArray | None) -> float:
-    """Motion below which the unit stays: that of a typical answer, or one that does not matter."""
-    return _floor(b) if least is None else float(np.abs(b.split(least)[0]).max())
 
 
 def _floor(b: Balance) -> float:

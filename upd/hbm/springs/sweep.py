@@ -83,9 +83,8 @@ def solve_curve(
     omega = 2 * np.pi * f
     linear = stuck_points(b, omega) if fast and b.start == "zero" else np.zeros(len(f), dtype=bool)
     if linear.all():
-        x = np.array([b.stuck(float(w)) for w in omega])
         message = "every point sticks over the whole cycle: the linear answer is exact"
-        return b, Curve(f, x, linear, "complete", message)
+        return b, _stuck(b, f, message)
     apart = separated(b, omega) if fast else None
     if apart is not None:
         message = "nothing presses the contacts: the free answer is exact"
@@ -129,8 +128,7 @@ def sweep(
     while i < len(f):
         if exact[i]:
             stop = i + int(np.argmin(np.append(exact[i:], False)))
-            x = np.array([b.stuck(2 * np.pi * v) for v in f[i:stop]])
-            parts.append(Curve(f[i:stop], x, np.ones(stop - i, dtype=bool), "complete", ""))
+            parts.append(_stuck(b, f[i:stop]))
             i = stop
             continue
         stop = i + int(np.argmax(np.append(exact[i:], True)))
@@ -146,6 +144,12 @@ def sweep(
     return Curve(p, x, e, parts[-1].status, parts[-1].message or done)
 
 
+def _stuck(b: Balance, f: FloatArray, message: str = "") -> Curve:
+    """The stuck answers, where they are exact."""
+    x = np.array([b.stuck(2 * np.pi * v) for v in f])
+    return Curve(f, x, np.ones(len(f), dtype=bool), "complete", message)
+
+
 def _to_the_next(
     b: Balance,
     f: FloatArray,
@@ -159,39 +163,32 @@ def _to_the_next(
     Arriving on another branch, it follows that to the end.
     """
     last = stop < len(f)
-    part = _stretch(b, f, list(range(i, stop + last)), x, settings)
+    part = _stretch(b, f, slice(i, stop + last), x, settings)
     if not last or part.status != "complete":
         return part, stop
     there, here = b.stuck(2 * np.pi * f[stop]), part.x[-1]
     if float(np.abs((here - there) / sizes_of(b)(there)).max()) <= OTHER_BRANCH:
         return Curve(part.p[:-1], part.x[:-1], part.exact[:-1], part.status, part.message), stop
-    return _stretch(b, f, list(range(i, len(f))), x, settings), len(f)
+    return _stretch(b, f, slice(i, len(f)), x, settings), len(f)
 
 
 def _stretch(
-    b: Balance,
-    f: FloatArray,
-    index: list[int],
-    x: FloatArray | None,
-    settings: Settings | None,
+    b: Balance, f: FloatArray, part: slice, x: FloatArray | None, settings: Settings | None
 ) -> Curve:
-    """Continuation over the consecutive frequencies f[index].
+    """Continuation over the consecutive frequencies f[part].
 
     From x, the solved point before them, where there is one.
     """
-    known = x is not None
-    begin = f[index[0] - 1] if known else f[index[0]]
+    wanted, known = f[part], int(x is not None)
+    begin, end = f[part.start - known], wanted[-1]
     if x is None:
         x = first_point(b, begin, settings)
     if x is None:
-        empty = np.zeros((0, b.size))
         message = (
             f"no solution found at {begin:.9g} Hz: start at a frequency far from resonance or "
             "change the slider start"
         )
-        return Curve(np.zeros(0), empty, np.zeros(0, dtype=bool), "stopped", message)
-    end, wanted = f[index[-1]], f[index]
-    p_scale = FREQUENCY_SHARE * float(np.mean(f))
+        return Curve(f[:0], np.zeros((0, b.size)), np.zeros(0, dtype=bool), "stopped", message)
     if begin == end:
         return Curve(np.array([begin]), x[None], np.zeros(1, dtype=bool), "complete", "")
     path: Path = follow(
@@ -199,19 +196,13 @@ def _stretch(
         (x, begin),
         end,
         scale=scale_of(b),
-        p_scale=p_scale,
+        p_scale=FREQUENCY_SHARE * float(np.mean(f)),
         wanted=wanted,
         turned=float(f[0] - BEHIND * (f[-1] - f[0])),
         settings=settings,
     )
-    keep = slice(1, None) if known else slice(None)
-    return Curve(
-        path.p[keep],
-        path.x[keep],
-        np.zeros(len(path.p[keep]), dtype=bool),
-        path.status,
-        path.message if path.status != "complete" else "",
-    )
+    p, message = path.p[known:], "" if path.status == "complete" else path.message
+    return Curve(p, path.x[known:], np.zeros(len(p), dtype=bool), path.status, message)
 
 
 def place_sliders(b: Balance, frequency: float, settings: Settings | None = None) -> Balance | None:
@@ -233,7 +224,15 @@ def place_sliders(b: Balance, frequency: float, settings: Settings | None = None
     if b.start != "static" or b.slider is not None:
         return b
     statics = static_point(b, frequency, settings)
-    return None if statics is None else b.with_sliders("static", sliders(b, statics))
+    if statics is None:
+        return None
+    # positions after the static loads have led there, from sliders at zero
+    rest = b.with_loads(1.0, 0.0).with_sliders("zero")
+    out, d = np.zeros((b.contacts.n_point, 2)), b.contacts.tangents
+    if b.harmonics.static:
+        T = rest.force(statics)[:, 1:, 0]
+        out[:, :d] = b.split(statics)[0][:, 1:, 0] - T / b.contacts.law.k_t[:, None]
+    return b.with_sliders("static", out)
 
 
 def first_point(
@@ -379,25 +378,3 @@ def static_point(
     x = newton(rest, rest.stuck(2 * np.pi * frequency), frequency, settings)
     x = from_stuck(rest, frequency, settings) if x is None else x
     return None if x is None else b.embedded(x, rest)
-
-
-def sliders(b: Balance, x: FloatArray) -> FloatArray:
-    """Slider positions after the static loads have led to an answer, from sliders at zero.
-
-    Parameters
-    ----------
-    b : Balance
-    x : (n_unknown,) ndarray
-        Unknowns under the static loads.
-
-    Returns
-    -------
-    (n_point, 2) ndarray
-        Positions [mm].
-    """
-    rest = b.with_loads(1.0, 0.0).with_sliders("zero")
-    out, d = np.zeros((b.contacts.n_point, 2)), b.contacts.tangents
-    if b.harmonics.static:
-        T = rest.force(x)[:, 1:, 0]
-        out[:, :d] = b.split(x)[0][:, 1:, 0] - T / b.contacts.law.k_t[:, None]
-    return out

@@ -48,7 +48,7 @@ def _whole_cycle(w, k_n, k_t, mu, preload, gap, mode, slider):  # type: ignore[n
 def _normal_tangent(slope, E, Q, k_n, rows, out):  # type: ignore[no-untyped-def]
     """Derivative (size, size) of the normal force's coefficients by those of the closing motion.
 
-    `slope` (3, n) as `upd.hbm.springs.friction.March` keeps it, rows (n, size) is scratch.
+    `slope` (3, n) as `upd.hbm.springs.points.March` keeps it, rows (n, size) is scratch.
     """
     n, size = E.shape
     always = True

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from upd.hbm.core.fourier import analysis, to_complex
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import normal, step
-from upd.hbm.springs.friction import Law
 from upd.labels import Shown
 from upd.linalg.compiled import compiled
 
@@ -230,7 +229,9 @@ def steady_state(
     c, law = len(b.Psi), b.contacts.law
     W, F, X = np.zeros((c, steps)), np.zeros((c, steps)), np.zeros((m, steps))
     linear = (np.ascontiguousarray(damping), b.modal.eigenvalues, S, b.Psi, Gamma)
-    tolerated = 1e4 * EPS * (1 + float(_stiff(b, law, Gamma)))
+    # contact stiffness against that of a step multiplies the rounding of the displacement
+    stiff = float(np.abs(Gamma).max() * max(law.k_n.max(), law.k_t.max()))
+    tolerated = 1e4 * EPS * (1 + stiff)
     d1, out = 1 + b.contacts.tangents, (W, F, X)
     change, status, period, before = np.inf, "period limit", 0, np.zeros_like(X)
     while period < most_periods:
@@ -254,14 +255,6 @@ def steady_state(
     return SteadyState(
         coefficients, W.reshape(shape), F.reshape(shape), period, change, status, message
     )
-
-
-def _stiff(b: Balance, law: Law, Gamma: FloatArray) -> float:
-    """Contact stiffness against the stiffness of one step.
-
-    What multiplies the rounding of the contact displacement.
-    """
-    return float(np.abs(Gamma).max() * max(law.k_n.max(), law.k_t.max()))
 
 
 def _initial(b: Balance, omega: float, x: FloatArray) -> tuple[FloatArray, ...]:
