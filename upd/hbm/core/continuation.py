@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upd.hbm.core.newton import (
     EPS,
@@ -83,8 +82,6 @@ class Path(Shown):
         Unknowns.
     p : (n_step,) ndarray
         Parameter.
-    iterations : (n_step,) ndarray of int
-        Newton iterations.
     state : State
         The last state, from which the path can be continued.
     status : {"complete", "stopped", "step limit"}
@@ -94,7 +91,6 @@ class Path(Shown):
 
     x: FloatArray
     p: FloatArray
-    iterations: NDArray[np.int64]
     state: State
     status: Status
     message: str
@@ -145,23 +141,24 @@ def follow(
     state = start if isinstance(start, State) else begin(problem, *start, end)
     marks = np.unique(np.append(np.asarray([] if wanted is None else wanted, dtype=float), end))
     rest = 0
-    xs, ps, counts = [state.x], [state.p], [0]
+    xs, ps = [state.x], [state.p]
     passed: dict[float, list[FloatArray]] = {float(mark): [] for mark in marks}
     status: Status = "stopped"
     while len(ps) < s.most_points:
         if (end - state.p) * state.direction <= 0:
             status, message = "complete", f"reached p = {end:.9g} in {len(ps)} points"
             break
-        found, state = advance(problem, state, marks)
+        found = advance(problem, state, marks)
         if found is None:
             message = (
                 f"stopped at p = {state.p:.9g}: no convergence with the smallest step; refine "
                 "the samples or change the start"
             )
             break
+        state = found
         rest = len(ps) if abs(found.p - ps[-1]) > 4 * EPS * abs(found.p) else rest
         if rest < len(ps) and np.abs(found.x).max() > UNBOUNDED * np.abs(xs[rest]).max() > 0:
-            xs, ps, counts = xs[: rest + 1], ps[: rest + 1], counts[: rest + 1]
+            xs, ps = xs[: rest + 1], ps[: rest + 1]
             message = (
                 f"stopped at p = {found.p:.9g}: the answer grows without bound there; it needs "
                 "damping, or more friction"
@@ -170,7 +167,6 @@ def follow(
         left = rest == len(ps)
         xs.append(found.x)
         ps.append(found.p)
-        counts.append(found.iterations)
         there = passed.get(found.p, [])
         if left and any(np.abs((found.x - x) / scale(x)).max() <= ROUNDING for x in there):
             message = (
@@ -190,8 +186,7 @@ def follow(
         message = f"{s.most_points} points used before p = {end:.9g}; it is at p = {state.p:.9g}"
     if status == "stopped":
         log.warning(message)
-    iterations = np.array(counts, dtype=np.int64)
-    return Path(np.array(xs), np.array(ps), iterations, state, status, message)
+    return Path(np.array(xs), np.array(ps), state, status, message)
 
 
 def begin(problem: Problem, x: FloatArray, p: float, end: float = np.inf) -> State:
@@ -219,9 +214,7 @@ def begin(problem: Problem, x: FloatArray, p: float, end: float = np.inf) -> Sta
     return State(x, p, lu.tangent(), problem.settings.first_step, direction, lu.sign)
 
 
-def advance(
-    problem: Problem, state: State, marks: FloatArray | None = None
-) -> tuple[Solution | None, State]:
+def advance(problem: Problem, state: State, marks: FloatArray | None = None) -> State | None:
     """One accepted step, round corners too, or None when even the smallest fails.
 
     Along one piece of the path the determinant keeps its sign but at bifurcations, which the
@@ -238,12 +231,10 @@ def advance(
 
     Returns
     -------
-    solution : Solution or None
-    state : State
-        The next state; the same one when the step fails.
+    State or None
+        The next one.
     """
-    found = _PathStep(problem, state).taken(np.zeros(0) if marks is None else marks)
-    return (None, state) if found is None else found
+    return _PathStep(problem, state).taken(np.zeros(0) if marks is None else marks)
 
 
 class _PathStep:
@@ -253,7 +244,7 @@ class _PathStep:
         self.problem, self.state, self.D = problem, state, problem.scale(state.x)
         self.p_scale, self.s = problem.p_scale, problem.settings
 
-    def taken(self, marks: FloatArray) -> tuple[Solution, State] | None:
+    def taken(self, marks: FloatArray) -> State | None:
         """The first step that is good, of shorter and shorter ones."""
         s, state, h = self.s, self.state, self.state.step
         while h >= s.smallest_step:
@@ -289,7 +280,7 @@ class _PathStep:
             h = min(h, length) / 2
         return self._corner()
 
-    def _corner(self) -> tuple[Solution, State] | None:
+    def _corner(self) -> State | None:
         """One step round a corner of more than a right angle.
 
         A path has such corners where the equations are only piecewise smooth. Beyond the kink the
@@ -370,14 +361,14 @@ class _PathStep:
         """Scaled length of the way from a point to a solution."""
         return float(np.hypot(np.linalg.norm((found.x - x) / self.D), (found.p - p) / self.p_scale))
 
-    def _moved(self, found: Solution, side: float, step: float) -> tuple[Solution, State]:
-        """A solution, and the state there with its tangent to one side."""
+    def _moved(self, found: Solution, side: float, step: float) -> State:
+        """The state at a solution, with its tangent to one side."""
         assert found.tangent is not None
         tangent = side * found.tangent
         tangent[:-1] = tangent[:-1] * self.D / self.problem.scale(found.x)
         tangent /= np.linalg.norm(tangent)
         direction = self.state.direction
-        return found, State(found.x, found.p, tangent, step, direction, side * found.sign)
+        return State(found.x, found.p, tangent, step, direction, side * found.sign)
 
     def _to_mark(self, marks: FloatArray, h: float) -> tuple[float, float | None]:
         """Step length cut at the next wanted p, and that p when it lies within the step."""

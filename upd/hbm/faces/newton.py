@@ -130,15 +130,23 @@ class PeriodDerivative:
             self._invert()
         if not self.fine:
             return np.full_like(q, np.nan), np.full_like(rigid, np.nan), np.full_like(slips, np.nan)
-        C = len(faster)
+        e, (h, m, C), N = self.e, q.shape, len(self.state)
+        step = (self.step.W, self.Z, self.M, self.step.J, self.late)
         # an even number of equal pieces, whatever the threads
         wide = C if C <= FEW else -(-C // (2 * -(-C // (2 * DIRECTIONS))))
-        parts = [slice(a, a + wide) for a in range(0, C, wide)]
-        given = (q, rigid, slips, faster, verge)
-        jobs = [partial(self._march, *(of[..., one] for of in given)) for one in parts]
-        found = self.e.beside.run(jobs)
-        modal, ends, slid = (np.concatenate(one, axis=-1) for one in zip(*found, strict=True))
-        return modal, ends, slid
+
+        def some(one: slice) -> tuple[FloatArray, FloatArray, FloatArray]:
+            motion = (e.E @ q[..., one].reshape(h, -1)).reshape(N, m, -1)
+            ends, forces = (rigid[:, one].copy(), slips[:, one].copy()), np.empty_like(motion)
+            nodes, change = (self.moved, self.place), (motion, faster[one], verge[one])
+            march_directions(
+                self.state, step, nodes, self.rows, self.inverted, change, ends, forces
+            )
+            return (e.Q @ forces.reshape(N, -1)).reshape(h, m, -1), *ends
+
+        found = e.beside.run([partial(some, slice(a, a + wide)) for a in range(0, C, wide)])
+        modal, after, slid = (np.concatenate(one, axis=-1) for one in zip(*found, strict=True))
+        return modal, after, slid
 
     def _invert(self) -> None:
         """Overwrite the factors by inverses."""
@@ -149,26 +157,6 @@ class PeriodDerivative:
             for first in range(0, N, SAMPLES)
         ]
         self.inverted, self.fine = True, all(self.e.beside.run(jobs))
-
-    def _march(
-        self,
-        q: FloatArray,
-        rigid: FloatArray,
-        slips: FloatArray,
-        faster: FloatArray,
-        verge: FloatArray,
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Some of the directions."""
-        e, (h, m, C), N = self.e, q.shape, len(self.state)
-        rigid, slips = rigid.copy(), slips.copy()
-        motion = (e.E @ q.reshape(h, m * C)).reshape(N, m, C)
-        forces = np.empty((N, m, C))
-        step = (self.step.W, self.Z, self.M, self.step.J, self.late)
-        nodes, change = (self.moved, self.place), (motion, faster, verge)
-        march_directions(
-            self.state, step, nodes, self.rows, self.inverted, change, (rigid, slips), forces
-        )
-        return (e.Q @ forces.reshape(N, m * C)).reshape(q.shape), rigid, slips
 
 
 def _remembered(

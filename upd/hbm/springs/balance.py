@@ -29,7 +29,6 @@ from upd.hbm.springs.points import (
     March,
     Start,
     march,
-    stuck_constant,
     stuck_stiffness,
 )
 from upd.hbm.springs.terms import contact_terms
@@ -286,7 +285,7 @@ class Balance:
         )
         if not jacobian:
             return residual, None, by_frequency
-        parts = BalanceJacobian(linear, linear.k * omega, state, self._stiffness, DF)
+        parts = BalanceJacobian(linear, linear.k * omega, state, self.stuck_stiffness, DF)
         return residual, parts, by_frequency
 
     def contact_terms(
@@ -368,7 +367,8 @@ class Balance:
         return self.Psi[:, self.modal.rigid]
 
     @cached_property
-    def _stiffness(self) -> FloatArray:
+    def stuck_stiffness(self) -> FloatArray:
+        """Stiffness (n_point, 1 + d) of closed points that stick [N/mm]."""
         # loads, preload and sliders may change in copies: none of them enters
         return stuck_stiffness(self.contacts)
 
@@ -386,19 +386,22 @@ class Balance:
         -------
         (n_unknown,) ndarray
         """
-        return self._linear(omega, self._stiffness.ravel(), *self._stuck_rest)
+        return self._linear(omega, self.stuck_stiffness.ravel(), *self._stuck_rest)
 
     @property
     def stuck_modal_stiffness(self) -> FloatArray:
         """Stiffness (m, m) of the modes with closed points that stick [1/s2]."""
         own = np.diag(np.where(self.modal.rigid, 0.0, self.modal.eigenvalues))
-        return np.asarray(own + (self.Psi.T * self._stiffness.ravel()) @ self.Psi)
+        return np.asarray(own + (self.Psi.T * self.stuck_stiffness.ravel()) @ self.Psi)
 
     @property
     def stuck_constant(self) -> FloatArray:
         """Force (n_point, 1 + d) of closed points that stick to given sliders, unmoved [N]."""
-        given = self.slider if self.start in ("zero", "static") else None
-        return stuck_constant(self.contacts, given)
+        law, out = self.contacts.law, np.zeros_like(self.stuck_stiffness)
+        out[:, 0] = law.preload - law.k_n * law.gap
+        if self.slider is not None and self.start in ("zero", "static"):
+            out[:, 1:] = -self.stuck_stiffness[:, 1:] * self.slider[:, : self.contacts.tangents]
+        return out
 
     @property
     def frictionless_sliders(self) -> FloatArray:
@@ -406,7 +409,7 @@ class Balance:
         traction [mm].
         """
         law, out = self.contacts.law, np.zeros((self.contacts.n_point, 2))
-        k, constant = np.zeros_like(self._stiffness), np.zeros_like(self._stiffness)
+        k, constant = np.zeros_like(self.stuck_stiffness), np.zeros_like(self.stuck_stiffness)
         k[:, 0], constant[:, 0] = law.k_n, law.preload - law.k_n * law.gap
         mean = self._linear_rest(k.ravel(), constant.ravel())[0].reshape(k.shape)
         out[:, : self.contacts.tangents] = mean[:, 1:]
@@ -429,7 +432,7 @@ class Balance:
 
     @cached_property
     def _stuck_rest(self) -> tuple[FloatArray, FloatArray]:
-        return self._linear_rest(self._stiffness.ravel(), self.stuck_constant.ravel())
+        return self._linear_rest(self.stuck_stiffness.ravel(), self.stuck_constant.ravel())
 
     def _linear_rest(self, k: FloatArray, constant: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean displacements (c,) and rigid amplitudes of a linear answer."""
@@ -475,7 +478,7 @@ class Balance:
         (n, n_dof) ndarray of complex
             Displacement [mm].
         """
-        k = stuck_stiffness(self.contacts).ravel() if stuck else np.zeros(len(self.Psi))
+        k = self.stuck_stiffness.ravel() if stuck else np.zeros(len(self.Psi))
         j = self.harmonics.place(harmonic)
         load, (modal, Psi) = self.loads[j : j + 1], self.part(harmonic)
         out = np.empty((len(omega), len(modal.Phi)), dtype=complex)
@@ -518,25 +521,9 @@ class Balance:
             out[:, :, 0] = eta @ Phi.T
         return out
 
-    def with_loads(self, static: float, dynamic: float) -> Balance:
-        """The same problem with its loads multiplied.
-
-        Parameters
-        ----------
-        static, dynamic : float
-            Factors on the static and on the dynamic loads.
-
-        Returns
-        -------
-        Balance
-        """
-        return self._changed(
-            static=static * self.static,
-            u0=static * self.u0,
-            rigid_load=static * self.rigid_load,
-            dynamic=dynamic * self.dynamic,
-            loads=dynamic * self.loads,
-        )
+    def unexcited(self) -> Balance:
+        """The same problem under its static loads alone."""
+        return self._changed(dynamic=0.0 * self.dynamic, loads=0.0 * self.loads)
 
     def with_sliders(self, start: Start, slider: FloatArray | None = None) -> Balance:
         """The same problem with another start of the sliders.

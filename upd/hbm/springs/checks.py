@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 from upd.hbm.core.fourier import analysis, harmonics, synthesis, to_complex
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
-from upd.hbm.springs.points import MOST_PERIODS, March, stuck_stiffness
+from upd.hbm.springs.points import MOST_PERIODS, March
 
 FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
@@ -34,7 +34,7 @@ def stuck_points(b: Balance, omega: FloatArray) -> NDArray[np.bool_]:
     -------
     (n,) ndarray of bool
     """
-    k, constant = stuck_stiffness(b.contacts), b.stuck_constant
+    k, constant = b.stuck_stiffness, b.stuck_constant
     # the friction cone is convex: a mean force outside it puts a sample outside at every frequency
     mean = (
         b.split(b.stuck(float(omega[0])))[0][..., 0] * k + constant
@@ -142,7 +142,7 @@ def separated(b: Balance, omega: FloatArray) -> FloatArray | None:
 def _stuck_forces(b: Balance, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Normal force and size of the traction (n_point, n) over the cycle of the stuck answer."""
     motion = b.split(x)[0] @ b.E.T
-    force = stuck_stiffness(b.contacts)[..., None] * motion + b.stuck_constant[..., None]
+    force = b.stuck_stiffness[..., None] * motion + b.stuck_constant[..., None]
     return force[:, 0], np.sqrt((force[:, 1:] ** 2).sum(axis=1))
 
 
@@ -172,7 +172,7 @@ def truncation(
     enough = b.samples > 2 * rest.highest
     Q = analysis(rest, b.samples if enough else 4 * rest.highest)
     E = b.E if enough else synthesis(b.harmonics, Q.shape[1])
-    stiffness, out = stuck_stiffness(b.contacts).ravel(), np.zeros(len(x))
+    stiffness, out = b.stuck_stiffness.ravel(), np.zeros(len(x))
     known = marched if enough else None
     for part in portions(len(x)) if known is None else [slice(0, len(x))]:
         W = b.coefficients(x[part])

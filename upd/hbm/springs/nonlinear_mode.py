@@ -34,7 +34,7 @@ from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.checks import measures
 from upd.hbm.springs.damper import RigidDamper
 from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart, real_part
-from upd.hbm.springs.points import Contacts, Start, stuck_stiffness
+from upd.hbm.springs.points import Contacts, Start
 from upd.hbm.springs.residuals import FREQUENCY_SHARE, scale_of
 from upd.labels import Shown
 from upd.linalg.parallel import threads_for
@@ -426,7 +426,7 @@ class ExtendedBalance:
             return residual, None, by_p
         w, modal, n = linear.k * omega, linear.modal, len(found)
         one = w[:1]
-        parts = BalanceJacobian(linear, w, state, stuck_stiffness(b.contacts), moving)
+        parts = BalanceJacobian(linear, w, state, b.stuck_stiffness, moving)
         DF, J = parts.every_derivative(), parts.matrix(2)
         J[:n, n] = by_omega
         # xi acts on each harmonic as i k omega eta_k, a force

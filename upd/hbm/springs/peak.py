@@ -147,8 +147,8 @@ def climb(
         # to be left in the opposite direction
         here = here._replace(tangent=-here.tangent, sign=-here.sign)
     for _ in range(MOST_STEPS):
-        found, there = advance(problem, here)
-        if found is None:
+        there = advance(problem, here)
+        if there is None:
             return peak(here, "no convergence along the path")
         if slope(there) > 0:
             here = there

@@ -306,24 +306,3 @@ def stuck_stiffness(points: Contacts) -> FloatArray:
     sticking = np.where(points.law.mu > 0, points.law.k_t, 0.0)
     k_t = np.repeat(sticking[:, None], points.tangents, axis=1)
     return np.column_stack([points.law.k_n, k_t])
-
-
-def stuck_constant(points: Contacts, slider: FloatArray | None = None) -> FloatArray:
-    """Force of closed, sticking points at zero displacement.
-
-    Parameters
-    ----------
-    points : Contacts
-    slider : (n_point, 2) ndarray, optional
-        Positions of the sliders [mm], zero by default.
-
-    Returns
-    -------
-    (n_point, 1 + d) ndarray
-        N_0 - k_n gap, and the tractions -k_t slider [N].
-    """
-    out = np.zeros(points.rows.shape[:2])
-    out[:, 0] = points.law.preload - points.law.k_n * points.law.gap
-    if slider is not None:
-        out[:, 1:] = -stuck_stiffness(points)[:, 1:] * slider[:, : points.tangents]
-    return out

@@ -63,7 +63,7 @@ def over_load(b: Balance, frequency: float) -> Function:
         (x, factor, with Jacobian) -> residual, Jacobian or None, derivative by the factor.
     """
     omega = 2 * np.pi * frequency
-    none = b.with_loads(1.0, 0.0)
+    none = b.unexcited()
     zero = np.zeros(b.size)
     slope = b.linearised(zero, omega, False)[0] - none.linearised(zero, omega, False)[0]
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from upd.hbm.core.continuation import Path, follow
 from upd.hbm.core.fourier import harmonics
-from upd.hbm.core.newton import Problem, Settings
+from upd.hbm.core.newton import Function, Problem, Settings
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.checks import separated, sticking_preload, stuck_points
 from upd.hbm.springs.residuals import (
@@ -227,7 +227,7 @@ def place_sliders(b: Balance, frequency: float, settings: Settings | None = None
     if statics is None:
         return None
     # positions after the static loads have led there, from sliders at zero
-    rest = b.with_loads(1.0, 0.0).with_sliders("zero")
+    rest = b.unexcited().with_sliders("zero")
     out, d = np.zeros((b.contacts.n_point, 2)), b.contacts.tangents
     if b.harmonics.static:
         T = rest.force(statics)[:, 1:, 0]
@@ -270,14 +270,15 @@ def first_point(
     statics = static_point(b, frequency, settings)
     if statics is None:
         return None
-    path = follow(
-        over_load(b, frequency),
-        (statics, 0.0),
-        1.0,
-        scale=scale_of(b, b.stuck(omega)),
-        p_scale=1.0,
-        settings=settings,
-    )
+    return _to_one(b, over_load(b, frequency), statics, b.stuck(omega), settings)
+
+
+def _to_one(
+    b: Balance, function: Function, x: FloatArray, like: FloatArray, settings: Settings | None
+) -> FloatArray | None:
+    """The answer at 1 of a parameter by continuation from one at 0; `like` has its size."""
+    scale = scale_of(b, like)
+    path = follow(function, (x, 0.0), 1.0, scale=scale, p_scale=1.0, settings=settings)
     return path.x[-1] if path.status == "complete" else None
 
 
@@ -332,16 +333,7 @@ def from_stuck(b: Balance, frequency: float, settings: Settings | None = None) -
     pressed = newton(b.pressed(P), x, frequency, settings)
     if pressed is None or not np.any(P):
         return pressed
-    x = pressed
-    path = follow(
-        over_preload(b, frequency, P),
-        (x, 0.0),
-        1.0,
-        scale=scale_of(b, x),
-        p_scale=1.0,
-        settings=settings,
-    )
-    return path.x[-1] if path.status == "complete" else None
+    return _to_one(b, over_preload(b, frequency, P), pressed, pressed, settings)
 
 
 def static_point(
@@ -368,7 +360,7 @@ def static_point(
     few = harmonics((0, int(b.harmonics.dynamic[0])))
     samples = 2 * few.highest + 1
     rest = replace(
-        b.with_loads(1.0, 0.0),
+        b.unexcited(),
         harmonics=few,
         samples=samples,
         dynamic=np.zeros((1, len(b.static)), complex),
