@@ -183,7 +183,7 @@ def test_factors_are_renewed_when_waiting_costs_more() -> None:
 
 def test_another_size_of_problem_is_factored() -> None:
     of = kept(np.eye(5))
-    assert type(of.near(*parts(np.eye(7)), 7)).__name__ == "WholeMatrix"
+    assert type(of.near(*parts(np.eye(7)), 7)).__name__ == "Factors"
 
 
 def test_curves_are_those_of_new_factors_each_time(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -211,11 +211,11 @@ def bordered_factors(J: FloatArray | StructuredJacobian | None, border: Border) 
     BorderedFactors
     """
     assert J is not None
-    return WholeMatrix(J, border) if isinstance(J, np.ndarray) else J.bordered(border)
+    return Factors(J, border) if isinstance(J, np.ndarray) else J.bordered(border)
 
 
 class Factors:
-    """LU of the bordered matrix, equations divided by their largest entries.
+    """LU of [[J, r_p], [normal]] of a matrix J (n, n), equations divided by their largest entries.
 
     Attributes
     ----------
@@ -231,6 +231,17 @@ class Factors:
     sign: float
     ratio: float
     D: FloatArray
+
+    def __init__(self, J: FloatArray, border: Border) -> None:
+        n, self.D = len(J), border.D
+        A = np.empty((n + 1, n + 1), order="F")
+        np.multiply(J, border.D, out=A[:n, :n])
+        A[:n, n] = border.dp * border.p_scale
+        rows = np.abs(A[:n]).max(axis=1)
+        rows[rows == 0] = 1.0
+        A[:n] /= rows[:, None]
+        A[n] = border.normal
+        self._factorise(A, rows)
 
     def _factorise(self, A: FloatArray, rows: FloatArray) -> None:
         """Parameters: the matrix, overwritten, and what its equations were divided by."""
@@ -262,21 +273,6 @@ class Factors:
         """Unit vector along the path, on the side the border points to."""
         t = self.solve(np.zeros(len(self.D)), 1.0)
         return np.asarray(t / np.linalg.norm(t))
-
-
-class WholeMatrix(Factors):
-    """LU of [[J, r_p], [normal]] of a matrix J (n, n)."""
-
-    def __init__(self, J: FloatArray, border: Border) -> None:
-        n, self.D = len(J), border.D
-        A = np.empty((n + 1, n + 1), order="F")
-        np.multiply(J, border.D, out=A[:n, :n])
-        A[:n, n] = border.dp * border.p_scale
-        rows = np.abs(A[:n]).max(axis=1)
-        rows[rows == 0] = 1.0
-        A[:n] /= rows[:, None]
-        A[n] = border.normal
-        self._factorise(A, rows)
 
 
 def correct(

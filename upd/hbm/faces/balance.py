@@ -26,7 +26,7 @@ from upd.hbm.faces.march import Fallback, InterfaceMarch
 from upd.hbm.faces.state import EPS, ComplexArray, FloatArray, InterfaceModel, InterfaceState
 from upd.hbm.faces.step import OPEN, SLIP, STICK
 from upd.hbm.faces.sweep import settle
-from upd.hbm.springs.residuals import FREQUENCY_SHARE
+from upd.hbm.springs.sweep import FREQUENCY_SHARE
 from upd.linalg.parallel import SideBySide
 from upd.linalg.select import threads_used
 

@@ -11,12 +11,7 @@ from upd.errors import ConvergenceError
 from upd.hbm.core.kept_factors import KeptFactors
 from upd.hbm.core.newton import Border, BorderedFactors, Settings
 from upd.hbm.faces.equations import ContactPeriod, InterfaceEquations
-from upd.hbm.faces.newton import (
-    InterfaceEvaluation,
-    StrangerMovesError,
-    evaluate,
-    slips_for_good,
-)
+from upd.hbm.faces.newton import InterfaceEvaluation, slips_for_good
 from upd.hbm.faces.state import FloatArray
 from upd.hbm.faces.step import SOLVED
 
@@ -206,14 +201,16 @@ class InterfaceCorrector:
             steps = PlaneSteps(known, normal, D, True)
         while True:
             try:
-                found = evaluate(e, x, 2.0 * np.pi * p, past)
+                period = e.march(x, 2.0 * np.pi * p)
             except ConvergenceError:
                 return None
-            except StrangerMovesError as more:
-                x, D, normal = self._with_more(more.moving, x, D, normal)
+            if (period.moving & ~e.mobile).any():
+                # slips of more nodes are unknowns from now on
+                x, D, normal = self._with_more(period.moving, x, D, normal)
                 before = past[e.tangents - e.model.n].reshape(2, -1)
                 steps = None
                 continue
+            found = InterfaceEvaluation(e, x, period, past)
             step = None
             if steps is not None and steps.learns and steps.known.suits(found):
                 step = steps.next(found.residual)

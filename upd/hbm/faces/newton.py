@@ -24,7 +24,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.core.newton import Border, BorderedFactors, WholeMatrix
+from upd.hbm.core.newton import Border, BorderedFactors, Factors
 from upd.hbm.faces.equations import ContactPeriod, IntArray, InterfaceEquations
 from upd.hbm.faces.jacobian import VERGE, factor_period, invert_period, march_directions
 from upd.hbm.faces.state import FloatArray
@@ -175,22 +175,20 @@ def _remembered(
     return out
 
 
-class StrangerMovesError(Exception):
-    """A node moves whose slips are not among the unknowns.
+class InterfaceEvaluation:
+    """The equations at one point, residual and derivatives, and the period they come from.
 
     Parameters
     ----------
-    moving : (n,) ndarray of bool
-        Nodes that move.
-    """
-
-    def __init__(self, moving: NDArray[np.bool_]) -> None:
-        super().__init__()
-        self.moving = moving
-
-
-class InterfaceEvaluation:
-    """The equations at one point.
+    e : InterfaceEquations
+        The slips of all nodes that move are among their unknowns.
+    x : (u,) ndarray
+        Unknowns.
+    period : ContactPeriod
+        That of the unknowns.
+    past : (2 n,) ndarray, optional
+        Slips before. Nodes that slip for good are then led to the verge of slipping, see the
+        module; without it residual and derivative are those of the equations as they stand.
 
     Attributes
     ----------
@@ -204,7 +202,7 @@ class InterfaceEvaluation:
         e: InterfaceEquations,
         x: FloatArray,
         period: ContactPeriod,
-        past: FloatArray | None,
+        past: FloatArray | None = None,
     ) -> None:
         self.e, self.x, self.period = e, x, period
         slip, (h, m) = period.slip_before, e.shape
@@ -260,7 +258,7 @@ class InterfaceEvaluation:
 
     def factored(self, border: Border) -> BorderedFactors:
         """Factors of the derivative with a border."""
-        return WholeMatrix(self.jacobian, border)
+        return Factors(self.jacobian, border)
 
     def in_direction(self, dx: FloatArray, dw: float) -> FloatArray:
         """Derivative in one direction, without the others.
@@ -333,38 +331,6 @@ class InterfaceEvaluation:
         # along the way the equations, across it the slips themselves
         kept = v1 * (out[one] - dx[one]) + v2 * (out[two] - dx[two])
         out[one], out[two] = dx[one] + v1 * kept, dx[two] + v2 * kept
-
-
-def evaluate(
-    e: InterfaceEquations, x: FloatArray, w: float, past: FloatArray | None = None
-) -> InterfaceEvaluation:
-    """Residual, its derivatives, and the period they come from.
-
-    Parameters
-    ----------
-    e : InterfaceEquations
-    x : (u,) ndarray
-        Unknowns.
-    w : float
-        rad/s.
-    past : (2 n,) ndarray, optional
-        Slips before. Nodes that slip for good are then led to the verge of slipping, see the
-        module; without it residual and derivative are those of the equations as they stand.
-
-    Returns
-    -------
-    InterfaceEvaluation
-
-    Raises
-    ------
-    StrangerMovesError
-        When a node moves whose slips are not among the unknowns.
-    """
-    period = e.march(x, w)
-    moving = period.moving
-    if (moving & ~e.mobile).any():
-        raise StrangerMovesError(moving)
-    return InterfaceEvaluation(e, x, period, past)
 
 
 def slips_for_good(e: InterfaceEquations, period: ContactPeriod) -> FloatArray:

@@ -35,7 +35,7 @@ from upd.hbm.springs.checks import measures
 from upd.hbm.springs.damper import RigidDamper
 from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart, real_part
 from upd.hbm.springs.points import Contacts, Start
-from upd.hbm.springs.residuals import FREQUENCY_SHARE, scale_of
+from upd.hbm.springs.sweep import FREQUENCY_SHARE, scale_of
 from upd.labels import Shown
 from upd.linalg.parallel import threads_for
 

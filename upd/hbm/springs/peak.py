@@ -20,7 +20,7 @@ from upd.hbm.core.continuation import State, advance, begin
 from upd.hbm.core.fourier import to_complex
 from upd.hbm.core.newton import Problem, Settings, Solution, correct
 from upd.hbm.springs.balance import Balance
-from upd.hbm.springs.residuals import FREQUENCY_SHARE, over_frequency, scale_of
+from upd.hbm.springs.sweep import FREQUENCY_SHARE, over_frequency, scale_of
 from upd.labels import Shown
 
 log = logging.getLogger(__name__)

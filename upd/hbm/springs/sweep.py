@@ -1,7 +1,8 @@
 """The curve over frequency.
 
 Exact stuck answers where proven, continuation over each stretch between. Its first points: Newton
-from linear answers, then homotopies that start from an answer known to be exact.
+from linear answers, then homotopies that start from an answer known to be exact. Residuals over one
+parameter, and the sizes of the unknowns, are the bridge between mechanics and continuation.
 """
 
 from __future__ import annotations
@@ -14,21 +15,21 @@ from numpy.typing import NDArray
 
 from upd.hbm.core.continuation import Path, follow
 from upd.hbm.core.fourier import harmonics
-from upd.hbm.core.newton import Function, Problem, Settings
+from upd.hbm.core.newton import EPS, Function, Problem, Scale, Settings
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.checks import separated, sticking_preload, stuck_points
-from upd.hbm.springs.residuals import (
-    FREQUENCY_SHARE,
-    over_frequency,
-    over_load,
-    over_preload,
-    scale_of,
-    sizes_of,
-)
+from upd.hbm.springs.jacobian import BalanceJacobian
+from upd.hbm.springs.terms import unit_sizes
 
 log = logging.getLogger(__name__)
 
 FloatArray = NDArray[np.float64]
+#: arclength unit of frequency, as a share of the mean frequency: a resonance of a few per cent is
+#: one unit wide
+FREQUENCY_SHARE = 0.05
+#: smallest mean displacement, relative to what the static loads cause, that is converged to its own
+#: size
+STATIC_SHARE = 1e-5
 #: share of the range by which a path may come back behind the first frequency before it is ended
 BEHIND = 0.05
 #: difference, relative to their size, at which two answers at one frequency are different solutions
@@ -370,3 +371,162 @@ def static_point(
     x = newton(rest, rest.stuck(2 * np.pi * frequency), frequency, settings)
     x = from_stuck(rest, frequency, settings) if x is None else x
     return None if x is None else b.embedded(x, rest)
+
+
+def over_frequency(b: Balance) -> Function:
+    """Residual over frequency for the continuation.
+
+    Parameters
+    ----------
+    b : Balance
+
+    Returns
+    -------
+    callable
+        (x, frequency [Hz], with Jacobian) -> residual, Jacobian or None, derivative by the
+        frequency.
+    """
+
+    def function(
+        x: FloatArray, f: float, jacobian: bool
+    ) -> tuple[FloatArray, BalanceJacobian | None, FloatArray]:
+        residual, parts, slope = b.linearised(x, 2 * np.pi * f, jacobian)
+        return residual, parts, 2 * np.pi * slope
+
+    return function
+
+
+def over_load(b: Balance, frequency: float) -> Function:
+    """Residual over a factor on the dynamic loads at one frequency; linear in the factor.
+
+    Parameters
+    ----------
+    b : Balance
+    frequency : float
+        [Hz]
+
+    Returns
+    -------
+    callable
+        (x, factor, with Jacobian) -> residual, Jacobian or None, derivative by the factor.
+    """
+    omega = 2 * np.pi * frequency
+    none = b.unexcited()
+    zero = np.zeros(b.size)
+    slope = b.linearised(zero, omega, False)[0] - none.linearised(zero, omega, False)[0]
+
+    def function(
+        x: FloatArray, s: float, jacobian: bool
+    ) -> tuple[FloatArray, BalanceJacobian | None, FloatArray]:
+        residual, parts, _ = none.linearised(x, omega, jacobian)
+        return residual + s * slope, parts, slope
+
+    return function
+
+
+def scale_of(b: Balance, least: FloatArray | None = None) -> Scale:
+    """Units of the unknowns for the continuation: a path is measured by the energy of the springs.
+
+    Every contact p with the largest coefficient m_p and the stiffness kappa_p = k_n + k_t counts in
+    the length of a change dw with its share of the energy,
+
+        |dw|^2 = sum_p kappa_p |dw_p|^2 / sum_p kappa_p m_p^2,
+
+    so that a contact cut into parts, kappa_p with it, counts as before: the unit of its unknowns is
+    their `sizes_of` times sqrt(sum_q kappa_q (m_q/m)^2 / kappa_p), m the largest m_q.
+
+    Parameters
+    ----------
+    b : Balance
+    least : (n_unknown,) ndarray, optional
+        An answer of typical size that keeps the unit when the solution starts from rest.
+
+    Returns
+    -------
+    callable
+        x (n_unknown,) -> units (n_unknown,).
+    """
+    law = b.contacts.law
+    kappa = (law.k_n + law.k_t) / float((law.k_n + law.k_t).max())
+    return _sized(b, least, kappa)
+
+
+def sizes_of(b: Balance) -> Scale:
+    """Sizes of the unknowns.
+
+    The largest mean displacement, the largest dynamic one and the rigid amplitudes, each measured
+    by its own.
+
+    Parameters
+    ----------
+    b : Balance
+
+    Returns
+    -------
+    callable
+        x (n_unknown,) -> sizes (n_unknown,).
+    """
+    return _sized(b, None, np.zeros(0))
+
+
+def _sized(b: Balance, least: FloatArray | None, kappa: FloatArray) -> Scale:
+    o, rigid = b.harmonics.offset, b.rigid
+    # the motion below which the unit stays: that of a typical answer, or one that does not matter
+    floor = _floor(b) if least is None else float(np.abs(b.split(least)[0]).max())
+    # the mean is a difference of static terms: below their rounding, as the tolerance magnifies it,
+    # it is not resolved
+    resolved = STATIC_SHARE * float(np.abs(b.u0).max(initial=0.0))
+    rigid_rows = float(np.abs(b.Psi[:, b.modal.rigid]).max(initial=0.0)) or 1.0
+
+    def scale(x: FloatArray) -> FloatArray:
+        D: FloatArray = unit_sizes(b.split(x)[0], kappa, o, floor, resolved, rigid_rows, rigid)
+        return D
+
+    return scale
+
+
+def _floor(b: Balance) -> float:
+    """A displacement below which nothing matters.
+
+    Rounding of the motions the loads cause across the contact springs.
+    """
+    k = float(max(b.contacts.law.k_t.max(), b.contacts.law.k_n.max()))
+    force = max(
+        float(np.abs(b.static).max()),
+        float(np.abs(b.dynamic).max()),
+        float(b.contacts.law.preload.max()),
+    )
+    return float(max(1e4 * EPS * force / k, float(np.finfo(float).tiny) ** 0.5))
+
+
+def over_preload(b: Balance, frequency: float, P: FloatArray) -> Function:
+    """Residual over q, with (1 - q) P more preload balanced by as much static load.
+
+    q = 0 sticks when P is enough, q = 1 is the problem.
+
+    Parameters
+    ----------
+    b : Balance
+    frequency : float
+        [Hz]
+    P : (n_point,) ndarray
+        Extra preload [N].
+
+    Returns
+    -------
+    callable
+        (x, q, with Jacobian) -> residual, Jacobian or None, derivative by q.
+    """
+    omega = 2 * np.pi * frequency
+
+    def function(
+        x: FloatArray, q: float, jacobian: bool
+    ) -> tuple[FloatArray, BalanceJacobian | None, FloatArray]:
+        residual, parts, _ = b.pressed((1 - q) * P).linearised(x, omega, jacobian)
+        h = EPS ** (1 / 3)
+        if not jacobian:
+            return residual, None, np.zeros(b.size)
+        up, down = (b.pressed((1 - q - d) * P).linearised(x, omega, False)[0] for d in (h, -h))
+        return residual, parts, (up - down) / (2 * h)
+
+    return function
