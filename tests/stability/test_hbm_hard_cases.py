@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from upd.hbm import Contacts, FrequencyResponse, Settings, contacts, follow, frequency_response
-from upd.hbm.core.newton import Problem
+from upd.hbm.core.newton import PathProblem
 from upd.hbm.springs.coulomb import SLIP
 from upd.hbm.springs.points import Start
 from upd.hbm.springs.sweep import from_stuck
@@ -154,7 +154,7 @@ def test_continuation_passes_both_folds_and_restarts() -> None:
     def scale(x: np.ndarray) -> np.ndarray:
         return np.ones_like(x)
 
-    start = Problem(circle, scale).solve(np.array([0.9]), -0.5)
+    start = PathProblem(circle, scale).solve(np.array([0.9]), -0.5)
     first = follow(
         circle,
         (start.x, -0.5),

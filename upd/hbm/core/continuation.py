@@ -25,7 +25,7 @@ from upd.hbm.core.newton import (
     Border,
     FloatArray,
     Function,
-    Problem,
+    PathProblem,
     Scale,
     Settings,
     Solution,
@@ -137,7 +137,7 @@ def follow(
     Path
     """
     s = settings or Settings()
-    problem = Problem(function, scale, p_scale, s)
+    problem = PathProblem(function, scale, p_scale, s)
     state = start if isinstance(start, State) else begin(problem, *start, end)
     marks = np.unique(np.append(np.asarray([] if wanted is None else wanted, dtype=float), end))
     rest = 0
@@ -189,12 +189,12 @@ def follow(
     return Path(np.array(xs), np.array(ps), state, status, message)
 
 
-def begin(problem: Problem, x: FloatArray, p: float, end: float = np.inf) -> State:
+def begin(problem: PathProblem, x: FloatArray, p: float, end: float = np.inf) -> State:
     """State at a solved point (x, p), towards larger p, or towards an end.
 
     Parameters
     ----------
-    problem : Problem
+    problem : PathProblem
     x : (n,) ndarray
         Unknowns of the point.
     p : float
@@ -214,7 +214,7 @@ def begin(problem: Problem, x: FloatArray, p: float, end: float = np.inf) -> Sta
     return State(x, p, lu.tangent(), problem.settings.first_step, direction, lu.sign)
 
 
-def advance(problem: Problem, state: State, marks: FloatArray | None = None) -> State | None:
+def advance(problem: PathProblem, state: State, marks: FloatArray | None = None) -> State | None:
     """One accepted step, round corners too, or None when even the smallest fails.
 
     Along one piece of the path the determinant keeps its sign but at bifurcations, which the
@@ -223,7 +223,7 @@ def advance(problem: Problem, state: State, marks: FloatArray | None = None) -> 
 
     Parameters
     ----------
-    problem : Problem
+    problem : PathProblem
     state : State
         Where the path stands.
     marks : (k,) ndarray, optional
@@ -240,7 +240,7 @@ def advance(problem: Problem, state: State, marks: FloatArray | None = None) -> 
 class _PathStep:
     """Steps from a state, in its scaled coordinates."""
 
-    def __init__(self, problem: Problem, state: State) -> None:
+    def __init__(self, problem: PathProblem, state: State) -> None:
         self.problem, self.state, self.D = problem, state, problem.scale(state.x)
         self.p_scale, self.s = problem.p_scale, problem.settings
 

@@ -156,7 +156,7 @@ class Solution(NamedTuple):
     sign: float = 0.0
 
 
-class Problem(NamedTuple):
+class PathProblem(NamedTuple):
     """Equations of a path.
 
     Attributes
@@ -276,7 +276,7 @@ class Factors:
 
 
 def correct(
-    problem: Problem, guess: FloatArray, p_guess: float, D: FloatArray, normal: FloatArray
+    problem: PathProblem, guess: FloatArray, p_guess: float, D: FloatArray, normal: FloatArray
 ) -> Solution:
     """Newton in the plane through the guess, damped so that the next correction shrinks.
 
@@ -285,7 +285,7 @@ def correct(
 
     Parameters
     ----------
-    problem : Problem
+    problem : PathProblem
     guess, p_guess : (n,) ndarray, float
         Where it begins.
     D : (n,) ndarray

@@ -290,7 +290,21 @@ def _complex_part(X: FloatArray, o: int) -> ComplexArray:
 
 
 def real_part(X: ComplexArray, static: FloatArray, o: int) -> FloatArray:
-    """Coefficients (c, size) of amplitudes (n_k, c) and a mean (c,)."""
+    """Coefficients of amplitudes and a mean.
+
+    Parameters
+    ----------
+    X : (n_k, c) ndarray of complex
+        Amplitudes a - i b of the harmonics above 0.
+    static : (c,) ndarray
+        Mean.
+    o : int
+        Column of the first cosine.
+
+    Returns
+    -------
+    (c, size) ndarray
+    """
     out = np.empty((X.shape[1], o + 2 * len(X)))
     out[:, o::2], out[:, o + 1 :: 2] = X.real.T, -X.imag.T
     if o:

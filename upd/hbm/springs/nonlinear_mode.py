@@ -28,7 +28,7 @@ from upd.errors import InputError
 from upd.hbm.core.continuation import follow
 from upd.hbm.core.fourier import harmonics as harmonics_of
 from upd.hbm.core.fourier import to_complex
-from upd.hbm.core.newton import Problem, Settings
+from upd.hbm.core.newton import PathProblem, Settings
 from upd.hbm.springs import response
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.checks import measures
@@ -324,7 +324,7 @@ def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearM
     of = ExtendedBalance(b, shape, omega)
     begin = wanted[0]
     for _ in range(HALVINGS):
-        first = Problem(of.function, of.scale, settings=s).solve(of.guess(begin), begin)
+        first = PathProblem(of.function, of.scale, settings=s).solve(of.guess(begin), begin)
         if first.tangent is not None:
             break
         begin -= np.log(2.0)

@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 
 from upd.hbm.core.continuation import State, advance, begin
 from upd.hbm.core.fourier import to_complex
-from upd.hbm.core.newton import Problem, Settings, Solution, correct
+from upd.hbm.core.newton import PathProblem, Settings, Solution, correct
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.sweep import FREQUENCY_SHARE, over_frequency, scale_of
 from upd.labels import Shown
@@ -134,7 +134,7 @@ def climb(
     """
     measure = _Measure(b, b.modal_row(row, harmonic), b.harmonics.place(harmonic), power)
     p_scale = FREQUENCY_SHARE * frequency
-    problem = Problem(over_frequency(b), scale_of(b), p_scale, settings or Settings())
+    problem = PathProblem(over_frequency(b), scale_of(b), p_scale, settings or Settings())
 
     def slope(state: State) -> float:
         return measure.slope(state.x, state.p, state.tangent, problem.scale(state.x), p_scale)
@@ -164,7 +164,7 @@ def climb(
     return peak(here, f"still rising after {MOST_STEPS} steps")
 
 
-def _between(problem: Problem, measure: _Measure, base: State, reach: float) -> Peak | None:
+def _between(problem: PathProblem, measure: _Measure, base: State, reach: float) -> Peak | None:
     """The peak between the base and the plane at `reach`.
 
     Root of the slope, or its jump where a contact changes state.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from upd.hbm.core.continuation import Path, follow
 from upd.hbm.core.fourier import harmonics
-from upd.hbm.core.newton import EPS, Function, Problem, Scale, Settings
+from upd.hbm.core.newton import EPS, Function, PathProblem, Scale, Settings
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.checks import separated, sticking_preload, stuck_points
 from upd.hbm.springs.jacobian import BalanceJacobian
@@ -127,14 +127,23 @@ def sweep(
     parts: list[Curve] = []
     i = 0
     while i < len(f):
+        others = np.flatnonzero(exact[i:] != exact[i])
+        stop = i + int(others[0]) if len(others) else len(f)
         if exact[i]:
-            stop = i + int(np.argmin(np.append(exact[i:], False)))
             parts.append(_stuck(b, f[i:stop]))
             i = stop
             continue
-        stop = i + int(np.argmax(np.append(exact[i:], True)))
-        part, i = _to_the_next(b, f, i, stop, parts[-1].x[-1] if parts else None, settings)
+        # onto the next exact answer; arriving on another branch, the path follows that to the end
+        x = parts[-1].x[-1] if parts else None
+        part = _stretch(b, f, slice(i, stop + 1), x, settings)
+        if stop < len(f) and part.status == "complete":
+            there = b.stuck(2 * np.pi * f[stop])
+            if float(np.abs((part.x[-1] - there) / sizes_of(b)(there)).max()) <= OTHER_BRANCH:
+                part = replace(part, p=part.p[:-1], x=part.x[:-1], exact=part.exact[:-1])
+            else:
+                part, stop = _stretch(b, f, slice(i, len(f)), x, settings), len(f)
         parts.append(part)
+        i = stop
         if part.status != "complete":
             break
     p, x, e = (np.concatenate([getattr(c, name) for c in parts]) for name in ("p", "x", "exact"))
@@ -149,28 +158,6 @@ def _stuck(b: Balance, f: FloatArray, message: str = "") -> Curve:
     """The stuck answers, where they are exact."""
     x = np.array([b.stuck(2 * np.pi * v) for v in f])
     return Curve(f, x, np.ones(len(f), dtype=bool), "complete", message)
-
-
-def _to_the_next(
-    b: Balance,
-    f: FloatArray,
-    i: int,
-    stop: int,
-    x: FloatArray | None,
-    settings: Settings | None,
-) -> tuple[Curve, int]:
-    """Continuation over f[i:stop] and onto the next exact answer.
-
-    Arriving on another branch, it follows that to the end.
-    """
-    last = stop < len(f)
-    part = _stretch(b, f, slice(i, stop + last), x, settings)
-    if not last or part.status != "complete":
-        return part, stop
-    there, here = b.stuck(2 * np.pi * f[stop]), part.x[-1]
-    if float(np.abs((here - there) / sizes_of(b)(there)).max()) <= OTHER_BRANCH:
-        return Curve(part.p[:-1], part.x[:-1], part.exact[:-1], part.status, part.message), stop
-    return _stretch(b, f, slice(i, len(f)), x, settings), len(f)
 
 
 def _stretch(
@@ -303,7 +290,7 @@ def newton(
         None when it does not converge.
     """
     patient = replace(settings or Settings(), iterations=PATIENCE)
-    found = Problem(over_frequency(b), scale_of(b), settings=patient).solve(x, frequency)
+    found = PathProblem(over_frequency(b), scale_of(b), settings=patient).solve(x, frequency)
     return found.x if found.tangent is not None else None
 
 
