@@ -296,7 +296,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
     "analyses": 12824,
-    "hbm": 6316,
+    "hbm": 6315,
     "contact": 3785,
     "linalg": 3125,
     "scene": 2329,

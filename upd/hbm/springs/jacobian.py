@@ -208,10 +208,10 @@ class BalanceJacobian(NamedTuple):
     @property
     def unknowns(self) -> int:
         """Rows of its factors, without the border."""
-        of, wide = self.of, len(self.DF) * self.stiffness.shape[1]
-        if self.kind is EveryPoint:
+        of, kind, wide = self.of, self.kind, len(self.DF) * self.stiffness.shape[1]
+        if kind is EveryPoint:
             wide = of.rows
-        elif self.kind is LowRank and of.basis is not None:
+        elif kind is LowRank and of.basis is not None:
             wide = of.basis.shape[1]
         return int(wide * of.size + of.R.shape[1])
 
@@ -221,10 +221,9 @@ class BalanceJacobian(NamedTuple):
 
     def bordered(self, border: Border) -> BorderedFactors:
         """The same; large ones of an earlier point serve (`upd.hbm.core.kept_factors`)."""
-        unknowns = self.unknowns
-        if unknowns < WORTH_KEEPING:
+        if len(border.D) < WORTH_KEEPING or self.unknowns < WORTH_KEEPING:
             return self.factored(border)
-        return self.of.kept.near(self, border, unknowns)
+        return self.of.kept.near(self, border, self.unknowns)
 
     def product(self, x: FloatArray) -> FloatArray:
         """J x of a change (n,) of the unknowns.
