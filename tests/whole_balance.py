@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import LIFT
-from upd.hbm.springs.friction import MOST_PERIODS, START_CODE, Law, March, Start
 from upd.hbm.springs.period import march_points
+from upd.hbm.springs.points import MOST_PERIODS, START_CODE, Law, March, Start
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class Derived(NamedTuple):
 def harmonic_force(
     law: Law, X: Array, E: Array, Q: Array, *, start: Start = "zero", slider: Array | None = None
 ) -> Derived:
-    """As `upd.hbm.springs.friction.harmonic_force`, with the derivative of the discrete march."""
+    """Coefficients of `upd.hbm.springs.points.march`, with the derivative of that march."""
     n_point, rows, size = X.shape
     w, n = np.ascontiguousarray(X @ E.T), len(E)
     force, weighed = np.zeros((n_point, rows, n)), np.zeros((n_point, rows, n))

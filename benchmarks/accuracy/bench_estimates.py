@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from upd.hbm import contacts
 from upd.hbm.core.fourier import analysis, harmonics, synthesis
-from upd.hbm.springs.friction import harmonic_force
+from upd.hbm.springs.points import march
 from upd.reference.friction import jenkins_harmonic
 from upd.vary.orders import estimate_error
 
@@ -104,8 +104,8 @@ def jenkins(samples: Sequence[int]) -> Ladder:
         motion = np.array([[[0.0, 0.0], [amplitude, 0.0]]])
         found = np.array(
             [
-                harmonic_force(law, motion, synthesis(h, n), analysis(h, n)).force[0, 1]
-                for n in samples
+                (march(law, motion @ E.T, E).coefficients(analysis(h, len(E))))[0, 1]
+                for E in (synthesis(h, n) for n in samples)
             ]
         )
         exact = jenkins_harmonic(amplitude, stiffness, 1.0, limit)

@@ -16,7 +16,7 @@ from upd.analyses.forced import measures
 from upd.analyses.forced.plan import grid
 from upd.hbm import FrequencyResponse, contacts, frequency_response
 from upd.hbm.core.fourier import analysis, harmonics, synthesis
-from upd.hbm.springs.friction import harmonic_force
+from upd.hbm.springs.points import march
 from upd.hbm.springs.response import parabola
 from upd.hbm.springs.time_integration import steady_state
 from upd.reference.den_hartog import den_hartog_amplitude
@@ -85,9 +85,8 @@ def jenkins() -> Iterator[Row]:
         law = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=K_T, mu=1.0, preload=limit).law
         worst = 0.0
         for amplitude in limit / K_T * np.array([1.1, 2.0, 5.0, 50.0]):
-            found = harmonic_force(law, np.array([[[0.0, 0.0], [amplitude, 0.0]]]), E, Q).force[
-                0, 1
-            ]
+            motion = np.array([[[0.0, 0.0], [amplitude, 0.0]]]) @ E.T
+            found = march(law, motion, E).coefficients(Q)[0, 1]
             exact = jenkins_harmonic(amplitude, K_T, 1.0, limit)
             worst = max(worst, float(np.abs(found - exact).max() / np.hypot(*exact)))
         case = f"Jenkins element, {samples} samples"

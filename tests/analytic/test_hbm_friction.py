@@ -5,6 +5,8 @@ Jenkins loops, circular sliding, a contact that opens, slider starts.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -12,8 +14,7 @@ from numpy.typing import NDArray
 from upd.errors import InputError
 from upd.hbm.core.fourier import analysis, harmonics, sample_count, synthesis
 from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
-from upd.hbm.springs.friction import Harmonic, Law, Start, harmonic_force, march
-from upd.hbm.springs.points import contacts
+from upd.hbm.springs.points import Law, March, Start, contacts, march
 from upd.reference.friction import jenkins_harmonic, jenkins_loop_area
 
 FloatArray = NDArray[np.float64]
@@ -23,11 +24,20 @@ def law(k_n: float, k_t: float, mu: float, preload: float, gap: float = 0.0) -> 
     return contacts([[1.0]], [[1.0]], k_n=k_n, k_t=k_t, mu=mu, preload=preload, gap=gap).law
 
 
+class Found(NamedTuple):
+    """Coefficients of the force, and the period they are from."""
+
+    force: FloatArray
+    march: March
+
+
 def force(
     parameters: Law, X: FloatArray, samples: int, highest: int = 1, start: Start = "zero"
-) -> Harmonic:
+) -> Found:
     h = harmonics(range(highest + 1))
-    return harmonic_force(parameters, X, synthesis(h, samples), analysis(h, samples), start=start)
+    E, Q = synthesis(h, samples), analysis(h, samples)
+    found = march(parameters, np.ascontiguousarray(X @ E.T), E, start=start)
+    return Found(found.coefficients(Q), found)
 
 
 @pytest.mark.parametrize("amplitude", [0.5, 1.0001, 1.2, 3.0, 20.0])
@@ -127,8 +137,8 @@ def test_error_falls_with_the_square_of_the_sample(tangents: int, preload: float
     X = np.random.default_rng(2).normal(size=(20, 1 + tangents, h.size)) / decay
     parameters = point(tangents, preload).tiled(len(X))
 
-    def found(n: int) -> Harmonic:
-        return harmonic_force(parameters, X, synthesis(h, n), analysis(h, n))
+    def found(n: int) -> Found:
+        return force(parameters, X, n, h.highest)
 
     exact = found(fine)
     at_samples, of_coefficients = [], []

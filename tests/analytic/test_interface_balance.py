@@ -11,7 +11,6 @@ import pytest
 
 import upd.hbm.core.kept_factors as kept_factors
 import upd.hbm.faces.corrector as corrector
-import upd.hbm.faces.corrector as steps
 import upd.hbm.faces.equations as module
 import upd.hbm.faces.newton as linear
 from upd.analyses import make_plan
@@ -22,7 +21,7 @@ from upd.errors import ConvergenceError, InputError
 from upd.hbm.core.newton import Settings
 from upd.hbm.faces.balance import InterfaceResponse, interface_response
 from upd.hbm.faces.equations import InterfaceEquations
-from upd.hbm.faces.newton import StrangerMovesError, evaluate
+from upd.hbm.faces.newton import InterfaceEvaluation
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
 from upd.hbm.faces.step import OPEN, SLIP, STICK
 from upd.hbm.faces.sweep import stepped_sine
@@ -30,6 +29,12 @@ from upd.scene import load_scene
 
 F_C, MU, DAMPING = 350.0, 0.6, 0.005
 LEFT, RIGHT = 0, 1
+
+
+def evaluate(
+    e: InterfaceEquations, x: np.ndarray, w: float, past: np.ndarray | None = None
+) -> InterfaceEvaluation:
+    return InterfaceEvaluation(e, x, e.march(x, w), past)
 
 
 @cache
@@ -134,15 +139,15 @@ def test_one_direction_is_that_of_the_derivative() -> None:
 def test_curve_by_few_directions_is_that_by_derivatives(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same answers to the corrections' tolerance, from fewer derivatives."""
     formed, found, frequencies = [], [], [436.0, 440.0, 444.0, 446.0]
-    factored = steps.PlaneMatrix.factored
+    factored = linear.InterfaceEvaluation.factored
     for many in (10**6, 1):
         count: list[int] = []
 
-        def told(one: Any, count: list[int] = count) -> Any:
+        def told(one: Any, border: Any, count: list[int] = count) -> Any:
             count.append(1)
-            return factored(one)
+            return factored(one, border)
 
-        monkeypatch.setattr(steps.PlaneMatrix, "factored", told)
+        monkeypatch.setattr(linear.InterfaceEvaluation, "factored", told)
         monkeypatch.setattr(corrector, "MANY", many)
         # factors of so few unknowns are quick; here they are to be kept all the same
         monkeypatch.setattr(kept_factors, "SOLUTIONS", 4.0)
@@ -168,7 +173,7 @@ def test_steps_that_grow_near_a_known_point_end(
         sizes.append(1e-9 * 2.0 ** len(sizes))
         return np.eye(1, len(residual) + 1, 0)[0] * sizes[-1]
 
-    monkeypatch.setattr(steps.NewtonSteps, "next", grown)
+    monkeypatch.setattr(corrector.PlaneSteps, "next", grown)
     of = corrector.InterfaceCorrector(e, Settings(tolerance=1e-12), 1.0)
     known = of._factors(evaluate(e, x, w), of.across(1.0, x), of.scale(x))
     assert known is not None
@@ -221,13 +226,16 @@ def test_the_way_on_is_that_of_the_answer() -> None:
     assert (found.share[:, STICK] > 0.999).all()
 
 
-def test_a_node_out_of_the_equations_is_told() -> None:
+def test_a_node_out_of_the_equations_comes_in() -> None:
+    """Nodes that move without their slips among the unknowns: the correction takes these in."""
     e, x, w = at_a_motion()
     q, rigid, slip = e.split(x)
     e.mobile = np.zeros_like(e.mobile)
-    with pytest.raises(StrangerMovesError) as told:
-        evaluate(e, e.joined(q, rigid, slip), w)
-    assert told.value.moving.any()
+    x = e.joined(q, rigid, slip)
+    assert e.march(x, w).moving.any()
+    of = corrector.InterfaceCorrector(e, Settings(tolerance=1e-6), 1.0)
+    found = of.correct(x, w / (2.0 * np.pi), of.across(1.0, x), of.scale(x), slip)
+    assert found is not None and e.mobile.any() and len(found.x) > len(x)
 
 
 def test_answers_do_not_depend_on_the_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:

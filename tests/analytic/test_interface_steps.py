@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from upd.hbm.core.newton import bordered_factors
-from upd.hbm.faces.corrector import BroydenSteps, KnownFactors, NewtonSteps
+from upd.hbm.core.newton import Border, bordered_factors
+from upd.hbm.faces.corrector import KnownFactors, PlaneSteps
 from upd.hbm.faces.newton import InterfaceEvaluation
 
 FloatArray = NDArray[np.float64]
@@ -23,12 +23,13 @@ def problem(changed: int) -> tuple[FloatArray, FloatArray, FloatArray, KnownFact
     J = rng.normal(size=(U, U + 1)) + 4.0 * np.eye(U, U + 1)
     near = J + rng.normal(size=(U, changed)) @ rng.normal(size=(changed, U + 1)) * 0.3
     D = rng.uniform(0.5, 2.0, U)
-    factors = bordered_factors(near[:, :-1], near[:, -1], D, 1.0, rng.normal(size=U + 1))
+    border = Border(near[:, -1], D, 1.0, rng.normal(size=U + 1))
+    factors = bordered_factors(near[:, :-1], border)
     known = KnownFactors(factors, D, cast(InterfaceEvaluation, None))
     return J, rng.normal(size=U), rng.normal(size=U + 1), known
 
 
-def solved(J: FloatArray, b: FloatArray, steps: BroydenSteps, D: FloatArray, count: int) -> Any:
+def solved(J: FloatArray, b: FloatArray, steps: PlaneSteps, D: FloatArray, count: int) -> Any:
     """Residuals after each step of J x = b, and the steps."""
     x, left, taken = np.zeros(U + 1), [], []
     for _ in range(count):
@@ -44,7 +45,7 @@ def test_linear_equations_end_after_twice_the_rank_of_what_is_off(changed: int) 
     """D. M. Gay, SIAM J. Numer. Anal. 16 (1979) 623: 2 r steps and one; a chord never ends."""
     J, b, normal, known = problem(changed)
     D = np.linspace(1.0, 3.0, U)
-    left, taken = solved(J, b, BroydenSteps(known, normal, D), D, 2 * changed + 1)
+    left, taken = solved(J, b, PlaneSteps(known, normal, D, True), D, 2 * changed + 1)
     assert left[-1] < 1e-9 * np.linalg.norm(b)
     assert all(one > 1e-4 * np.linalg.norm(b) for one in left[:-2]), left
     for step in taken:
@@ -56,7 +57,7 @@ def test_without_updates_the_same_steps_do_not_end() -> None:
     D = np.linspace(1.0, 3.0, U)
     x = np.zeros(U + 1)
     for _ in range(5):
-        x = x + BroydenSteps(known, normal, D).next(J @ x - b) * np.append(D, 1.0)
+        x = x + PlaneSteps(known, normal, D, True).next(J @ x - b) * np.append(D, 1.0)
     assert np.linalg.norm(J @ x - b) > 1e-3 * np.linalg.norm(b)
 
 
@@ -64,5 +65,5 @@ def test_a_step_of_newton_s_stays_in_the_plane() -> None:
     """Whatever the factors leave of the border: a frequency that is asked for is met exactly."""
     _, b, _, known = problem(0)
     across = np.eye(1, U + 1, U)[0]
-    step = NewtonSteps(known, across).next(-b)
+    step = PlaneSteps(known, across, np.ones(U), False).next(-b)
     assert np.linalg.norm(step) > 0.0 and step[-1] == 0.0

@@ -13,10 +13,9 @@ from scipy.optimize import minimize_scalar
 
 from upd.errors import InputError
 from upd.hbm import NonlinearMode, contacts, frequency_response, nonlinear_mode
-from upd.hbm.core.fourier import harmonics
-from upd.hbm.springs.balance import assembled
 from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
 from upd.hbm.springs.nonlinear_mode import ExtendedBalance, stuck_modes
+from upd.hbm.springs.response import GivenSystem
 from upd.reference.friction import jenkins_peak
 
 FloatArray = NDArray[np.float64]
@@ -180,15 +179,15 @@ def test_jacobian_by_differences(amplitude: float, states: set[int], proportiona
         preload=[1.0, 0.3],
     )
     static = np.array([0.1, 0.05])
-    h = harmonics((0, 1, 2, 3))
-    b = assembled(one, damping, K, points, {}, static, h, samples=256, fast_exits=False)
+    given = GivenSystem(one, damping, K, points, static, None, None, range(4), 256, "zero", None)
+    b = given.balance("nonlinear_mode", np.ones(1), None, fast_exits=False)
     stuck, omegas, number = stuck_modes(b, 1)
     extended = ExtendedBalance(b, stuck[:, number], float(omegas[number]))
     p, rng, h = np.log(amplitude), np.random.default_rng(0), 1e-6
     X = extended.guess(p)
     X[:-2] += 0.1 * amplitude * rng.standard_normal(len(X) - 2)
     X[-1] = 0.03
-    assert set(b.force(X[:-2]).march.state.ravel()) == states
+    assert set(b.period(X[:-2]).state.ravel()) == states
     _, J, by_p = extended.function(X, p, True)
     assert J is not None
 

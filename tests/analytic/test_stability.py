@@ -14,7 +14,7 @@ from scipy.optimize import brentq, fsolve
 from upd.errors import InputError
 from upd.hbm import FrequencyResponse, Settings, contacts, frequency_response, harmonics, stability
 from upd.hbm.core.fourier import synthesis
-from upd.hbm.springs.balance import assembled
+from upd.hbm.springs.response import GivenSystem
 from upd.hbm.springs.stability import Changes, changes, period_map
 
 FloatArray = NDArray[np.float64]
@@ -210,15 +210,10 @@ def test_friction_along_two_directions_is_what_differences_of_marched_periods_gi
     points = contacts(
         [[1.0, 0, 0]], [[[0, 1.0, 0]], [[0, 0, 1.0]]], k_n=k_n, k_t=k_t, mu=mu, preload=preload
     )
-    b = assembled(
-        np.eye(3),
-        np.diag(zeta),
-        K,
-        points,
-        {1: np.zeros(3, complex)},
-        np.zeros(3),
-        harmonics((0, 1)),
+    given = GivenSystem(
+        np.eye(3), np.diag(zeta), K, points, None, None, None, (0, 1), None, "zero", None
     )
+    b = given.balance("stability", np.ones(1), None, fast_exits=True)
     found = period_map(values, zeta, Psi, changes(b, ws[None], fs[None]), dt)
     h = 1e-6
     moved = np.array(

@@ -24,8 +24,9 @@ from upd.hbm import (
     travelling_wave_response,
     wave_in_time,
 )
+from upd.hbm.core.newton import Border
 from upd.hbm.springs import jacobian
-from upd.hbm.springs.waves import WaveBalance, Waves, spread_to_all
+from upd.hbm.springs.waves import WaveBalance, spread_to_all
 
 N = 12
 SLIDER = contacts([[0.0, 0.0]], [[1.0, -1.0]], k_n=0.0, k_t=0.1, mu=1.0, preload=0.5)
@@ -78,14 +79,14 @@ def test_chains(order: int, w: float, heights: tuple[float, ...]) -> None:
 def test_each_harmonic_has_its_own_phase(monkeypatch: pytest.MonkeyPatch) -> None:
     # the phase of the first harmonic for all: seen with the engine order 2, not with 3
     right = {order: float(chain(engine_order=order).amplitude([1.0])[0]) for order in (2, 3)}
-    part = Waves.part
+    part = WaveBalance.part
 
-    def wrong(self: Waves, harmonic: int) -> tuple[Any, Any]:
+    def wrong(self: WaveBalance, harmonic: int | None = None) -> tuple[Any, Any]:
         modes, _ = part(self, harmonic)
         rows = self.near + self.far * np.exp(2j * np.pi * self.engine_order / self.n_sectors)
         return modes, rows.reshape(-1, len(modes.Phi)) @ modes.Phi
 
-    monkeypatch.setattr(Waves, "part", wrong)
+    monkeypatch.setattr(WaveBalance, "part", wrong)
     assert chain(engine_order=3).amplitude([1.0])[0] == pytest.approx(right[3], rel=1e-9)
     spoiled = chain(engine_order=2, harmonics=range(8)).amplitude([1.0])[0]
     assert spoiled == pytest.approx(28.584, abs=1e-3) != pytest.approx(right[2], rel=1e-3)
@@ -351,7 +352,7 @@ def test_jacobian_and_all_sectors(proportional: bool) -> None:
         D, border, right = 0.5 + rng.uniform(size=len(at)), *rng.normal(size=(2, len(at) + 1))
         A = np.block([[J.matrix() * D, 0.3 * slope[:, None]], [border[None]]])
         for kind in (jacobian.EveryPoint, jacobian.Eliminated):
-            z = kind(J, slope, D, 0.3, border).solve(right[:-1], float(right[-1]))
+            z = kind(J, Border(slope, D, 0.3, border)).solve(right[:-1], float(right[-1]))
             np.testing.assert_allclose(A @ z, right, atol=1e-7 * np.abs(z).max())
     assert seen == {0, 1, 2}
 

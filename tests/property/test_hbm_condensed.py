@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from tests.whole_balance import evaluate
 from upd.hbm import contacts, harmonics
+from upd.hbm.core.newton import Border
 from upd.hbm.springs import jacobian
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import LIFT, STICK
@@ -105,7 +106,7 @@ def test_condensed_correction_is_that_of_the_whole_matrix(
     )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(jacobian, "WORTH", worth)
-        factors = parts.bordered(slope, D, p_scale, normal)
+        factors = parts.bordered(Border(slope, D, p_scale, normal))
     assert type(factors).__name__ == how
     wanted = np.linalg.solve(A, np.append(r, right))
     limit = 1e-13 * np.linalg.cond(A) * np.abs(wanted).max()

@@ -16,25 +16,26 @@ from tests.stability.test_hbm_hard_cases import gap_oscillator
 from tests.whole_balance import evaluate
 from upd.hbm.core import kept_factors
 from upd.hbm.core.kept_factors import LEFT, LEFT_OF_TANGENT, KeptFactors
-from upd.hbm.core.newton import bordered_factors
+from upd.hbm.core.newton import Border, bordered_factors
 from upd.hbm.springs import jacobian
 
 
 class Dense(NamedTuple):
-    """A bordered matrix as it is: all unknowns of size one."""
+    """A Jacobian as it is."""
 
-    A: np.ndarray
+    J: np.ndarray
 
-    @property
-    def sizes(self) -> np.ndarray:
-        return np.ones(len(self.A))
+    def factored(self, border: Border):
+        return bordered_factors(self.J, border)
 
-    def factored(self):
-        n = len(self.A) - 1
-        return bordered_factors(self.A[:n, :n], self.A[:n, n], np.ones(n), 1.0, self.A[n])
+    def product(self, x: np.ndarray) -> np.ndarray:
+        return self.J @ x
 
-    def product(self, z: np.ndarray) -> np.ndarray:
-        return self.A @ z
+
+def parts(A: np.ndarray) -> tuple[Dense, Border]:
+    """A bordered matrix: all unknowns of size one."""
+    n = len(A) - 1
+    return Dense(A[:n, :n]), Border(A[:n, n], np.ones(n), 1.0, A[n])
 
 
 @pytest.fixture
@@ -47,7 +48,7 @@ def always(monkeypatch: pytest.MonkeyPatch) -> None:
 def kept(of: np.ndarray) -> KeptFactors:
     """Kept factors of a matrix."""
     out = KeptFactors()
-    out.near(Dense(of), len(of))
+    out.near(*parts(of), len(of))
     return out
 
 
@@ -80,14 +81,15 @@ def test_corrections_from_an_earlier_point_are_those_of_the_matrix(
         patch.setattr(jacobian, "WORTH_KEEPING", 0)
         patch.setattr(kept_factors, "SOLUTIONS", 0.01)
         patch.setattr(kept_factors, "LEFT", LEFT_OF_TANGENT)
-        _, parts, slope = b.linearised(x, 1.3)
-        assert parts is not None
-        parts.bordered(slope, rng.uniform(0.5, 2, b.size), 0.8, rng.normal(size=b.size + 1))
-        _, parts, slope = b.linearised(other, 1.31)
-        assert parts is not None
+        _, J, slope = b.linearised(x, 1.3)
+        assert J is not None
+        D = rng.uniform(0.5, 2, b.size)
+        J.bordered(Border(slope, D, 0.8, rng.normal(size=b.size + 1)))
+        _, J, slope = b.linearised(other, 1.31)
+        assert J is not None
         D, normal, right = rng.uniform(0.5, 2, b.size), rng.normal(size=b.size + 1), rng.normal()
         r, p_scale = rng.normal(size=b.size), 1.7
-        found = parts.bordered(slope, D, p_scale, normal)
+        found = J.bordered(Border(slope, D, p_scale, normal))
         assert type(found).__name__ == "_Near"
         correction, tangent = found.solve(r, right), found.tangent()
         sign = found.sign
@@ -111,7 +113,7 @@ def test_a_correction_leaves_its_share() -> None:
     P = near_identity(rng, 60)
     M = P + 0.2 * near_identity(rng, 60)
     r = rng.normal(size=60)
-    z = kept(P).near(Dense(M), 60).solve(r[:-1], r[-1])
+    z = kept(P).near(*parts(M), 60).solve(r[:-1], r[-1])
     left, whole = (np.linalg.norm(np.linalg.solve(P, x)) for x in (r - M @ z, r))
     assert LEFT / 100 < left / whole <= LEFT * 1.001
 
@@ -126,7 +128,7 @@ def test_a_determinant_of_the_other_sign_is_seen(seed: int) -> None:
     # det(P + s u v') = det P (1 + s v' P^-1 u): of the other sign by this s
     s = -1.5 / (v @ np.linalg.solve(P, u))
     M = P + s * np.outer(u, v)
-    found = kept(P).near(Dense(M), n)
+    found = kept(P).near(*parts(M), n)
     found.tangent()
     assert found.sign == np.linalg.slogdet(M)[0] == -np.linalg.slogdet(P)[0]
 
@@ -139,13 +141,14 @@ def test_a_matrix_too_far_is_factored() -> None:
     with pytest.MonkeyPatch.context() as patch:
         # ten solutions at most
         patch.setattr(kept_factors, "SOLUTIONS", 2.0)
-        found = of.near(Dense(M), 40)
+        found = of.near(*parts(M), 40)
         r = rng.normal(size=40)
         np.testing.assert_allclose(found.solve(r[:-1], r[-1]), np.linalg.solve(M, r), rtol=1e-9)
-    own = Dense(M).factored()
+    J, border = parts(M)
+    own = J.factored(border)
     assert (found.sign, found.ratio) == (own.sign, own.ratio)
     # and kept for the next one: one product
-    of.near(Dense(M), 40).solve(r[:-1], r[-1])
+    of.near(*parts(M), 40).solve(r[:-1], r[-1])
     assert of._newest == 2
 
 
@@ -154,7 +157,7 @@ def test_a_singular_matrix_has_no_finite_correction() -> None:
     """A path shortens its step then."""
     M = np.eye(6)
     M[2] = 0.0
-    found = kept(np.eye(6)).near(Dense(M), 6)
+    found = kept(np.eye(6)).near(*parts(M), 6)
     with np.errstate(all="ignore"):
         assert not np.isfinite(found.solve(np.ones(5), 1.0)).all()
 
@@ -164,12 +167,12 @@ def test_factors_are_renewed_when_waiting_costs_more() -> None:
     """Costs of a correction rise by one each time: the best is where the average is least."""
     of, A = KeptFactors(), np.eye(1)
     dear, costs = 0.5 / kept_factors.SOLUTIONS, list[int]()
-    of.near(Dense(np.eye(1)), 0)
+    of.near(*parts(np.eye(1)), 0)
     of._spent = dear
-    first = of._factors
+    first = of.factors
     for cost in range(1, 100):
-        of.near(Dense(A), 0)
-        if of._factors is not first:
+        of.near(*parts(A), 0)
+        if of.factors is not first:
             break
         of.note(cost)
         costs.append(cost)
@@ -180,7 +183,7 @@ def test_factors_are_renewed_when_waiting_costs_more() -> None:
 
 def test_another_size_of_problem_is_factored() -> None:
     of = kept(np.eye(5))
-    assert type(of.near(Dense(np.eye(7)), 7)).__name__ == "_Bordered"
+    assert type(of.near(*parts(np.eye(7)), 7)).__name__ == "Factors"
 
 
 def test_curves_are_those_of_new_factors_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -202,7 +205,7 @@ def test_curves_are_those_of_new_factors_each_time(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(jacobian, "WORTH_KEEPING", 0)
     monkeypatch.setattr(kept_factors, "SOLUTIONS", 0.5)
     near = curves()
-    assert all(one.balance.linear.kept._factors is None for one in near)
+    assert all(one.balance.linear.kept.factors is None for one in near)
     assert len(used) > 500
     for row, one, other in zip((Y2, [1.0]), usual, near, strict=True):
         assert (one.status, other.status) == ("complete", "complete")
@@ -216,5 +219,5 @@ def test_curves_are_those_of_new_factors_each_time(monkeypatch: pytest.MonkeyPat
 
 def test_files_hold_no_factors() -> None:
     of = kept(np.eye(5))
-    assert of._factors is not None
-    assert pickle.loads(pickle.dumps(of))._factors is None
+    assert of.factors is not None
+    assert pickle.loads(pickle.dumps(of)).factors is None

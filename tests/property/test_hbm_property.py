@@ -17,8 +17,8 @@ from upd.hbm import contacts, frequency_response, harmonics
 from upd.hbm.core.fourier import analysis, embed, synthesis
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
-from upd.hbm.springs.friction import Start
 from upd.hbm.springs.modal import modal
+from upd.hbm.springs.points import Start
 
 # Central differences: error h^2 from curvature of the radial return, eps/h from rounding; best h =
 # eps^(1/3), error about eps^(2/3).

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from upd.hbm import Contacts, FrequencyResponse, Settings, contacts, follow, frequency_response
-from upd.hbm.core.newton import solve
+from upd.hbm.core.newton import PathProblem
 from upd.hbm.springs.coulomb import SLIP
-from upd.hbm.springs.friction import Start
+from upd.hbm.springs.points import Start
 from upd.hbm.springs.sweep import from_stuck
 from upd.hbm.springs.time_integration import steady_state
 
@@ -154,7 +154,7 @@ def test_continuation_passes_both_folds_and_restarts() -> None:
     def scale(x: np.ndarray) -> np.ndarray:
         return np.ones_like(x)
 
-    start = solve(circle, np.array([0.9]), -0.5, scale)
+    start = PathProblem(circle, scale).solve(np.array([0.9]), -0.5)
     first = follow(
         circle,
         (start.x, -0.5),

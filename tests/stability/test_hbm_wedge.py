@@ -179,7 +179,7 @@ def test_static_point_balances_the_centrifugal_force() -> None:
     b = answer.balance
     x = static_point(b, 250.0)
     assert x is not None
-    f = b.force(x).force[..., 0]
+    f = b.force(x)[..., 0]
     held = np.einsum("pri,pr->i", b.contacts.rows, f)[6:]
     np.testing.assert_allclose(held, [0, CF, 0], atol=1e-8 * CF)
 

@@ -226,7 +226,7 @@ class CurveWithFriction:
         if not len(f):
             return {side: np.zeros(0, complex) for side in SIDES}
         x = np.array([self._point(b, answer, float(one)) for one in f])
-        forces = np.array([b.force(one).force for one in x]).reshape(len(f), len(b.Psi), -1)
+        forces = np.array([b.force(one) for one in x]).reshape(len(f), len(b.Psi), -1)
         rigid = np.array([b.split(one)[1] for one in x])
         q = b.displacement(2.0 * np.pi * f, forces, rigid)
         moving = to_complex(q, b.harmonics)[..., b.harmonics.place(k)]

@@ -19,10 +19,9 @@ from upd.hbm.core.continuation import Path, State, follow
 from upd.hbm.core.fourier import Harmonics, harmonics
 from upd.hbm.core.newton import Settings
 from upd.hbm.springs.damper import RigidDamper, contact_rows, rigid_damper
-from upd.hbm.springs.friction import Law
 from upd.hbm.springs.nonlinear_mode import NonlinearMode, nonlinear_mode
 from upd.hbm.springs.peak import Peak, climb
-from upd.hbm.springs.points import Contacts, contacts
+from upd.hbm.springs.points import Contacts, Law, contacts
 from upd.hbm.springs.response import FrequencyResponse, frequency_response
 from upd.hbm.springs.stability import Stability, stability
 from upd.hbm.springs.time_integration import SteadyState, steady_state

@@ -205,7 +205,7 @@ def test_a_motion_off_by_a_little_is_off_balance(response: ForcedSolution) -> No
     a = stuck.curves[0].answer
     assert residual_error(a) < 1e-9
     x = a.x * (1.0 + 1e-5)
-    force = np.array([a.balance.force(one).force for one in x])
+    force = np.array([a.balance.force(one) for one in x])
     off = residual_error(replace(a, x=x, contact_force=force))
     assert 1e-6 < off < 1e-4
 

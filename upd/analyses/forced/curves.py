@@ -39,7 +39,6 @@ from upd.hbm.faces.balance import InterfaceResponse
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
 from upd.hbm.faces.sweep import SteppedSine
 from upd.hbm.springs.balance import Balance
-from upd.hbm.springs.points import stuck_stiffness
 from upd.results import Case
 from upd.scene.forced_contact import SIDES, Side
 
@@ -325,7 +324,7 @@ def linear_modes(balance: Balance, stuck: bool) -> tuple[Array, Array]:
     D. J. Ewins, Modal Testing: Theory, Practice and Application, 2nd ed. (2000), 2.4 and 4.2.
     """
     modal, Psi = balance.modal, balance.Psi
-    k = stuck_stiffness(balance.contacts).ravel() if stuck else np.zeros(len(Psi))
+    k = balance.stuck_stiffness.ravel() if stuck else np.zeros(len(Psi))
     values, shapes = eigh(np.diag(modal.eigenvalues) + Psi.T @ (k[:, None] * Psi))
     C = np.diag(modal.damping) if modal.proportional else modal.damping
     width = np.einsum("ij,ik,kj->j", shapes, C, shapes) / (2.0 * np.pi)

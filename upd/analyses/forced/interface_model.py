@@ -474,9 +474,9 @@ def state_at(
         F_E, N.
     """
     drive = force * model.excitation.at_start
-    march, h, contact = springs.march, b.harmonics, b.force(x)
+    march, h, contact = springs.march, b.harmonics, b.period(x)
     omega, k = 2.0 * np.pi * frequency, h.dynamic
-    flat = contact.force.reshape(1, len(b.Psi), h.size)
+    flat = contact.coefficients(b.Q).reshape(1, len(b.Psi), h.size)
     moving = b.displacement(np.array([omega]), flat, b.split(x)[1][None])[0]
     z = to_complex(moving, h)
     mean = moving[:, 0] if h.static else np.zeros(len(z))
@@ -488,7 +488,7 @@ def state_at(
     q += (march.shapes.T @ springs.rest.T.ravel()) / march.omega**2
     carried = np.zeros((march.n, 3))
     # without friction there is no force along a face
-    now = contact.march.force[:, :, 0]
+    now = contact.force[:, :, 0]
     carried[:, _PLACES[now.shape[1] - 1]] = now
     f = np.ascontiguousarray(carried.T).ravel()
     s, sv, sa = (part[n_blade:] for part in (moved, speed, pull))

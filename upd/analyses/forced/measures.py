@@ -215,7 +215,7 @@ def loops(answer: FrequencyResponse, i: int, count: int) -> list[Loop]:
     if not b.contacts.tangents:
         return []
     x = answer.x[i]
-    force, motion = b.force(x).march.force, b.split(x)[0] @ b.E.T
+    force, motion = b.period(x).force, b.split(x)[0] @ b.E.T
     out = []
     for p in losing_most(answer.energy[i], count):
         limit = b.contacts.law.mu[p] * force[p, 0]
@@ -339,7 +339,7 @@ def residual_error(answer: FrequencyResponse) -> float:
     """
     b, worst = answer.balance, 0.0
     for f, x, kept in zip(answer.frequency, answer.x, answer.contact_force, strict=True):
-        off = np.abs(b.force(x).force - kept).max()
+        off = np.abs(b.force(x) - kept).max()
         forces = off / max(float(np.abs(kept).max()), _TINY)
         worst = max(worst, b.misfit(x, float(2.0 * np.pi * f)), float(forces))
     return worst

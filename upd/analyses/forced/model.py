@@ -38,12 +38,12 @@ from upd.hbm import (
     contact_rows,
     contacts,
     frequency_response,
-    harmonics,
     rigid_damper,
 )
-from upd.hbm.springs.balance import Balance, assembled
+from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.damper import attach
 from upd.hbm.springs.points import stuck_stiffness
+from upd.hbm.springs.response import GivenSystem
 from upd.linalg.parallel import in_parallel
 from upd.mesh import IntArray
 from upd.scene import ForcedScene
@@ -445,23 +445,10 @@ def balance_of(
         Per period; those of the scene when None.
     """
     b = plan.scene.balance
-    given = model.slider
-    slider = None
-    if given is not None:
-        slider = np.zeros((len(given), 2))
-        slider[:, : given.shape[1]] = given
-    return assembled(
-        model.M,
-        model.C,
-        model.K,
-        model.contacts,
-        model.harmonic_force(force),
-        model.static,
-        harmonics(numbers),
-        joined_to=(model.damper, model.damper_rows),
-        samples=samples or (None if b.samples == "auto" else b.samples),
-        start=b.slider,
-        slider=slider,
+    count = samples or (None if b.samples == "auto" else b.samples)
+    given = GivenSystem(**model.system, harmonics=numbers, samples=count, start=b.slider)
+    return given.balance(
+        "forced response", np.ones(1), model.harmonic_force(force), fast_exits=True
     )
 
 

@@ -146,7 +146,7 @@ def climbed(
     height = 1e-3 * (2.0 * np.pi * k * top.frequency) ** 2 * top.amplitude / force
     if not top.found or not is_near(top.frequency / about.frequency, height / about.height):
         return None
-    slips = bool((b.force(top.x).march.state != STICK).any())
+    slips = bool((b.period(top.x).state != STICK).any())
     return Top(top.frequency, float(height), top.x, slips)
 
 
@@ -350,6 +350,6 @@ def _amplitude(model: Model, b: Balance, x: Array, f: float, side: Side) -> floa
     """Of a blade in the lowest harmonic excited, mm."""
     j = b.harmonics.place(model.excitation.lowest)
     omega = np.array([2.0 * np.pi * f])
-    force = b.force(x).force.reshape(1, len(b.Psi), b.harmonics.size)
+    force = b.force(x).reshape(1, len(b.Psi), b.harmonics.size)
     moving = to_complex(b.displacement(omega, force, b.split(x)[1][None])[0], b.harmonics)
     return float(abs(model.row(side) @ moving[:, j]))

@@ -27,7 +27,6 @@ from upd.analyses.forced.plan import ForcedPlan
 from upd.errors import InputError
 from upd.hbm import nonlinear_mode
 from upd.hbm.springs.balance import Balance
-from upd.hbm.springs.points import stuck_stiffness
 from upd.hbm.springs.response import parabola
 from upd.linalg.parallel import threads_for
 from upd.linalg.processes import Job
@@ -423,7 +422,7 @@ def first_slip(b: Balance, shape: Array, omega: float) -> float:
     InputError
         Where no point sticks at rest, or none ever slips.
     """
-    stiffness = stuck_stiffness(b.contacts)
+    stiffness = b.stuck_stiffness
     rest = b.split(b.stuck(omega))[0][..., 0] * stiffness + b.stuck_constant
     moved = (b.Psi @ shape).reshape(rest.shape) * stiffness
     mu = b.contacts.law.mu

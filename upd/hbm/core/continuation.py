@@ -18,13 +18,14 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upd.hbm.core.newton import (
     EPS,
     ROUNDING,
+    Border,
     FloatArray,
     Function,
+    PathProblem,
     Scale,
     Settings,
     Solution,
@@ -81,8 +82,6 @@ class Path(Shown):
         Unknowns.
     p : (n_step,) ndarray
         Parameter.
-    iterations : (n_step,) ndarray of int
-        Newton iterations.
     state : State
         The last state, from which the path can be continued.
     status : {"complete", "stopped", "step limit"}
@@ -92,7 +91,6 @@ class Path(Shown):
 
     x: FloatArray
     p: FloatArray
-    iterations: NDArray[np.int64]
     state: State
     status: Status
     message: str
@@ -139,30 +137,28 @@ def follow(
     Path
     """
     s = settings or Settings()
-    state = (
-        start
-        if isinstance(start, State)
-        else begin(function, start[0], start[1], scale, p_scale, s, end)
-    )
+    problem = PathProblem(function, scale, p_scale, s)
+    state = start if isinstance(start, State) else begin(problem, *start, end)
     marks = np.unique(np.append(np.asarray([] if wanted is None else wanted, dtype=float), end))
     rest = 0
-    xs, ps, counts = [state.x], [state.p], [0]
+    xs, ps = [state.x], [state.p]
     passed: dict[float, list[FloatArray]] = {float(mark): [] for mark in marks}
     status: Status = "stopped"
     while len(ps) < s.most_points:
         if (end - state.p) * state.direction <= 0:
             status, message = "complete", f"reached p = {end:.9g} in {len(ps)} points"
             break
-        found, state = advance(function, state, scale, p_scale, s, marks)
+        found = advance(problem, state, marks)
         if found is None:
             message = (
                 f"stopped at p = {state.p:.9g}: no convergence with the smallest step; refine "
                 "the samples or change the start"
             )
             break
+        state = found
         rest = len(ps) if abs(found.p - ps[-1]) > 4 * EPS * abs(found.p) else rest
         if rest < len(ps) and np.abs(found.x).max() > UNBOUNDED * np.abs(xs[rest]).max() > 0:
-            xs, ps, counts = xs[: rest + 1], ps[: rest + 1], counts[: rest + 1]
+            xs, ps = xs[: rest + 1], ps[: rest + 1]
             message = (
                 f"stopped at p = {found.p:.9g}: the answer grows without bound there; it needs "
                 "damping, or more friction"
@@ -171,7 +167,6 @@ def follow(
         left = rest == len(ps)
         xs.append(found.x)
         ps.append(found.p)
-        counts.append(found.iterations)
         there = passed.get(found.p, [])
         if left and any(np.abs((found.x - x) / scale(x)).max() <= ROUNDING for x in there):
             message = (
@@ -191,32 +186,19 @@ def follow(
         message = f"{s.most_points} points used before p = {end:.9g}; it is at p = {state.p:.9g}"
     if status == "stopped":
         log.warning(message)
-    iterations = np.array(counts, dtype=np.int64)
-    return Path(np.array(xs), np.array(ps), iterations, state, status, message)
+    return Path(np.array(xs), np.array(ps), state, status, message)
 
 
-def begin(
-    function: Function,
-    x: FloatArray,
-    p: float,
-    scale: Scale,
-    p_scale: float,
-    settings: Settings,
-    end: float = np.inf,
-) -> State:
+def begin(problem: PathProblem, x: FloatArray, p: float, end: float = np.inf) -> State:
     """State at a solved point (x, p), towards larger p, or towards an end.
 
     Parameters
     ----------
-    function, scale
-        As in `follow`.
+    problem : PathProblem
     x : (n,) ndarray
         Unknowns of the point.
     p : float
         Its parameter.
-    p_scale : float
-        Size of the parameter.
-    settings : Settings
     end : float
         Value of the parameter to go to.
 
@@ -224,23 +206,15 @@ def begin(
     -------
     State
     """
-    D = scale(x)
-    _, J, dp = function(x, p, True)
+    _, J, dp = problem.function(x, p, True)
     direction = 1.0 if end >= p else -1.0
     normal = np.zeros(len(x) + 1)
     normal[-1] = direction
-    lu = bordered_factors(J, dp, D, p_scale, normal)
-    return State(x, p, lu.tangent(), settings.first_step, direction, lu.sign)
+    lu = bordered_factors(J, Border(dp, problem.scale(x), problem.p_scale, normal))
+    return State(x, p, lu.tangent(), problem.settings.first_step, direction, lu.sign)
 
 
-def advance(
-    function: Function,
-    state: State,
-    scale: Scale,
-    p_scale: float,
-    settings: Settings,
-    marks: FloatArray | None = None,
-) -> tuple[Solution | None, State]:
+def advance(problem: PathProblem, state: State, marks: FloatArray | None = None) -> State | None:
     """One accepted step, round corners too, or None when even the smallest fails.
 
     Along one piece of the path the determinant keeps its sign but at bifurcations, which the
@@ -249,37 +223,28 @@ def advance(
 
     Parameters
     ----------
-    function, scale
-        As in `follow`.
+    problem : PathProblem
     state : State
         Where the path stands.
-    p_scale : float
-        Size of the parameter.
-    settings : Settings
     marks : (k,) ndarray, optional
         Values of the parameter that are hit exactly.
 
     Returns
     -------
-    solution : Solution or None
-    state : State
-        The next state; the same one when the step fails.
+    State or None
+        The next one.
     """
-    step = _PathStep(function, state, scale, p_scale, settings)
-    found = step.taken(np.zeros(0) if marks is None else marks)
-    return (None, state) if found is None else found
+    return _PathStep(problem, state).taken(np.zeros(0) if marks is None else marks)
 
 
 class _PathStep:
     """Steps from a state, in its scaled coordinates."""
 
-    def __init__(
-        self, function: Function, state: State, scale: Scale, p_scale: float, settings: Settings
-    ) -> None:
-        self.function, self.state, self.scale = function, state, scale
-        self.p_scale, self.s, self.D = p_scale, settings, scale(state.x)
+    def __init__(self, problem: PathProblem, state: State) -> None:
+        self.problem, self.state, self.D = problem, state, problem.scale(state.x)
+        self.p_scale, self.s = problem.p_scale, problem.settings
 
-    def taken(self, marks: FloatArray) -> tuple[Solution, State] | None:
+    def taken(self, marks: FloatArray) -> State | None:
         """The first step that is good, of shorter and shorter ones."""
         s, state, h = self.s, self.state, self.state.step
         while h >= s.smallest_step:
@@ -315,7 +280,7 @@ class _PathStep:
             h = min(h, length) / 2
         return self._corner()
 
-    def _corner(self) -> tuple[Solution, State] | None:
+    def _corner(self) -> State | None:
         """One step round a corner of more than a right angle.
 
         A path has such corners where the equations are only piecewise smooth. Beyond the kink the
@@ -330,15 +295,15 @@ class _PathStep:
         s, state = self.s, self.state
         reach = 4 * s.smallest_step
         while reach <= s.kink_step:
-            _, J, dp = self.function(*self._along(state.tangent, reach), True)
+            _, J, dp = self.problem.function(*self._along(state.tangent, reach), True)
             lu = None
             if finite_jacobian(J):
-                lu = bordered_factors(J, dp, self.D, self.p_scale, state.tangent)
+                lu = bordered_factors(J, Border(dp, self.D, self.p_scale, state.tangent))
             if lu is not None and not lu.singular:
                 tangent = lu.tangent() * (lu.sign * state.sign)
                 if tangent @ state.tangent < np.cos(s.angle):
                     guess, p = self._along(tangent, reach)
-                    found = correct(self.function, guess, p, self.D, self.p_scale, tangent, s)
+                    found = correct(self.problem, guess, p, self.D, tangent)
                     near = self._distance(found, state.x, state.p) <= STRAY * reach
                     # a tangent of the other sign runs back on the piece the path came from
                     if near and found.tangent is not None and found.sign == state.sign:
@@ -372,7 +337,7 @@ class _PathStep:
 
     def _corrected(self, x: FloatArray, p: float, normal: FloatArray, most: float) -> Solution:
         """The solution in the plane through a point, or none when it strays farther than `most`."""
-        found = correct(self.function, x, p, self.D, self.p_scale, normal, self.s)
+        found = correct(self.problem, x, p, self.D, normal)
         return found if self._distance(found, x, p) <= most else found._replace(tangent=None)
 
     def _along(self, direction: FloatArray, length: float) -> tuple[FloatArray, float]:
@@ -396,14 +361,14 @@ class _PathStep:
         """Scaled length of the way from a point to a solution."""
         return float(np.hypot(np.linalg.norm((found.x - x) / self.D), (found.p - p) / self.p_scale))
 
-    def _moved(self, found: Solution, side: float, step: float) -> tuple[Solution, State]:
-        """A solution, and the state there with its tangent to one side."""
+    def _moved(self, found: Solution, side: float, step: float) -> State:
+        """The state at a solution, with its tangent to one side."""
         assert found.tangent is not None
         tangent = side * found.tangent
-        tangent[:-1] = tangent[:-1] * self.D / self.scale(found.x)
+        tangent[:-1] = tangent[:-1] * self.D / self.problem.scale(found.x)
         tangent /= np.linalg.norm(tangent)
         direction = self.state.direction
-        return found, State(found.x, found.p, tangent, step, direction, side * found.sign)
+        return State(found.x, found.p, tangent, step, direction, side * found.sign)
 
     def _to_mark(self, marks: FloatArray, h: float) -> tuple[float, float | None]:
         """Step length cut at the next wanted p, and that p when it lies within the step."""

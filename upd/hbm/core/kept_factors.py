@@ -28,7 +28,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.hbm.core.newton import BorderedFactors
+from upd.hbm.core.newton import Border, BorderedFactors
 from upd.linalg.gmres import gmres
 
 FloatArray = NDArray[np.float64]
@@ -47,18 +47,14 @@ WORTH_KEEPING = 1000
 SOLUTIONS = 24.0
 
 
-class BorderedMatrix(Protocol):
-    """[[J, r_p], [normal]], in scaled unknowns, with the equations as they are."""
+class KeptJacobian(Protocol):
+    """A Jacobian J, direction by direction."""
 
-    def product(self, z: FloatArray) -> FloatArray:
-        """What scaled unknowns z (n + 1,) give: the equations (n,) and the border."""
+    def product(self, x: FloatArray) -> FloatArray:
+        """J x."""
 
-    def factored(self) -> BorderedFactors:
-        """Its factors."""
-
-    @property
-    def sizes(self) -> FloatArray:
-        """Sizes of the unknowns, that of the parameter last (n + 1,)."""
+    def factored(self, border: Border) -> BorderedFactors:
+        """Factors of [[J, r_p], [normal]]."""
 
 
 class KeptFactors:
@@ -69,16 +65,17 @@ class KeptFactors:
     """
 
     def __init__(self) -> None:
-        self._factors: BorderedFactors | None = None
-        self._sizes = np.zeros(0)
+        self.factors: BorderedFactors | None = None
+        self.sizes = np.zeros(0)
         self._spent, self._uses, self._newest = 0.0, 0, 0.0
 
-    def near(self, matrix: BorderedMatrix, unknowns: int) -> BorderedFactors:
+    def near(self, J: KeptJacobian, border: Border, unknowns: int) -> BorderedFactors:
         """Factors of a matrix, or what solves with it from those that are kept.
 
         Parameters
         ----------
-        matrix : BorderedMatrix
+        J : KeptJacobian
+        border : Border
         unknowns : int
             Rows of its factors.
 
@@ -86,25 +83,22 @@ class KeptFactors:
         -------
         BorderedFactors
         """
-        same = len(self._sizes) == len(matrix.sizes)
-        if not same or self._factors is None or self._factors.singular or self._dear:
-            return self.renewed(matrix, unknowns)
+        same = len(self.sizes) == len(border.normal)
+        dear = self._newest * max(self._uses, 1) > self._spent
+        if not same or self.factors is None or self.factors.singular or dear:
+            return self.renewed(J, border, unknowns)
         self._uses, self._newest = self._uses + 1, 0.0
-        return _Near(self, matrix, self._factors, self._sizes, unknowns)
+        return _Near(self, J, border, unknowns)
 
-    @property
-    def _dear(self) -> bool:
-        return self._newest * max(self._uses, 1) > self._spent
-
-    def renewed(self, matrix: BorderedMatrix, unknowns: int) -> BorderedFactors:
+    def renewed(self, J: KeptJacobian, border: Border, unknowns: int) -> BorderedFactors:
         """Factors of the matrix, kept from now on; parameters as of `near`."""
-        self._factors, self._sizes = matrix.factored(), matrix.sizes
+        self.factors, self.sizes = J.factored(border), border.sizes
         self._spent, self._uses, self._newest = unknowns / SOLUTIONS, 1, 0.0
-        return self._factors
+        return self.factors
 
     def forget(self) -> None:
         """Let the factors go: the next ones are new."""
-        self._factors, self._sizes = None, np.zeros(0)
+        self.factors, self.sizes = None, np.zeros(0)
 
     def __reduce__(self) -> tuple[type[KeptFactors], tuple[()]]:
         # files and other processes do without them
@@ -121,17 +115,11 @@ class _Near:
 
     singular = False
 
-    def __init__(
-        self,
-        kept: KeptFactors,
-        matrix: BorderedMatrix,
-        factors: BorderedFactors,
-        sizes: FloatArray,
-        unknowns: int,
-    ) -> None:
-        self._kept, self._matrix, self._factors, self._unknowns = kept, matrix, factors, unknowns
+    def __init__(self, kept: KeptFactors, J: KeptJacobian, border: Border, unknowns: int) -> None:
+        assert kept.factors is not None
+        self._kept, self._J, self._border, self._unknowns = kept, J, border, unknowns
         # unknowns of the factors are scaled by sizes of their own
-        self._rescaled = sizes / matrix.sizes
+        self._factors, self._rescaled = kept.factors, kept.sizes / border.sizes
         self._own: BorderedFactors | None = None
         self._right = True
 
@@ -147,8 +135,13 @@ class _Near:
 
     def _renew(self) -> BorderedFactors:
         if self._own is None:
-            self._own = self._kept.renewed(self._matrix, self._unknowns)
+            self._own = self._kept.renewed(self._J, self._border, self._unknowns)
         return self._own
+
+    def _product(self, z: FloatArray) -> FloatArray:
+        """What scaled unknowns z (n + 1,) give: the equations (n,) and the border."""
+        dp, D, p_scale, normal = self._border
+        return np.append(self._J.product(z[:-1] * D) + dp * (z[-1] * p_scale), normal @ z)
 
     def _from_factors(self, b: FloatArray) -> FloatArray:
         return self._factors.solve(b[:-1], float(b[-1])) * self._rescaled
@@ -157,7 +150,7 @@ class _Near:
         if self._own is None:
             most = int(self._unknowns / SOLUTIONS / 2)
             found = gmres(
-                lambda z: self._from_factors(self._matrix.product(z)),
+                lambda z: self._from_factors(self._product(z)),
                 self._from_factors(b),
                 left,
                 most,

@@ -14,7 +14,7 @@ FloatArray = NDArray[np.float64]
 
 
 class BorderedFactors(Protocol):
-    """LU of [[J, r_p], [normal]] in scaled unknowns and equations."""
+    """What solves with [[J, r_p], [normal]] in scaled unknowns."""
 
     @property
     def singular(self) -> bool:
@@ -36,16 +36,40 @@ class BorderedFactors(Protocol):
 
 
 class StructuredJacobian(Protocol):
-    """A Jacobian that knows its structure, where a matrix (n, n) would be large."""
+    """A Jacobian J that knows its structure, where a matrix (n, n) would be large."""
 
     @property
     def finite(self) -> bool:
         """Whether all its entries are."""
 
-    def bordered(
-        self, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray
-    ) -> BorderedFactors:
+    def bordered(self, border: Border) -> BorderedFactors:
         """Factors of [[J, r_p], [normal]]."""
+
+
+class Border(NamedTuple):
+    """What makes a Jacobian J the matrix [[J, r_p], [normal]] of a plane, in scaled unknowns.
+
+    Attributes
+    ----------
+    dp : (n,) ndarray
+        Derivative of the residual by the parameter.
+    D : (n,) ndarray
+        Sizes of the unknowns.
+    p_scale : float
+        Size of the parameter.
+    normal : (n + 1,) ndarray
+        Across the plane, in scaled coordinates.
+    """
+
+    dp: FloatArray
+    D: FloatArray
+    p_scale: float
+    normal: FloatArray
+
+    @property
+    def sizes(self) -> FloatArray:
+        """Sizes of the unknowns, that of the parameter last (n + 1,)."""
+        return np.append(self.D, self.p_scale)
 
 
 #: (x, p, with Jacobian) -> residual (n,), Jacobian (n, n) or None, derivative by p (n,)
@@ -121,8 +145,6 @@ class Solution(NamedTuple):
         Scaled tangent, None when the corrector failed.
     iterations : int
         Newton iterations.
-    ratio : float
-        Smallest over largest pivot.
     sign : float
         Sign of the bordered determinant.
     """
@@ -131,34 +153,33 @@ class Solution(NamedTuple):
     p: float
     tangent: FloatArray | None
     iterations: int
-    ratio: float
     sign: float = 0.0
 
 
-def solve(
-    function: Function, x: FloatArray, p: float, scale: Scale, settings: Settings | None = None
-) -> Solution:
-    """Newton at a fixed parameter.
+class PathProblem(NamedTuple):
+    """Equations of a path.
 
-    Parameters
+    Attributes
     ----------
     function : callable
         (x, p, with Jacobian) -> residual (n,), Jacobian (n, n) or None, derivative by p (n,).
-    x : (n,) ndarray
-        Initial guess.
-    p : float
-        Parameter.
     scale : callable
         x (n,) -> sizes of the unknowns (n,).
-    settings : Settings, optional
-
-    Returns
-    -------
-    Solution
+    p_scale : float
+        Size of the parameter.
+    settings : Settings
     """
-    normal = np.zeros(len(x) + 1)
-    normal[-1] = 1.0
-    return correct(function, x, p, scale(x), 1.0, normal, settings or Settings())
+
+    function: Function
+    scale: Scale
+    p_scale: float = 1.0
+    settings: Settings = Settings()
+
+    def solve(self, x: FloatArray, p: float) -> Solution:
+        """Newton at a fixed parameter from a guess."""
+        normal = np.zeros(len(x) + 1)
+        normal[-1] = 1.0
+        return correct(self, x, p, self.scale(x), normal)
 
 
 def finite_jacobian(J: FloatArray | StructuredJacobian | None) -> bool:
@@ -177,76 +198,85 @@ def finite_jacobian(J: FloatArray | StructuredJacobian | None) -> bool:
     return bool(np.isfinite(J).all()) if isinstance(J, np.ndarray) else J.finite
 
 
-def bordered_factors(
-    J: FloatArray | StructuredJacobian | None,
-    dp: FloatArray,
-    D: FloatArray,
-    p_scale: float,
-    normal: FloatArray,
-) -> BorderedFactors:
+def bordered_factors(J: FloatArray | StructuredJacobian | None, border: Border) -> BorderedFactors:
     """LU of [[J, r_p], [normal]] in scaled unknowns and equations.
 
     Parameters
     ----------
     J : (n, n) ndarray or StructuredJacobian
-    dp : (n,) ndarray
-        Derivative of the residual by the parameter.
-    D : (n,) ndarray
-        Sizes of the unknowns.
-    p_scale : float
-        Size of the parameter.
-    normal : (n + 1,) ndarray
-        The border, in scaled coordinates.
+    border : Border
 
     Returns
     -------
     BorderedFactors
     """
     assert J is not None
-    if isinstance(J, np.ndarray):
-        return _Bordered(J, dp, D, p_scale, normal)
-    return J.bordered(dp, D, p_scale, normal)
+    return Factors(J, border) if isinstance(J, np.ndarray) else J.bordered(border)
 
 
-class _Bordered:
-    """LU of [[J, r_p], [normal]] in scaled unknowns and equations."""
+class Factors:
+    """LU of [[J, r_p], [normal]] of a matrix J (n, n), equations divided by their largest entries.
 
-    def __init__(
-        self, J: FloatArray, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray
-    ) -> None:
-        n = len(D)
+    Attributes
+    ----------
+    singular : bool
+        Whether a pivot is zero.
+    sign : float
+        Sign of the determinant, up to a factor that never changes on a path.
+    ratio : float
+        Smallest over largest pivot.
+    """
+
+    singular: bool
+    sign: float
+    ratio: float
+    D: FloatArray
+
+    def __init__(self, J: FloatArray, border: Border) -> None:
+        n, self.D = len(J), border.D
         A = np.empty((n + 1, n + 1), order="F")
-        np.multiply(J, D, out=A[:n, :n])
-        A[:n, n] = dp * p_scale
-        self.rows = np.abs(A[:n]).max(axis=1)
-        self.rows[self.rows == 0] = 1.0
-        A[:n] /= self.rows[:, None]
-        A[n] = normal
+        np.multiply(J, border.D, out=A[:n, :n])
+        A[:n, n] = border.dp * border.p_scale
+        rows = np.abs(A[:n]).max(axis=1)
+        rows[rows == 0] = 1.0
+        A[:n] /= rows[:, None]
+        A[n] = border.normal
+        self._factorise(A, rows)
+
+    def _factorise(self, A: FloatArray, rows: FloatArray) -> None:
+        """Parameters: the matrix, overwritten, and what its equations were divided by."""
+        self.rows = rows
         self.lu, self.piv, info = lapack.dgetrf(A, overwrite_a=True)
-        self.singular = info != 0
-        swaps = int(np.count_nonzero(self.piv != np.arange(n + 1)))
-        self.sign = float(np.prod(np.sign(np.diagonal(self.lu)))) * (-1.0) ** swaps
-        diagonal = np.abs(np.diagonal(self.lu))
-        self.ratio = max(float(diagonal.min() / diagonal.max()), EPS)
+        diagonal = np.diagonal(self.lu)
+        size = np.abs(diagonal)
+        self.singular = info != 0 or not np.isfinite(size).all()
+        if self.singular:
+            self.sign, self.ratio = 0.0, EPS
+            return
+        swaps = int(np.count_nonzero(self.piv != np.arange(len(size))))
+        negative = int(np.count_nonzero(diagonal < 0.0))
+        self.sign = 1.0 if (swaps + negative) % 2 == 0 else -1.0
+        self.ratio = max(float(size.min() / size.max()), EPS)
+
+    def _condensed(self, r: FloatArray, last: float) -> FloatArray:
+        """Scaled unknowns of the factored equations."""
+        right = np.empty(len(self.rows) + 1)
+        np.divide(r, self.rows, out=right[:-1])
+        right[-1] = last
+        return np.asarray(lapack.dgetrs(self.lu, self.piv, right, overwrite_b=True)[0])
 
     def solve(self, r: FloatArray, last: float) -> FloatArray:
         """Scaled correction for the residual r (n,) and the right-hand side of the border."""
-        return np.asarray(lapack.dgetrs(self.lu, self.piv, np.append(r / self.rows, last))[0])
+        return self._condensed(r, last)
 
     def tangent(self) -> FloatArray:
         """Unit vector along the path, on the side the border points to."""
-        t = self.solve(np.zeros(len(self.rows)), 1.0)
+        t = self.solve(np.zeros(len(self.D)), 1.0)
         return np.asarray(t / np.linalg.norm(t))
 
 
 def correct(
-    function: Function,
-    guess: FloatArray,
-    p_guess: float,
-    D: FloatArray,
-    p_scale: float,
-    normal: FloatArray,
-    s: Settings,
+    problem: PathProblem, guess: FloatArray, p_guess: float, D: FloatArray, normal: FloatArray
 ) -> Solution:
     """Newton in the plane through the guess, damped so that the next correction shrinks.
 
@@ -255,11 +285,13 @@ def correct(
 
     Parameters
     ----------
+    problem : PathProblem
     guess, p_guess : (n,) ndarray, float
         Where it begins.
-    function, D, p_scale, normal, s
-        As in `solve`; size of the parameter; direction (n + 1,) across the plane, in scaled
-        coordinates; step control.
+    D : (n,) ndarray
+        Sizes of the unknowns.
+    normal : (n + 1,) ndarray
+        Direction across the plane, in scaled coordinates.
 
     Returns
     -------
@@ -270,12 +302,13 @@ def correct(
     ----------
     P. Deuflhard, Newton Methods for Nonlinear Problems (2004), 3.3.
     """
+    function, _, p_scale, s = problem
     x, p = guess.copy(), p_guess
     for count in range(1, s.iterations + 1):
         r, J, dp = function(x, p, True)
         if not finite_jacobian(J):
             break
-        lu = bordered_factors(J, dp, D, p_scale, normal)
+        lu = bordered_factors(J, Border(dp, D, p_scale, normal))
         if lu.singular:
             break
         correction, factor = lu.solve(-r, 0.0), 1.0
@@ -289,14 +322,8 @@ def correct(
             r, _, _ = function(x_new, p_new, False)
             rest = lu.solve(-r, 0.0)
             if _solved(rest, correction, lu.ratio, s):
-                return Solution(
-                    x_new + rest[:-1] * D,
-                    p_new + float(rest[-1]) * p_scale,
-                    lu.tangent(),
-                    count + 1,
-                    lu.ratio,
-                    lu.sign,
-                )
+                x, p = x_new + rest[:-1] * D, p_new + float(rest[-1]) * p_scale
+                return Solution(x, p, lu.tangent(), count + 1, lu.sign)
             shrinks = float(np.linalg.norm(rest)) / float(np.linalg.norm(correction))
             if factor == 1 and shrinks <= CHORD:
                 x, p, correction = x_new, p_new, rest
@@ -305,9 +332,9 @@ def correct(
             else:
                 factor /= 2
         else:
-            return Solution(x, p, None, count, 0.0)
+            return Solution(x, p, None, count)
         x, p = x_new, p_new
-    return Solution(x, p, None, s.iterations, 0.0)
+    return Solution(x, p, None, s.iterations)
 
 
 def _solved(rest: FloatArray, correction: FloatArray, ratio: float, s: Settings) -> bool:

@@ -26,7 +26,7 @@ from upd.hbm.faces.march import Fallback, InterfaceMarch
 from upd.hbm.faces.state import EPS, ComplexArray, FloatArray, InterfaceModel, InterfaceState
 from upd.hbm.faces.step import OPEN, SLIP, STICK
 from upd.hbm.faces.sweep import settle
-from upd.hbm.springs.residuals import FREQUENCY_SHARE
+from upd.hbm.springs.sweep import FREQUENCY_SHARE
 from upd.linalg.parallel import SideBySide
 from upd.linalg.select import threads_used
 
@@ -120,7 +120,8 @@ class InterfaceResponse:
         InterfaceState
         """
         one = self.points[i]
-        return self.equations.state(one.q, one.rigid, one.slip, 2.0 * np.pi * one.frequency)
+        w = 2.0 * np.pi * one.frequency
+        return self.equations.state(self.equations.march_from(one.q, one.rigid, one.slip, w))
 
 
 def interface_response(
@@ -173,7 +174,9 @@ def interface_response(
     """
     clock = time.perf_counter()
     f = np.asarray(frequencies, float)
-    if f.ndim != 1 or not f.size or not (f > 0.0).all() or not _in_order(f):
+    steps = np.diff(f.ravel())
+    in_order = (steps > 0.0).all() or (steps < 0.0).all()
+    if f.ndim != 1 or not f.size or not (f > 0.0).all() or not in_order:
         raise InputError(
             "interface balance: frequencies must be a rising or falling list of positive numbers, "
             "in Hz"
@@ -200,11 +203,6 @@ def interface_response(
         message,
         equations,
     )
-
-
-def _in_order(f: FloatArray) -> bool:
-    steps = np.diff(f)
-    return bool((steps > 0.0).all() or (steps < 0.0).all())
 
 
 class InterfacePoint(NamedTuple):
@@ -257,13 +255,7 @@ class InterfacePoint(NamedTuple):
 
 
 def read_point(
-    e: InterfaceEquations,
-    period: ContactPeriod,
-    q: FloatArray,
-    rigid: FloatArray,
-    slip: FloatArray,
-    frequency: float,
-    iterations: int,
+    e: InterfaceEquations, period: ContactPeriod, frequency: float, iterations: int
 ) -> InterfacePoint:
     """Read a point from its period; a period is large and is not kept.
 
@@ -272,36 +264,35 @@ def read_point(
     e : InterfaceEquations
     period : ContactPeriod
         That of the unknowns.
-    q, rigid, slip, frequency, iterations
+    frequency, iterations
         As in `InterfacePoint`.
 
     Returns
     -------
     InterfacePoint
     """
-    w = 2.0 * np.pi * frequency
     nodes = np.array([(period.state == code).mean(axis=0) for code in (OPEN, STICK, SLIP)]).T
     loss = _rubbed(e, period)
     return InterfacePoint(
         frequency,
-        q,
-        rigid,
-        slip,
+        period.q,
+        period.rigid_before,
+        period.slip_before,
         iterations,
-        _outputs(e, q, period),
+        _outputs(e, period),
         nodes.mean(axis=0),
         _left_out(period, e.highest),
-        np.append(_energy(e, q, period, w), loss.sum()),
+        np.append(_energy(e, period), loss.sum()),
         nodes,
         loss,
-        _unresolved(e, q, period, w),
-        _residual(e, period, q, rigid, slip, w),
+        _unresolved(e, period),
+        _residual(e, period),
     )
 
 
-def _unresolved(e: InterfaceEquations, q: FloatArray, period: ContactPeriod, w: float) -> float:
+def _unresolved(e: InterfaceEquations, period: ContactPeriod) -> float:
     """What the contact forces' harmonics above H would move the faces by the blades' modes."""
-    model = e.model
+    model, q, w = e.model, period.q, period.w
     modal = 2.0 / e.samples * np.fft.rfft(period.modal, axis=0)[e.highest + 1 :]
     kw = w * np.arange(e.highest + 1, e.highest + 1 + len(modal))[:, None]
     resistance = model.omega**2 - kw**2 + 2j * model.damping * model.omega * kw
@@ -311,24 +302,18 @@ def _unresolved(e: InterfaceEquations, q: FloatArray, period: ContactPeriod, w: 
     return float(np.linalg.norm(model.shapes @ (modal / resistance).T)) / moved
 
 
-def _residual(
-    e: InterfaceEquations,
-    period: ContactPeriod,
-    q: FloatArray,
-    rigid: FloatArray,
-    slip: FloatArray,
-    w: float,
-) -> float:
+def _residual(e: InterfaceEquations, period: ContactPeriod) -> float:
     """The largest of the residual of the equations, over what they are made of."""
-    model = e.model
+    model, q = e.model, period.q
     forces = np.abs(e.Q @ period.modal).max() + np.abs(e.drive @ model.places.T).max()
-    blades = float(np.abs(e.misfit(period, q, w)).max() / forces) if forces > 0.0 else 0.0
+    blades = float(np.abs(e.misfit(period)).max() / forces) if forces > 0.0 else 0.0
     face = float(np.abs(model.shapes @ q[1:].T).max())
     if face <= EPS * float(np.abs(model.shapes @ q[0]).max()):
         return blades
     reach = np.abs(model.columns).max(axis=0)
-    ends = [np.abs((period.rigid - rigid)[0] * reach).max(), np.abs(period.slip - slip).max()]
-    return max(blades, float(max(ends)) / face)
+    moved = np.abs((period.rigid - period.rigid_before)[0] * reach).max()
+    slid = np.abs(period.slip - period.slip_before).max()
+    return max(blades, float(max(moved, slid)) / face)
 
 
 def _rubbed(e: InterfaceEquations, period: ContactPeriod) -> FloatArray:
@@ -338,10 +323,10 @@ def _rubbed(e: InterfaceEquations, period: ContactPeriod) -> FloatArray:
     return np.asarray(e.model.copies * lost)
 
 
-def _outputs(e: InterfaceEquations, q: FloatArray, period: ContactPeriod) -> ComplexArray:
+def _outputs(e: InterfaceEquations, period: ContactPeriod) -> ComplexArray:
     """(H + 1, K) harmonics of the outputs."""
     model = e.model
-    real = q @ model.seen_modes.T + e.Q @ (period.force @ model.seen_contact.T)
+    real = period.q @ model.seen_modes.T + e.Q @ (period.force @ model.seen_contact.T)
     real = real + e.drive @ model.seen_drive.T
     out = np.zeros((e.highest + 1, real.shape[1]), complex)
     out[0] = real[0]
@@ -359,9 +344,9 @@ def _left_out(period: ContactPeriod, highest: int) -> float:
     return float(np.linalg.norm(modal[1 + highest :])) / whole
 
 
-def _energy(e: InterfaceEquations, q: FloatArray, period: ContactPeriod, w: float) -> FloatArray:
+def _energy(e: InterfaceEquations, period: ContactPeriod) -> FloatArray:
     """Work of the excitation and lost by damping, of the whole [N mm]."""
-    model, share = e.model, 2.0 * np.pi / e.samples
+    model, q, w, share = e.model, period.q, period.w, 2.0 * np.pi / e.samples
     F, rate = e.E @ e.drive, e.E @ e.turned(e.drive, e.order)
     v = e.E @ e.turned(q, e.order)
     # the places also move with the contact forces: F d(E'f) = d(F E'f) - E'f dF
@@ -404,12 +389,14 @@ class InterfaceCurve:
     def follow(self, f: FloatArray) -> tuple[str, str]:
         """Status and message of the walk over the frequencies."""
         way = 1.0 if f[-1] >= f[0] else -1.0
-        at = self._first(float(f[0]))
-        if at is not None:
-            at = self._begin(at, way)
-        missed = self.missed
+        missed, first = self.missed, float(f[0])
+        # a start that moves is integrated in time
+        at = None if self.equations.start.v.any() else self._raised(first)
+        at = at or self._jump(first)
         if at is None:
-            missed.append(float(f[0]))
+            missed.append(first)
+        else:
+            at = self._entered(at, way)
         while at is None or (f[-1] - at.p) * way > 0.0:
             if len(self.places) >= self.settings.most_points:
                 return "step limit", (
@@ -439,8 +426,7 @@ class InterfaceCurve:
             self.jumps.append(at.p)
             if self.places:
                 self.broken.append(len(self.places) - 1)
-            self.places.append(self._kept(at))
-            at = self._begin(at, way)
+            at = self._entered(at, way)
         if missed and missed[-1] == f[-1]:
             return "stopped", (
                 f"no periodic motion found at {f[-1]:.9g} Hz{self._told(missed)}; march there, or "
@@ -453,11 +439,10 @@ class InterfaceCurve:
 
     def _kept(self, at: InterfacePlace) -> InterfacePoint:
         """The point of a place; a jump from there begins with its state."""
-        e, w = self.equations, 2.0 * np.pi * at.p
-        q, rigid, slip = e.split(at.x)
-        period = e.march(at.x, w)
-        self.moving = e.state_in(period, q, rigid, slip, w)
-        return read_point(e, period, q, rigid, slip, at.p, at.iterations)
+        e = self.equations
+        period = e.march(at.x, 2.0 * np.pi * at.p)
+        self.moving = e.state(period)
+        return read_point(e, period, at.p, at.iterations)
 
     def _told(self, missed: list[float]) -> str:
         """Where it jumped, and where nothing was found."""
@@ -510,8 +495,9 @@ class InterfaceCurve:
             x, f, self.corrector.across(1.0, x), self.corrector.scale(x), self.equations.split(x)[2]
         )
 
-    def _begin(self, at: InterfacePlace, way: float) -> InterfacePlace:
-        """The place with its tangent in the direction of travel, and the first step."""
+    def _entered(self, at: InterfacePlace, way: float) -> InterfacePlace:
+        """A place kept, with its tangent in the direction of travel, and the first step."""
+        self.places.append(self._kept(at))
         tangent = at.tangent * np.sign(at.tangent[-1]) * way
         return replace(at, tangent=tangent, step=self.settings.first_step)
 
@@ -566,20 +552,8 @@ class InterfaceCurve:
             h = (FAILED if found is None else 0.5) * min(h, length)
         return None
 
-    def _first(self, f: float) -> InterfacePlace | None:
-        """The load raised from rest in steps as long as Newton's method takes them.
-
-        A start that moves is integrated in time.
-        """
-        e = self.equations
-        moves = bool(e.start.v.any())
-        found = self._jump(f) if moves else self._raised(f) or self._jump(f)
-        if found is not None:
-            self.places.append(self._kept(found))
-        return found
-
     def _raised(self, f: float) -> InterfacePlace | None:
-        """The answer by raising the load from rest."""
+        """The answer by raising the load from rest, as long as Newton's method takes the steps."""
         e, load, step, found = self.equations, 0.0, 1.0, None
         q = np.zeros(e.shape)
         q[0] = e.start.q

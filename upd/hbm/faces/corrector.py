@@ -9,14 +9,9 @@ from numpy.typing import NDArray
 
 from upd.errors import ConvergenceError
 from upd.hbm.core.kept_factors import KeptFactors
-from upd.hbm.core.newton import BorderedFactors, Settings, bordered_factors
+from upd.hbm.core.newton import Border, BorderedFactors, Settings
 from upd.hbm.faces.equations import ContactPeriod, InterfaceEquations
-from upd.hbm.faces.newton import (
-    InterfaceEvaluation,
-    StrangerMovesError,
-    evaluate,
-    slips_for_good,
-)
+from upd.hbm.faces.newton import InterfaceEvaluation, slips_for_good
 from upd.hbm.faces.state import FloatArray
 from upd.hbm.faces.step import SOLVED
 
@@ -44,94 +39,43 @@ class KnownFactors:
 
     def suits(self, found: InterfaceEvaluation) -> bool:
         """Whether the equations of another point have the same unknowns and the same form."""
-        return len(self.D) == len(found.x) and found.like(self.of)
+        return len(self.D) == len(found.x) and np.array_equal(found.good, self.of.good)
 
 
-class PlaneMatrix:
-    """The bordered derivative at a point, direction by direction (`upd.hbm.core.kept_factors`).
+class PlaneSteps:
+    """Corrections in a plane, by factors of the point itself or of another one.
+
+    Those that learn are updated by every step. With B the factors' matrix, s the steps taken so far
+    and r the residual,
+
+        z = -B^-1 r,   z += s_{k+1} (s_k . z) / |s_k|^2 for every step but the last,
+        s_{n+1} = z / (1 - s_n . z / |s_n|^2)
+
+    (Broyden). The others, Newton's own, are by a few directions of the derivative at the point.
 
     Parameters
     ----------
-    of : InterfaceEvaluation
+    known : KnownFactors
+        The border of their matrix may be another plane's where they learn: a share of its tangent
+        leads into the plane.
     normal : (u + 1,) ndarray
-        The border, in units of D.
+        Across the plane, a unit vector in units of D.
     D : (u,) ndarray
-        Units of the unknowns.
-    p_scale : float
-        Unit of the frequency [Hz].
+        Units of the unknowns here.
+    learns : bool
+        Whether they lead on from the next point.
     """
 
     def __init__(
-        self, of: InterfaceEvaluation, normal: FloatArray, D: FloatArray, p_scale: float
+        self, known: KnownFactors, normal: FloatArray, D: FloatArray, learns: bool
     ) -> None:
-        self.of, self.normal, self.D, self.p_scale = of, normal, D, p_scale
-
-    @property
-    def sizes(self) -> FloatArray:
-        """(u + 1,) units of the unknowns and of the frequency."""
-        return np.append(self.D, self.p_scale)
-
-    def product(self, z: FloatArray) -> FloatArray:
-        """What scaled unknowns (u + 1,) give: the equations (u,), and the border."""
-        faster = 2.0 * np.pi * self.p_scale * float(z[-1])
-        return np.append(self.of.in_direction(z[:-1] * self.D, faster), self.normal @ z)
-
-    def factored(self) -> BorderedFactors:
-        """Its factors."""
-        J, by_p = self.of.jacobian, 2.0 * np.pi * self.of.by_w
-        return bordered_factors(J, by_p, self.D, self.p_scale, self.normal)
-
-
-class NewtonSteps:
-    """A correction in a plane, by a few directions of the derivative at the point itself.
-
-    Parameters
-    ----------
-    known : KnownFactors
-        Of the point, with the plane for its border.
-    normal : (u + 1,) ndarray
-        Across the plane, a unit vector in units of D.
-    """
-
-    #: whether they lead on from the next point
-    learns = False
-
-    def __init__(self, known: KnownFactors, normal: FloatArray) -> None:
-        self.known, self.normal = known, normal
-
-    def next(self, residual: FloatArray) -> FloatArray:
-        """The step from a residual (u,), in units of D (u + 1,), exactly in the plane."""
-        z = self.known.factors.solve(-residual, 0.0)
-        return np.asarray(z - self.normal * float(self.normal @ z))
-
-
-class BroydenSteps:
-    """Corrections in a plane, by factors of another point that are updated by every step.
-
-    With B the factors' matrix, s the steps taken so far and r the residual,
-
-        z = -B^-1 r,   z += s_{k+1} (s_k . z) / |s_k|^2 for every step but the last,
-        s_{n+1} = z / (1 - s_n . z / |s_n|^2).
-
-    Parameters
-    ----------
-    known : KnownFactors
-        The border of their matrix may be another plane's: a share of its tangent leads into the
-        plane.
-    normal : (u + 1,) ndarray
-        Across the plane, in units of D.
-    D : (u,) ndarray
-        Units of the unknowns here.
-    """
-
-    learns = True
-
-    def __init__(self, known: KnownFactors, normal: FloatArray, D: FloatArray) -> None:
-        self.known, self.normal = known, normal
-        self.units = np.append(known.D / D, 1.0)
-        along = self.units * known.factors.solve(np.zeros(len(D)), 1.0)
-        self.along = along / float(normal @ along)
+        self.known, self.normal, self.learns = known, normal, learns
         self.steps: list[FloatArray] = []
+        self.units, self.along = np.ones(len(D) + 1), normal
+        if learns:
+            self.units = np.append(known.D / D, 1.0)
+            along = self.units * known.factors.solve(np.zeros(len(D)), 1.0)
+            self.along = along / float(normal @ along)
 
     def next(self, residual: FloatArray) -> FloatArray:
         """The step from the residual where the last one led to.
@@ -143,7 +87,7 @@ class BroydenSteps:
         Returns
         -------
         (u + 1,) ndarray
-            In units of D; not finite where there is none.
+            In units of D, exactly in the plane; not finite where there is none.
         """
         z = self.units * self.known.factors.solve(-residual, 0.0)
         z -= self.along * float(self.normal @ z)
@@ -154,7 +98,8 @@ class BroydenSteps:
                 z = z + steps[k + 1] * (float(steps[k] @ z) / sizes[k])
             with np.errstate(divide="ignore", invalid="ignore"):
                 z = z / (1.0 - np.float64(steps[-1] @ z) / sizes[-1])
-        steps.append(z)
+        if self.learns:
+            steps.append(z)
         return z
 
 
@@ -251,19 +196,21 @@ class InterfaceCorrector:
         first = len(x) - len(e.tangents)
         before = past[e.tangents - e.model.n].reshape(2, -1)
         count, sizes, near = 0, [np.inf, np.inf], known is not None
-        steps: BroydenSteps | NewtonSteps | None = None
+        steps: PlaneSteps | None = None
         if known is not None and len(known.D) == len(D) < MANY:
-            steps = BroydenSteps(known, normal, D)
+            steps = PlaneSteps(known, normal, D, True)
         while True:
             try:
-                found = evaluate(e, x, 2.0 * np.pi * p, past)
+                period = e.march(x, 2.0 * np.pi * p)
             except ConvergenceError:
                 return None
-            except StrangerMovesError as more:
-                x, D, normal = self._with_more(more.moving, x, D, normal)
+            if (period.moving & ~e.mobile).any():
+                # slips of more nodes are unknowns from now on
+                x, D, normal = self._with_more(period.moving, x, D, normal)
                 before = past[e.tangents - e.model.n].reshape(2, -1)
                 steps = None
                 continue
+            found = InterfaceEvaluation(e, x, period, past)
             step = None
             if steps is not None and steps.learns and steps.known.suits(found):
                 step = steps.next(found.residual)
@@ -275,7 +222,7 @@ class InterfaceCorrector:
                 known = self._factors(found, normal, D)
                 if known is None:
                     return None
-                steps = self._steps(known, normal, D)
+                steps = PlaneSteps(known, normal, D, len(D) < MANY)
                 step = steps.next(found.residual)
                 # steps in few directions cost little where they converge fast
                 fast = not steps.learns and float(np.linalg.norm(step)) <= FAST * sizes[-1]
@@ -294,7 +241,7 @@ class InterfaceCorrector:
             x, p = x + step[:-1] * D, p + float(step[-1]) * self.p_scale
             if self._stay(x[first:].reshape(2, -1), slip, before, found.period):
                 # the step taken is not the one that was asked for
-                steps = self._steps(steps.known, normal, D)
+                steps = PlaneSteps(steps.known, normal, D, len(D) < MANY)
             if float(np.abs(step).max()) * len(step) ** 0.5 <= s.tolerance:
                 # the way on is that of the answer, not of the point whose factors led to it
                 here = steps.known if steps.known.of is found else self._factors(found, normal, D)
@@ -339,7 +286,8 @@ class InterfaceCorrector:
         moving = max(float(np.abs(q[1:]).max()), least)
         size = np.full(q.shape, moving)
         size[0] = max(moving, still)
-        face = max(float(np.abs(e.model.shapes @ q[1:].T).max()), least * e.largest)
+        shapes = e.model.shapes
+        face = max(float(np.abs(shapes @ q[1:].T).max()), least * float(np.abs(shapes).max()))
         reach = np.abs(e.model.columns).max(axis=0)
         damper = np.tile(face * rigid.size**0.5 / reach, 3)
         return np.concatenate(
@@ -367,16 +315,11 @@ class InterfaceCorrector:
         """Of the derivative at a point; None where it has none, or is singular."""
         if not found.linear.fine:
             return None
-        matrix = PlaneMatrix(found, normal, D, self.p_scale)
-        factors = matrix.factored() if len(D) < MANY else self.kept.near(matrix, len(D))
+        many = len(D) >= MANY
+        by_w = found.in_direction(np.zeros(len(D)), 1.0) if many else found.by_w
+        border = Border(2.0 * np.pi * by_w, D, self.p_scale, normal)
+        factors = self.kept.near(found, border, len(D)) if many else found.factored(border)
         return None if factors.singular else KnownFactors(factors, D, found)
-
-    @staticmethod
-    def _steps(
-        known: KnownFactors, normal: FloatArray, D: FloatArray
-    ) -> BroydenSteps | NewtonSteps:
-        """Corrections by the factors of a point."""
-        return BroydenSteps(known, normal, D) if len(D) < MANY else NewtonSteps(known, normal)
 
     def _stay(
         self, moved: FloatArray, slip: FloatArray, before: FloatArray, period: ContactPeriod

@@ -49,6 +49,12 @@ class ContactPeriod:
         Damper's motion, velocity and acceleration after the period, time in steps.
     slip : (2 n,) ndarray
         Slips after it [mm].
+    q : (h, m) ndarray
+        Coefficients of the blades' modes it is given.
+    rigid_before, slip_before : (3, r), (2 n,) ndarray
+        As `rigid` and `slip`, before the period.
+    w : float
+        rad/s.
     fallbacks : int
         Samples that the slow solver had to finish.
     """
@@ -59,6 +65,10 @@ class ContactPeriod:
     modal: FloatArray
     rigid: FloatArray
     slip: FloatArray
+    q: FloatArray
+    rigid_before: FloatArray
+    slip_before: FloatArray
+    w: float
     fallbacks: int
 
     @property
@@ -202,11 +212,6 @@ class InterfaceEquations:
         h, m = self.shape
         return h * m + 3 * len(self.model.load)
 
-    @property
-    def size(self) -> int:
-        """Unknowns."""
-        return self.others + 2 * int(np.count_nonzero(self.mobile))
-
     def places_of(self, mobile: NDArray[np.bool_]) -> IntArray:
         """Where the unknowns stood with fewer nodes that may move.
 
@@ -239,7 +244,7 @@ class InterfaceEquations:
         -------
         ndarray
         """
-        out = np.empty(self.size)
+        out = np.empty(self.others + len(self.tangents))
         out[self.others :] = self.slip[self.tangents - self.model.n] if more is None else more
         out[rows] = values
         return out
@@ -255,11 +260,6 @@ class InterfaceEquations:
         slip = self.slip.copy()
         slip[self.tangents - self.model.n] = x[h * m + 3 * r :]
         return x[: h * m].reshape(h, m), x[h * m : h * m + 3 * r].reshape(3, r), slip
-
-    @property
-    def largest(self) -> float:
-        """Largest motion of a face by a mode."""
-        return float(np.abs(self.model.shapes).max())
 
     def turned(self, q: FloatArray, by: FloatArray | IntArray) -> FloatArray:
         """Coefficients (h, ...) of the derivative by the angle, each harmonic k times its `by`.
@@ -378,27 +378,24 @@ class InterfaceEquations:
             given, fallbacks = True, fallbacks + 1
             self._by_the_slow_way(x0, step, w, F[done], Y[done], S[done])
         after = slip + Y[:, n:].sum(axis=0)
-        return ContactPeriod(F, Y, S, F @ model.shapes, end, after, fallbacks)
+        modal = F @ model.shapes
+        return ContactPeriod(F, Y, S, modal, end, after, q, rigid, slip, w, fallbacks)
 
     def stiffness(self, w: float) -> tuple[FloatArray, FloatArray]:
         """Of each coefficient and mode at w rad/s: by itself, and by its turned partner (h, m)."""
         kw, model = self.order[:, None] * w, self.model
         return model.omega**2 - kw**2, 2.0 * model.damping * model.omega * kw
 
-    def misfit(self, period: ContactPeriod, q: FloatArray, w: float) -> FloatArray:
+    def misfit(self, period: ContactPeriod) -> FloatArray:
         """What the balance of the blades lacks, (h, m) modal forces."""
-        alpha, beta = self.stiffness(w)
+        alpha, beta = self.stiffness(period.w)
+        q = period.q
         pushed = self.Q @ period.modal + self.drive @ self.model.places.T
         return np.asarray(alpha * q + beta * self.turned(q, np.ones(len(q))) - pushed)
 
-    def state(self, q: FloatArray, rigid: FloatArray, slip: FloatArray, w: float) -> InterfaceState:
+    def state(self, period: ContactPeriod) -> InterfaceState:
         """The state of a march at the beginning of a periodic motion's period."""
-        return self.state_in(self.march_from(q, rigid, slip, w), q, rigid, slip, w)
-
-    def state_in(
-        self, period: ContactPeriod, q: FloatArray, rigid: FloatArray, slip: FloatArray, w: float
-    ) -> InterfaceState:
-        """The same where the period is known."""
+        q, rigid, w = period.q, period.rigid_before, period.w
         dt = 2.0 * np.pi / (w * self.samples)
         # the last sample is the beginning
         row = self.E[-1]
@@ -411,7 +408,7 @@ class InterfaceEquations:
             rigid[2] / dt**2,
             period.force[-1].copy(),
             period.relative[-1].copy(),
-            slip.copy(),
+            period.slip_before.copy(),
             period.state[-1].copy(),
             self.start.held.copy(),
         )

@@ -152,10 +152,6 @@ class InterfacePeriod:
         Work of the excitation, lost by damping, lost by friction, of the whole [N mm].
     fallbacks : int
         Steps that the slow solver had to finish.
-    force : (N, 3 n) ndarray
-        Contact forces after each step [N]; (0, ...) where not recorded.
-    state : (N, n) ndarray of int
-        States; likewise.
     """
 
     output: FloatArray
@@ -163,8 +159,6 @@ class InterfacePeriod:
     newton: float
     energy: FloatArray
     fallbacks: int
-    force: FloatArray
-    state: NDArray[np.int64]
 
 
 class InterfaceMarch:
@@ -288,15 +282,13 @@ class InterfaceMarch:
         Z[:, c] = self.forces_by[:, c] - self.forces_by[:, o] @ up
         return Tt, Z
 
-    def period(self, at: InterfaceState, *, record: bool = False) -> InterfacePeriod:
+    def period(self, at: InterfaceState) -> InterfacePeriod:
         """March one period; the state moves on.
 
         Parameters
         ----------
         at : InterfaceState
             Overwritten.
-        record : bool
-            Whether forces and states of all samples are kept.
 
         Returns
         -------
@@ -307,64 +299,27 @@ class InterfaceMarch:
         ConvergenceError
             When a step has no answer that any of the solvers finds.
         """
-        out, sums = np.zeros((self.samples, len(self.model.seen_modes))), np.zeros(4)
-        fallbacks = self.advance(at, out, sums)
-        return self.period_of(out, sums, fallbacks, record=record)
-
-    def advance(self, at: InterfaceState, out: FloatArray, sums: FloatArray) -> int:
-        """March one period and leave of it what is written and the past.
-
-        Parameters
-        ----------
-        at : InterfaceState
-            Overwritten.
-        out, sums : (N, K), (4,) ndarray
-            Overwritten as `upd.hbm.faces.period.march_steps` does.
-
-        Returns
-        -------
-        int
-            Steps that the slow solver had to finish.
-        """
-        sums[:] = 0.0
-        parts, motion, past = tuple(self.steps), at.arrays(), tuple(self.past)
-        N, known, done, given, fallbacks = self.samples, self.known, 0, False, 0
+        N, n, past = self.samples, self.model.n, self.past
+        out, sums = np.zeros((N, len(self.model.seen_modes))), np.zeros(4)
+        parts, motion, known = tuple(self.steps), at.arrays(), self.known
+        done, given, fallbacks = 0, False, 0
         while done < N:
-            bases = tuple(self.bases)
-            done = march_steps(
-                done, N, given, parts, bases, self.which, motion, known, past, self.x0, out, sums
-            )
+            held = tuple(self.bases), self.which, motion, known, tuple(past)
+            done = march_steps(done, N, given, parts, *held, self.x0, out, sums)
             given = done < N
             if given:
                 self.finish_step(done, at)
                 fallbacks += 1
         self.known = True
-        self.suit()
-        return fallbacks
-
-    def period_of(
-        self, out: FloatArray, sums: FloatArray, fallbacks: int, *, record: bool = False
-    ) -> InterfacePeriod:
-        """The last period from its outputs and sums; parameters as of `advance` and `period`."""
-        N, n, past = self.samples, self.model.n, self.past
+        # for every sample the base that most of its nodes agree with; a new one where it pays
+        best = suit_bases(past.state, self.bases.open, self.which, PAYS)
+        if best >= 0:
+            self._add(past.state[best] == OPEN)
+            suit_bases(past.state, self.bases.open, self.which, np.inf)
         counts = np.array([(past.state == kind).sum() for kind in (OPEN, STICK)] + [0], float)
         counts[2] = n * N - counts.sum()
-        return InterfacePeriod(
-            out,
-            counts / (n * N),
-            float(sums[3]) / N,
-            self.model.copies * sums[:3],
-            fallbacks,
-            past.force.copy() if record else np.zeros((0, 3 * n)),
-            past.state.copy() if record else np.zeros((0, n), np.int64),
-        )
-
-    def suit(self) -> None:
-        """For every sample the base that most of its nodes agree with; a new one where it pays."""
-        best = suit_bases(self.past.state, self.bases.open, self.which, PAYS)
-        if best >= 0:
-            self._add(self.past.state[best] == OPEN)
-            suit_bases(self.past.state, self.bases.open, self.which, np.inf)
+        energy = self.model.copies * sums[:3]
+        return InterfacePeriod(out, counts / (n * N), float(sums[3]) / N, energy, fallbacks)
 
     def _add(self, open_: NDArray[np.bool_]) -> None:
         """Add a base; where there are as many as may be, in place of another if that pays.

@@ -24,6 +24,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.hbm.core.newton import Border, BorderedFactors, Factors
 from upd.hbm.faces.equations import ContactPeriod, IntArray, InterfaceEquations
 from upd.hbm.faces.jacobian import VERGE, factor_period, invert_period, march_directions
 from upd.hbm.faces.state import FloatArray
@@ -48,8 +49,6 @@ class PeriodDerivative:
     period : ContactPeriod
     state : (N, n) ndarray of int
         Its states, with the verges.
-    w : float
-        rad/s.
 
     Attributes
     ----------
@@ -63,10 +62,8 @@ class PeriodDerivative:
         that direction, whatever it has slipped along it.
     """
 
-    def __init__(
-        self, e: InterfaceEquations, period: ContactPeriod, state: IntArray, w: float
-    ) -> None:
-        model, step, n = e.model, e.step(w), e.model.n
+    def __init__(self, e: InterfaceEquations, period: ContactPeriod, state: IntArray) -> None:
+        model, step, n = e.model, e.step(period.w), e.model.n
         self.e, self.step, self.state = e, step, state
         m, r = e.shape[1], len(model.load)
         on = np.flatnonzero((state != STICK).any(axis=0))
@@ -133,15 +130,23 @@ class PeriodDerivative:
             self._invert()
         if not self.fine:
             return np.full_like(q, np.nan), np.full_like(rigid, np.nan), np.full_like(slips, np.nan)
-        C = len(faster)
+        e, (h, m, C), N = self.e, q.shape, len(self.state)
+        step = (self.step.W, self.Z, self.M, self.step.J, self.late)
         # an even number of equal pieces, whatever the threads
         wide = C if C <= FEW else -(-C // (2 * -(-C // (2 * DIRECTIONS))))
-        parts = [slice(a, a + wide) for a in range(0, C, wide)]
-        given = (q, rigid, slips, faster, verge)
-        jobs = [partial(self._march, *(of[..., one] for of in given)) for one in parts]
-        found = self.e.beside.run(jobs)
-        modal, ends, slid = (np.concatenate(one, axis=-1) for one in zip(*found, strict=True))
-        return modal, ends, slid
+
+        def some(one: slice) -> tuple[FloatArray, FloatArray, FloatArray]:
+            motion = (e.E @ q[..., one].reshape(h, -1)).reshape(N, m, -1)
+            ends, forces = (rigid[:, one].copy(), slips[:, one].copy()), np.empty_like(motion)
+            nodes, change = (self.moved, self.place), (motion, faster[one], verge[one])
+            march_directions(
+                self.state, step, nodes, self.rows, self.inverted, change, ends, forces
+            )
+            return (e.Q @ forces.reshape(N, -1)).reshape(h, m, -1), *ends
+
+        found = e.beside.run([partial(some, slice(a, a + wide)) for a in range(0, C, wide)])
+        modal, after, slid = (np.concatenate(one, axis=-1) for one in zip(*found, strict=True))
+        return modal, after, slid
 
     def _invert(self) -> None:
         """Overwrite the factors by inverses."""
@@ -152,26 +157,6 @@ class PeriodDerivative:
             for first in range(0, N, SAMPLES)
         ]
         self.inverted, self.fine = True, all(self.e.beside.run(jobs))
-
-    def _march(
-        self,
-        q: FloatArray,
-        rigid: FloatArray,
-        slips: FloatArray,
-        faster: FloatArray,
-        verge: FloatArray,
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Some of the directions."""
-        e, (h, m, C), N = self.e, q.shape, len(self.state)
-        rigid, slips = rigid.copy(), slips.copy()
-        motion = (e.E @ q.reshape(h, m * C)).reshape(N, m, C)
-        forces = np.empty((N, m, C))
-        step = (self.step.W, self.Z, self.M, self.step.J, self.late)
-        nodes, change = (self.moved, self.place), (motion, faster, verge)
-        march_directions(
-            self.state, step, nodes, self.rows, self.inverted, change, (rigid, slips), forces
-        )
-        return (e.Q @ forces.reshape(N, m * C)).reshape(q.shape), rigid, slips
 
 
 def _remembered(
@@ -190,22 +175,20 @@ def _remembered(
     return out
 
 
-class StrangerMovesError(Exception):
-    """A node moves whose slips are not among the unknowns.
+class InterfaceEvaluation:
+    """The equations at one point, residual and derivatives, and the period they come from.
 
     Parameters
     ----------
-    moving : (n,) ndarray of bool
-        Nodes that move.
-    """
-
-    def __init__(self, moving: NDArray[np.bool_]) -> None:
-        super().__init__()
-        self.moving = moving
-
-
-class InterfaceEvaluation:
-    """The equations at one point.
+    e : InterfaceEquations
+        The slips of all nodes that move are among their unknowns.
+    x : (u,) ndarray
+        Unknowns.
+    period : ContactPeriod
+        That of the unknowns.
+    past : (2 n,) ndarray, optional
+        Slips before. Nodes that slip for good are then led to the verge of slipping, see the
+        module; without it residual and derivative are those of the equations as they stand.
 
     Attributes
     ----------
@@ -218,18 +201,17 @@ class InterfaceEvaluation:
         self,
         e: InterfaceEquations,
         x: FloatArray,
-        w: float,
         period: ContactPeriod,
-        past: FloatArray | None,
+        past: FloatArray | None = None,
     ) -> None:
-        self.e, self.x, self.w, self.period = e, x, w, period
-        q, rigid, slip = e.split(x)
-        h, m = e.shape
+        self.e, self.x, self.period = e, x, period
+        slip, (h, m) = period.slip_before, e.shape
         along = np.zeros((2, e.model.n)) if past is None else slips_for_good(e, period)
         state = period.state if past is None else _with_verges(e, period, slip != past, along)
         self.state = state
-        ends = e.joined(np.zeros((h, m)), rigid - period.rigid, slip - period.slip)[h * m :]
-        self.residual = np.concatenate([e.misfit(period, q, w).ravel(), ends])
+        left = period.rigid_before - period.rigid, slip - period.slip
+        ends = e.joined(np.zeros((h, m)), *left)[h * m :]
+        self.residual = np.concatenate([e.misfit(period).ravel(), ends])
         #: nodes that slip out of the way for good, numbered among those that may, and that way
         mine = along[:, e.mobile]
         self.good = np.flatnonzero(mine.any(axis=0))
@@ -241,18 +223,13 @@ class InterfaceEvaluation:
     @cached_property
     def linear(self) -> PeriodDerivative:
         """The period's derivative: its systems are formed where something is asked of it."""
-        return PeriodDerivative(self.e, self.period, self.state, self.w)
+        return PeriodDerivative(self.e, self.period, self.state)
 
     @cached_property
     def slips(self) -> IntArray:
         """Unknowns of the slips of nodes that move among those that may."""
-        h, m = self.e.shape
-        first = h * m + 3 * len(self.e.model.load)
-        return np.asarray(first + np.searchsorted(self.e.tangents, self.linear.moved))
-
-    def like(self, other: InterfaceEvaluation) -> bool:
-        """Whether the equations of both have the same form: the same nodes held to a way."""
-        return np.array_equal(self.good, other.good)
+        e = self.e
+        return np.asarray(e.others + np.searchsorted(e.tangents, self.linear.moved))
 
     @cached_property
     def derivative(self) -> FloatArray:
@@ -274,6 +251,14 @@ class InterfaceEvaluation:
         out[:, slip] = found[:, first:-1] @ memory.T
         formed[:, own] = self._with_blades(out, dx, dw)
         return formed
+
+    def product(self, x: FloatArray) -> FloatArray:
+        """Derivative in a direction of the unknowns (u,), without the others."""
+        return self.in_direction(x, 0.0)
+
+    def factored(self, border: Border) -> BorderedFactors:
+        """Factors of the derivative with a border."""
+        return Factors(self.jacobian, border)
 
     def in_direction(self, dx: FloatArray, dw: float) -> FloatArray:
         """Derivative in one direction, without the others.
@@ -304,9 +289,8 @@ class InterfaceEvaluation:
 
     def _with_blades(self, out: FloatArray, dx: FloatArray, dw: FloatArray) -> FloatArray:
         """What the period takes from the residual, overwritten, and all else of the residual."""
-        e, w = self.e, self.w
+        e, w, q = self.e, self.period.w, self.period.q
         h, m = e.shape
-        q = self.x[: h * m].reshape(h, m)
         alpha, beta = e.stiffness(w)
         change = dx[: h * m].reshape(h, m, -1)
         blades = alpha[:, :, None] * change
@@ -347,38 +331,6 @@ class InterfaceEvaluation:
         # along the way the equations, across it the slips themselves
         kept = v1 * (out[one] - dx[one]) + v2 * (out[two] - dx[two])
         out[one], out[two] = dx[one] + v1 * kept, dx[two] + v2 * kept
-
-
-def evaluate(
-    e: InterfaceEquations, x: FloatArray, w: float, past: FloatArray | None = None
-) -> InterfaceEvaluation:
-    """Residual, its derivatives, and the period they come from.
-
-    Parameters
-    ----------
-    e : InterfaceEquations
-    x : (u,) ndarray
-        Unknowns.
-    w : float
-        rad/s.
-    past : (2 n,) ndarray, optional
-        Slips before. Nodes that slip for good are then led to the verge of slipping, see the
-        module; without it residual and derivative are those of the equations as they stand.
-
-    Returns
-    -------
-    InterfaceEvaluation
-
-    Raises
-    ------
-    StrangerMovesError
-        When a node moves whose slips are not among the unknowns.
-    """
-    period = e.march(x, w)
-    moving = period.moving
-    if (moving & ~e.mobile).any():
-        raise StrangerMovesError(moving)
-    return InterfaceEvaluation(e, x, w, period, past)
 
 
 def slips_for_good(e: InterfaceEquations, period: ContactPeriod) -> FloatArray:

@@ -244,17 +244,16 @@ def recorded_period(march: InterfaceMarch, start: InterfaceState) -> RecordedPer
         When a step has no answer that any of the solvers finds.
     """
     n, N, at = march.model.n, march.samples, start.copy()
-    period = march.period(at, record=True)
-    assert march.past is not None
+    march.period(at)
     moved = march.past.move[:, n:].reshape(N, 2, n)
-    force = period.force.reshape(N, 3, n)
+    force = march.past.force.reshape(N, 3, n).copy()
     before = np.concatenate([start.f.reshape(1, 3, n), force[:-1]])
     loss = np.einsum("ktp,ktp->p", 0.5 * (before + force)[:, 1:], moved)
     return RecordedPeriod(
         force,
         start.slip.reshape(2, n) + np.cumsum(moved, axis=0),
-        period.state,
-        _motion(march.model, march.dt, period.force, start),
+        march.past.state.copy(),
+        _motion(march.model, march.dt, march.past.force, start),
         loss,
         march.model.copies,
     )
@@ -352,10 +351,10 @@ def settle(
     changes: list[list[float]] = []
     seen: list[FloatArray] = []
     fallbacks, remaining = 0, np.inf
-    out, sums = np.zeros((N, len(march.model.seen_modes))), np.zeros(4)
     while len(seen) < most_periods and not remaining <= tolerance:
         start = at.copy()
-        fallbacks += march.advance(at, out, sums)
+        last = march.period(at)
+        out, fallbacks = last.output, fallbacks + last.fallbacks
         harmonics = Q @ out
         seen.append(np.abs(harmonics[0]))
         moved = np.concatenate([harmonics.view(float).ravel(), out.mean(axis=0)])
@@ -373,7 +372,7 @@ def settle(
             of_each = zip(np.transpose(changes[-2 * WINDOW :]), sizes, strict=True)
             remaining = max(_to_come(change, size, most_periods) for change, size in of_each)
     return SteadyPoint(
-        march.period_of(out, sums, fallbacks),
+        last,
         np.min(seen[-WINDOW:], axis=0),
         np.max(seen[-WINDOW:], axis=0),
         remaining,

@@ -10,7 +10,6 @@ is (1 + d) n_point (2 H + 1) + n_rigid, whatever the size of K.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -20,20 +19,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
-from upd.hbm.core.fourier import Harmonics, analysis, embed, sample_count, synthesis, to_complex
-from upd.hbm.springs.damper import RigidDamper, attach
-from upd.hbm.springs.friction import (
+from upd.hbm.core.fourier import Harmonics, analysis, embed, synthesis, to_complex
+from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart, real_part
+from upd.hbm.springs.modal import Modal
+from upd.hbm.springs.points import (
     MOST_PERIODS,
     START_CODE,
-    Harmonic,
+    Contacts,
     March,
     Start,
-    harmonic_force,
     march,
+    stuck_stiffness,
 )
-from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart, linear_part
-from upd.hbm.springs.modal import Modal, modal
-from upd.hbm.springs.points import Contacts, frictionless, stuck_constant, stuck_stiffness
 from upd.hbm.springs.terms import contact_terms
 
 FloatArray = NDArray[np.float64]
@@ -208,8 +205,8 @@ class Balance:
         W, a = old.split(x)
         return np.concatenate([embed(W, old.harmonics, self.harmonics).ravel(), a])
 
-    def force(self, x: FloatArray) -> Harmonic:
-        """Contact forces of one answer.
+    def period(self, x: FloatArray) -> March:
+        """One period of the contact forces of one answer.
 
         Parameters
         ----------
@@ -218,10 +215,14 @@ class Balance:
 
         Returns
         -------
-        Harmonic
+        March
         """
-        law, W = self.contacts.law, self.split(x)[0]
-        return harmonic_force(law, W, self.E, self.Q, start=self.start, slider=self.slider)
+        w = np.ascontiguousarray(self.split(x)[0] @ self.E.T)
+        return march(self.contacts.law, w, self.E, start=self.start, slider=self.slider)
+
+    def force(self, x: FloatArray) -> FloatArray:
+        """Coefficients (n_point, 1 + d, size) of the contact forces of one answer [N]."""
+        return self.period(x).coefficients(self.Q)
 
     def marched(self, W: FloatArray, E: FloatArray, most: int = MOST_PERIODS) -> March:
         """Contact forces of many motions in one march.
@@ -284,7 +285,7 @@ class Balance:
         )
         if not jacobian:
             return residual, None, by_frequency
-        parts = BalanceJacobian(linear, linear.k * omega, state, self._stiffness, DF)
+        parts = BalanceJacobian(linear, linear.k * omega, state, self.stuck_stiffness, DF)
         return residual, parts, by_frequency
 
     def contact_terms(
@@ -308,7 +309,13 @@ class Balance:
         """The linear system as the contacts see it."""
         # loads, preload and sliders may change in copies: none of them enters
         h = self.harmonics
-        return linear_part(self.modal, self.Psi, self.G0, self._rigid_rows, h.dynamic, h.offset)
+        R = np.ascontiguousarray(self._rigid_rows[:, : self.rigid])
+        return LinearPart(*self._each_harmonic, self.G0, R, h.dynamic.astype(float), h.offset)
+
+    @property
+    def _each_harmonic(self) -> tuple[Modal, FloatArray]:
+        """The linear system and the rows on its modes, for all harmonics above 0."""
+        return self.modal, self.Psi
 
     @cached_property
     def _transform(self) -> tuple[FloatArray, ...]:
@@ -340,7 +347,7 @@ class Balance:
         float
         """
         (W, a), o, c = self.split(x), self.harmonics.offset, len(self.Psi)
-        F, w = self.force(x).force.reshape(c, -1), W.reshape(c, -1)
+        F, w = self.force(x).reshape(c, -1), W.reshape(c, -1)
         residual = self.linearised(x, omega, False)[0]
         off = np.abs(residual[: W.size].reshape(c, -1))
         u = self.linear.moves(self.amplitudes(np.zeros_like(F), omega))
@@ -360,7 +367,8 @@ class Balance:
         return self.Psi[:, self.modal.rigid]
 
     @cached_property
-    def _stiffness(self) -> FloatArray:
+    def stuck_stiffness(self) -> FloatArray:
+        """Stiffness (n_point, 1 + d) of closed points that stick [N/mm]."""
         # loads, preload and sliders may change in copies: none of them enters
         return stuck_stiffness(self.contacts)
 
@@ -378,19 +386,22 @@ class Balance:
         -------
         (n_unknown,) ndarray
         """
-        return self._linear(omega, self._stiffness.ravel(), *self._stuck_rest)
+        return self._linear(omega, self.stuck_stiffness.ravel(), *self._stuck_rest)
 
     @property
     def stuck_modal_stiffness(self) -> FloatArray:
         """Stiffness (m, m) of the modes with closed points that stick [1/s2]."""
         own = np.diag(np.where(self.modal.rigid, 0.0, self.modal.eigenvalues))
-        return np.asarray(own + (self.Psi.T * self._stiffness.ravel()) @ self.Psi)
+        return np.asarray(own + (self.Psi.T * self.stuck_stiffness.ravel()) @ self.Psi)
 
     @property
     def stuck_constant(self) -> FloatArray:
         """Force (n_point, 1 + d) of closed points that stick to given sliders, unmoved [N]."""
-        given = self.slider if self.start in ("zero", "static") else None
-        return stuck_constant(self.contacts, given)
+        law, out = self.contacts.law, np.zeros_like(self.stuck_stiffness)
+        out[:, 0] = law.preload - law.k_n * law.gap
+        if self.slider is not None and self.start in ("zero", "static"):
+            out[:, 1:] = -self.stuck_stiffness[:, 1:] * self.slider[:, : self.contacts.tangents]
+        return out
 
     @property
     def frictionless_sliders(self) -> FloatArray:
@@ -398,7 +409,7 @@ class Balance:
         traction [mm].
         """
         law, out = self.contacts.law, np.zeros((self.contacts.n_point, 2))
-        k, constant = np.zeros_like(self._stiffness), np.zeros_like(self._stiffness)
+        k, constant = np.zeros_like(self.stuck_stiffness), np.zeros_like(self.stuck_stiffness)
         k[:, 0], constant[:, 0] = law.k_n, law.preload - law.k_n * law.gap
         mean = self._linear_rest(k.ravel(), constant.ravel())[0].reshape(k.shape)
         out[:, : self.contacts.tangents] = mean[:, 1:]
@@ -421,7 +432,7 @@ class Balance:
 
     @cached_property
     def _stuck_rest(self) -> tuple[FloatArray, FloatArray]:
-        return self._linear_rest(self._stiffness.ravel(), self.stuck_constant.ravel())
+        return self._linear_rest(self.stuck_stiffness.ravel(), self.stuck_constant.ravel())
 
     def _linear_rest(self, k: FloatArray, constant: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean displacements (c,) and rigid amplitudes of a linear answer."""
@@ -437,21 +448,16 @@ class Balance:
         return found[:c], found[c:]
 
     def _linear(self, omega: float, k: FloatArray, mean: FloatArray, a: FloatArray) -> FloatArray:
-        c, o = len(self.Psi), self.harmonics.offset
         at = np.asarray(self.harmonics.dynamic * omega, dtype=float)
         try:
-            w = _sprung(self.linear.modal, self.linear.Psi, at, self.loads, k).T
+            w = _sprung(self.linear.modal, self.linear.Psi, at, self.loads, k)
         except np.linalg.LinAlgError:
             raise InputError(
                 f"frequency_response: no damping at a resonance of the sticking contacts, "
                 f"{omega / (2.0 * np.pi):.6g} Hz: the response has no bound; give damping, or "
                 "leave this frequency out"
             ) from None
-        X = np.zeros((c, self.harmonics.size))
-        X[:, o::2], X[:, o + 1 :: 2] = w.real, -w.imag
-        if self.harmonics.static:
-            X[:, 0] = mean
-        return np.concatenate([X.ravel(), a])
+        return np.concatenate([real_part(w, mean, self.harmonics.offset).ravel(), a])
 
     def linear_displacement(
         self, omega: FloatArray, stuck: bool, harmonic: int | None = None
@@ -472,7 +478,7 @@ class Balance:
         (n, n_dof) ndarray of complex
             Displacement [mm].
         """
-        k = stuck_stiffness(self.contacts).ravel() if stuck else np.zeros(len(self.Psi))
+        k = self.stuck_stiffness.ravel() if stuck else np.zeros(len(self.Psi))
         j = self.harmonics.place(harmonic)
         load, (modal, Psi) = self.loads[j : j + 1], self.part(harmonic)
         out = np.empty((len(omega), len(modal.Phi)), dtype=complex)
@@ -515,25 +521,9 @@ class Balance:
             out[:, :, 0] = eta @ Phi.T
         return out
 
-    def with_loads(self, static: float, dynamic: float) -> Balance:
-        """The same problem with its loads multiplied.
-
-        Parameters
-        ----------
-        static, dynamic : float
-            Factors on the static and on the dynamic loads.
-
-        Returns
-        -------
-        Balance
-        """
-        return self._changed(
-            static=static * self.static,
-            u0=static * self.u0,
-            rigid_load=static * self.rigid_load,
-            dynamic=dynamic * self.dynamic,
-            loads=dynamic * self.loads,
-        )
+    def unexcited(self) -> Balance:
+        """The same problem under its static loads alone."""
+        return self._changed(dynamic=0.0 * self.dynamic, loads=0.0 * self.loads)
 
     def with_sliders(self, start: Start, slider: FloatArray | None = None) -> Balance:
         """The same problem with another start of the sliders.
@@ -594,57 +584,3 @@ def _sprung(
     """Motion (n, c) of rows on springs k (c,) at w (n,) rad/s under modal loads (n, m)."""
     G, u = modal.receptance(Psi, w, loads)
     return np.asarray(np.linalg.solve(np.eye(len(k)) + G * k, u[..., None])[..., 0])
-
-
-def assembled(
-    M: FloatArray,
-    C: FloatArray,
-    K: FloatArray,
-    contacts: Contacts,
-    force: Mapping[int, ComplexArray],
-    static: FloatArray,
-    h: Harmonics,
-    *,
-    joined_to: tuple[RigidDamper, FloatArray] | None = None,
-    samples: int | None = None,
-    start: Start = "zero",
-    slider: FloatArray | None = None,
-    fast_exits: bool = True,
-) -> Balance:
-    """The condensed problem of a system, with a damper where one is given.
-
-    Parameters
-    ----------
-    M, C, K : (n, n) ndarray
-        Mass [t], damping [N s/mm] and stiffness [N/mm].
-    contacts : Contacts
-    force : mapping
-        Harmonic number -> (n,) complex amplitude [N].
-    static : (n,) ndarray
-        [N]
-    h : Harmonics
-    joined_to : (RigidDamper, (n_point, 1 + d, n_dof of the damper) ndarray), optional
-        A damper, whose dofs and centrifugal force are appended, and its share of the rows.
-    samples : int, optional
-        Samples per period; by rule when None.
-    start, slider
-        As `upd.hbm.springs.response.frequency_response` takes them, sliders (n_point, 2).
-    fast_exits : bool
-        Leave the tangents out where there is no friction.
-
-    Returns
-    -------
-    Balance
-    """
-    if joined_to is not None:
-        damper, rows = joined_to
-        M, C, K, contacts = attach(M, C, K, contacts, damper, rows)
-        static = np.concatenate([static, damper.force])
-        force = {k: np.concatenate([v, np.zeros(damper.n_dof)]) for k, v in force.items()}
-    if fast_exits and contacts.tangents and not np.any(contacts.law.mu):
-        contacts = frictionless(contacts)
-    dynamic = np.zeros((len(h.dynamic), len(static)), dtype=complex)
-    for k, amplitude in force.items():
-        dynamic[h.place(k)] = amplitude
-    count = sample_count(h, samples)
-    return Balance(modal(M, C, K), contacts, h, count, static, dynamic, start, slider)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from upd.hbm.core.fourier import Harmonics, analysis, harmonics, synthesis, to_complex
+from upd.hbm.core.fourier import analysis, harmonics, synthesis, to_complex
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
-from upd.hbm.springs.friction import MOST_PERIODS, March
-from upd.hbm.springs.points import stuck_stiffness
+from upd.hbm.springs.points import MOST_PERIODS, March
 
 FloatArray = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
@@ -35,7 +34,7 @@ def stuck_points(b: Balance, omega: FloatArray) -> NDArray[np.bool_]:
     -------
     (n,) ndarray of bool
     """
-    k, constant = stuck_stiffness(b.contacts), b.stuck_constant
+    k, constant = b.stuck_stiffness, b.stuck_constant
     # the friction cone is convex: a mean force outside it puts a sample outside at every frequency
     mean = (
         b.split(b.stuck(float(omega[0])))[0][..., 0] * k + constant
@@ -143,13 +142,8 @@ def separated(b: Balance, omega: FloatArray) -> FloatArray | None:
 def _stuck_forces(b: Balance, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Normal force and size of the traction (n_point, n) over the cycle of the stuck answer."""
     motion = b.split(x)[0] @ b.E.T
-    force = stuck_stiffness(b.contacts)[..., None] * motion + b.stuck_constant[..., None]
+    force = b.stuck_stiffness[..., None] * motion + b.stuck_constant[..., None]
     return force[:, 0], np.sqrt((force[:, 1:] ** 2).sum(axis=1))
-
-
-def missing(h: Harmonics) -> Harmonics:
-    """Harmonics that are not in the set, from 0 up to twice its highest plus three."""
-    return harmonics(k for k in range(2 * h.highest + 4) if k not in h.numbers)
 
 
 def truncation(
@@ -172,11 +166,13 @@ def truncation(
     (n,) ndarray
         Relative to the contact motion.
     """
-    rest = missing(b.harmonics)
+    kept = b.harmonics
+    # from 0 up to twice the highest plus three
+    rest = harmonics(k for k in range(2 * kept.highest + 4) if k not in kept.numbers)
     enough = b.samples > 2 * rest.highest
     Q = analysis(rest, b.samples if enough else 4 * rest.highest)
     E = b.E if enough else synthesis(b.harmonics, Q.shape[1])
-    stiffness, out = stuck_stiffness(b.contacts).ravel(), np.zeros(len(x))
+    stiffness, out = b.stuck_stiffness.ravel(), np.zeros(len(x))
     known = marched if enough else None
     for part in portions(len(x)) if known is None else [slice(0, len(x))]:
         W = b.coefficients(x[part])
@@ -268,12 +264,13 @@ def portions(n: int) -> list[slice]:
     return [slice(i, i + PORTION) for i in range(0, n, PORTION)]
 
 
-class Measures(NamedTuple):
+@dataclass(frozen=True)
+class Measures:
     """What is measured on n solved points.
 
     Attributes
     ----------
-    displacement, force : (n, n_point, 1 + d, size) ndarray
+    contact_displacement, contact_force : (n, n_point, 1 + d, size) ndarray
         Coefficients of the relative displacements [mm] and of the contact forces [N].
     state : (n, n_point, 3) ndarray
         Shares of the cycle in stick, slip, lift-off.
@@ -285,8 +282,8 @@ class Measures(NamedTuple):
         What harmonics left out and twice the samples would change, relative.
     """
 
-    displacement: FloatArray
-    force: FloatArray
+    contact_displacement: FloatArray
+    contact_force: FloatArray
     state: FloatArray
     energy: FloatArray
     periodic: NDArray[np.bool_]

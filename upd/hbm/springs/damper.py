@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
 
 from upd.errors import InputError
 from upd.hbm.springs.points import Contacts
@@ -220,16 +221,6 @@ def attach(
     """
     none = np.zeros((damper.n_dof, damper.n_dof))
     joined = np.concatenate([points.rows, rows], axis=2)
-    return (
-        _block(M, damper.M),
-        _block(C, none),
-        _block(K, damper.K),
-        Contacts(np.ascontiguousarray(joined), points.law),
-    )
-
-
-def _block(A: FloatArray, D: FloatArray) -> FloatArray:
-    n, m = len(A), len(D)
-    out = np.zeros((n + m, n + m))
-    out[:n, :n], out[n:, n:] = A, D
-    return out
+    pairs = (M, damper.M), (C, none), (K, damper.K)
+    A = [block_diag(*pair) for pair in pairs]
+    return A[0], A[1], A[2], Contacts(np.ascontiguousarray(joined), points.law)

@@ -26,15 +26,15 @@ inverse of a matrix, SIAM Review 31 (1989), for the low rank.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack
 
 from upd.hbm.core.kept_factors import WORTH_KEEPING, KeptFactors
-from upd.hbm.core.newton import BorderedFactors
+from upd.hbm.core.newton import Border, BorderedFactors, Factors
 from upd.hbm.springs.modal import Modal
 from upd.hbm.springs.terms import MOVES, STICKS, bordered, by_harmonic, residual_terms
 
@@ -56,12 +56,6 @@ class LinearPart:
         The linear system, or one for each harmonic above 0.
     Psi : (c, m) ndarray, or (n_k, c, m) of complex
         Rows of the contacts on its modes.
-    transposed : (m, c) ndarray, or (n_k, m, c) of complex
-        Their conjugate transpose.
-    damping : (1, m) or (m, m) ndarray
-        Modal damping, one row where it is diagonal.
-    basis : (c, r) ndarray or None
-        Orthonormal basis U of the columns of Psi where r < c.
     G0 : (c, c) ndarray
         Static compliance [mm/N].
     R : (c, n_rigid) ndarray
@@ -76,14 +70,30 @@ class LinearPart:
 
     modal: Modal
     Psi: FloatArray
-    transposed: FloatArray
-    damping: FloatArray
-    basis: FloatArray | None
     G0: FloatArray
     R: FloatArray
     k: FloatArray
     offset: int
-    kept: KeptFactors
+    kept: KeptFactors = field(default_factory=KeptFactors)
+
+    @cached_property
+    def transposed(self) -> FloatArray:
+        """Conjugate transpose of the rows, (m, c) or (n_k, m, c)."""
+        return np.ascontiguousarray(np.swapaxes(self.Psi.conj(), -1, -2))
+
+    @cached_property
+    def damping(self) -> FloatArray:
+        """Modal damping (m, m), or one row (1, m) where it is diagonal."""
+        return np.ascontiguousarray(np.atleast_2d(self.modal.damping))
+
+    @cached_property
+    def basis(self) -> FloatArray | None:
+        """Orthonormal basis (c, r) of the columns of real rows where r < c."""
+        if not self.symmetric:
+            return None
+        U, size, _ = np.linalg.svd(self.Psi, full_matrices=False)
+        rank = int(np.count_nonzero(size > max(self.Psi.shape) * EPS * size.max(initial=0.0)))
+        return np.ascontiguousarray(U[:, :rank]) if 0 < rank < len(self.Psi) else None
 
     @property
     def size(self) -> int:
@@ -103,8 +113,7 @@ class LinearPart:
     def shifted(self, xi: float) -> LinearPart:
         """The same system with xi [1/s] off its modal damping, C - xi M."""
         off = xi if self.modal.proportional else xi * np.eye(len(self.modal.eigenvalues))
-        modal = replace(self.modal, damping=self.modal.damping - off)
-        return replace(self, modal=modal, damping=self.damping - off)
+        return replace(self, modal=replace(self.modal, damping=self.modal.damping - off))
 
     def pushes(self, f: ComplexArray) -> ComplexArray:
         """Modal forces (n_k, m) of amplitudes (n_k, c) of forces on the rows."""
@@ -143,56 +152,14 @@ class LinearPart:
         (loads, u0, rigid_load), o, w = acting, self.offset, self.k * omega
         eta = self.modal.solve(w, loads - self.pushes(_complex_part(F, o)))
         mean = u0 - self.G0 @ F[:, 0] + self.R @ a
-        left = W - _real_part(self.moves(eta), mean, o)
+        left = W - real_part(self.moves(eta), mean, o)
         below = self.R.T @ F[:, 0] - rigid_load if o else a
         by_omega = np.zeros(W.size + len(a))
         if slopes:
             slope = self.modal.solve(w, 2.0 * w[:, None] * eta - 1j * self.damped(eta))
             moved = self.moves(self.k[:, None] * slope)
-            by_omega[: W.size] = -_real_part(moved, np.zeros(self.rows), o).ravel()
+            by_omega[: W.size] = -real_part(moved, np.zeros(self.rows), o).ravel()
         return np.concatenate([left.ravel(), below]), by_omega
-
-
-def linear_part(
-    modal: Modal,
-    Psi: FloatArray,
-    G0: FloatArray,
-    R: FloatArray,
-    k: NDArray[np.int64],
-    offset: int,
-) -> LinearPart:
-    """The linear part of a balance.
-
-    Parameters
-    ----------
-    modal, Psi, G0, R
-        As in `LinearPart`.
-    k : (n_k,) ndarray of int
-        Harmonics above 0.
-    offset : int
-        Coefficients before theirs.
-
-    Returns
-    -------
-    LinearPart
-    """
-    basis = None
-    if Psi.ndim == 2:
-        U, size, _ = np.linalg.svd(Psi, full_matrices=False)
-        rank = int(np.count_nonzero(size > max(Psi.shape) * EPS * size.max(initial=0.0)))
-        basis = np.ascontiguousarray(U[:, :rank]) if 0 < rank < len(Psi) else None
-    return LinearPart(
-        modal,
-        Psi,
-        np.ascontiguousarray(np.swapaxes(Psi.conj(), -1, -2)),
-        np.ascontiguousarray(np.atleast_2d(modal.damping)),
-        basis,
-        G0,
-        np.ascontiguousarray(R if offset else R[:, :0]),
-        k.astype(float),
-        offset,
-        KeptFactors(),
-    )
 
 
 class BalanceJacobian(NamedTuple):
@@ -228,41 +195,44 @@ class BalanceJacobian(NamedTuple):
         """Stiffness (n_point, 1 + d) of points that stick, 0 of the others [N/mm]."""
         return np.where(self.state[:, None] == STICKS, self.stiffness, 0.0)
 
-    def bordered(
-        self, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray
-    ) -> BorderedFactors:
-        """Factors of [[J, r_p], [normal]] in scaled unknowns and equations, the cheapest way.
+    @property
+    def kind(self) -> type[LowRank | Eliminated | EveryPoint]:
+        """The factors with the fewest unknowns."""
+        of, d1, moving = self.of, self.stiffness.shape[1], len(self.DF)
+        if of.basis is not None and of.basis.shape[1] < moving * d1:
+            return LowRank
+        n = of.rows * of.size + of.R.shape[1]
+        left = n - (len(self.state) - moving) * d1 * of.size
+        return Eliminated if 2 * (n**3 - left**3) / 3 > WORTH else EveryPoint
 
-        Large ones, of an earlier point, serve for later ones (`upd.hbm.core.kept_factors`).
+    @property
+    def unknowns(self) -> int:
+        """Rows of its factors, without the border."""
+        of, kind, wide = self.of, self.kind, len(self.DF) * self.stiffness.shape[1]
+        if kind is EveryPoint:
+            wide = of.rows
+        elif kind is LowRank and of.basis is not None:
+            wide = of.basis.shape[1]
+        return int(wide * of.size + of.R.shape[1])
 
-        Parameters
-        ----------
-        dp : (n,) ndarray
-            Derivative of the residual by the parameter.
-        D : (n,) ndarray
-            Sizes of the unknowns.
-        p_scale : float
-            Size of the parameter.
-        normal : (n + 1,) ndarray
-            Border, of the scaled unknowns.
+    def factored(self, border: Border) -> BorderedFactors:
+        """Factors of [[J, r_p], [normal]] in scaled unknowns and equations, the cheapest way."""
+        return self.kind(self, border)
 
-        Returns
-        -------
-        BorderedFactors
-        """
-        matrix = _Matrix(self, dp, D, p_scale, normal)
-        unknowns = matrix.unknowns
-        if unknowns < WORTH_KEEPING:
-            return matrix.factored()
-        return self.of.kept.near(matrix, unknowns)
+    def bordered(self, border: Border) -> BorderedFactors:
+        """The same; large ones of an earlier point serve (`upd.hbm.core.kept_factors`)."""
+        if len(border.D) < WORTH_KEEPING or self.unknowns < WORTH_KEEPING:
+            return self.factored(border)
+        return self.of.kept.near(self, border, self.unknowns)
 
-    def product(self, X: FloatArray, a: FloatArray) -> FloatArray:
-        """J x of a change (c, size) of the motion and one (n_rigid,) of the rigid amplitudes.
+    def product(self, x: FloatArray) -> FloatArray:
+        """J x of a change (n,) of the unknowns.
 
         The residual is linear in motion and forces: J x is that of the motion and of its forces
         without loads.
         """
-        of = self.of
+        of, n = self.of, self.of.rows * self.of.size
+        X, a = x[:n].reshape(of.rows, -1), x[n:]
         modes = of.Psi.shape[-1]
         none = (np.zeros((len(self.w), modes), complex), np.zeros(len(X)), 0.0 * a)
         return of.residual(X, a, self.force(X), float(self.w[0] / of.k[0]), none, False)[0]
@@ -318,8 +288,22 @@ def _complex_part(X: FloatArray, o: int) -> ComplexArray:
     return np.asarray((X[:, o::2] - 1j * X[:, o + 1 :: 2]).T)
 
 
-def _real_part(X: ComplexArray, static: FloatArray, o: int) -> FloatArray:
-    """Coefficients (c, size) of amplitudes (n_k, c) and a mean (c,)."""
+def real_part(X: ComplexArray, static: FloatArray, o: int) -> FloatArray:
+    """Coefficients of amplitudes and a mean.
+
+    Parameters
+    ----------
+    X : (n_k, c) ndarray of complex
+        Amplitudes a - i b of the harmonics above 0.
+    static : (c,) ndarray
+        Mean.
+    o : int
+        Column of the first cosine.
+
+    Returns
+    -------
+    (c, size) ndarray
+    """
     out = np.empty((X.shape[1], o + 2 * len(X)))
     out[:, o::2], out[:, o + 1 :: 2] = X.real.T, -X.imag.T
     if o:
@@ -327,81 +311,17 @@ def _real_part(X: ComplexArray, static: FloatArray, o: int) -> FloatArray:
     return out
 
 
-class _Matrix(NamedTuple):
-    """[[J, r_p], [normal]] in scaled unknowns, not factored yet."""
+class CondensedFactors(Factors):
+    """LU of the condensed [[J, r_p], [normal]]."""
 
-    J: BalanceJacobian
-    dp: FloatArray
-    D: FloatArray
-    p_scale: float
-    normal: FloatArray
+    def __init__(self, J: BalanceJacobian, border: Border) -> None:
+        self.J = J
+        dp, self.D, self.p_scale, self.normal = border
+        self.c, self.size, self.static = J.of.rows, J.of.size, J.of.offset == 1
+        self.n = self.c * self.size
+        self.dp, self.dp_rigid = dp[: self.n].reshape(self.c, self.size), dp[self.n :]
 
-    @property
-    def sizes(self) -> FloatArray:
-        return np.append(self.D, self.p_scale)
-
-    @property
-    def kind(self) -> type[Factors]:
-        """The factors with the fewest unknowns."""
-        J = self.J
-        basis, d1, moving = J.of.basis, J.stiffness.shape[1], len(J.DF)
-        if basis is not None and basis.shape[1] < moving * d1:
-            return LowRank
-        n = len(self.D)
-        left = n - (len(J.state) - moving) * d1 * J.of.size
-        return Eliminated if 2 * (n**3 - left**3) / 3 > WORTH else EveryPoint
-
-    @property
-    def unknowns(self) -> int:
-        """Rows of its factors, without the border."""
-        J, kind, basis = self.J, self.kind, self.J.of.basis
-        if kind is EveryPoint:
-            return len(self.D)
-        rank = 0 if basis is None else basis.shape[1]
-        wide = rank if kind is LowRank else len(J.DF) * J.stiffness.shape[1]
-        return int(wide * J.of.size + J.of.R.shape[1])
-
-    def factored(self) -> Factors:
-        """Its factors."""
-        return self.kind(self.J, self.dp, self.D, self.p_scale, self.normal)
-
-    def product(self, z: FloatArray) -> FloatArray:
-        """What scaled unknowns z (n + 1,) give: the equations (n,) and the border."""
-        x, p, c = z[:-1] * self.D, float(z[-1]) * self.p_scale, self.J.of.rows
-        n = c * self.J.of.size
-        out = np.empty(len(z))
-        out[:-1] = self.J.product(x[:n].reshape(c, -1), x[n:]) + self.dp * p
-        out[-1] = self.normal @ z
-        return out
-
-
-class Factors:
-    """LU of the condensed [[J, r_p], [normal]] in scaled unknowns and equations.
-
-    Attributes
-    ----------
-    singular : bool
-        Whether a pivot is zero.
-    sign : float
-        Sign of the determinant, up to a factor that never changes on a path.
-    ratio : float
-        Smallest over largest pivot.
-    """
-
-    singular: bool
-    sign: float
-    ratio: float
-
-    def __init__(
-        self, J: BalanceJacobian, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray
-    ) -> None:
-        self.J, self.p_scale, self.D, self.normal = J, p_scale, D, normal
-        c = J.of.rows
-        self.c, self.size, self.static = c, J.of.size, J.of.offset == 1
-        self.n = c * self.size
-        self.dp, self.dp_rigid = dp[: self.n].reshape(c, self.size), dp[self.n :]
-
-    def _factorise(
+    def _condense(
         self,
         compliance: tuple[FloatArray, ...],
         DF: FloatArray,
@@ -413,47 +333,20 @@ class Factors:
             real, imag, *rest = compliance
             turned = (np.ascontiguousarray(np.swapaxes(G, 1, 2)) for G in (real, imag))
             compliance = (*turned, *rest)
-        A, self.rows = bordered(compliance, DF, self.static, D, self.D[self.n :], border)
-        self.lu, self.piv, info = lapack.dgetrf(A.T, overwrite_a=True)
-        diagonal = np.diagonal(self.lu)
-        size = np.abs(diagonal)
-        self.singular = info != 0 or not np.isfinite(size).all()
-        if self.singular:
-            self.sign, self.ratio = 0.0, EPS
-            return
-        swaps = int(np.count_nonzero(self.piv != np.arange(len(size))))
-        negative = int(np.count_nonzero(diagonal < 0.0))
-        self.sign = 1.0 if (swaps + negative) % 2 == 0 else -1.0
-        self.ratio = max(float(size.min() / size.max()), EPS)
-
-    def _condensed(self, r: FloatArray, last: float) -> FloatArray:
-        """Scaled unknowns of the condensed equations."""
-        right = np.empty(len(self.rows) + 1)
-        np.divide(r, self.rows, out=right[:-1])
-        right[-1] = last
-        return np.asarray(lapack.dgetrs(self.lu, self.piv, right, overwrite_b=True)[0])
-
-    def solve(self, r: FloatArray, last: float) -> FloatArray:
-        """Scaled correction for the residual r (n,) and the right-hand side of the border."""
-        raise NotImplementedError
-
-    def tangent(self) -> FloatArray:
-        """Unit vector along the path, on the side the border points to."""
-        t = self.solve(np.zeros(len(self.D)), 1.0)
-        return np.asarray(t / np.linalg.norm(t))
+        A, rows = bordered(compliance, DF, self.static, D, self.D[self.n :], border)
+        self._factorise(A.T, rows)
 
 
-class EveryPoint(Factors):
+class EveryPoint(CondensedFactors):
     """Every point has its unknowns."""
 
-    def __init__(
-        self, J: BalanceJacobian, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray
-    ) -> None:
-        super().__init__(J, dp, D, p_scale, normal)
+    def __init__(self, J: BalanceJacobian, border: Border) -> None:
+        super().__init__(J, border)
         c, size, n, of = self.c, self.size, self.n, J.of
+        dp, D, p_scale, normal = border
         rigid = len(D) - n
         across, column = self._by_coefficient(normal[:-1]), self._by_coefficient(dp) * p_scale
-        self._factorise(
+        self._condense(
             (*of.modal.receptance_parts(of.Psi, J.w), of.G0, of.R, np.zeros((rigid, rigid))),
             J.DF if len(J.DF) == len(J.state) else J.every_derivative(),
             np.ascontiguousarray(D[:n].reshape(c, size).T),
@@ -473,14 +366,13 @@ class EveryPoint(Factors):
         return out
 
 
-class Eliminated(Factors):
+class Eliminated(CondensedFactors):
     """Points that stick or are open over the whole cycle are eliminated first."""
 
-    def __init__(
-        self, J: BalanceJacobian, dp: FloatArray, D: FloatArray, p_scale: float, normal: FloatArray
-    ) -> None:
-        super().__init__(J, dp, D, p_scale, normal)
+    def __init__(self, J: BalanceJacobian, border: Border) -> None:
+        super().__init__(J, border)
         c, size, n, of = self.c, self.size, self.n, J.of
+        _, D, p_scale, normal = border
         held = np.repeat(J.state != MOVES, J.stiffness.shape[1])
         s, m = np.flatnonzero(held), np.flatnonzero(~held)
         self.s, self.m = s, m
@@ -509,12 +401,12 @@ class Eliminated(Factors):
         self.V = scaled[s] / D[:n].reshape(c, size)[s]
         # the border on the held points is one on the forces of the others
         q = np.einsum("ks,ksm->km", _complex_part(self.V, of.offset).conj(), self.across)
-        by_force = _real_part(-q.conj(), -(self.V[:, 0] @ self.across0), of.offset)
+        by_force = real_part(-q.conj(), -(self.V[:, 0] @ self.across0), of.offset)
         column, share, self.moved_by_p = self._reduced(self.dp, self.dp_rigid)
         border_rigid = normal[n:-1] + D[n:] * (self.V[:, 0] @ self.by_rigid)
         across = np.concatenate([scaled[m].T.ravel(), border_rigid])
         last = float(normal[-1]) - p_scale * share
-        self._factorise(
+        self._condense(
             (np.ascontiguousarray(G.real), np.ascontiguousarray(G.imag), G0, R, below),
             J.DF,
             np.ascontiguousarray(D[:n].reshape(c, size)[m].T),
@@ -554,18 +446,12 @@ class Eliminated(Factors):
         return out
 
 
-class LowRank(Factors):
+class LowRank(CondensedFactors):
     """The motion of the rows in a basis of fewer, and what no mode moves beside it."""
 
-    def __init__(
-        self,
-        J: BalanceJacobian,
-        dp: FloatArray,
-        D: FloatArray,
-        p_scale: float,
-        normal: FloatArray,
-    ) -> None:
-        super().__init__(J, dp, D, p_scale, normal)
+    def __init__(self, J: BalanceJacobian, border: Border) -> None:
+        super().__init__(J, border)
+        _, D, p_scale, normal = border
         basis, of = J.of.basis, J.of
         assert basis is not None
         c, size, n, r = self.c, self.size, self.n, basis.shape[1]
@@ -591,7 +477,7 @@ class LowRank(Factors):
         rigid = len(D) - n
         column = np.concatenate([(basis.T @ self.dp).T.ravel(), self.dp_rigid])
         across = np.concatenate([(basis.T @ self.border).T.ravel() * self.unit, normal[n:-1]])
-        self._factorise(
+        self._condense(
             (real, imag, self.G0, self.R, np.zeros((rigid, rigid))),
             DF,
             np.repeat(unit[:, None], r, axis=1),

@@ -28,15 +28,14 @@ from upd.errors import InputError
 from upd.hbm.core.continuation import follow
 from upd.hbm.core.fourier import harmonics as harmonics_of
 from upd.hbm.core.fourier import to_complex
-from upd.hbm.core.newton import Settings, solve
+from upd.hbm.core.newton import PathProblem, Settings
 from upd.hbm.springs import response
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.checks import measures
 from upd.hbm.springs.damper import RigidDamper
-from upd.hbm.springs.friction import Start
-from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart
-from upd.hbm.springs.points import Contacts, stuck_stiffness
-from upd.hbm.springs.residuals import FREQUENCY_SHARE, scale_of
+from upd.hbm.springs.jacobian import BalanceJacobian, LinearPart, real_part
+from upd.hbm.springs.points import Contacts, Start
+from upd.hbm.springs.sweep import FREQUENCY_SHARE, scale_of
 from upd.labels import Shown
 from upd.linalg.parallel import threads_for
 
@@ -325,7 +324,7 @@ def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearM
     of = ExtendedBalance(b, shape, omega)
     begin = wanted[0]
     for _ in range(HALVINGS):
-        first = solve(of.function, of.guess(begin), begin, of.scale, s)
+        first = PathProblem(of.function, of.scale, settings=s).solve(of.guess(begin), begin)
         if first.tangent is not None:
             break
         begin -= np.log(2.0)
@@ -348,7 +347,7 @@ def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearM
     xs, ps = path.x[kept:], path.p[kept:]
     x, omegas, xi = xs[:, :-2], xs[:, -2], xs[:, -1]
     found = measures(b, omegas / (2.0 * np.pi), x)
-    each = zip(xi.tolist(), omegas.tolist(), found.force, strict=True)
+    each = zip(xi.tolist(), omegas.tolist(), found.contact_force, strict=True)
     eta = [of.amplitudes(b.linear.shifted(one), F, omega, 1)[0] for one, omega, F in each]
     return NonlinearMode(
         amplitude=np.exp(ps),
@@ -427,13 +426,12 @@ class ExtendedBalance:
             return residual, None, by_p
         w, modal, n = linear.k * omega, linear.modal, len(found)
         one = w[:1]
-        parts = BalanceJacobian(linear, w, state, stuck_stiffness(b.contacts), moving)
+        parts = BalanceJacobian(linear, w, state, b.stuck_stiffness, moving)
         DF, J = parts.every_derivative(), parts.matrix(2)
         J[:n, n] = by_omega
         # xi acts on each harmonic as i k omega eta_k, a force
         moved = linear.moves(modal.solve(w, -1j * w[:, None] * all_eta))
-        by_xi = np.zeros((c, linear.size))
-        by_xi[:, o::2], by_xi[:, o + 1 :: 2] = moved.real.T, -moved.imag.T
+        by_xi = real_part(moved, np.zeros(c), o)
         J[: by_xi.size, n + 1] = by_xi.ravel()
         lost = linear.damped(eta[None])[0]
         pushes = np.array([2.0 * omega * eta - 1j * lost, 1j * omega * eta])

@@ -18,9 +18,9 @@ from scipy.optimize import brentq
 
 from upd.hbm.core.continuation import State, advance, begin
 from upd.hbm.core.fourier import to_complex
-from upd.hbm.core.newton import Function, Settings, Solution, correct
+from upd.hbm.core.newton import PathProblem, Settings, Solution, correct
 from upd.hbm.springs.balance import Balance
-from upd.hbm.springs.residuals import FREQUENCY_SHARE, over_frequency, scale_of
+from upd.hbm.springs.sweep import FREQUENCY_SHARE, over_frequency, scale_of
 from upd.labels import Shown
 
 log = logging.getLogger(__name__)
@@ -78,22 +78,18 @@ class _Measure:
     def amplitude(self, x: FloatArray, frequency: float) -> float:
         """|row @ q| alone, mm."""
         b, j = self.b, self.place
-        F = to_complex(b.force(x).force.reshape(len(b.Psi), -1), b.harmonics)[:, j]
+        F = to_complex(b.force(x).reshape(len(b.Psi), -1), b.harmonics)[:, j]
         w = np.array([2 * np.pi * b.harmonics.dynamic[j] * frequency])
         modal, Psi = b.part(int(b.harmonics.dynamic[j]))
         eta = modal.solve(w, b.loads[j : j + 1] - F @ Psi.conj())[0]
         return float(abs(eta @ self.modal_row))
 
-    def slope(self, x: FloatArray, p: float, direction: FloatArray) -> float:
-        """Derivative along a direction (n_unknown + 1,), by central differences."""
-        h = EPS ** (1 / 3)
-        return float(
-            (
-                self(x + h * direction[:-1], p + h * direction[-1])
-                - self(x - h * direction[:-1], p - h * direction[-1])
-            )
-            / (2 * h)
-        )
+    def slope(
+        self, x: FloatArray, p: float, tangent: FloatArray, D: FloatArray, p_scale: float
+    ) -> float:
+        """Derivative along a scaled direction (n_unknown + 1,), by central differences."""
+        h, dx, dp = EPS ** (1 / 3), tangent[:-1] * D, float(tangent[-1] * p_scale)
+        return float((self(x + h * dx, p + h * dp) - self(x - h * dx, p - h * dp)) / (2 * h))
 
 
 def climb(
@@ -136,39 +132,30 @@ def climb(
     InputError
         For a harmonic that is not kept, or a row of another length.
     """
-    s, measure = (
-        settings or Settings(),
-        _Measure(b, b.modal_row(row, harmonic), b.harmonics.place(harmonic), power),
-    )
-    function, scale, p_scale = over_frequency(b), scale_of(b), FREQUENCY_SHARE * frequency
+    measure = _Measure(b, b.modal_row(row, harmonic), b.harmonics.place(harmonic), power)
+    p_scale = FREQUENCY_SHARE * frequency
+    problem = PathProblem(over_frequency(b), scale_of(b), p_scale, settings or Settings())
 
     def slope(state: State) -> float:
-        return measure.slope(
-            state.x,
-            state.p,
-            np.append(state.tangent[:-1] * scale(state.x), state.tangent[-1] * p_scale),
-        )
+        return measure.slope(state.x, state.p, state.tangent, problem.scale(state.x), p_scale)
 
     def peak(state: State, status: str) -> Peak:
         return Peak(state.p, measure.amplitude(state.x, state.p), state.x, status)
 
-    here = begin(function, x, frequency, scale, p_scale, s)._replace(step=reach)
+    here = begin(problem, x, frequency)._replace(step=reach)
     if slope(here) < 0:
         # to be left in the opposite direction
         here = here._replace(tangent=-here.tangent, sign=-here.sign)
     for _ in range(MOST_STEPS):
-        found, there = advance(function, here, scale, p_scale, s)
-        if found is None:
+        there = advance(problem, here)
+        if there is None:
             return peak(here, "no convergence along the path")
         if slope(there) > 0:
             here = there
             continue
-        length = float(
-            np.hypot(
-                np.linalg.norm((there.x - here.x) / scale(here.x)), (there.p - here.p) / p_scale
-            )
-        )
-        top = _between(function, measure, here, length, scale(here.x), p_scale, s)
+        way = np.linalg.norm((there.x - here.x) / problem.scale(here.x))
+        length = float(np.hypot(way, (there.p - here.p) / p_scale))
+        top = _between(problem, measure, here, length)
         if top is not None:
             return top
         if length <= POSITION:
@@ -177,32 +164,22 @@ def climb(
     return peak(here, f"still rising after {MOST_STEPS} steps")
 
 
-def _between(
-    function: Function,
-    measure: _Measure,
-    base: State,
-    reach: float,
-    D: FloatArray,
-    p_scale: float,
-    s: Settings,
-) -> Peak | None:
+def _between(problem: PathProblem, measure: _Measure, base: State, reach: float) -> Peak | None:
     """The peak between the base and the plane at `reach`.
 
     Root of the slope, or its jump where a contact changes state.
     """
-    origin = Solution(base.x, base.p, base.tangent, 0, 0.0)
-    best = [origin]
+    D, p_scale = problem.scale(base.x), problem.p_scale
+    best = [Solution(base.x, base.p, base.tangent, 0)]
 
     def slope(share: float) -> float:
         way, along = share * reach, base.tangent
         x, p = base.x + way * along[:-1] * D, base.p + way * float(along[-1]) * p_scale
-        found = correct(function, x, p, D, p_scale, along, s)
+        found = correct(problem, x, p, D, along)
         if found.tangent is None:
             raise ArithmeticError
         best[0] = found
-        return measure.slope(
-            found.x, found.p, np.append(found.tangent[:-1] * D, found.tangent[-1] * p_scale)
-        )
+        return measure.slope(found.x, found.p, found.tangent, D, p_scale)
 
     try:
         if slope(0.0) <= 0 or slope(1.0) >= 0:

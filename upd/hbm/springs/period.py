@@ -264,7 +264,7 @@ def march_points(  # type: ignore[no-untyped-def]
     jacobian : bool
         Whether the derivative is wanted.
     filled : tuple of ndarray
-        Filled with force, weighed, state, slope and tangent of `upd.hbm.springs.friction.March`;
+        Filled with force, weighed, state, slope and tangent of `upd.hbm.springs.points.March`;
         the tangent is not touched without the derivative.
     periodic, periods : ndarray
         Filled likewise.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, NamedTuple, cast, get_args
 
@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upd.errors import InputError
-from upd.hbm.core.fourier import Harmonics, harmonics, to_complex
+from upd.hbm.core.fourier import Harmonics, harmonics, sample_count, to_complex
 from upd.hbm.core.newton import Settings
-from upd.hbm.springs.balance import Balance, assembled
-from upd.hbm.springs.checks import measures
-from upd.hbm.springs.damper import RigidDamper
-from upd.hbm.springs.friction import Start
+from upd.hbm.springs.balance import Balance
+from upd.hbm.springs.checks import Measures, measures
+from upd.hbm.springs.damper import RigidDamper, attach
+from upd.hbm.springs.modal import modal
 from upd.hbm.springs.peak import climb
-from upd.hbm.springs.points import Contacts
+from upd.hbm.springs.points import Contacts, Start
 from upd.hbm.springs.sweep import Curve, solve_curve
 from upd.linalg.parallel import threads_for
 
@@ -38,8 +38,8 @@ ALIASING = 1e-2
 Status = Literal["complete", "not periodic", "stopped", "step limit"]
 
 
-@dataclass(frozen=True)
-class FrequencyResponse:
+@dataclass(frozen=True, kw_only=True)
+class FrequencyResponse(Measures):
     """Steady forced response along the solution path.
 
     n points, in order of the path: frequencies repeat or turn back at folds. Coefficients are
@@ -80,16 +80,9 @@ class FrequencyResponse:
     balance: Balance
     frequency: FloatArray
     x: FloatArray
-    contact_displacement: FloatArray
-    contact_force: FloatArray
-    state: FloatArray
-    energy: FloatArray
     linear: NDArray[np.bool_]
-    truncation: FloatArray
-    aliasing: FloatArray
     status: Status
     message: str
-    periodic: NDArray[np.bool_]
 
     def __repr__(self) -> str:
         """Its end and its size, without the arrays."""
@@ -434,19 +427,13 @@ def _answer(b: Balance, curve: Curve) -> FrequencyResponse:
     for note in notes:
         log.warning(note)
     return FrequencyResponse(
+        **vars(found),
         balance=b,
         frequency=curve.p,
         x=curve.x,
-        contact_displacement=found.displacement,
-        contact_force=found.force,
-        state=found.state,
-        energy=found.energy,
         linear=curve.exact,
-        truncation=found.truncation,
-        aliasing=found.aliasing,
         status=cast(Status, status),
         message="; ".join([curve.message, *notes]),
-        periodic=found.periodic,
     )
 
 
@@ -490,29 +477,24 @@ class GivenSystem(NamedTuple):
         -------
         Balance
         """
-        A = self._dense(what)
-        n, joined_to = len(A[0]), None
-        force = {1: np.zeros(n, dtype=complex)} if force is None else force
-        static = np.zeros(n) if self.static_force is None else np.asarray(self.static_force, float)
+        M, C, K = self._dense(what)
+        force = {1: np.zeros(len(M), dtype=complex)} if force is None else force
+        given = self.static_force
+        static = np.zeros(len(M)) if given is None else np.asarray(given, float)
         self._require(what, f, static, force)
-        slider = self._sliders(what)
-        h = harmonics(self.harmonics)
+        slider, h, points = self._sliders(what), harmonics(self.harmonics), self.contacts
         self._require_harmonics(what, h, static, force)
         if self.damper is not None and self.damper_rows is not None:
-            joined_to = self.damper, self.damper_rows
+            M, C, K, points = attach(M, C, K, points, self.damper, self.damper_rows)
+            static = np.concatenate([static, self.damper.force])
+        if fast_exits and points.tangents and not np.any(points.law.mu):
+            points = replace(points, rows=np.ascontiguousarray(points.rows[:, :1]))
+        dynamic = np.zeros((len(h.dynamic), len(static)), dtype=complex)
+        for k, amplitude in force.items():
+            dynamic[h.place(k), : len(amplitude)] = amplitude
         free = self.start == "frictionless"
-        b = assembled(
-            *A,
-            self.contacts,
-            force,
-            static,
-            h,
-            joined_to=joined_to,
-            samples=self.samples,
-            start="zero" if free else self.start,
-            slider=slider,
-            fast_exits=fast_exits,
-        )
+        count, start = sample_count(h, self.samples), "zero" if free else self.start
+        b = Balance(modal(M, C, K), points, h, count, static, dynamic, start, slider)
         return b.with_sliders("zero", b.frictionless_sliders) if free else b
 
     def _dense(self, what: str) -> tuple[FloatArray, FloatArray, FloatArray]:

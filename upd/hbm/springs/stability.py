@@ -29,7 +29,6 @@ from upd.errors import InputError
 from upd.hbm.core.fourier import synthesis
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import LIFT, normal, step
-from upd.hbm.springs.points import stuck_stiffness
 from upd.hbm.springs.response import FrequencyResponse
 from upd.labels import Shown
 from upd.linalg.compiled import compiled
@@ -216,7 +215,7 @@ def changes(b: Balance, w: FloatArray, force: FloatArray) -> Changes:
     n_point, rows, n = w.shape
     c, s, law = n_point * rows, n_point * (rows - 1), b.contacts.law
     out = Changes(*(np.zeros((n, *shape)) for shape in ((c, c), (c, s), (s, c), (s, s))))
-    k_t = stuck_stiffness(b.contacts)[:, 1:].max(axis=1, initial=0.0)
+    k_t = b.stuck_stiffness[:, 1:].max(axis=1, initial=0.0)
     _fill(w, force, law.k_n, k_t, law.mu, law.preload, law.gap, *out)
     return out
 

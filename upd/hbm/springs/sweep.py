@@ -1,7 +1,8 @@
 """The curve over frequency.
 
 Exact stuck answers where proven, continuation over each stretch between. Its first points: Newton
-from linear answers, then homotopies that start from an answer known to be exact.
+from linear answers, then homotopies that start from an answer known to be exact. Residuals over one
+parameter, and the sizes of the unknowns, are the bridge between mechanics and continuation.
 """
 
 from __future__ import annotations
@@ -14,21 +15,21 @@ from numpy.typing import NDArray
 
 from upd.hbm.core.continuation import Path, follow
 from upd.hbm.core.fourier import harmonics
-from upd.hbm.core.newton import Settings, solve
+from upd.hbm.core.newton import EPS, Function, PathProblem, Scale, Settings
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.checks import separated, sticking_preload, stuck_points
-from upd.hbm.springs.residuals import (
-    FREQUENCY_SHARE,
-    over_frequency,
-    over_load,
-    over_preload,
-    scale_of,
-    sizes_of,
-)
+from upd.hbm.springs.jacobian import BalanceJacobian
+from upd.hbm.springs.terms import unit_sizes
 
 log = logging.getLogger(__name__)
 
 FloatArray = NDArray[np.float64]
+#: arclength unit of frequency, as a share of the mean frequency: a resonance of a few per cent is
+#: one unit wide
+FREQUENCY_SHARE = 0.05
+#: smallest mean displacement, relative to what the static loads cause, that is converged to its own
+#: size
+STATIC_SHARE = 1e-5
 #: share of the range by which a path may come back behind the first frequency before it is ended
 BEHIND = 0.05
 #: difference, relative to their size, at which two answers at one frequency are different solutions
@@ -83,9 +84,8 @@ def solve_curve(
     omega = 2 * np.pi * f
     linear = stuck_points(b, omega) if fast and b.start == "zero" else np.zeros(len(f), dtype=bool)
     if linear.all():
-        x = np.array([b.stuck(float(w)) for w in omega])
         message = "every point sticks over the whole cycle: the linear answer is exact"
-        return b, Curve(f, x, linear, "complete", message)
+        return b, _stuck(b, f, message)
     apart = separated(b, omega) if fast else None
     if apart is not None:
         message = "nothing presses the contacts: the free answer is exact"
@@ -127,15 +127,23 @@ def sweep(
     parts: list[Curve] = []
     i = 0
     while i < len(f):
+        others = np.flatnonzero(exact[i:] != exact[i])
+        stop = i + int(others[0]) if len(others) else len(f)
         if exact[i]:
-            stop = i + int(np.argmin(np.append(exact[i:], False)))
-            x = np.array([b.stuck(2 * np.pi * v) for v in f[i:stop]])
-            parts.append(Curve(f[i:stop], x, np.ones(stop - i, dtype=bool), "complete", ""))
+            parts.append(_stuck(b, f[i:stop]))
             i = stop
             continue
-        stop = i + int(np.argmax(np.append(exact[i:], True)))
-        part, i = _to_the_next(b, f, i, stop, parts[-1].x[-1] if parts else None, settings)
+        # onto the next exact answer; arriving on another branch, the path follows that to the end
+        x = parts[-1].x[-1] if parts else None
+        part = _stretch(b, f, slice(i, stop + 1), x, settings)
+        if stop < len(f) and part.status == "complete":
+            there = b.stuck(2 * np.pi * f[stop])
+            if float(np.abs((part.x[-1] - there) / sizes_of(b)(there)).max()) <= OTHER_BRANCH:
+                part = replace(part, p=part.p[:-1], x=part.x[:-1], exact=part.exact[:-1])
+            else:
+                part, stop = _stretch(b, f, slice(i, len(f)), x, settings), len(f)
         parts.append(part)
+        i = stop
         if part.status != "complete":
             break
     p, x, e = (np.concatenate([getattr(c, name) for c in parts]) for name in ("p", "x", "exact"))
@@ -146,52 +154,29 @@ def sweep(
     return Curve(p, x, e, parts[-1].status, parts[-1].message or done)
 
 
-def _to_the_next(
-    b: Balance,
-    f: FloatArray,
-    i: int,
-    stop: int,
-    x: FloatArray | None,
-    settings: Settings | None,
-) -> tuple[Curve, int]:
-    """Continuation over f[i:stop] and onto the next exact answer.
-
-    Arriving on another branch, it follows that to the end.
-    """
-    last = stop < len(f)
-    part = _stretch(b, f, list(range(i, stop + last)), x, settings)
-    if not last or part.status != "complete":
-        return part, stop
-    there, here = b.stuck(2 * np.pi * f[stop]), part.x[-1]
-    if float(np.abs((here - there) / sizes_of(b)(there)).max()) <= OTHER_BRANCH:
-        return Curve(part.p[:-1], part.x[:-1], part.exact[:-1], part.status, part.message), stop
-    return _stretch(b, f, list(range(i, len(f))), x, settings), len(f)
+def _stuck(b: Balance, f: FloatArray, message: str = "") -> Curve:
+    """The stuck answers, where they are exact."""
+    x = np.array([b.stuck(2 * np.pi * v) for v in f])
+    return Curve(f, x, np.ones(len(f), dtype=bool), "complete", message)
 
 
 def _stretch(
-    b: Balance,
-    f: FloatArray,
-    index: list[int],
-    x: FloatArray | None,
-    settings: Settings | None,
+    b: Balance, f: FloatArray, part: slice, x: FloatArray | None, settings: Settings | None
 ) -> Curve:
-    """Continuation over the consecutive frequencies f[index].
+    """Continuation over the consecutive frequencies f[part].
 
     From x, the solved point before them, where there is one.
     """
-    known = x is not None
-    begin = f[index[0] - 1] if known else f[index[0]]
+    wanted, known = f[part], int(x is not None)
+    begin, end = f[part.start - known], wanted[-1]
     if x is None:
         x = first_point(b, begin, settings)
     if x is None:
-        empty = np.zeros((0, b.size))
         message = (
             f"no solution found at {begin:.9g} Hz: start at a frequency far from resonance or "
             "change the slider start"
         )
-        return Curve(np.zeros(0), empty, np.zeros(0, dtype=bool), "stopped", message)
-    end, wanted = f[index[-1]], f[index]
-    p_scale = FREQUENCY_SHARE * float(np.mean(f))
+        return Curve(f[:0], np.zeros((0, b.size)), np.zeros(0, dtype=bool), "stopped", message)
     if begin == end:
         return Curve(np.array([begin]), x[None], np.zeros(1, dtype=bool), "complete", "")
     path: Path = follow(
@@ -199,19 +184,13 @@ def _stretch(
         (x, begin),
         end,
         scale=scale_of(b),
-        p_scale=p_scale,
+        p_scale=FREQUENCY_SHARE * float(np.mean(f)),
         wanted=wanted,
         turned=float(f[0] - BEHIND * (f[-1] - f[0])),
         settings=settings,
     )
-    keep = slice(1, None) if known else slice(None)
-    return Curve(
-        path.p[keep],
-        path.x[keep],
-        np.zeros(len(path.p[keep]), dtype=bool),
-        path.status,
-        path.message if path.status != "complete" else "",
-    )
+    p, message = path.p[known:], "" if path.status == "complete" else path.message
+    return Curve(p, path.x[known:], np.zeros(len(p), dtype=bool), path.status, message)
 
 
 def place_sliders(b: Balance, frequency: float, settings: Settings | None = None) -> Balance | None:
@@ -233,7 +212,15 @@ def place_sliders(b: Balance, frequency: float, settings: Settings | None = None
     if b.start != "static" or b.slider is not None:
         return b
     statics = static_point(b, frequency, settings)
-    return None if statics is None else b.with_sliders("static", sliders(b, statics))
+    if statics is None:
+        return None
+    # positions after the static loads have led there, from sliders at zero
+    rest = b.unexcited().with_sliders("zero")
+    out, d = np.zeros((b.contacts.n_point, 2)), b.contacts.tangents
+    if b.harmonics.static:
+        T = rest.force(statics)[:, 1:, 0]
+        out[:, :d] = b.split(statics)[0][:, 1:, 0] - T / b.contacts.law.k_t[:, None]
+    return b.with_sliders("static", out)
 
 
 def first_point(
@@ -271,14 +258,15 @@ def first_point(
     statics = static_point(b, frequency, settings)
     if statics is None:
         return None
-    path = follow(
-        over_load(b, frequency),
-        (statics, 0.0),
-        1.0,
-        scale=scale_of(b, b.stuck(omega)),
-        p_scale=1.0,
-        settings=settings,
-    )
+    return _to_one(b, over_load(b, frequency), statics, b.stuck(omega), settings)
+
+
+def _to_one(
+    b: Balance, function: Function, x: FloatArray, like: FloatArray, settings: Settings | None
+) -> FloatArray | None:
+    """The answer at 1 of a parameter by continuation from one at 0; `like` has its size."""
+    scale = scale_of(b, like)
+    path = follow(function, (x, 0.0), 1.0, scale=scale, p_scale=1.0, settings=settings)
     return path.x[-1] if path.status == "complete" else None
 
 
@@ -302,7 +290,7 @@ def newton(
         None when it does not converge.
     """
     patient = replace(settings or Settings(), iterations=PATIENCE)
-    found = solve(over_frequency(b), x, frequency, scale_of(b), patient)
+    found = PathProblem(over_frequency(b), scale_of(b), settings=patient).solve(x, frequency)
     return found.x if found.tangent is not None else None
 
 
@@ -333,16 +321,7 @@ def from_stuck(b: Balance, frequency: float, settings: Settings | None = None) -
     pressed = newton(b.pressed(P), x, frequency, settings)
     if pressed is None or not np.any(P):
         return pressed
-    x = pressed
-    path = follow(
-        over_preload(b, frequency, P),
-        (x, 0.0),
-        1.0,
-        scale=scale_of(b, x),
-        p_scale=1.0,
-        settings=settings,
-    )
-    return path.x[-1] if path.status == "complete" else None
+    return _to_one(b, over_preload(b, frequency, P), pressed, pressed, settings)
 
 
 def static_point(
@@ -369,7 +348,7 @@ def static_point(
     few = harmonics((0, int(b.harmonics.dynamic[0])))
     samples = 2 * few.highest + 1
     rest = replace(
-        b.with_loads(1.0, 0.0),
+        b.unexcited(),
         harmonics=few,
         samples=samples,
         dynamic=np.zeros((1, len(b.static)), complex),
@@ -381,23 +360,160 @@ def static_point(
     return None if x is None else b.embedded(x, rest)
 
 
-def sliders(b: Balance, x: FloatArray) -> FloatArray:
-    """Slider positions after the static loads have led to an answer, from sliders at zero.
+def over_frequency(b: Balance) -> Function:
+    """Residual over frequency for the continuation.
 
     Parameters
     ----------
     b : Balance
-    x : (n_unknown,) ndarray
-        Unknowns under the static loads.
 
     Returns
     -------
-    (n_point, 2) ndarray
-        Positions [mm].
+    callable
+        (x, frequency [Hz], with Jacobian) -> residual, Jacobian or None, derivative by the
+        frequency.
     """
-    rest = b.with_loads(1.0, 0.0).with_sliders("zero")
-    out, d = np.zeros((b.contacts.n_point, 2)), b.contacts.tangents
-    if b.harmonics.static:
-        T = rest.force(x).force[:, 1:, 0]
-        out[:, :d] = b.split(x)[0][:, 1:, 0] - T / b.contacts.law.k_t[:, None]
-    return out
+
+    def function(
+        x: FloatArray, f: float, jacobian: bool
+    ) -> tuple[FloatArray, BalanceJacobian | None, FloatArray]:
+        residual, parts, slope = b.linearised(x, 2 * np.pi * f, jacobian)
+        return residual, parts, 2 * np.pi * slope
+
+    return function
+
+
+def over_load(b: Balance, frequency: float) -> Function:
+    """Residual over a factor on the dynamic loads at one frequency; linear in the factor.
+
+    Parameters
+    ----------
+    b : Balance
+    frequency : float
+        [Hz]
+
+    Returns
+    -------
+    callable
+        (x, factor, with Jacobian) -> residual, Jacobian or None, derivative by the factor.
+    """
+    omega = 2 * np.pi * frequency
+    none = b.unexcited()
+    zero = np.zeros(b.size)
+    slope = b.linearised(zero, omega, False)[0] - none.linearised(zero, omega, False)[0]
+
+    def function(
+        x: FloatArray, s: float, jacobian: bool
+    ) -> tuple[FloatArray, BalanceJacobian | None, FloatArray]:
+        residual, parts, _ = none.linearised(x, omega, jacobian)
+        return residual + s * slope, parts, slope
+
+    return function
+
+
+def scale_of(b: Balance, least: FloatArray | None = None) -> Scale:
+    """Units of the unknowns for the continuation: a path is measured by the energy of the springs.
+
+    Every contact p with the largest coefficient m_p and the stiffness kappa_p = k_n + k_t counts in
+    the length of a change dw with its share of the energy,
+
+        |dw|^2 = sum_p kappa_p |dw_p|^2 / sum_p kappa_p m_p^2,
+
+    so that a contact cut into parts, kappa_p with it, counts as before: the unit of its unknowns is
+    their `sizes_of` times sqrt(sum_q kappa_q (m_q/m)^2 / kappa_p), m the largest m_q.
+
+    Parameters
+    ----------
+    b : Balance
+    least : (n_unknown,) ndarray, optional
+        An answer of typical size that keeps the unit when the solution starts from rest.
+
+    Returns
+    -------
+    callable
+        x (n_unknown,) -> units (n_unknown,).
+    """
+    law = b.contacts.law
+    kappa = (law.k_n + law.k_t) / float((law.k_n + law.k_t).max())
+    return _sized(b, least, kappa)
+
+
+def sizes_of(b: Balance) -> Scale:
+    """Sizes of the unknowns.
+
+    The largest mean displacement, the largest dynamic one and the rigid amplitudes, each measured
+    by its own.
+
+    Parameters
+    ----------
+    b : Balance
+
+    Returns
+    -------
+    callable
+        x (n_unknown,) -> sizes (n_unknown,).
+    """
+    return _sized(b, None, np.zeros(0))
+
+
+def _sized(b: Balance, least: FloatArray | None, kappa: FloatArray) -> Scale:
+    o, rigid = b.harmonics.offset, b.rigid
+    # the motion below which the unit stays: that of a typical answer, or one that does not matter
+    floor = _floor(b) if least is None else float(np.abs(b.split(least)[0]).max())
+    # the mean is a difference of static terms: below their rounding, as the tolerance magnifies it,
+    # it is not resolved
+    resolved = STATIC_SHARE * float(np.abs(b.u0).max(initial=0.0))
+    rigid_rows = float(np.abs(b.Psi[:, b.modal.rigid]).max(initial=0.0)) or 1.0
+
+    def scale(x: FloatArray) -> FloatArray:
+        D: FloatArray = unit_sizes(b.split(x)[0], kappa, o, floor, resolved, rigid_rows, rigid)
+        return D
+
+    return scale
+
+
+def _floor(b: Balance) -> float:
+    """A displacement below which nothing matters.
+
+    Rounding of the motions the loads cause across the contact springs.
+    """
+    k = float(max(b.contacts.law.k_t.max(), b.contacts.law.k_n.max()))
+    force = max(
+        float(np.abs(b.static).max()),
+        float(np.abs(b.dynamic).max()),
+        float(b.contacts.law.preload.max()),
+    )
+    return float(max(1e4 * EPS * force / k, float(np.finfo(float).tiny) ** 0.5))
+
+
+def over_preload(b: Balance, frequency: float, P: FloatArray) -> Function:
+    """Residual over q, with (1 - q) P more preload balanced by as much static load.
+
+    q = 0 sticks when P is enough, q = 1 is the problem.
+
+    Parameters
+    ----------
+    b : Balance
+    frequency : float
+        [Hz]
+    P : (n_point,) ndarray
+        Extra preload [N].
+
+    Returns
+    -------
+    callable
+        (x, q, with Jacobian) -> residual, Jacobian or None, derivative by q.
+    """
+    omega = 2 * np.pi * frequency
+
+    def function(
+        x: FloatArray, q: float, jacobian: bool
+    ) -> tuple[FloatArray, BalanceJacobian | None, FloatArray]:
+        residual, parts, _ = b.pressed((1 - q) * P).linearised(x, omega, jacobian)
+        h = EPS ** (1 / 3)
+        if not jacobian:
+            return residual, None, np.zeros(b.size)
+        up, down = (b.pressed((1 - q - d) * P).linearised(x, omega, False)[0] for d in (h, -h))
+        return residual, parts, (up - down) / (2 * h)
+
+    return function

@@ -16,6 +16,8 @@ import numpy as np
 from upd.hbm.springs.period import GIVEN, march_point
 from upd.linalg.compiled import compiled
 
+#: smallest motion, relative to the mean displacement, that is converged to its own size
+SMALL_MOTION = 1e-3
 #: what a point does over the whole cycle
 MOVES, STICKS, OPEN = 0, 1, 2
 
@@ -48,7 +50,7 @@ def _whole_cycle(w, k_n, k_t, mu, preload, gap, mode, slider):  # type: ignore[n
 def _normal_tangent(slope, E, Q, k_n, rows, out):  # type: ignore[no-untyped-def]
     """Derivative (size, size) of the normal force's coefficients by those of the closing motion.
 
-    `slope` (3, n) as `upd.hbm.springs.friction.March` keeps it, rows (n, size) is scratch.
+    `slope` (3, n) as `upd.hbm.springs.points.March` keeps it, rows (n, size) is scratch.
     """
     n, size = E.shape
     always = True
@@ -372,3 +374,54 @@ def by_harmonic(A, A0, static, X):  # type: ignore[no-untyped-def]
                 sin += real * X[j, x + 1] - imag * X[j, x]
             out[i, x], out[i, x + 1] = cos, sin
     return out
+
+
+@compiled
+def unit_sizes(W, kappa, o, floor, resolved, rigid_rows, rigid):  # type: ignore[no-untyped-def]
+    """Sizes of all unknowns, of those of each contact by its share of the energy if `kappa`.
+
+    Parameters
+    ----------
+    W : (n_point, 1 + d, size) ndarray
+        Coefficients of the relative displacements [mm].
+    kappa : (n_point,) ndarray, or none
+        Stiffness of each contact.
+    o : int
+        Coefficients before the first cosine.
+    floor, resolved : float
+        Motion below which nothing matters, and mean displacement that is resolved [mm].
+    rigid_rows : float
+        Largest motion of a row by a rigid mode.
+    rigid : int
+        Rigid amplitudes.
+
+    Returns
+    -------
+    (n_unknown,) ndarray
+    """
+    n_point, d1, size = W.shape
+    each, mean = np.zeros(n_point), 0.0
+    for p in range(n_point):
+        for i in range(d1):
+            for m in range(o):
+                mean = max(mean, abs(W[p, i, m]))
+            for m in range(o, size):
+                each[p] = max(each[p], abs(W[p, i, m]))
+    moving = each.max()
+    still = max(mean, moving, floor, resolved)
+    # a motion far below the mean displacement is measured by its own size as far as the rounding of
+    # the mean lets it
+    moves = max(moving, SMALL_MOTION * mean, floor)
+    energy, most = 0.0, max(moving, floor)
+    for p in range(len(kappa)):
+        energy += kappa[p] * (max(each[p], floor) / most) ** 2
+    D = np.empty(n_point * d1 * size + rigid)
+    place = 0
+    for p in range(n_point):
+        share = np.sqrt(energy / kappa[p]) if len(kappa) > 0 else 1.0
+        for _ in range(d1):
+            for m in range(size):
+                D[place] = share * (still if m < o else moves)
+                place += 1
+    D[place:] = still / rigid_rows
+    return D

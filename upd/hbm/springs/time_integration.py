@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from upd.hbm.core.fourier import analysis, to_complex
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.coulomb import normal, step
-from upd.hbm.springs.friction import Law
 from upd.labels import Shown
 from upd.linalg.compiled import compiled
 
@@ -230,7 +229,9 @@ def steady_state(
     c, law = len(b.Psi), b.contacts.law
     W, F, X = np.zeros((c, steps)), np.zeros((c, steps)), np.zeros((m, steps))
     linear = (np.ascontiguousarray(damping), b.modal.eigenvalues, S, b.Psi, Gamma)
-    tolerated = 1e4 * EPS * (1 + float(_stiff(b, law, Gamma)))
+    # contact stiffness against that of a step multiplies the rounding of the displacement
+    stiff = float(np.abs(Gamma).max() * max(law.k_n.max(), law.k_t.max()))
+    tolerated = 1e4 * EPS * (1 + stiff)
     d1, out = 1 + b.contacts.tangents, (W, F, X)
     change, status, period, before = np.inf, "period limit", 0, np.zeros_like(X)
     while period < most_periods:
@@ -256,29 +257,21 @@ def steady_state(
     )
 
 
-def _stiff(b: Balance, law: Law, Gamma: FloatArray) -> float:
-    """Contact stiffness against the stiffness of one step.
-
-    What multiplies the rounding of the contact displacement.
-    """
-    return float(np.abs(Gamma).max() * max(law.k_n.max(), law.k_t.max()))
-
-
 def _initial(b: Balance, omega: float, x: FloatArray) -> tuple[FloatArray, ...]:
     """Modal displacement, velocity, acceleration, contact displacement, force and tractions.
 
     At t = 0 of the harmonic answer.
     """
-    found = b.force(x)
-    size = b.harmonics.size
-    q = b.displacement(np.array([omega]), found.force.reshape(1, -1, size), b.split(x)[1][None])[0]
+    found, size = b.period(x), b.harmonics.size
+    force = found.coefficients(b.Q).reshape(1, -1, size)
+    q = b.displacement(np.array([omega]), force, b.split(x)[1][None])[0]
     eta = np.linalg.solve(b.modal.Phi, q)
     k, amplitude = b.harmonics.dynamic, to_complex(eta, b.harmonics)
     mean = eta[:, 0] if b.harmonics.static else np.zeros(len(eta))
     displacement = mean + amplitude.real.sum(axis=1)
     velocity = (1j * omega * k * amplitude).real.sum(axis=1)
     acceleration = (-((omega * k) ** 2) * amplitude).real.sum(axis=1)
-    force = np.ascontiguousarray(found.march.force[:, :, 0])
+    force = np.ascontiguousarray(found.force[:, :, 0])
     T = np.zeros((len(force), 2))
     T[:, : b.contacts.tangents] = force[:, 1:]
     return displacement, velocity, acceleration, b.Psi @ displacement, force.ravel(), T

@@ -28,7 +28,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from math import gcd
 from typing import Any, NamedTuple
 
@@ -42,10 +41,8 @@ from upd.hbm.core.fourier import harmonics as harmonics_of
 from upd.hbm.core.newton import Settings
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.damper import RigidDamper
-from upd.hbm.springs.friction import Start
-from upd.hbm.springs.jacobian import LinearPart, linear_part
 from upd.hbm.springs.modal import Modal, modal
-from upd.hbm.springs.points import Contacts
+from upd.hbm.springs.points import Contacts, Start
 from upd.hbm.springs.response import FrequencyResponse, GivenSystem, force_of, response_of
 from upd.hbm.springs.time_integration import SteadyState, steady_state
 from upd.linalg.parallel import threads_for
@@ -84,37 +81,45 @@ def nodal_diameters(
 
 
 @dataclass(frozen=True)
-class Waves:
-    """The waves of a disk that the contacts see.
+class WaveBalance(Balance):
+    """The balance of one sector under a travelling wave; its static part is nodal diameter 0.
 
     Attributes
     ----------
     n_sectors, engine_order : int
+        Beside those of `Balance`.
     modes : mapping
         Nodal diameter, at most N/2 -> modes of the sector, a damper's dofs last.
     near, far : (n_point, 1 + d, n) ndarray
         Rows of the contacts on a sector and on the next one.
     """
 
-    n_sectors: int
-    engine_order: int
-    modes: Mapping[int, Modal]
-    near: FloatArray
-    far: FloatArray
+    n_sectors: int = field(kw_only=True)
+    engine_order: int = field(kw_only=True)
+    modes: Mapping[int, Modal] = field(kw_only=True)
+    near: FloatArray = field(kw_only=True)
+    far: FloatArray = field(kw_only=True)
     _parts: dict[int, tuple[Modal, Any]] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        each = zip(self.dynamic, self.harmonics.dynamic, strict=True)
+        loads = [f @ self.part(int(k))[0].Phi.conj() for f, k in each]
+        self.__dict__["loads"] = np.array(loads, dtype=complex)
 
     def number(self, harmonic: int) -> int:
         """Index of the wave of a harmonic, 0 to N - 1."""
         return harmonic * self.engine_order % self.n_sectors
 
-    def has(self, harmonic: int) -> bool:
-        """Whether the modes of its nodal diameter are known."""
+    def has_part(self, harmonic: int) -> bool:
+        """As of `Balance`: whether the modes of its nodal diameter are known."""
         n = self.number(harmonic)
         return min(n, self.n_sectors - n) in self.modes
 
-    def part(self, harmonic: int) -> tuple[Modal, Any]:
-        """Modes of a harmonic, and the rows Psi (c, m) of the contacts on them."""
-        n, N = self.number(harmonic), self.n_sectors
+    def part(self, harmonic: int | None = None) -> tuple[Modal, Any]:
+        """As of `Balance`, with complex modes and rows."""
+        first, N = int(self.harmonics.dynamic[0]), self.n_sectors
+        n = self.number(first if harmonic is None else harmonic)
         if n not in self._parts:
             m = self.modes[min(n, N - n)]
             if 2 * n > N:
@@ -123,33 +128,6 @@ class Waves:
             self._parts[n] = m, rows @ m.Phi
         return self._parts[n]
 
-
-@dataclass(frozen=True)
-class WaveBalance(Balance):
-    """The balance of one sector under a travelling wave; its static part is nodal diameter 0.
-
-    Attributes
-    ----------
-    waves : Waves
-        Beside those of `Balance`.
-    """
-
-    waves: Waves = field(kw_only=True)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        each = zip(self.dynamic, self.harmonics.dynamic, strict=True)
-        loads = [f @ self.waves.part(int(k))[0].Phi.conj() for f, k in each]
-        self.__dict__["loads"] = np.array(loads, dtype=complex)
-
-    def part(self, harmonic: int | None = None) -> tuple[Modal, Any]:
-        """As of `Balance`, with complex modes and rows."""
-        return self.waves.part(int(self.harmonics.dynamic[0]) if harmonic is None else harmonic)
-
-    def has_part(self, harmonic: int) -> bool:
-        """As of `Balance`."""
-        return self.waves.has(harmonic)
-
     def require_all_sectors(self, what: str) -> None:
         """As of `Balance`."""
         raise InputError(
@@ -157,11 +135,10 @@ class WaveBalance(Balance):
             "of all sectors, see upd.hbm.all_sectors"
         )
 
-    @cached_property
-    def linear(self) -> LinearPart:
-        """The linear system as the contacts see it."""
-        h = self.harmonics
-        parts = [self.waves.part(int(k)) for k in h.dynamic]
+    @property
+    def _each_harmonic(self) -> tuple[Modal, Any]:
+        """As of `Balance`, one after the other."""
+        parts = [self.part(int(k)) for k in self.harmonics.dynamic]
         modes, c = [m for m, _ in parts], [m.damping for m, _ in parts]
         if not all(m.proportional for m in modes):
             c = [one if one.ndim == 2 else np.diag(one) for one in c]
@@ -171,8 +148,7 @@ class WaveBalance(Balance):
             np.array(c),
             np.array([m.rigid for m in modes]),
         )
-        Psi: Any = np.array([rows for _, rows in parts], dtype=complex)
-        return linear_part(stacked, Psi, self.G0, self._rigid_rows, h.dynamic, h.offset)
+        return stacked, np.array([rows for _, rows in parts], dtype=complex)
 
 
 def travelling_wave_response(
@@ -275,9 +251,9 @@ def travelling_wave_response(
     with threads_for(len(b.modal.Phi)):
         modes = {d: modal(*A) if d else b.modal for d, A in joined.items()}
     d1 = 1 + b.contacts.tangents
-    waves = Waves(N, EO, modes, near[:, :d1], far[:, :d1])
     parts = (b.modal, b.contacts, b.harmonics, b.samples, b.static, b.dynamic, b.start, b.slider)
-    wave = WaveBalance(*parts, waves=waves)
+    near, far = near[:, :d1], far[:, :d1]
+    wave = WaveBalance(*parts, n_sectors=N, engine_order=EO, modes=modes, near=near, far=far)
     if not np.any(wave.loads):
         raise InputError(f"{what}: engine order {EO} moves no blade: its force is zero")
     return response_of(wave, f, sweep_down, fast_exits, settings)
@@ -363,11 +339,11 @@ def all_sectors(b: WaveBalance) -> Balance:
     InputError
         When nodal diameters are missing.
     """
-    waves, N, Phi, damping = b.waves, b.waves.n_sectors, [], []
-    missing = sorted({*range(N // 2 + 1)} - {*waves.modes})
+    N, Phi, damping = b.n_sectors, [], []
+    missing = sorted({*range(N // 2 + 1)} - {*b.modes})
     if missing:
         raise InputError(f"all sectors: give the nodal diameters {missing} as well")
-    modes = [waves.modes[d] for d in range(N // 2 + 1)]
+    modes = [b.modes[d] for d in range(N // 2 + 1)]
     for d, m in enumerate(modes):
         each = np.array([phase_of(j * d, N) for j in range(N)])[:, None, None] * m.Phi
         shapes = each.reshape(-1, each.shape[-1]) / N**0.5
@@ -388,13 +364,13 @@ def all_sectors(b: WaveBalance) -> Balance:
         c,
         np.concatenate([m.rigid for m in twice]),
     )
-    n_point, d1, n = waves.near.shape
+    n_point, d1, n = b.near.shape
     rows = np.zeros((N, n_point, d1, N, n))
     for j in range(N):
-        rows[j, :, :, j] += waves.near
-        rows[j, :, :, (j + 1) % N] += waves.far
+        rows[j, :, :, j] += b.near
+        rows[j, :, :, (j + 1) % N] += b.far
     turns = np.array(
-        [[phase_of(j * waves.number(k), N) for j in range(N)] for k in b.harmonics.dynamic.tolist()]
+        [[phase_of(j * b.number(k), N) for j in range(N)] for k in b.harmonics.dynamic.tolist()]
     )
     return Balance(
         whole,
@@ -422,10 +398,10 @@ def spread_to_all(b: WaveBalance, x: FloatArray, whole: Balance) -> FloatArray:
     -------
     (whole.size,) ndarray
     """
-    (W, a), N, o = b.split(x), b.waves.n_sectors, b.harmonics.offset
+    (W, a), N, o = b.split(x), b.n_sectors, b.harmonics.offset
     out = np.repeat(W[None], N, axis=0)
     for i, k in enumerate(b.harmonics.dynamic.tolist()):
-        turns = np.array([phase_of(j * b.waves.number(k), N) for j in range(N)])
+        turns = np.array([phase_of(j * b.number(k), N) for j in range(N)])
         wave = turns[:, None, None] * (W[..., o + 2 * i] - 1j * W[..., o + 2 * i + 1])
         out[..., o + 2 * i], out[..., o + 2 * i + 1] = wave.real, -wave.imag
     # modes of nodal diameter 0 come first, each over all sectors
@@ -491,8 +467,8 @@ def wave_in_time(
     b = answer.balance
     if not isinstance(b, WaveBalance):
         raise InputError("wave_in_time: give an answer of travelling_wave_response")
-    N, k = b.waves.n_sectors, int(b.harmonics.dynamic[0])
-    shift = N // gcd(N, b.waves.engine_order)
+    N, k = b.n_sectors, int(b.harmonics.dynamic[0])
+    shift = N // gcd(N, b.engine_order)
     whole = all_sectors(b)
     steady = steady_state(
         whole,
@@ -503,5 +479,5 @@ def wave_in_time(
         tolerance=tolerance,
     )
     q = to_complex(steady.coefficients, b.harmonics)[:, 0].reshape(N, -1)
-    back = np.array([phase_of(-j * b.waves.number(k), N) for j in range(N)])
+    back = np.array([phase_of(-j * b.number(k), N) for j in range(N)])
     return WaveInTime(back * (q @ np.asarray(row, dtype=float)), steady)
