@@ -18,9 +18,8 @@ from upd.errors import InputError
 from upd.scene import ForcedScene
 from upd.scene.quantities import FROM_FORCE, UNKNOWN
 from upd.scene.ranges import with_values
-from upd.sizing.choice import ChosenDamper
-from upd.sizing.ranges import InputRange
-from upd.sizing.rig_peaks import RigPeaks
+from upd.sizing.choice import BestDamper
+from upd.sizing.ranges import InputRange, RigPeaks
 from upd.vary.outcome import Outcome
 
 Array = NDArray[np.float64]
@@ -61,7 +60,7 @@ class GridCheck:
 
 
 def check_by_grid(
-    found: ChosenDamper,
+    found: BestDamper,
     count: int,
     out: str | Path,
     *,
@@ -119,7 +118,7 @@ def _ends(unsure: InputRange) -> list[float]:
     return sorted(values)
 
 
-def grid_scene(found: ChosenDamper) -> ForcedScene:
+def grid_scene(found: BestDamper) -> ForcedScene:
     """The scene of every run of a grid, but for what is varied.
 
     Parameters
@@ -158,7 +157,7 @@ def _fine_points(rig: RigPeaks) -> int:
     return max(int(e.points), math.ceil((e.stop - e.start) / (QUARTER * float(inside.min()))) + 1)
 
 
-def _tops(outcome: Outcome, found: ChosenDamper) -> dict[float, float]:
+def _tops(outcome: Outcome, found: BestDamper) -> dict[float, float]:
     """F_C/F_E -> the highest peak with friction of the right blade, per newton; none where a load
     lacks one.
     """
@@ -171,7 +170,7 @@ def _tops(outcome: Outcome, found: ChosenDamper) -> dict[float, float]:
     return tops if len(tops) == len(grid_scene(found).excitation.force) else {}
 
 
-def _worst(tops: NDArray[np.object_], found: ChosenDamper, one: InputRange) -> Array:
+def _worst(tops: NDArray[np.object_], found: BestDamper, one: InputRange) -> Array:
     """Worst peaks (n,) of the points of a grid; nan of those whose own runs lack one.
 
     Parameters

@@ -28,7 +28,7 @@ from upd.analyses.forced.performance import (
     ratios_of,
     with_curves,
 )
-from upd.analyses.forced.solution import ForcedSolution
+from upd.analyses.forced.solve import ForcedSolution
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 
@@ -56,9 +56,9 @@ def solved(ratio: float) -> ForcedSolution:
     return found  # type: ignore[no-any-return]
 
 
-def at(ratio: float, harmonics: int = 3, **changes: Any) -> RatioPoint:
+def at(ratio: float, harmonics: int = 3) -> RatioPoint:
     s = solved(1e5)
-    return peaks_at(s.plan, s.models["thesis"], ratio, harmonics, changes or None)
+    return peaks_at(s.plan, s.models["thesis"], ratio, harmonics)
 
 
 def test_where_all_sticks_the_peaks_are_the_stuck_ones() -> None:

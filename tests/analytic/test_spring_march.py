@@ -12,10 +12,10 @@ import pytest
 from rigs import LINES, state_of
 
 from upd.analyses import forced, make_plan
-from upd.analyses.forced.curves import stuck_modes_of
+from upd.analyses.forced.curves import both_ways, stuck_modes_of, sweep_maxima
 from upd.analyses.forced.interface_model import by_coulomb, make_springs, spring_march
 from upd.analyses.forced.measures import stuck_motion
-from upd.analyses.forced.solution import ForcedSolution, both_ways, sweep_maxima
+from upd.analyses.forced.solve import ForcedSolution
 from upd.errors import InputError
 from upd.hbm.faces.march import InterfaceMarch
 from upd.hbm.faces.sweep import settle, stepped_sine

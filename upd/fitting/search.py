@@ -18,19 +18,21 @@ from upd.cache.arrays import Journal
 from upd.cache.sources import key_of, source_digest
 from upd.errors import ConvergenceError, InputError
 from upd.fitting.answer import Fit, FittedCurve, Status
-from upd.fitting.intervals import (
+from upd.fitting.residuals import (
     KEPT,
+    ROUNDING,
     Knowledge,
+    Residuals,
+    Start,
+    as_complex,
     is_bent,
     knowledge,
     misfit_rises,
     profile_ends,
     rank_measurements,
 )
-from upd.fitting.parameters import VariedInput, read_parameters
-from upd.fitting.residuals import ROUNDING, Residuals, Start, as_complex
 from upd.fitting.responses import FitResponses
-from upd.fitting.targets import CurveTarget, Targets, read_targets
+from upd.fitting.targets import CurveTarget, Targets, VariedInput, read_parameters, read_targets
 from upd.measured import MeasuredCurve
 from upd.progress import Listener, Stages, silent
 from upd.scene import AnyScene, ForcedScene

@@ -23,8 +23,8 @@ from upd.fitting import (
     read_parameters,
     read_targets,
 )
-from upd.fitting.intervals import rank_measurements
-from upd.fitting.parameters import fitted_scene
+from upd.fitting.residuals import rank_measurements
+from upd.fitting.targets import fitted_scene
 from upd.measured import MeasuredCurve
 from upd.scene import ForcedScene, load_scene
 

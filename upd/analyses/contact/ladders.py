@@ -17,6 +17,7 @@ from upd.analyses.contact.varied import edge_of, governing, level_geometry, over
 from upd.linalg import select
 from upd.mesh import recipes
 from upd.scene import Scene
+from upd.vary.curves import points_table
 from upd.vary.ladder import (
     Asked,
     Ladder,
@@ -30,7 +31,6 @@ from upd.vary.ladder import (
     whole_levels,
 )
 from upd.vary.outcome import SolvedPoint, matching, without_failed
-from upd.vary.tables import points_table
 from upd.vary.variation import Key, Overrides, Variation
 
 #: numbers a ladder follows beside those the analysis names first

@@ -13,11 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import FacesCurve, ForcedCurve, PointCurve, SweptCurve, WholeFaces
+from upd.analyses.forced.curves import TOLERANCE, FacesCurve, ForcedCurve, PointCurve, SweptCurve
+from upd.analyses.forced.interface_model import WholeFaces
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.performance import Performance
 from upd.analyses.forced.plan import CONFIRMED, excitation_of
-from upd.analyses.forced.solution import TOLERANCE, ForcedSolution
+from upd.analyses.forced.solve import ForcedSolution
 from upd.analyses.forced.statics import BALANCE, StaticState
 from upd.analyses.measured import fit_checks
 from upd.hbm.faces.balance import InterfaceResponse

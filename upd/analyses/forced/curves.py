@@ -2,13 +2,21 @@
 
 Peaks of the limits, free and with every point stuck, of contact points and of whole faces, are
 sought around their own modes: they do not depend on the frequencies asked for.
+
+A sweep is a stepped sine up and down, as in an experiment: where friction and lift-off leave
+several steady motions, a curve by harmonic balance follows one path through all of them. A sweep
+shows what a rig would: rising, the motion that the past below leads to; falling, that from above.
+
+Whole faces by harmonic balance have blades in frequency, damper and contact in time, see
+`upd.hbm.faces.balance`: every node with its past, as a sweep from the static state at rising
+frequency.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Generic, Literal, NamedTuple, TypeVar
 
@@ -18,28 +26,41 @@ from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 
 from upd.analyses.forced import measures
+from upd.analyses.forced.interface_model import (
+    WholeFaces,
+    by_coulomb,
+)
 from upd.analyses.forced.measures import (
     CANDIDATES,
+    PEAKS_ABOVE,
     Array,
     ComplexArray,
     CurvePeak,
     ModeShapes,
     StuckMode,
+    accelerance_of,
     chosen_peaks,
     numbered,
+    path_maxima,
     tell_stuck_peaks,
     unmoved,
 )
 from upd.analyses.forced.model import Model, balance_of
-from upd.analyses.forced.plan import Excitation, ForcedPlan, excitation_of, grid
-from upd.analyses.forced.statics import StaticState
-from upd.analyses.seated.interface import Interface
+from upd.analyses.forced.plan import (
+    SAMPLES,
+    Excitation,
+    ForcedPlan,
+    excitation_of,
+    grid,
+    time_steps,
+)
 from upd.hbm import FrequencyResponse
-from upd.hbm.faces.balance import InterfaceResponse
+from upd.hbm.faces.balance import InterfaceResponse, interface_response
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
-from upd.hbm.faces.sweep import SteppedSine
+from upd.hbm.faces.sweep import SteppedSine, stepped_sine
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.points import stuck_stiffness
+from upd.linalg.parallel import threads_for
 from upd.results import Case
 from upd.scene.forced_contact import SIDES, Side
 
@@ -277,29 +298,6 @@ def rising(frequency: Array) -> NDArray[np.bool_]:
     return np.concatenate([steps[:1], steps[1:] & steps[:-1], steps[-1:]])
 
 
-@dataclass(frozen=True)
-class WholeFaces:
-    """Both faces node by node.
-
-    Attributes
-    ----------
-    of
-        The contact: places, areas, frames of its nodes.
-    march
-        Its outputs are the tips of the left and the right blade along x, then the coordinates of
-        the blades' lowest modes.
-    start
-        At rest under F_C.
-    state
-        Forces of both faces there.
-    """
-
-    of: Interface
-    march: InterfaceModel
-    start: InterfaceState
-    state: StaticState
-
-
 # -- linear limits ---------------------------------------------------------------------------------
 
 
@@ -527,25 +525,48 @@ def linear_of_faces(plan: ForcedPlan, march: InterfaceModel) -> LinearCurves:
     return LinearCurves(frequency, free, stuck, shapes.modes, free_peaks, named)
 
 
+def limit_balance(plan: ForcedPlan, model: Model) -> Balance:
+    """The problem of both limits, with F_C as excitation."""
+    harmonics = (0, *model.excitation.harmonics)
+    return balance_of(plan, model, plan.scene.damper.centrifugal, harmonics)
+
+
+def limit_peaks(
+    plan: ForcedPlan, model: Model, b: Balance, f: Array, side: Side, stuck: bool
+) -> Peaks:
+    """Numbered peaks of a blade, free or stuck; none of a free blade at rest.
+
+    Parameters
+    ----------
+    b
+        Of `limit_balance`.
+    f
+        (n,) Hz, rising: the sweep.
+    """
+    if not stuck and side not in model.excitation.free_blades:
+        return []
+    found = linear_peaks(b, model.row(side), plan.scene.damper.centrifugal, f, stuck)
+    return tell_stuck_peaks(model, found, plan.scene.excitation.stop) if stuck else unmoved(found)
+
+
 def linear_of(plan: ForcedPlan, model: Model) -> LinearCurves:
     """Free and stuck curves of a model, their peaks and modes."""
-    force, stop = plan.scene.damper.centrifugal, plan.scene.excitation.stop
-    b = balance_of(plan, model, force, (0, *model.excitation.harmonics))
-    f, k = grid(plan), model.excitation.lowest
+    b, f, k = limit_balance(plan, model), grid(plan), model.excitation.lowest
     # finer around every mode: a drawn curve has its tops
     for stuck in (False, True):
         at, width = linear_modes(b, stuck)
         f = finer(f, at / k, width / k)
     curves, peaks = (_at_rest(f), _at_rest(f)), (dict[Side, Peaks](), dict[Side, Peaks]())
+    force = plan.scene.damper.centrifugal
     for side in SIDES:
-        row = model.row(side)
         for stuck in (False, True):
-            found: Peaks = []
             if stuck or side in model.excitation.free_blades:
-                curves[stuck][side] = measures.linear_accelerance(b, row, force, f, stuck)
-                found = linear_peaks(b, row, force, f, stuck)
-            peaks[stuck][side] = tell_stuck_peaks(model, found, stop) if stuck else unmoved(found)
-    return LinearCurves(f, *curves, measures.stuck_modes(model, CANDIDATES * stop), *peaks)
+                curves[stuck][side] = measures.linear_accelerance(
+                    b, model.row(side), force, f, stuck
+                )
+            peaks[stuck][side] = limit_peaks(plan, model, b, f, side, stuck)
+    modes = measures.stuck_modes(model, CANDIDATES * plan.scene.excitation.stop)
+    return LinearCurves(f, *curves, modes, *peaks)
 
 
 def stuck_frequency(modes: Iterable[StuckMode], in_phase: bool) -> float:
@@ -573,3 +594,144 @@ def fine_grid(
     problem = balance_of(plan, model, force, (0, *model.excitation.harmonics))
     modes, width = linear_modes(problem, True)
     return finer(grid(plan) if frequencies is None else frequencies, modes / k, width / k)
+
+
+# -- sweeps, and whole faces by harmonic balance ---------------------------------------------------
+
+
+#: how steady a motion has to be
+TOLERANCE = 1e-3
+
+
+#: periods after which a motion counts as not settled: light damping, 0.5 %, leaves 1e-3 of a
+#: transient after 220, and a third of the damping after 660
+MOST_PERIODS = 700
+
+
+def both_ways(
+    plan: ForcedPlan, name: str, ratio: float, march: InterfaceModel, start: InterfaceState
+) -> list[SweptCurve]:
+    """The sweep up from a state, and the one down from where that ends.
+
+    Parameters
+    ----------
+    name, ratio
+        Of the contact; F_C/F_E.
+    march, start
+        What is integrated, and where it begins.
+    """
+    out: list[SweptCurve] = []
+    scene, excitation, frequency = plan.scene, excitation_of(plan.scene.excitation), grid(plan)
+    force = scene.damper.centrifugal / ratio
+    ways: tuple[tuple[Way, Array], ...] = (("up", frequency), ("down", frequency[::-1]))
+    with threads_for(3 * march.n):
+        for way, f in ways:
+            found = stepped_sine(
+                march,
+                f,
+                force * excitation.drive,
+                start,
+                samples=time_steps(scene),
+                tolerance=TOLERANCE,
+                most_periods=MOST_PERIODS,
+                fallback=by_coulomb,
+            )
+            start = found.state
+            moved = {k: found.harmonics[:, i] for i, k in enumerate(excitation.harmonics)}
+            moved[excitation.lowest] = found.amplitude
+            curve = ForcedCurve(
+                name, ratio, force, {}, {}, {}, found, float(found.seconds.sum()), way
+            )
+            out.append(with_outputs(plan, march, curve, moved, sweep_maxima))
+    return out
+
+
+def with_outputs(
+    plan: ForcedPlan,
+    march: InterfaceModel,
+    curve: ForcedCurve[Answer],
+    moved: Mapping[int, ComplexArray],
+    maxima: Callable[[Array, Array], list[CurvePeak]],
+) -> ForcedCurve[Answer]:
+    """The curve with the accelerances of both blades and their peaks.
+
+    Parameters
+    ----------
+    march
+        Its outputs are the tips, then the coordinates of modes.
+    moved
+        Harmonic that is excited -> (n, K) mm of all outputs.
+    maxima
+        Frequencies and heights along the curve -> its local maxima.
+    """
+    excitation, stop = excitation_of(plan.scene.excitation), plan.scene.excitation.stop
+    modes, f = stuck_modes_of(march, CANDIDATES * stop), curve.frequency
+    blades: dict[int, dict[Side, ComplexArray]] = {
+        k: {s: accelerance_of(u[:, j], f, k, curve.force) for j, s in enumerate(SIDES)}
+        for k, u in moved.items()
+    }
+    read, peaks = blades.pop(excitation.lowest), dict[Side, tuple[CurvePeak, ...]]()
+    for side in SIDES:
+        found = maxima(f, np.abs(read[side]))
+        at = np.array([one.sample for one in found], int)
+        motion = moved[excitation.lowest][at, len(SIDES) :]
+        peaks[side] = tuple(numbered(modes, found, motion))
+    return replace(curve, accelerance=read, more=blades, peaks=peaks)
+
+
+def sweep_maxima(frequency: Array, size: Array) -> list[CurvePeak]:
+    """Local maxima of a sweep, at its own points: the motion may jump between two of them.
+
+    Parameters
+    ----------
+    frequency, size
+        (k,) in the order of the sweep.
+    """
+    if len(size) < 3:
+        return []
+    inner = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
+    least = PEAKS_ABOVE * float(size.max())
+    return [
+        CurvePeak(float(frequency[i]), float(size[i]), int(i)) for i in inner if size[i] >= least
+    ]
+
+
+def balance_curve(plan: ForcedPlan, name: str, faces: WholeFaces, ratio: float) -> FacesCurve:
+    """The balance from the static state along the sweep, rising.
+
+    Parameters
+    ----------
+    name
+        Of the contact.
+    ratio
+        F_C/F_E.
+    """
+    b, force = plan.scene.balance, plan.scene.damper.centrifugal / ratio
+    excitation = excitation_of(plan.scene.excitation)
+    found = interface_response(
+        faces.march,
+        grid(plan),
+        force * excitation.drive,
+        faces.start,
+        harmonics=plan.scene.balance.harmonics,
+        samples=SAMPLES if b.samples == "auto" else b.samples,
+        fallback=by_coulomb,
+    )
+    moved = {k: found.amplitude[:, k] for k in excitation.harmonics}
+    curve = ForcedCurve(name, ratio, force, {}, {}, {}, found, found.seconds)
+    return with_outputs(plan, faces.march, curve, moved, partial(_maxima, found.jumps))
+
+
+def _maxima(jumps: Sequence[int], frequency: Array, size: Array) -> list[CurvePeak]:
+    """Local maxima of a curve; none is read across a jump, and a stretch may be highest where one
+    ends it.
+    """
+    out, begin = [], 0
+    for end in (*(i + 1 for i in jumps), len(size)):
+        f, a = frequency[begin:end], size[begin:end]
+        out += [one._replace(sample=one.sample + begin) for one in path_maxima(f, a, 0.0)]
+        for i, inner, jumped in ((0, 1, begin > 0), (len(a) - 1, len(a) - 2, end < len(size))):
+            if jumped and (len(a) == 1 or a[i] > a[inner]):
+                out.append(CurvePeak(float(f[i]), float(a[i]), begin + i))
+        begin = end
+    return [one for one in out if one.height >= PEAKS_ABOVE * size.max()]

@@ -102,6 +102,26 @@ def accelerance(
     return accelerance_of(u, answer.frequency, k, force)
 
 
+def accelerance_at(
+    model: Model, b: Balance, x: Array, frequency: Array, force: float
+) -> dict[Side, ComplexArray]:
+    """(k,) (m/s2)/N of both blades in the lowest harmonic that is excited, at solved points.
+
+    Parameters
+    ----------
+    x, frequency
+        (k, n_unknown) unknowns of the problem, (k,) Hz.
+    force
+        F_E, N.
+    """
+    k, h = model.excitation.lowest, b.harmonics
+    forces = np.array([b.force(one).force for one in x]).reshape(len(x), len(b.Psi), h.size)
+    rigid = np.array([b.split(one)[1] for one in x])
+    q = b.displacement(2.0 * np.pi * frequency, forces, rigid)
+    moved = to_complex(q, h)[..., h.place(k)]
+    return {s: accelerance_of(moved @ model.row(s), frequency, k, force) for s in SIDES}
+
+
 def accelerance_of(
     moved: ComplexArray, frequency: Array, harmonic: int, force: float
 ) -> ComplexArray:

@@ -11,14 +11,14 @@ import numpy as np
 from upd.analyses import base, measured
 from upd.analyses.forced import measures
 from upd.analyses.forced.again import limit_results, peak_results
-from upd.analyses.forced.curves import ForcedCurve, PointCurve, linear_curves
+from upd.analyses.forced.curves import ForcedCurve, PointCurve, limit_balance, linear_curves
 from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.model import Array, ComplexArray, Model, balance_of
+from upd.analyses.forced.model import Array, ComplexArray, Model
 from upd.analyses.forced.performance import mode_results, performance_results
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
-from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak, marched_damper
+from upd.analyses.forced.solve import ContactPlaces, ForcedSolution, MarchedPeak, marched_damper
 from upd.analyses.forced.statics import StaticState
-from upd.analyses.measured import FREE, STUCK, Computed, numbered
+from upd.analyses.measured import FREE, STUCK, Computed
 from upd.analyses.seated.results import RIGID
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.balance import InterfaceResponse
@@ -126,7 +126,7 @@ def _computed(solution: ForcedSolution, choice: MeasuredChoice) -> Iterator[Comp
             told = (linear.stuck_peaks if stuck else linear.free_peaks)[side]
             case = Case(stiffness=name, kind=choice.state, blade=side)
             band = (scene.excitation.start, scene.excitation.stop)
-            yield Computed(case, band, _linear_at(solution, name, side, stuck), numbered(told))
+            yield Computed(case, band, _linear_at(solution, name, side, stuck), told)
         return
     # as the labels of curves tell them apart
     wanted = f"{choice.centrifugal_to_force:.6g}"
@@ -144,9 +144,7 @@ def _linear_at(
         march = solution.faces[name].march
         return lambda f: np.asarray(linear_curves(march, f, excitation, stuck=stuck)[0][side])
     model, plan = solution.models[name], solution.plan
-    force = plan.scene.damper.centrifugal
-    numbers = (0, *model.excitation.harmonics)
-    problem, row = balance_of(plan, model, force, numbers), model.row(side)
+    problem, row, force = limit_balance(plan, model), model.row(side), plan.scene.damper.centrifugal
     return lambda f: measures.linear_accelerance(problem, row, force, f, stuck)
 
 
@@ -154,14 +152,9 @@ def _with_friction(c: ForcedCurve[Any], side: Side) -> Computed:
     """A curve with friction, between its points by straight lines."""
     f, H = c.frequency, c.accelerance[side]
     way = slice(None) if f[-1] > f[0] else slice(None, None, -1)
-    f, H = f[way], H[way]
-    peaks = c.peaks.get(side, ())
-    return Computed(
-        replace(c.case, blade=side),
-        (float(f.min()), float(f.max())),
-        lambda at: on_path(at, f, H),
-        numbered(peaks),
-    )
+    f, H, band = f[way], H[way], (float(f.min()), float(f.max()))
+    case = replace(c.case, blade=side)
+    return Computed(case, band, lambda at: on_path(at, f, H), c.peaks.get(side, ()))
 
 
 # -- numbers of curves -----------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import partial
 
 from upd.analyses.base import Analysis, rig_needs
-from upd.analyses.modal import charts, checks, output, results, varied
+from upd.analyses.modal import charts, output, results, varied
 from upd.vary import errors
 from upd.vary.inputs import coarsened_rig
 from upd.vary.wanted import plan_wanted
@@ -21,7 +21,7 @@ ANALYSIS = Analysis(
     needs=partial(rig_needs, "reduction"),
     solve=varied.solve_levels,
     make_results=results.make_results,
-    check_solution=checks.check_solution,
+    check_solution=results.check_solution,
     arrays=output.arrays,
     sizes=output.sizes,
     write_files=output.write_files,
