@@ -62,9 +62,11 @@ from upd.fitting.targets import (
     CurveTarget,
     FitTarget,
     Targets,
+    kind_of,
 )
 from upd.measured.damping import noise_of
 from upd.scene import ForcedScene
+from upd.units import unit_inside
 
 Array = NDArray[np.float64]
 #: half of the digits: below, a change of an exact number is rounding
@@ -163,7 +165,7 @@ class Residuals:
             unknowns = len(self.low) * len(one.values) / count
             noise = noise_after(one, value[part], unknowns, count - len(self.low), self.rounding)
             self.curves.append(noise)
-            size.append(magnitude_of(one, value[part]))
+            size.append(np.abs(as_complex(one, value[part])))
         self.scale = self._scales(size)
         change = np.abs(self.scale / before - 1.0)
         return float(change.max(initial=0.0))
@@ -326,11 +328,6 @@ def as_complex(target: CurveTarget, parts: Array) -> NDArray[np.complex128]:
     return np.asarray(real + 1j * imaginary)
 
 
-def magnitude_of(target: CurveTarget, parts: Array) -> Array:
-    """(n,) of a computed curve."""
-    return np.abs(as_complex(target, parts))
-
-
 def noise_after(
     target: CurveTarget, parts: Array, unknowns: float, free: int, least: float
 ) -> CurveNoise:
@@ -348,7 +345,7 @@ def noise_after(
         Part of a value that the model itself is off.
     """
     r = (parts - target.values).reshape(target.parts, -1)
-    size = magnitude_of(target, parts)
+    size = np.abs(as_complex(target, parts))
     if target.stated:
         relative, constant = target.relative or 0.0, target.constant or 0.0
     else:
@@ -608,7 +605,7 @@ def candidates(scene: ForcedScene, targets: Targets, *, friction: bool) -> Targe
         ]
     names += [(one, None) for one in CONTACT_TOTALS]
     made = {one.name for one in targets.numbers}
-    found = [FitTarget(of, 1.0, None, _unit(of), ratio) for of, ratio in names]
+    found = [FitTarget(of, 1.0, None, unit_inside(kind_of(of)), ratio) for of, ratio in names]
     return Targets(tuple(one for one in found if one.name not in made))
 
 
@@ -647,12 +644,6 @@ def rank_measurements(residuals: Residuals, best: Array) -> tuple[FurtherMeasure
             ends = v - spread, v + spread
             out.append(FurtherMeasurement(one.name, one.unit, *ends, half, now, then))
     return tuple(sorted(out, key=lambda one: one.then))
-
-
-def _unit(of: str) -> str:
-    if of in CONTACT_TOTALS:
-        return "N/mm"
-    return "(m/s2)/N" if of.endswith("accelerance") else "Hz"
 
 
 def _half(unit: str, value: float, targets: Targets) -> float:

@@ -194,10 +194,11 @@ class ModelSource:
 
     def _model(self, scene: ForcedScene) -> tuple[ForcedPlan, Model]:
         self.made += 1
-        plan = replace(self._plan(scene), scene=scene)
+        frame = self._frame(scene)
+        plan = _remembered(self._plans, frame, lambda: make_plan(scene))
+        plan = replace(plan, scene=scene)
         bodies = _remembered(self._bodies, bodies_key(plan), lambda: make_bodies(plan))
         laws = face_laws(scene.stiffnesses[self.stiffness], self._stages)
-        frame = self._frame(scene)
         if frame in self._models:
             return plan, _with_contact(self._models[frame], laws, scene.contact.friction)
         # small matrices once the blades are reduced
@@ -215,9 +216,6 @@ class ModelSource:
             # what the points carry at rest does not depend on it
             contact = replace(contact, friction=self.scene.contact.friction)
         return repr(replace(scene, stiffness={}, text="", contact=contact))
-
-    def _plan(self, scene: ForcedScene) -> ForcedPlan:
-        return _remembered(self._plans, self._frame(scene), lambda: make_plan(scene))
 
 
 def is_seated(scene: ForcedScene) -> bool:

@@ -227,15 +227,20 @@ def _number(name: str, text: str) -> FitTarget:
     if friction != bool(at):
         right = f"{of}@194" if friction else of
         raise InputError(f"{'needs its' if friction else 'has no'} F_C/F_E; write {right}")
-    kind = "frequency" if of in STUCK_MODES else "stiffness"
-    if of in PEAK_NUMBERS:
-        kind = PEAK_NUMBERS[of][3]
+    kind = kind_of(of)
     if not text:
         raise InputError(f'has no value; write {name}="377 {unit_inside(kind)}"')
     value, half = read_band(text, kind)
     if not value > 0.0:
         raise InputError(f"{text!r} is not above 0")
     return FitTarget(of, value, half, unit_inside(kind), _ratio(at) if friction else None)
+
+
+def kind_of(of: str) -> str:
+    """Kind of quantity of a number, as in `upd.units.UNITS`."""
+    if of in PEAK_NUMBERS:
+        return PEAK_NUMBERS[of][3]
+    return "frequency" if of in STUCK_MODES else "stiffness"
 
 
 def _ratio(text: str) -> float:

@@ -199,9 +199,11 @@ class BestDamper(FigureAnswer):
     @property
     def verdict(self) -> str:
         """One sentence: the optimum and its worst peak."""
+        chosen = [one.path for one in self.ranges.over]
         place = ", ".join(
             f"{one.path} {one.of.shown(one.value)}{f' (its {one.bound} bound)' * bool(one.bound)}"
-            for one in _chosen(self)
+            for one in sensitivities(self)
+            if one.path in chosen
         )
         worst = f"{self.worst:.4g} {UNITS_OF[self.objective]}"
         return f"{self.ranges.scene.name}: worst peak {worst} at {place}"
@@ -462,12 +464,6 @@ def _unsure(found: BestDamper, one: InputRange) -> Sensitivity:
 
 
 # -- the answer ------------------------------------------------------------------------------------
-
-
-def _chosen(found: BestDamper) -> list[Sensitivity]:
-    """The sensitivities of what was chosen."""
-    paths = [one.path for one in found.ranges.over]
-    return [one for one in sensitivities(found) if one.path in paths]
 
 
 def _height(value: float) -> str:

@@ -271,8 +271,12 @@ class DamperDesign(FigureAnswer):
 
     @property
     def charts(self) -> list[Chart]:
-        """Maps of its angles and friction."""
-        return statics_charts(self)
+        """Maps of its angles and friction, marked with the damper."""
+        tied = abs(self.section.left.angle - self.section.right.angle) <= _SAME
+        over = [("left face", True, False), ("right face", False, True)]
+        over = [("both faces", True, True)] if tied else over
+        charts = [_angles(self), *(_over_friction(self, *one) for one in over)]
+        return [replace(one, figure=self.figure, size=_SIZE, columns=2) for one in charts]
 
 
 def damper_statics(scene: AnyScene) -> DamperDesign:
@@ -457,24 +461,6 @@ def _outcome(state: MotionState) -> str:
 
 
 # -- charts ---------------------------------------------------------------------------------------
-
-
-def statics_charts(found: DamperDesign) -> list[Chart]:
-    """Maps of angles and friction with the damper marked.
-
-    Parameters
-    ----------
-    found : DamperDesign
-        Of the damper.
-    """
-    tied = abs(found.section.left.angle - found.section.right.angle) <= _SAME
-    over = (
-        [("both faces", True, True)]
-        if tied
-        else [("left face", True, False), ("right face", False, True)]
-    )
-    charts = [_angles(found), *(_over_friction(found, *one) for one in over)]
-    return [replace(one, figure=found.figure, size=_SIZE, columns=2) for one in charts]
 
 
 def _map(x: Array, y: Array, states: NDArray[np.int64]) -> Map:

@@ -64,7 +64,12 @@ def input_parts(
     plan = solution.plan
     if not plan.scene.uncertain:
         return {}
-    main = [one for one in numbers if is_main(analysis, one)]
+    names = analysis.headline_names
+    main = [
+        one
+        for one in numbers
+        if not one.withheld and any(fnmatchcase(one.name, name) for name in names)
+    ]
     out: dict[Key, tuple[InputPart, ...]] = {(one.name, one.case): () for one in main}
     for ends in input_ends(plan.scene):
         of = ends[0]
@@ -80,13 +85,6 @@ def input_parts(
             part = InputPart(of.path, of.relative, found.get(key, math.nan), how)
             out[key] = (*parts, part)
     return out
-
-
-def is_main(analysis: Any, number: Result) -> bool:
-    """Whether it is a number an engineer asks for first."""
-    return not number.withheld and any(
-        fnmatchcase(number.name, pattern) for pattern in analysis.headline_names
-    )
 
 
 def input_ends(scene: Any) -> list[Ends]:

@@ -26,7 +26,6 @@ from upd.sizing.statics import (
     motion_state,
     outcomes,
     scene_damper,
-    statics_charts,
     tilts_from,
 )
 
@@ -152,7 +151,7 @@ def test_a_damper_that_tilts_without_friction() -> None:
 @pytest.mark.parametrize("name", ["symmetric-response", "asymmetric-seated"])
 def test_charts_mark_the_damper(name: str, mu: float) -> None:
     found = damper_statics(load_scene(name, {"contact.friction": mu}))
-    charts = statics_charts(found)
+    charts = found.charts
     maps = [chart for chart in charts if chart.maps]
     assert {state for chart in maps for state in chart.maps[0].states} == set(OUTCOMES)
     marked = [t for chart in maps for t in chart.traces if t.style == "star"]

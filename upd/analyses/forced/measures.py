@@ -365,12 +365,6 @@ def residual_error(answer: FrequencyResponse) -> float:
     return worst
 
 
-def static_normal(answer: FrequencyResponse, model: Model, i: int) -> dict[Side, float]:
-    """Mean normal force in N on each face at point i of the path."""
-    N = answer.contact_force[i, :, 0, 0]
-    return {side: float(N[model.face == k].sum()) for k, side in enumerate(SIDES)}
-
-
 def face_shares(state: Array, face: IntArray, weight: Array) -> Array:
     """Shares of the cycle that each face sticks, slips and is open.
 

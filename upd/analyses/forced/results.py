@@ -284,11 +284,11 @@ def _at_point(
 ) -> list[Result]:
     """Contact state, losses and damper motion at point i of the path."""
     scene, answer = solution.plan.scene, curve.answer
-    mean = answer.state[i].mean(axis=0)
+    mean, normal = answer.state[i].mean(axis=0), answer.contact_force[i, :, 0, 0]
     results = [
         *(
-            q.STATIC_NORMAL.of(N, replace(at, side=side))
-            for side, N in measures.static_normal(answer, model, i).items()
+            q.STATIC_NORMAL.of(normal[model.face == k].sum(), replace(at, side=side))
+            for k, side in enumerate(SIDES)
         ),
         *_shares(at, answer.state[i], solution.places(curve.stiffness)),
         q.CONTACT_SLIP.of(mean[1], at),
