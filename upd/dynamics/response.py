@@ -269,20 +269,14 @@ class TunedDamping:
     zeta : float
         Damping ratio.
     peak : float
-        The peak it gives, in the unit of the quantity.
+        The peak it gives, (m/s2)/N.
     frequency : float
         Its frequency [Hz].
-    evaluations : int
-        Number of peaks computed.
-    message : str
-        One sentence.
     """
 
     zeta: float
     peak: float
     frequency: float
-    evaluations: int
-    message: str
 
 
 def peak_response(
@@ -290,7 +284,6 @@ def peak_response(
     force: ArrayLike,
     output: ArrayLike,
     band: tuple[float, float],
-    quantity: str = "accelerance",
 ) -> tuple[float, float]:
     """Frequency and height of the highest response of one output in a band.
 
@@ -299,7 +292,7 @@ def peak_response(
     Parameters
     ----------
     system : ModalSystem
-    force, output, quantity
+    force, output
         As in `frequency_response`; one output.
     band : tuple of two float
         Lowest and highest frequency [Hz].
@@ -309,7 +302,7 @@ def peak_response(
     frequency : float
         [Hz]
     height : float
-        In the unit of the quantity.
+        (m/s2)/N.
 
     Raises
     ------
@@ -327,9 +320,7 @@ def peak_response(
     f = np.unique(np.clip(np.concatenate([np.linspace(low, high, _GRID), near.ravel()]), low, high))
 
     def height(at: ArrayLike) -> FloatArray:
-        out: FloatArray = frequency_response(system, force, output, at, quantity).magnitude.max(
-            axis=1
-        )
+        out: FloatArray = frequency_response(system, force, output, at).magnitude.max(axis=1)
         return out
 
     sampled = height(f)
@@ -352,8 +343,6 @@ def tune_damping(
     target_peak: float,
     *,
     band: tuple[float, float],
-    quantity: str = "accelerance",
-    modes: ArrayLike | None = None,
 ) -> TunedDamping:
     """The damping ratio at which the highest response in a band has a given height.
 
@@ -363,15 +352,13 @@ def tune_damping(
     Parameters
     ----------
     system : ModalSystem
-        The system; its own damping ratios serve for the modes that are not tuned.
-    force, output, quantity
+        The system; the ratio is that of all its modes.
+    force, output
         As in `frequency_response`; one output.
     target_peak : float
-        Height wanted, in the unit of the quantity.
+        Height wanted, (m/s2)/N.
     band : tuple of two float
         Lowest and highest frequency [Hz].
-    modes : (k,) array_like of int, optional
-        Numbers of the modes whose ratio is tuned (all alike); None: all.
 
     Returns
     -------
@@ -380,7 +367,7 @@ def tune_damping(
     Raises
     ------
     InputError
-        For a target that is not positive, or no mode.
+        For a target that is not positive.
     ConvergenceError
         When no ratio between 1e-7 and 0.5 gives the target; the message names the peaks at both
         ends.
@@ -400,24 +387,10 @@ def tune_damping(
     """
     if not (np.isfinite(target_peak) and target_peak > 0.0):
         raise InputError(f"target_peak = {target_peak}: give a positive peak.")
-    chosen = (
-        np.arange(len(system.frequency))
-        if modes is None
-        else np.atleast_1d(np.asarray(modes, dtype=np.int64))
-    )
-    if not chosen.size or chosen.min() < 0 or chosen.max() >= len(system.frequency):
-        raise InputError(
-            f"Modes {chosen.tolist()} are tuned; the system has {len(system.frequency)}, "
-            "numbered from 0."
-        )
-    count = 0
 
     def peak(zeta: float) -> tuple[float, float]:
-        nonlocal count
-        count += 1
-        ratios = system.zeta.copy()
-        ratios[chosen] = zeta
-        return peak_response(replace(system, zeta=ratios), force, output, band, quantity)
+        ratios = np.full_like(system.zeta, zeta)
+        return peak_response(replace(system, zeta=ratios), force, output, band)
 
     def excess(log_zeta: float) -> float:
         height = peak(float(np.exp(log_zeta)))[1]
@@ -437,7 +410,4 @@ def tune_damping(
         )
     )
     where, height = peak(root)
-    message = (
-        f"zeta = {root:.6g} gives {height:.6g} at {where:.6g} Hz; {target_peak:.6g} was asked."
-    )
-    return TunedDamping(root, height, where, count, message)
+    return TunedDamping(root, height, where)
