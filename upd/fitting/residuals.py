@@ -115,9 +115,6 @@ class Residuals:
     ----------
     curves : list of CurveNoise
         What the weights of the measured curves are made of.
-    coarse : bool
-        Whether curves count by the logarithms of their magnitudes, which lead to the answer from
-        far: a peak at another frequency is seen from beside it.
     """
 
     def __init__(self, responses: FitResponses) -> None:
@@ -128,7 +125,6 @@ class Residuals:
         self.target = np.concatenate([*values, *(one.values for one in targets.curves)])
         self.known = bool(targets.curves) or targets.numbers[0].half_width is not None
         self.low, self.high = np.array([one.bounds for one in responses.parameters]).T
-        self.coarse = False
         self.curves = [first_noise(one) for one in targets.curves]
         self.scale = self._scales([one.curve.magnitude for one in targets.curves])
         ends = self.numbers + np.cumsum([0, *(len(one.values) for one in targets.curves)])
@@ -137,17 +133,32 @@ class Residuals:
 
     def __call__(self, z: Array) -> Array:
         """(m,) residuals."""
-        value = self.responses.at(z)[0]
-        out = np.asarray((value - self.target) / self.scale)
-        return self._coarse(value, out, None)[0] if self.coarse else out
+        return self._with_slopes(z)[0]
 
     def jacobian(self, z: Array) -> Array:
         """(m, n) their derivatives by ln(factor)."""
+        return self._with_slopes(z)[1]
+
+    def _with_slopes(self, z: Array, coarse: bool = False) -> tuple[Array, Array]:
+        """Residuals and Jacobian.
+
+        Coarse ones count curves by the logarithms of their magnitudes, ln |H| / |H_measured| of
+        every point, which lead to the answer from far: a peak at another frequency is seen from
+        beside it.
+        """
         value, slope = self.responses.at(z)
-        J = np.asarray(slope / self.scale[:, None])
-        if not self.coarse:
-            return J
-        return self._coarse(value, (value - self.target) / self.scale, (slope, J))[1]
+        r, J = (value - self.target) / self.scale, slope / self.scale[:, None]
+        if not coarse:
+            return r, J
+        rows, lines = [r[: self.numbers]], [J[: self.numbers]]
+        for one, part in zip(self.responses.targets.curves, self.parts, strict=True):
+            H, dH = as_complex(one, value[part]), as_complex(one, slope[part])
+            size = np.maximum(np.abs(H), np.finfo(float).tiny)
+            measured = one.curve.magnitude
+            least = np.finfo(float).eps * measured.max()
+            rows.append(np.log(size / np.maximum(measured, least)))
+            lines.append((H.conj()[:, None] * dH).real / size[:, None] ** 2)
+        return np.concatenate(rows), np.concatenate(lines)
 
     def weigh(self, z: Array) -> float:
         """Weights of the measured curves by what the fit has there: their noise by the magnitude of
@@ -196,25 +207,7 @@ class Residuals:
             parts.append(np.tile(half, one.parts))
         return np.concatenate([np.array([one.scale for one in targets.numbers]), *parts])
 
-    def _coarse(
-        self, value: Array, r: Array, slopes: tuple[Array, Array] | None
-    ) -> tuple[Array, Array]:
-        """Residuals and Jacobian with one row ln |H| / |H_measured| for every point of a curve."""
-        rows, lines = [r[: self.numbers]], []
-        if slopes is not None:
-            lines.append(slopes[1][: self.numbers])
-        for one, part in zip(self.responses.targets.curves, self.parts, strict=True):
-            H = as_complex(one, value[part])
-            size = np.maximum(np.abs(H), np.finfo(float).tiny)
-            measured = one.curve.magnitude
-            least = np.finfo(float).eps * measured.max()
-            rows.append(np.log(size / np.maximum(measured, least)))
-            if slopes is not None:
-                dH = as_complex(one, slopes[0][part])
-                lines.append((H.conj()[:, None] * dH).real / size[:, None] ** 2)
-        return np.concatenate(rows), np.concatenate(lines) if lines else np.zeros(0)
-
-    def solve(self, begin: Array, held: int | None = None) -> Start:
+    def solve(self, begin: Array, held: int | None = None, coarse: bool = False) -> Start:
         """The nearest answer to a start; with one parameter held where it is.
 
         Parameters
@@ -223,6 +216,8 @@ class Residuals:
             (n,) within the bounds.
         held
             Number of a parameter.
+        coarse
+            Whether curves count by the logarithms of their magnitudes.
         """
         free = np.array([k for k in range(len(begin)) if k != held], int)
 
@@ -233,16 +228,16 @@ class Residuals:
 
         def residual(part: Array) -> Array:
             try:
-                return self(whole(part))
+                return self._with_slopes(whole(part), coarse)[0]
             except ConvergenceError:
                 # the method takes a shorter step
                 return np.full(len(first), np.inf)
 
         def slope(part: Array) -> Array:
-            return self.jacobian(whole(part))[:, free]
+            return self._with_slopes(whole(part), coarse)[1][:, free]
 
         try:
-            first = self(begin)
+            first = self._with_slopes(begin, coarse)[0]
             if not free.size:
                 return Start(begin, begin, float((first**2).sum()))
             # with noise the misfit stays, and the last digits of z change nothing that is known

@@ -254,11 +254,7 @@ def _from(residuals: Residuals, begin: Array) -> Start:
     """One start: of curves their magnitudes first, as logarithms, then as they are."""
     if not residuals.parts:
         return residuals.solve(begin)
-    residuals.coarse = True
-    try:
-        near = residuals.solve(begin)
-    finally:
-        residuals.coarse = False
+    near = residuals.solve(begin, coarse=True)
     if near.failure:
         return near
     found = residuals.solve(residuals.inside(near.end))
