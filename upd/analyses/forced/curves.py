@@ -362,21 +362,21 @@ def finer(frequency: Array, modes: Array, width: Array) -> Array:
     return np.union1d(frequency, around_modes(modes[coarse], width[coarse], *ends))
 
 
-def exact_peaks(height: Callable[[Array], Array], f: Array, grid: Array) -> list[CurvePeak]:
+def exact_peaks(response: Callable[[Array], ComplexArray], f: Array, grid: Array) -> Peaks:
     """The peaks of a curve, each by a local search between its neighbours.
 
     Parameters
     ----------
-    height
-        Of the curve at any frequencies (n,) in Hz.
+    response
+        The curve at any frequencies (n,) in Hz.
     f
         (n,) Hz, rising, fine enough to hold every peak.
     grid
         (m,) Hz on which the curve is kept: the point next to a peak is one of these.
     """
-    a = height(f)
+    a = np.abs(response(f))
     found = [
-        _top(height, f[i - 1], f[i + 1])
+        _top(response, f[i - 1], f[i + 1])
         for i in np.flatnonzero((a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])) + 1
     ]
     highest = max([float(a.max(initial=0.0)), *(top for _, top in found)])
@@ -388,10 +388,10 @@ def exact_peaks(height: Callable[[Array], Array], f: Array, grid: Array) -> list
     return chosen_peaks(peaks)
 
 
-def _top(height: Callable[[Array], Array], low: float, high: float) -> tuple[float, float]:
+def _top(response: Callable[[Array], ComplexArray], low: float, high: float) -> tuple[float, float]:
     # flat at the top: to half of the digits of f, of the height lacks (eps^1/2 f / width)^2
     found = minimize_scalar(
-        lambda f: -float(height(np.array([f]))[0]),
+        lambda f: -float(abs(response(np.array([f]))[0])),
         bounds=(low, high),
         method="bounded",
         options={"xatol": float(np.sqrt(np.finfo(float).eps)) * high},
@@ -399,7 +399,7 @@ def _top(height: Callable[[Array], Array], low: float, high: float) -> tuple[flo
     return float(found.x), -float(found.fun)
 
 
-def linear_peaks(b: Balance, row: Array, force: float, grid: Array, stuck: bool) -> list[CurvePeak]:
+def linear_peaks(b: Balance, row: Array, force: float, grid: Array, stuck: bool) -> Peaks:
     """Peaks of the accelerance without contacts or with all points stuck.
 
     Parameters
@@ -422,11 +422,9 @@ def linear_peaks(b: Balance, row: Array, force: float, grid: Array, stuck: bool)
     k = measures.read_harmonic(b)
     modes, width = linear_modes(b, stuck)
 
-    def height(f: NDArray[np.float64]) -> Array:
-        return np.abs(measures.linear_accelerance(b, row, force, f, stuck))
-
+    response = partial(measures.linear_accelerance, b, row, force, stuck=stuck)
     f = around_modes(modes / k, width / k, float(grid[0]), float(grid[-1]))
-    return exact_peaks(height, f, grid)
+    return exact_peaks(response, f, grid)
 
 
 def stuck_system(march: InterfaceModel) -> tuple[Array, Array, Array]:
@@ -473,56 +471,39 @@ def stuck_modes_of(march: InterfaceModel, below: float) -> ModeShapes:
     return measures.modes_of_tips(np.eye(len(rows)), frequency, rows @ shapes, tips, below)
 
 
-def linear_curves(
-    march: InterfaceModel, frequency: Array, excitation: Excitation, *, stuck: bool
-) -> tuple[Mapping[Side, ComplexArray], Mapping[Side, list[CurvePeak]]]:
-    """Accelerance of both blades per newton of F_E, (m/s2)/N, and its peaks, free or stuck.
-
-    Parameters
-    ----------
-    frequency
-        (n,) Hz, rising: the sweep.
-    excitation
-        What of the blades is excited.
-    stuck
-        Every node closed and sticking; else none touches.
+def faces_accelerance(
+    march: InterfaceModel, excitation: Excitation, side: Side, f: Array, *, stuck: bool
+) -> ComplexArray:
+    """(n,) (m/s2)/N of a blade at (n,) Hz per newton of F_E, with every node closed and sticking,
+    or none touching.
     """
-    k, H, peaks = excitation.lowest, _at_rest(frequency), dict[Side, list[CurvePeak]]()
-    at = stuck_system(march)[0] if stuck else np.sort(march.frequency)
-    width = 2.0 * float(march.damping.max()) * at
-    fine = around_modes(at / k, width / k, float(frequency[0]), float(frequency[-1]))
-
-    def read(side: Side, f: Array) -> ComplexArray:
-        moved = march.linear_response(k * f, excitation.read, stuck=stuck)[:, SIDES.index(side)]
-        return measures.accelerance_of(moved, f, k, 1.0)
-
-    for side in SIDES if stuck else excitation.free_blades:
-        H[side] = read(side, frequency)
-        peaks[side] = exact_peaks(partial(_size, read, side), fine, frequency)
-    return H, {side: peaks.get(side, []) for side in SIDES}
-
-
-def _at_rest(frequency: Array) -> dict[Side, ComplexArray]:
-    return {side: np.zeros(len(frequency), complex) for side in SIDES}
-
-
-def _size(read: Callable[[Side, Array], ComplexArray], side: Side, f: Array) -> Array:
-    return np.asarray(np.abs(read(side, f)))
+    k = excitation.lowest
+    moved = march.linear_response(k * f, excitation.read, stuck=stuck)[:, SIDES.index(side)]
+    return measures.accelerance_of(moved, f, k, 1.0)
 
 
 def linear_of_faces(plan: ForcedPlan, march: InterfaceModel) -> LinearCurves:
     """Curves without the damper, and with every node closed and sticking."""
-    frequency, excitation = grid(plan), excitation_of(plan.scene.excitation)
-    free, free_peaks = linear_curves(march, frequency, excitation, stuck=False)
-    stuck, stuck_peaks = linear_curves(march, frequency, excitation, stuck=True)
-    shapes = stuck_modes_of(march, CANDIDATES * plan.scene.excitation.stop)
-    named = {}
-    for side, peaks in stuck_peaks.items():
-        f = excitation.lowest * np.array([one.frequency for one in peaks])
-        motion = march.linear_response(f, excitation.read, stuck=True)[:, len(SIDES) :]
-        named[side] = numbered(shapes, peaks, motion)
-    free_peaks = {side: unmoved(peaks) for side, peaks in free_peaks.items()}
-    return LinearCurves(frequency, free, stuck, shapes.modes, free_peaks, named)
+    f, excitation = grid(plan), excitation_of(plan.scene.excitation)
+    k, shapes = excitation.lowest, stuck_modes_of(march, CANDIDATES * plan.scene.excitation.stop)
+    curves, peaks = (_at_rest(f), _at_rest(f)), ({s: Peaks() for s in SIDES}, dict[Side, Peaks]())
+    for stuck, at in enumerate((np.sort(march.frequency), stuck_system(march)[0])):
+        width = 2.0 * float(march.damping.max()) * at
+        fine = around_modes(at / k, width / k, float(f[0]), float(f[-1]))
+        for side in SIDES if stuck else excitation.free_blades:
+            read = partial(faces_accelerance, march, excitation, side, stuck=bool(stuck))
+            curves[stuck][side], found = read(f), exact_peaks(read, fine, f)
+            if not stuck:
+                peaks[0][side] = unmoved(found)
+                continue
+            tops = k * np.array([one.frequency for one in found])
+            motion = march.linear_response(tops, excitation.read, stuck=True)[:, len(SIDES) :]
+            peaks[1][side] = numbered(shapes, found, motion)
+    return LinearCurves(f, *curves, shapes.modes, *peaks)
+
+
+def _at_rest(frequency: Array) -> dict[Side, ComplexArray]:
+    return {side: np.zeros(len(frequency), complex) for side in SIDES}
 
 
 def limit_balance(plan: ForcedPlan, model: Model) -> Balance:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from upd.analyses import base, measured
 from upd.analyses.forced import measures
 from upd.analyses.forced.again import limit_results, peak_results
-from upd.analyses.forced.curves import ForcedCurve, PointCurve, limit_balance, linear_curves
+from upd.analyses.forced.curves import ForcedCurve, PointCurve, faces_accelerance, limit_balance
 from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array, ComplexArray, Model
 from upd.analyses.forced.performance import mode_results, performance_results
@@ -142,10 +143,10 @@ def _linear_at(
     if name in solution.faces:
         excitation = excitation_of(solution.plan.scene.excitation)
         march = solution.faces[name].march
-        return lambda f: np.asarray(linear_curves(march, f, excitation, stuck=stuck)[0][side])
+        return partial(faces_accelerance, march, excitation, side, stuck=stuck)
     model, plan = solution.models[name], solution.plan
     problem, row, force = limit_balance(plan, model), model.row(side), plan.scene.damper.centrifugal
-    return lambda f: measures.linear_accelerance(problem, row, force, f, stuck)
+    return partial(measures.linear_accelerance, problem, row, force, stuck=stuck)
 
 
 def _with_friction(c: ForcedCurve[Any], side: Side) -> Computed:
