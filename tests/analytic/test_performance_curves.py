@@ -96,13 +96,13 @@ def test_a_curve_that_ends_early_is_taken_from_its_other_end(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Together they are whole where they meet; what neither reaches is told."""
-    made = performance.respond
+    made = performance.response_of
     asked: list[bool] = []
 
     def cut(share: float) -> Any:
-        def respond(*args: Any, sweep_down: bool, **named: Any) -> Any:
+        def response_of(b: Any, f: Any, sweep_down: bool, *more: Any) -> Any:
             asked.append(sweep_down)
-            answer = made(*args, sweep_down=sweep_down, **named)
+            answer = made(b, f, sweep_down, *more)
             names = ("frequency", "x", "contact_displacement", "contact_force", "state")
             names += ("energy", "linear", "truncation", "aliasing", "periodic")
             n = int(share * len(answer.frequency))
@@ -110,16 +110,16 @@ def test_a_curve_that_ends_early_is_taken_from_its_other_end(
                 answer, status="stopped", **{name: getattr(answer, name)[:n] for name in names}
             )
 
-        return respond
+        return response_of
 
     whole = at(1e6)
     for share, arrived in ((0.7, True), (0.3, False)):
         asked.clear()
-        monkeypatch.setattr(performance, "respond", cut(share))
+        monkeypatch.setattr(performance, "response_of", cut(share))
         found = at(1e6)
         assert asked == [False, True]
         assert found.arrived == arrived
-    monkeypatch.setattr(performance, "respond", cut(0.7))
+    monkeypatch.setattr(performance, "response_of", cut(0.7))
     both = at(1e6)
     assert {(p.blade, p.number) for p in both.peaks} == {(p.blade, p.number) for p in whole.peaks}
 

@@ -623,7 +623,8 @@ def both_ways(
             curve = ForcedCurve(
                 name, ratio, force, {}, {}, {}, found, float(found.seconds.sum()), way
             )
-            out.append(with_outputs(plan, march, curve, moved, sweep_maxima))
+            maxima = partial(path_maxima, between=False)
+            out.append(with_outputs(plan, march, curve, moved, maxima))
     return out
 
 
@@ -658,23 +659,6 @@ def with_outputs(
         motion = moved[excitation.lowest][at, len(SIDES) :]
         peaks[side] = tuple(numbered(modes, found, motion))
     return replace(curve, accelerance=read, more=blades, peaks=peaks)
-
-
-def sweep_maxima(frequency: Array, size: Array) -> list[CurvePeak]:
-    """Local maxima of a sweep, at its own points: the motion may jump between two of them.
-
-    Parameters
-    ----------
-    frequency, size
-        (k,) in the order of the sweep.
-    """
-    if len(size) < 3:
-        return []
-    inner = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
-    least = PEAKS_ABOVE * float(size.max())
-    return [
-        CurvePeak(float(frequency[i]), float(size[i]), int(i)) for i in inner if size[i] >= least
-    ]
 
 
 def balance_curve(plan: ForcedPlan, name: str, faces: WholeFaces, ratio: float) -> FacesCurve:

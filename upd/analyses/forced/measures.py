@@ -188,7 +188,9 @@ def chosen_peaks(maxima: Sequence[CurvePeak]) -> list[CurvePeak]:
     return sorted(once[:2])
 
 
-def path_maxima(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) -> list[CurvePeak]:
+def path_maxima(
+    frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE, *, between: bool = True
+) -> list[CurvePeak]:
     """All local maxima along a path that may turn back, in its order.
 
     Parameters
@@ -197,6 +199,8 @@ def path_maxima(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) 
         (n,) along the path, Hz and any unit.
     above
         Maxima lower than this part of the highest are left out.
+    between
+        Whether they may lie between points: not in a sweep, whose motion may jump between two.
     """
     f, a = np.asarray(frequency), np.asarray(magnitude)
     if len(f) < 3:
@@ -207,7 +211,7 @@ def path_maxima(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) 
             continue
         part = slice(i - 1, i + 2)
         sense = 1 if f[i + 1] > f[i] else -1
-        if (f[i + 1] - f[i]) * (f[i] - f[i - 1]) > 0.0:
+        if between and (f[i + 1] - f[i]) * (f[i] - f[i - 1]) > 0.0:
             found = find_peaks(f[part][::sense], a[part][::sense])
             if len(found.frequency):
                 out.append(CurvePeak(float(found.frequency[0]), float(found.height[0]), int(i)))
