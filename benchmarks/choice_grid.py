@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.forced.curves import QUARTER, linear_modes
+from upd.analyses.forced.curves import QUARTER, limit_balance, linear_modes
 from upd.batch.engine import Watcher
 from upd.batch.plan import plan_sweep
 from upd.batch.sweeps import run_sweep
@@ -18,9 +18,8 @@ from upd.errors import InputError
 from upd.scene import ForcedScene
 from upd.scene.quantities import FROM_FORCE, UNKNOWN
 from upd.scene.ranges import with_values
-from upd.sizing.choice import ChosenDamper
-from upd.sizing.ranges import InputRange
-from upd.sizing.rig_peaks import RigPeaks
+from upd.sizing.choice import BestDamper
+from upd.sizing.ranges import InputRange, RigPeaks
 from upd.vary.outcome import Outcome
 
 Array = NDArray[np.float64]
@@ -61,7 +60,7 @@ class GridCheck:
 
 
 def check_by_grid(
-    found: ChosenDamper,
+    found: BestDamper,
     count: int,
     out: str | Path,
     *,
@@ -119,7 +118,7 @@ def _ends(unsure: InputRange) -> list[float]:
     return sorted(values)
 
 
-def grid_scene(found: ChosenDamper) -> ForcedScene:
+def grid_scene(found: BestDamper) -> ForcedScene:
     """The scene of every run of a grid, but for what is varied.
 
     Parameters
@@ -151,14 +150,14 @@ def grid_scene(found: ChosenDamper) -> ForcedScene:
 def _fine_points(rig: RigPeaks) -> int:
     """Frequencies of a sweep that are a quarter of the narrowest stuck peak's width apart."""
     e, k = rig.scene.excitation, rig.model.excitation.lowest
-    modes, width = (v / k for v in linear_modes(rig.balance, True))
+    modes, width = (v / k for v in linear_modes(limit_balance(rig.plan, rig.model), True))
     inside = width[(modes > e.start) & (modes < e.stop) & (width > 0.0)]
     if not inside.size:
         return int(e.points)
     return max(int(e.points), math.ceil((e.stop - e.start) / (QUARTER * float(inside.min()))) + 1)
 
 
-def _tops(outcome: Outcome, found: ChosenDamper) -> dict[float, float]:
+def _tops(outcome: Outcome, found: BestDamper) -> dict[float, float]:
     """F_C/F_E -> the highest peak with friction of the right blade, per newton; none where a load
     lacks one.
     """
@@ -171,7 +170,7 @@ def _tops(outcome: Outcome, found: ChosenDamper) -> dict[float, float]:
     return tops if len(tops) == len(grid_scene(found).excitation.force) else {}
 
 
-def _worst(tops: NDArray[np.object_], found: ChosenDamper, one: InputRange) -> Array:
+def _worst(tops: NDArray[np.object_], found: BestDamper, one: InputRange) -> Array:
     """Worst peaks (n,) of the points of a grid; nan of those whose own runs lack one.
 
     Parameters

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upd.fem import Material, box_mesh, mass, stiffness
-from upd.fem.rotation import centrifugal_load, plane_mass, stress_stiffness
+from upd.fem.inertia import centrifugal_load, plane_mass, stress_stiffness
 from upd.mesh import FloatArray, Mesh
 from upd.reduction.cyclic import CyclicModel, Sector
 

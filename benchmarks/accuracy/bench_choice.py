@@ -96,12 +96,12 @@ def both(name: str) -> tuple[BestDamper, float, GridCheck]:
             case.scene, minimise="peak", over=case.over, for_=case.during, overrides=case.changes
         )
         took = time.process_time() - begin
-        return found, took, check_by_grid(found.found, case.points, place / name, workers=0)
+        return found, took, check_by_grid(found, case.points, place / name, workers=0)
 
 
 def rows(name: str, found: BestDamper, took: float, grid: GridCheck) -> Iterator[dict[str, Any]]:
     """Optimum against grid, and what both cost."""
-    chosen = found.found
+    chosen = found
     k, case = grid.best, CASES[name]
     where = "within" if grid.within(chosen.centrifugal) else "NOT within"
     spacing = 100.0 * (grid.values[1] / grid.values[0] - 1.0)

@@ -20,8 +20,7 @@ from scipy.stats import beta
 
 import upd
 from upd.fitting import CurveTarget, FitResponses, Residuals, Targets, knowledge, read_parameters
-from upd.fitting.intervals import KEPT, is_bent, misfit_rises
-from upd.fitting.residuals import Start
+from upd.fitting.residuals import KEPT, Start, is_bent, misfit_rises
 from upd.fitting.search import search, settled
 from upd.measured import MeasuredCurve
 

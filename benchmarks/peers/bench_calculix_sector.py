@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.fem import Material, mass, stiffness
-from upd.fem.rotation import centrifugal_load, displaced_stiffness, plane_mass, stress_stiffness
+from upd.fem.inertia import centrifugal_load, displaced_stiffness, plane_mass, stress_stiffness
 from upd.mesh import Mesh
 from upd.mesh.recipes import build_mesh
 from upd.reduction.cyclic import CyclicModel, Sector

@@ -16,7 +16,7 @@ from upd.analyses.forced import peaks
 from upd.analyses.forced.curves import ForcedCurve, TimeCheck, Top
 from upd.analyses.forced.interface_model import make_springs
 from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.solution import ForcedSolution
+from upd.analyses.forced.solve import ForcedSolution
 from upd.errors import ConvergenceError
 from upd.hbm.faces.march import InterfaceMarch
 from upd.hbm.springs.time_integration import steady_state

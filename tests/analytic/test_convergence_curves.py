@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from upd.results import Case, Result
-from upd.vary.curves import ConvergenceCurve, make_curves
+from upd.vary.curves import ConvergenceCurve, enough, make_curves
 from upd.vary.outcome import Outcome, SolvedPoint
-from upd.vary.tables import enough
 from upd.vary.variation import Variation
 
 CASE = Case(load=200.0)

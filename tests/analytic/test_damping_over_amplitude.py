@@ -15,7 +15,7 @@ from upd.analyses import forced, make_plan
 from upd.analyses.forced import checks
 from upd.analyses.forced.checks import check_solution
 from upd.analyses.forced.performance import ModeCurve, first_slip, mode_results
-from upd.analyses.forced.solution import ForcedSolution
+from upd.analyses.forced.solve import ForcedSolution
 from upd.errors import InputError
 from upd.hbm import contacts, nonlinear_mode
 from upd.progress import Stages, silent

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from rigs import SET_LINES, state_of
 
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import linear_curves, linear_peaks
+from upd.analyses.forced.curves import exact_peaks, faces_accelerance, linear_peaks
 from upd.analyses.forced.interface_model import (
     by_coulomb,
     make_interface_model,
@@ -232,16 +232,24 @@ def whole_faces(*blades: Any) -> InterfaceModel:
     return worn_start(model, of, 350.0)[0]
 
 
+def at_forces(model: InterfaceModel) -> InterfaceModel:
+    """The model with the motion of its force nodes as outputs, but for what each force alone does
+    beside the modes.
+    """
+    none = np.zeros((model.places.shape[1],) * 2)
+    return replace(model, seen_modes=model.places.T, seen_contact=model.pushed.T, seen_drive=none)
+
+
 @pytest.mark.parametrize("stuck", [True, False])
 def test_whole_faces_are_reciprocal_at_both_places(stuck: bool) -> None:
     """What a force at one blade moves the other's force node by is what the other moves its by."""
     model, f = whole_faces(*SIDES), np.array([300.0, 420.0])
-    seen = [model.linear_response(f, drive, stuck=stuck)[:, 2:] for drive in np.eye(2)]
+    seen = [at_forces(model).linear_response(f, drive, stuck=stuck) for drive in np.eye(2)]
     A = np.array(seen)
     assert np.abs(A[LEFT, :, 1] - A[RIGHT, :, 0]).max() < 1e-9 * np.abs(A).max()
     assert stuck == (np.abs(A[LEFT, :, 1]).min() > 1e-3 * np.abs(A).max())
-    alone = whole_faces("right").linear_response(f, [1.0], stuck=stuck)
-    assert np.abs(alone[:, 3] - A[RIGHT, :, 1]).max() < 1e-9 * np.abs(A).max()
+    alone = at_forces(whole_faces("right")).linear_response(f, [1.0], stuck=stuck)
+    assert np.abs(alone[:, 0] - A[RIGHT, :, 1]).max() < 1e-9 * np.abs(A).max()
 
 
 def test_curves_of_whole_faces_are_sums_and_second_harmonics() -> None:
@@ -254,8 +262,10 @@ def test_curves_of_whole_faces_are_sums_and_second_harmonics() -> None:
                 1j * math.radians(one.phase)
             )
         of = Excitation(SIDES, drive)
-        H, peaks = linear_curves(model, f / of.lowest, of, stuck=True)
-        return np.array([H[side] for side in SIDES]), peaks["right"]
+        read = [partial(faces_accelerance, model, of, side, stuck=True) for side in SIDES]
+        fine = np.linspace(f[0], f[-1], 400) / of.lowest
+        peaks = exact_peaks(read[RIGHT], fine, f / of.lowest)
+        return np.array([one(f / of.lowest) for one in read]), peaks
 
     (one, _), (other, _), (both, peaks) = curves(ONE), curves(OTHER), curves(ONE, OTHER)
     assert np.abs(both - one - other).max() < 1e-9 * np.abs(both).max()
@@ -267,6 +277,5 @@ def test_curves_of_whole_faces_are_sums_and_second_harmonics() -> None:
 def test_a_blade_without_a_force_and_damper_is_at_rest() -> None:
     f = np.linspace(280.0, 320.0, 5)
     alone = Excitation(("right",), np.ones((1, 1), complex))
-    H, peaks = linear_curves(whole_faces("right"), f, alone, stuck=False)
-    assert not np.any(H["left"]) and not peaks["left"]
-    assert np.all(H["right"]) and peaks["right"]
+    assert alone.free_blades == ("right",)
+    assert np.all(faces_accelerance(whole_faces("right"), alone, "right", f, stuck=False))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from upd.errors import ConvergenceError, InputError, UpdError
-from upd.fitting.intervals import Knowledge, misfit_rises
+from upd.fitting.residuals import Knowledge, misfit_rises
 
 A = np.array([[2.0, 0.3], [-1.0, 1.5], [0.4, 0.8]])
 FAR = np.full(2, 10.0)

@@ -136,11 +136,12 @@ def test_mirror_pairs_keep_what_is_even_and_drop_what_is_odd(meshes: dict[str, M
         assert pairs is not None
         assert len(pairs.point) == face.n_point // 2
         assert np.all(pairs.image != pairs.point), "no point lies on the plane"
-        for fields, kept, gone in ((even, pairs.even, pairs.odd), (odd, pairs.odd, pairs.even)):
+        for fields, sign in ((even, 1.0), (odd, -1.0)):
             u = np.array([f(*face.position.T) for f in fields])
             rows = np.einsum("fc,rcm->mfr", face.frame, u)
-            assert kept(rows) == pytest.approx(rows[pairs.point], abs=1e-9)
-            assert gone(rows) == pytest.approx(np.zeros_like(rows[pairs.point]), abs=1e-9)
+            kept, gone = pairs.part(rows, sign), pairs.part(rows, -sign)
+            assert kept == pytest.approx(rows[pairs.point], abs=1e-9)
+            assert gone == pytest.approx(np.zeros_like(rows[pairs.point]), abs=1e-9)
         # a pair has the stiffness of both
         assert pairs.total(face.weight) == pytest.approx(2 * face.weight[pairs.point])
         assert pairs.face(face).weight.sum() == pytest.approx(1.0)

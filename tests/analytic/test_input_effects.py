@@ -12,8 +12,7 @@ from upd.analyses import forced, make_plan
 from upd.analyses.forced.again import Run, run_curve, solve_again
 from upd.analyses.forced.curves import linear_of
 from upd.analyses.forced.inputs import effects_of, few_harmonics, input_variants
-from upd.analyses.forced.solution import ForcedSolution
-from upd.analyses.forced.solve import with_totals
+from upd.analyses.forced.solve import ForcedSolution, with_totals
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 

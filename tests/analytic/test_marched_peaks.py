@@ -18,7 +18,7 @@ from upd.analyses.forced.arrays import arrays
 from upd.analyses.forced.interface_model import by_coulomb, make_springs
 from upd.analyses.forced.model import respond
 from upd.analyses.forced.results import make_results
-from upd.analyses.forced.solution import (
+from upd.analyses.forced.solve import (
     ForcedSolution,
     MarchedPeak,
     marched_damper,

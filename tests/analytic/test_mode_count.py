@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.sparse import block_diag, csr_array, diags_array
 
-from upd.analyses.modal.checks import no_mode_missed
+from upd.analyses.modal.results import no_mode_missed
 from upd.linalg import Eigenproblem, inertia, modes
 from upd.linalg.pardiso import signed_pardiso
 from upd.linalg.select import has_pardiso

@@ -28,7 +28,7 @@ from upd.analyses.forced.performance import (
     ratios_of,
     with_curves,
 )
-from upd.analyses.forced.solution import ForcedSolution
+from upd.analyses.forced.solve import ForcedSolution
 from upd.progress import Stages, silent
 from upd.scene import load_scene
 
@@ -56,9 +56,9 @@ def solved(ratio: float) -> ForcedSolution:
     return found  # type: ignore[no-any-return]
 
 
-def at(ratio: float, harmonics: int = 3, **changes: Any) -> RatioPoint:
+def at(ratio: float, harmonics: int = 3) -> RatioPoint:
     s = solved(1e5)
-    return peaks_at(s.plan, s.models["thesis"], ratio, harmonics, changes or None)
+    return peaks_at(s.plan, s.models["thesis"], ratio, harmonics)
 
 
 def test_where_all_sticks_the_peaks_are_the_stuck_ones() -> None:
@@ -96,13 +96,13 @@ def test_a_curve_that_ends_early_is_taken_from_its_other_end(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Together they are whole where they meet; what neither reaches is told."""
-    made = performance.respond
+    made = performance.response_of
     asked: list[bool] = []
 
     def cut(share: float) -> Any:
-        def respond(*args: Any, sweep_down: bool, **named: Any) -> Any:
+        def response_of(b: Any, f: Any, sweep_down: bool, *more: Any) -> Any:
             asked.append(sweep_down)
-            answer = made(*args, sweep_down=sweep_down, **named)
+            answer = made(b, f, sweep_down, *more)
             names = ("frequency", "x", "contact_displacement", "contact_force", "state")
             names += ("energy", "linear", "truncation", "aliasing", "periodic")
             n = int(share * len(answer.frequency))
@@ -110,16 +110,16 @@ def test_a_curve_that_ends_early_is_taken_from_its_other_end(
                 answer, status="stopped", **{name: getattr(answer, name)[:n] for name in names}
             )
 
-        return respond
+        return response_of
 
     whole = at(1e6)
     for share, arrived in ((0.7, True), (0.3, False)):
         asked.clear()
-        monkeypatch.setattr(performance, "respond", cut(share))
+        monkeypatch.setattr(performance, "response_of", cut(share))
         found = at(1e6)
         assert asked == [False, True]
         assert found.arrived == arrived
-    monkeypatch.setattr(performance, "respond", cut(0.7))
+    monkeypatch.setattr(performance, "response_of", cut(0.7))
     both = at(1e6)
     assert {(p.blade, p.number) for p in both.peaks} == {(p.blade, p.number) for p in whole.peaks}
 

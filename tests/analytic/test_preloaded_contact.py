@@ -16,7 +16,7 @@ from upd.analyses.forced.curves import linear_of
 from upd.analyses.forced.measures import accelerance, stuck_motion
 from upd.analyses.forced.model import Model, make_model, preloaded, respond
 from upd.analyses.forced.plan import ForcedPlan, make_plan
-from upd.analyses.forced.solution import ForcedSolution
+from upd.analyses.forced.solve import ForcedSolution
 from upd.analyses.forced.statics import face_laws, static_state
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import InputError

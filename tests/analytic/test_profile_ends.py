@@ -9,8 +9,16 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.stats import norm
 
-from upd.fitting.intervals import KEPT, SHOWN, Knowledge, is_bent, misfit_rises, profile_ends
-from upd.fitting.residuals import Residuals, Start
+from upd.fitting.residuals import (
+    KEPT,
+    SHOWN,
+    Knowledge,
+    Residuals,
+    Start,
+    is_bent,
+    misfit_rises,
+    profile_ends,
+)
 
 #: half-widths to first order, and how much steeper the first residual is above 0
 HALF, STEEPER = 0.1, 2.5

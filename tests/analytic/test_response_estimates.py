@@ -31,7 +31,7 @@ from upd.analyses.forced.again import (
 )
 from upd.analyses.forced.curves import Top
 from upd.analyses.forced.peaks import climbed
-from upd.analyses.forced.solution import ForcedSolution
+from upd.analyses.forced.solve import ForcedSolution
 from upd.errors import ConvergenceError
 from upd.hbm import climb, contacts, frequency_response
 from upd.progress import Stages, silent

@@ -10,7 +10,7 @@ from scipy.sparse.linalg import spsolve
 from tests.sectors import STEEL, bladed_sector, model_of
 from upd.errors import ConvergenceError, InputError
 from upd.fem import Material, box_mesh, mass, stiffness
-from upd.fem.rotation import (
+from upd.fem.inertia import (
     centrifugal_load,
     coriolis,
     displaced_stiffness,

@@ -12,10 +12,10 @@ import pytest
 from rigs import LINES, state_of
 
 from upd.analyses import forced, make_plan
-from upd.analyses.forced.curves import stuck_modes_of
+from upd.analyses.forced.curves import both_ways, stuck_modes_of
 from upd.analyses.forced.interface_model import by_coulomb, make_springs, spring_march
-from upd.analyses.forced.measures import stuck_motion
-from upd.analyses.forced.solution import ForcedSolution, both_ways, sweep_maxima
+from upd.analyses.forced.measures import path_maxima, stuck_motion
+from upd.analyses.forced.solve import ForcedSolution
 from upd.errors import InputError
 from upd.hbm.faces.march import InterfaceMarch
 from upd.hbm.faces.sweep import settle, stepped_sine
@@ -221,10 +221,11 @@ def test_maxima_of_a_sweep_are_its_own_points() -> None:
     f = np.arange(8.0)
     size = np.array([1.0, 2.0, 3.0, 10.0, 8.0, 7.0, 9.0, 4.0])
     for way in (1, -1):
-        found = sweep_maxima(f[::way], size[::way])
+        found = path_maxima(f[::way], size[::way], between=False)
         told = [(one.frequency, one.height) for one in found]
         assert told == [(3.0, 10.0), (6.0, 9.0)][::way]
         assert [f[::way][one.sample] for one in found] == [one.frequency for one in found]
     # small ones beside the highest are none
-    assert len(sweep_maxima(f, np.array([1e-9, 2e-9, 1e-9, 3.0, 9.0, 7.0, 5.0, 4.0]))) == 1
-    assert sweep_maxima(f[:2], size[:2]) == []
+    lone = np.array([1e-9, 2e-9, 1e-9, 3.0, 9.0, 7.0, 5.0, 4.0])
+    assert len(path_maxima(f, lone, between=False)) == 1
+    assert path_maxima(f[:2], size[:2], between=False) == []

@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 from scipy.sparse import block_diag, csr_array
 
 from upd.errors import ConvergenceError, InputError
-from upd.fem import Material, Supports, box_mesh, mass, rigid_body_modes, stiffness
+from upd.fem import Material, box_mesh, mass, rigid_body_modes, stiffness
 from upd.linalg import Eigenproblem, modes
 from upd.linalg.lanczos import BLOCK
 from upd.linalg.select import has_pardiso
@@ -144,22 +144,6 @@ def test_needle_elements(solver):
     bound = 10 * EPS * abs(K).max() / (found.eigenvalue * M.diagonal().min())
     assert (np.abs(found.eigenvalue / exact - 1) <= np.maximum(bound, 1e-9)).all()
     np.testing.assert_allclose(found.frequency[::2], found.frequency[1::2], rtol=1e-4)
-
-
-def test_a_node_clamped_twice():
-    mesh = box_mesh(np.linspace(0, 40, 7), [0, 4.0, 8.0], [0, 5.0])
-    once = (3 * mesh.nodes["x0"][:, None] + np.arange(3)).ravel()
-    results = []
-    for fixed in (once, np.concatenate([once, once[:5], once[::-1]])):
-        T = Supports(fixed).reduction(mesh.points).T
-        results.append(
-            modes(
-                csr_array(T.T @ stiffness(mesh, STEEL) @ T),
-                csr_array(T.T @ mass(mesh, STEEL) @ T),
-                count=5,
-            ).frequency
-        )
-    np.testing.assert_array_equal(*results)
 
 
 @pytest.mark.parametrize("solver", [*DIRECT, "dense"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -16,7 +16,6 @@ from upd.errors import InputError
 from upd.measured import (
     MeasuredCurve,
     MeasuredPeak,
-    fit_damping,
     frac,
     magnitude_correlation,
     noisy_peaks,
@@ -52,21 +51,16 @@ class ComputedPeak(NamedTuple):
     mode: str = ""
 
 
-def numbered(peaks: Iterable[Any]) -> list[ComputedPeak]:
-    """Peaks with these attributes and others."""
-    return [ComputedPeak(one.number, one.frequency, one.height, one.mode) for one in peaks]
-
-
 @dataclass(frozen=True)
 class Computed:
     """A computed curve: its case, band in Hz, accelerance at frequencies (nan where it has not one
-    value), peaks by their numbers.
+    value), peaks with the attributes of `ComputedPeak`.
     """
 
     case: Case
     band: tuple[float, float]
     at: Callable[[Array], ComplexArray]
-    peaks: Sequence[ComputedPeak]
+    peaks: Sequence[Any]
 
 
 def measured_results(
@@ -101,7 +95,7 @@ def measured_results(
         for one in found:
             results += _correlation(name, curve, one) + _differences(name, curve, peaks, one)
         if choice.state == FREE:
-            results += _damping(damping, name, choice, curve, peaks, found)
+            results += _damping(damping, name, choice, peaks, found)
     return results
 
 
@@ -181,7 +175,6 @@ def _damping(
     damping: float,
     name: str,
     choice: MeasuredChoice,
-    curve: MeasuredCurve,
     peaks: Sequence[MeasuredPeak],
     found: Sequence[Computed],
 ) -> list[Result]:
@@ -204,12 +197,11 @@ def _damping(
             _within(q.FITTED_FREQUENCY.of(f, at), errors[1] / f),
             q.FREQUENCY_ERROR.of(errors[1], at),
         ]
-    results += [
+    return [
+        *results,
         q.FITTED_NOISE.of(fit.noise.relative, case),
         q.NOISE_CONSTANT.of(fit.noise.constant, case),
     ]
-    # of all stiffnesses: without the damper they are one
-    return results + (_scales(case, curve, fit.constant, found[0]) if found else [])
 
 
 def _within(result: Result, standard_error: float) -> Result:
@@ -238,21 +230,6 @@ def _half_power(
         source = f"measured, {name}"
         out.append(q.HALF_POWER_DAMPING.of(near.zeta[0], case, peaks[j].zeta, source, exact=False))
     return out
-
-
-def _scales(case: Case, curve: MeasuredCurve, constant: Array, one: Computed) -> list[Result]:
-    """Modal constants of the measured over those of the computed curve, both fitted alike."""
-    try:
-        like = fit_damping(replace(curve, accelerance=one.at(curve.frequency)))
-    except InputError as error:
-        return [q.FITTED_SCALE.withheld(case, f"computed curve: {error}")]
-    if len(like.constant) != len(constant):
-        reason = "the computed curve has another number of peaks in the measured band"
-        return [q.FITTED_SCALE.withheld(case, reason)]
-    return [
-        q.FITTED_SCALE.of(abs(a / b), replace(case, peak=k))
-        for k, (a, b) in enumerate(zip(constant, like.constant, strict=True), 1)
-    ]
 
 
 def fit_checks(measured: MeasuredChoices) -> list[Check]:
@@ -336,7 +313,9 @@ def measured_traces(arrays: Arrays, blade: str, colours: Mapping[Any, int]) -> t
         beside none of them has one of its own.
     """
     out, spare = [], 1 + max(colours.values(), default=-1)
-    for group in _of_blade(arrays, blade):
+    for group in with_content(arrays, MEASURED_CURVE):
+        if f"accelerance_{blade}" not in group:
+            continue
         case = case_of(group)
         colour = colours.get(case.kind if case.force_ratio is None else case.force_ratio)
         if colour is None:
@@ -369,12 +348,6 @@ def damping_charts(arrays: Arrays) -> list[Chart]:
             )
         )
     return out
-
-
-def _of_blade(arrays: Arrays, blade: str) -> list[Group]:
-    return [
-        group for group in with_content(arrays, MEASURED_CURVE) if f"accelerance_{blade}" in group
-    ]
 
 
 def _points(group: Group, blade: str, colour: int) -> Trace:

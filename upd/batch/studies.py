@@ -31,9 +31,9 @@ from upd.plot.work_precision import work_precision_charts
 from upd.scene import AnyScene, load_scene
 from upd.scene.quantities import UNKNOWN
 from upd.scene.ranges import bare_quantity
+from upd.vary.curves import markdown_table
 from upd.vary.ladder import Asked, StudyReport
 from upd.vary.outcome import SolvedPoint
-from upd.vary.tables import markdown_table
 from upd.vary.variation import Variation
 
 if TYPE_CHECKING:

@@ -1,15 +1,16 @@
 """Linear dynamics: frequency response of full and reduced models, peaks, damping."""
 
-from upd.dynamics.peaks import Peaks, find_peaks, modulus
+from upd.dynamics.peaks import Peaks, find_peaks
 from upd.dynamics.response import (
     QUANTITIES,
     LinearResponse,
     ModalSystem,
-    converted,
+    TunedDamping,
     frequency_response,
     modal_system,
+    peak_response,
+    tune_damping,
 )
-from upd.dynamics.tuning import TunedDamping, peak_response, tune_damping
 
 __all__ = [
     "QUANTITIES",
@@ -17,11 +18,9 @@ __all__ = [
     "ModalSystem",
     "Peaks",
     "TunedDamping",
-    "converted",
     "find_peaks",
     "frequency_response",
     "modal_system",
-    "modulus",
     "peak_response",
     "tune_damping",
 ]

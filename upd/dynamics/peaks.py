@@ -35,12 +35,6 @@ class Peaks(Shown):
     sample: IntArray
 
 
-def modulus(H: ArrayLike) -> FloatArray:
-    """|H| as float64, of any shape."""
-    out: FloatArray = np.abs(np.asarray(H)).astype(np.float64)
-    return out
-
-
 def find_peaks(frequency: ArrayLike, magnitude: ArrayLike, *, above: float = 0.0) -> Peaks:
     """Local maxima of a sampled response.
 

@@ -1,4 +1,4 @@
-"""Frequency response functions: receptance, mobility, accelerance.
+"""Frequency response functions: receptance, mobility, accelerance; damping for a wanted peak.
 
 References
 ----------
@@ -7,14 +7,15 @@ D. J. Ewins, Modal Testing, ch. 2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq, minimize_scalar
 
 from upd.errors import ConvergenceError, InputError
-from upd.fem.damping import checked_ratio
+from upd.fem.assembly import checked_ratio
 from upd.labels import Shown
 from upd.linalg.common import checked_vectors
 from upd.linalg.eigen_checks import Modes
@@ -28,38 +29,6 @@ QUANTITIES = {
     "mobility": (1, 1.0, "(mm/s)/N"),
     "accelerance": (2, 1e-3, "(m/s2)/N"),
 }
-
-
-class System(Protocol):
-    """What answers a harmonic force: ModalSystem, or a user's own.
-
-    Attributes
-    ----------
-    n : int
-        Number of dofs.
-    """
-
-    @property
-    def n(self) -> int: ...
-
-    def receptance(self, force: FloatArray, rows: FloatArray, omega: FloatArray) -> ComplexArray:
-        """Displacement of the outputs under a harmonic force.
-
-        Parameters
-        ----------
-        force : (n,) ndarray
-            Amplitude of the force [N].
-        rows : (n_out, n) ndarray
-            Rows that weigh the displacements.
-        omega : (n_f,) ndarray
-            Angular frequencies [rad/s].
-
-        Returns
-        -------
-        (n_f, n_out) ndarray of complex
-            Displacement [mm].
-        """
-        ...
 
 
 @dataclass(frozen=True, repr=False)
@@ -192,7 +161,7 @@ class LinearResponse(Shown):
 
 
 def frequency_response(
-    system: System,
+    system: ModalSystem,
     force: ArrayLike,
     outputs: ArrayLike,
     frequencies: ArrayLike,
@@ -202,8 +171,8 @@ def frequency_response(
 
     Parameters
     ----------
-    system : DirectSystem, ModalSystem or System
-        The system of n dofs.
+    system : ModalSystem
+        The system of n dofs, or what has its ``n`` and ``receptance``.
     force : int or (n,) array_like
         A dof number (unit force), or a force distribution; the response is per newton of the unit
         it is given in.
@@ -242,6 +211,8 @@ def frequency_response(
     >>> (1e6 * np.linalg.inv(K)[0]).round(3).tolist()
     [375.0, 125.0]
     """
+    if quantity not in QUANTITIES:
+        raise InputError(f"Unknown quantity {quantity!r}: use one of {', '.join(QUANTITIES)}.")
     f = np.atleast_1d(np.asarray(frequencies, dtype=np.float64))
     if f.ndim != 1 or not np.isfinite(f).all() or (f < 0.0).any():
         raise InputError("Frequencies are a list of finite numbers in Hz, none negative.")
@@ -251,37 +222,11 @@ def frequency_response(
         if np.ndim(force) == 0
         else checked_vectors(force, system.n, "force")
     )
+    power, scale, unit = QUANTITIES[quantity]
     H = system.receptance(load.reshape(-1), rows, 2.0 * np.pi * f)
-    return converted(LinearResponse(f, H, "receptance", "mm/N"), quantity)
-
-
-def converted(response: LinearResponse, quantity: str) -> LinearResponse:
-    """The same response as another quantity: times (i omega) to a power.
-
-    Parameters
-    ----------
-    response : LinearResponse
-    quantity : {"receptance", "mobility", "accelerance"}
-
-    Returns
-    -------
-    LinearResponse
-
-    Raises
-    ------
-    InputError
-        For an unknown quantity, or a division by 0 Hz.
-    """
-    if quantity not in QUANTITIES:
-        raise InputError(f"Unknown quantity {quantity!r}: use one of {', '.join(QUANTITIES)}.")
-    (old, old_scale, _), (new, scale, unit) = QUANTITIES[response.quantity], QUANTITIES[quantity]
-    if new < old and (response.frequency == 0.0).any():
-        raise InputError(
-            "At 0 Hz there is no way back to a lower derivative: leave 0 Hz out, or ask "
-            "for the receptance first."
-        )
-    factor = (2j * np.pi * response.frequency) ** (new - old) * (scale / old_scale)
-    return LinearResponse(response.frequency, response.H * factor[:, None], quantity, unit)
+    # times (i omega) to a power
+    factor = (2j * np.pi * f) ** power * scale
+    return LinearResponse(f, H * factor[:, None], quantity, unit)
 
 
 def _rows(dofs: Any, n: int, name: str) -> FloatArray:
@@ -304,3 +249,165 @@ def _rows(dofs: Any, n: int, name: str) -> FloatArray:
     rows = np.zeros((len(numbers), n))
     rows[np.arange(len(numbers)), numbers] = 1.0
     return rows
+
+
+# -- damping that gives a wanted peak --------------------------------------------------------------
+
+
+#: Damping ratios searched: from a bell to hardly a resonance.
+_ZETA = (1e-7, 0.5)
+#: Samples over the band, at least, from which the highest one is refined.
+_GRID = 400
+
+
+@dataclass(frozen=True)
+class TunedDamping:
+    """Damping that gives a wanted peak.
+
+    Attributes
+    ----------
+    zeta : float
+        Damping ratio.
+    peak : float
+        The peak it gives, (m/s2)/N.
+    frequency : float
+        Its frequency [Hz].
+    """
+
+    zeta: float
+    peak: float
+    frequency: float
+
+
+def peak_response(
+    system: ModalSystem,
+    force: ArrayLike,
+    output: ArrayLike,
+    band: tuple[float, float],
+) -> tuple[float, float]:
+    """Frequency and height of the highest response of one output in a band.
+
+    Refined to the square root of eps.
+
+    Parameters
+    ----------
+    system : ModalSystem
+    force, output
+        As in `frequency_response`; one output.
+    band : tuple of two float
+        Lowest and highest frequency [Hz].
+
+    Returns
+    -------
+    frequency : float
+        [Hz]
+    height : float
+        (m/s2)/N.
+
+    Raises
+    ------
+    InputError
+        For a band that is none, and as `frequency_response` does.
+    """
+    low, high = band
+    if not 0.0 <= low < high:
+        raise InputError(f"The band {band} is none: give two rising frequencies in Hz.")
+    output = np.atleast_1d(np.asarray(output)) if np.ndim(output) < 2 else output
+    inside = (system.frequency >= low) & (system.frequency <= high)
+    # Each resonance with samples over its own width, however sharp.
+    offsets = np.array([-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0])
+    near = system.frequency[inside, None] * (1.0 + system.zeta[inside, None] * offsets)
+    f = np.unique(np.clip(np.concatenate([np.linspace(low, high, _GRID), near.ravel()]), low, high))
+
+    def height(at: ArrayLike) -> FloatArray:
+        out: FloatArray = frequency_response(system, force, output, at).magnitude.max(axis=1)
+        return out
+
+    sampled = height(f)
+    k = int(sampled.argmax())
+    bounds = (float(f[max(k - 1, 0)]), float(f[min(k + 1, len(f) - 1)]))
+    found = minimize_scalar(
+        lambda x: -float(height(x)[0]),
+        bounds=bounds,
+        method="bounded",
+        options={"xatol": 1e-9 * bounds[1]},
+    )
+    best = float(height(found.x)[0])
+    return (float(found.x), best) if best >= sampled[k] else (float(f[k]), float(sampled[k]))
+
+
+def tune_damping(
+    system: ModalSystem,
+    force: ArrayLike,
+    output: ArrayLike,
+    target_peak: float,
+    *,
+    band: tuple[float, float],
+) -> TunedDamping:
+    """The damping ratio at which the highest response in a band has a given height.
+
+    The peak of a lone mode is |phi_out phi_force| / (2 zeta) in accelerance; here the neighbours
+    count too.
+
+    Parameters
+    ----------
+    system : ModalSystem
+        The system; the ratio is that of all its modes.
+    force, output
+        As in `frequency_response`; one output.
+    target_peak : float
+        Height wanted, (m/s2)/N.
+    band : tuple of two float
+        Lowest and highest frequency [Hz].
+
+    Returns
+    -------
+    TunedDamping
+
+    Raises
+    ------
+    InputError
+        For a target that is not positive.
+    ConvergenceError
+        When no ratio between 1e-7 and 0.5 gives the target; the message names the peaks at both
+        ends.
+
+    Examples
+    --------
+    A modal mass of 1 kg: 1 / (2 zeta) = 25 (m/s2)/N asks for 2 % of damping.
+
+    >>> import numpy as np
+    >>> from upd.dynamics import ModalSystem, tune_damping
+    >>> mode = ModalSystem(np.array([100.0]), np.array([[1.0 / np.sqrt(1e-3)]]), np.array([0.01]))
+    >>> tuned = tune_damping(mode, 0, 0, target_peak=25.0, band=(90.0, 110.0))
+    >>> round(tuned.zeta, 4)
+    0.02
+    >>> round(tuned.frequency, 1)
+    100.0
+    """
+    if not (np.isfinite(target_peak) and target_peak > 0.0):
+        raise InputError(f"target_peak = {target_peak}: give a positive peak.")
+
+    def peak(zeta: float) -> tuple[float, float]:
+        ratios = np.full_like(system.zeta, zeta)
+        return peak_response(replace(system, zeta=ratios), force, output, band)
+
+    def excess(log_zeta: float) -> float:
+        height = peak(float(np.exp(log_zeta)))[1]
+        return float(np.log(height / target_peak)) if height > 0.0 else -np.inf
+
+    ends = [excess(float(np.log(z))) for z in _ZETA]
+    if not ends[0] >= 0.0 >= ends[1]:
+        least, most = (target_peak * float(np.exp(e)) for e in (ends[1], ends[0]))
+        raise ConvergenceError(
+            f"No damping ratio between {_ZETA[0]:g} and {_ZETA[1]:g} gives a peak of "
+            f"{target_peak:.4g} in {band[0]:g} to {band[1]:g} Hz: "
+            f"they give {most:.4g} to {least:.4g}. Check force, output and band, or the target."
+        )
+    root = float(
+        np.exp(
+            brentq(excess, float(np.log(_ZETA[0])), float(np.log(_ZETA[1])), xtol=1e-12, rtol=1e-12)
+        )
+    )
+    where, height = peak(root)
+    return TunedDamping(root, height, where)

@@ -1,21 +1,16 @@
-"""Mesh -> K, M: elements, materials, assembly, surface integrals, supports."""
+"""Mesh -> K, M: elements, materials, assembly, surface integrals."""
 
-from upd.fem.assembly import mass, stiffness
+from upd.fem.assembly import mass, modal_damping, stiffness
 from upd.fem.box import box_mesh
-from upd.fem.damping import modal_damping
 from upd.fem.elements import ELEMENTS
-from upd.fem.inertia import MassProperties, mass_properties
+from upd.fem.inertia import MassProperties, mass_properties, rigid_body_modes
 from upd.fem.material import Material
-from upd.fem.supports import Reduction, RigidSet, Supports, rigid_body_modes
 from upd.fem.surface import face_mass, traction_weights
 
 __all__ = [
     "ELEMENTS",
     "MassProperties",
     "Material",
-    "Reduction",
-    "RigidSet",
-    "Supports",
     "box_mesh",
     "face_mass",
     "mass",

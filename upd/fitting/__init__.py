@@ -5,12 +5,10 @@
 """
 
 from upd.fitting.answer import Fit
-from upd.fitting.intervals import Knowledge, knowledge
-from upd.fitting.parameters import read_parameters
-from upd.fitting.residuals import Residuals
+from upd.fitting.residuals import Knowledge, Residuals, knowledge
 from upd.fitting.responses import FitResponses
 from upd.fitting.search import fit
-from upd.fitting.targets import CurveTarget, Targets, read_targets
+from upd.fitting.targets import CurveTarget, Targets, read_parameters, read_targets
 
 __all__ = [
     "CurveTarget",

@@ -12,10 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.errors import InputError
-from upd.fitting.intervals import SHOWN, FurtherMeasurement, Knowledge, is_bent
-from upd.fitting.parameters import VariedInput, fitted_scene
-from upd.fitting.residuals import CurveNoise, Start
-from upd.fitting.targets import CurveTarget, FitTarget
+from upd.fitting.residuals import SHOWN, CurveNoise, FurtherMeasurement, Knowledge, Start, is_bent
+from upd.fitting.targets import CurveTarget, FitTarget, VariedInput, fitted_scene
 from upd.plot.chart import Axis, Band, Chart, Trace
 from upd.report.answer_folder import FigureAnswer
 from upd.results.answer_table import AnswerTable, Rounded

@@ -1,5 +1,8 @@
 """What a fit aims at as functions of what it varies, with derivatives.
 
+What an input leaves alone of a model is kept: what changes contact springs, friction, damping or
+loads re-uses the reduced blades.
+
 Derivatives are differences forward, of the logarithm of each factor. With friction every evaluation
 solves the whole curve over frequency, from its lowest end upwards, so that a fit does not depend on
 the way it came. Values are those of the harmonic balance alone.
@@ -7,64 +10,297 @@ the way it came. Values are those of the harmonic balance alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from typing import NamedTuple
+from dataclasses import fields, replace
+from functools import cached_property
+from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from upd.analyses import make_plan
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import fine_grid, linear_peaks
-from upd.analyses.forced.measures import (
-    CANDIDATES,
-    CurvePeak,
-    StuckMode,
-    numbered_peaks,
-    tell_stuck_peaks,
-    unmoved,
+from upd.analyses.forced.curves import (
+    Top,
+    fine_grid,
+    limit_balance,
+    limit_peaks,
+    stuck_frequency,
 )
-from upd.analyses.forced.model import Model, balance_of, quiet, respond
+from upd.analyses.forced.measures import CANDIDATES, CurvePeak, StuckMode, numbered_peaks
+from upd.analyses.forced.model import Model, balance_of, make_model, quiet, respond
+from upd.analyses.forced.peaks import top_from
 from upd.analyses.forced.plan import ForcedPlan, grid
-from upd.cache.arrays import Journal
+from upd.analyses.forced.statics import face_laws
+from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
+from upd.cache.arrays import Journal, cache_folder
+from upd.cache.files import write_text
+from upd.cache.sources import key_of
 from upd.errors import ConvergenceError
-from upd.fitting.models import ModelSource
-from upd.fitting.parameters import VariedInput
 from upd.fitting.targets import (
     CONTACT_TOTALS,
     PEAK_NUMBERS,
     STUCK_MODES,
     CurveTarget,
     Targets,
+    VariedInput,
+    fitted_scene,
 )
-from upd.hbm import FrequencyResponse, climb
-from upd.hbm.core.fourier import to_complex
+from upd.hbm import FrequencyResponse
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.sweep import first_point, newton, place_sliders
 from upd.linalg.parallel import threads_for
-from upd.scene import ForcedScene
-from upd.scene.forced_contact import SIDES, Side
+from upd.mesh import recipes
+from upd.progress import Stages
+from upd.scene import ForcedScene, load_scene
+from upd.scene.forced_contact import SIDES, FaceStiffness, Side
+from upd.scene.ranges import one_model, stiffness_of
+from upd.scene.toml import toml_key, toml_value
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
+#: of differences of ln(factor)
+STEP = 2e-3
+#: the same where a contact analysis is solved again: its set of nodes moves from node to node
+CONTACT_STEP = 0.02
+#: sets of bodies that are kept
+_KEPT = 3
+#: inputs that leave the reduced blades as they are
+_CHEAP = ("stiffness.", "contact.friction", "excitation.", "damper.centrifugal")
+_FRICTIONLESS = "frictionless"
+
+
+class ModelSource:
+    """Models of a scene with its inputs moved.
+
+    Parameters
+    ----------
+    scene
+        Of contact points on springs.
+    parameters
+        Of the fit.
+    ratios
+        F_C/F_E of what is followed with friction; without any the static state is omitted (a
+        stuck point is as stiff under any preload).
+    like
+        Of the same scene: its blades are taken.
+
+    Raises
+    ------
+    InputError
+        For a scene of whole faces, one that chooses its levels by an accuracy, parameters of
+        several contact stiffnesses, and harmonics that are no number.
+    """
+
+    def __init__(
+        self,
+        scene: ForcedScene,
+        parameters: Sequence[VariedInput],
+        ratios: Sequence[float] = (),
+        like: ModelSource | None = None,
+    ) -> None:
+        self.scene, self.parameters, self.ratios = scene, tuple(parameters), tuple(ratios)
+        paths = [path for one in parameters for path in one.paths]
+        self.stiffness = stiffness_of(scene, paths)
+        one_model(scene, self.stiffness, "a fit")
+        #: models made
+        self.made = 0
+        self._stages = Stages()
+        self._plans: dict[str, ForcedPlan] = {}
+        self._bodies: dict[str, Bodies] = {} if like is None else like._bodies
+        self._models: dict[str, Model] = {}
+        self._tangents: int | None = None
+        seated = bool(ratios) and is_seated(scene)
+        #: inputs that make new blades, or a new static state, with every evaluation
+        self.dear = [
+            p for p in paths if not p.startswith(_CHEAP) or (seated and p == "contact.friction")
+        ]
+        contact = scene.stiffness[self.stiffness].scene
+        self._contact = contact if any(p.startswith("geometry.") for p in paths) else None
+        #: of the differences of every parameter
+        self.steps = [
+            CONTACT_STEP
+            if self._contact and any(p.startswith("geometry.") for p in one.paths)
+            else STEP
+            for one in self.parameters
+        ]
+
+    @property
+    def cheap(self) -> bool:
+        """Whether every evaluation re-uses the same reduced blades."""
+        return not self.dear
+
+    @property
+    def cost(self) -> str:
+        """Which inputs make an evaluation slow; "" where none does."""
+        why = "every value makes new blades or a new static state"
+        return f"{', '.join(self.dear)}: {why}" if self.dear else ""
+
+    def at(self, z: Array) -> tuple[ForcedPlan, Model]:
+        """The model with moved inputs, and its plan.
+
+        Parameters
+        ----------
+        z
+            (n,) logarithms of the parameters' factors.
+
+        Raises
+        ------
+        InputError
+            Where the scene refuses the parameters.
+        """
+        return self._model(self.bare(fitted_scene(self.scene, self.parameters, z)))
+
+    def totals(self, z: Array) -> dict[Side, FaceStiffness]:
+        """Contact stiffness of both faces."""
+        scene = self.bare(fitted_scene(self.scene, self.parameters, z))
+        return face_laws(scene.stiffnesses[self.stiffness], self._stages)
+
+    def directions(self, z: Array) -> str:
+        """What contact.directions has to say in the scene with these parameters to give these
+        numbers; "" where its own word does.
+        """
+        scene = fitted_scene(self.scene, self.parameters, z)
+        if scene.contact.directions != "auto":
+            return ""
+        used = self.at(z)[1].contacts.tangents
+        kept, self._tangents = self._tangents, None
+        self._models.clear()
+        chosen = self.at(z)[1].contacts.tangents
+        self._tangents = kept
+        self._models.clear()
+        return "" if used == chosen else _DIRECTIONS[used]
+
+    def bare(self, scene: ForcedScene) -> ForcedScene:
+        """What is needed alone: one stiffness, the F_C/F_E that are followed, nothing estimated or
+        solved again; a contact scene with the rig's geometry.
+        """
+        one = one_model(scene, self.stiffness, "a fit")
+        contact, excitation, stiffness = one.contact, one.excitation, dict(one.stiffness)
+        if self._tangents is not None:
+            contact = replace(contact, directions=_DIRECTIONS[self._tangents])
+        if self.ratios:
+            excitation = replace(excitation, centrifugal_to_force=self.ratios, force=())
+        else:
+            contact = replace(contact, fit="unloaded")
+        if self._contact:
+            stiffness[self.stiffness] = replace(
+                stiffness[self.stiffness], scene=contact_scene(scene, self._contact)
+            )
+        return replace(one, contact=contact, excitation=excitation, stiffness=stiffness)
+
+    def _model(self, scene: ForcedScene) -> tuple[ForcedPlan, Model]:
+        self.made += 1
+        frame = self._frame(scene)
+        plan = _remembered(self._plans, frame, lambda: make_plan(scene))
+        plan = replace(plan, scene=scene)
+        bodies = _remembered(self._bodies, bodies_key(plan), lambda: make_bodies(plan))
+        laws = face_laws(scene.stiffnesses[self.stiffness], self._stages)
+        if frame in self._models:
+            return plan, _with_contact(self._models[frame], laws, scene.contact.friction)
+        # small matrices once the blades are reduced
+        with threads_for(1) if bodies.reduced else nullcontext():
+            model = make_model(plan, bodies, laws)
+        model = _remembered(self._models, frame, lambda: model)
+        if self._tangents is None and scene.contact.directions == "auto":
+            # once chosen they stay: numbers would jump
+            self._tangents = model.contacts.tangents if model.halved else None
+        return plan, model
+
+    def _frame(self, scene: ForcedScene) -> str:
+        contact = replace(scene.contact, directions="auto")
+        if not self.ratios or contact.static == _FRICTIONLESS:
+            # what the points carry at rest does not depend on it
+            contact = replace(contact, friction=self.scene.contact.friction)
+        return repr(replace(scene, stiffness={}, text="", contact=contact))
+
+
+def is_seated(scene: ForcedScene) -> bool:
+    """Whether friction changes the state at rest."""
+    return scene.contact.loaded and scene.contact.static == "seated"
+
+
+_DIRECTIONS: dict[int, Literal["one", "two"]] = {1: "one", 2: "two"}
+
+
+def contact_scene(scene: ForcedScene, name: str) -> str:
+    """A contact scene with the rig's geometry, as far as both recipes have it: the file it is
+    written to, one for each.
+
+    Parameters
+    ----------
+    scene
+        The rig, moved.
+    name
+        Of the contact scene.
+
+    Raises
+    ------
+    InputError
+        Where the contact refuses it.
+    """
+    given = load_scene(name)
+    shared = {f.name for f in fields(recipes.parameters(given.recipe))}
+    data = tomllib.loads(given.text)
+    own = tomllib.loads(scene.text)["geometry"]
+    more = {k: v for k, v in own.items() if k in shared and k in _OF_CONTACT}
+    data["geometry"] = {**data["geometry"], **more}
+    text = "".join(f"{toml_key(key)} = {toml_value(value)}\n" for key, value in data.items())
+    path = cache_folder() / f"contact-{key_of(data)[:32]}.toml"
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_text(path, text)
+    return str(path)
+
+
+#: parameters of a contact that a rig's recipe has under the same name
+_OF_CONTACT = ("patch_length", "patch_width", "patch_offset")
+
+
+def _with_contact(model: Model, laws: Mapping[Side, FaceStiffness], friction: float) -> Model:
+    """The model with other totals of its faces and another friction: those of its points grow
+    alike, and the directions in which friction resists stay.
+    """
+    old = model.contacts.law
+
+    def grown(values: Array, of: Literal["K_N", "K_T"]) -> Array:
+        by = [getattr(laws[side], of) / getattr(model.laws[side], of) for side in SIDES]
+        return np.asarray(values * np.array(by)[model.face])
+
+    law = replace(
+        old,
+        k_n=grown(old.k_n, "K_N"),
+        k_t=grown(old.k_t, "K_T"),
+        mu=np.full_like(old.mu, friction),
+    )
+    return replace(model, laws=laws, contacts=replace(model.contacts, law=law))
+
+
+def _remembered(kept: dict[str, T], key: str, make: Callable[[], T]) -> T:
+    """What was made for a key; of all keys the last few."""
+    if key not in kept:
+        while len(kept) >= _KEPT:
+            del kept[next(iter(kept))]
+        kept[key] = make()
+    return kept[key]
+
+
+# -- models as a fit moves its inputs --------------------------------------------------------------
+
+
 ComplexArray = NDArray[np.complex128]
 #: which peak: the blade and the number of its mode
 PeakKey = tuple[Side, int]
-#: mm to m
-_M = 1e-3
 #: difference of both one-sided slopes, over the larger, beyond which a number has none
 JUMPS = 0.5
 #: relative distance of a frequency asked for from a point of a path that is it
 _SAME = 1e-9
 
 
-class PeakTop(NamedTuple):
-    """A peak: Hz, and accelerance in (m/s2)/N."""
-
-    frequency: float
-    height: float
-
-
-def _told(peak: PeakTop | CurvePeak, what: str) -> float:
+def _told(peak: Top | CurvePeak, what: str) -> float:
     """Frequency or height of a peak."""
     return float(peak.frequency if what == "frequency" else peak.height)
 
@@ -80,8 +316,15 @@ class LimitNumbers:
 
     def __init__(self, plan: ForcedPlan, model: Model) -> None:
         self.plan, self.model = plan, model
-        self._modes: list[StuckMode] | None = None
         self._peaks: dict[tuple[str, Side], list[CurvePeak]] = {}
+
+    @cached_property
+    def _balance(self) -> Balance:
+        return limit_balance(self.plan, self.model)
+
+    @cached_property
+    def _modes(self) -> list[StuckMode]:
+        return measures.stuck_modes(self.model, CANDIDATES * self.plan.scene.excitation.stop)
 
     def __call__(self, of: str) -> float:
         """A number.
@@ -91,14 +334,21 @@ class LimitNumbers:
         ConvergenceError
             Where it is not among the numbers.
         """
+        e = self.plan.scene.excitation
         if of in STUCK_MODES:
-            return self._mode(of)
+            found = stuck_frequency(self._modes, of == "stuck_in_phase")
+            if math.isnan(found):
+                raise ConvergenceError(
+                    f"{of}: no such mode below {CANDIDATES * e.stop:g} Hz, {CANDIDATES:g} times "
+                    "excitation.stop"
+                )
+            return found
         kind, side, number, what = PEAK_NUMBERS[of]
         if (kind, side) not in self._peaks:
-            self._peaks[kind, side] = _peaks(self.plan, self.model, kind == "stuck", side)
+            given = self.plan, self.model, self._balance, grid(self.plan)
+            self._peaks[kind, side] = limit_peaks(*given, side, kind == "stuck")
         peak = next((p for p in self._peaks[kind, side] if p.number == number), None)
         if peak is None:
-            e = self.plan.scene.excitation
             raise ConvergenceError(
                 f"{of}: no such peak between {e.start:g} and {e.stop:g} Hz, the ends of the sweep"
             )
@@ -106,36 +356,14 @@ class LimitNumbers:
 
     def curve(self, side: Side, stuck: bool, frequency: Array) -> ComplexArray:
         """Accelerance (k,) of a blade, (m/s2)/N at (k,) Hz."""
-        force = self.plan.scene.damper.centrifugal
-        b = balance_of(self.plan, self.model, force, (0, *self.model.excitation.harmonics))
-        return measures.linear_accelerance(b, self.model.row(side), force, frequency, stuck)
-
-    def _mode(self, of: str) -> float:
-        below = CANDIDATES * self.plan.scene.excitation.stop
-        if self._modes is None:
-            self._modes = measures.stuck_modes(self.model, below)
-        for one in self._modes:
-            if one.in_phase == (of == "stuck_in_phase"):
-                return float(one.frequency)
-        raise ConvergenceError(
-            f"{of}: no such mode below {below:g} Hz, {CANDIDATES:g} times excitation.stop"
-        )
+        force, row = self.plan.scene.damper.centrifugal, self.model.row(side)
+        return measures.linear_accelerance(self._balance, row, force, frequency, stuck)
 
 
-def _peaks(plan: ForcedPlan, model: Model, stuck: bool, side: Side) -> list[CurvePeak]:
-    if not stuck and side not in model.excitation.free_blades:
-        return []
-    force = plan.scene.damper.centrifugal
-    problem = balance_of(plan, model, force, (0, *model.excitation.harmonics))
-    found = linear_peaks(problem, model.row(side), force, grid(plan), stuck)
-    stop = plan.scene.excitation.stop
-    return tell_stuck_peaks(model, found, stop) if stuck else unmoved(found)
-
-
-class CurveWithFriction:
+class CurveWithFriction(NamedTuple):
     """What a fit needs at one F_C/F_E.
 
-    Parameters
+    Attributes
     ----------
     ratio
         F_C/F_E.
@@ -145,14 +373,13 @@ class CurveWithFriction:
         (k,) Hz at which both blades' accelerance is, rising; empty without a curve.
     """
 
-    def __init__(self, ratio: float, peaks: Sequence[PeakKey], frequencies: Array) -> None:
-        self.ratio, self.peaks, self.frequencies = ratio, tuple(peaks), frequencies
-        #: times that the curve was solved
-        self.solved = 0
+    ratio: float
+    peaks: Sequence[PeakKey]
+    frequencies: Array
 
     def at(
         self, plan: ForcedPlan, model: Model
-    ) -> tuple[dict[PeakKey, PeakTop | ConvergenceError], dict[Side, ComplexArray]]:
+    ) -> tuple[dict[PeakKey, Top | ConvergenceError], dict[Side, ComplexArray]]:
         """Peaks, or why they were not found, and the curves of both blades.
 
         Raises
@@ -160,33 +387,27 @@ class CurveWithFriction:
         ConvergenceError
             Where a point of the curve is not found.
         """
-        force = plan.scene.damper.centrifugal / self.ratio
-        numbers = plan.scene.harmonic_numbers
-        assert isinstance(numbers, range)
-        b = place_sliders(balance_of(plan, model, force, numbers), plan.scene.excitation.start)
+        force, over = plan.scene.damper.centrifugal / self.ratio, self.frequencies
+        b = place_sliders(balance_of(plan, model, force), plan.scene.excitation.start)
         if b is None:
             raise ConvergenceError(
                 f"F_C/F_E {self.ratio:g}: the static loads alone have no solution; to fix it: "
                 'balance.slider = "zero"'
             )
-        answer = self._solve(plan, model, force)
-        tops: dict[PeakKey, PeakTop | ConvergenceError] = {}
+        if self.peaks:
+            # as fine as its peaks need
+            over = np.unique(np.concatenate([fine_grid(plan, model, force), over]))
+        answer = respond(plan, model, force, over)
+        tops: dict[PeakKey, Top | ConvergenceError] = {}
         for key in self.peaks:
             try:
                 tops[key] = self._top(plan, model, b, answer, key)
             except ConvergenceError as error:
                 tops[key] = error
-        return tops, self._curves(b, model, force, answer)
-
-    def _solve(self, plan: ForcedPlan, model: Model, force: float) -> FrequencyResponse:
-        """The curve over frequency, as fine as its peaks need."""
-        over = self.frequencies
-        if self.peaks:
-            over = np.unique(np.concatenate([fine_grid(plan, model, force), over]))
-        self.solved += 1
-        # what the balance leaves out is alike on every curve of a fit
-        with quiet() if self.solved > 1 else nullcontext():
-            return respond(plan, model, force, over)
+        if not len(self.frequencies):
+            return tops, {}
+        x = np.array([self._point(b, answer, float(f)) for f in self.frequencies])
+        return tops, measures.accelerance_at(model, b, x, self.frequencies, force)
 
     def _point(self, b: Balance, answer: FrequencyResponse, f: float) -> Array:
         here = np.flatnonzero(np.abs(answer.frequency / f - 1.0) <= _SAME)
@@ -199,40 +420,22 @@ class CurveWithFriction:
 
     def _top(
         self, plan: ForcedPlan, model: Model, b: Balance, answer: FrequencyResponse, key: PeakKey
-    ) -> PeakTop:
+    ) -> Top:
         """A peak between the points of the curve."""
         side, number = key
-        row, k = model.row(side), model.excitation.lowest
         name = f"{'left_' * (side == 'left')}peak_{number}@{self.ratio:g}"
         force = plan.scene.damper.centrifugal / self.ratio
-        height = np.abs(measures.accelerance(answer, row, force))
+        height = np.abs(measures.accelerance(answer, model.row(side), force))
         peaks = numbered_peaks(model, answer, height, plan.scene.excitation.stop)
         peak = next((one for one in peaks if one.number == number), None)
         if peak is None:
             raise ConvergenceError(f"{name}: no such peak on the curve ({answer.message})")
         f = float(answer.frequency[peak.sample])
         x = newton(b, answer.x[peak.sample], f)
-        top = None if x is None else climb(b, row, x, f, harmonic=k, power=2.0)
-        if top is None or not top.found:
+        top = None if x is None else top_from(model, b, x, f, side, force)
+        if top is None:
             raise ConvergenceError(f"{name}: the peak at {peak.frequency:.6g} Hz was not climbed")
-        scale = _M * (2.0 * np.pi * k * top.frequency) ** 2 / force
-        return PeakTop(top.frequency, float(scale * top.amplitude))
-
-    def _curves(
-        self, b: Balance, model: Model, force: float, answer: FrequencyResponse
-    ) -> dict[Side, ComplexArray]:
-        """Accelerance of both blades at the frequencies."""
-        f, k = self.frequencies, model.excitation.lowest
-        if not len(f):
-            return {side: np.zeros(0, complex) for side in SIDES}
-        x = np.array([self._point(b, answer, float(one)) for one in f])
-        forces = np.array([b.force(one) for one in x]).reshape(len(f), len(b.Psi), -1)
-        rigid = np.array([b.split(one)[1] for one in x])
-        q = b.displacement(2.0 * np.pi * f, forces, rigid)
-        moving = to_complex(q, b.harmonics)[..., b.harmonics.place(k)]
-        return {
-            side: measures.accelerance_of(moving @ model.row(side), f, k, force) for side in SIDES
-        }
+        return top
 
 
 class FitResponses:
@@ -274,6 +477,7 @@ class FitResponses:
         self.cheap = self.source.cheap
         self.stiffness = self.source.stiffness
         self._journal, self._needed = journal, needed
+        self._solved_once = False
         self._found: dict[bytes, tuple[Array, Array]] = {}
         for line in () if journal is None else journal.lines:
             z, value, slope = (np.array(one, float) for one in line)
@@ -334,7 +538,10 @@ class FitResponses:
     def _evaluate(self, z: Array, plan: ForcedPlan, model: Model) -> Array:
         parts: list[Array] = []
         with threads_for(len(model.M)):
-            friction = {one.ratio: one.at(plan, model) for one in self.friction}
+            # what the balance leaves out is alike on every curve of a fit
+            with quiet() if self._solved_once else nullcontext():
+                friction = {one.ratio: one.at(plan, model) for one in self.friction}
+            self._solved_once = True
             limits = LimitNumbers(plan, model)
             for one in self.targets.numbers:
                 try:
@@ -359,13 +566,11 @@ class FitResponses:
                 if of.force_ratio is None:
                     H = limits.curve(of.blade, of.state == "stuck", of.frequency)
                 else:
-                    at = np.searchsorted(self._frequencies(of.force_ratio), of.frequency)
+                    over = next(c.frequencies for c in self.friction if c.ratio == of.force_ratio)
+                    at = np.searchsorted(over, of.frequency)
                     H = friction[of.force_ratio][1][of.blade][at]
                 parts.append(_in_parts(curve, H))
         return np.concatenate(parts)
-
-    def _frequencies(self, ratio: float) -> Array:
-        return next(one.frequencies for one in self.friction if one.ratio == ratio)
 
 
 def _curve_at(ratio: float, targets: Targets) -> CurveWithFriction:

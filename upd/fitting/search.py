@@ -18,19 +18,21 @@ from upd.cache.arrays import Journal
 from upd.cache.sources import key_of, source_digest
 from upd.errors import ConvergenceError, InputError
 from upd.fitting.answer import Fit, FittedCurve, Status
-from upd.fitting.intervals import (
+from upd.fitting.residuals import (
     KEPT,
+    ROUNDING,
     Knowledge,
+    Residuals,
+    Start,
+    as_complex,
     is_bent,
     knowledge,
     misfit_rises,
     profile_ends,
     rank_measurements,
 )
-from upd.fitting.parameters import VariedInput, read_parameters
-from upd.fitting.residuals import ROUNDING, Residuals, Start, as_complex
 from upd.fitting.responses import FitResponses
-from upd.fitting.targets import CurveTarget, Targets, read_targets
+from upd.fitting.targets import CurveTarget, Targets, VariedInput, read_parameters, read_targets
 from upd.measured import MeasuredCurve
 from upd.progress import Listener, Stages, silent
 from upd.scene import AnyScene, ForcedScene
@@ -252,11 +254,7 @@ def _from(residuals: Residuals, begin: Array) -> Start:
     """One start: of curves their magnitudes first, as logarithms, then as they are."""
     if not residuals.parts:
         return residuals.solve(begin)
-    residuals.coarse = True
-    try:
-        near = residuals.solve(begin)
-    finally:
-        residuals.coarse = False
+    near = residuals.solve(begin, coarse=True)
     if near.failure:
         return near
     found = residuals.solve(residuals.inside(near.end))

@@ -33,7 +33,7 @@ from scipy.sparse import csr_array
 
 from upd import hbm
 from upd.errors import InputError
-from upd.fem.damping import modal_damping
+from upd.fem.assembly import modal_damping
 from upd.hbm.springs.modal import modal
 from upd.matrices.files import (
     COMPONENTS,

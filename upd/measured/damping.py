@@ -130,8 +130,8 @@ class DampingFit(Shown):
         Natural frequencies and their standard errors, Hz.
     zeta, zeta_error : (m,) ndarray
         Damping ratios and their standard errors.
-    constant, constant_error : (m,) ndarray
-        Modal constants A_r and their standard errors, (m/s2)/N.
+    constant : (m,) ndarray
+        Modal constants A_r, (m/s2)/N.
     residual : (3,) ndarray
         L, U, W, (m/s2)/N.
     reference : float
@@ -149,7 +149,6 @@ class DampingFit(Shown):
     zeta: FloatArray
     zeta_error: FloatArray
     constant: FloatArray
-    constant_error: FloatArray
     residual: FloatArray
     reference: float
     noise: NoiseLevel
@@ -388,7 +387,7 @@ def _reweighted(
     error = np.sqrt(variance * np.diag(inverse)) / length
     order = np.argsort(x[: sums.m])
     fr, zeta, A = (part[order] for part in np.split(x[: _OF_MODE * sums.m], _OF_MODE))
-    df, dz, dA = (part[order] for part in np.split(error[: _OF_MODE * sums.m], _OF_MODE))
+    df, dz, _ = (part[order] for part in np.split(error[: _OF_MODE * sums.m], _OF_MODE))
     top = float(np.abs(sums(x)[0]).max())
     noise = NoiseLevel(float(np.sqrt(variance * mix)) / top, float(np.sqrt(variance * (1.0 - mix))))
     if not (np.isfinite(error).all() and (zeta > 0.0).all()):
@@ -398,9 +397,7 @@ def _reweighted(
         )
     near = float((r[:, 1:] * r[:, :-1]).sum() / max(float((r**2).sum()), np.finfo(float).tiny))
     n = len(sums.f)
-    fit = DampingFit(
-        fr, df, zeta, dz, A, dA, x[_OF_MODE * sums.m :], sums.reference, noise, near, n
-    )
+    fit = DampingFit(fr, df, zeta, dz, A, x[_OF_MODE * sums.m :], sums.reference, noise, near, n)
     # r is weighted: sum ln v is of the weights
     least = max(float((r**2).mean()), float(np.finfo(float).tiny))
     return fit, float(n * np.log(least) + 2.0 * np.log(sigma).sum())

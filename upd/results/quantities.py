@@ -337,7 +337,6 @@ FITTED_FREQUENCY = Quantity(
     "fitted_frequency", "Hz", "natural frequency fitted to the measured curve"
 )
 FREQUENCY_ERROR = Quantity("fitted_frequency_error", "Hz", "its standard error", is_error=True)
-FITTED_SCALE = Quantity("fitted_scale", words="modal constant, measured over computed")
 FITTED_NOISE = Quantity("fitted_noise", "%", "noise of the measured curve, part of the value")
 NOISE_CONSTANT = Quantity(
     "fitted_noise_constant", "(m/s2)/N", "noise of the measured curve, constant"

@@ -4,18 +4,14 @@
 F_C whose worst peak is lowest from peaks of whole curves over F_C/F_E, of a rig or of any balance.
 """
 
-from upd.sizing.choice import ChosenDamper
-from upd.sizing.choice_answer import BestDamper
+from upd.sizing.choice import BestDamper
 from upd.sizing.search import design
-from upd.sizing.statics import DamperStatics, damper_statics
-from upd.sizing.statics_answer import DamperDesign
+from upd.sizing.statics import DamperDesign, damper_statics
 from upd.sizing.worst_peak import LowestWorst, WorstPeak, lowest_worst
 
 __all__ = [
     "BestDamper",
-    "ChosenDamper",
     "DamperDesign",
-    "DamperStatics",
     "LowestWorst",
     "WorstPeak",
     "damper_statics",

@@ -32,7 +32,7 @@ from upd.scene import AnyScene, ForcedScene
 from upd.scene.ranges import stiffness_of, with_values
 from upd.scene.read import as_scene
 from upd.sizing.choice import (
-    ChosenDamper,
+    BestDamper,
     Objective,
     Tried,
     best_of,
@@ -41,11 +41,8 @@ from upd.sizing.choice import (
     nominal_of,
     reaches_of,
 )
-from upd.sizing.choice_answer import BestDamper
-from upd.sizing.ranges import InputRange, Ranges, read_ranges
-from upd.sizing.rig_peaks import RigPeaks, bare
-from upd.sizing.statics import damper_statics
-from upd.sizing.statics_answer import DamperDesign
+from upd.sizing.ranges import InputRange, Ranges, RigPeaks, bare, read_ranges
+from upd.sizing.statics import DamperDesign, damper_statics
 from upd.sizing.worst_peak import WorstPeak, lowest_worst
 
 log = logging.getLogger(__name__)
@@ -129,15 +126,15 @@ def design(
     if minimise is None:
         if over or for_:
             raise InputError('over and for_ belong to a choice: add minimise = "peak"')
-        found: DamperDesign | BestDamper = DamperDesign(loaded, damper_statics(loaded))
+        found: DamperDesign | BestDamper = damper_statics(loaded)
     else:
         ranges = read_ranges(loaded, over, for_)
-        found = BestDamper(loaded, choose_damper(ranges, minimise, progress))
+        found = choose_damper(ranges, minimise, progress)
     return found if out is None else found.write(out)
 
 
 @quiet()
-def choose_damper(ranges: Ranges, objective: Objective, progress: Listener) -> ChosenDamper:
+def choose_damper(ranges: Ranges, objective: Objective, progress: Listener) -> BestDamper:
     """The damper whose worst peak over the ranges is lowest.
 
     Parameters
@@ -176,7 +173,8 @@ def choose_damper(ranges: Ranges, objective: Objective, progress: Listener) -> C
             there = plain.worst.solved(plain.nominal.log_centrifugal)
         if curves_of(search.tried) == solved:
             break
-    return ChosenDamper(
+    return BestDamper(
+        ranges.scene,
         ranges,
         objective,
         search.stiffness,

@@ -12,13 +12,16 @@ from upd.results.answer_table import AnswerTable
 from upd.vary.curves import (
     ConvergenceCurve,
     accuracy_curves,
+    convergence_tables,
+    enough,
     finest_curves,
+    level_table,
     make_curves,
+    points_table,
     true_errors,
     with_friction,
 )
 from upd.vary.outcome import SolvedPoint, matching
-from upd.vary.tables import convergence_tables, enough, level_table, points_table
 from upd.vary.variation import Key, Overrides, Variation
 
 #: divisions, refinements, numbers of modes ...: the levels a user asks for; None: the usual ones

@@ -12,10 +12,11 @@ import pytest
 
 from upd.analyses import forced, make_plan, modal
 from upd.analyses.base import Resolved
+from upd.analyses.forced.curves import both_ways
 from upd.analyses.forced.interface_model import make_springs
 from upd.analyses.forced.measures import accelerance, residual_error
 from upd.analyses.forced.performance import Performance, RatioPoint, of_curve
-from upd.analyses.forced.solution import ForcedSolution, both_ways, marched_peak
+from upd.analyses.forced.solve import ForcedSolution, marched_peak
 from upd.analyses.forced.statics import StaticState
 from upd.analyses.modal.solve import ModalSolution, modal_error
 from upd.progress import Stages, silent

@@ -12,7 +12,7 @@ from rigs import LINES
 
 import upd
 from upd.analyses import analysis_of
-from upd.analyses.forced.solution import ForcedSolution
+from upd.analyses.forced.solve import ForcedSolution
 from upd.progress import Stages
 from upd.results import Case, InputPart, Result
 from upd.scene import load_scene

@@ -8,7 +8,7 @@ import pytest
 from rigs import LINES
 
 import upd
-from upd.analyses.forced.solution import TOLERANCE
+from upd.analyses.forced.curves import TOLERANCE
 from upd.errors import InputError
 from upd.report.notebook import RunResult, charts
 from upd.scene import load_scene

@@ -21,10 +21,16 @@ from upd.cli.tables import print_table
 from upd.errors import InputError, did_you_mean
 from upd.plot.work_precision import work_precision_charts
 from upd.results import Case, Result
-from upd.vary.curves import ESTIMATED, TRUE, accuracy_curves, finest_curves, make_curves
+from upd.vary.curves import (
+    ESTIMATED,
+    TRUE,
+    accuracy_curves,
+    finest_curves,
+    make_curves,
+    markdown_table,
+)
 from upd.vary.ladder import limit_report
 from upd.vary.outcome import Outcome, SolvedPoint, read_outcome
-from upd.vary.tables import markdown_table
 from upd.vary.variation import Variation
 
 pytestmark = pytest.mark.estimated

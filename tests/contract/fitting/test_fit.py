@@ -247,7 +247,7 @@ def test_all_that_is_wrong_is_told_at_once(scene: ForcedScene) -> None:
 def test_what_only_moves_springs_reuses_the_reduced_blades(
     scene: ForcedScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from upd.fitting import models as home
+    from upd.fitting import responses as home
 
     made = []
     real = home.make_bodies

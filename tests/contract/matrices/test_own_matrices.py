@@ -15,7 +15,7 @@ from scipy.linalg import eigh
 
 from upd import hbm
 from upd.errors import InputError
-from upd.fem.damping import modal_damping
+from upd.fem.assembly import modal_damping
 from upd.matrices import Matrices, write_dof_map, write_matrices, write_matrix
 from upd.own_matrices import Joint, forced_response
 

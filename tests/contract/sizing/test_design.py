@@ -28,7 +28,6 @@ from upd.sizing.statics import (
     scene_damper,
     tilts_from,
 )
-from upd.sizing.statics_answer import statics_charts
 
 F_C, TAN_30 = 350.0, math.tan(math.pi / 6.0)
 
@@ -152,7 +151,7 @@ def test_a_damper_that_tilts_without_friction() -> None:
 @pytest.mark.parametrize("name", ["symmetric-response", "asymmetric-seated"])
 def test_charts_mark_the_damper(name: str, mu: float) -> None:
     found = damper_statics(load_scene(name, {"contact.friction": mu}))
-    charts = statics_charts(found)
+    charts = found.charts
     maps = [chart for chart in charts if chart.maps]
     assert {state for chart in maps for state in chart.maps[0].states} == set(OUTCOMES)
     marked = [t for chart in maps for t in chart.traces if t.style == "star"]
@@ -213,7 +212,7 @@ def test_folder_that_cannot_be_written(tmp_path: Path) -> None:
 
 def test_friction_known_within_limits() -> None:
     found = upd.design("asymmetric-response", overrides=["contact.friction=0.6 +- 0.1"])
-    assert [mu for mu, _ in found.statics.known_within] == pytest.approx([0.5, 0.7])
+    assert [mu for mu, _ in found.known_within] == pytest.approx([0.5, 0.7])
     told = (
         "at 0.5 both faces carry in every motion; at 0.7 the damper jams, the left face lifts off"
     )
@@ -231,7 +230,7 @@ def test_in_a_notebook() -> None:
     found = upd.design("symmetric-response", overrides=turning)
     assert found.folder is None
     omega = 4000.0 * 2.0 * math.pi / 60.0
-    assert found.statics.centrifugal == pytest.approx(7.8e-9 * 9180.0 * 300.0 * omega**2)
+    assert found.centrifugal == pytest.approx(7.8e-9 * 9180.0 * 300.0 * omega**2)
     assert "F_C 3769.1 N = m r w^2: damper 71.604 g, 300 mm, 4000 rpm" in found.table()
     page = found._repr_html_()
     assert "tilts" in page

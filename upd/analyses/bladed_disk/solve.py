@@ -22,7 +22,7 @@ from upd.analyses.bladed_disk.response import (
 )
 from upd.errors import InputError, MeshError
 from upd.fem import Material, mass, stiffness
-from upd.fem.rotation import (
+from upd.fem.inertia import (
     centrifugal_load,
     coriolis,
     displaced_stiffness,

@@ -16,6 +16,7 @@ from upd.analyses.contact.varied import PROBLEM, edge_of, governing, level_geome
 from upd.linalg import select
 from upd.mesh import recipes
 from upd.scene import Scene
+from upd.vary.curves import points_table
 from upd.vary.ladder import (
     Asked,
     Ladder,
@@ -29,7 +30,6 @@ from upd.vary.ladder import (
     whole_levels,
 )
 from upd.vary.outcome import SolvedPoint, matching, without_failed
-from upd.vary.tables import points_table
 from upd.vary.variation import Key, Overrides, Variation, of_geometry
 from upd.vary.wanted import plan_wanted
 

@@ -20,7 +20,7 @@ from upd.analyses.forced import (
     ladders,
     results,
 )
-from upd.analyses.forced.solution import ForcedSolution
+from upd.analyses.forced.solve import ForcedSolution
 from upd.linalg.parallel import threads_for
 from upd.vary.inputs import coarsened_rig
 

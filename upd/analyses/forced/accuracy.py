@@ -38,8 +38,7 @@ from upd.analyses.forced.again import (
 )
 from upd.analyses.forced.plan import make_plan
 from upd.analyses.forced.results import make_results
-from upd.analyses.forced.solution import ForcedSolution
-from upd.analyses.forced.solve import solve
+from upd.analyses.forced.solve import ForcedSolution, solve
 from upd.results import Case, ErrorPart, Estimates, Result
 from upd.results import quantities as q
 from upd.results.quantities import Quantity, quantity_of

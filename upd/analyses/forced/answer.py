@@ -292,7 +292,10 @@ def _inputs(results: Sequence[Entry]) -> AnswerTable | None:
             ratios.append(float(_fields(e)["force_ratio"]))
     if not changes:
         return None
-    ranked = sorted(changes.items(), key=lambda pair: -_weight(pair[1]))
+    ranked = sorted(
+        changes.items(),
+        key=lambda pair: -max(abs(value) / _WEIGHTS[of] for _, of, value in pair[1]),
+    )
     rows: list[tuple[str, ...]] = [
         (
             name,
@@ -309,10 +312,6 @@ def _inputs(results: Sequence[Entry]) -> AnswerTable | None:
         note += f" Less than these: {others}."
     heads = ("input", "changed to", "#frequency", "#height")
     return AnswerTable("What the answer depends on most", heads, tuple(rows), note)
-
-
-def _weight(found: Sequence[_Change]) -> float:
-    return max(abs(value) / _WEIGHTS[quantity] for _, quantity, value in found)
 
 
 def _span(found: Sequence[_Change], quantity: Quantity, digits: int) -> str:

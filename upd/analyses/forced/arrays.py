@@ -18,7 +18,7 @@ from upd.analyses.forced.model import Array
 from upd.analyses.forced.performance import mode_arrays, performance_arrays
 from upd.analyses.forced.plan import excitation_of
 from upd.analyses.forced.results import measured_peaks
-from upd.analyses.forced.solution import (
+from upd.analyses.forced.solve import (
     ContactPlaces,
     ForcedSolution,
     MarchedPeak,

@@ -36,7 +36,10 @@ References
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -45,12 +48,17 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from upd.analyses.forced.plan import ForcedPlan, excitation_of
 from upd.analyses.seated.bodies import Blade, Bodies, is_half, lattice, patch_frame
 from upd.errors import InputError
 from upd.fem.surface import face_moments
+from upd.linalg.parallel import in_parallel
 from upd.mesh import FloatArray, IntArray, Mesh
 from upd.reduction import attachment_modes, craig_bampton
-from upd.scene.forced_contact import Side
+from upd.scene import ForcedScene
+from upd.scene.forced_contact import GAUSS, SIDES, Side
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -323,15 +331,12 @@ class MirrorPairs:
     point: IntArray
     image: IntArray
 
-    def even(self, rows: FloatArray) -> FloatArray:
+    def part(self, rows: FloatArray, sign: float = 1.0) -> FloatArray:
         """Rows (n, 3, r) of all points -> (m, 3, r) even part of the displacement of the points
-        kept.
+        kept; the odd one with sign -1.
         """
-        return np.asarray(0.5 * (rows[self.point] + MIRROR_SIGNS[:, None] * rows[self.image]))
-
-    def odd(self, rows: FloatArray) -> FloatArray:
-        """The odd part."""
-        return np.asarray(0.5 * (rows[self.point] - MIRROR_SIGNS[:, None] * rows[self.image]))
+        image = sign * MIRROR_SIGNS[:, None] * rows[self.image]
+        return np.asarray(0.5 * (rows[self.point] + image))
 
     def total(self, values: FloatArray) -> FloatArray:
         """Values (n,) of all points -> (m,) of each pair together, a point on the plane by
@@ -392,7 +397,7 @@ def even_modes(rows: FloatArray, pairs: MirrorPairs, shapes: FloatArray) -> Floa
     """
     even, odd = (
         np.linalg.norm(part.reshape(-1, part.shape[-1]) @ shapes, axis=0)
-        for part in (pairs.even(rows), pairs.odd(rows))
+        for part in (pairs.part(rows), pairs.part(rows, -1.0))
     )
     share = odd / np.maximum(np.hypot(even, odd), np.finfo(float).tiny)
     if ((share > PARITY) & (share < np.sqrt(1.0 - PARITY**2))).any():
@@ -427,29 +432,65 @@ class BladePart:
     n_modes: int
 
 
-def nodal_part(
-    bodies: Bodies,
-    side: Side,
-    face: FacePoints,
-    names: tuple[str, ...],
-    count: int,
-    solver: str,
+def reduced_blades(
+    plan: ForcedPlan, bodies: Bodies
+) -> tuple[Mapping[Side, FacePoints], list[BladePart], Mapping[Side, MirrorPairs] | None]:
+    """Points of whole faces, each blade on what its points and probes see; pairs of the points
+    where only motion even about y = 0 is kept.
+    """
+    faces = {side: _face(plan.scene, bodies, side) for side in SIDES}
+    parts = in_parallel(
+        [partial(_reduced, plan.scene, bodies, side, faces[side]) for side in SIDES], plan.workers
+    )
+    pairs: dict[Side, MirrorPairs] = {}
+    for side in SIDES if plan.symmetry == "half" and not bodies.half else ():
+        found = mirror_pairs(faces[side])
+        if found is not None:
+            pairs[side] = found
+    if len(pairs) == len(SIDES):
+        of = list(zip(parts, (pairs[side] for side in SIDES), strict=True))
+        even = [even_modes(part.rows, mine, _lowest(part)) for part, mine in of]
+        if all(modes is not None for modes in even):
+            small = [
+                ritz(part, modes, mine.part(part.rows))
+                for (part, mine), modes in zip(of, even, strict=True)
+                if modes is not None
+            ]
+            return faces, small, pairs
+        log.info("modes of mixed parity, both halves are kept")
+    whole = [
+        part if faces[side].at_nodes else ritz(part, _lowest(part), part.rows)
+        for side, part in zip(SIDES, parts, strict=True)
+    ]
+    return faces, whole, None
+
+
+def _face(scene: ForcedScene, bodies: Bodies, side: Side) -> FacePoints:
+    mesh, (rows, columns) = bodies.blades[side].mesh, scene.contact.lines(side)
+    if scene.contact.rule == GAUSS:
+        return gauss_points(mesh, rows, columns, side)
+    return lattice_points(mesh, rows, columns, side, scene.contact.share == "equal")
+
+
+def _reduced(scene: ForcedScene, bodies: Bodies, side: Side, face: FacePoints) -> BladePart:
+    """One blade on what its points and probes see: its accelerometer, and where it is excited the
+    node of its force.
+    """
+    excited = side in excitation_of(scene.excitation).blades
+    names = ("accelerometer", "force") if excited else ("accelerometer",)
+    if scene.contact.rule == GAUSS:
+        return _attached(scene, bodies, side, names)
+    return _nodal(scene, bodies, side, face, names)
+
+
+def _nodal(
+    scene: ForcedScene, bodies: Bodies, side: Side, face: FacePoints, names: tuple[str, ...]
 ) -> BladePart:
     """By Craig-Bampton on the nodes of the points and the probes' x.
 
     Kept in the bodies, as several stiffnesses share their points.
-
-    Parameters
-    ----------
-    face
-        Its points.
-    names
-        Of the probes.
-    count
-        Modes kept.
-    solver
-        As in the scene.
     """
+    count = scene.reduction.modes
     blade = bodies.blades[side]
     probes = [blade.probe(name) for name in names]
     boundary = np.unique(np.concatenate([blade.dofs(face.nodes), probes]))
@@ -461,7 +502,7 @@ def nodal_part(
             boundary,
             n_modes=count,
             rows=boundary,
-            solver=solver,
+            solver=scene.solver.name,
         )
     model = bodies.reduced[key].truncated(count)
     nodal = model.at(blade.dofs(face.nodes)).reshape(len(face.nodes), 3, -1)
@@ -471,39 +512,26 @@ def nodal_part(
     return BladePart(model.K, model.M, rows, seen, max(model.n_modes, 1) + _BESIDE)
 
 
-def attached_part(
-    bodies: Bodies,
-    side: Side,
-    lines: tuple[int, int],
-    names: tuple[str, ...],
-    count: int,
-    again: bool,
-    solver: str,
-) -> BladePart:
+def _attached(scene: ForcedScene, bodies: Bodies, side: Side, names: tuple[str, ...]) -> BladePart:
     """By its lowest modes and the static shapes of its points' and probes' forces.
 
     A half blade has half of the energy, and its points stand for themselves and their mirror
     images: K and M of the whole are twice its own. Fewer points are means of those that a body was
-    reduced to before: where models with more points follow, to twice the rows at once.
-
-    Parameters
-    ----------
-    lines
-        Gauss points up the slope and along the damper. Others as of `nodal_part`.
-    again
-        Whether models with more points follow.
+    reduced to before: where models with more points follow, for error estimates, to twice the rows
+    at once.
     """
-    blade, most = bodies.blades[side], max(count, 1) + _BESIDE
-    rows, columns = lines
+    blade, most = bodies.blades[side], max(scene.reduction.modes, 1) + _BESIDE
+    rows, columns = scene.contact.lines(side)
     known_keys = (key for key, one in bodies.attached.items() if len(one.frequency) >= most)
     key = next(
         (k for k in known_keys if k[0] == side and k[1] >= rows and k[2] == columns),
-        (side, 2 * rows if again else rows, columns),
+        (side, 2 * rows if scene.estimates else rows, columns),
     )
-    many = gauss_points(blade.mesh, *key[1:], side)
+    _, fine, columns = key
+    many = gauss_points(blade.mesh, fine, columns, side)
     if key not in bodies.attached or len(bodies.attached[key].frequency) < most:
         loads = _loads(blade, many, names)
-        found = attachment_modes(blade.K, blade.M, loads, most, solver=solver)
+        found = attachment_modes(blade.K, blade.M, loads, most, solver=scene.solver.name)
         bodies.attached[key] = found
     known = bodies.attached[key]
     twice = 2.0 if bodies.half else 1.0
@@ -525,24 +553,21 @@ def _loads(blade: Blade, face: FacePoints, names: tuple[str, ...]) -> FloatArray
     return out
 
 
-def ritz(
-    model: BladePart, pairs: MirrorPairs | None = None
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
-    """K, M, contact rows and probe rows on what points and probes see: their static shapes
-    (attachment modes) and the lowest modes.
+def _lowest(blade: BladePart) -> FloatArray:
+    """(r, k) its lowest modes, those to keep."""
+    few = min(len(blade.K), blade.n_modes)
+    return np.asarray(eigh(blade.K, blade.M, subset_by_index=[0, few - 1])[1])
+
+
+def ritz(model: BladePart, modes: FloatArray, rows: FloatArray) -> BladePart:
+    """The blade on what points (rows) and probes see: their static shapes (attachment modes) and
+    the lowest modes.
 
     Points between nodes hang on nearly all nodes of the patch; the shapes K^-1 B' keep their static
-    compliance exactly. With mirror pairs, only what is even about y = 0 is kept; None when a mode
-    is neither even nor odd. Source: R. R. Craig, A. J. Kurdila, Fundamentals of Structural
-    Dynamics, ch. 17.
+    compliance exactly. Source: R. R. Craig, A. J. Kurdila, Fundamentals of Structural Dynamics,
+    ch. 17.
     """
-    rows, probes = model.rows, model.probes
-    _, modes = eigh(model.K, model.M, subset_by_index=[0, min(len(model.K), model.n_modes) - 1])
-    if pairs is not None:
-        even = even_modes(rows, pairs, modes)
-        if even is None:
-            return None
-        modes, rows = even, pairs.even(rows)
+    probes = model.probes
     B = np.vstack([rows.reshape(-1, len(model.K)), probes])
     B = B[np.linalg.norm(B, axis=1) > np.finfo(float).eps ** 0.5 * np.linalg.norm(B, axis=1).max()]
     static = np.linalg.solve(model.K, B.T)
@@ -554,8 +579,8 @@ def ritz(
     keep = values > len(values) * np.finfo(float).eps ** 0.75 * values[-1]
     rest = static @ (V[:, keep] / np.sqrt(values[keep]))
     T = np.hstack([modes, rest - modes @ (modes.T @ model.M @ rest)])
-    K = T.T @ model.K @ T
-    return symmetric(K), symmetric(T.T @ model.M @ T), rows @ T, probes @ T
+    K, M = (symmetric(T.T @ A @ T) for A in (model.K, model.M))
+    return BladePart(K, M, rows @ T, probes @ T, model.n_modes)
 
 
 def symmetric(A: FloatArray) -> FloatArray:

@@ -228,14 +228,8 @@ _STAR = 5
 _MOST = 3
 
 
-def performance_charts(arrays: Arrays) -> list[Chart]:
-    """Peaks of both blades over F_C/F_E, one chart for every stiffness."""
-    return [
-        _chart(group) for group in with_content(arrays, PERFORMANCE) if group["ratio"].data.size
-    ]
-
-
-def _chart(group: Group) -> Chart:
+def _performance(group: Group) -> Chart:
+    """Peaks of both blades over F_C/F_E."""
     ratio = group["ratio"].data
     traces = [Trace("highest of all", ratio, group["highest_accelerance"].data, "line", 0)]
     names = [key for key in group if key.startswith("peak_") and key.endswith("_right")]
@@ -302,7 +296,11 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     rubbed = [c for c in curves if "loop_peak" in c.group]
     return [
         *_responses(arrays, curves, {r: k for k, r in enumerate(ratios)}),
-        *performance_charts(arrays),
+        *(
+            _performance(group)
+            for group in with_content(arrays, PERFORMANCE)
+            if group["ratio"].data.size
+        ),
         *mode_charts(arrays),
         *damping_charts(arrays),
         *(shares_chart(c, k) for c in moving if "share" in c.group for k in range(len(SIDES))),

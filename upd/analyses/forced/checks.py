@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import FacesCurve, ForcedCurve, PointCurve, SweptCurve, WholeFaces
-from upd.analyses.forced.model import Model
+from upd.analyses.forced.curves import TOLERANCE, FacesCurve, ForcedCurve, PointCurve, SweptCurve
+from upd.analyses.forced.interface_model import WholeFaces
 from upd.analyses.forced.performance import Performance
 from upd.analyses.forced.plan import CONFIRMED, excitation_of
-from upd.analyses.forced.solution import TOLERANCE, ForcedSolution
+from upd.analyses.forced.solve import ForcedSolution
 from upd.analyses.forced.statics import BALANCE, StaticState
 from upd.analyses.measured import fit_checks
 from upd.hbm.faces.balance import InterfaceResponse
@@ -201,17 +201,21 @@ def _preloaded(case: Case, state: StaticState, mu: float, least: float) -> Check
 
 
 def _curve_checks(solution: ForcedSolution, curve: ForcedCurve[Any]) -> Iterator[Check]:
-    e = solution.plan.scene.excitation
-    if isinstance(curve.answer, SteppedSine):
+    e, answer, case = solution.plan.scene.excitation, curve.answer, curve.case
+    if isinstance(answer, SteppedSine):
         yield from _sweep_checks(curve)
         return
     yield _path(curve)
     if curve.empty:
         return
-    if isinstance(curve.answer, InterfaceResponse):
+    if isinstance(answer, InterfaceResponse):
         yield from check_faces_curve(curve, e.points, excitation_of(e).lowest)
-    else:
-        yield from _point_checks(curve, solution.models[curve.stiffness])
+        return
+    rest = measures.rest_error(answer, solution.models[curve.stiffness])
+    yield _check("balance residual, points", case, measures.residual_error(answer))
+    yield _check("energy balance, points", case, float(np.abs(answer.energy_balance).max()))
+    yield _check("damper at rest", case, rest)
+    yield from _integrated(curve)
 
 
 def _path(curve: ForcedCurve[Any]) -> Check:
@@ -219,14 +223,6 @@ def _path(curve: ForcedCurve[Any]) -> Check:
         return _check("path complete, stopped", curve.case, 1.0, message=curve.answer.message)
     astray = int((~curve.answer.periodic).sum()) if hasattr(curve.answer, "periodic") else 0
     return _check("path complete, periodic", curve.case, float(astray), count=astray)
-
-
-def _point_checks(curve: PointCurve, model: Model) -> Iterator[Check]:
-    answer, case = curve.answer, curve.case
-    yield _check("balance residual, points", case, measures.residual_error(answer))
-    yield _check("energy balance, points", case, float(np.abs(answer.energy_balance).max()))
-    yield _check("damper at rest", case, measures.rest_error(answer, model))
-    yield from _integrated(curve)
 
 
 def _integrated(curve: PointCurve) -> Iterator[Check]:

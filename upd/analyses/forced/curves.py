@@ -2,13 +2,21 @@
 
 Peaks of the limits, free and with every point stuck, of contact points and of whole faces, are
 sought around their own modes: they do not depend on the frequencies asked for.
+
+A sweep is a stepped sine up and down, as in an experiment: where friction and lift-off leave
+several steady motions, a curve by harmonic balance follows one path through all of them. A sweep
+shows what a rig would: rising, the motion that the past below leads to; falling, that from above.
+
+Whole faces by harmonic balance have blades in frequency, damper and contact in time, see
+`upd.hbm.faces.balance`: every node with its past, as a sweep from the static state at rising
+frequency.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Generic, Literal, NamedTuple, TypeVar
 
@@ -18,27 +26,40 @@ from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 
 from upd.analyses.forced import measures
+from upd.analyses.forced.interface_model import (
+    WholeFaces,
+    by_coulomb,
+)
 from upd.analyses.forced.measures import (
     CANDIDATES,
+    PEAKS_ABOVE,
     Array,
     ComplexArray,
     CurvePeak,
     ModeShapes,
     StuckMode,
+    accelerance_of,
     chosen_peaks,
     numbered,
+    path_maxima,
     tell_stuck_peaks,
     unmoved,
 )
 from upd.analyses.forced.model import Model, balance_of
-from upd.analyses.forced.plan import Excitation, ForcedPlan, excitation_of, grid
-from upd.analyses.forced.statics import StaticState
-from upd.analyses.seated.interface import Interface
+from upd.analyses.forced.plan import (
+    SAMPLES,
+    Excitation,
+    ForcedPlan,
+    excitation_of,
+    grid,
+    time_steps,
+)
 from upd.hbm import FrequencyResponse
-from upd.hbm.faces.balance import InterfaceResponse
+from upd.hbm.faces.balance import InterfaceResponse, interface_response
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
-from upd.hbm.faces.sweep import SteppedSine
+from upd.hbm.faces.sweep import SteppedSine, stepped_sine
 from upd.hbm.springs.balance import Balance
+from upd.linalg.parallel import threads_for
 from upd.results import Case
 from upd.scene.forced_contact import SIDES, Side
 
@@ -276,29 +297,6 @@ def rising(frequency: Array) -> NDArray[np.bool_]:
     return np.concatenate([steps[:1], steps[1:] & steps[:-1], steps[-1:]])
 
 
-@dataclass(frozen=True)
-class WholeFaces:
-    """Both faces node by node.
-
-    Attributes
-    ----------
-    of
-        The contact: places, areas, frames of its nodes.
-    march
-        Its outputs are the tips of the left and the right blade along x, then the coordinates of
-        the blades' lowest modes.
-    start
-        At rest under F_C.
-    state
-        Forces of both faces there.
-    """
-
-    of: Interface
-    march: InterfaceModel
-    start: InterfaceState
-    state: StaticState
-
-
 # -- linear limits ---------------------------------------------------------------------------------
 
 
@@ -363,21 +361,21 @@ def finer(frequency: Array, modes: Array, width: Array) -> Array:
     return np.union1d(frequency, around_modes(modes[coarse], width[coarse], *ends))
 
 
-def exact_peaks(height: Callable[[Array], Array], f: Array, grid: Array) -> list[CurvePeak]:
+def exact_peaks(response: Callable[[Array], ComplexArray], f: Array, grid: Array) -> Peaks:
     """The peaks of a curve, each by a local search between its neighbours.
 
     Parameters
     ----------
-    height
-        Of the curve at any frequencies (n,) in Hz.
+    response
+        The curve at any frequencies (n,) in Hz.
     f
         (n,) Hz, rising, fine enough to hold every peak.
     grid
         (m,) Hz on which the curve is kept: the point next to a peak is one of these.
     """
-    a = height(f)
+    a = np.abs(response(f))
     found = [
-        _top(height, f[i - 1], f[i + 1])
+        _top(response, f[i - 1], f[i + 1])
         for i in np.flatnonzero((a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])) + 1
     ]
     highest = max([float(a.max(initial=0.0)), *(top for _, top in found)])
@@ -389,10 +387,10 @@ def exact_peaks(height: Callable[[Array], Array], f: Array, grid: Array) -> list
     return chosen_peaks(peaks)
 
 
-def _top(height: Callable[[Array], Array], low: float, high: float) -> tuple[float, float]:
+def _top(response: Callable[[Array], ComplexArray], low: float, high: float) -> tuple[float, float]:
     # flat at the top: to half of the digits of f, of the height lacks (eps^1/2 f / width)^2
     found = minimize_scalar(
-        lambda f: -float(height(np.array([f]))[0]),
+        lambda f: -float(abs(response(np.array([f]))[0])),
         bounds=(low, high),
         method="bounded",
         options={"xatol": float(np.sqrt(np.finfo(float).eps)) * high},
@@ -400,7 +398,7 @@ def _top(height: Callable[[Array], Array], low: float, high: float) -> tuple[flo
     return float(found.x), -float(found.fun)
 
 
-def linear_peaks(b: Balance, row: Array, force: float, grid: Array, stuck: bool) -> list[CurvePeak]:
+def linear_peaks(b: Balance, row: Array, force: float, grid: Array, stuck: bool) -> Peaks:
     """Peaks of the accelerance without contacts or with all points stuck.
 
     Parameters
@@ -423,11 +421,9 @@ def linear_peaks(b: Balance, row: Array, force: float, grid: Array, stuck: bool)
     k = measures.read_harmonic(b)
     modes, width = linear_modes(b, stuck)
 
-    def height(f: NDArray[np.float64]) -> Array:
-        return np.abs(measures.linear_accelerance(b, row, force, f, stuck))
-
+    response = partial(measures.linear_accelerance, b, row, force, stuck=stuck)
     f = around_modes(modes / k, width / k, float(grid[0]), float(grid[-1]))
-    return exact_peaks(height, f, grid)
+    return exact_peaks(response, f, grid)
 
 
 def stuck_system(march: InterfaceModel) -> tuple[Array, Array, Array]:
@@ -474,77 +470,83 @@ def stuck_modes_of(march: InterfaceModel, below: float) -> ModeShapes:
     return measures.modes_of_tips(np.eye(len(rows)), frequency, rows @ shapes, tips, below)
 
 
-def linear_curves(
-    march: InterfaceModel, frequency: Array, excitation: Excitation, *, stuck: bool
-) -> tuple[Mapping[Side, ComplexArray], Mapping[Side, list[CurvePeak]]]:
-    """Accelerance of both blades per newton of F_E, (m/s2)/N, and its peaks, free or stuck.
-
-    Parameters
-    ----------
-    frequency
-        (n,) Hz, rising: the sweep.
-    excitation
-        What of the blades is excited.
-    stuck
-        Every node closed and sticking; else none touches.
+def faces_accelerance(
+    march: InterfaceModel, excitation: Excitation, side: Side, f: Array, *, stuck: bool
+) -> ComplexArray:
+    """(n,) (m/s2)/N of a blade at (n,) Hz per newton of F_E, with every node closed and sticking,
+    or none touching.
     """
-    k, H, peaks = excitation.lowest, _at_rest(frequency), dict[Side, list[CurvePeak]]()
-    at = stuck_system(march)[0] if stuck else np.sort(march.frequency)
-    width = 2.0 * float(march.damping.max()) * at
-    fine = around_modes(at / k, width / k, float(frequency[0]), float(frequency[-1]))
+    k = excitation.lowest
+    moved = march.linear_response(k * f, excitation.read, stuck=stuck)[:, SIDES.index(side)]
+    return measures.accelerance_of(moved, f, k, 1.0)
 
-    def read(side: Side, f: Array) -> ComplexArray:
-        moved = march.linear_response(k * f, excitation.read, stuck=stuck)[:, SIDES.index(side)]
-        return measures.accelerance_of(moved, f, k, 1.0)
 
-    for side in SIDES if stuck else excitation.free_blades:
-        H[side] = read(side, frequency)
-        peaks[side] = exact_peaks(partial(_size, read, side), fine, frequency)
-    return H, {side: peaks.get(side, []) for side in SIDES}
+def linear_of_faces(plan: ForcedPlan, march: InterfaceModel) -> LinearCurves:
+    """Curves without the damper, and with every node closed and sticking."""
+    f, excitation = grid(plan), excitation_of(plan.scene.excitation)
+    k, shapes = excitation.lowest, stuck_modes_of(march, CANDIDATES * plan.scene.excitation.stop)
+    curves, peaks = (_at_rest(f), _at_rest(f)), ({s: Peaks() for s in SIDES}, dict[Side, Peaks]())
+    for stuck, at in enumerate((np.sort(march.frequency), stuck_system(march)[0])):
+        width = 2.0 * float(march.damping.max()) * at
+        fine = around_modes(at / k, width / k, float(f[0]), float(f[-1]))
+        for side in SIDES if stuck else excitation.free_blades:
+            read = partial(faces_accelerance, march, excitation, side, stuck=bool(stuck))
+            curves[stuck][side], found = read(f), exact_peaks(read, fine, f)
+            if not stuck:
+                peaks[0][side] = unmoved(found)
+                continue
+            tops = k * np.array([one.frequency for one in found])
+            motion = march.linear_response(tops, excitation.read, stuck=True)[:, len(SIDES) :]
+            peaks[1][side] = numbered(shapes, found, motion)
+    return LinearCurves(f, *curves, shapes.modes, *peaks)
 
 
 def _at_rest(frequency: Array) -> dict[Side, ComplexArray]:
     return {side: np.zeros(len(frequency), complex) for side in SIDES}
 
 
-def _size(read: Callable[[Side, Array], ComplexArray], side: Side, f: Array) -> Array:
-    return np.asarray(np.abs(read(side, f)))
+def limit_balance(plan: ForcedPlan, model: Model) -> Balance:
+    """The problem of both limits, with F_C as excitation."""
+    harmonics = (0, *model.excitation.harmonics)
+    return balance_of(plan, model, plan.scene.damper.centrifugal, harmonics)
 
 
-def linear_of_faces(plan: ForcedPlan, march: InterfaceModel) -> LinearCurves:
-    """Curves without the damper, and with every node closed and sticking."""
-    frequency, excitation = grid(plan), excitation_of(plan.scene.excitation)
-    free, free_peaks = linear_curves(march, frequency, excitation, stuck=False)
-    stuck, stuck_peaks = linear_curves(march, frequency, excitation, stuck=True)
-    shapes = stuck_modes_of(march, CANDIDATES * plan.scene.excitation.stop)
-    named = {}
-    for side, peaks in stuck_peaks.items():
-        f = excitation.lowest * np.array([one.frequency for one in peaks])
-        motion = march.linear_response(f, excitation.read, stuck=True)[:, len(SIDES) :]
-        named[side] = numbered(shapes, peaks, motion)
-    free_peaks = {side: unmoved(peaks) for side, peaks in free_peaks.items()}
-    return LinearCurves(frequency, free, stuck, shapes.modes, free_peaks, named)
+def limit_peaks(
+    plan: ForcedPlan, model: Model, b: Balance, f: Array, side: Side, stuck: bool
+) -> Peaks:
+    """Numbered peaks of a blade, free or stuck; none of a free blade at rest.
+
+    Parameters
+    ----------
+    b
+        Of `limit_balance`.
+    f
+        (n,) Hz, rising: the sweep.
+    """
+    if not stuck and side not in model.excitation.free_blades:
+        return []
+    found = linear_peaks(b, model.row(side), plan.scene.damper.centrifugal, f, stuck)
+    return tell_stuck_peaks(model, found, plan.scene.excitation.stop) if stuck else unmoved(found)
 
 
 def linear_of(plan: ForcedPlan, model: Model) -> LinearCurves:
     """Free and stuck curves of a model, their peaks and modes."""
-    force, stop = plan.scene.damper.centrifugal, plan.scene.excitation.stop
-    b = balance_of(plan, model, force, (0, *model.excitation.harmonics))
-    f, k = grid(plan), model.excitation.lowest
+    b, f, k = limit_balance(plan, model), grid(plan), model.excitation.lowest
     # finer around every mode: a drawn curve has its tops
     for stuck in (False, True):
         at, width = linear_modes(b, stuck)
         f = finer(f, at / k, width / k)
     curves, peaks = (_at_rest(f), _at_rest(f)), (dict[Side, Peaks](), dict[Side, Peaks]())
+    force = plan.scene.damper.centrifugal
     for side in SIDES:
-        row = model.row(side)
         for stuck in (False, True):
-            found: Peaks = []
             if stuck or side in model.excitation.free_blades:
-                curves[stuck][side] = measures.linear_accelerance(b, row, force, f, stuck)
-                found = linear_peaks(b, row, force, f, stuck)
-            peaks[stuck][side] = tell_stuck_peaks(model, found, stop) if stuck else unmoved(found)
-    return LinearCurves(f, *curves, measures.stuck_modes(model, CANDIDATES * stop), *peaks)
+                curves[stuck][side] = measures.linear_accelerance(
+                    b, model.row(side), force, f, stuck
+                )
+            peaks[stuck][side] = limit_peaks(plan, model, b, f, side, stuck)
+    modes = measures.stuck_modes(model, CANDIDATES * plan.scene.excitation.stop)
+    return LinearCurves(f, *curves, modes, *peaks)
 
 
 def stuck_frequency(modes: Iterable[StuckMode], in_phase: bool) -> float:
@@ -572,3 +574,128 @@ def fine_grid(
     problem = balance_of(plan, model, force, (0, *model.excitation.harmonics))
     modes, width = linear_modes(problem, True)
     return finer(grid(plan) if frequencies is None else frequencies, modes / k, width / k)
+
+
+# -- sweeps, and whole faces by harmonic balance ---------------------------------------------------
+
+
+#: how steady a motion has to be
+TOLERANCE = 1e-3
+
+
+#: periods after which a motion counts as not settled: light damping, 0.5 %, leaves 1e-3 of a
+#: transient after 220, and a third of the damping after 660
+MOST_PERIODS = 700
+
+
+def both_ways(
+    plan: ForcedPlan, name: str, ratio: float, march: InterfaceModel, start: InterfaceState
+) -> list[SweptCurve]:
+    """The sweep up from a state, and the one down from where that ends.
+
+    Parameters
+    ----------
+    name, ratio
+        Of the contact; F_C/F_E.
+    march, start
+        What is integrated, and where it begins.
+    """
+    out: list[SweptCurve] = []
+    scene, excitation, frequency = plan.scene, excitation_of(plan.scene.excitation), grid(plan)
+    force = scene.damper.centrifugal / ratio
+    ways: tuple[tuple[Way, Array], ...] = (("up", frequency), ("down", frequency[::-1]))
+    with threads_for(3 * march.n):
+        for way, f in ways:
+            found = stepped_sine(
+                march,
+                f,
+                force * excitation.drive,
+                start,
+                samples=time_steps(scene),
+                tolerance=TOLERANCE,
+                most_periods=MOST_PERIODS,
+                fallback=by_coulomb,
+            )
+            start = found.state
+            moved = {k: found.harmonics[:, i] for i, k in enumerate(excitation.harmonics)}
+            moved[excitation.lowest] = found.amplitude
+            curve = ForcedCurve(
+                name, ratio, force, {}, {}, {}, found, float(found.seconds.sum()), way
+            )
+            maxima = partial(path_maxima, between=False)
+            out.append(with_outputs(plan, march, curve, moved, maxima))
+    return out
+
+
+def with_outputs(
+    plan: ForcedPlan,
+    march: InterfaceModel,
+    curve: ForcedCurve[Answer],
+    moved: Mapping[int, ComplexArray],
+    maxima: Callable[[Array, Array], list[CurvePeak]],
+) -> ForcedCurve[Answer]:
+    """The curve with the accelerances of both blades and their peaks.
+
+    Parameters
+    ----------
+    march
+        Its outputs are the tips, then the coordinates of modes.
+    moved
+        Harmonic that is excited -> (n, K) mm of all outputs.
+    maxima
+        Frequencies and heights along the curve -> its local maxima.
+    """
+    excitation, stop = excitation_of(plan.scene.excitation), plan.scene.excitation.stop
+    modes, f = stuck_modes_of(march, CANDIDATES * stop), curve.frequency
+    blades: dict[int, dict[Side, ComplexArray]] = {
+        k: {s: accelerance_of(u[:, j], f, k, curve.force) for j, s in enumerate(SIDES)}
+        for k, u in moved.items()
+    }
+    read, peaks = blades.pop(excitation.lowest), dict[Side, tuple[CurvePeak, ...]]()
+    for side in SIDES:
+        found = maxima(f, np.abs(read[side]))
+        at = np.array([one.sample for one in found], int)
+        motion = moved[excitation.lowest][at, len(SIDES) :]
+        peaks[side] = tuple(numbered(modes, found, motion))
+    return replace(curve, accelerance=read, more=blades, peaks=peaks)
+
+
+def balance_curve(plan: ForcedPlan, name: str, faces: WholeFaces, ratio: float) -> FacesCurve:
+    """The balance from the static state along the sweep, rising.
+
+    Parameters
+    ----------
+    name
+        Of the contact.
+    ratio
+        F_C/F_E.
+    """
+    b, force = plan.scene.balance, plan.scene.damper.centrifugal / ratio
+    excitation = excitation_of(plan.scene.excitation)
+    found = interface_response(
+        faces.march,
+        grid(plan),
+        force * excitation.drive,
+        faces.start,
+        harmonics=plan.scene.balance.harmonics,
+        samples=SAMPLES if b.samples == "auto" else b.samples,
+        fallback=by_coulomb,
+    )
+    moved = {k: found.amplitude[:, k] for k in excitation.harmonics}
+    curve = ForcedCurve(name, ratio, force, {}, {}, {}, found, found.seconds)
+    return with_outputs(plan, faces.march, curve, moved, partial(_maxima, found.jumps))
+
+
+def _maxima(jumps: Sequence[int], frequency: Array, size: Array) -> list[CurvePeak]:
+    """Local maxima of a curve; none is read across a jump, and a stretch may be highest where one
+    ends it.
+    """
+    out, begin = [], 0
+    for end in (*(i + 1 for i in jumps), len(size)):
+        f, a = frequency[begin:end], size[begin:end]
+        out += [one._replace(sample=one.sample + begin) for one in path_maxima(f, a, 0.0)]
+        for i, inner, jumped in ((0, 1, begin > 0), (len(a) - 1, len(a) - 2, end < len(size))):
+            if jumped and (len(a) == 1 or a[i] > a[inner]):
+                out.append(CurvePeak(float(f[i]), float(a[i]), begin + i))
+        begin = end
+    return [one for one in out if one.height >= PEAKS_ABOVE * size.max()]

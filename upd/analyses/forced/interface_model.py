@@ -28,7 +28,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eigh
 
 from upd.analyses.base import Plan
-from upd.analyses.forced.curves import WholeFaces
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.plan import ForcedPlan, excitation_of, time_steps
 from upd.analyses.forced.statics import GIVEN, SEATED, StaticState
@@ -75,6 +74,7 @@ def make_whole_faces(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> WholeF
             centrifugal=F,
             damping=scene.excitation.damping,
             excited=excitation_of(scene.excitation).blades,
+            seen=SEEN * scene.excitation.stop,
         )
         # every mode is of one blade, those of the left one first
         on = np.repeat(np.eye(len(SIDES)), len(made.frequency) // len(SIDES), axis=0)
@@ -85,7 +85,7 @@ def make_whole_faces(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> WholeF
         [start.f.reshape(3, -1)[:, of.face == k].sum(axis=1) for k in range(len(SIDES))]
     )
     state = StaticState(_name(scene.contact.static), forces[:, 0], forces[:, 2])
-    return WholeFaces(of, _seen(march, SEEN * scene.excitation.stop), start, state)
+    return WholeFaces(of, march, start, state)
 
 
 def _name(static: Any) -> str:
@@ -135,20 +135,6 @@ def _both(static: Any) -> float:
     return left
 
 
-def _seen(model: InterfaceModel, below: float) -> InterfaceModel:
-    """The model with the tips and the coordinates of its modes below a frequency as outputs."""
-    low = np.flatnonzero(model.frequency < below)
-    rows = np.eye(len(model.frequency))[low]
-    tips = len(SIDES)
-    n, places = 3 * model.n, model.places.shape[1]
-    return replace(
-        model,
-        seen_modes=np.vstack([model.seen_modes[:tips], rows]),
-        seen_contact=np.vstack([model.seen_contact[:tips], np.zeros((len(low), n))]),
-        seen_drive=np.vstack([model.seen_drive[:tips], np.zeros((len(low), places))]),
-    )
-
-
 def make_interface_model(
     plan: Plan[Any],
     bodies: Bodies,
@@ -159,11 +145,12 @@ def make_interface_model(
     damping: float,
     n_modes: int = MODES,
     excited: Sequence[Side] = ("right",),
+    seen: float = 0.0,
 ) -> InterfaceModel:
     """Blades in their free-interface modes and what those leave of the static compliance.
 
     Excited along x at the force nodes of some blades; the outputs are the displacements along x
-    of the left and the right accelerometer, then of both force nodes.
+    of the left and the right accelerometer, then the coordinates of the lowest modes.
 
     Parameters
     ----------
@@ -181,6 +168,8 @@ def make_interface_model(
         Of each blade.
     excited
         Blades with a force.
+    seen
+        Hz; modes below are outputs.
 
     Raises
     ------
@@ -197,7 +186,7 @@ def make_interface_model(
         )
     solver = plan.scene.solver.name
     parts = in_parallel([partial(_part, b, n_modes, solver) for b in blades], plan.workers)
-    both = _side_by_side(parts, interface, excited)
+    both = _side_by_side(parts, interface, excited, seen)
     Phi, frequency = both["shapes"], both["frequency"]
     G = interface.compliance - (Phi / (2.0 * np.pi * frequency) ** 2) @ Phi.T
     inertia = np.zeros((6, 6))
@@ -222,31 +211,33 @@ def _side_by_side(
     parts: Sequence[tuple[Array, Array, Array, Array, Array]],
     interface: Interface,
     excited: Sequence[Side],
+    below: float,
 ) -> dict[str, Array]:
     """The blades' parts of `_part` beside each other, in the terms of `InterfaceModel`."""
     n, m = interface.n, len(parts[0][0])
-    shapes, pushed, carried = np.zeros((3, n, 2 * m)), np.zeros((3, n, 2)), np.zeros((4, 3, n))
-    places, seen, drive = np.zeros((2 * m, 2)), np.zeros((4, 2 * m)), np.zeros((4, 2))
+    frequency = np.concatenate([part[0] for part in parts])
+    low = np.eye(2 * m)[frequency < below]
+    outputs = len(SIDES) + len(low)
+    shapes, pushed, places = np.zeros((3, n, 2 * m)), np.zeros((3, n, 2)), np.zeros((2 * m, 2))
+    carried, drive = np.zeros((outputs, 3, n)), np.zeros((outputs, 2))
+    seen = np.vstack([np.zeros((2, 2 * m)), low])
     for k, (hertz, Phi, probes, static, direct) in enumerate(parts):
         on, mine = np.flatnonzero(interface.face == k), slice(k * m, (k + 1) * m)
         flexible = 1.0 / (2.0 * np.pi * hertz) ** 2
         # what the modes leave
         rest = static - np.einsum("fim,m,pm->pfi", Phi, flexible, probes)
         shapes[:, on, mine], pushed[:, on, k] = Phi, rest[1]
-        # the accelerometers of both blades, then their force nodes
-        for row, one, static_one in zip((k, 2 + k), probes, rest, strict=True):
-            seen[row, mine] = one
-            carried[row][:, on] = static_one
+        seen[k, mine], carried[k][:, on] = probes[0], rest[0]
         places[mine, k] = probes[1]
-        drive[[k, 2 + k], k] = direct[:, 1] - (probes * flexible) @ probes[1]
+        drive[k, k] = direct[0, 1] - (probes[0] * flexible) @ probes[1]
     forced = [SIDES.index(side) for side in excited]
     return {
-        "frequency": np.concatenate([part[0] for part in parts]),
+        "frequency": frequency,
         "shapes": shapes.reshape(3 * n, -1),
         "places": places[:, forced],
         "pushed": pushed[..., forced].reshape(3 * n, -1),
         "seen_modes": seen,
-        "seen_contact": carried.reshape(4, -1),
+        "seen_contact": carried.reshape(outputs, -1),
         "seen_drive": drive[:, forced],
     }
 
@@ -511,3 +502,26 @@ def state_at(
         np.where(open_, OPEN, STICK).astype(np.int64),
         march.shapes.T @ springs.rest.T.ravel(),
     )
+
+
+@dataclass(frozen=True)
+class WholeFaces:
+    """Both faces node by node.
+
+    Attributes
+    ----------
+    of
+        The contact: places, areas, frames of its nodes.
+    march
+        Its outputs are the tips of the left and the right blade along x, then the coordinates of
+        the blades' lowest modes.
+    start
+        At rest under F_C.
+    state
+        Forces of both faces there.
+    """
+
+    of: Interface
+    march: InterfaceModel
+    start: InterfaceState
+    state: StaticState

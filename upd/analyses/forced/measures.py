@@ -102,6 +102,26 @@ def accelerance(
     return accelerance_of(u, answer.frequency, k, force)
 
 
+def accelerance_at(
+    model: Model, b: Balance, x: Array, frequency: Array, force: float
+) -> dict[Side, ComplexArray]:
+    """(k,) (m/s2)/N of both blades in the lowest harmonic that is excited, at solved points.
+
+    Parameters
+    ----------
+    x, frequency
+        (k, n_unknown) unknowns of the problem, (k,) Hz.
+    force
+        F_E, N.
+    """
+    k, h = model.excitation.lowest, b.harmonics
+    forces = np.array([b.force(one) for one in x]).reshape(len(x), len(b.Psi), h.size)
+    rigid = np.array([b.split(one)[1] for one in x])
+    q = b.displacement(2.0 * np.pi * frequency, forces, rigid)
+    moved = to_complex(q, h)[..., h.place(k)]
+    return {s: accelerance_of(moved @ model.row(s), frequency, k, force) for s in SIDES}
+
+
 def accelerance_of(
     moved: ComplexArray, frequency: Array, harmonic: int, force: float
 ) -> ComplexArray:
@@ -168,7 +188,9 @@ def chosen_peaks(maxima: Sequence[CurvePeak]) -> list[CurvePeak]:
     return sorted(once[:2])
 
 
-def path_maxima(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) -> list[CurvePeak]:
+def path_maxima(
+    frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE, *, between: bool = True
+) -> list[CurvePeak]:
     """All local maxima along a path that may turn back, in its order.
 
     Parameters
@@ -177,6 +199,8 @@ def path_maxima(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) 
         (n,) along the path, Hz and any unit.
     above
         Maxima lower than this part of the highest are left out.
+    between
+        Whether they may lie between points: not in a sweep, whose motion may jump between two.
     """
     f, a = np.asarray(frequency), np.asarray(magnitude)
     if len(f) < 3:
@@ -187,7 +211,7 @@ def path_maxima(frequency: Array, magnitude: Array, above: float = PEAKS_ABOVE) 
             continue
         part = slice(i - 1, i + 2)
         sense = 1 if f[i + 1] > f[i] else -1
-        if (f[i + 1] - f[i]) * (f[i] - f[i - 1]) > 0.0:
+        if between and (f[i + 1] - f[i]) * (f[i] - f[i - 1]) > 0.0:
             found = find_peaks(f[part][::sense], a[part][::sense])
             if len(found.frequency):
                 out.append(CurvePeak(float(found.frequency[0]), float(found.height[0]), int(i)))
@@ -343,12 +367,6 @@ def residual_error(answer: FrequencyResponse) -> float:
         forces = off / max(float(np.abs(kept).max()), _TINY)
         worst = max(worst, b.misfit(x, float(2.0 * np.pi * f)), float(forces))
     return worst
-
-
-def static_normal(answer: FrequencyResponse, model: Model, i: int) -> dict[Side, float]:
-    """Mean normal force in N on each face at point i of the path."""
-    N = answer.contact_force[i, :, 0, 0]
-    return {side: float(N[model.face == k].sum()) for k, side in enumerate(SIDES)}
 
 
 def face_shares(state: Array, face: IntArray, weight: Array) -> Array:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,15 +14,9 @@ from scipy.linalg import block_diag, eigh
 
 from upd.analyses.forced.blade_parts import (
     EVEN_DOFS,
-    BladePart,
     FacePoints,
     MirrorPairs,
-    attached_part,
-    gauss_points,
-    lattice_points,
-    mirror_pairs,
-    nodal_part,
-    ritz,
+    reduced_blades,
     symmetric,
 )
 from upd.analyses.forced.plan import Excitation, ForcedPlan, excitation_of
@@ -37,19 +30,16 @@ from upd.hbm import (
     Settings,
     contact_rows,
     contacts,
-    frequency_response,
     rigid_damper,
 )
 from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.damper import attach
-from upd.hbm.springs.points import stuck_stiffness
-from upd.hbm.springs.response import GivenSystem
-from upd.linalg.parallel import in_parallel
+from upd.hbm.springs.points import Start, stuck_stiffness
+from upd.hbm.springs.response import GivenSystem, response_of
 from upd.mesh import IntArray
 from upd.scene import ForcedScene
-from upd.scene.forced_contact import GAUSS, SIDES, FaceStiffness, Side
+from upd.scene.forced_contact import SIDES, FaceStiffness, Side
 
-log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 _AXIS_Y = 1
@@ -190,14 +180,13 @@ def make_model(
         The static state, with contact.fit = "loaded"; that of the scene when None.
     """
     scene = plan.scene
-    whole = {side: _face(scene, bodies, side) for side in SIDES}
-    small, pairs = _reduced_blades(plan, bodies, whole)
+    whole, small, pairs = reduced_blades(plan, bodies)
     half = pairs is not None or bodies.half
     faces = {side: pairs[side].face(whole[side]) for side in SIDES} if pairs else whole
-    K, M = (block_diag(small[0][j], small[1][j]) for j in range(2))
+    K, M = block_diag(*(one.K for one in small)), block_diag(*(one.M for one in small))
     values, shapes = eigh(K, M)
     frequency = np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
-    n = [len(part[0]) for part in small]
+    n = [len(one.K) for one in small]
     # M has a block for each blade
     blades = slice(0, n[0]), slice(n[0], n[0] + n[1])
     share = np.stack([(shapes[on] * (M @ shapes)[on]).sum(axis=0) for on in blades], 1)
@@ -205,11 +194,11 @@ def make_model(
     before_after = ((0, n[1]), (n[0], 0))
     rows = np.concatenate(
         [
-            np.pad(part[2], ((0, 0), (0, 0), at))
-            for part, at in zip(small, before_after, strict=True)
+            np.pad(one.rows, ((0, 0), (0, 0), at))
+            for one, at in zip(small, before_after, strict=True)
         ]
     )
-    probes = [np.pad(part[3], ((0, 0), at)) for part, at in zip(small, before_after, strict=True)]
+    probes = [np.pad(one.probes, ((0, 0), at)) for one, at in zip(small, before_after, strict=True)]
     excitation = excitation_of(scene.excitation)
     damper = _rigid(scene, bodies, half)
     k_n, k_t = _stiffnesses(whole, laws, pairs)
@@ -246,37 +235,6 @@ def make_model(
     if not scene.contact.loaded:
         return model
     return preloaded(model, state or static_state(plan, bodies))
-
-
-def _reduced_blades(
-    plan: ForcedPlan, bodies: Bodies, faces: Mapping[Side, FacePoints]
-) -> tuple[list[tuple[Array, Array, Array, Array]], Mapping[Side, MirrorPairs] | None]:
-    """K, M, contact rows and probe rows of each blade; pairs of the points where only motion even
-    about y = 0 is kept.
-    """
-    parts = in_parallel(
-        [partial(_reduced, plan, bodies, side, faces[side]) for side in SIDES], plan.workers
-    )
-    pairs: dict[Side, MirrorPairs] = {}
-    for side in SIDES if plan.symmetry == "half" and not bodies.half else ():
-        found = mirror_pairs(faces[side])
-        if found is not None:
-            pairs[side] = found
-    if len(pairs) == len(SIDES):
-        small = [ritz(part, pairs[side]) for side, part in zip(SIDES, parts, strict=True)]
-        even = [one for one in small if one is not None]
-        if len(even) == len(SIDES):
-            return even, pairs
-        log.info("modes of mixed parity, both halves are kept")
-    out = []
-    for side, part in zip(SIDES, parts, strict=True):
-        if faces[side].at_nodes:
-            out.append((part.K, part.M, part.rows, part.probes))
-        else:
-            found_ritz = ritz(part)
-            assert found_ritz is not None
-            out.append(found_ritz)
-    return out, None
 
 
 def _rigid(scene: ForcedScene, bodies: Bodies, half: bool) -> RigidDamper:
@@ -356,31 +314,6 @@ def _along_matters(model: Model) -> bool:
     return bool(np.abs(found[1] / found[0] - 1.0).max() > ALONG_MATTERS)
 
 
-def _face(scene: ForcedScene, bodies: Bodies, side: Side) -> FacePoints:
-    mesh = bodies.blades[side].mesh
-    lines = scene.contact.lines(side)
-    if scene.contact.rule == GAUSS:
-        return gauss_points(mesh, *lines, side)
-    return lattice_points(mesh, *lines, side, scene.contact.share == "equal")
-
-
-def _reduced(plan: ForcedPlan, bodies: Bodies, side: Side, face: FacePoints) -> BladePart:
-    """One blade on what its points and probes see."""
-    scene = plan.scene
-    count, names, solver = scene.reduction.modes, _probes(scene, side), scene.solver.name
-    if scene.contact.rule == GAUSS:
-        lines = scene.contact.lines(side)
-        again = scene.estimates
-        return attached_part(bodies, side, lines, names, count, again, solver)
-    return nodal_part(bodies, side, face, names, count, solver)
-
-
-def _probes(scene: ForcedScene, side: Side) -> tuple[str, ...]:
-    """What of a blade is seen: its accelerometer, and where it is excited its force's node."""
-    excited = side in excitation_of(scene.excitation).blades
-    return ("accelerometer", "force") if excited else ("accelerometer",)
-
-
 # -- harmonic balance ------------------------------------------------------------------------------
 
 
@@ -398,7 +331,13 @@ LONG_STEPS = Settings(angle=0.7, kink_step=0.1, wanted_iterations=8)
 
 
 def respond(
-    plan: ForcedPlan, model: Model, force: float, frequencies: Array, **changes: Any
+    plan: ForcedPlan,
+    model: Model,
+    force: float,
+    frequencies: Array,
+    harmonics: Iterable[int] | None = None,
+    settings: Settings | None = None,
+    **changes: Any,
 ) -> FrequencyResponse:
     """The harmonic balance of one model along the frequencies.
 
@@ -408,48 +347,45 @@ def respond(
         Excitation, N.
     frequencies
         (n,) Hz.
-    **changes
-        Replace the scene's harmonics, samples, start of the sliders, or settings of the path.
+    settings
+        Of the path; by the number of frequencies when None.
+    harmonics, **changes
+        As of `balance_of`.
     """
-    b, n = plan.scene.balance, len(frequencies)
-    usual: dict[str, Any] = {
-        "harmonics": plan.scene.harmonic_numbers,
-        "samples": None if b.samples == "auto" else b.samples,
-        "start": b.slider,
-        "settings": replace(LONG_STEPS, most_points=max(LEAST_POINTS, MOST_POINTS * n)),
-    }
-    return frequency_response(
-        **model.system,
-        harmonic_force=model.harmonic_force(force),
-        frequencies=frequencies,
-        **(usual | changes),
-    )
+    most = max(LEAST_POINTS, MOST_POINTS * len(frequencies))
+    steps = settings or replace(LONG_STEPS, most_points=most)
+    b = balance_of(plan, model, force, harmonics, **changes)
+    return response_of(b, frequencies, False, True, steps)
 
 
 def balance_of(
     plan: ForcedPlan,
     model: Model,
     force: float,
-    numbers: Sequence[int],
+    harmonics: Iterable[int] | None = None,
+    *,
     samples: int | None = None,
+    start: Start | None = None,
 ) -> Balance:
-    """The problem that `respond` follows, with these harmonics.
+    """The problem that `respond` follows.
 
     Parameters
     ----------
     force
         Excitation, N.
-    numbers
-        Of the harmonics.
-    samples
-        Per period; those of the scene when None.
+    harmonics
+        Their numbers; those of the scene when None.
+    samples, start
+        Per period, and of the sliders; those of the scene when None.
     """
     b = plan.scene.balance
-    count = samples or (None if b.samples == "auto" else b.samples)
-    given = GivenSystem(**model.system, harmonics=numbers, samples=count, start=b.slider)
-    return given.balance(
-        "forced response", np.ones(1), model.harmonic_force(force), fast_exits=True
+    given = GivenSystem(
+        **model.system,
+        harmonics=plan.scene.harmonic_numbers if harmonics is None else harmonics,
+        samples=samples or (None if b.samples == "auto" else b.samples),
+        start=start or b.slider,
     )
+    return given.balance("balance", np.ones(1), model.harmonic_force(force), fast_exits=True)
 
 
 @contextmanager

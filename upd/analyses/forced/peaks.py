@@ -39,7 +39,6 @@ from upd.analyses.forced.model import Array, Model, respond
 from upd.analyses.forced.plan import ForcedPlan, time_steps
 from upd.errors import ConvergenceError, one_line
 from upd.hbm import climb
-from upd.hbm.core.fourier import to_complex
 from upd.hbm.faces.march import InterfaceMarch
 from upd.hbm.faces.state import InterfaceState
 from upd.hbm.faces.sweep import settle
@@ -141,11 +140,27 @@ def climbed(
     reach
         First step along the path.
     """
+    top = top_from(model, b, x, frequency, side, force, reach)
+    if top is None or not is_near(top.frequency / about.frequency, top.height / about.height):
+        return None
+    return top
+
+
+def top_from(
+    model: Model,
+    b: Balance,
+    x: Array,
+    frequency: float,
+    side: Side,
+    force: float,
+    reach: float = FIRST_REACH,
+) -> Top | None:
+    """The top uphill from a solved point, as `climbed`, wherever it is."""
     k = model.excitation.lowest
     top = climb(b, model.row(side), x, frequency, reach, harmonic=k, power=2)
-    height = 1e-3 * (2.0 * np.pi * k * top.frequency) ** 2 * top.amplitude / force
-    if not top.found or not is_near(top.frequency / about.frequency, height / about.height):
+    if not top.found:
         return None
+    height = 1e-3 * (2.0 * np.pi * k * top.frequency) ** 2 * top.amplitude / force
     slips = bool((b.period(top.x).state != STICK).any())
     return Top(top.frequency, float(height), top.x, slips)
 
@@ -335,7 +350,8 @@ def _stays(
         log.info("time integration at %.6g Hz: %s", f, one_line(error))
         return None
     integrated = scale * np.abs(found.first_harmonic[: len(SIDES)])
-    balance = scale * np.array([_amplitude(model, b, x, f, side) for side in SIDES])
+    H = measures.accelerance_at(model, b, x[None], np.array([f]), force)
+    balance = np.array([abs(H[side][0]) for side in SIDES])
     size, near, room = np.linalg.norm(balance), balance, STAYS
     if before is not None:
         near = before.heights[1]
@@ -344,12 +360,3 @@ def _stays(
     if abs(change) > room or not found.remaining <= STAYS:
         return None
     return _Steady(np.array([balance, integrated]), at)
-
-
-def _amplitude(model: Model, b: Balance, x: Array, f: float, side: Side) -> float:
-    """Of a blade in the lowest harmonic excited, mm."""
-    j = b.harmonics.place(model.excitation.lowest)
-    omega = np.array([2.0 * np.pi * f])
-    force = b.force(x).reshape(1, len(b.Psi), b.harmonics.size)
-    moving = to_complex(b.displacement(omega, force, b.split(x)[1][None])[0], b.harmonics)
-    return float(abs(model.row(side) @ moving[:, j]))

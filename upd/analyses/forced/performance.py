@@ -22,12 +22,13 @@ from scipy.linalg import eigh
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import LinearCurves, PointCurve, fine_grid, stuck_frequency
 from upd.analyses.forced.measures import CurvePeak, numbered_peaks
-from upd.analyses.forced.model import LONG_STEPS, SWEEP_POINTS, Array, Model, balance_of, respond
+from upd.analyses.forced.model import LONG_STEPS, SWEEP_POINTS, Array, Model, balance_of
 from upd.analyses.forced.plan import ForcedPlan
 from upd.errors import InputError
 from upd.hbm import nonlinear_mode
 from upd.hbm.springs.balance import Balance
-from upd.hbm.springs.response import parabola
+from upd.hbm.springs.points import Start
+from upd.hbm.springs.response import parabola, response_of
 from upd.linalg.parallel import threads_for
 from upd.linalg.processes import Job
 from upd.results import Case, Result, variable
@@ -110,7 +111,7 @@ def peaks_at(
     model: Model,
     ratio: float,
     harmonics: int,
-    changes: Mapping[str, Any] | None = None,
+    start: Start | None = None,
 ) -> RatioPoint:
     """The peaks of the whole curve at one F_C/F_E.
 
@@ -118,19 +119,19 @@ def peaks_at(
     ----------
     harmonics
         The highest of the balance.
-    changes
-        Other choices of it, as `respond` takes them.
+    start
+        Of the sliders; that of the scene when None.
     """
     force, e = plan.scene.damper.centrifugal / ratio, plan.scene
     span = np.linspace(e.excitation.start, e.excitation.stop, SWEEP_POINTS)
     sweep = fine_grid(plan, model, force, span)
     settings = replace(LONG_STEPS, most_points=MOST_PATH_POINTS)
-    given = {"harmonics": range(harmonics + 1), "settings": settings} | dict(changes or {})
+    b = balance_of(plan, model, force, range(harmonics + 1), start=start)
     found: dict[tuple[Side, int], CurvePeak] = {}
     up_to = -math.inf
     with threads_for(len(model.M)):
         for down in (False, True):
-            answer = respond(plan, model, force, sweep, sweep_down=down, **given)
+            answer = response_of(b, sweep, down, True, settings)
             f = answer.frequency
             for side in SIDES if len(f) else ():
                 size = np.abs(measures.accelerance(answer, model.row(side), force))

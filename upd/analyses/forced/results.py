@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,14 +12,14 @@ import numpy as np
 from upd.analyses import base, measured
 from upd.analyses.forced import measures
 from upd.analyses.forced.again import limit_results, peak_results
-from upd.analyses.forced.curves import ForcedCurve, PointCurve, linear_curves
+from upd.analyses.forced.curves import ForcedCurve, PointCurve, faces_accelerance, limit_balance
 from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.model import Array, ComplexArray, Model, balance_of
+from upd.analyses.forced.model import Array, ComplexArray, Model
 from upd.analyses.forced.performance import mode_results, performance_results
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
-from upd.analyses.forced.solution import ContactPlaces, ForcedSolution, MarchedPeak, marched_damper
+from upd.analyses.forced.solve import ContactPlaces, ForcedSolution, MarchedPeak, marched_damper
 from upd.analyses.forced.statics import StaticState
-from upd.analyses.measured import FREE, STUCK, Computed, numbered
+from upd.analyses.measured import FREE, STUCK, Computed
 from upd.analyses.seated.results import RIGID
 from upd.hbm import FrequencyResponse
 from upd.hbm.faces.balance import InterfaceResponse
@@ -126,7 +127,7 @@ def _computed(solution: ForcedSolution, choice: MeasuredChoice) -> Iterator[Comp
             told = (linear.stuck_peaks if stuck else linear.free_peaks)[side]
             case = Case(stiffness=name, kind=choice.state, blade=side)
             band = (scene.excitation.start, scene.excitation.stop)
-            yield Computed(case, band, _linear_at(solution, name, side, stuck), numbered(told))
+            yield Computed(case, band, _linear_at(solution, name, side, stuck), told)
         return
     # as the labels of curves tell them apart
     wanted = f"{choice.centrifugal_to_force:.6g}"
@@ -142,26 +143,19 @@ def _linear_at(
     if name in solution.faces:
         excitation = excitation_of(solution.plan.scene.excitation)
         march = solution.faces[name].march
-        return lambda f: np.asarray(linear_curves(march, f, excitation, stuck=stuck)[0][side])
+        return partial(faces_accelerance, march, excitation, side, stuck=stuck)
     model, plan = solution.models[name], solution.plan
-    force = plan.scene.damper.centrifugal
-    numbers = (0, *model.excitation.harmonics)
-    problem, row = balance_of(plan, model, force, numbers), model.row(side)
-    return lambda f: measures.linear_accelerance(problem, row, force, f, stuck)
+    problem, row, force = limit_balance(plan, model), model.row(side), plan.scene.damper.centrifugal
+    return partial(measures.linear_accelerance, problem, row, force, stuck=stuck)
 
 
 def _with_friction(c: ForcedCurve[Any], side: Side) -> Computed:
     """A curve with friction, between its points by straight lines."""
     f, H = c.frequency, c.accelerance[side]
     way = slice(None) if f[-1] > f[0] else slice(None, None, -1)
-    f, H = f[way], H[way]
-    peaks = c.peaks.get(side, ())
-    return Computed(
-        replace(c.case, blade=side),
-        (float(f.min()), float(f.max())),
-        lambda at: on_path(at, f, H),
-        numbered(peaks),
-    )
+    f, H, band = f[way], H[way], (float(f.min()), float(f.max()))
+    case = replace(c.case, blade=side)
+    return Computed(case, band, lambda at: on_path(at, f, H), c.peaks.get(side, ()))
 
 
 # -- numbers of curves -----------------------------------------------------------------------------
@@ -291,11 +285,11 @@ def _at_point(
 ) -> list[Result]:
     """Contact state, losses and damper motion at point i of the path."""
     scene, answer = solution.plan.scene, curve.answer
-    mean = answer.state[i].mean(axis=0)
+    mean, normal = answer.state[i].mean(axis=0), answer.contact_force[i, :, 0, 0]
     results = [
         *(
-            q.STATIC_NORMAL.of(N, replace(at, side=side))
-            for side, N in measures.static_normal(answer, model, i).items()
+            q.STATIC_NORMAL.of(normal[model.face == k].sum(), replace(at, side=side))
+            for k, side in enumerate(SIDES)
         ),
         *_shares(at, answer.state[i], solution.places(curve.stiffness)),
         q.CONTACT_SLIP.of(mean[1], at),

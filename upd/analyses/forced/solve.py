@@ -1,16 +1,19 @@
 """Forced responses: for every contact stiffness the reduced model, for every F_C/F_E the curve with
-friction; around the peaks what levels, inputs and effects left out change.
+friction; around the peaks what levels, inputs and effects left out change. Contact states, loops
+and the damper's motion at peaks of sweeps are read from the last period.
 """
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple
 
-from upd.analyses.base import keeping
+import numpy as np
+
+from upd.analyses.base import Resolved, keeping
 from upd.analyses.forced.again import (
     MESH,
     Run,
@@ -20,7 +23,15 @@ from upd.analyses.forced.again import (
     run_curve,
     solve_again,
 )
-from upd.analyses.forced.curves import linear_of, linear_of_faces
+from upd.analyses.forced.curves import (
+    ForcedCurve,
+    LinearCurves,
+    SweptCurve,
+    balance_curve,
+    both_ways,
+    linear_of,
+    linear_of_faces,
+)
 from upd.analyses.forced.inputs import (
     along_changes,
     along_the_damper,
@@ -29,10 +40,26 @@ from upd.analyses.forced.inputs import (
     few_harmonics,
     input_variants,
 )
-from upd.analyses.forced.interface_model import INTERFACE, make_springs, make_whole_faces
-from upd.analyses.forced.model import Model, make_model, preloaded, quiet
+from upd.analyses.forced.interface_model import (
+    INTERFACE,
+    WholeFaces,
+    by_coulomb,
+    make_springs,
+    make_whole_faces,
+)
+from upd.analyses.forced.measures import (
+    MOTIONS,
+    CurvePeak,
+    Loop,
+    in_faces,
+    loop_along_main,
+    losing_most,
+)
+from upd.analyses.forced.model import Array, Model, make_model, preloaded, quiet
 from upd.analyses.forced.peaks import solve_curve
 from upd.analyses.forced.performance import (
+    ModeCurve,
+    Performance,
     RatioPoint,
     further_points,
     harmonics_of,
@@ -42,25 +69,211 @@ from upd.analyses.forced.performance import (
     ratios_of,
     with_curves,
 )
-from upd.analyses.forced.plan import ForcedPlan
-from upd.analyses.forced.solution import ForcedSolution, balance_curve, both_ways, march_peaks
+from upd.analyses.forced.plan import (
+    ForcedPlan,
+    excitation_of,
+)
 from upd.analyses.forced.statics import admissible, face_laws, same
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import InputError, UpdError, one_line
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
+from upd.hbm.faces.sweep import RecordedPeriod, period_of_sweep
 from upd.linalg.parallel import threads_for
 from upd.linalg.processes import SideProcesses
+from upd.mesh import IntArray
 from upd.progress import Stages
-from upd.results import Case
+from upd.results import Case, Result
 from upd.results import quantities as q
-from upd.scene.forced_contact import StiffnessChoice
+from upd.scene.forced_contact import SIDES, StiffnessChoice
 from upd.vary.solve import changed
+from upd.vary.variation import SolvedVariation
 
 log = logging.getLogger(__name__)
 #: what a process beside this one imports at once
 _MODULES = ("upd.analyses.forced.inputs", "upd.analyses.forced.performance")
 #: other starts of the sliders of a band
 STARTS = ("mid", "upper", "lower")
+_TINY = float(np.finfo(float).tiny)
+
+
+@dataclass(frozen=True)
+class ContactPlaces:
+    """Contact points or nodes of both faces: face (n,) as an index into SIDES; place (n,) along the
+    damper and up the slope, mm; weight (n,) in means over a face; compliance (n,) of the tangential
+    springs, mm/N, 0 without.
+    """
+
+    face: IntArray
+    along: Array
+    up: Array
+    weight: Array
+    compliance: Array
+
+
+@dataclass(frozen=True)
+class MarchedPeak:
+    """The last period of a sweep at one of its peaks, node by node.
+
+    Attributes
+    ----------
+    sweep, peak
+        The peak and the sweep that has it.
+    period
+        What the contact does.
+    places
+        Of its nodes.
+    motion
+        (N, 6) of the damper from its rest, mm and rad.
+    """
+
+    sweep: SweptCurve
+    peak: CurvePeak
+    period: RecordedPeriod
+    places: ContactPlaces
+    motion: Array
+
+    @property
+    def frequency(self) -> float:
+        """Hz, of the point of the sweep next to the peak."""
+        return float(self.sweep.frequency[self.peak.sample])
+
+    @property
+    def case(self) -> Case:
+        """What its numbers belong to."""
+        return replace(self.sweep.case, peak=self.peak.number, mode=self.peak.mode)
+
+    @property
+    def off(self) -> float:
+        """Of the losses of all nodes from that of the sweep at this point, over the work of the
+        excitation and all losses there.
+        """
+        own = self.sweep.answer.energy[self.peak.sample]
+        return abs(self.period.energy - float(own[2])) / max(float(np.abs(own).sum()), _TINY)
+
+
+@dataclass
+class ForcedSolution:
+    """All that was solved, for results, checks and arrays.
+
+    Dictionaries by the name of the contact stiffness; ``band`` and ``effects`` are numbers of peaks
+    from other static states and starts of the sliders, and of their changes by inputs.
+    """
+
+    plan: ForcedPlan
+    bodies: Bodies | None = None
+    models: dict[str, Model] = field(default_factory=dict)
+    linear: dict[str, LinearCurves] = field(default_factory=dict)
+    curves: list[ForcedCurve[Any]] = field(default_factory=list)
+    faces: dict[str, WholeFaces] = field(default_factory=dict)
+    marched: list[MarchedPeak] = field(default_factory=list)
+    band: list[Result] = field(default_factory=list)
+    performances: dict[str, Performance] = field(default_factory=dict)
+    nonlinear_modes: list[ModeCurve] = field(default_factory=list)
+    omissions: list[Resolved] = field(default_factory=list)
+    levels: list[SolvedVariation] = field(default_factory=list)
+    effects: list[Result] = field(default_factory=list)
+
+    @property
+    def order(self) -> int:
+        """Largest order of a matrix that the curves are read with."""
+        reduced = [len(one.M) for one in self.models.values()]
+        return max([*reduced, *(3 * one.of.n for one in self.faces.values())], default=0)
+
+    def places(self, stiffness: str) -> ContactPlaces:
+        """Of the contact points, or of the nodes of whole faces."""
+        if stiffness in self.faces:
+            of = self.faces[stiffness].of
+            along, up = in_faces(of.position, of.face, of.frame)
+            return ContactPlaces(of.face, along, up, of.area, np.zeros(of.n))
+        model, law = self.models[stiffness], self.models[stiffness].contacts.law
+        frames = [model.faces[side].frame for side in SIDES]
+        along, up = in_faces(model.position, model.face, frames)
+        springs = np.divide(1.0, law.k_t, out=np.zeros_like(law.k_t), where=law.k_t > 0.0)
+        return ContactPlaces(model.face, along, up, law.k_n, springs)
+
+    def marked_points(self, curve: ForcedCurve[Any]) -> list[tuple[int, str, int]]:
+        """Number, mode and point of the path of the right blade's peaks.
+
+        Number 0 and the highest point of a curve without a peak.
+        """
+        peaks: Sequence[CurvePeak] = curve.peaks["right"]
+        if peaks:
+            return [(peak.number, peak.mode, peak.sample) for peak in peaks]
+        return [(0, "", int(np.abs(curve.accelerance["right"]).argmax()))]
+
+
+# -- peaks of sweeps -------------------------------------------------------------------------------
+
+
+#: outputs that are read from them
+WANTS = ("contact_state", "hysteresis", "damper_motion")
+
+
+def march_peaks(solution: ForcedSolution, name: str, stages: Stages) -> None:
+    """Add the last period of every sweep of a stiffness at every peak of the right blade."""
+    if not any(solution.plan.scene.wants(one) for one in WANTS):
+        return
+    for sweep in (c for c in solution.curves if c.stiffness == name):
+        for top in sweep.peaks["right"]:
+            with stages("time march", f"{sweep.case}, peak {top.number}: its last period"):
+                solution.marched.append(marched_peak(solution, sweep, top))
+
+
+def marched_peak(solution: ForcedSolution, sweep: SweptCurve, peak: CurvePeak) -> MarchedPeak:
+    """The last period of a sweep at one of its peaks, integrated again and kept."""
+    name = sweep.stiffness
+    if name in solution.faces:
+        faces = solution.faces[name]
+        rest, kept = faces.start.s, list(faces.of.kept)
+    else:
+        # springs count from the static state
+        damper = solution.models[name].damper
+        rest, kept = np.zeros(damper.n_dof), list(damper.kept)
+    period = period_of_sweep(sweep.answer, peak.sample, by_coulomb)
+    motion = np.zeros((len(period.motion), MOTIONS))
+    motion[:, kept] = period.motion - rest
+    return MarchedPeak(sweep, peak, period, solution.places(name), motion)
+
+
+def marched_loops(one: MarchedPeak, count: int) -> list[Loop]:
+    """Loops of the nodes that lose most, as `upd.analyses.forced.measures.loops`.
+
+    The displacement is the slip and what the springs give, f_t / k_t, about its mean: the march
+    counts slips from faces that carry nothing.
+
+    Parameters
+    ----------
+    one
+        A peak.
+    count
+        Loops at most.
+    """
+    period, out = one.period, []
+    friction = one.sweep.answer.model.friction
+    for p in losing_most(period.loss, count):
+        traction = period.force[:, 1:, p].T
+        motion = period.slip[:, :, p].T + one.places.compliance[p] * traction
+        motion -= motion.mean(axis=1, keepdims=True)
+        limit = friction[p] * period.force[:, 0, p]
+        out.append(loop_along_main(int(p), motion, traction, limit, float(period.loss[p])))
+    return out
+
+
+def marched_damper(solution: ForcedSolution, one: MarchedPeak) -> tuple[Array, Array]:
+    """Motion of the damper's six dofs about its rest, as
+    `upd.analyses.forced.measures.damper_motion`.
+
+    Returns
+    -------
+    static, amplitude
+        (6,) mean, and amplitude of the lowest harmonic that is excited, mm and rad.
+    """
+    k, N = excitation_of(solution.plan.scene.excitation).lowest, len(one.motion)
+    turn = np.exp(-2j * np.pi * k * np.arange(1, N + 1) / N)
+    return one.motion.mean(axis=0), np.abs(2.0 / N * turn @ one.motion)
+
+
+# -- the run ---------------------------------------------------------------------------------------
 
 
 def solve(plan: ForcedPlan, stages: Stages) -> ForcedSolution:
@@ -270,18 +483,18 @@ def _band(solution: ForcedSolution, name: str) -> Iterator[_Work]:
     plan, model, bodies = solution.plan, solution.models[name], solution.bodies
     assert bodies is not None
     scene, highest = plan.scene, harmonics_of(plan)
-    choices: list[tuple[str, Model, dict[str, Any]]] = []
+    choices: list[tuple[str, Model, str | None]] = []
     if model.state is not None:
         for state in admissible(plan, bodies, Stages()):
             if not same(state, model.state, scene.damper.centrifugal):
                 try:
-                    choices.append((f"static {state.name}", preloaded(model, state), {}))
+                    choices.append((f"static {state.name}", preloaded(model, state), None))
                 except InputError as error:
                     log.info("static state %s: %s", state.name, one_line(error))
-    choices += [(f"start {s}", model, {"start": s}) for s in STARTS if s != scene.balance.slider]
+    choices += [(f"start {s}", model, s) for s in STARTS if s != scene.balance.slider]
     for ratio in scene.excitation.centrifugal_to_force:
-        for choice, other, changes in choices:
-            point = plan, other, ratio, highest, changes
+        for choice, other, start in choices:
+            point = plan, other, ratio, highest, start
             yield _Work(partial(_into_band, solution, name, choice), peaks_at, point, needed=True)
 
 

@@ -6,7 +6,7 @@ Modes free and with the damper glued, Craig-Bampton models, linear frequency res
 from __future__ import annotations
 
 from upd.analyses.base import Analysis, rig_needs
-from upd.analyses.modal import charts, checks, output, results, varied
+from upd.analyses.modal import charts, output, results, varied
 from upd.vary.inputs import coarsened_rig
 
 ANALYSIS = Analysis(
@@ -15,7 +15,7 @@ ANALYSIS = Analysis(
     input_checks=(),
     problem=varied.PROBLEM,
     needs=lambda plan, threads: rig_needs(plan, threads, "reduction"),
-    check_solution=checks.check_solution,
+    check_solution=results.check_solution,
     arrays=output.arrays,
     sizes=output.sizes,
     write_files=output.write_files,
