@@ -317,7 +317,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 12555,
+    "analyses": 12459,
     "hbm": 6315,
     "contact": 3535,
     "linalg": 2997,
@@ -326,14 +326,14 @@ ROOM_LINES = {
     "report": 1910,
     "fitting": 1444,
     "sizing": 1329,
-    "batch": 1514,
+    "batch": 1512,
     "mesh": 1423,
-    "vary": 1288,
+    "vary": 1287,
     "reference": 1110,
     "cli": 869,
     "measured": 913,
-    "reduction": 1136,
-    "results": 823,
+    "reduction": 1135,
+    "results": 822,
     "fem": 728,
     "matrices": 632,
     "root": 571,
@@ -343,7 +343,7 @@ ROOM_LINES = {
     "manual": 113,
 }
 #: totals of upd/; pages of the manual's gallery are no modules
-MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 47610, 312, 3600, 458
+MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 45804, 295, 3457, 428
 #: parameters of a function and fields of a class, outside the solver rooms
 MOST_PARAMETERS, MOST_FIELDS, SOLVER_ROOMS = 11, 20, ("hbm", "contact", "linalg")
 
