@@ -10,9 +10,8 @@ import pytest
 
 import upd
 from upd.analyses import make_plan
-from upd.analyses.seated.ladders import PROBLEM, STEPS, levels
 from upd.analyses.seated.plan import make_plan as bare_plan
-from upd.analyses.seated.varied import edges
+from upd.analyses.seated.varied import PROBLEM, STEPS, edges, levels
 from upd.errors import InputError
 from upd.progress import Stages
 from upd.report.tables import budget_table, error_parts

@@ -317,7 +317,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 12459,
+    "analyses": 12452,
     "hbm": 6315,
     "contact": 3535,
     "linalg": 2997,
@@ -343,7 +343,7 @@ ROOM_LINES = {
     "manual": 113,
 }
 #: totals of upd/; pages of the manual's gallery are no modules
-MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 45804, 295, 3457, 428
+MOST_LINES, MOST_FILES, MOST_FUNCTIONS, MOST_CLASSES = 45797, 294, 3457, 428
 #: parameters of a function and fields of a class, outside the solver rooms
 MOST_PARAMETERS, MOST_FIELDS, SOLVER_ROOMS = 11, 20, ("hbm", "contact", "linalg")
 

@@ -20,7 +20,7 @@ from functools import partial
 from typing import Any
 
 from upd.analyses.forced.interface_model import INTERFACE
-from upd.analyses.seated.ladders import PATCH
+from upd.analyses.seated.varied import PATCH
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import ForcedScene
