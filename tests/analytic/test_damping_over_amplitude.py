@@ -119,7 +119,8 @@ def test_a_run_leaves_curves_chart_and_table(
     tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # what a run makes of the rig solved above
-    known = replace(forced.ANALYSIS, solve=lambda *_: solved())
+    problem = replace(forced.ANALYSIS.problem, solve=lambda *_: solved())
+    known = replace(forced.ANALYSIS, problem=problem)
     monkeypatch.setattr("upd.runner.analysis_of", lambda scene: known)
     result = upd.run("asymmetric-response", overrides=RIG, out=tmp_path / "run", report=False)
     assert (tmp_path / "run" / "nonlinear_modes.png").stat().st_size > 0

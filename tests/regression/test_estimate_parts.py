@@ -86,7 +86,7 @@ def rows(name: str) -> list[list[Any]]:
         + [
             item
             for part in one.parts
-            for item in (part.source, part.as_dict()["error"], _told(part.basis))
+            for item in (part.source, part.error if part.known else None, _told(part.basis))
         ]
         for one in upd.run(scene, overrides=overrides).results
         if one.parts

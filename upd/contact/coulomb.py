@@ -177,7 +177,7 @@ class Coulomb(CoulombConditions):
             best = answer if best is None or answer.residual < best.residual else best
             if answer.converged:
                 best = answer
-                if answer.residual <= fine:
+                if answer.residual <= fine or self.pressed is not None:
                     break
             rows = self._rows(at)
             if hold and rows.relaxed.all():
@@ -238,7 +238,7 @@ class Coulomb(CoulombConditions):
 
         Its residual is judged as that of every answer.
         """
-        if start is None or step.load is None:
+        if start is None or step.load is None or self.pressed is not None:
             return None
         before = self.B.T @ start.f
         size = float(before @ before)

@@ -20,8 +20,6 @@ BoolArray = NDArray[np.bool_]
 NOT_CARRIED = "nothing touches and carries the load"
 #: A product of a matrix with a vector waits for memory and costs so much more, for weighing only.
 _PASS = 10.0
-#: Operations that a factor takes in the time of the many small calls of a step by another's factor.
-_CALLS = 1e7
 #: Refinements behind the factor of C; each gains the digits that its condition leaves.
 _REFINED = 2
 
@@ -109,8 +107,8 @@ class ClosedSystem:
 
     @property
     def dear(self) -> bool:
-        """Whether another factor costs more than a step by this one."""
-        return self.q**3 / 3.0 > _PASS * len(self.of.C) ** 2 + _CALLS
+        """Whether another factor costs more than a product with all of C."""
+        return self.q**3 / 3.0 > _PASS * len(self.of.C) ** 2
 
     def turned(self, right: FloatArray) -> FloatArray:
         """Q of the closed rows (q,) or (q, columns), in place."""

@@ -15,6 +15,7 @@ from upd.plot.chart import Entry
 from upd.report.tables import budget_table, error_parts
 from upd.results import Case, ErrorPart, InputPart, Result, with_parts
 from upd.scene import as_scene, load_scene
+from upd.vary.solve import changed
 
 pytestmark = pytest.mark.estimated
 
@@ -132,7 +133,7 @@ def test_an_accuracy_is_reached_on_the_cheapest_level() -> None:
 
 def _levels(scene: Any) -> list[Any]:
     (mesh,) = choices(scene)
-    return [mesh.at(scene, k) for k in range(len(mesh.labels))]
+    return [changed(scene, mesh.at(scene, k)) for k in range(len(mesh.labels))]
 
 
 def test_levels_of_a_flat_contact_have_twenty_nodes() -> None:

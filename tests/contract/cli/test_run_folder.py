@@ -281,13 +281,15 @@ def test_numbers_that_are_none_are_withheld_and_null(
 
     from upd.analyses.contact import ANALYSES
 
-    real = ANALYSES["hertz"].make_results
+    hertz = ANALYSES["hertz"]
+    real = hertz.problem.make_results
 
     def infinite(solution: Any) -> list[Any]:
         first, *rest = real(solution)
         return [replace(first, value=float("inf")), *rest]
 
-    monkeypatch.setitem(ANALYSES, "hertz", replace(ANALYSES["hertz"], make_results=infinite))
+    problem = replace(hertz.problem, make_results=infinite)
+    monkeypatch.setitem(ANALYSES, "hertz", replace(hertz, problem=problem))
     found = run("hertz", overrides=TINY, out=tmp_path / "run", report=False)
     assert found.results[0].withheld
     assert found.status.startswith("ok with warnings")

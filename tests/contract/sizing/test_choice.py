@@ -122,8 +122,7 @@ def test_what_is_told(found: BestDamper, tmp_path: Path) -> None:
 
 
 def test_what_an_optimum_has_in_the_others_place_may_be_unknown(found: BestDamper) -> None:
-    lost = replace(found, robust_at_nominal=math.nan, nominal_at_worst=math.nan)
-    told = replace(found, found=lost)
+    told = replace(found, robust_at_nominal=math.nan, nominal_at_worst=math.nan)
     assert str(told).count("not known") == 2
     assert "nan" not in str(told).lower()
     assert "NaN" not in json.dumps(told.as_dict())
