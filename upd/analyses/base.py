@@ -123,10 +123,13 @@ class Resolved:
         )
 
 
-def conditions(case: Case, remedy: str, *rows: tuple[str, float, float, str]) -> list[Check]:
+def conditions(
+    case: Case, remedy: str, *rows: tuple[str, float, float, str], fatal: bool = True
+) -> list[Check]:
     """Self-checks of a case with one remedy: name, value, limit and what is compared."""
     return [
-        Check(name, case, float(value), limit, what, remedy) for name, value, limit, what in rows
+        Check(name, case, float(value), limit, what, remedy, fatal=fatal)
+        for name, value, limit, what in rows
     ]
 
 

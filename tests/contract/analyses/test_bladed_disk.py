@@ -108,10 +108,13 @@ def test_damped_response_lies_below_the_free_one(monkeypatch: pytest.MonkeyPatch
     assert checks["energy balance"].passed
     assert checks["path complete"].passed and checks["contact settled"].passed
     assert 0.0 < checks["contact settled"].value < 0.01
+    assert checks["omitted harmonics"].passed
     spoiled = found._replace(answer=replace(found.answer, status="stopped"))
+    few = replace(whole.plan.scene, response=replace(whole.plan.scene.response, harmonics=2))
+    plan = replace(whole.plan, scene=few)
     monkeypatch.setattr(marches, "MOST_PERIODS", 1)
-    checks = {c.name: c for c in output.check_solution(replace(whole, wave=spoiled))}
-    for name in ("path complete", "contact settled"):
+    checks = {c.name: c for c in output.check_solution(replace(whole, plan=plan, wave=spoiled))}
+    for name in ("omitted harmonics", "path complete", "contact settled"):
         assert not checks[name].passed
 
 
