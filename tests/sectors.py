@@ -64,15 +64,17 @@ def with_contacts(mesh: Mesh) -> Mesh:
     return Mesh(mesh.points, mesh.hexes, mesh.faces, {**mesh.nodes, **sets})
 
 
-def model_of(mesh: Mesh, n_sectors: int, *, rotating: bool = False) -> CyclicModel:
-    """Of steel, hex20."""
+def model_of(
+    mesh: Mesh, n_sectors: int, *, rotating: bool = False, element: str = "hex20"
+) -> CyclicModel:
+    """Of steel."""
     sector = Sector.of(mesh, n_sectors)
-    K, M = stiffness(mesh, STEEL, "hex20"), mass(mesh, STEEL)
+    K, M = stiffness(mesh, STEEL, element), mass(mesh, STEEL)
     model = CyclicModel.of(sector, K, M)
     if not rotating:
         return model
     u = model.static(centrifugal_load(mesh, M))
-    return CyclicModel.of(sector, K, M, stress_stiffness(mesh, STEEL, u, "hex20") - plane_mass(M))
+    return CyclicModel.of(sector, K, M, stress_stiffness(mesh, STEEL, u, element) - plane_mass(M))
 
 
 def whole_ring(mesh: Mesh, n_sectors: int) -> tuple[Mesh, FloatArray]:

@@ -10,6 +10,8 @@ from upd.fem import ELEMENTS, Material, box_mesh, mass, stiffness, traction_weig
 from upd.mesh import Mesh
 
 STEEL = Material(200e3, 0.3)
+#: those that may stand in one row
+FULL = tuple(name for name in ELEMENTS if name != "hex20r")
 
 
 def solve(
@@ -25,7 +27,7 @@ def solve(
 
 
 def nodes_per_hex(element: str) -> int:
-    return int(element[3:].rstrip("i"))
+    return int(element[3:].rstrip("ir"))
 
 
 def tip_deflection_ratio(element: str, material: Material, n: tuple[int, int, int]) -> float:
@@ -107,13 +109,14 @@ def bore_displacement_ratio(element: str, nu: float) -> float:
     return float((u[bore, :2] * radial[bore]).sum(axis=1).mean() / exact)
 
 
-@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("element", FULL)
 def test_thick_cylinder_follows_lame(element: str) -> None:
     assert bore_displacement_ratio(element, 0.3) == pytest.approx(1.0, abs=0.01)
 
 
 @pytest.mark.parametrize(
-    ("element", "nu"), [("hex8i", 0.499), ("hex8i", 0.4999), ("hex20", 0.499), ("hex27", 0.499)]
+    ("element", "nu"),
+    [("hex8i", 0.499), ("hex8i", 0.4999), ("hex20", 0.499), ("hex20r", 0.499), ("hex27", 0.499)],
 )
 def test_thick_cylinder_near_incompressibility_does_not_lock(element: str, nu: float) -> None:
     assert bore_displacement_ratio(element, nu) == pytest.approx(1.0, abs=0.01)
@@ -124,7 +127,7 @@ def test_thick_cylinder_of_hex8_locks_near_incompressibility() -> None:
     assert bore_displacement_ratio("hex8", 0.4999) < 0.2
 
 
-@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("element", FULL)
 @pytest.mark.parametrize("aspect", [1.0, 100.0])
 def test_axial_stiffness_of_a_bar_is_EA_over_L(element: str, aspect: float) -> None:
     n, side = 3, 1.0

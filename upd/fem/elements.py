@@ -17,9 +17,13 @@ from skfem.mapping import MappingIsoparametric
 
 from upd.errors import InputError, MeshError
 from upd.mesh import FloatArray, IntArray, Mesh
+from upd.mesh.hexmesh import free_sides
 
 #: names accepted wherever an element is asked for
-ELEMENTS = ("hex8", "hex8i", "hex20", "hex27")
+ELEMENTS = ("hex8", "hex8i", "hex20", "hex20r", "hex27")
+
+#: opposite sides of a hexahedron, S1 ... S6 from 0
+_OPPOSITE = ((0, 1), (2, 4), (3, 5))
 
 #: VTK node positions on the unit cube: corners, mid-edges, face centres (-x, +x, -y, +y, -z, +z),
 #: centre
@@ -199,6 +203,7 @@ _TABLE = {
     "hex8": HexElement("hex8", 8, ElementHex1, 2),
     "hex8i": HexElement("hex8i", 8, ElementHex1, 2, incompatible=True),
     "hex20": HexElement("hex20", 20, ElementHexS2, 3),
+    "hex20r": HexElement("hex20r", 20, ElementHexS2, 2),
     "hex27": HexElement("hex27", 27, ElementHex2, 3),
 }
 
@@ -221,7 +226,8 @@ def hex_element(name: str | None, mesh: Mesh) -> HexElement:
     InputError
         When the name is unknown or the mesh has another number of nodes per hexahedron.
     MeshError
-        When hexahedra name nodes that are not there, or nodes belong to no hexahedron.
+        When hexahedra name nodes that are not there, or nodes belong to no hexahedron; when one of
+        hex20r hangs on a neighbour, or on two opposite ones, alone.
     """
     width = mesh.hexes.shape[1]
     if name is None:
@@ -238,6 +244,8 @@ def hex_element(name: str | None, mesh: Mesh) -> HexElement:
             f"{width}: use {fitting}."
         )
     _check_nodes(mesh)
+    if name == "hex20r":
+        _check_neighbours(mesh)
     return element
 
 
@@ -256,6 +264,23 @@ def _check_nodes(mesh: Mesh) -> None:
         raise MeshError(
             f"{unused.size} of {mesh.n_node} nodes belong to no hexahedron (first: node "
             f"{unused[0]}): drop them and renumber."
+        )
+
+
+def _check_neighbours(mesh: Mesh) -> None:
+    """Raises MeshError where 2 x 2 x 2 points leave a motion without stiffness.
+
+    One hexahedron has six of them; neighbours in two directions suppress them, a row of single
+    hexahedra passes one on, even from a clamped end.
+    """
+    shared = ~free_sides(mesh)
+    directions = sum(shared[:, pair].any(axis=1).astype(int) for pair in _OPPOSITE)
+    weak = np.flatnonzero(directions < 2)
+    if weak.size:
+        raise MeshError(
+            f"{weak.size} hexahedra have neighbours in one direction at most (first: hexahedron "
+            f"{weak[0]}), where hex20r has motions without stiffness: take hex20, or two elements "
+            "across."
         )
 
 

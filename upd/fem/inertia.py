@@ -277,7 +277,7 @@ def stress_stiffness(mesh: Mesh, material: Material, u: FloatArray, element: str
     material : Material
     u : (3 n,) ndarray
         Displacements that the linear stresses sigma come from, mm.
-    element : {"hex8", "hex20", "hex27"}
+    element : {"hex8", "hex20", "hex20r", "hex27"}
 
     Returns
     -------
@@ -308,7 +308,7 @@ def displaced_stiffness(mesh: Mesh, material: Material, u: FloatArray, element: 
     material : Material
     u : (3 n,) ndarray
         Static displacements, mm.
-    element : {"hex8", "hex20", "hex27"}
+    element : {"hex8", "hex20", "hex20r", "hex27"}
 
     Returns
     -------
@@ -349,7 +349,9 @@ def _assembled(mesh: Mesh, u: FloatArray, name: str, size: int, of: _Element) ->
     """Matrix of element matrices that depend on the gradient of a displacement."""
     element = hex_element(name, mesh)
     if element.incompatible:
-        raise InputError("rotation: element hex8i is not available: use hex8, hex20 or hex27.")
+        raise InputError(
+            "rotation: element hex8i is not available: use hex8, hex20, hex20r or hex27."
+        )
     maker = BasisMaker(mesh, element)
     pattern = _Pattern.of(maker.nodes, mesh.n_node)
     data = np.zeros(size**2 * pattern.nodes.nnz)

@@ -126,19 +126,19 @@ def boundary_faces(mesh: Mesh) -> IntArray:
     The ring first, seen from outside counter-clockwise, then mid-edges, then the centre.
     """
     size = FACE_SIZE[mesh.hexes.shape[1]]
-    faces = mesh.hexes[:, SIDE_NODES[:, :size]].reshape(-1, size)
-    return np.asarray(faces[_alone(faces[:, :4])], dtype=np.int64)
+    faces = mesh.hexes[:, SIDE_NODES[:, :size]]
+    return np.asarray(faces[free_sides(mesh)], dtype=np.int64)
 
 
-def _alone(quads: IntArray) -> NDArray[np.bool_]:
-    """Which quadrilaterals (n, 4) have their corners to themselves."""
-    corners = np.sort(quads, axis=1)
+def free_sides(mesh: Mesh) -> NDArray[np.bool_]:
+    """Which sides S1 ... S6 of each hexahedron belong to no other, (n_hex, 6)."""
+    corners = np.sort(mesh.hexes[:, SIDES].reshape(-1, 4), axis=1)
     order = np.lexsort(corners.T)
     same = (corners[order[1:]] == corners[order[:-1]]).all(axis=1)
-    alone = np.ones(len(quads), dtype=bool)
+    alone = np.ones(len(corners), dtype=bool)
     alone[order[1:][same]] = False
     alone[order[:-1][same]] = False
-    return alone
+    return alone.reshape(-1, 6)
 
 
 def owners(mesh: Mesh, faces: IntArray, place: str) -> IntArray:

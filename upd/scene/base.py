@@ -52,14 +52,15 @@ class MeshChoice(Table):
     ----------
     element
         Hexahedron: 8 nodes ("hex8"; "hex8i" with incompatible modes, which bends without locking),
-        20 ("hex20") or 27 ("hex27"). Cost: hex20 and hex27 take four to eight times the dofs of
-        the 8-node elements on the same divisions.
+        20 ("hex20"; "hex20r" with reduced integration, which does not lock in thin bodies and needs
+        two elements across) or 27 ("hex27"). Cost: 20 and 27 nodes take four to eight times the
+        dofs of the 8-node elements on the same divisions.
     symmetry
         Part of the model that is solved; "auto" uses the mirror planes that geometry, load and
         effects share. Cost: each mirror plane halves the dofs.
     """
 
-    element: Literal["hex8", "hex8i", "hex20", "hex27"] = "hex8i"
+    element: Literal["hex8", "hex8i", "hex20", "hex20r", "hex27"] = "hex8i"
     symmetry: Literal["auto", "full", "half", "quarter"] = "auto"
 
 

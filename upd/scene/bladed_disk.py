@@ -159,7 +159,7 @@ class BladedDiskScene(SceneBase):
     def problems(self) -> Iterator[str]:
         """What does not fit together."""
         if self.mesh.element == "hex8i":
-            yield 'mesh.element: hex8i has no stress stiffness; use "hex20", "hex27" or "hex8"'
+            yield 'mesh.element: hex8i has no stress stiffness; use "hex20", "hex20r" or "hex27"'
         if self.mesh.symmetry not in ("auto", "full"):
             yield 'mesh.symmetry: a sector has no mirror plane; use "full" or "auto"'
         if self.material.yield_stress is not None:

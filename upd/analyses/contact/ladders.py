@@ -13,6 +13,7 @@ from upd.analyses.base import Plan
 from upd.analyses.contact.bodies import held_sets
 from upd.analyses.contact.plan import is_curved
 from upd.analyses.contact.varied import PROBLEM, edge_of, governing, level_geometry
+from upd.analyses.cost import NODES
 from upd.linalg import select
 from upd.mesh import recipes
 from upd.scene import Scene
@@ -115,7 +116,7 @@ def _solvers(plan: Plan[Any], levels: Sequence[int]) -> list[Variation]:
 def _on_mesh(
     source: str, element: str, divisions: int, plan: Plan[Any], *extra: tuple[str, Any]
 ) -> Variation:
-    per_edge = 2 if element in ("hex20", "hex27") else 1
+    per_edge = 2 if NODES[element] > 8 else 1
     own = level_geometry(plan.parameters, divisions, per_edge=per_edge)
     label = f"{own.get('divisions_long', divisions)} x {divisions}"
     overrides = (*of_geometry(own), ("mesh.element", element), *extra)

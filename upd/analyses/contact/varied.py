@@ -38,6 +38,7 @@ from upd.analyses.contact.results import make_results
 from upd.analyses.contact.scene_plan import make_plan
 from upd.analyses.contact.solution import ContactSolution, NormalCase
 from upd.analyses.contact.solve import solve_normal, solve_plan, solve_tangential
+from upd.analyses.cost import NODES
 from upd.errors import InputError, UpdError
 from upd.mesh import recipes
 from upd.progress import Stages
@@ -235,7 +236,7 @@ def _curved_level(scene: Scene, nodes: float) -> Overrides:
     if scene.geometry.get("patch", "auto") != "auto":
         patch = min(patch, float(scene.geometry["patch"]))
     divisions = 2 * math.ceil(0.5 * patch / radius * nodes)
-    if scene.mesh.element in ("hex20", "hex27"):
+    if NODES[scene.mesh.element] > 8:
         divisions = 2 * math.ceil(divisions / 4)
     geometry: dict[str, Any] = {"patch": patch, "divisions": max(4, divisions)}
     if recipes.has_parameter(scene.recipe, "growth"):

@@ -47,6 +47,7 @@ _REFINE: Mapping[str, tuple[float, ...]] = {
     "hex8": (0.5, 1, 2, 3),
     "hex8i": (0.5, 1, 2, 3),
     "hex20": (0.5, 1, 2),
+    "hex20r": (0.5, 1, 2),
     "hex27": (0.5, 1),
 }
 #: Gauss points where a scene has lattice lines

@@ -27,7 +27,7 @@ KEPT = "modes kept"
 #: times the elements along an edge, and numbers of modes kept, of an accuracy
 _FINER, _MODES = (1, 2, 3), (5, 10, 20, 40)
 #: elements with nodes between the corners, and the spacing of nodes without these over that with
-_QUADRATIC, _BETWEEN = ("hex20", "hex27"), 2.0
+_QUADRATIC, _BETWEEN = ("hex20", "hex20r", "hex27"), 2.0
 #: outputs a companion has, where the run has them: the reduced model has the mesh of the full one
 _WANTED = ("free", "glued", "response")
 
