@@ -68,11 +68,12 @@ def test_rotation_stiffens(disk: solve.BladedDiskSolution) -> None:
 
 
 def test_reduced_integration_is_nearer_to_a_finer_mesh(disk: solve.BladedDiskSolution) -> None:
-    reduced = solved(**{"mesh.element": "hex20r", "want": ["campbell"]})
-    finer = {"geometry.disk_layers": 6, "geometry.blade_layers": 10, "geometry.axial": 4}
-    fine = solved(**{"want": ["campbell"], **finer})
-    full, few = (abs(d.at_speed / fine.at_speed - 1.0).max() for d in (disk, reduced))
-    assert few < 0.002 < 0.012 < full
+    quick = {"want": ["modes"], "modes.computed": 2}
+    reduced = solved(**{"mesh.element": "hex20r", **quick})
+    finer = {"geometry.disk_layers": 6, "geometry.blade_layers": 10, "geometry.axial": 3}
+    fine = solved(**{**finer, **quick})
+    full, few = (abs(d.at_rest[0] / fine.at_rest[0] - 1.0).max() for d in (disk, reduced))
+    assert few < full / 3.0
 
 
 def test_numbers_and_arrays(disk: solve.BladedDiskSolution) -> None:
