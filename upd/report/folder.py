@@ -52,6 +52,7 @@ FIGURES = (
     "modes_free",
     "modes_glued",
     "dimensions",
+    "nodal_diameters",
     "campbell",
     "interference",
 )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import upd
 import upd.hbm.springs.checks as marches
 from upd.analyses import make_plan
 from upd.analyses.bladed_disk import charts, output, solve
@@ -125,6 +127,15 @@ def test_damped_response_lies_below_the_free_one(monkeypatch: pytest.MonkeyPatch
     checks = {c.name: c for c in output.check_solution(replace(whole, plan=plan, wave=spoiled))}
     for name in ("omitted harmonics", "path complete", "contact settled"):
         assert not checks[name].passed
+
+
+def test_a_run_replaces_an_earlier_one(tmp_path: Path) -> None:
+    geometry = {**SMALL["geometry"], "disk_layers": 1, "blade_layers": 2, "axial": 1}
+    quick = {**SMALL, "left_out": {"solve": "no"}, "geometry": geometry}
+    for _ in range(2):
+        upd.run(quick, out=tmp_path / "run")
+    written = {path.name for path in (tmp_path / "run").iterdir()}
+    assert {"mesh.vtu", "nodal_diameters.png", "campbell.png", "interference.png"} <= written
 
 
 @pytest.mark.parametrize(

@@ -265,4 +265,4 @@ def write_files(solution: BladedDiskSolution, folder: Path) -> None:
         # meshio is slow to import
         from upd.mesh.export import write_mesh
 
-        write_mesh({"sector": solution.sector.mesh}, folder / "sector.vtu")
+        write_mesh({"sector": solution.sector.mesh}, folder / "mesh.vtu")
