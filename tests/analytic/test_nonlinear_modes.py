@@ -4,6 +4,7 @@ shooting, forced peaks against harmonic balance, the Jacobian by differences.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,16 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+import upd.hbm.springs.nonlinear_mode as nonlinear_modes
 from upd.errors import InputError
-from upd.hbm import NonlinearMode, contacts, frequency_response, nonlinear_mode
+from upd.hbm import (
+    NonlinearMode,
+    Path,
+    Settings,
+    contacts,
+    frequency_response,
+    nonlinear_mode,
+)
 from upd.hbm.springs.coulomb import LIFT, SLIP, STICK
 from upd.hbm.springs.nonlinear_mode import ExtendedBalance, stuck_modes
 from upd.hbm.springs.response import GivenSystem
@@ -150,6 +159,28 @@ def test_best_preload_of_the_benchmark_is_that_of_curves() -> None:
     factor, worst = mode.best_preload(FORCE, Y2)
     assert factor == pytest.approx(0.41, rel=0.05)
     assert worst == pytest.approx(3.98e-5, rel=0.05)
+
+
+def test_a_path_that_stops_is_taken_up_with_shorter_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    amplitudes = X_C * np.geomspace(0.5, 50.0, 9)
+    whole, steps, follow = jenkins(amplitudes), [], nonlinear_modes.follow
+
+    def closed(*args: Any, settings: Settings, **options: Any) -> Path:
+        path = follow(*args, settings=settings, **options)
+        steps.append(settings.angle)
+        if len(steps) > 1:
+            return path
+        # beyond the fifth amplitude, as where it crosses to a closed path
+        end = int(np.argmax(path.p > np.log(amplitudes[4]))) + 1
+        return replace(path, x=path.x[:end], p=path.p[:end], status="stopped", message="closed")
+
+    monkeypatch.setattr(nonlinear_modes, "follow", closed)
+    found = jenkins(amplitudes)
+    assert found.status == "complete" and found.message.startswith("closed; taken up")
+    assert steps == [0.35, 0.175] and len(found.amplitude) > len(whole.amplitude)
+    assert (np.diff(found.amplitude) > 0.0).all()
+    for a in amplitudes:
+        assert at(found, a) == pytest.approx(at(whole, a), rel=1e-9)
 
 
 def test_amplitude_turns_back_under_lift_off() -> None:

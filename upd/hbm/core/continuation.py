@@ -40,6 +40,8 @@ log = logging.getLogger(__name__)
 Status = Literal["complete", "stopped", "step limit"]
 #: growth of the solution while p stands still that is taken for one without bound
 UNBOUNDED = 10.0
+#: points without a wanted value after which one of the path's own is hit when it comes there again
+PROBE = 100
 #: how far the corrector may move from the predicted point, in steps: farther away lies another
 #: piece of the path
 STRAY = 2.0
@@ -110,8 +112,8 @@ def follow(
     """Path from a solved point to a value of the parameter.
 
     A failed corrector shortens the step; when that ends, the path so far comes back with status
-    "stopped". So does one that comes to a solution at a wanted value a second time: it is closed,
-    or runs back on itself, and does not arrive.
+    "stopped". So does one that comes to a solution a second time, at a wanted value or one of its
+    own every `PROBE` points: it is closed, or runs back on itself, and does not arrive.
 
     Parameters
     ----------
@@ -140,7 +142,7 @@ def follow(
     problem = PathProblem(function, scale, p_scale, s)
     state = start if isinstance(start, State) else begin(problem, *start, end)
     marks = np.unique(np.append(np.asarray([] if wanted is None else wanted, dtype=float), end))
-    rest = 0
+    rest = latest = 0
     xs, ps = [state.x], [state.p]
     passed: dict[float, list[FloatArray]] = {float(mark): [] for mark in marks}
     status: Status = "stopped"
@@ -165,6 +167,11 @@ def follow(
             )
             break
         left = rest == len(ps)
+        if found.p in passed:
+            latest = len(ps)
+        elif len(ps) - latest >= PROBE:
+            marks, latest = np.union1d(marks, found.p), len(ps)
+            passed[found.p] = []
         xs.append(found.x)
         ps.append(found.p)
         there = passed.get(found.p, [])

@@ -17,7 +17,8 @@ concept, Computers and Structures 154 (2015) 59.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +26,7 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import eigh
 
 from upd.errors import InputError
-from upd.hbm.core.continuation import follow
+from upd.hbm.core.continuation import Path, follow
 from upd.hbm.core.fourier import harmonics as harmonics_of
 from upd.hbm.core.fourier import to_complex
 from upd.hbm.core.newton import PathProblem, Settings
@@ -43,6 +44,8 @@ FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 #: halvings of the first amplitude in search of one at which the mode is found
 HALVINGS = 40
+#: share of the angle between tangents with which a path that stopped is taken up
+SHORTER = 0.5
 #: points of a forced response for each of the path
 FINE = 50
 #: peaks from which the best preload is read, and places at which it is sought
@@ -333,15 +336,7 @@ def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearM
             f"nonlinear_mode: mode {mode} near {omega / (2.0 * np.pi):.6g} Hz is not found at any "
             f"amplitude below {np.exp(wanted[0]):.3g}: do the contacts carry a load at rest?"
         )
-    path = follow(
-        of.function,
-        (first.x, float(begin)),
-        float(wanted[-1]),
-        scale=of.scale,
-        p_scale=1.0,
-        wanted=wanted,
-        settings=s,
-    )
+    path = _over(of, first.x, float(begin), wanted, s)
     # an amplitude below those asked for was only where the path began
     kept = int(np.argmax(np.append(path.p >= wanted[0], True)))
     xs, ps = path.x[kept:], path.p[kept:]
@@ -363,6 +358,28 @@ def _along(b: Balance, mode: int, wanted: FloatArray, s: Settings) -> NonlinearM
         stuck=stuck,
         stuck_omega=omegas_stuck,
         number=number,
+    )
+
+
+def _over(
+    of: ExtendedBalance, x: FloatArray, begin: float, wanted: FloatArray, s: Settings
+) -> Path:
+    """The path over log a; one that stops is taken up with shorter steps at the last value wanted
+    that it reached: long ones may cross from it to a closed one beside it.
+    """
+    along = partial(follow, of.function, scale=of.scale, p_scale=1.0, wanted=wanted)
+    path = along((x, begin), float(wanted[-1]), settings=s)
+    reached = wanted[wanted <= path.p.max()]
+    if path.status != "stopped" or not len(reached):
+        return path
+    kept = int(np.argmax(path.p >= reached[-1]))
+    shorter = replace(s, angle=SHORTER * s.angle, kink_step=SHORTER**2 * s.kink_step)
+    rest = along((path.x[kept], float(path.p[kept])), float(wanted[-1]), settings=shorter)
+    return replace(
+        rest,
+        x=np.concatenate([path.x[:kept], rest.x]),
+        p=np.concatenate([path.p[:kept], rest.p]),
+        message=f"{path.message}; taken up with shorter steps: {rest.message}",
     )
 
 
