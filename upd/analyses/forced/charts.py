@@ -196,31 +196,15 @@ def loss_chart(curves: Sequence[ChartedCurve]) -> Chart:
 
 def motion_chart(curve: ChartedCurve, kind: int) -> Chart:
     """The damper's degrees of freedom over frequency: amplitudes of the first harmonic."""
-    name, unit, scale, first, _ = MOTIONS[kind]
+    name, unit, scale, first, names = MOTIONS[kind]
     amplitude = scale * curve.data("damper_amplitude")[:, first : first + 3].T
     axes = HZ_AXIS, Axis(f"{name}, first harmonic", unit)
-    traces = _motions(kind, curve.frequency, amplitude, amplitude.max(axis=1))
+    # those that symmetry forbids are rounding
+    size = amplitude.max(axis=1)
+    shown = np.flatnonzero(size > np.sqrt(np.finfo(float).eps) * size.max())
+    traces = tuple(Trace(names[k], curve.frequency, amplitude[k], "line", int(k)) for k in shown)
     title, case = f"Damper motion: {name}", curve.case.label
     return _sheet("damper_motion", title, axes, traces=traces, case=case)
-
-
-def turn_chart(at: ChartedPeak, kind: int) -> Chart:
-    """The damper's degrees of freedom over a period at a peak, about their means."""
-    name, unit, scale, first, _ = MOTIONS[kind]
-    motion = scale * at.curve.data("damper_motion")[at.index, first : first + 3]
-    motion = motion - motion.mean(axis=1, keepdims=True)
-    turn = np.arange(1, motion.shape[1] + 1) / motion.shape[1]
-    axes = Axis("time in periods", low=0.0, high=1.0), Axis(f"{name} about its mean", unit)
-    traces = _motions(kind, turn, motion, np.abs(motion).max(axis=1))
-    title = f"Damper motion over a period: {name}"
-    given = {"traces": traces, "case": at.case.label, "detail": at.detail}
-    return _sheet("damper_period", title, axes, **given)
-
-
-def _motions(kind: int, x: Array, values: Array, size: Array) -> tuple[Trace, ...]:
-    """Three motions of one kind; those that symmetry forbids are rounding."""
-    shown = np.flatnonzero(size > np.sqrt(np.finfo(float).eps) * size.max())
-    return tuple(Trace(MOTIONS[kind][-1][k], x, values[k], "line", int(k)) for k in shown)
 
 
 _STAR = 5
@@ -322,12 +306,6 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
             motion_chart(c, k)
             for c in shown
             if "damper_amplitude" in c.group
-            for k in range(len(MOTIONS))
-        ),
-        *(
-            turn_chart(one, k)
-            for one in peaks
-            if "damper_motion" in one.curve.group
             for k in range(len(MOTIONS))
         ),
     ]

@@ -308,13 +308,6 @@ def in_faces(position: Array, face: IntArray, frames: Iterable[Array]) -> tuple[
     return along, up
 
 
-def power(answer: FrequencyResponse) -> Array:
-    """Friction power of every contact point along the path, (n, n_point) in W: loop area per cycle
-    in N mm times frequency.
-    """
-    return np.asarray(answer.energy * answer.frequency[:, None] * _M)
-
-
 def damper_motion(answer: FrequencyResponse, model: Model) -> tuple[Array, Array]:
     """Motion of the damper's six dofs along the path.
 
@@ -329,26 +322,13 @@ def damper_motion(answer: FrequencyResponse, model: Model) -> tuple[Array, Array
     return static.copy(), np.hypot(q[:, :, first], q[:, :, first + 1])
 
 
-def rest_error(answer: FrequencyResponse, model: Model) -> float:
-    """Largest misfit along the path of the mean contact forces on the damper against F_C, relative
-    to it (moments by the damper's arms).
-    """
-    if not len(answer.frequency) or not answer.harmonics.static:
-        return 0.0
-    return _off_balance(model, answer.contact_force[..., 0])
-
-
 def static_error(model: Model) -> float:
     """Largest misfit of the points' static forces and moments on the damper against F_C, relative
     to it (moments by the damper's arms).
     """
-    return _off_balance(model, np.column_stack([model.contacts.law.preload, model.traction])[None])
-
-
-def _off_balance(model: Model, force: Array) -> float:
-    """Of contact forces (n, n_point, 1 + d) on the damper against F_C."""
-    rows = model.damper_rows[:, : force.shape[2]]
-    total = np.einsum("pdr,npd->nr", rows, force)
+    force = np.column_stack([model.contacts.law.preload, model.traction])
+    rows = model.damper_rows[:, : force.shape[1]]
+    total = np.einsum("pdr,pd->r", rows, force)
     rotation = np.array(model.damper.kept) >= 3
     arm = np.sqrt(float((rows[:, :, rotation] ** 2).sum(axis=(1, 2)).max()))
     size = float(np.linalg.norm(model.damper.force))

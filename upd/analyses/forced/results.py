@@ -12,12 +12,12 @@ import numpy as np
 from upd.analyses import base, measured
 from upd.analyses.forced import measures
 from upd.analyses.forced.again import limit_results, peak_results
-from upd.analyses.forced.curves import ForcedCurve, PointCurve, faces_accelerance, limit_balance
+from upd.analyses.forced.curves import ForcedCurve, faces_accelerance, limit_balance
 from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.model import Array, ComplexArray, Model
+from upd.analyses.forced.model import Array, ComplexArray
 from upd.analyses.forced.performance import mode_results, performance_results
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
-from upd.analyses.forced.solve import ContactPlaces, ForcedSolution, MarchedPeak, marched_damper
+from upd.analyses.forced.solve import ContactPlaces, ForcedSolution, marched_damper
 from upd.analyses.forced.statics import StaticState
 from upd.analyses.measured import FREE, STUCK, Computed
 from upd.analyses.seated.results import RIGID
@@ -29,7 +29,6 @@ from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result
 from upd.results import quantities as q
 from upd.results.quantities import quantity_of
-from upd.scene import ForcedScene
 from upd.scene.forced_contact import SIDES, Side
 from upd.scene.measured import MeasuredChoice
 
@@ -204,19 +203,41 @@ def curve_results(solution: ForcedSolution, curve: ForcedCurve[Any]) -> list[Res
     return results
 
 
-def _at_peak(solution: ForcedSolution, curve: ForcedCurve[Any], peak: CurvePeak) -> list[Result]:
-    """The contact at a peak: of points, of the last period of a sweep, or of the whole contact."""
-    at, i = replace(curve.case, peak=peak.number, mode=peak.mode), peak.sample
-    if isinstance(curve.answer, FrequencyResponse):
-        return _at_point(solution, curve, solution.models[curve.stiffness], at, i)
-    marched = [one for one in solution.marched if one.case == at]
-    if marched:
-        return _at_marched(solution, marched[0])
-    lift, stick, slip = curve.answer.share[i]
-    return [
-        *(one.of(value, at) for one, value in zip(q.SHARES, (stick, slip, lift), strict=True)),
-        q.FRICTION_ENERGY.of(curve.answer.energy[i, 2], at),
-    ]
+def _at_peak(
+    solution: ForcedSolution, curve: ForcedCurve[Any], peak: CurvePeak
+) -> Iterator[Result]:
+    """The contact at a peak, its losses and the damper's motion: of a path by the balance, of the
+    last period of a sweep; of the whole contact where only that is known.
+    """
+    scene, answer, i = solution.plan.scene, curve.answer, peak.sample
+    at = replace(curve.case, peak=peak.number, mode=peak.mode)
+    marched = next((one for one in solution.marched if one.case == at), None)
+    if isinstance(answer, FrequencyResponse):
+        model = solution.models[curve.stiffness]
+        normal = answer.contact_force[i, :, 0, 0]
+        for k, side in enumerate(SIDES):
+            yield q.STATIC_NORMAL.of(normal[model.face == k].sum(), replace(at, side=side))
+        state, energy = answer.state[i], float(answer.energy[i].sum())
+        motion = [of[i] for of in measures.damper_motion(answer, model)]
+    elif marched is not None:
+        state, energy = marched.period.share, marched.period.energy
+        motion = list(marched_damper(solution, marched))
+    else:
+        for of, value in zip(q.SHARES, np.roll(answer.share[i], -1), strict=True):
+            yield of.of(value, at)
+        yield q.FRICTION_ENERGY.of(answer.energy[i, 2], at)
+        return
+    yield from _shares(at, state, solution.places(curve.stiffness))
+    yield q.CONTACT_SLIP.of(state[:, 1].mean(), at)
+    yield q.CONTACT_LIFT.of(state[:, 2].mean(), at)
+    yield q.FRICTION_ENERGY.of(energy, at)
+    if scene.wants("contact_state"):
+        # Their mean traction remembers where the sliders began.
+        yield q.POINTS_ALWAYS_STUCK.of((state[:, 0] == 1.0).sum(), at)
+    if scene.wants("hysteresis"):
+        yield q.FRICTION_POWER.of(energy * curve.frequency[i], at)
+    if scene.wants("damper_motion"):
+        yield from motion_results(at, *motion)
 
 
 def _folds(curve: ForcedCurve[Any]) -> Iterator[Result]:
@@ -280,44 +301,6 @@ def _reduction(solution: ForcedSolution, curve: ForcedCurve[Any], blade: Side) -
     return [quantity.of(1.0 - highest / top, case)]
 
 
-def _at_point(
-    solution: ForcedSolution, curve: PointCurve, model: Model, at: Case, i: int
-) -> list[Result]:
-    """Contact state, losses and damper motion at point i of the path."""
-    scene, answer = solution.plan.scene, curve.answer
-    mean, normal = answer.state[i].mean(axis=0), answer.contact_force[i, :, 0, 0]
-    results = [
-        *(
-            q.STATIC_NORMAL.of(normal[model.face == k].sum(), replace(at, side=side))
-            for k, side in enumerate(SIDES)
-        ),
-        *_shares(at, answer.state[i], solution.places(curve.stiffness)),
-        q.CONTACT_SLIP.of(mean[1], at),
-        q.CONTACT_LIFT.of(mean[2], at),
-        *_losses(
-            scene,
-            at,
-            answer.state[i],
-            float(answer.energy[i].sum()),
-            1e3 * float(measures.power(answer)[i].sum()),
-        ),
-    ]
-    if scene.wants("damper_motion"):
-        results += motion_results(at, *(of[i] for of in measures.damper_motion(answer, model)))
-    return results
-
-
-def _at_marched(solution: ForcedSolution, one: MarchedPeak) -> list[Result]:
-    """Contact state of each face, loss and damper motion at a peak of a sweep."""
-    scene, at, energy = solution.plan.scene, one.case, one.period.energy
-    results = list(_losses(scene, at, one.period.share, energy, energy * one.frequency))
-    if scene.wants("contact_state"):
-        results += _shares(at, one.period.share, one.places)
-    if scene.wants("damper_motion"):
-        results += motion_results(at, *marched_damper(solution, one))
-    return results
-
-
 def _shares(at: Case, state: Array, places: ContactPlaces) -> Iterator[Result]:
     """Shares of the cycle of each face, from those (n_point, 3) of its points."""
     for side, share in zip(
@@ -325,18 +308,6 @@ def _shares(at: Case, state: Array, places: ContactPlaces) -> Iterator[Result]:
     ):
         for quantity, value in zip(q.SHARES, share, strict=True):
             yield quantity.of(value, replace(at, side=side))
-
-
-def _losses(
-    scene: ForcedScene, at: Case, state: Array, energy: float, power: float
-) -> Iterator[Result]:
-    """Loss of all points, N mm and mW, and how many of them stick all the time."""
-    yield q.FRICTION_ENERGY.of(energy, at)
-    if scene.wants("contact_state"):
-        # Their mean traction remembers where the sliders began.
-        yield q.POINTS_ALWAYS_STUCK.of((state[:, 0] == 1.0).sum(), at)
-    if scene.wants("hysteresis"):
-        yield q.FRICTION_POWER.of(power, at)
 
 
 # -- numbers of peaks and of the damper's motion ---------------------------------------------------

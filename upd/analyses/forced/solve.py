@@ -93,7 +93,6 @@ log = logging.getLogger(__name__)
 _MODULES = ("upd.analyses.forced.inputs", "upd.analyses.forced.performance")
 #: other starts of the sliders of a band
 STARTS = ("mid", "upper", "lower")
-_TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
@@ -141,14 +140,6 @@ class MarchedPeak:
     def case(self) -> Case:
         """What its numbers belong to."""
         return replace(self.sweep.case, peak=self.peak.number, mode=self.peak.mode)
-
-    @property
-    def off(self) -> float:
-        """Of the losses of all nodes from that of the sweep at this point, over the work of the
-        excitation and all losses there.
-        """
-        own = self.sweep.answer.energy[self.peak.sample]
-        return abs(self.period.energy - float(own[2])) / max(float(np.abs(own).sum()), _TINY)
 
 
 @dataclass
