@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
 from upd.analyses.forced.curves import (
+    Limit,
     Top,
     fine_grid,
-    limit_balance,
-    limit_peaks,
+    point_limit,
     stuck_frequency,
 )
 from upd.analyses.forced.measures import CANDIDATES, CurvePeak, StuckMode, numbered_peaks
@@ -316,11 +316,13 @@ class LimitNumbers:
 
     def __init__(self, plan: ForcedPlan, model: Model) -> None:
         self.plan, self.model = plan, model
-        self._peaks: dict[tuple[str, Side], list[CurvePeak]] = {}
+        self._limits: dict[bool, Limit] = {}
 
-    @cached_property
-    def _balance(self) -> Balance:
-        return limit_balance(self.plan, self.model)
+    def limit(self, stuck: bool) -> Limit:
+        """Free or stuck."""
+        if stuck not in self._limits:
+            self._limits[stuck] = point_limit(self.plan, self.model, stuck)
+        return self._limits[stuck]
 
     @cached_property
     def _modes(self) -> list[StuckMode]:
@@ -344,20 +346,13 @@ class LimitNumbers:
                 )
             return found
         kind, side, number, what = PEAK_NUMBERS[of]
-        if (kind, side) not in self._peaks:
-            given = self.plan, self.model, self._balance, grid(self.plan)
-            self._peaks[kind, side] = limit_peaks(*given, side, kind == "stuck")
-        peak = next((p for p in self._peaks[kind, side] if p.number == number), None)
+        peaks = self.limit(kind == "stuck").peaks(side, grid(self.plan))
+        peak = next((p for p in peaks if p.number == number), None)
         if peak is None:
             raise ConvergenceError(
                 f"{of}: no such peak between {e.start:g} and {e.stop:g} Hz, the ends of the sweep"
             )
         return _told(peak, what)
-
-    def curve(self, side: Side, stuck: bool, frequency: Array) -> ComplexArray:
-        """Accelerance (k,) of a blade, (m/s2)/N at (k,) Hz."""
-        force, row = self.plan.scene.damper.centrifugal, self.model.row(side)
-        return measures.linear_accelerance(self._balance, row, force, frequency, stuck)
 
 
 class CurveWithFriction(NamedTuple):
@@ -396,7 +391,7 @@ class CurveWithFriction(NamedTuple):
             )
         if self.peaks:
             # as fine as its peaks need
-            over = np.unique(np.concatenate([fine_grid(plan, model, force), over]))
+            over = np.unique(np.concatenate([fine_grid(plan, model), over]))
         answer = respond(plan, model, force, over)
         tops: dict[PeakKey, Top | ConvergenceError] = {}
         for key in self.peaks:
@@ -564,7 +559,7 @@ class FitResponses:
             for curve in self.targets.curves:
                 of = curve.curve
                 if of.force_ratio is None:
-                    H = limits.curve(of.blade, of.state == "stuck", of.frequency)
+                    H = limits.limit(of.state == "stuck").accelerance(of.blade, of.frequency)
                 else:
                     over = next(c.frequencies for c in self.friction if c.ratio == of.force_ratio)
                     at = np.searchsorted(over, of.frequency)

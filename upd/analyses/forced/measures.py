@@ -129,36 +129,6 @@ def accelerance_of(
     return np.asarray(-((2.0 * np.pi * harmonic * frequency) ** 2) * _M / force * moved)
 
 
-def linear_accelerance(
-    b: Balance,
-    row: Array,
-    force: float,
-    frequency: Array,
-    stuck: bool,
-) -> ComplexArray:
-    """Accelerance without contacts or with all points stuck, in the lowest harmonic excited.
-
-    Parameters
-    ----------
-    row
-        (n_dof,) output.
-    force
-        Its excitation, N.
-    frequency
-        (n,) Hz.
-    stuck
-        All points closed and sticking; else without contacts.
-
-    Returns
-    -------
-    ComplexArray
-        (n,) in (m/s2)/N.
-    """
-    k = read_harmonic(b)
-    moved = b.linear_displacement(2.0 * np.pi * frequency, stuck, k) @ row
-    return accelerance_of(moved, frequency, k, force)
-
-
 class CurvePeak(NamedTuple):
     """A peak of a curve: frequency in Hz, height, and the point of the path next to it.
 
@@ -591,32 +561,3 @@ def in_quadrature(model: Model, motion: ComplexArray) -> NDArray[np.bool_]:
     """
     driven = motion[:, : len(model.force)] @ model.force.conj()
     return np.asarray(np.abs(driven.imag) >= np.abs(driven.real))
-
-
-def stuck_motion(model: Model, frequency: Array) -> ComplexArray:
-    """Amplitudes (m, n_dof) of all dofs with every point stuck, mm per newton of F_E, in the lowest
-    harmonic that is excited.
-    """
-    M, C, K, _ = model.linear(stuck=True)
-    force = np.concatenate([model.force, np.zeros(len(M) - len(model.force))])
-    omega = 2.0 * np.pi * model.excitation.lowest * np.asarray(frequency)
-    return np.array([np.linalg.solve(K + 1j * w * C - w**2 * M, force) for w in omega])
-
-
-def unmoved(peaks: Sequence[CurvePeak]) -> list[CurvePeak]:
-    """Peaks of a curve of no stuck mode, numbered by frequency."""
-    return [peak._replace(number=k) for k, peak in enumerate(peaks, 1)]
-
-
-def tell_stuck_peaks(model: Model, peaks: Sequence[CurvePeak], stop: float) -> list[CurvePeak]:
-    """Peaks of a stuck curve by the numbers of their modes.
-
-    Parameters
-    ----------
-    stop
-        End of the sweep, Hz.
-    """
-    if not peaks:
-        return []
-    motion = stuck_motion(model, np.array([one.frequency for one in peaks]))
-    return numbered(mode_shapes(model, CANDIDATES * stop), peaks, motion)

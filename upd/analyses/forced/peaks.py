@@ -73,7 +73,7 @@ def solve_curve(
         Of the contact stiffness; F_C/F_E.
     """
     begin, force = time.perf_counter(), plan.scene.damper.centrifugal / ratio
-    answer = respond(plan, model, force, fine_grid(plan, model, force))
+    answer = respond(plan, model, force, fine_grid(plan, model))
     H = {
         k: {side: measures.accelerance(answer, model.row(side), force, k) for side in SIDES}
         for k in model.excitation.harmonics

@@ -124,7 +124,7 @@ def peaks_at(
     """
     force, e = plan.scene.damper.centrifugal / ratio, plan.scene
     span = np.linspace(e.excitation.start, e.excitation.stop, SWEEP_POINTS)
-    sweep = fine_grid(plan, model, force, span)
+    sweep = fine_grid(plan, model, span)
     settings = replace(LONG_STEPS, most_points=MOST_PATH_POINTS)
     b = balance_of(plan, model, force, range(harmonics + 1), start=start)
     found: dict[tuple[Side, int], CurvePeak] = {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -12,9 +12,9 @@ import numpy as np
 from upd.analyses import base, measured
 from upd.analyses.forced import measures
 from upd.analyses.forced.again import limit_results, peak_results
-from upd.analyses.forced.curves import ForcedCurve, faces_accelerance, limit_balance
+from upd.analyses.forced.curves import ForcedCurve, Limit, faces_limit, point_limit
 from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.model import Array, ComplexArray
+from upd.analyses.forced.model import Array
 from upd.analyses.forced.performance import mode_results, performance_results
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
 from upd.analyses.forced.solve import ContactPlaces, ForcedSolution, marched_damper
@@ -126,7 +126,8 @@ def _computed(solution: ForcedSolution, choice: MeasuredChoice) -> Iterator[Comp
             told = (linear.stuck_peaks if stuck else linear.free_peaks)[side]
             case = Case(stiffness=name, kind=choice.state, blade=side)
             band = (scene.excitation.start, scene.excitation.stop)
-            yield Computed(case, band, _linear_at(solution, name, side, stuck), told)
+            read = partial(_limit(solution, name, stuck).accelerance, side)
+            yield Computed(case, band, read, told)
         return
     # as the labels of curves tell them apart
     wanted = f"{choice.centrifugal_to_force:.6g}"
@@ -135,17 +136,12 @@ def _computed(solution: ForcedSolution, choice: MeasuredChoice) -> Iterator[Comp
             yield _with_friction(c, side)
 
 
-def _linear_at(
-    solution: ForcedSolution, name: str, side: Side, stuck: bool
-) -> Callable[[Array], ComplexArray]:
-    """Accelerance of a blade free or stuck, exact at any frequency."""
+def _limit(solution: ForcedSolution, name: str, stuck: bool) -> Limit:
+    """Blades free or stuck, exact at any frequency."""
+    plan, e = solution.plan, solution.plan.scene.excitation
     if name in solution.faces:
-        excitation = excitation_of(solution.plan.scene.excitation)
-        march = solution.faces[name].march
-        return partial(faces_accelerance, march, excitation, side, stuck=stuck)
-    model, plan = solution.models[name], solution.plan
-    problem, row, force = limit_balance(plan, model), model.row(side), plan.scene.damper.centrifugal
-    return partial(measures.linear_accelerance, problem, row, force, stuck=stuck)
+        return faces_limit(solution.faces[name].march, excitation_of(e), e.stop, stuck)
+    return point_limit(plan, solution.models[name], stuck)
 
 
 def _with_friction(c: ForcedCurve[Any], side: Side) -> Computed:

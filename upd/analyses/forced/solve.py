@@ -29,8 +29,9 @@ from upd.analyses.forced.curves import (
     SweptCurve,
     balance_curve,
     both_ways,
+    faces_limit,
+    linear_curves,
     linear_of,
-    linear_of_faces,
 )
 from upd.analyses.forced.inputs import (
     along_changes,
@@ -299,7 +300,10 @@ def _whole_faces(solution: ForcedSolution, stages: Stages) -> None:
     faces = make_whole_faces(plan, solution.bodies, stages)
     solution.faces[INTERFACE] = faces
     with stages("free and stuck", f"{faces.of.n} nodes"):
-        solution.linear[INTERFACE] = linear_of_faces(plan, faces.march)
+        e = plan.scene.excitation
+        given = faces.march, excitation_of(e), e.stop
+        limits = (faces_limit(*given, stuck) for stuck in (False, True))
+        solution.linear[INTERFACE] = linear_curves(plan, *limits)
     if plan.scene.balance.method == "march":
         _sweep(solution, INTERFACE, faces.march, faces.start, stages)
         return
