@@ -28,11 +28,9 @@ from upd.analyses.forced.again import (
     RECIPE,
     SAMPLES,
     TIME,
-    Change,
     changed_results,
     graded,
     lines_named,
-    run_curve,
     samples,
     with_gauss,
 )
@@ -43,7 +41,7 @@ from upd.results import Case, ErrorPart, Estimates, Result
 from upd.results import quantities as q
 from upd.results.quantities import Quantity, quantity_of
 from upd.scene import ForcedScene
-from upd.scene.forced_contact import GAUSS, SIDES, Side
+from upd.scene.forced_contact import GAUSS, Side
 from upd.vary.orders import observed_order, two_level_error
 from upd.vary.solve import changed
 from upd.vary.variation import (
@@ -147,13 +145,12 @@ def _integrated(solution: ForcedSolution) -> Iterator[SolvedVariation]:
     """The next motion towards a top, which leaves, as a level of the highest that stays."""
     of = Variation(TIME, "the next motion towards the top, which leaves")
     for curve in solution.curves:
-        changes: dict[tuple[Side, int], Change] = {}
-        for one in (one for one in curve.checked if not one.at_top):
+        found = list[Result]()
+        for one in {one.number: one for one in curve.checked if not one.at_top}.values():
             why = "" if one.stays else "no motion near it is stable"
-            change = Change(1.0 + one.apart, 1.0 + one.step, why)
-            changes |= {(side, one.number): change for side in SIDES}
-        if changes:
-            yield SolvedVariation(of, list(changed_results(run_curve(curve), changes)))
+            found += changed_results(curve, one.number, 1.0 + one.apart, 1.0 + one.step, why)
+        if found:
+            yield SolvedVariation(of, found)
 
 
 def _parts(levels: Sequence[SolvedVariation], key: Key, own: float) -> Iterator[ErrorPart]:

@@ -377,7 +377,7 @@ def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: St
     plan, bodies = solution.plan, solution.bodies
     assert bodies is not None
     scene, names = plan.scene, list(solution.models)
-    variants: dict[str, list[Variant]] = {name: [] for name in names}
+    variants: dict[str, list[Variant | SolvedVariation]] = {name: [] for name in names}
     points: list[RatioPoint] = []
     work: list[_Work] = []
     for name in names if scene.estimates else ():
@@ -426,7 +426,7 @@ def _mode_work(solution: ForcedSolution) -> Iterator[_Work]:
 
 def _around(
     solution: ForcedSolution,
-    variants: Mapping[str, Sequence[Variant]],
+    variants: Mapping[str, Sequence[Variant | SolvedVariation]],
     points: Sequence[RatioPoint],
     beside: SideProcesses,
 ) -> None:
