@@ -30,7 +30,7 @@ from scipy.linalg import eigh
 from upd.analyses.base import Plan
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.plan import ForcedPlan, excitation_of, time_steps
-from upd.analyses.forced.statics import GIVEN, SEATED, StaticState
+from upd.analyses.forced.statics import GIVEN, SEATED, StaticState, point_preload
 from upd.analyses.seated.bodies import Blade, Bodies, lattice, patch_frame
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.contact import CoupledContact
@@ -74,7 +74,7 @@ def make_whole_faces(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> WholeF
             centrifugal=F,
             damping=scene.excitation.damping,
             excited=excitation_of(scene.excitation).blades,
-            seen=SEEN * scene.excitation.stop,
+            kept_modes=(MODES, SEEN * scene.excitation.stop),
         )
         # every mode is of one blade, those of the left one first
         on = np.repeat(np.eye(len(SIDES)), len(made.frequency) // len(SIDES), axis=0)
@@ -143,9 +143,8 @@ def make_interface_model(
     friction: float,
     centrifugal: float,
     damping: float,
-    n_modes: int = MODES,
     excited: Sequence[Side] = ("right",),
-    seen: float = 0.0,
+    kept_modes: tuple[int, float] = (MODES, 0.0),
 ) -> InterfaceModel:
     """Blades in their free-interface modes and what those leave of the static compliance.
 
@@ -164,12 +163,10 @@ def make_interface_model(
         F_C on the whole, N.
     damping
         Of all modes, ratio to critical.
-    n_modes
-        Of each blade.
     excited
         Blades with a force.
-    seen
-        Hz; modes below are outputs.
+    kept_modes
+        How many of each blade, and Hz below which they are outputs.
 
     Raises
     ------
@@ -184,7 +181,7 @@ def make_interface_model(
         raise InputError(
             "contact.model: the faces belong to other meshes: make them of these bodies"
         )
-    solver = plan.scene.solver.name
+    solver, (n_modes, seen) = plan.scene.solver.name, kept_modes
     parts = in_parallel([partial(_part, b, n_modes, solver) for b in blades], plan.workers)
     both = _side_by_side(parts, interface, excited, seen)
     Phi, frequency = both["shapes"], both["frequency"]
@@ -308,21 +305,21 @@ def worn_start(
         )
     load = np.zeros(len(kept))
     load[kept.index(2)] = centrifugal / interface.copies
-    B = interface.columns[:n] + traction * interface.columns[2 * n :]
-    A = B.T * np.sqrt(interface.area)
-    # rows of forces and of moments differ by a length
-    size = np.linalg.norm(A, axis=1)
-    eps = np.sqrt(np.finfo(float).eps)
-    used = size > eps * np.where(np.array(kept) < 3, size[0], size.max())
-    x = np.linalg.lstsq(A[used] / size[used, None], load[used] / size[used], rcond=eps)[0]
-    normal = np.sqrt(interface.area) * x
-    off = np.abs(B.T @ normal - load)[used] / size[used]
-    if off.max() > eps * np.abs(load[used] / size[used]).max() or normal.min() < 0.0:
+    both, columns = np.ones(len(SIDES)), interface.columns
+    normal, held = point_preload(
+        columns[:n],
+        columns[2 * n :],
+        interface.face,
+        interface.area,
+        StaticState(f"T/N {traction:g}", both, traction * both),
+        load,
+    )
+    if normal.min() <= 0.0:
         raise InputError(
             f"contact.static: pressure on the whole of both faces with T/N {traction:g} cannot "
             "hold this damper against F_C; take another T/N, or seat it"
         )
-    force = np.stack([normal, np.zeros(n), traction * normal], axis=1)
+    force = np.stack([normal, np.zeros(n), held], axis=1)
     w = -(interface.compliance @ force.T.ravel()).reshape(3, n)
     made = replace(model, gap=w[0])
     still = np.zeros(len(kept))
