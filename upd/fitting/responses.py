@@ -32,7 +32,7 @@ from upd.analyses.forced.curves import (
 )
 from upd.analyses.forced.measures import CANDIDATES, CurvePeak, StuckMode, numbered_peaks
 from upd.analyses.forced.model import Model, balance_of, make_model, quiet, respond
-from upd.analyses.forced.peaks import top_from
+from upd.analyses.forced.peaks import climbed
 from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.analyses.forced.statics import face_laws
 from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
@@ -427,7 +427,7 @@ class CurveWithFriction(NamedTuple):
             raise ConvergenceError(f"{name}: no such peak on the curve ({answer.message})")
         f = float(answer.frequency[peak.sample])
         x = newton(b, answer.x[peak.sample], f)
-        top = None if x is None else top_from(model, b, x, f, side, force)
+        top = None if x is None else climbed(model, b, x, f, side, force)
         if top is None:
             raise ConvergenceError(f"{name}: the peak at {peak.frequency:.6g} Hz was not climbed")
         return top

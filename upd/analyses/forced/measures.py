@@ -65,14 +65,10 @@ class Loop:
     energy: float
 
 
-def read_place(b: Balance) -> int:
-    """Place of the lowest harmonic that is excited, among those above 0."""
-    return int(np.flatnonzero(np.any(b.dynamic != 0.0, axis=1))[0])
-
-
 def read_harmonic(b: Balance) -> int:
     """Number of the lowest harmonic that is excited."""
-    return int(b.harmonics.dynamic[read_place(b)])
+    excited = np.any(b.dynamic != 0.0, axis=1)
+    return int(b.harmonics.dynamic[np.flatnonzero(excited)[0]])
 
 
 def accelerance(
@@ -287,8 +283,9 @@ def damper_motion(answer: FrequencyResponse, model: Model) -> tuple[Array, Array
         (n, 6) mean, and amplitude of the lowest harmonic that is excited, mm and rad.
     """
     q = model.damper_dofs(answer.coefficients)
-    first = answer.harmonics.offset + 2 * read_place(answer.balance)
-    static = q[:, :, 0] if answer.harmonics.static else np.zeros(q.shape[:2])
+    h = answer.harmonics
+    first = h.offset + 2 * h.place(read_harmonic(answer.balance))
+    static = q[:, :, 0] if h.static else np.zeros(q.shape[:2])
     return static.copy(), np.hypot(q[:, :, first], q[:, :, first + 1])
 
 
@@ -533,7 +530,7 @@ def numbered(
 
 def first_harmonic(answer: FrequencyResponse, points: NDArray[np.int64]) -> ComplexArray:
     """Amplitudes (m, n_dof) of all dofs at some points of a path, lowest harmonic excited, mm."""
-    j = read_place(answer.balance)
+    j = answer.harmonics.place(read_harmonic(answer.balance))
     found = [to_complex(answer.coefficients[i], answer.harmonics)[:, j] for i in points]
     return np.asarray(found)
 

@@ -126,7 +126,7 @@ def climbed(
     frequency: float,
     side: Side,
     force: float,
-    about: CurvePeak | Top,
+    about: CurvePeak | Top | None = None,
     reach: float = FIRST_REACH,
 ) -> Top | None:
     """The top of the accelerance of a blade uphill from a solved point; None where none is near.
@@ -136,31 +136,17 @@ def climbed(
     b, x, frequency
         The problem, its unknowns there, Hz.
     about
-        The peak that is looked for.
+        The peak that is looked for; any when None.
     reach
         First step along the path.
     """
-    top = top_from(model, b, x, frequency, side, force, reach)
-    if top is None or not is_near(top.frequency / about.frequency, top.height / about.height):
-        return None
-    return top
-
-
-def top_from(
-    model: Model,
-    b: Balance,
-    x: Array,
-    frequency: float,
-    side: Side,
-    force: float,
-    reach: float = FIRST_REACH,
-) -> Top | None:
-    """The top uphill from a solved point, as `climbed`, wherever it is."""
     k = model.excitation.lowest
     top = climb(b, model.row(side), x, frequency, reach, harmonic=k, power=2)
     if not top.found:
         return None
     height = 1e-3 * (2.0 * np.pi * k * top.frequency) ** 2 * top.amplitude / force
+    if about and not is_near(top.frequency / about.frequency, height / about.height):
+        return None
     slips = bool((b.period(top.x).state != STICK).any())
     return Top(top.frequency, float(height), top.x, slips)
 
