@@ -68,9 +68,10 @@ class ChartedCurve:
         return frequency_of(self.group)
 
     @property
-    def slips(self) -> bool:
-        """Whether a contact point slips anywhere on it."""
-        return bool(self.data("state")[..., SLIP_SHARE].max() > 0.0)
+    def rank(self) -> tuple[bool, float]:
+        """Curves on which a contact point slips come first, by rising F_C/F_E."""
+        slips = self.data("state")[..., SLIP_SHARE].max() > 0.0
+        return not slips, float(self.case.force_ratio or 0.0)
 
     @property
     def moves(self) -> bool:
@@ -268,7 +269,7 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
         for some in (groups, others)
     )
     # the page opens on the lowest F_C/F_E on which something slips
-    shown, shown_recorded = (sorted(some, key=_rank) for some in (curves, recorded))
+    shown, shown_recorded = (sorted(some, key=lambda c: c.rank) for some in (curves, recorded))
     peaks = [
         one for c in (*shown, *shown_recorded) if "peak" in c.group for one in charted_peaks(c)
     ]
@@ -309,11 +310,6 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
             for k in range(len(MOTIONS))
         ),
     ]
-
-
-def _rank(curve: ChartedCurve) -> tuple[bool, float]:
-    """Curves on which something slips first, by rising F_C/F_E."""
-    return not curve.slips, float(curve.case.force_ratio or 0.0)
 
 
 def _responses(

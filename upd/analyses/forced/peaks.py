@@ -215,20 +215,9 @@ class _Steady(NamedTuple):
     state: InterfaceState
 
 
-class _Reached(NamedTuple):
-    """The last motion that stays on a way up to a top.
-
-    Attributes
-    ----------
-    sample, beyond
-        Its place on the path, and the next one towards the top.
-    heights
-        As of `_Steady`.
-    """
-
-    sample: int
-    beyond: int
-    heights: Array
+#: the last motion that stays on a way up to a top: its place on the path, the next one towards the
+#: top, heights as of `_Steady`
+_Reached = tuple[int, int, Array]
 
 
 def _confirmed(
@@ -256,10 +245,9 @@ def _confirmed(
     if peak.number not in motions:
         found = (_highest(integrate, curve, way) for way in _downhill(curve, size, peak.sample))
         motions[peak.number] = [one for one in found if one is not None]
-    for one in motions[peak.number]:
-        balance, integrated = (float(height) for height in one.heights[:, k])
+    for i, beyond, heights in motions[peak.number]:
+        balance, integrated = (float(height) for height in heights[:, k])
         if not best.stays or integrated > best.integrated:
-            i, beyond = one.sample, one.beyond
             best = replace(
                 best,
                 frequency=float(f[i]),
@@ -296,7 +284,7 @@ def _highest(
         if further is None or np.linalg.norm(further.heights[1]) < np.linalg.norm(kept.heights[1]):
             break
         high, kept = k, further
-    return _Reached(way[high], way[max(high - 1, 0)], kept.heights)
+    return way[high], way[max(high - 1, 0)], kept.heights
 
 
 def _downhill(curve: PointCurve, size: Array, top: int) -> list[list[int]]:

@@ -185,7 +185,7 @@ def curve_results(solution: ForcedSolution, curve: ForcedCurve[Any]) -> list[Res
             one
             for blade in SIDES[::-1]
             for peak in curve.peaks.get(blade, ())
-            for one in _peak(case, peak, blade)
+            for one in peak_results(case, peak, blade)
         ),
         *_not_reached(solution, curve),
         *(r for blade in SIDES[::-1] for r in _reduction(solution, curve, blade)),
@@ -195,6 +195,7 @@ def curve_results(solution: ForcedSolution, curve: ForcedCurve[Any]) -> list[Res
     if isinstance(curve.answer, InterfaceResponse):
         results.append(q.PATH_JUMPS.of(len(curve.answer.jumps), case))
     for peak in curve.peaks.get("right", ()):
+        results.append(q.PEAK_MAC.of(peak.mac, replace(case, mode=peak.mode), n=peak.number))
         results += _at_peak(solution, curve, peak)
     return results
 
@@ -307,13 +308,6 @@ def _shares(at: Case, state: Array, places: ContactPlaces) -> Iterator[Result]:
 
 
 # -- numbers of peaks and of the damper's motion ---------------------------------------------------
-
-
-def _peak(case: Case, peak: CurvePeak, blade: Side) -> Iterator[Result]:
-    """A numbered peak with friction."""
-    yield from peak_results(case, peak, blade)
-    if blade == "right":
-        yield q.PEAK_MAC.of(peak.mac, replace(case, mode=peak.mode), n=peak.number)
 
 
 def _with_measured_peaks(solution: ForcedSolution, results: Sequence[Result]) -> list[Result]:

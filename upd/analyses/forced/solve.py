@@ -74,7 +74,7 @@ from upd.analyses.forced.plan import (
     ForcedPlan,
     excitation_of,
 )
-from upd.analyses.forced.statics import admissible, face_laws, same
+from upd.analyses.forced.statics import admissible, face_laws
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import InputError, UpdError, one_line
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
@@ -481,7 +481,7 @@ def _band(solution: ForcedSolution, name: str) -> Iterator[_Work]:
     choices: list[tuple[str, Model, str | None]] = []
     if model.state is not None:
         for state in admissible(plan, bodies, Stages()):
-            if not same(state, model.state, scene.damper.centrifugal):
+            if not state.same(model.state):
                 try:
                     choices.append((f"static {state.name}", preloaded(model, state), None))
                 except InputError as error:

@@ -253,6 +253,11 @@ class StaticState:
         """Faces that carry nothing: they just touch."""
         return [side for side, N in zip(SIDES, self.N, strict=True) if N == 0.0]
 
+    def same(self, other: StaticState) -> bool:
+        """Whether another state has the same forces, to what the balance is checked to."""
+        off = np.abs([self.N - other.N, self.T - other.T]).max()
+        return bool(off <= BALANCE * np.abs(self.N).sum())
+
 
 def face_frames(bodies: Bodies) -> Array:
     """(2, 3, 3) of each face, unit rows: normal into the blade, along the damper, up the slope."""
@@ -320,13 +325,6 @@ def admissible(plan: Plan[ForcedScene], bodies: Bodies, stages: Stages) -> list[
             continue
         out.append(state)
     return out
-
-
-def same(a: StaticState, b: StaticState, F: float) -> bool:
-    """Whether two states have the same forces, to the share of F_C to which the balance is
-    checked.
-    """
-    return bool(np.abs(np.concatenate([a.N - b.N, a.T - b.T])).max() <= BALANCE * F)
 
 
 def imbalance(frames: Array, F: float, N: Array, T: Array) -> float:
