@@ -14,7 +14,6 @@ from rigs import LINES
 
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import again as solved_again
-from upd.analyses.forced import solve as solving
 from upd.analyses.forced.accuracy import bound, estimate
 from upd.analyses.forced.again import (
     HARMONICS,
@@ -331,7 +330,7 @@ def test_a_wanted_accuracy_unknown_solves_no_level(monkeypatch: pytest.MonkeyPat
         raise AssertionError("solved")
 
     for name in ("level_variations", "make_variant", "solve_again"):
-        monkeypatch.setattr(solving, name, never)
+        monkeypatch.setattr(solved_again, name, never)
     plan = make_plan(load_scene("symmetric-response", RIG))
     assert plan.estimate_seconds > 0.0
     plan = make_plan(load_scene("symmetric-response", RIG | {"accuracy": "unknown"}))

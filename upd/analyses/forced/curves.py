@@ -30,19 +30,7 @@ from upd.analyses.forced.interface_model import (
     WholeFaces,
     by_coulomb,
 )
-from upd.analyses.forced.measures import (
-    CANDIDATES,
-    PEAKS_ABOVE,
-    Array,
-    ComplexArray,
-    CurvePeak,
-    ModeShapes,
-    StuckMode,
-    accelerance_of,
-    chosen_peaks,
-    numbered,
-    path_maxima,
-)
+from upd.analyses.forced.measures import Array, ComplexArray, CurvePeak, ModeShapes, StuckMode
 from upd.analyses.forced.model import Model, balance_of
 from upd.analyses.forced.plan import (
     SAMPLES,
@@ -382,7 +370,7 @@ def exact_peaks(response: Callable[[Array], ComplexArray], f: Array, grid: Array
         for at, top in found
         if top >= measures.PEAKS_ABOVE * highest
     ]
-    return chosen_peaks(peaks)
+    return measures.chosen_peaks(peaks)
 
 
 def _top(response: Callable[[Array], ComplexArray], low: float, high: float) -> tuple[float, float]:
@@ -427,7 +415,9 @@ class Limit(NamedTuple):
 
     def accelerance(self, side: Side, f: Array) -> ComplexArray:
         """(n,) (m/s2)/N of a blade at (n,) Hz."""
-        return accelerance_of(self.moved(f) @ self.rows[side], f, self.harmonic, self.force)
+        return measures.accelerance_of(
+            self.moved(f) @ self.rows[side], f, self.harmonic, self.force
+        )
 
     def peaks(self, side: Side, grid: Array) -> Peaks:
         """At most the two highest of a blade within (n,) Hz, rising, numbered; none of one at
@@ -440,7 +430,7 @@ class Limit(NamedTuple):
         if self.shapes is None or not found:
             return [peak._replace(number=k) for k, peak in enumerate(found, 1)]
         motion = self.moved(np.array([one.frequency for one in found]))
-        return numbered(self.shapes, found, motion[:, -len(self.shapes.M) :])
+        return measures.numbered(self.shapes, found, motion[:, -len(self.shapes.M) :])
 
 
 def point_limit(plan: ForcedPlan, model: Model, stuck: bool) -> Limit:
@@ -456,7 +446,7 @@ def point_limit(plan: ForcedPlan, model: Model, stuck: bool) -> Limit:
         lambda f: b.linear_displacement(2.0 * np.pi * f, stuck, k),
         {side: model.row(side) for side in SIDES},
         SIDES if stuck else model.excitation.free_blades,
-        measures.mode_shapes(model, CANDIDATES * e.stop) if stuck else None,
+        measures.mode_shapes(model, measures.CANDIDATES * e.stop) if stuck else None,
     )
 
 
@@ -473,7 +463,7 @@ def faces_limit(march: InterfaceModel, excitation: Excitation, stop: float, stuc
         lambda f: march.linear_response(k * f, excitation.read, stuck=stuck),
         dict(zip(SIDES, outputs, strict=False)),
         SIDES if stuck else excitation.free_blades,
-        stuck_modes_of(march, CANDIDATES * stop) if stuck else None,
+        stuck_modes_of(march, measures.CANDIDATES * stop) if stuck else None,
     )
 
 
@@ -611,7 +601,7 @@ def both_ways(
             curve = ForcedCurve(
                 name, ratio, force, {}, {}, {}, found, float(found.seconds.sum()), way
             )
-            maxima = partial(path_maxima, between=False)
+            maxima = partial(measures.path_maxima, between=False)
             out.append(with_outputs(plan, march, curve, moved, maxima))
     return out
 
@@ -635,9 +625,9 @@ def with_outputs(
         Frequencies and heights along the curve -> its local maxima.
     """
     excitation, stop = excitation_of(plan.scene.excitation), plan.scene.excitation.stop
-    modes, f = stuck_modes_of(march, CANDIDATES * stop), curve.frequency
+    modes, f = stuck_modes_of(march, measures.CANDIDATES * stop), curve.frequency
     blades: dict[int, dict[Side, ComplexArray]] = {
-        k: {s: accelerance_of(u[:, j], f, k, curve.force) for j, s in enumerate(SIDES)}
+        k: {s: measures.accelerance_of(u[:, j], f, k, curve.force) for j, s in enumerate(SIDES)}
         for k, u in moved.items()
     }
     read, peaks = blades.pop(excitation.lowest), dict[Side, tuple[CurvePeak, ...]]()
@@ -645,7 +635,7 @@ def with_outputs(
         found = maxima(f, np.abs(read[side]))
         at = np.array([one.sample for one in found], int)
         motion = moved[excitation.lowest][at, len(SIDES) :]
-        peaks[side] = tuple(numbered(modes, found, motion))
+        peaks[side] = tuple(measures.numbered(modes, found, motion))
     return replace(curve, accelerance=read, more=blades, peaks=peaks)
 
 
@@ -682,9 +672,9 @@ def _maxima(jumps: Sequence[int], frequency: Array, size: Array) -> list[CurvePe
     out, begin = [], 0
     for end in (*(i + 1 for i in jumps), len(size)):
         f, a = frequency[begin:end], size[begin:end]
-        out += [one._replace(sample=one.sample + begin) for one in path_maxima(f, a, 0.0)]
+        out += [one._replace(sample=one.sample + begin) for one in measures.path_maxima(f, a, 0.0)]
         for i, inner, jumped in ((0, 1, begin > 0), (len(a) - 1, len(a) - 2, end < len(size))):
             if jumped and (len(a) == 1 or a[i] > a[inner]):
                 out.append(CurvePeak(float(f[i]), float(a[i]), begin + i))
         begin = end
-    return [one for one in out if one.height >= PEAKS_ABOVE * size.max()]
+    return [one for one in out if one.height >= measures.PEAKS_ABOVE * size.max()]
