@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 from upd.analyses.forced.interface_model import INTERFACE
 from upd.analyses.seated.varied import PATCH
@@ -33,8 +32,8 @@ from upd.vary.ladder import (
     counts,
     even,
     finest_report,
-    no_levels,
     refinements,
+    whole_levels,
 )
 from upd.vary.outcome import SolvedPoint
 from upd.vary.variation import Overrides, Variation, of_geometry
@@ -49,35 +48,19 @@ _REFINE: Mapping[str, tuple[float, ...]] = {
     "hex20": (0.5, 1, 2),
     "hex27": (0.5, 1),
 }
-#: Gauss points where a scene has lattice lines
-_GAUSS_POINTS: Overrides = (
-    ("contact.rule", GAUSS),
-    ("contact.share", "area"),
-    *((f"contact.{face}rows", 4) for face in ("", "left.", "right.")),
-    *((f"contact.{face}columns", 2) for face in ("", "left.", "right.")),
-)
+#: rows of Gauss points on the ladder of contact points, and on every mesh of a scene that has
+#: lattice lines
+_ROWS, _ON_MESHES = (2, 3, 5, 7, 10), 4
 
 
-#: choices of contact points on the symmetric patch of 5 x 11 lattice lines, and on the asymmetric
-#: faces of 4 rows; the whole face last
-_SYMMETRIC: tuple[tuple[str, Any, Any], ...] = (
-    ("row 2", [2], 3),
-    ("rows 0-1, 2 spots", [0, 1], [1, 9]),
-    ("rows 0-1", [0, 1], 3),
-    ("rows 1-2, 2 spots", [1, 2], [1, 9]),
-    ("rows 1-2", [1, 2], 3),
-    ("rows 0-2", [0, 1, 2], 3),
-    ("all rows, 2 spots", "all", [1, 9]),
-    ("all rows", "all", 3),
-)
-_ASYMMETRIC: tuple[tuple[str, Any, Any], ...] = (
-    ("rows 1-2", [1, 2], 2),
-    ("rows 0 and 3", [0, 3], 2),
-    ("2 groups of rows", 2, 2),
-    ("all rows, 1 column", "all", 1),
-    ("all rows, 2 columns", "all", 2),
-    ("all rows, 4 columns", "all", 4),
-)
+def _gauss(rows: int) -> Overrides:
+    """So many rows of two Gauss points on each face."""
+    return (
+        ("contact.rule", GAUSS),
+        ("contact.share", "area"),
+        *((f"contact.{face}rows", rows) for face in ("", "left.", "right.")),
+        *((f"contact.{face}columns", 2) for face in ("", "left.", "right.")),
+    )
 
 
 def _base(scene: ForcedScene, method: str = "balance") -> Overrides:
@@ -90,22 +73,9 @@ def _base(scene: ForcedScene, method: str = "balance") -> Overrides:
 
 
 def _contact_points(scene: ForcedScene, asked: Asked) -> list[Variation]:
-    no_levels(asked, "the choices of contact points are fixed")
     return [
-        Variation(
-            "contacts",
-            label,
-            (
-                *_base(scene),
-                ("contact.rule", "lines"),
-                ("contact.rows", rows),
-                ("contact.columns", columns),
-            ),
-            1.0,
-        )
-        for label, rows, columns in (
-            _SYMMETRIC if scene.arrangement == "symmetric" else _ASYMMETRIC
-        )
+        Variation("contacts", f"{n} x 2 Gauss points", (*_base(scene), *_gauss(n)), 1.0 / n)
+        for n in whole_levels(asked, 1) or _ROWS
     ]
 
 
@@ -124,7 +94,7 @@ def response_meshes(scene: ForcedScene, asked: Asked, *, vary: str = "mesh") -> 
     refined = refinements(asked)
     # Gauss points do not hang on the mesh
     keeps = whole_faces or scene.contact.rule == GAUSS
-    base = (*_base(scene), *(() if keeps else _GAUSS_POINTS))
+    base = (*_base(scene), *(() if keeps else _gauss(_ON_MESHES)))
     for element in (scene.mesh.element,) if vary == "mesh" else known:
         for refine in refined or _usual(scene, element):
             overrides = (*base, ("geometry.refine", refine), ("mesh.element", element))
