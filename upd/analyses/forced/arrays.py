@@ -128,7 +128,7 @@ def _curve_arrays(solution: ForcedSolution, curve: ForcedCurve[Any]) -> Variable
         return out | _point_arrays(solution, curve)
     if isinstance(a, InterfaceResponse):
         return out | _faces_arrays(solution, curve)
-    return out | _swept_arrays(solution, curve)
+    return out | _swept_arrays(curve)
 
 
 def _contact(
@@ -278,15 +278,6 @@ def _point_arrays(solution: ForcedSolution, curve: PointCurve) -> Variables:
             "0 between two folds, where the frequency falls",
         ),
         **_fold_arrays(curve),
-        "truncation": variable("frequency", answer.truncation, "1"),
-        "periodic": variable(
-            "frequency",
-            answer.periodic.astype(np.int8),
-            "1",
-            "whether the contact forces came back to their start",
-        ),
-        "aliasing": variable("frequency", answer.aliasing, "1"),
-        "energy_balance": variable("frequency", answer.energy_balance, "1"),
         "damper": variable(
             "frequency damper_dof coefficient",
             model.damper_dofs(answer.coefficients),
@@ -316,23 +307,15 @@ def _faces_arrays(solution: ForcedSolution, curve: FacesCurve) -> Variables:
     state = np.array([one.nodes for one in answer.points])[:, :, [1, 2, 0]]
     loss = np.array([one.loss for one in answer.points])
     return {
-        "truncation": variable(
-            on,
-            [one.unresolved for one in answer.points],
-            "1",
-            "motion of the faces by harmonics left out, relative",
-        ),
         "jump": variable(on, jumped, "1", "whether the motion jumps to another after this point"),
         **_contact(solution, curve, solution.marked_points(curve), curve.frequency, state, loss),
     }
 
 
-def _swept_arrays(solution: ForcedSolution, one: SweptCurve) -> Variables:
-    """Along a sweep: states, losses and cost."""
-    found, at = one.answer, "frequency"
-    lowest = excitation_of(solution.plan.scene.excitation).lowest
-    scale = (2.0 * np.pi * lowest * found.frequency) ** 2 * 1e-3 / one.force
-    out: Variables = {
+def _swept_arrays(one: SweptCurve) -> Variables:
+    """Along a sweep: states and losses."""
+    found = one.answer
+    return {
         "share": variable(
             "frequency state",
             found.share[:, [1, 2, 0]],
@@ -345,13 +328,8 @@ def _swept_arrays(solution: ForcedSolution, one: SweptCurve) -> Variables:
             "N mm",
             kind="work of the excitation, lost by damping, by friction",
         ),
-        "settled": variable(at, found.settled.astype(np.int8), "1"),
-        "periods": variable(at, found.periods, "1"),
+        "settled": variable("frequency", found.settled.astype(np.int8), "1"),
     }
-    for k, side in enumerate(SIDES):
-        out[f"lowest_{side}"] = variable(at, scale * found.lowest[:, k], "(m/s2)/N")
-        out[f"highest_{side}"] = variable(at, scale * found.highest[:, k], "(m/s2)/N")
-    return out
 
 
 def marched_arrays(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Variables:
