@@ -94,11 +94,6 @@ class ChartedPeak:
         given = self.curve.case.given() | {"peak": self.number, "mode": self.mode}
         return replace(Case(**given), choice="")
 
-    def moves(self, points: Group, side: int) -> bool:
-        """Whether a contact point of a face slips or lifts off."""
-        stick = self.curve.data("state")[self.index, :, STICK_SHARE]
-        return bool((stick[np.asarray(points["face"].data) == side] < 1.0).any())
-
     @property
     def detail(self) -> str:
         """Where it lies, and the sweep that found it where that is no balance."""
@@ -294,7 +289,6 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
             for one in sliding
             if "share" in one.curve.group
             for k in range(len(SIDES))
-            if one.moves(points[one.case.stiffness], k)
             for chart in contact_maps(one, points[one.case.stiffness], k)
         ),
         *(
