@@ -14,7 +14,6 @@ from rigs import LINES
 
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import again as solved_again
-from upd.analyses.forced.accuracy import bound, estimate
 from upd.analyses.forced.again import (
     HARMONICS,
     MESH,
@@ -31,6 +30,7 @@ from upd.analyses.forced.again import (
 from upd.analyses.forced.curves import Top
 from upd.analyses.forced.peaks import climbed
 from upd.analyses.forced.solve import ForcedSolution
+from upd.analyses.forced.varied import bound, estimate
 from upd.errors import ConvergenceError
 from upd.hbm import climb, contacts, frequency_response
 from upd.progress import Stages, silent

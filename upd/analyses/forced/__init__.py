@@ -12,13 +12,12 @@ from typing import TypeVar
 
 from upd.analyses.base import Analysis, rig_needs
 from upd.analyses.forced import (
-    accuracy,
     answer,
     arrays,
     charts,
     checks,
-    ladders,
     results,
+    varied,
 )
 from upd.analyses.forced.solve import ForcedSolution
 from upd.linalg.parallel import threads_for
@@ -48,7 +47,7 @@ ANALYSIS = Analysis(
     name="forced",
     headline_names=answer.MAIN,
     input_checks=(),
-    problem=replace(accuracy.PROBLEM, make_results=_on_one_thread(results.make_results)),
+    problem=replace(varied.PROBLEM, make_results=_on_one_thread(results.make_results)),
     needs=lambda plan, threads: rig_needs(plan, threads, "reduction"),
     check_solution=_on_one_thread(checks.check_solution),
     arrays=_on_one_thread(arrays.arrays),
@@ -57,7 +56,7 @@ ANALYSIS = Analysis(
     write_files=lambda solution, folder: None,
     charts=charts.charts,
     headline=answer.headline,
-    ladders=ladders.LADDERS,
+    ladders=varied.LADDERS,
     answer=answer.answer,
     verdict_names=("best_peak", "reduction_of_free_peak"),
     coarsened=lambda plan: coarsened_rig(plan, ("response",), ("balance.method", "balance")),
