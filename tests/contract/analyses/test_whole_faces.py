@@ -8,8 +8,13 @@ import pytest
 from rigs import LINES
 
 import upd
+from upd.analyses import make_plan
 from upd.analyses.forced.curves import TOLERANCE
+from upd.analyses.forced.interface_model import make_whole_faces
+from upd.analyses.forced.statics import static_state
+from upd.analyses.seated.bodies import make_bodies
 from upd.errors import InputError
+from upd.progress import Stages
 from upd.report.notebook import RunResult, charts
 from upd.scene import load_scene
 
@@ -204,6 +209,13 @@ def test_what_does_not_go_together_is_told(changes: Mapping[str, Any], words: st
 def test_states_of_worn_faces_need_worn_faces() -> None:
     with pytest.raises(InputError, match="is a state of faces worn in"):
         run(**{"contact.fit": "new", "contact.static": "opposing"})
-    uneven = {"left": 0.1, "right": 0.2}
-    with pytest.raises(InputError, match="one T/N for both"):
-        run(**{"contact.static": uneven})
+
+
+def test_worn_faces_carry_each_its_traction() -> None:
+    scene = TOY | {"contact.static": {"left": 0.1, "right": 0.2}}
+    plan: Any = make_plan(load_scene("symmetric-response", scene))
+    found = make_whole_faces(plan, make_bodies(plan), Stages())
+    ratio = (found.state.T / found.state.N).tolist()
+    assert ratio == pytest.approx([0.1, 0.2], rel=1e-9)
+    wanted = static_state(plan, make_bodies(plan))
+    assert found.state.N.tolist() == pytest.approx(wanted.N.tolist(), rel=1e-9)
