@@ -46,14 +46,11 @@ def _sizes(solution: ForcedSolution) -> dict[str, int]:
 ANALYSIS = Analysis(
     name="forced",
     headline_names=answer.MAIN,
-    input_checks=(),
     problem=replace(varied.PROBLEM, make_results=_on_one_thread(results.make_results)),
     needs=lambda plan, threads: rig_needs(plan, threads, "reduction"),
     check_solution=_on_one_thread(checks.check_solution),
     arrays=_on_one_thread(arrays.arrays),
     sizes=_sizes,
-    # every figure is drawn from the arrays
-    write_files=lambda solution, folder: None,
     charts=charts.charts,
     headline=answer.headline,
     ladders=varied.LADDERS,

@@ -17,7 +17,7 @@ from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.performance import mode_arrays, performance_arrays
 from upd.analyses.forced.plan import excitation_of
-from upd.analyses.forced.results import measured_peaks
+from upd.analyses.forced.results import MEASURED_PEAK, printed_of
 from upd.analyses.forced.solve import (
     ContactPlaces,
     ForcedSolution,
@@ -72,7 +72,7 @@ def arrays(solution: ForcedSolution) -> dict[str, Group]:
     for mode in solution.nonlinear_modes:
         add(MODES, mode.case, mode_arrays(mode))
     out |= measured_arrays(scene.measured) if out else {}
-    measured = measured_peaks(solution.plan)
+    measured = printed_of(solution.plan)(MEASURED_PEAK, {})
     if measured and out:
         source = ", ".join(dict.fromkeys(one.source for one in measured))
         frequency = variable("peak", [one.value for one in measured], "Hz", source=source)

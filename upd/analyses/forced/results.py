@@ -360,8 +360,3 @@ def printed_of(plan: ForcedPlan) -> Lookup:
         return look_up(name, case) if free or same else ()
 
     return under_load
-
-
-def measured_peaks(plan: ForcedPlan) -> tuple[Printed, ...]:
-    """Peaks in Hz measured with the damper."""
-    return printed_of(plan)(MEASURED_PEAK, {})
