@@ -18,7 +18,6 @@ from upd.analyses.forced.model import Array
 from upd.analyses.forced.performance import mode_results, performance_results
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
 from upd.analyses.forced.solve import ContactPlaces, ForcedSolution, marched_damper
-from upd.analyses.forced.statics import StaticState
 from upd.analyses.measured import FREE, STUCK, Computed
 from upd.analyses.seated.results import RIGID
 from upd.hbm import FrequencyResponse
@@ -55,38 +54,28 @@ def _contact_results(solution: ForcedSolution, name: str) -> Iterator[Result]:
     """Mass of the damper, points or nodes, stiffness of the faces, forces at rest beside those of a
     rigid damper in that state.
     """
-    case, model = Case(stiffness=name), solution.models.get(name)
-    if model is None:
-        faces = solution.faces[name]
-        assert solution.bodies is not None
-        yield q.DAMPER_MASS.of(solution.plan.copies * solution.bodies.damper.mass, case)
-        yield q.CONTACT_POINTS.of(faces.of.n, case)
-        yield from _static_forces(case, faces.state, faces.state.N, faces.state.T)
+    case, model, bodies = Case(stiffness=name), solution.models.get(name), solution.bodies
+    assert bodies is not None
+    state = solution.faces[name].state if model is None else model.state
+    yield q.DAMPER_MASS.of((2.0 if bodies.half else 1.0) * bodies.damper.mass, case)
+    yield q.CONTACT_POINTS.of(len(solution.places(name).face), case)
+    if model is not None:
+        law = model.contacts.law
+        for k, side in enumerate(SIDES):
+            on, face = model.face == k, replace(case, side=side)
+            yield q.FACE_K_N.of(law.k_n[on].sum(), face)
+            yield q.FACE_K_T.of(law.k_t[on].sum(), face)
+    if state is None:
         return
-    law = model.contacts.law
-    yield q.DAMPER_MASS.of(model.damper.mass, case)
-    yield q.CONTACT_POINTS.of(model.contacts.n_point, case)
-    for k, side in enumerate(SIDES):
-        on, face = model.face == k, replace(case, side=side)
-        yield q.FACE_K_N.of(law.k_n[on].sum(), face)
-        yield q.FACE_K_T.of(law.k_t[on].sum(), face)
-    if model.state is not None:
-        of_points = (law.preload, model.traction[:, -1])
-        N, T = (np.array([one[model.face == k].sum() for k in (0, 1)]) for one in of_points)
-        yield from _static_forces(case, model.state, N, T)
-
-
-def _static_forces(case: Case, state: StaticState, N: Array, T: Array) -> list[Result]:
-    """Normal and tangential force of each face, (2,) N."""
-    results = []
     for k, side in enumerate(SIDES):
         at = replace(case, side=side, choice=state.name)
-        for quantity, values, way in ((q.STATIC_N, N, "normal"), (q.STATIC_T, T, "tangential")):
+        for of, values, way in (
+            (q.STATIC_N, state.N, "normal"),
+            (q.STATIC_T, state.T, "tangential"),
+        ):
             known = None if state.known is None else getattr(state.known, f"{way}_{side}")
             source = RIGID.get(state.name, "") if known is not None else ""
-            exact = state.name != "seated"
-            results.append(quantity.of(values[k], at, known, source, exact=exact))
-    return results
+            yield of.of(values[k], at, known, source, exact=state.name != "seated")
 
 
 def measured_results(solution: ForcedSolution) -> list[Result]:
