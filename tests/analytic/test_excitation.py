@@ -223,9 +223,8 @@ def whole_faces(*blades: Any) -> InterfaceModel:
     plan: Any = make_plan(load_scene("symmetric-seated", changes))
     bodies = make_bodies(plan)
     of = make_interface(plan, bodies)
-    model = make_interface_model(
-        plan, bodies, of, friction=0.6, centrifugal=350.0, damping=0.005, excited=blades
-    )
+    given: Any = {"friction": 0.6, "centrifugal": 350.0, "damping": 0.005}
+    model = make_interface_model(plan, bodies, of, **given, excited=blades, kept_modes=(5, 2000.0))
     return worn_start(model, of, 350.0)[0]
 
 

@@ -15,7 +15,6 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import fields, replace
-from functools import cached_property
 from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -30,7 +29,7 @@ from upd.analyses.forced.curves import (
     point_limit,
     stuck_frequency,
 )
-from upd.analyses.forced.measures import CANDIDATES, CurvePeak, StuckMode, numbered_peaks
+from upd.analyses.forced.measures import CANDIDATES, CurvePeak, numbered_peaks
 from upd.analyses.forced.model import Model, balance_of, make_model, quiet, respond
 from upd.analyses.forced.peaks import climbed
 from upd.analyses.forced.plan import ForcedPlan, grid
@@ -317,16 +316,13 @@ class LimitNumbers:
     def __init__(self, plan: ForcedPlan, model: Model) -> None:
         self.plan, self.model = plan, model
         self._limits: dict[bool, Limit] = {}
+        self._peaks: dict[tuple[str, Side], list[CurvePeak]] = {}
 
     def limit(self, stuck: bool) -> Limit:
         """Free or stuck."""
         if stuck not in self._limits:
             self._limits[stuck] = point_limit(self.plan, self.model, stuck)
         return self._limits[stuck]
-
-    @cached_property
-    def _modes(self) -> list[StuckMode]:
-        return measures.stuck_modes(self.model, CANDIDATES * self.plan.scene.excitation.stop)
 
     def __call__(self, of: str) -> float:
         """A number.
@@ -338,7 +334,8 @@ class LimitNumbers:
         """
         e = self.plan.scene.excitation
         if of in STUCK_MODES:
-            found = stuck_frequency(self._modes, of == "stuck_in_phase")
+            shapes = self.limit(True).shapes
+            found = stuck_frequency(shapes.modes if shapes else (), of == "stuck_in_phase")
             if math.isnan(found):
                 raise ConvergenceError(
                     f"{of}: no such mode below {CANDIDATES * e.stop:g} Hz, {CANDIDATES:g} times "
@@ -346,8 +343,9 @@ class LimitNumbers:
                 )
             return found
         kind, side, number, what = PEAK_NUMBERS[of]
-        peaks = self.limit(kind == "stuck").peaks(side, grid(self.plan))
-        peak = next((p for p in peaks if p.number == number), None)
+        if (kind, side) not in self._peaks:
+            self._peaks[kind, side] = self.limit(kind == "stuck").peaks(side, grid(self.plan))
+        peak = next((p for p in self._peaks[kind, side] if p.number == number), None)
         if peak is None:
             raise ConvergenceError(
                 f"{of}: no such peak between {e.start:g} and {e.stop:g} Hz, the ends of the sweep"
