@@ -22,13 +22,7 @@ from numpy.typing import NDArray
 
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import (
-    Limit,
-    Top,
-    fine_grid,
-    point_limit,
-    stuck_frequency,
-)
+from upd.analyses.forced.curves import Limit, Top, fine_grid, point_limit, stuck_frequency
 from upd.analyses.forced.measures import CANDIDATES, CurvePeak, numbered_peaks
 from upd.analyses.forced.model import Model, balance_of, make_model, quiet, respond
 from upd.analyses.forced.peaks import climbed

@@ -11,14 +11,7 @@ from functools import wraps
 from typing import TypeVar
 
 from upd.analyses.base import Analysis, rig_needs
-from upd.analyses.forced import (
-    answer,
-    arrays,
-    charts,
-    checks,
-    results,
-    varied,
-)
+from upd.analyses.forced import answer, arrays, charts, checks, results, varied
 from upd.analyses.forced.solve import ForcedSolution
 from upd.linalg.parallel import threads_for
 from upd.vary.inputs import coarsened_rig

@@ -20,13 +20,7 @@ import numpy as np
 
 from upd.analyses.cost import NODES
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import (
-    LinearCurves,
-    PointCurve,
-    Top,
-    linear_of,
-    stuck_frequency,
-)
+from upd.analyses.forced.curves import LinearCurves, PointCurve, Top, linear_of, stuck_frequency
 from upd.analyses.forced.measures import CurvePeak, numbered_peaks
 from upd.analyses.forced.model import (
     BAND,

@@ -26,10 +26,7 @@ from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.interface_model import (
-    WholeFaces,
-    by_coulomb,
-)
+from upd.analyses.forced.interface_model import WholeFaces, by_coulomb
 from upd.analyses.forced.measures import Array, ComplexArray, CurvePeak, ModeShapes, StuckMode
 from upd.analyses.forced.model import Model, balance_of
 from upd.analyses.forced.plan import (

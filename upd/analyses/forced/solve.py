@@ -27,10 +27,7 @@ from upd.analyses.forced.measures import CurvePeak, Loop
 from upd.analyses.forced.model import Array, Model, make_model, preloaded, quiet
 from upd.analyses.forced.peaks import solve_curve
 from upd.analyses.forced.performance import ModeCurve, Performance, RatioPoint
-from upd.analyses.forced.plan import (
-    ForcedPlan,
-    excitation_of,
-)
+from upd.analyses.forced.plan import ForcedPlan, excitation_of
 from upd.analyses.forced.statics import admissible, face_laws
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import InputError, UpdError, one_line
@@ -158,16 +155,6 @@ class ForcedSolution:
 WANTS = ("contact_state", "hysteresis", "damper_motion")
 
 
-def march_peaks(solution: ForcedSolution, name: str, stages: Stages) -> None:
-    """Add the last period of every sweep of a stiffness at every peak of the right blade."""
-    if not any(solution.plan.scene.wants(one) for one in WANTS):
-        return
-    for sweep in (c for c in solution.curves if c.stiffness == name):
-        for top in sweep.peaks["right"]:
-            with stages("time march", f"{sweep.case}, peak {top.number}: its last period"):
-                solution.marched.append(marched_peak(solution, sweep, top))
-
-
 def marched_peak(solution: ForcedSolution, sweep: SweptCurve, peak: CurvePeak) -> MarchedPeak:
     """The last period of a sweep at one of its peaks, integrated again and kept."""
     name = sweep.stiffness
@@ -280,7 +267,12 @@ def _sweep(
     for ratio in solution.plan.scene.excitation.centrifugal_to_force:
         with stages("sweeps", f"{name}, F_C/F_E {ratio:g}: up and down"):
             solution.curves += curves.both_ways(solution.plan, name, ratio, march, start)
-    march_peaks(solution, name, stages)
+    if not any(solution.plan.scene.wants(one) for one in WANTS):
+        return
+    for sweep in (c for c in solution.curves if c.stiffness == name):
+        for top in sweep.peaks["right"]:
+            with stages("time march", f"{sweep.case}, peak {top.number}: its last period"):
+                solution.marched.append(marched_peak(solution, sweep, top))
 
 
 def _models(solution: ForcedSolution, stages: Stages) -> None:
