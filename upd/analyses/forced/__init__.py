@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import wraps
-from typing import TypeVar
+from typing import Any
 
 from upd.analyses.base import Analysis, rig_needs
 from upd.analyses.forced import answer, arrays, charts, checks, results, varied
@@ -16,14 +15,11 @@ from upd.analyses.forced.solve import ForcedSolution
 from upd.linalg.parallel import threads_for
 from upd.vary.inputs import coarsened_rig
 
-Made = TypeVar("Made")
 
-
-def _on_one_thread(make: Callable[[ForcedSolution], Made]) -> Callable[[ForcedSolution], Made]:
+def _on_one_thread(make: Callable[[ForcedSolution], Any]) -> Callable[[ForcedSolution], Any]:
     """Read a solution with small matrices on one thread, where more would wait for each other."""
 
-    @wraps(make)
-    def made(solution: ForcedSolution) -> Made:
+    def made(solution: ForcedSolution) -> Any:
         with threads_for(solution.order):
             return make(solution)
 
