@@ -241,9 +241,7 @@ def loop_arrays(
 def _linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:
     """Accelerance of both blades free and stuck, their peaks, the stuck modes, the damping."""
     excited = excitation_of(solution.plan.scene.excitation)
-    # not where F_E on the right blade is all of it
-    usual = excited.blades == ("right",) and excited.drive.tolist() == [[1.0]]
-    told = {} if usual else {"excitation": excited.words}
+    told = {} if excited.usual else {"excitation": excited.words}
     out: Variables = {"frequency": variable("frequency", linear.frequency, "Hz", **told)}
     for kind, curves, peaks in (
         ("free", linear.free, linear.free_peaks),

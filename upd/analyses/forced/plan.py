@@ -306,6 +306,11 @@ class Excitation:
         return tuple(side for side, a in zip(self.blades, self.read, strict=True) if a != 0.0)
 
     @property
+    def usual(self) -> bool:
+        """Whether F_E on the right blade is all of it."""
+        return self.blades == ("right",) and self.drive.tolist() == [[1.0]]
+
+    @property
     def words(self) -> str:
         """The forces along x at mid-core: "F_E on the right blade, 0.5 F_E at 180 deg on the left
         blade".
