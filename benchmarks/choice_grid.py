@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.forced.curves import QUARTER, limit_balance, linear_modes
+from upd.analyses.forced.curves import QUARTER, point_limit
 from upd.batch.engine import Watcher
 from upd.batch.plan import plan_sweep
 from upd.batch.sweeps import run_sweep
@@ -149,8 +149,8 @@ def grid_scene(found: BestDamper) -> ForcedScene:
 
 def _fine_points(rig: RigPeaks) -> int:
     """Frequencies of a sweep that are a quarter of the narrowest stuck peak's width apart."""
-    e, k = rig.scene.excitation, rig.model.excitation.lowest
-    modes, width = (v / k for v in linear_modes(limit_balance(rig.plan, rig.model), True))
+    e, limit = rig.scene.excitation, point_limit(rig.plan, rig.model, True)
+    modes, width = limit.modes, limit.width
     inside = width[(modes > e.start) & (modes < e.stop) & (width > 0.0)]
     if not inside.size:
         return int(e.points)

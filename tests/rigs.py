@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -13,6 +16,7 @@ if TYPE_CHECKING:
     from upd.hbm.faces.state import InterfaceState
     from upd.results import Result
 
+Array = NDArray[np.float64]
 #: keys over a ready response
 LINES: dict[str, Any] = {
     "geometry.across": 2,
@@ -38,6 +42,16 @@ def state_of(
 
     f = float(answer.frequency[i])
     return state_at(springs, model, answer.balance, answer.x[i], f, force)
+
+
+def stuck_motion(model: Model, f: Array) -> NDArray[np.complex128]:
+    """(m, n) amplitudes of all dofs at (m,) Hz with every point stuck, mm per newton of F_E, by the
+    whole matrices.
+    """
+    M, C, K, _ = model.linear(stuck=True)
+    force = np.concatenate([model.force, np.zeros(len(M) - len(model.force))])
+    omega = 2.0 * np.pi * model.excitation.lowest * f
+    return np.array([np.linalg.solve(K + 1j * w * C - w**2 * M, force) for w in omega])
 
 
 def undeclared(results: Iterable[Result]) -> list[str]:

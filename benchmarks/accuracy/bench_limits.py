@@ -279,7 +279,10 @@ def whole_faces(name: str) -> Iterator[Row]:
     F, mu = plan.scene.damper.centrifugal, plan.scene.contact.friction
 
     def made(centrifugal: float, n_modes: int = MODES[0]) -> tuple[InterfaceModel, InterfaceState]:
-        options: dict[str, Any] = {"damping": plan.scene.excitation.damping, "n_modes": n_modes}
+        options: dict[str, Any] = {
+            "damping": plan.scene.excitation.damping,
+            "kept_modes": (n_modes, 0.0),
+        }
         model = make_interface_model(
             plan, bodies, of, friction=mu, centrifugal=centrifugal, **options
         )

@@ -18,9 +18,9 @@ from typing import Any
 
 import upd
 from upd.analyses.base import CHOSEN_BY_ACCURACY
-from upd.analyses.forced.accuracy import PROBLEM, estimate
 from upd.analyses.forced.results import make_results
 from upd.analyses.forced.solve import solve
+from upd.analyses.forced.varied import PROBLEM, estimate
 from upd.errors import ConvergenceError, InputError, UpdError
 from upd.progress import Stages
 from upd.scene import AnyScene, load_scene

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,14 +11,14 @@ from rigs import SET_LINES, state_of
 
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import exact_peaks, faces_accelerance, linear_peaks
+from upd.analyses.forced.curves import faces_limit, point_limit
 from upd.analyses.forced.interface_model import (
     by_coulomb,
     make_interface_model,
     spring_march,
     worn_start,
 )
-from upd.analyses.forced.measures import Array, ComplexArray, tell_stuck_peaks
+from upd.analyses.forced.measures import Array, ComplexArray
 from upd.analyses.forced.model import Model, make_model, respond
 from upd.analyses.forced.performance import peaks_at
 from upd.analyses.forced.plan import Excitation, ForcedPlan, excitation_of
@@ -105,10 +105,8 @@ def test_forces_in_phase_leave_out_the_out_of_phase_peak() -> None:
         ((ONE, replace(OTHER, phase=180.0)), ["out of phase"]),
     ):
         model = excited(*forces)
-        grid, found = np.linspace(380.0, 480.0, 101), answer(model, F[:1])
         for side in SIDES:
-            peaks = linear_peaks(found.balance, model.row(side), STUCK, grid, True)
-            told = tell_stuck_peaks(model, peaks, plan.scene.excitation.stop)
+            told = point_limit(plan, model, True).peaks(side, np.linspace(380.0, 480.0, 101))
             assert [one.mode for one in told] == modes
 
 
@@ -141,10 +139,9 @@ def test_the_second_harmonic_is_the_first_of_twice_the_frequency() -> None:
     for model, f, k in ((first, F, 1), (second, F / 2.0, 2)):
         found = answer(model, f)
         grid = np.linspace(380.0, 480.0, 101) / k
-        (peak,) = linear_peaks(found.balance, model.row("right"), STUCK, grid, True)
-        (told,) = tell_stuck_peaks(model, [peak], 480.0)
+        (told,) = point_limit(rig()[0], model, True).peaks("right", grid)
         damper = measures.damper_motion(found, model)[1][1]
-        tops.append([k * peak.frequency, peak.height, told.mac, *damper[[0, 4]]])
+        tops.append([k * told.frequency, told.height, told.mac, *damper[[0, 4]]])
     assert tops[1] == pytest.approx(tops[0], rel=1e-6)
 
 
@@ -226,9 +223,8 @@ def whole_faces(*blades: Any) -> InterfaceModel:
     plan: Any = make_plan(load_scene("symmetric-seated", changes))
     bodies = make_bodies(plan)
     of = make_interface(plan, bodies)
-    model = make_interface_model(
-        plan, bodies, of, friction=0.6, centrifugal=350.0, damping=0.005, excited=blades
-    )
+    given: Any = {"friction": 0.6, "centrifugal": 350.0, "damping": 0.005}
+    model = make_interface_model(plan, bodies, of, **given, excited=blades, kept_modes=(5, 2000.0))
     return worn_start(model, of, 350.0)[0]
 
 
@@ -262,10 +258,9 @@ def test_curves_of_whole_faces_are_sums_and_second_harmonics() -> None:
                 1j * math.radians(one.phase)
             )
         of = Excitation(SIDES, drive)
-        read = [partial(faces_accelerance, model, of, side, stuck=True) for side in SIDES]
-        fine = np.linspace(f[0], f[-1], 400) / of.lowest
-        peaks = exact_peaks(read[RIGHT], fine, f / of.lowest)
-        return np.array([one(f / of.lowest) for one in read]), peaks
+        at, limit = f / of.lowest, faces_limit(model, of, 480.0, True)
+        read = np.array([limit.accelerance(side, at) for side in SIDES])
+        return read, limit.peaks("right", at)
 
     (one, _), (other, _), (both, peaks) = curves(ONE), curves(OTHER), curves(ONE, OTHER)
     assert np.abs(both - one - other).max() < 1e-9 * np.abs(both).max()
@@ -278,4 +273,5 @@ def test_a_blade_without_a_force_and_damper_is_at_rest() -> None:
     f = np.linspace(280.0, 320.0, 5)
     alone = Excitation(("right",), np.ones((1, 1), complex))
     assert alone.free_blades == ("right",)
-    assert np.all(faces_accelerance(whole_faces("right"), alone, "right", f, stuck=False))
+    limit = faces_limit(whole_faces("right"), alone, 320.0, False)
+    assert np.all(limit.accelerance("right", f)) and limit.peaks("left", f) == []

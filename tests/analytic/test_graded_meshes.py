@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from rigs import LINES
 
-from upd.analyses.forced.accuracy import PROBLEM, choices
 from upd.analyses.forced.again import GRADED, OFF_CONTACT, count_of, graded
+from upd.analyses.forced.varied import PROBLEM, choices
 from upd.fem import Material, mass, stiffness
 from upd.linalg import modes
 from upd.mesh import recipes

@@ -770,7 +770,13 @@ def test_half_is_whole() -> None:
         of = make_interface(plan, bodies)
         n_modes = 2 if symmetry == "half" else 4
         model = make_interface_model(
-            plan, bodies, of, friction=MU, centrifugal=F_C, damping=DAMPING, n_modes=n_modes
+            plan,
+            bodies,
+            of,
+            friction=MU,
+            centrifugal=F_C,
+            damping=DAMPING,
+            kept_modes=(n_modes, 0.0),
         )
         model, start = worn_start(model, of, F_C)
         found.append(

@@ -7,12 +7,22 @@ import pytest
 from numpy.typing import NDArray
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import finer, linear_modes, linear_peaks
-from upd.hbm import contacts, frequency_response
+from upd.analyses.forced.curves import Limit, finer, linear_modes
+from upd.hbm import FrequencyResponse, contacts, frequency_response
 from upd.scene.forced_contact import SIDES
 
 C, F = 0.004, 3.0
 ROW = np.array([1.0])
+
+
+def limit_of(answer: FrequencyResponse, stuck: bool) -> Limit:
+    """One limit of the blade."""
+    b = answer.balance
+
+    def moved(f: NDArray[np.float64]) -> NDArray[np.complex128]:
+        return b.linear_displacement(2.0 * np.pi * f, stuck, 1)
+
+    return Limit(1, F, *linear_modes(b, stuck), moved, {"right": ROW}, ("right",))
 
 
 @pytest.mark.parametrize("points", [10, 23, 400])
@@ -29,7 +39,7 @@ def test_peak_of_one_mode_in_closed_form(points: int, stuck: bool, stiffness: fl
     frequency, width = linear_modes(answer.balance, stuck)
     assert frequency == pytest.approx([f0], rel=1e-12)
     assert width == pytest.approx([2.0 * zeta * f0], rel=1e-12)
-    (peak,) = linear_peaks(answer.balance, ROW, F, grid, stuck)
+    (peak,) = limit_of(answer, stuck).peaks("right", grid)
     # w^2 / |w0^2 - w^2 + 2 i zeta w0 w| is highest at w0 / sqrt(1 - 2 zeta^2)
     assert peak.frequency == pytest.approx(f0 / np.sqrt(1.0 - 2.0 * zeta**2), rel=1e-7)
     exact = 1e-3 / (2.0 * zeta * np.sqrt(1.0 - zeta**2))
@@ -65,7 +75,7 @@ def test_peak_outside_the_sweep_is_none_of_it() -> None:
     answer = frequency_response(
         [[1.0]], [[C]], [[1.0]], slider, harmonic_force=[F], frequencies=grid, harmonics=(1,)
     )
-    assert linear_peaks(answer.balance, ROW, F, grid, False) == []
+    assert limit_of(answer, False).peaks("right", grid) == []
 
 
 def test_a_light_shape_far_above_does_not_turn_modes_across_the_blades() -> None:

@@ -155,7 +155,7 @@ def test_charts_are_of_the_march(solution: ForcedSolution, one: MarchedPeak) -> 
     """Drawn from the arrays alone, titled with the sweep, none from the balance's one point."""
     drawn = forced.ANALYSIS.charts(arrays(solution), {})
     at = {f"time integration, sweep {m.sweep.way}, {m.frequency:.1f} Hz" for m in solution.marched}
-    figures = {"contact_map", "hysteresis", "damper_period"}
+    figures = {"contact_map", "hysteresis"}
     mine = [chart for chart in drawn if chart.figure in figures]
     assert {chart.figure for chart in mine} == figures
     assert {chart.detail for chart in mine} == at

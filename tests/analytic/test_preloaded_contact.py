@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rigs import LINES
+from rigs import LINES, stuck_motion
 
 from upd.analyses.forced import checks
 from upd.analyses.forced.curves import linear_of
-from upd.analyses.forced.measures import accelerance, stuck_motion
+from upd.analyses.forced.measures import accelerance
 from upd.analyses.forced.model import Model, make_model, preloaded, respond
 from upd.analyses.forced.plan import ForcedPlan, make_plan
 from upd.analyses.forced.solve import ForcedSolution

@@ -14,8 +14,6 @@ from rigs import LINES
 
 from upd.analyses import forced, make_plan
 from upd.analyses.forced import again as solved_again
-from upd.analyses.forced import solve as solving
-from upd.analyses.forced.accuracy import bound, estimate
 from upd.analyses.forced.again import (
     HARMONICS,
     MESH,
@@ -32,6 +30,7 @@ from upd.analyses.forced.again import (
 from upd.analyses.forced.curves import Top
 from upd.analyses.forced.peaks import climbed
 from upd.analyses.forced.solve import ForcedSolution
+from upd.analyses.forced.varied import bound, estimate
 from upd.errors import ConvergenceError
 from upd.hbm import climb, contacts, frequency_response
 from upd.progress import Stages, silent
@@ -331,7 +330,7 @@ def test_a_wanted_accuracy_unknown_solves_no_level(monkeypatch: pytest.MonkeyPat
         raise AssertionError("solved")
 
     for name in ("level_variations", "make_variant", "solve_again"):
-        monkeypatch.setattr(solving, name, never)
+        monkeypatch.setattr(solved_again, name, never)
     plan = make_plan(load_scene("symmetric-response", RIG))
     assert plan.estimate_seconds > 0.0
     plan = make_plan(load_scene("symmetric-response", RIG | {"accuracy": "unknown"}))

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rigs import LINES, state_of
+from rigs import LINES, state_of, stuck_motion
 
 from upd.analyses import forced, make_plan
 from upd.analyses.forced.curves import both_ways, stuck_modes_of
 from upd.analyses.forced.interface_model import by_coulomb, make_springs, spring_march
-from upd.analyses.forced.measures import path_maxima, stuck_motion
+from upd.analyses.forced.measures import path_maxima
 from upd.analyses.forced.solve import ForcedSolution
 from upd.errors import InputError
 from upd.hbm.faces.march import InterfaceMarch

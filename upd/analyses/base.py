@@ -334,16 +334,16 @@ class Analysis:
 
     name: str
     headline_names: tuple[str, ...]
-    input_checks: tuple[str, ...]
     problem: Problem
     needs: Callable[[Any, int], Needs]
     check_solution: Callable[[Any], list[Check]]
     arrays: Callable[[Any], dict[str, Group]]
     sizes: Callable[[Any], dict[str, int]]
-    write_files: Callable[[Any, Path], None]
     charts: Callable[[Arrays, Mapping[str, Any]], list[Chart]]
     headline: Callable[[Sequence[Entry]], list[Entry]]
     ladders: Mapping[str, Ladder]
+    input_checks: tuple[str, ...] = ()
+    write_files: Callable[[Any, Path], None] = lambda solution, folder: None
     answer: Callable[[Sequence[Entry]], list[AnswerTable]] | None = None
     verdict_names: tuple[str, ...] = ()
     solve_left_out: Callable[[Any, Stages], None] | None = None

@@ -15,7 +15,6 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import fields, replace
-from functools import cached_property
 from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -23,16 +22,10 @@ from numpy.typing import NDArray
 
 from upd.analyses import make_plan
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import (
-    Top,
-    fine_grid,
-    limit_balance,
-    limit_peaks,
-    stuck_frequency,
-)
-from upd.analyses.forced.measures import CANDIDATES, CurvePeak, StuckMode, numbered_peaks
+from upd.analyses.forced.curves import Limit, Top, fine_grid, point_limit, stuck_frequency
+from upd.analyses.forced.measures import CANDIDATES, CurvePeak, numbered_peaks
 from upd.analyses.forced.model import Model, balance_of, make_model, quiet, respond
-from upd.analyses.forced.peaks import top_from
+from upd.analyses.forced.peaks import climbed
 from upd.analyses.forced.plan import ForcedPlan, grid
 from upd.analyses.forced.statics import face_laws
 from upd.analyses.seated.bodies import Bodies, bodies_key, make_bodies
@@ -316,15 +309,14 @@ class LimitNumbers:
 
     def __init__(self, plan: ForcedPlan, model: Model) -> None:
         self.plan, self.model = plan, model
+        self._limits: dict[bool, Limit] = {}
         self._peaks: dict[tuple[str, Side], list[CurvePeak]] = {}
 
-    @cached_property
-    def _balance(self) -> Balance:
-        return limit_balance(self.plan, self.model)
-
-    @cached_property
-    def _modes(self) -> list[StuckMode]:
-        return measures.stuck_modes(self.model, CANDIDATES * self.plan.scene.excitation.stop)
+    def limit(self, stuck: bool) -> Limit:
+        """Free or stuck."""
+        if stuck not in self._limits:
+            self._limits[stuck] = point_limit(self.plan, self.model, stuck)
+        return self._limits[stuck]
 
     def __call__(self, of: str) -> float:
         """A number.
@@ -336,7 +328,8 @@ class LimitNumbers:
         """
         e = self.plan.scene.excitation
         if of in STUCK_MODES:
-            found = stuck_frequency(self._modes, of == "stuck_in_phase")
+            shapes = self.limit(True).shapes
+            found = stuck_frequency(shapes.modes if shapes else (), of == "stuck_in_phase")
             if math.isnan(found):
                 raise ConvergenceError(
                     f"{of}: no such mode below {CANDIDATES * e.stop:g} Hz, {CANDIDATES:g} times "
@@ -345,19 +338,13 @@ class LimitNumbers:
             return found
         kind, side, number, what = PEAK_NUMBERS[of]
         if (kind, side) not in self._peaks:
-            given = self.plan, self.model, self._balance, grid(self.plan)
-            self._peaks[kind, side] = limit_peaks(*given, side, kind == "stuck")
+            self._peaks[kind, side] = self.limit(kind == "stuck").peaks(side, grid(self.plan))
         peak = next((p for p in self._peaks[kind, side] if p.number == number), None)
         if peak is None:
             raise ConvergenceError(
                 f"{of}: no such peak between {e.start:g} and {e.stop:g} Hz, the ends of the sweep"
             )
         return _told(peak, what)
-
-    def curve(self, side: Side, stuck: bool, frequency: Array) -> ComplexArray:
-        """Accelerance (k,) of a blade, (m/s2)/N at (k,) Hz."""
-        force, row = self.plan.scene.damper.centrifugal, self.model.row(side)
-        return measures.linear_accelerance(self._balance, row, force, frequency, stuck)
 
 
 class CurveWithFriction(NamedTuple):
@@ -396,7 +383,7 @@ class CurveWithFriction(NamedTuple):
             )
         if self.peaks:
             # as fine as its peaks need
-            over = np.unique(np.concatenate([fine_grid(plan, model, force), over]))
+            over = np.unique(np.concatenate([fine_grid(plan, model), over]))
         answer = respond(plan, model, force, over)
         tops: dict[PeakKey, Top | ConvergenceError] = {}
         for key in self.peaks:
@@ -432,7 +419,7 @@ class CurveWithFriction(NamedTuple):
             raise ConvergenceError(f"{name}: no such peak on the curve ({answer.message})")
         f = float(answer.frequency[peak.sample])
         x = newton(b, answer.x[peak.sample], f)
-        top = None if x is None else top_from(model, b, x, f, side, force)
+        top = None if x is None else climbed(model, b, x, f, side, force)
         if top is None:
             raise ConvergenceError(f"{name}: the peak at {peak.frequency:.6g} Hz was not climbed")
         return top
@@ -564,7 +551,7 @@ class FitResponses:
             for curve in self.targets.curves:
                 of = curve.curve
                 if of.force_ratio is None:
-                    H = limits.curve(of.blade, of.state == "stuck", of.frequency)
+                    H = limits.limit(of.state == "stuck").accelerance(of.blade, of.frequency)
                 else:
                     over = next(c.frequencies for c in self.friction if c.ratio == of.force_ratio)
                     at = np.searchsorted(over, of.frequency)

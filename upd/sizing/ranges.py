@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from upd.analyses import make_plan
-from upd.analyses.forced.curves import limit_balance, limit_peaks
+from upd.analyses.forced.curves import point_limit
 from upd.analyses.forced.model import Model, make_model
 from upd.analyses.forced.performance import peaks_at
 from upd.analyses.forced.plan import ForcedPlan, grid
@@ -303,9 +303,9 @@ class RigPeaks:
             laws = face_laws(scene.stiffnesses[self.stiffness], stages)
             state = static_state(self.plan, bodies[key], stages=stages)
             self.model: Model = make_model(self.plan, bodies[key], laws, state)
-        e, b = scene.excitation, limit_balance(plan, self.model)
+        e = scene.excitation
         with threads_for(len(self.model.M)):
-            stuck = limit_peaks(plan, self.model, b, grid(plan), "right", stuck=True)
+            stuck = point_limit(plan, self.model, True).peaks("right", grid(plan))
         if not stuck:
             raise InputError(
                 f"no stuck peak of the right blade between {e.start:g} and {e.stop:g} Hz; to "

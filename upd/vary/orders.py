@@ -196,13 +196,11 @@ def estimate_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
     def richardson(order: float) -> float:
         return two_level_error(float(q[1]), float(q[0]), float(size[1] / size[0]), order)
 
-    def share(difference: float) -> float:
-        return difference / scale if scale else float("inf") if difference else 0.0
-
     if len(size) == 2:
         basis = f"two levels, order {ASSUMED:g} assumed, factor {UNCONFIRMED:g}"
         return ErrorEstimate(UNCONFIRMED * richardson(ASSUMED), float("nan"), basis)
-    order, spread = observed_order(size[:3], q[:3]), share(float(np.ptp(q[:3])))
+    order, spread = observed_order(size[:3], q[:3]), float(np.ptp(q[:3]))
+    spread = spread / scale if scale else float("inf") if spread else 0.0
     if not order >= _LOWEST:
         slow = UNCONFIRMED * richardson(_LOWEST) if order > 0.0 else 0.0
         basis = f"no clear order: {UNCONFIRMED:g} times the range of three levels"

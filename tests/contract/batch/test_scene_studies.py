@@ -13,7 +13,7 @@ from rigs import LINES
 
 from upd import load_scene, make_plan, run
 from upd.analyses import ladders_of
-from upd.analyses.forced.ladders import response_meshes
+from upd.analyses.forced.varied import response_meshes
 from upd.batch.engine import Workers
 from upd.batch.studies import plan_study, point_task, run_study, scene_at
 from upd.cli import main

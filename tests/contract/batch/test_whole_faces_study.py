@@ -11,7 +11,7 @@ from rich.console import Console
 from rigs import LINES
 
 from upd import load_scene, make_plan
-from upd.analyses.forced.ladders import whole_faces_points
+from upd.analyses.forced.varied import whole_faces_points
 from upd.batch.engine import Workers
 from upd.batch.studies import plan_study, run_study
 from upd.cli.batch import print_study

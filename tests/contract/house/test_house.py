@@ -317,18 +317,18 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 12452,
+    "analyses": 12131,
     "hbm": 6315,
     "contact": 3535,
     "linalg": 2997,
     "scene": 2238,
     "plot": 1525,
     "report": 1910,
-    "fitting": 1444,
+    "fitting": 1433,
     "sizing": 1329,
     "batch": 1512,
     "mesh": 1423,
-    "vary": 1287,
+    "vary": 1280,
     "reference": 1110,
     "cli": 869,
     "measured": 913,

@@ -22,7 +22,7 @@ import upd
 from tests.pictures import png_size
 from upd import cli
 from upd.analyses.forced import peaks
-from upd.analyses.forced.curves import limit_balance, linear_modes
+from upd.analyses.forced.curves import point_limit
 from upd.errors import InputError
 from upd.scene import load_scene
 from upd.sizing import BestDamper, search
@@ -91,8 +91,8 @@ def test_worst_peaks_are_those_of_runs(
     # as many frequencies as the narrowest stuck peak needs, not the scene's 60
     rig = found.best.rigs[0][1]
     e = rig.scene.excitation
-    modes, width = linear_modes(limit_balance(rig.plan, rig.model), True)
-    narrowest = width[(modes > e.start) & (modes < e.stop)].min()
+    limit = point_limit(rig.plan, rig.model, True)
+    narrowest = limit.width[(limit.modes > e.start) & (limit.modes < e.stop)].min()
     points = runs.grid_scene(found).excitation.points
     assert points > 60 and 0.24 < (e.stop - e.start) / (points - 1) / narrowest <= 0.25
 

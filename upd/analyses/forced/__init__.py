@@ -7,31 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import wraps
-from typing import TypeVar
+from typing import Any
 
 from upd.analyses.base import Analysis, rig_needs
-from upd.analyses.forced import (
-    accuracy,
-    answer,
-    arrays,
-    charts,
-    checks,
-    ladders,
-    results,
-)
+from upd.analyses.forced import answer, arrays, charts, checks, results, varied
 from upd.analyses.forced.solve import ForcedSolution
 from upd.linalg.parallel import threads_for
 from upd.vary.inputs import coarsened_rig
 
-Made = TypeVar("Made")
 
-
-def _on_one_thread(make: Callable[[ForcedSolution], Made]) -> Callable[[ForcedSolution], Made]:
+def _on_one_thread(make: Callable[[ForcedSolution], Any]) -> Callable[[ForcedSolution], Any]:
     """Read a solution with small matrices on one thread, where more would wait for each other."""
 
-    @wraps(make)
-    def made(solution: ForcedSolution) -> Made:
+    def made(solution: ForcedSolution) -> Any:
         with threads_for(solution.order):
             return make(solution)
 
@@ -47,17 +35,14 @@ def _sizes(solution: ForcedSolution) -> dict[str, int]:
 ANALYSIS = Analysis(
     name="forced",
     headline_names=answer.MAIN,
-    input_checks=(),
-    problem=replace(accuracy.PROBLEM, make_results=_on_one_thread(results.make_results)),
+    problem=replace(varied.PROBLEM, make_results=_on_one_thread(results.make_results)),
     needs=lambda plan, threads: rig_needs(plan, threads, "reduction"),
     check_solution=_on_one_thread(checks.check_solution),
     arrays=_on_one_thread(arrays.arrays),
     sizes=_sizes,
-    # every figure is drawn from the arrays
-    write_files=lambda solution, folder: None,
     charts=charts.charts,
     headline=answer.headline,
-    ladders=ladders.LADDERS,
+    ladders=varied.LADDERS,
     answer=answer.answer,
     verdict_names=("best_peak", "reduction_of_free_peak"),
     coarsened=lambda plan: coarsened_rig(plan, ("response",), ("balance.method", "balance")),

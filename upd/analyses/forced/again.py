@@ -12,22 +12,15 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from upd.analyses.cost import NODES
 from upd.analyses.forced import measures
-from upd.analyses.forced.curves import (
-    LinearCurves,
-    PointCurve,
-    TimeCheck,
-    Top,
-    linear_of,
-    stuck_frequency,
-)
+from upd.analyses.forced.curves import LinearCurves, PointCurve, Top, linear_of, stuck_frequency
 from upd.analyses.forced.measures import CurvePeak, numbered_peaks
 from upd.analyses.forced.model import (
     BAND,
@@ -45,7 +38,6 @@ from upd.analyses.forced.statics import face_laws
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import ConvergenceError, UpdError, one_line
 from upd.hbm.core.fourier import harmonics, sample_count
-from upd.hbm.springs.balance import Balance
 from upd.hbm.springs.peak import FIRST_REACH, is_near
 from upd.hbm.springs.sweep import newton
 from upd.linalg.parallel import threads_for
@@ -67,21 +59,12 @@ _CLOSE = 0.1
 _MOST_POINTS = 400
 
 
-class RunCurve(NamedTuple):
-    """A curve of the run with friction, without its path; attributes as of `ForcedCurve`."""
-
-    case: Case
-    force: float
-    balance: Balance
-    peaks: Mapping[Side, Sequence[CurvePeak]]
-    tops: Mapping[tuple[Side, int], Top]
-    checked: Sequence[TimeCheck] = ()
-
-
-def run_curve(curve: PointCurve) -> RunCurve:
-    """The curve without its path."""
-    balance = curve.answer.balance
-    return RunCurve(curve.case, curve.force, balance, curve.peaks, curve.tops, curve.checked)
+def run_curve(curve: PointCurve) -> PointCurve:
+    """The curve without its path, which is long: its balance, peaks and tops stay."""
+    answer = curve.answer
+    bare = {f.name: getattr(answer, f.name) for f in fields(answer)}
+    bare = {name: one[:0] for name, one in bare.items() if isinstance(one, np.ndarray)}
+    return replace(curve, accelerance={}, more={}, answer=replace(answer, **bare))
 
 
 class Run(NamedTuple):
@@ -91,7 +74,7 @@ class Run(NamedTuple):
     name: str
     model: Model
     linear: LinearCurves
-    curves: tuple[RunCurve, ...]
+    curves: tuple[PointCurve, ...]
 
 
 class Variant(NamedTuple):
@@ -103,26 +86,24 @@ class Variant(NamedTuple):
         The change. Without a size it is no level: peaks may then move far, and the highest of their
         mode is taken, wherever in the sweep and however high.
     plan
-        With it; None where there is none.
+        With it.
     model
         The changed model; None where the run's own is solved with other harmonics or samples.
     seconds
         That making the model took.
-    why
-        Why there is no model.
     """
 
     of: Variation
-    plan: ForcedPlan | None = None
+    plan: ForcedPlan
     model: Model | None = None
     seconds: float = 0.0
-    why: str = ""
 
 
 def make_variant(
     plan: ForcedPlan, name: str, base: Model, bodies: Bodies | None, of: Variation
-) -> Variant:
-    """The model of a variation with the sliding directions and the static state of the run's.
+) -> Variant | SolvedVariation:
+    """The model of a variation with the sliding directions and the static state of the run's; why
+    there is none.
 
     Parameters
     ----------
@@ -135,7 +116,7 @@ def make_variant(
     """
     begin, fixed = time.perf_counter(), "one" if base.contacts.tangents < 2 else "two"
     if not of.overrides:
-        return Variant(of, why="the mesh has no such level")
+        return SolvedVariation(of, reason="the mesh has no such level")
     try:
         scene = changed(plan.scene, (("contact.directions", fixed), *of.overrides))
         other = replace(plan, scene=scene, parameters=parameters_of(scene), workers=1)
@@ -145,40 +126,28 @@ def make_variant(
         state = base.state if scene.contact.static == plan.scene.contact.static else None
         model = make_model(other, bodies or make_bodies(other), laws, state)
     except UpdError as error:
-        return Variant(of, why=one_line(error))
+        log.info("%s, %s: %s", of.source, of.label, one_line(error))
+        return SolvedVariation(of, reason=one_line(error))
     return Variant(of, other, model, time.perf_counter() - begin)
 
 
-def solve_again(run: Run, variant: Variant) -> SolvedVariation:
+def solve_again(run: Run, variant: Variant | SolvedVariation) -> SolvedVariation:
     """The numbers of the run's peaks with one thing changed; a fault becomes its reason."""
+    if isinstance(variant, SolvedVariation):
+        return variant
     of, begin = variant.of, time.perf_counter() - variant.seconds
     model, numbers = variant.model or run.model, list[Result]()
-    if variant.plan is None:
-        log.info("%s, %s: %s", of.source, of.label, variant.why)
-        return SolvedVariation(of, reason=variant.why)
     other = run._replace(plan=variant.plan, model=model)
     with threads_for(len(model.M)):
         if variant.model is not None:
             other = other._replace(linear=linear_of(variant.plan, model))
             numbers += limit_results(run.name, other.linear)
         for curve in run.curves:
-            numbers += changed_results(curve, _changes(run, other, curve, of))
+            numbers += _changes(run, other, curve, of)
     return SolvedVariation(of, numbers, time.perf_counter() - begin)
 
 
 # -- numbers ---------------------------------------------------------------------------------------
-
-
-class Change(NamedTuple):
-    """Frequency and height of a peak over those of the run; why they were not found."""
-
-    frequency: float
-    height: float
-    why: str = ""
-
-
-#: blade and number of a peak -> its change
-Changes = Mapping[tuple[Side, int], Change]
 
 
 def limit_results(name: str, linear: LinearCurves) -> list[Result]:
@@ -206,21 +175,20 @@ def peak_results(case: Case, peak: CurvePeak, blade: Side, withheld: str = "") -
     ]
 
 
-def changed_results(curve: RunCurve, changes: Changes) -> Iterator[Result]:
-    """Numbers of the peaks that changed."""
+def changed_results(
+    curve: PointCurve, number: int, frequency: float, height: float, why: str = ""
+) -> Iterator[Result]:
+    """A numbered peak of both blades with its frequency and height times these factors, or why it
+    was not found.
+    """
     for side, peaks in curve.peaks.items():
-        for peak in peaks:
-            if change := changes.get((side, peak.number)):
-                f, height = peak.frequency * change.frequency, peak.height * change.height
-                again = peak._replace(frequency=f, height=height)
-                yield from peak_results(curve.case, again, side, change.why)
+        for peak in (one for one in peaks if one.number == number):
+            again = peak._replace(frequency=peak.frequency * frequency, height=peak.height * height)
+            yield from peak_results(curve.case, again, side, why)
 
 
-def _changes(
-    run: Run, other: Run, curve: RunCurve, of: Variation
-) -> dict[tuple[Side, int], Change]:
-    """Of every peak of a curve: of the right blade where that has one, the other changes alike."""
-    out: dict[tuple[Side, int], Change] = {}
+def _changes(run: Run, other: Run, curve: PointCurve, of: Variation) -> Iterator[Result]:
+    """Every peak of a curve: of the right blade where that has one, the other changes alike."""
     for number in dict.fromkeys(number for _, number in curve.tops):
         side: Side = "right" if ("right", number) in curve.tops else "left"
         top = curve.tops[side, number]
@@ -230,19 +198,17 @@ def _changes(
             continue
         try:
             f, height = peak_again(run, other, curve, side, number, far=math.isnan(of.size))
-            found = Change(f / top.frequency, height / top.height)
+            yield from changed_results(curve, number, f / top.frequency, height / top.height)
         except UpdError as error:
             log.info("%s, %s, %s: %s", of.source, of.label, curve.case, one_line(error))
-            found = Change(math.nan, math.nan, one_line(error))
-        out |= {(one, number): found for one in SIDES}
-    return out
+            yield from changed_results(curve, number, math.nan, math.nan, one_line(error))
 
 
 # -- peaks with friction ---------------------------------------------------------------------------
 
 
 def peak_again(
-    run: Run, other: Run, curve: RunCurve, side: Side, number: int, *, far: bool
+    run: Run, other: Run, curve: PointCurve, side: Side, number: int, *, far: bool
 ) -> tuple[float, float]:
     """Frequency and height of a peak on another model: climbed to from the run's top; else on a
     path along a band about it, then along the whole sweep, as the loop of a fold may be longer than
@@ -262,7 +228,8 @@ def peak_again(
     ConvergenceError
         Where none is near the run's.
     """
-    top, old, plan, model = curve.tops[side, number], curve.balance, other.plan, other.model
+    top, old = curve.tops[side, number], curve.answer.balance
+    plan, model = other.plan, other.model
     b = balance_of(plan, model, curve.force, plan.scene.harmonic_numbers)
     ratio = expected(run.linear, other.linear, top, number)
     alike = (len(b.Psi), b.contacts.tangents, b.rigid)

@@ -5,7 +5,7 @@ Curves, linear limits, contact points, states, energies, loops, peaks over F_C/F
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import groupby
 from typing import Any
 
@@ -17,7 +17,7 @@ from upd.analyses.forced.measures import CurvePeak
 from upd.analyses.forced.model import Array
 from upd.analyses.forced.performance import mode_arrays, performance_arrays
 from upd.analyses.forced.plan import excitation_of
-from upd.analyses.forced.results import measured_peaks
+from upd.analyses.forced.results import MEASURED_PEAK, printed_of
 from upd.analyses.forced.solve import (
     ContactPlaces,
     ForcedSolution,
@@ -72,7 +72,7 @@ def arrays(solution: ForcedSolution) -> dict[str, Group]:
     for mode in solution.nonlinear_modes:
         add(MODES, mode.case, mode_arrays(mode))
     out |= measured_arrays(scene.measured) if out else {}
-    measured = measured_peaks(solution.plan)
+    measured = printed_of(solution.plan)(MEASURED_PEAK, {})
     if measured and out:
         source = ", ".join(dict.fromkeys(one.source for one in measured))
         frequency = variable("peak", [one.value for one in measured], "Hz", source=source)
@@ -128,17 +128,53 @@ def _curve_arrays(solution: ForcedSolution, curve: ForcedCurve[Any]) -> Variable
         return out | _point_arrays(solution, curve)
     if isinstance(a, InterfaceResponse):
         return out | _faces_arrays(solution, curve)
-    return out | _swept_arrays(solution, curve)
+    return out | _swept_arrays(curve)
 
 
-def _contact(state: Array, energy: Array, power: Array) -> Variables:
-    """States (frequency, point, 3) and losses (frequency, point) of contact points."""
-    at = "frequency contact_point"
-    return {
-        "state": variable(f"{at} state", state, "1", state="stick slip lift, shares of the cycle"),
-        "energy": variable(at, energy, "N mm", "friction loss per cycle"),
-        "power": variable(at, power, "W"),
+def _contact(
+    solution: ForcedSolution,
+    curve: ForcedCurve[Any],
+    at: Sequence[tuple[int, str, int]],
+    frequency: Array,
+    state: Array,
+    energy: Array,
+    amplitude: Array | None = None,
+    loops: Iterable[tuple[int, float, measures.Loop]] = (),
+) -> Variables:
+    """What the contact does at points of a curve, as far as it is wanted.
+
+    Parameters
+    ----------
+    at
+        Number, mode and place of the peaks among the points.
+    frequency
+        (n,) Hz.
+    state, energy
+        (n, n_point, 3) shares of the cycle; (n, n_point) losses in a cycle, N mm.
+    amplitude
+        (n, 6) of the damper.
+    loops
+        Number and frequency of a peak, and a loop.
+    """
+    scene, places = solution.plan.scene, solution.places(curve.stiffness)
+    on = "frequency contact_point"
+    out: Variables = {
+        "state": variable(f"{on} state", state, "1", state="stick slip lift, shares of the cycle"),
+        "energy": variable(on, energy, "N mm", "friction loss per cycle"),
+        "power": variable(on, 1e-3 * energy * frequency[:, None], "W"),
+        **marked_peaks(at),
     }
+    if scene.wants("contact_state"):
+        share = measures.face_shares(state, places.face, places.weight)
+        words = "stick slip lift, mean over the face by stiffness, or area without springs"
+        out["share"] = variable(
+            "frequency side state", share, "1", side=" ".join(SIDES), state=words
+        )
+    if amplitude is not None and scene.wants("damper_motion"):
+        k = excitation_of(scene.excitation).lowest
+        words = f"amplitude of {'the first harmonic' if k == 1 else f'harmonic {k}'}"
+        out["damper_amplitude"] = variable("frequency damper_dof", amplitude, "mm, rad", words)
+    return out | (loop_arrays(list(loops), places) if scene.wants("hysteresis") else {})
 
 
 def peak_arrays(name: str, peaks: Sequence[CurvePeak]) -> Variables:
@@ -166,22 +202,6 @@ def marked_peaks(at: Sequence[tuple[int, str, int]]) -> Variables:
             "peak", [i for *_, i in at], "", "place of the peak in frequency, from 0"
         ),
     }
-
-
-def share_array(
-    state: Array, places: ContactPlaces, mean: str = "stiffness, or area without springs"
-) -> tuple[Any, ...]:
-    """Shares of the cycle of each face from those of its points, (frequency, points, state)."""
-    share = measures.face_shares(state, places.face, places.weight)
-    words = f"stick slip lift, mean over the face by {mean}"
-    return variable("frequency side state", share, "1", side=" ".join(SIDES), state=words)
-
-
-def damper_array(solution: ForcedSolution, amplitude: Any) -> tuple[Any, ...]:
-    """Amplitudes of the damper along a curve, of the harmonic that is read."""
-    k = excitation_of(solution.plan.scene.excitation).lowest
-    words = f"amplitude of {'the first harmonic' if k == 1 else f'harmonic {k}'}"
-    return variable("frequency damper_dof", amplitude, "mm, rad", words)
 
 
 def loop_arrays(
@@ -240,9 +260,15 @@ def _linear_arrays(solution: ForcedSolution, linear: LinearCurves) -> Variables:
 
 def _point_arrays(solution: ForcedSolution, curve: PointCurve) -> Variables:
     """Along a path of points: states, losses, motion of the damper, loops."""
-    answer, model, scene = curve.answer, solution.models[curve.stiffness], solution.plan.scene
-    at, places = solution.marked_points(curve), solution.places(curve.stiffness)
-    out: Variables = {
+    answer, model = curve.answer, solution.models[curve.stiffness]
+    at, f = solution.marked_points(curve), answer.frequency
+    loops = (
+        (number, float(f[i]), one)
+        for number, _, i in at
+        for one in measures.loops(answer, i, N_LOOPS)
+    )
+    amplitude = measures.damper_motion(answer, model)[1]
+    return {
         "stable": variable(
             "frequency",
             curve.rising.astype(np.int8),
@@ -250,36 +276,14 @@ def _point_arrays(solution: ForcedSolution, curve: PointCurve) -> Variables:
             "0 between two folds, where the frequency falls",
         ),
         **_fold_arrays(curve),
-        **_contact(answer.state, answer.energy, measures.power(answer)),
-        "truncation": variable("frequency", answer.truncation, "1"),
-        "periodic": variable(
-            "frequency",
-            answer.periodic.astype(np.int8),
-            "1",
-            "whether the contact forces came back to their start",
-        ),
-        "aliasing": variable("frequency", answer.aliasing, "1"),
-        "energy_balance": variable("frequency", answer.energy_balance, "1"),
         "damper": variable(
             "frequency damper_dof coefficient",
             model.damper_dofs(answer.coefficients),
             "mm, rad",
             coefficient="a0 a1 b1 ...",
         ),
-        **marked_peaks(at),
+        **_contact(solution, curve, at, f, answer.state, answer.energy, amplitude, loops),
     }
-    if scene.wants("contact_state"):
-        out["share"] = share_array(answer.state, places, "stiffness")
-    if scene.wants("damper_motion"):
-        out["damper_amplitude"] = damper_array(solution, measures.damper_motion(answer, model)[1])
-    if not scene.wants("hysteresis"):
-        return out
-    loops = [
-        (number, float(answer.frequency[i]), one)
-        for number, _, i in at
-        for one in measures.loops(answer, i, N_LOOPS)
-    ]
-    return out | loop_arrays(loops, places)
 
 
 def _fold_arrays(curve: PointCurve) -> Variables:
@@ -298,33 +302,18 @@ def _faces_arrays(solution: ForcedSolution, curve: FacesCurve) -> Variables:
     answer, on = curve.answer, "frequency"
     jumped = np.zeros(len(curve.frequency), np.int8)
     jumped[list(answer.jumps)] = 1
+    state = np.array([one.nodes for one in answer.points])[:, :, [1, 2, 0]]
     loss = np.array([one.loss for one in answer.points])
-    out: Variables = {
-        **_contact(
-            np.array([one.nodes for one in answer.points])[:, :, [1, 2, 0]],
-            loss,
-            1e-3 * loss * answer.frequency[:, None],
-        ),
-        "truncation": variable(
-            on,
-            [one.unresolved for one in answer.points],
-            "1",
-            "motion of the faces by harmonics left out, relative",
-        ),
+    return {
         "jump": variable(on, jumped, "1", "whether the motion jumps to another after this point"),
-        **marked_peaks(solution.marked_points(curve)),
+        **_contact(solution, curve, solution.marked_points(curve), curve.frequency, state, loss),
     }
-    if solution.plan.scene.wants("contact_state"):
-        out["share"] = share_array(out["state"][1], solution.places(curve.stiffness))
-    return out
 
 
-def _swept_arrays(solution: ForcedSolution, one: SweptCurve) -> Variables:
-    """Along a sweep: states, losses and cost."""
-    found, at = one.answer, "frequency"
-    lowest = excitation_of(solution.plan.scene.excitation).lowest
-    scale = (2.0 * np.pi * lowest * found.frequency) ** 2 * 1e-3 / one.force
-    out: Variables = {
+def _swept_arrays(one: SweptCurve) -> Variables:
+    """Along a sweep: states and losses."""
+    found = one.answer
+    return {
         "share": variable(
             "frequency state",
             found.share[:, [1, 2, 0]],
@@ -337,50 +326,32 @@ def _swept_arrays(solution: ForcedSolution, one: SweptCurve) -> Variables:
             "N mm",
             kind="work of the excitation, lost by damping, by friction",
         ),
-        "settled": variable(at, found.settled.astype(np.int8), "1"),
-        "periods": variable(at, found.periods, "1"),
+        "settled": variable("frequency", found.settled.astype(np.int8), "1"),
     }
-    for k, side in enumerate(SIDES):
-        out[f"lowest_{side}"] = variable(at, scale * found.lowest[:, k], "(m/s2)/N")
-        out[f"highest_{side}"] = variable(at, scale * found.highest[:, k], "(m/s2)/N")
-    return out
 
 
 def marched_arrays(solution: ForcedSolution, found: Sequence[MarchedPeak]) -> Variables:
     """States, losses, loops and the damper's motion at peaks of a sweep, in the variables of a path
     by the balance with these points.
     """
-    scene, at = solution.plan.scene, "frequency"
-    f = np.array([one.frequency for one in found])
-    # of a half model each node stands for its image too
-    copies = np.array([one.period.copies for one in found])[:, None]
-    energy = copies * np.array([one.period.loss for one in found])
-    out: Variables = {
-        "frequency": variable(at, f, "Hz"),
-        "excitation_force": variable("", found[0].sweep.force, "N"),
-        **_contact(
-            np.array([one.period.share for one in found]), energy, 1e-3 * energy * f[:, None]
-        ),
-        **marked_peaks([(one.peak.number, one.peak.mode, i) for i, one in enumerate(found)]),
-    }
-    if scene.wants("contact_state"):
-        out["share"] = share_array(out["state"][1], found[0].places)
-    if scene.wants("damper_motion"):
-        both = [marched_damper(solution, one) for one in found]
-        motion = [one.motion.T for one in found]
-        static, rest = [mean for mean, _ in both], "mean, from the damper at rest"
-        along = "over the period, from the damper at rest"
-        on = f"{at} damper_dof"
-        out |= {
-            "damper_motion": variable(f"{on} sample", motion, "mm, rad", along),
-            "damper_static": variable(on, static, "mm, rad", rest),
-            "damper_amplitude": damper_array(solution, [amplitude for _, amplitude in both]),
-        }
-    if not scene.wants("hysteresis"):
-        return out
-    loops = [
+    sweep, f = found[0].sweep, np.array([one.frequency for one in found])
+    loops = (
         (one.peak.number, one.frequency, loop)
         for one in found
         for loop in marched_loops(one, N_LOOPS)
-    ]
-    return out | loop_arrays(loops, found[0].places)
+    )
+    return {
+        "frequency": variable("frequency", f, "Hz"),
+        "excitation_force": variable("", sweep.force, "N"),
+        **_contact(
+            solution,
+            sweep,
+            [(one.peak.number, one.peak.mode, i) for i, one in enumerate(found)],
+            f,
+            np.array([one.period.share for one in found]),
+            # of a half model each node stands for its image too
+            np.array([one.period.copies * one.period.loss for one in found]),
+            np.array([marched_damper(solution, one)[1] for one in found]),
+            loops,
+        ),
+    }

@@ -36,7 +36,6 @@ References
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -57,8 +56,6 @@ from upd.mesh import FloatArray, IntArray, Mesh
 from upd.reduction import attachment_modes, craig_bampton
 from upd.scene import ForcedScene
 from upd.scene.forced_contact import GAUSS, SIDES, Side
-
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -320,8 +317,6 @@ def _rectangle(
 EVEN_DOFS = (0, 2, 4)
 #: signs of the mirror image's displacement: normal, along the damper, up the slope
 MIRROR_SIGNS = np.array([1.0, -1.0, 1.0])
-#: share of odd motion below which a mode counts as even, above one minus which as odd
-PARITY = 1e-4
 
 
 @dataclass(frozen=True)
@@ -379,30 +374,19 @@ def mirror_pairs(face: FacePoints) -> MirrorPairs | None:
     return MirrorPairs(kept, image[kept])
 
 
-def even_modes(rows: FloatArray, pairs: MirrorPairs, shapes: FloatArray) -> FloatArray | None:
-    """Of mode shapes those that are even about y = 0 at the contact points.
+def even_modes(rows: FloatArray, pairs: MirrorPairs, shapes: FloatArray) -> FloatArray:
+    """Of mode shapes (r, k) those with more motion even about y = 0 at the contact points than odd.
 
     Parameters
     ----------
     rows
         (n, 3, r) displacement of all points of the coordinates.
-    shapes
-        (r, k) modes.
-
-    Returns
-    -------
-    FloatArray or None
-        (r, j) even modes; None when a mode is neither even nor odd: its pair of equal frequencies
-        is mixed.
     """
     even, odd = (
         np.linalg.norm(part.reshape(-1, part.shape[-1]) @ shapes, axis=0)
         for part in (pairs.part(rows), pairs.part(rows, -1.0))
     )
-    share = odd / np.maximum(np.hypot(even, odd), np.finfo(float).tiny)
-    if ((share > PARITY) & (share < np.sqrt(1.0 - PARITY**2))).any():
-        return None
-    return np.asarray(shapes[:, share <= PARITY])
+    return np.asarray(shapes[:, odd < even])
 
 
 #: modes of the whole blade beside the ones kept, of those that points off the nodes are put on
@@ -442,27 +426,20 @@ def reduced_blades(
     parts = in_parallel(
         [partial(_reduced, plan.scene, bodies, side, faces[side]) for side in SIDES], plan.workers
     )
-    pairs: dict[Side, MirrorPairs] = {}
-    for side in SIDES if plan.symmetry == "half" and not bodies.half else ():
-        found = mirror_pairs(faces[side])
-        if found is not None:
-            pairs[side] = found
-    if len(pairs) == len(SIDES):
-        of = list(zip(parts, (pairs[side] for side in SIDES), strict=True))
-        even = [even_modes(part.rows, mine, _lowest(part)) for part, mine in of]
-        if all(modes is not None for modes in even):
-            small = [
-                ritz(part, modes, mine.part(part.rows))
-                for (part, mine), modes in zip(of, even, strict=True)
-                if modes is not None
-            ]
-            return faces, small, pairs
-        log.info("modes of mixed parity, both halves are kept")
-    whole = [
-        part if faces[side].at_nodes else ritz(part, _lowest(part), part.rows)
-        for side, part in zip(SIDES, parts, strict=True)
+    half = plan.symmetry == "half" and not bodies.half
+    found = {side: mirror_pairs(faces[side]) if half else None for side in SIDES}
+    pairs = {side: one for side, one in found.items() if one is not None}
+    if len(pairs) < len(SIDES):
+        whole = [
+            part if faces[side].at_nodes else ritz(part, _lowest(part), part.rows)
+            for side, part in zip(SIDES, parts, strict=True)
+        ]
+        return faces, whole, None
+    small = [
+        ritz(part, even_modes(part.rows, mine, _lowest(part)), mine.part(part.rows))
+        for part, mine in zip(parts, pairs.values(), strict=True)
     ]
-    return faces, whole, None
+    return faces, small, pairs
 
 
 def _face(scene: ForcedScene, bodies: Bodies, side: Side) -> FacePoints:

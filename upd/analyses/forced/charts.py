@@ -68,9 +68,10 @@ class ChartedCurve:
         return frequency_of(self.group)
 
     @property
-    def slips(self) -> bool:
-        """Whether a contact point slips anywhere on it."""
-        return bool(self.data("state")[..., SLIP_SHARE].max() > 0.0)
+    def rank(self) -> tuple[bool, float]:
+        """Curves on which a contact point slips come first, by rising F_C/F_E."""
+        slips = self.data("state")[..., SLIP_SHARE].max() > 0.0
+        return not slips, float(self.case.force_ratio or 0.0)
 
     @property
     def moves(self) -> bool:
@@ -92,11 +93,6 @@ class ChartedPeak:
         """The curve's, at the peak."""
         given = self.curve.case.given() | {"peak": self.number, "mode": self.mode}
         return replace(Case(**given), choice="")
-
-    def moves(self, points: Group, side: int) -> bool:
-        """Whether a contact point of a face slips or lifts off."""
-        stick = self.curve.data("state")[self.index, :, STICK_SHARE]
-        return bool((stick[np.asarray(points["face"].data) == side] < 1.0).any())
 
     @property
     def detail(self) -> str:
@@ -196,31 +192,15 @@ def loss_chart(curves: Sequence[ChartedCurve]) -> Chart:
 
 def motion_chart(curve: ChartedCurve, kind: int) -> Chart:
     """The damper's degrees of freedom over frequency: amplitudes of the first harmonic."""
-    name, unit, scale, first, _ = MOTIONS[kind]
+    name, unit, scale, first, names = MOTIONS[kind]
     amplitude = scale * curve.data("damper_amplitude")[:, first : first + 3].T
     axes = HZ_AXIS, Axis(f"{name}, first harmonic", unit)
-    traces = _motions(kind, curve.frequency, amplitude, amplitude.max(axis=1))
+    # those that symmetry forbids are rounding
+    size = amplitude.max(axis=1)
+    shown = np.flatnonzero(size > np.sqrt(np.finfo(float).eps) * size.max())
+    traces = tuple(Trace(names[k], curve.frequency, amplitude[k], "line", int(k)) for k in shown)
     title, case = f"Damper motion: {name}", curve.case.label
     return _sheet("damper_motion", title, axes, traces=traces, case=case)
-
-
-def turn_chart(at: ChartedPeak, kind: int) -> Chart:
-    """The damper's degrees of freedom over a period at a peak, about their means."""
-    name, unit, scale, first, _ = MOTIONS[kind]
-    motion = scale * at.curve.data("damper_motion")[at.index, first : first + 3]
-    motion = motion - motion.mean(axis=1, keepdims=True)
-    turn = np.arange(1, motion.shape[1] + 1) / motion.shape[1]
-    axes = Axis("time in periods", low=0.0, high=1.0), Axis(f"{name} about its mean", unit)
-    traces = _motions(kind, turn, motion, np.abs(motion).max(axis=1))
-    title = f"Damper motion over a period: {name}"
-    given = {"traces": traces, "case": at.case.label, "detail": at.detail}
-    return _sheet("damper_period", title, axes, **given)
-
-
-def _motions(kind: int, x: Array, values: Array, size: Array) -> tuple[Trace, ...]:
-    """Three motions of one kind; those that symmetry forbids are rounding."""
-    shown = np.flatnonzero(size > np.sqrt(np.finfo(float).eps) * size.max())
-    return tuple(Trace(MOTIONS[kind][-1][k], x, values[k], "line", int(k)) for k in shown)
 
 
 _STAR = 5
@@ -284,7 +264,7 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
         for some in (groups, others)
     )
     # the page opens on the lowest F_C/F_E on which something slips
-    shown, shown_recorded = (sorted(some, key=_rank) for some in (curves, recorded))
+    shown, shown_recorded = (sorted(some, key=lambda c: c.rank) for some in (curves, recorded))
     peaks = [
         one for c in (*shown, *shown_recorded) if "peak" in c.group for one in charted_peaks(c)
     ]
@@ -309,7 +289,6 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
             for one in sliding
             if "share" in one.curve.group
             for k in range(len(SIDES))
-            if one.moves(points[one.case.stiffness], k)
             for chart in contact_maps(one, points[one.case.stiffness], k)
         ),
         *(
@@ -324,18 +303,7 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
             if "damper_amplitude" in c.group
             for k in range(len(MOTIONS))
         ),
-        *(
-            turn_chart(one, k)
-            for one in peaks
-            if "damper_motion" in one.curve.group
-            for k in range(len(MOTIONS))
-        ),
     ]
-
-
-def _rank(curve: ChartedCurve) -> tuple[bool, float]:
-    """Curves on which something slips first, by rising F_C/F_E."""
-    return not curve.slips, float(curve.case.force_ratio or 0.0)
 
 
 def _responses(

@@ -26,25 +26,8 @@ from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 
 from upd.analyses.forced import measures
-from upd.analyses.forced.interface_model import (
-    WholeFaces,
-    by_coulomb,
-)
-from upd.analyses.forced.measures import (
-    CANDIDATES,
-    PEAKS_ABOVE,
-    Array,
-    ComplexArray,
-    CurvePeak,
-    ModeShapes,
-    StuckMode,
-    accelerance_of,
-    chosen_peaks,
-    numbered,
-    path_maxima,
-    tell_stuck_peaks,
-    unmoved,
-)
+from upd.analyses.forced.interface_model import WholeFaces, by_coulomb
+from upd.analyses.forced.measures import Array, ComplexArray, CurvePeak, ModeShapes, StuckMode
 from upd.analyses.forced.model import Model, balance_of
 from upd.analyses.forced.plan import (
     SAMPLES,
@@ -384,7 +367,7 @@ def exact_peaks(response: Callable[[Array], ComplexArray], f: Array, grid: Array
         for at, top in found
         if top >= measures.PEAKS_ABOVE * highest
     ]
-    return chosen_peaks(peaks)
+    return measures.chosen_peaks(peaks)
 
 
 def _top(response: Callable[[Array], ComplexArray], low: float, high: float) -> tuple[float, float]:
@@ -398,32 +381,110 @@ def _top(response: Callable[[Array], ComplexArray], low: float, high: float) -> 
     return float(found.x), -float(found.fun)
 
 
-def linear_peaks(b: Balance, row: Array, force: float, grid: Array, stuck: bool) -> Peaks:
-    """Peaks of the accelerance without contacts or with all points stuck.
+class Limit(NamedTuple):
+    """A linear limit as a function of frequency: no contacts, or all of them closed and sticking.
 
-    Parameters
+    Attributes
     ----------
-    row
-        (n_dof,) output.
-    force
-        Its excitation, N.
-    grid
-        (n,) Hz, rising: the sweep.
-    stuck
-        All points closed and sticking; else without contacts.
-
-    Returns
-    -------
-    list of CurvePeak
-        At most the two highest within the sweep, by rising frequency; heights in (m/s2)/N.
+    harmonic, force
+        That is read; N.
+    modes, width
+        (m,) Hz, where this harmonic meets the modes, and their half-power widths.
+    moved
+        (n,) Hz -> (n, K) amplitudes of coordinates, mm.
+    rows
+        Side -> (K,) displacement along x at the accelerometer.
+    moving
+        Blades that move.
+    shapes
+        Stuck modes on the last of the coordinates; None without contacts: peaks are then numbered
+        by frequency.
     """
-    # a mode answers where the harmonic that is read meets it
-    k = measures.read_harmonic(b)
-    modes, width = linear_modes(b, stuck)
 
-    response = partial(measures.linear_accelerance, b, row, force, stuck=stuck)
-    f = around_modes(modes / k, width / k, float(grid[0]), float(grid[-1]))
-    return exact_peaks(response, f, grid)
+    harmonic: int
+    force: float
+    modes: Array
+    width: Array
+    moved: Callable[[Array], ComplexArray]
+    rows: Mapping[Side, Array]
+    moving: Sequence[Side]
+    shapes: ModeShapes | None = None
+
+    def accelerance(self, side: Side, f: Array) -> ComplexArray:
+        """(n,) (m/s2)/N of a blade at (n,) Hz."""
+        return measures.accelerance_of(
+            self.moved(f) @ self.rows[side], f, self.harmonic, self.force
+        )
+
+    def peaks(self, side: Side, grid: Array) -> Peaks:
+        """At most the two highest of a blade within (n,) Hz, rising, numbered; none of one at
+        rest.
+        """
+        if side not in self.moving:
+            return []
+        f = around_modes(self.modes, self.width, float(grid[0]), float(grid[-1]))
+        found = exact_peaks(partial(self.accelerance, side), f, grid)
+        if self.shapes is None or not found:
+            return [peak._replace(number=k) for k, peak in enumerate(found, 1)]
+        motion = self.moved(np.array([one.frequency for one in found]))
+        return measures.numbered(self.shapes, found, motion[:, -len(self.shapes.M) :])
+
+
+def point_limit(plan: ForcedPlan, model: Model, stuck: bool) -> Limit:
+    """A limit of contact points, with F_C as excitation."""
+    e, force, k = plan.scene.excitation, plan.scene.damper.centrifugal, model.excitation.lowest
+    b = balance_of(plan, model, force, (0, *model.excitation.harmonics))
+    modes, width = linear_modes(b, stuck)
+    return Limit(
+        k,
+        force,
+        modes / k,
+        width / k,
+        lambda f: b.linear_displacement(2.0 * np.pi * f, stuck, k),
+        {side: model.row(side) for side in SIDES},
+        SIDES if stuck else model.excitation.free_blades,
+        measures.mode_shapes(model, measures.CANDIDATES * e.stop) if stuck else None,
+    )
+
+
+def faces_limit(march: InterfaceModel, excitation: Excitation, stop: float, stuck: bool) -> Limit:
+    """A limit of whole faces in a sweep up to so many Hz, per newton of F_E."""
+    k = excitation.lowest
+    at = stuck_system(march)[0] if stuck else np.sort(march.frequency)
+    outputs = np.eye(len(march.seen_modes))
+    return Limit(
+        k,
+        1.0,
+        at / k,
+        2.0 * float(march.damping.max()) * at / k,
+        lambda f: march.linear_response(k * f, excitation.read, stuck=stuck),
+        dict(zip(SIDES, outputs, strict=False)),
+        SIDES if stuck else excitation.free_blades,
+        stuck_modes_of(march, measures.CANDIDATES * stop) if stuck else None,
+    )
+
+
+def linear_curves(plan: ForcedPlan, free: Limit, stuck: Limit) -> LinearCurves:
+    """Curves of both limits, their peaks and modes."""
+    f, limits = grid(plan), (free, stuck)
+    # finer around every mode: a drawn curve has its tops
+    for one in limits:
+        f = finer(f, one.modes, one.width)
+    curves: list[dict[Side, ComplexArray]] = [
+        {
+            side: one.accelerance(side, f) if side in one.moving else np.zeros(len(f), complex)
+            for side in SIDES
+        }
+        for one in limits
+    ]
+    peaks = [{side: one.peaks(side, f) for side in SIDES} for one in limits]
+    modes = stuck.shapes.modes if stuck.shapes else []
+    return LinearCurves(f, curves[0], curves[1], modes, peaks[0], peaks[1])
+
+
+def linear_of(plan: ForcedPlan, model: Model) -> LinearCurves:
+    """Free and stuck curves of a model, their peaks and modes."""
+    return linear_curves(plan, *(point_limit(plan, model, stuck) for stuck in (False, True)))
 
 
 def stuck_system(march: InterfaceModel) -> tuple[Array, Array, Array]:
@@ -470,94 +531,13 @@ def stuck_modes_of(march: InterfaceModel, below: float) -> ModeShapes:
     return measures.modes_of_tips(np.eye(len(rows)), frequency, rows @ shapes, tips, below)
 
 
-def faces_accelerance(
-    march: InterfaceModel, excitation: Excitation, side: Side, f: Array, *, stuck: bool
-) -> ComplexArray:
-    """(n,) (m/s2)/N of a blade at (n,) Hz per newton of F_E, with every node closed and sticking,
-    or none touching.
-    """
-    k = excitation.lowest
-    moved = march.linear_response(k * f, excitation.read, stuck=stuck)[:, SIDES.index(side)]
-    return measures.accelerance_of(moved, f, k, 1.0)
-
-
-def linear_of_faces(plan: ForcedPlan, march: InterfaceModel) -> LinearCurves:
-    """Curves without the damper, and with every node closed and sticking."""
-    f, excitation = grid(plan), excitation_of(plan.scene.excitation)
-    k, shapes = excitation.lowest, stuck_modes_of(march, CANDIDATES * plan.scene.excitation.stop)
-    curves, peaks = (_at_rest(f), _at_rest(f)), ({s: Peaks() for s in SIDES}, dict[Side, Peaks]())
-    for stuck, at in enumerate((np.sort(march.frequency), stuck_system(march)[0])):
-        width = 2.0 * float(march.damping.max()) * at
-        fine = around_modes(at / k, width / k, float(f[0]), float(f[-1]))
-        for side in SIDES if stuck else excitation.free_blades:
-            read = partial(faces_accelerance, march, excitation, side, stuck=bool(stuck))
-            curves[stuck][side], found = read(f), exact_peaks(read, fine, f)
-            if not stuck:
-                peaks[0][side] = unmoved(found)
-                continue
-            tops = k * np.array([one.frequency for one in found])
-            motion = march.linear_response(tops, excitation.read, stuck=True)[:, len(SIDES) :]
-            peaks[1][side] = numbered(shapes, found, motion)
-    return LinearCurves(f, *curves, shapes.modes, *peaks)
-
-
-def _at_rest(frequency: Array) -> dict[Side, ComplexArray]:
-    return {side: np.zeros(len(frequency), complex) for side in SIDES}
-
-
-def limit_balance(plan: ForcedPlan, model: Model) -> Balance:
-    """The problem of both limits, with F_C as excitation."""
-    harmonics = (0, *model.excitation.harmonics)
-    return balance_of(plan, model, plan.scene.damper.centrifugal, harmonics)
-
-
-def limit_peaks(
-    plan: ForcedPlan, model: Model, b: Balance, f: Array, side: Side, stuck: bool
-) -> Peaks:
-    """Numbered peaks of a blade, free or stuck; none of a free blade at rest.
-
-    Parameters
-    ----------
-    b
-        Of `limit_balance`.
-    f
-        (n,) Hz, rising: the sweep.
-    """
-    if not stuck and side not in model.excitation.free_blades:
-        return []
-    found = linear_peaks(b, model.row(side), plan.scene.damper.centrifugal, f, stuck)
-    return tell_stuck_peaks(model, found, plan.scene.excitation.stop) if stuck else unmoved(found)
-
-
-def linear_of(plan: ForcedPlan, model: Model) -> LinearCurves:
-    """Free and stuck curves of a model, their peaks and modes."""
-    b, f, k = limit_balance(plan, model), grid(plan), model.excitation.lowest
-    # finer around every mode: a drawn curve has its tops
-    for stuck in (False, True):
-        at, width = linear_modes(b, stuck)
-        f = finer(f, at / k, width / k)
-    curves, peaks = (_at_rest(f), _at_rest(f)), (dict[Side, Peaks](), dict[Side, Peaks]())
-    force = plan.scene.damper.centrifugal
-    for side in SIDES:
-        for stuck in (False, True):
-            if stuck or side in model.excitation.free_blades:
-                curves[stuck][side] = measures.linear_accelerance(
-                    b, model.row(side), force, f, stuck
-                )
-            peaks[stuck][side] = limit_peaks(plan, model, b, f, side, stuck)
-    modes = measures.stuck_modes(model, CANDIDATES * plan.scene.excitation.stop)
-    return LinearCurves(f, *curves, modes, *peaks)
-
-
 def stuck_frequency(modes: Iterable[StuckMode], in_phase: bool) -> float:
     """The lowest in Hz, in or out of phase; nan without."""
     found = (m.frequency for m in modes if m.in_phase == in_phase)
     return next(found, math.nan)
 
 
-def fine_grid(
-    plan: ForcedPlan, model: Model, force: float, frequencies: Array | None = None
-) -> Array:
+def fine_grid(plan: ForcedPlan, model: Model, frequencies: Array | None = None) -> Array:
     """Frequencies of the sweep in Hz, and finer ones around stuck modes where they are too coarse
     for these.
 
@@ -565,15 +545,11 @@ def fine_grid(
     ----------
     plan, model
         Of the rig.
-    force
-        F_E, N.
     frequencies
         (n,) Hz in place of those of the sweep.
     """
-    k = model.excitation.lowest
-    problem = balance_of(plan, model, force, (0, *model.excitation.harmonics))
-    modes, width = linear_modes(problem, True)
-    return finer(grid(plan) if frequencies is None else frequencies, modes / k, width / k)
+    limit = point_limit(plan, model, True)
+    return finer(grid(plan) if frequencies is None else frequencies, limit.modes, limit.width)
 
 
 # -- sweeps, and whole faces by harmonic balance ---------------------------------------------------
@@ -622,7 +598,7 @@ def both_ways(
             curve = ForcedCurve(
                 name, ratio, force, {}, {}, {}, found, float(found.seconds.sum()), way
             )
-            maxima = partial(path_maxima, between=False)
+            maxima = partial(measures.path_maxima, between=False)
             out.append(with_outputs(plan, march, curve, moved, maxima))
     return out
 
@@ -646,9 +622,9 @@ def with_outputs(
         Frequencies and heights along the curve -> its local maxima.
     """
     excitation, stop = excitation_of(plan.scene.excitation), plan.scene.excitation.stop
-    modes, f = stuck_modes_of(march, CANDIDATES * stop), curve.frequency
+    modes, f = stuck_modes_of(march, measures.CANDIDATES * stop), curve.frequency
     blades: dict[int, dict[Side, ComplexArray]] = {
-        k: {s: accelerance_of(u[:, j], f, k, curve.force) for j, s in enumerate(SIDES)}
+        k: {s: measures.accelerance_of(u[:, j], f, k, curve.force) for j, s in enumerate(SIDES)}
         for k, u in moved.items()
     }
     read, peaks = blades.pop(excitation.lowest), dict[Side, tuple[CurvePeak, ...]]()
@@ -656,7 +632,7 @@ def with_outputs(
         found = maxima(f, np.abs(read[side]))
         at = np.array([one.sample for one in found], int)
         motion = moved[excitation.lowest][at, len(SIDES) :]
-        peaks[side] = tuple(numbered(modes, found, motion))
+        peaks[side] = tuple(measures.numbered(modes, found, motion))
     return replace(curve, accelerance=read, more=blades, peaks=peaks)
 
 
@@ -693,9 +669,9 @@ def _maxima(jumps: Sequence[int], frequency: Array, size: Array) -> list[CurvePe
     out, begin = [], 0
     for end in (*(i + 1 for i in jumps), len(size)):
         f, a = frequency[begin:end], size[begin:end]
-        out += [one._replace(sample=one.sample + begin) for one in path_maxima(f, a, 0.0)]
+        out += [one._replace(sample=one.sample + begin) for one in measures.path_maxima(f, a, 0.0)]
         for i, inner, jumped in ((0, 1, begin > 0), (len(a) - 1, len(a) - 2, end < len(size))):
             if jumped and (len(a) == 1 or a[i] > a[inner]):
                 out.append(CurvePeak(float(f[i]), float(a[i]), begin + i))
         begin = end
-    return [one for one in out if one.height >= PEAKS_ABOVE * size.max()]
+    return [one for one in out if one.height >= measures.PEAKS_ABOVE * size.max()]

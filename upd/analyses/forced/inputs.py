@@ -48,7 +48,7 @@ _MOBILISED = (-0.5, 0.5)
 FEW_HARMONICS = 3
 
 
-def input_variants(few: Run, bodies: Bodies) -> list[Variant]:
+def input_variants(few: Run, bodies: Bodies) -> list[Variant | SolvedVariation]:
     """Both ends of every input that applies, those that take the longest first."""
     plan, name, model = few.plan, few.name, few.model
     out = [make_variant(plan, name, model, bodies, of) for of in _inputs(few)]
@@ -114,10 +114,11 @@ def few_harmonics(run: Run) -> Run | None:
                 continue
             with suppress(UpdError):
                 f, height = peak_again(run, other, curve, "right", peak.number, far=True)
-                x = b.embedded(top.x, curve.balance)
+                x = b.embedded(top.x, curve.answer.balance)
                 peaks.append(peak._replace(frequency=f, height=height))
                 tops["right", peak.number] = top._replace(frequency=f, height=height, x=x)
-    few = curve._replace(balance=b, peaks={"right": peaks}, tops=tops, checked=())
+    answer = replace(curve.answer, balance=b)
+    few = replace(curve, answer=answer, peaks={"right": tuple(peaks)}, tops=tops, checked=())
     return other._replace(curves=(few,)) if peaks else None
 
 
@@ -196,7 +197,7 @@ def nearer(model: Model, factor: float) -> Model | None:
 # -- an effect left out ----------------------------------------------------------------------------
 
 
-def along_the_damper(few: Run, bodies: Bodies) -> tuple[Run, Variant] | None:
+def along_the_damper(few: Run, bodies: Bodies) -> tuple[Run, Variant | SolvedVariation] | None:
     """The highest peak on which a point slips alone, and the model in which friction resists
     sliding along the damper too; None where the run has it or nothing rubs.
     """
@@ -205,7 +206,7 @@ def along_the_damper(few: Run, bodies: Bodies) -> tuple[Run, Variant] | None:
     if model.contacts.tangents == 2 or not few.plan.scene.contact.friction or not slipping:
         return None
     highest = max(slipping, key=lambda key: slipping[key].height)
-    alone = few._replace(curves=(curve._replace(tops={highest: slipping[highest]}),))
+    alone = few._replace(curves=(replace(curve, tops={highest: slipping[highest]}),))
     of = Variation(ALONG, "both sliding directions", (("contact.directions", "two"),))
     return alone, make_variant(few.plan, few.name, model, bodies, of)
 

@@ -30,7 +30,7 @@ from scipy.linalg import eigh
 from upd.analyses.base import Plan
 from upd.analyses.forced.model import Model
 from upd.analyses.forced.plan import ForcedPlan, excitation_of, time_steps
-from upd.analyses.forced.statics import GIVEN, SEATED, StaticState
+from upd.analyses.forced.statics import GIVEN, SEATED, StaticState, point_preload, static_state
 from upd.analyses.seated.bodies import Blade, Bodies, lattice, patch_frame
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.contact import CoupledContact
@@ -74,13 +74,13 @@ def make_whole_faces(plan: ForcedPlan, bodies: Bodies, stages: Stages) -> WholeF
             centrifugal=F,
             damping=scene.excitation.damping,
             excited=excitation_of(scene.excitation).blades,
-            seen=SEEN * scene.excitation.stop,
+            kept_modes=(MODES, SEEN * scene.excitation.stop),
         )
         # every mode is of one blade, those of the left one first
         on = np.repeat(np.eye(len(SIDES)), len(made.frequency) // len(SIDES), axis=0)
         made = replace(made, damping=scene.modal_damping(made.frequency, on))
     with stages("static state", f"{_name(scene.contact.static)}, {of.n} nodes"):
-        march, start = _begin(made, of, scene.contact.worn, scene.contact.static, F, mu)
+        march, start = _begin(plan, bodies, made, of)
     forces = of.copies * np.stack(
         [start.f.reshape(3, -1)[:, of.face == k].sum(axis=1) for k in range(len(SIDES))]
     )
@@ -93,9 +93,11 @@ def _name(static: Any) -> str:
 
 
 def _begin(
-    model: InterfaceModel, of: Interface, worn: float, static: Any, F: float, mu: float
+    plan: ForcedPlan, bodies: Bodies, model: InterfaceModel, of: Interface
 ) -> tuple[InterfaceModel, InterfaceState]:
     """The model with its gap, and the damper at rest under F_C."""
+    contact, F = plan.scene.contact, plan.scene.damper.centrifugal
+    worn, static, mu = contact.worn, contact.static, contact.friction
     if static in (SEATED, "frictionless"):
         gap = worn * of.worn_gap(F) if worn else np.zeros(of.n)
         loads = F * np.arange(1, _STEPS + 1) / _STEPS if static == SEATED else np.array([F])
@@ -119,20 +121,7 @@ def _begin(
             f"contact.static: {_name(static)!r} is a state of faces worn in; to fix it: "
             'contact.fit = "worn", or contact.static = "seated" or "frictionless"'
         )
-    named = {"opposing": mu, "reversed": -mu}
-    ratio = named[static] if isinstance(static, str) else _both(static)
-    return worn_start(model, of, F, ratio)
-
-
-def _both(static: Any) -> float:
-    """T/N that both faces share."""
-    left, right = (static[side] for side in SIDES)
-    if not isinstance(left, float) or left != right:
-        raise InputError(
-            "contact.static: worn faces node by node take one T/N for both; to fix it: give the "
-            'same ratio to left and right, or contact.static = "seated"'
-        )
-    return left
+    return worn_start(model, of, F, static_state(plan, bodies).ratio)
 
 
 def make_interface_model(
@@ -143,9 +132,8 @@ def make_interface_model(
     friction: float,
     centrifugal: float,
     damping: float,
-    n_modes: int = MODES,
     excited: Sequence[Side] = ("right",),
-    seen: float = 0.0,
+    kept_modes: tuple[int, float] = (MODES, 0.0),
 ) -> InterfaceModel:
     """Blades in their free-interface modes and what those leave of the static compliance.
 
@@ -164,12 +152,10 @@ def make_interface_model(
         F_C on the whole, N.
     damping
         Of all modes, ratio to critical.
-    n_modes
-        Of each blade.
     excited
         Blades with a force.
-    seen
-        Hz; modes below are outputs.
+    kept_modes
+        How many of each blade, and Hz below which they are outputs.
 
     Raises
     ------
@@ -184,7 +170,7 @@ def make_interface_model(
         raise InputError(
             "contact.model: the faces belong to other meshes: make them of these bodies"
         )
-    solver = plan.scene.solver.name
+    solver, (n_modes, seen) = plan.scene.solver.name, kept_modes
     parts = in_parallel([partial(_part, b, n_modes, solver) for b in blades], plan.workers)
     both = _side_by_side(parts, interface, excited, seen)
     Phi, frequency = both["shapes"], both["frequency"]
@@ -272,7 +258,7 @@ def seated_start(model: InterfaceModel, seated: CoupledContact) -> InterfaceStat
 
 
 def worn_start(
-    model: InterfaceModel, interface: Interface, centrifugal: float, traction: float = 0.0
+    model: InterfaceModel, interface: Interface, centrifugal: float, traction: ArrayLike = 0.0
 ) -> tuple[InterfaceModel, InterfaceState]:
     """Faces worn in until they touch everywhere under F_C, as evenly as they can.
 
@@ -289,7 +275,7 @@ def worn_start(
     centrifugal
         F_C on the whole, N.
     traction
-        T/N of both faces.
+        T/N of both faces, or (2,) of each.
 
     Returns
     -------
@@ -301,28 +287,29 @@ def worn_start(
     InputError
         When friction cannot hold that traction, or the faces would have to pull.
     """
-    n, kept = interface.n, interface.kept
-    if abs(traction) > model.friction.min():
+    n, kept, ratio = interface.n, interface.kept, np.broadcast_to(traction, len(SIDES))
+    words = ", ".join(f"{one:g}" for one in dict.fromkeys(ratio.tolist()))
+    if np.abs(ratio).max() > model.friction.min():
         raise InputError(
-            f"contact.static: T/N {traction:g} is more than friction {model.friction.min():g} holds"
+            f"contact.static: T/N {words} is more than friction {model.friction.min():g} holds"
         )
     load = np.zeros(len(kept))
     load[kept.index(2)] = centrifugal / interface.copies
-    B = interface.columns[:n] + traction * interface.columns[2 * n :]
-    A = B.T * np.sqrt(interface.area)
-    # rows of forces and of moments differ by a length
-    size = np.linalg.norm(A, axis=1)
-    eps = np.sqrt(np.finfo(float).eps)
-    used = size > eps * np.where(np.array(kept) < 3, size[0], size.max())
-    x = np.linalg.lstsq(A[used] / size[used, None], load[used] / size[used], rcond=eps)[0]
-    normal = np.sqrt(interface.area) * x
-    off = np.abs(B.T @ normal - load)[used] / size[used]
-    if off.max() > eps * np.abs(load[used] / size[used]).max() or normal.min() < 0.0:
+    columns = interface.columns
+    normal, held = point_preload(
+        columns[:n],
+        columns[2 * n :],
+        interface.face,
+        interface.area,
+        StaticState(f"T/N {words}", np.ones(len(SIDES)), ratio),
+        load,
+    )
+    if normal.min() <= 0.0:
         raise InputError(
-            f"contact.static: pressure on the whole of both faces with T/N {traction:g} cannot "
+            f"contact.static: pressure on the whole of both faces with T/N {words} cannot "
             "hold this damper against F_C; take another T/N, or seat it"
         )
-    force = np.stack([normal, np.zeros(n), traction * normal], axis=1)
+    force = np.stack([normal, np.zeros(n), held], axis=1)
     w = -(interface.compliance @ force.T.ravel()).reshape(3, n)
     made = replace(model, gap=w[0])
     still = np.zeros(len(kept))

@@ -65,14 +65,10 @@ class Loop:
     energy: float
 
 
-def read_place(b: Balance) -> int:
-    """Place of the lowest harmonic that is excited, among those above 0."""
-    return int(np.flatnonzero(np.any(b.dynamic != 0.0, axis=1))[0])
-
-
 def read_harmonic(b: Balance) -> int:
     """Number of the lowest harmonic that is excited."""
-    return int(b.harmonics.dynamic[read_place(b)])
+    excited = np.any(b.dynamic != 0.0, axis=1)
+    return int(b.harmonics.dynamic[np.flatnonzero(excited)[0]])
 
 
 def accelerance(
@@ -127,36 +123,6 @@ def accelerance_of(
 ) -> ComplexArray:
     """(n,) (m/s2)/N of F_E, from the amplitudes (n,) mm of a harmonic at frequencies (n,) in Hz."""
     return np.asarray(-((2.0 * np.pi * harmonic * frequency) ** 2) * _M / force * moved)
-
-
-def linear_accelerance(
-    b: Balance,
-    row: Array,
-    force: float,
-    frequency: Array,
-    stuck: bool,
-) -> ComplexArray:
-    """Accelerance without contacts or with all points stuck, in the lowest harmonic excited.
-
-    Parameters
-    ----------
-    row
-        (n_dof,) output.
-    force
-        Its excitation, N.
-    frequency
-        (n,) Hz.
-    stuck
-        All points closed and sticking; else without contacts.
-
-    Returns
-    -------
-    ComplexArray
-        (n,) in (m/s2)/N.
-    """
-    k = read_harmonic(b)
-    moved = b.linear_displacement(2.0 * np.pi * frequency, stuck, k) @ row
-    return accelerance_of(moved, frequency, k, force)
 
 
 class CurvePeak(NamedTuple):
@@ -308,13 +274,6 @@ def in_faces(position: Array, face: IntArray, frames: Iterable[Array]) -> tuple[
     return along, up
 
 
-def power(answer: FrequencyResponse) -> Array:
-    """Friction power of every contact point along the path, (n, n_point) in W: loop area per cycle
-    in N mm times frequency.
-    """
-    return np.asarray(answer.energy * answer.frequency[:, None] * _M)
-
-
 def damper_motion(answer: FrequencyResponse, model: Model) -> tuple[Array, Array]:
     """Motion of the damper's six dofs along the path.
 
@@ -324,31 +283,19 @@ def damper_motion(answer: FrequencyResponse, model: Model) -> tuple[Array, Array
         (n, 6) mean, and amplitude of the lowest harmonic that is excited, mm and rad.
     """
     q = model.damper_dofs(answer.coefficients)
-    first = answer.harmonics.offset + 2 * read_place(answer.balance)
-    static = q[:, :, 0] if answer.harmonics.static else np.zeros(q.shape[:2])
+    h = answer.harmonics
+    first = h.offset + 2 * h.place(read_harmonic(answer.balance))
+    static = q[:, :, 0] if h.static else np.zeros(q.shape[:2])
     return static.copy(), np.hypot(q[:, :, first], q[:, :, first + 1])
-
-
-def rest_error(answer: FrequencyResponse, model: Model) -> float:
-    """Largest misfit along the path of the mean contact forces on the damper against F_C, relative
-    to it (moments by the damper's arms).
-    """
-    if not len(answer.frequency) or not answer.harmonics.static:
-        return 0.0
-    return _off_balance(model, answer.contact_force[..., 0])
 
 
 def static_error(model: Model) -> float:
     """Largest misfit of the points' static forces and moments on the damper against F_C, relative
     to it (moments by the damper's arms).
     """
-    return _off_balance(model, np.column_stack([model.contacts.law.preload, model.traction])[None])
-
-
-def _off_balance(model: Model, force: Array) -> float:
-    """Of contact forces (n, n_point, 1 + d) on the damper against F_C."""
-    rows = model.damper_rows[:, : force.shape[2]]
-    total = np.einsum("pdr,npd->nr", rows, force)
+    force = np.column_stack([model.contacts.law.preload, model.traction])
+    rows = model.damper_rows[:, : force.shape[1]]
+    total = np.einsum("pdr,pd->r", rows, force)
     rotation = np.array(model.damper.kept) >= 3
     arm = np.sqrt(float((rows[:, :, rotation] ** 2).sum(axis=(1, 2)).max()))
     size = float(np.linalg.norm(model.damper.force))
@@ -583,7 +530,7 @@ def numbered(
 
 def first_harmonic(answer: FrequencyResponse, points: NDArray[np.int64]) -> ComplexArray:
     """Amplitudes (m, n_dof) of all dofs at some points of a path, lowest harmonic excited, mm."""
-    j = read_place(answer.balance)
+    j = answer.harmonics.place(read_harmonic(answer.balance))
     found = [to_complex(answer.coefficients[i], answer.harmonics)[:, j] for i in points]
     return np.asarray(found)
 
@@ -611,32 +558,3 @@ def in_quadrature(model: Model, motion: ComplexArray) -> NDArray[np.bool_]:
     """
     driven = motion[:, : len(model.force)] @ model.force.conj()
     return np.asarray(np.abs(driven.imag) >= np.abs(driven.real))
-
-
-def stuck_motion(model: Model, frequency: Array) -> ComplexArray:
-    """Amplitudes (m, n_dof) of all dofs with every point stuck, mm per newton of F_E, in the lowest
-    harmonic that is excited.
-    """
-    M, C, K, _ = model.linear(stuck=True)
-    force = np.concatenate([model.force, np.zeros(len(M) - len(model.force))])
-    omega = 2.0 * np.pi * model.excitation.lowest * np.asarray(frequency)
-    return np.array([np.linalg.solve(K + 1j * w * C - w**2 * M, force) for w in omega])
-
-
-def unmoved(peaks: Sequence[CurvePeak]) -> list[CurvePeak]:
-    """Peaks of a curve of no stuck mode, numbered by frequency."""
-    return [peak._replace(number=k) for k, peak in enumerate(peaks, 1)]
-
-
-def tell_stuck_peaks(model: Model, peaks: Sequence[CurvePeak], stop: float) -> list[CurvePeak]:
-    """Peaks of a stuck curve by the numbers of their modes.
-
-    Parameters
-    ----------
-    stop
-        End of the sweep, Hz.
-    """
-    if not peaks:
-        return []
-    motion = stuck_motion(model, np.array([one.frequency for one in peaks]))
-    return numbered(mode_shapes(model, CANDIDATES * stop), peaks, motion)

@@ -73,7 +73,7 @@ def solve_curve(
         Of the contact stiffness; F_C/F_E.
     """
     begin, force = time.perf_counter(), plan.scene.damper.centrifugal / ratio
-    answer = respond(plan, model, force, fine_grid(plan, model, force))
+    answer = respond(plan, model, force, fine_grid(plan, model))
     H = {
         k: {side: measures.accelerance(answer, model.row(side), force, k) for side in SIDES}
         for k in model.excitation.harmonics
@@ -126,7 +126,7 @@ def climbed(
     frequency: float,
     side: Side,
     force: float,
-    about: CurvePeak | Top,
+    about: CurvePeak | Top | None = None,
     reach: float = FIRST_REACH,
 ) -> Top | None:
     """The top of the accelerance of a blade uphill from a solved point; None where none is near.
@@ -136,31 +136,17 @@ def climbed(
     b, x, frequency
         The problem, its unknowns there, Hz.
     about
-        The peak that is looked for.
+        The peak that is looked for; any when None.
     reach
         First step along the path.
     """
-    top = top_from(model, b, x, frequency, side, force, reach)
-    if top is None or not is_near(top.frequency / about.frequency, top.height / about.height):
-        return None
-    return top
-
-
-def top_from(
-    model: Model,
-    b: Balance,
-    x: Array,
-    frequency: float,
-    side: Side,
-    force: float,
-    reach: float = FIRST_REACH,
-) -> Top | None:
-    """The top uphill from a solved point, as `climbed`, wherever it is."""
     k = model.excitation.lowest
     top = climb(b, model.row(side), x, frequency, reach, harmonic=k, power=2)
     if not top.found:
         return None
     height = 1e-3 * (2.0 * np.pi * k * top.frequency) ** 2 * top.amplitude / force
+    if about and not is_near(top.frequency / about.frequency, height / about.height):
+        return None
     slips = bool((b.period(top.x).state != STICK).any())
     return Top(top.frequency, float(height), top.x, slips)
 
@@ -229,20 +215,9 @@ class _Steady(NamedTuple):
     state: InterfaceState
 
 
-class _Reached(NamedTuple):
-    """The last motion that stays on a way up to a top.
-
-    Attributes
-    ----------
-    sample, beyond
-        Its place on the path, and the next one towards the top.
-    heights
-        As of `_Steady`.
-    """
-
-    sample: int
-    beyond: int
-    heights: Array
+#: the last motion that stays on a way up to a top: its place on the path, the next one towards the
+#: top, heights as of `_Steady`
+_Reached = tuple[int, int, Array]
 
 
 def _confirmed(
@@ -270,10 +245,9 @@ def _confirmed(
     if peak.number not in motions:
         found = (_highest(integrate, curve, way) for way in _downhill(curve, size, peak.sample))
         motions[peak.number] = [one for one in found if one is not None]
-    for one in motions[peak.number]:
-        balance, integrated = (float(height) for height in one.heights[:, k])
+    for i, beyond, heights in motions[peak.number]:
+        balance, integrated = (float(height) for height in heights[:, k])
         if not best.stays or integrated > best.integrated:
-            i, beyond = one.sample, one.beyond
             best = replace(
                 best,
                 frequency=float(f[i]),
@@ -310,7 +284,7 @@ def _highest(
         if further is None or np.linalg.norm(further.heights[1]) < np.linalg.norm(kept.heights[1]):
             break
         high, kept = k, further
-    return _Reached(way[high], way[max(high - 1, 0)], kept.heights)
+    return way[high], way[max(high - 1, 0)], kept.heights
 
 
 def _downhill(curve: PointCurve, size: Array, top: int) -> list[list[int]]:

@@ -87,23 +87,18 @@ class Performance:
         """Whether the best is no end of the curve."""
         return self.best is not None and self.best not in (self.known[0], self.known[-1])
 
-    def worst_at(self, ratio: float) -> float:
-        """Height of the highest peak at an F_C/F_E, between those of the curve on logarithmic axes;
-        nan beyond its ends.
-        """
-        known = self.known
-        x = np.log([one.ratio for one in known])
-        y = np.log([one.worst.height for one in known if one.worst is not None])
-        at = math.log(ratio)
-        return float(np.exp(np.interp(at, x, y, left=np.nan, right=np.nan)))
-
     def factor_two(self) -> tuple[float, float] | None:
-        """The highest peak at half and at twice the best F_C/F_E, over that at the best."""
-        best = self.best
+        """The highest peak at half and at twice the best F_C/F_E, over that at the best: between
+        those of the curve on logarithmic axes, nan beyond its ends.
+        """
+        best, known = self.best, self.known
         if best is None or best.worst is None:
             return None
-        low, high = (self.worst_at(best.ratio * factor) for factor in (0.5, 2.0))
-        return low / best.worst.height, high / best.worst.height
+        x = np.log([one.ratio for one in known])
+        y = np.log([one.worst.height for one in known if one.worst is not None])
+        at = math.log(best.ratio) + np.log([0.5, 2.0])
+        low, high = np.exp(np.interp(at, x, y, left=np.nan, right=np.nan)) / best.worst.height
+        return float(low), float(high)
 
 
 def peaks_at(
@@ -124,7 +119,7 @@ def peaks_at(
     """
     force, e = plan.scene.damper.centrifugal / ratio, plan.scene
     span = np.linspace(e.excitation.start, e.excitation.stop, SWEEP_POINTS)
-    sweep = fine_grid(plan, model, force, span)
+    sweep = fine_grid(plan, model, span)
     settings = replace(LONG_STEPS, most_points=MOST_PATH_POINTS)
     b = balance_of(plan, model, force, range(harmonics + 1), start=start)
     found: dict[tuple[Side, int], CurvePeak] = {}

@@ -22,11 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import Effect, Plan
-from upd.analyses.cost import NODES, CostModel, Count, dense_s
+from upd.analyses.cost import NODES, CostModel, Count
 from upd.analyses.forced.statics import check_sources, plans_to_solve
 from upd.analyses.seated.plan import centrifugal_effects, friction_effect, worn_effect
 from upd.hbm.core.fourier import harmonics, sample_count
-from upd.hbm.core.kept_factors import WORTH_KEEPING
 from upd.mesh import recipes
 from upd.scene import ForcedScene
 from upd.scene.base import rig_parameters
@@ -41,27 +40,21 @@ HARMONICS, SAMPLES = 3, 128
 ALONG = "sliding along y"
 CONFIRMED = "confirmed by time integration"
 ELASTIC = "elastic damper"
-# Counted and timed on the ready scenes with one thread. A Newton step with new factors: its small
-# calls, each contact point and each of its samples, each entry of the Jacobian, times of its LU.
-_STEP_S, _POINT_S, _SAMPLE_S, _ENTRY_S, _STEP_LU = 4.5e-4, 1.9e-5, 2e-7, 1.7e-8, 0.55
-# Large factors are kept for several steps.
-_KEPT = 0.15
-# Newton steps of a curve over F_C/F_E (points that begin or end to slip are kinks of its path).
-_KINKS = 1.2e5
-# Newton steps of a mode over its amplitude.
-_MODE = 600.0
+# Timed on the ready scenes with one thread: a point of a curve, of each contact point its harmonics
+# and samples, of each entry of the Jacobian.
+_CURVE_POINT_S, _HARMONIC_S, _SAMPLE_S, _ENTRY_S = 3e-4, 8e-6, 6e-7, 2e-9
+# Points that a curve has beside the frequencies asked for, and those of a mode over its amplitude.
+_MORE, _MODE = 150, 600
 # What is solved again around the peaks, and the coarser meshes, over the run.
 _AROUND = 0.4
 # Sweeps: periods at each frequency until it settles; seconds of a time step, of each point there.
 _PERIODS, _MARCH_S, _MARCH_POINT_S = 150.0, 1.2e-6, 4e-8
 # Whole faces by sweeps: frequencies of one in a unit of the logarithm, time steps at each, seconds
-# of a step and of each dof of the contact there; dense products of one frequency.
-_CLOSER, _MARCHED, _FACES_S, _DOF_S, _FACTORS = 130.0, 3.2e4, 4e-6, 1.5e-7, 4.0
-# By the balance: Newton iterations of a curve, seconds of one sample for each dof that moves, share
-# of those; matrices of all dofs at a time.
-_ITERATIONS, _MOVED_S, _MOVING, _MATRICES = 250.0, 2e-6, 0.2, 10.0
-# Figures, files and page, and those of a curve.
-_FILES_S, _CURVE_S = 4.0, 1.0
+# of each dof of the contact there. By the balance: Newton iterations of a curve, seconds of one
+# sample for each dof. Matrices of all dofs at a time.
+_CLOSER, _MARCHED, _DOF_S, _ITERATIONS, _MOVED_S, _MATRICES = 130.0, 3.2e4, 2e-7, 250.0, 8e-7, 10.0
+# Figures, files and page.
+_FILES_S = 5.0
 #: time steps in a period of a time integration where the scene names none
 MARCH_SAMPLES = 128
 
@@ -78,14 +71,16 @@ def make_plan(scene: ForcedScene) -> ForcedPlan:
         check_sources(scene)
     cost = CostModel(scene, recipes.count(scene.recipe, parameters))
     (_add_whole_faces if whole else _add_points)(cost, scene)
-    needs, files = cost.side_by_side(min(2, cost.threads), 2), _files_seconds(scene)
+    needs = cost.side_by_side(min(2, cost.threads), 2)
     solves = not whole and scene.balance.method == "balance"
-    again = _AROUND * (cost.seconds + files)
+    again = _AROUND * (cost.seconds + cost.shared)
     again *= solves and (scene.estimates or scene.left_out.solves)
     cost.seconds += again
     symmetry = "full" if scene.mesh.symmetry == "full" else "half"
     effects = effects_of_faces(scene) if whole else effects_of_points(scene)
-    return ForcedPlan.of(cost, symmetry, parameters, effects, needs, files, estimate_seconds=again)
+    return ForcedPlan.of(
+        cost, symmetry, parameters, effects, needs, _FILES_S, estimate_seconds=again
+    )
 
 
 def _add_whole_faces(cost: CostModel, scene: ForcedScene) -> None:
@@ -97,20 +92,12 @@ def _add_whole_faces(cost: CostModel, scene: ForcedScene) -> None:
     e, curves = scene.excitation, len(scene.excitation.centrifugal_to_force)
     if scene.balance.method == "march":
         solved = 2.0 * curves * _CLOSER * math.log(e.stop / e.start)
-        cost.seconds += solved * _MARCHED * (_FACES_S + _DOF_S * m)
-        cost.seconds += solved * dense_s(_FACTORS * m**3)
+        cost.seconds += solved * _MARCHED * _DOF_S * m
     else:
         samples = SAMPLES if scene.balance.samples == "auto" else int(scene.balance.samples)
-        moving, rows = _ITERATIONS * curves * samples * (scene.contact.friction > 0.0), _MOVING * m
-        cost.seconds += moving * _MOVED_S * rows + dense_s(moving * 2.0 * rows**2 * m)
+        slides = scene.contact.friction > 0.0
+        cost.seconds += _ITERATIONS * curves * samples * slides * _MOVED_S * m
     cost.kept_bytes += _MATRICES * 8.0 * m**2
-
-
-def _files_seconds(scene: ForcedScene) -> float:
-    """Figures, files and page."""
-    curves = len(scene.stiffnesses) * len(scene.excitation.centrifugal_to_force)
-    whole = scene.contact.model == "interface"
-    return _FILES_S + _CURVE_S * curves * (not whole)
 
 
 def parameters_of(scene: ForcedScene) -> dict[str, Any]:
@@ -137,44 +124,32 @@ def _add_points(cost: CostModel, scene: ForcedScene) -> None:
         cost.dynamic_body(cost.size["damper"], len(scene.stiffnesses))
     sources = plans_to_solve(scene)
     cost.seconds += sum(one.seconds - one.estimate_seconds - one.files_seconds for one in sources)
-    cost.seconds += _curves_seconds(scene, cost.size)
+    _add_curves(cost, scene)
     cost.before_bytes = max((plan.memory_bytes for plan in sources), default=0.0)
 
 
-def _curves_seconds(scene: ForcedScene, size: Mapping[str, Count]) -> float:
+def _add_curves(cost: CostModel, scene: ForcedScene) -> None:
     """All curves of the run, and those of the performance curve."""
-    e, points = scene.excitation, _points(scene, size)
+    e, points = scene.excitation, _points(scene, cost.size)
+    names, curves = len(scene.stiffnesses), len(e.centrifugal_to_force)
     if scene.balance.method == "march":
-        solved = 2.0 * e.points * len(scene.stiffnesses) * len(e.centrifugal_to_force)
-        return solved * _PERIODS * time_steps(scene) * (_MARCH_S + _MARCH_POINT_S * points)
-    kinks = _KINKS * (scene.contact.friction > 0.0)
-    steps = sum(kinks / ratio + e.points for ratio in e.centrifugal_to_force)
-    steps *= len(scene.stiffnesses)
-    if scene.wants("performance"):
-        c = scene.performance
-        steps += c.points * (kinks / math.sqrt(c.lowest * c.highest) + e.points)
-    if scene.wants("nonlinear_modes"):
-        steps += 2 * _MODE * len(scene.stiffnesses)
-    return steps * _step_seconds(scene, size)
+        solved = 2.0 * e.points * names * curves
+        cost.seconds += solved * _PERIODS * time_steps(scene) * (_MARCH_S + _MARCH_POINT_S * points)
+        return
+    whole = names * curves + scene.wants("performance") * scene.performance.points
+    places = whole * (e.points + _MORE) + 2 * names * _MODE * scene.wants("nonlinear_modes")
+    highest, given = int(scene.balance.harmonics), scene.balance.samples
+    samples = sample_count(harmonics(range(highest + 1)), None if given == "auto" else given)
+    # normal and along, cosine and sine
+    unknowns = 2.0 * points * (2 * highest + 1)
+    each = _CURVE_POINT_S + _HARMONIC_S * unknowns + _ENTRY_S * unknowns**2
+    cost.shared += places * (each + _SAMPLE_S * points * samples)
 
 
 def time_steps(scene: ForcedScene) -> int:
     """Steps in a period of every march."""
     given = scene.balance.samples
     return MARCH_SAMPLES if given == "auto" else int(given)
-
-
-def _step_seconds(scene: ForcedScene, size: Mapping[str, Count]) -> float:
-    """Seconds of a Newton step with its factors."""
-    across = 3 if scene.contact.directions == "two" or scene.mesh.symmetry == "full" else 2
-    highest, given = int(scene.balance.harmonics), scene.balance.samples
-    points = _points(scene, size)
-    # coefficients of the motion of the contact points
-    n = across * points * (2 * highest + 1)
-    factors = _ENTRY_S * n**2 + dense_s(_STEP_LU * 2.0 / 3.0 * n**3)
-    factors *= _KEPT if n > WORTH_KEEPING else 1.0
-    count = sample_count(harmonics(range(highest + 1)), None if given == "auto" else given)
-    return _STEP_S + (_POINT_S + _SAMPLE_S * count) * points + factors
 
 
 def _points(scene: ForcedScene, size: Mapping[str, Count]) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -12,13 +12,12 @@ import numpy as np
 from upd.analyses import base, measured
 from upd.analyses.forced import measures
 from upd.analyses.forced.again import limit_results, peak_results
-from upd.analyses.forced.curves import ForcedCurve, PointCurve, faces_accelerance, limit_balance
+from upd.analyses.forced.curves import ForcedCurve, Limit, faces_limit, point_limit
 from upd.analyses.forced.measures import CurvePeak
-from upd.analyses.forced.model import Array, ComplexArray, Model
+from upd.analyses.forced.model import Array
 from upd.analyses.forced.performance import mode_results, performance_results
 from upd.analyses.forced.plan import ForcedPlan, excitation_of
-from upd.analyses.forced.solve import ContactPlaces, ForcedSolution, MarchedPeak, marched_damper
-from upd.analyses.forced.statics import StaticState
+from upd.analyses.forced.solve import ContactPlaces, ForcedSolution, marched_damper
 from upd.analyses.measured import FREE, STUCK, Computed
 from upd.analyses.seated.results import RIGID
 from upd.hbm import FrequencyResponse
@@ -29,7 +28,6 @@ from upd.reference.printed import Lookup, Printed
 from upd.results import Case, Result
 from upd.results import quantities as q
 from upd.results.quantities import quantity_of
-from upd.scene import ForcedScene
 from upd.scene.forced_contact import SIDES, Side
 from upd.scene.measured import MeasuredChoice
 
@@ -56,38 +54,28 @@ def _contact_results(solution: ForcedSolution, name: str) -> Iterator[Result]:
     """Mass of the damper, points or nodes, stiffness of the faces, forces at rest beside those of a
     rigid damper in that state.
     """
-    case, model = Case(stiffness=name), solution.models.get(name)
-    if model is None:
-        faces = solution.faces[name]
-        assert solution.bodies is not None
-        yield q.DAMPER_MASS.of(solution.plan.copies * solution.bodies.damper.mass, case)
-        yield q.CONTACT_POINTS.of(faces.of.n, case)
-        yield from _static_forces(case, faces.state, faces.state.N, faces.state.T)
+    case, model, bodies = Case(stiffness=name), solution.models.get(name), solution.bodies
+    assert bodies is not None
+    state = solution.faces[name].state if model is None else model.state
+    yield q.DAMPER_MASS.of((2.0 if bodies.half else 1.0) * bodies.damper.mass, case)
+    yield q.CONTACT_POINTS.of(len(solution.places(name).face), case)
+    if model is not None:
+        law = model.contacts.law
+        for k, side in enumerate(SIDES):
+            on, face = model.face == k, replace(case, side=side)
+            yield q.FACE_K_N.of(law.k_n[on].sum(), face)
+            yield q.FACE_K_T.of(law.k_t[on].sum(), face)
+    if state is None:
         return
-    law = model.contacts.law
-    yield q.DAMPER_MASS.of(model.damper.mass, case)
-    yield q.CONTACT_POINTS.of(model.contacts.n_point, case)
-    for k, side in enumerate(SIDES):
-        on, face = model.face == k, replace(case, side=side)
-        yield q.FACE_K_N.of(law.k_n[on].sum(), face)
-        yield q.FACE_K_T.of(law.k_t[on].sum(), face)
-    if model.state is not None:
-        of_points = (law.preload, model.traction[:, -1])
-        N, T = (np.array([one[model.face == k].sum() for k in (0, 1)]) for one in of_points)
-        yield from _static_forces(case, model.state, N, T)
-
-
-def _static_forces(case: Case, state: StaticState, N: Array, T: Array) -> list[Result]:
-    """Normal and tangential force of each face, (2,) N."""
-    results = []
     for k, side in enumerate(SIDES):
         at = replace(case, side=side, choice=state.name)
-        for quantity, values, way in ((q.STATIC_N, N, "normal"), (q.STATIC_T, T, "tangential")):
+        for of, values, way in (
+            (q.STATIC_N, state.N, "normal"),
+            (q.STATIC_T, state.T, "tangential"),
+        ):
             known = None if state.known is None else getattr(state.known, f"{way}_{side}")
             source = RIGID.get(state.name, "") if known is not None else ""
-            exact = state.name != "seated"
-            results.append(quantity.of(values[k], at, known, source, exact=exact))
-    return results
+            yield of.of(values[k], at, known, source, exact=state.name != "seated")
 
 
 def measured_results(solution: ForcedSolution) -> list[Result]:
@@ -127,7 +115,8 @@ def _computed(solution: ForcedSolution, choice: MeasuredChoice) -> Iterator[Comp
             told = (linear.stuck_peaks if stuck else linear.free_peaks)[side]
             case = Case(stiffness=name, kind=choice.state, blade=side)
             band = (scene.excitation.start, scene.excitation.stop)
-            yield Computed(case, band, _linear_at(solution, name, side, stuck), told)
+            read = partial(_limit(solution, name, stuck).accelerance, side)
+            yield Computed(case, band, read, told)
         return
     # as the labels of curves tell them apart
     wanted = f"{choice.centrifugal_to_force:.6g}"
@@ -136,17 +125,12 @@ def _computed(solution: ForcedSolution, choice: MeasuredChoice) -> Iterator[Comp
             yield _with_friction(c, side)
 
 
-def _linear_at(
-    solution: ForcedSolution, name: str, side: Side, stuck: bool
-) -> Callable[[Array], ComplexArray]:
-    """Accelerance of a blade free or stuck, exact at any frequency."""
+def _limit(solution: ForcedSolution, name: str, stuck: bool) -> Limit:
+    """Blades free or stuck, exact at any frequency."""
+    plan, e = solution.plan, solution.plan.scene.excitation
     if name in solution.faces:
-        excitation = excitation_of(solution.plan.scene.excitation)
-        march = solution.faces[name].march
-        return partial(faces_accelerance, march, excitation, side, stuck=stuck)
-    model, plan = solution.models[name], solution.plan
-    problem, row, force = limit_balance(plan, model), model.row(side), plan.scene.damper.centrifugal
-    return partial(measures.linear_accelerance, problem, row, force, stuck=stuck)
+        return faces_limit(solution.faces[name].march, excitation_of(e), e.stop, stuck)
+    return point_limit(plan, solution.models[name], stuck)
 
 
 def _with_friction(c: ForcedCurve[Any], side: Side) -> Computed:
@@ -190,7 +174,7 @@ def curve_results(solution: ForcedSolution, curve: ForcedCurve[Any]) -> list[Res
             one
             for blade in SIDES[::-1]
             for peak in curve.peaks.get(blade, ())
-            for one in _peak(case, peak, blade)
+            for one in peak_results(case, peak, blade)
         ),
         *_not_reached(solution, curve),
         *(r for blade in SIDES[::-1] for r in _reduction(solution, curve, blade)),
@@ -200,23 +184,46 @@ def curve_results(solution: ForcedSolution, curve: ForcedCurve[Any]) -> list[Res
     if isinstance(curve.answer, InterfaceResponse):
         results.append(q.PATH_JUMPS.of(len(curve.answer.jumps), case))
     for peak in curve.peaks.get("right", ()):
+        results.append(q.PEAK_MAC.of(peak.mac, replace(case, mode=peak.mode), n=peak.number))
         results += _at_peak(solution, curve, peak)
     return results
 
 
-def _at_peak(solution: ForcedSolution, curve: ForcedCurve[Any], peak: CurvePeak) -> list[Result]:
-    """The contact at a peak: of points, of the last period of a sweep, or of the whole contact."""
-    at, i = replace(curve.case, peak=peak.number, mode=peak.mode), peak.sample
-    if isinstance(curve.answer, FrequencyResponse):
-        return _at_point(solution, curve, solution.models[curve.stiffness], at, i)
-    marched = [one for one in solution.marched if one.case == at]
-    if marched:
-        return _at_marched(solution, marched[0])
-    lift, stick, slip = curve.answer.share[i]
-    return [
-        *(one.of(value, at) for one, value in zip(q.SHARES, (stick, slip, lift), strict=True)),
-        q.FRICTION_ENERGY.of(curve.answer.energy[i, 2], at),
-    ]
+def _at_peak(
+    solution: ForcedSolution, curve: ForcedCurve[Any], peak: CurvePeak
+) -> Iterator[Result]:
+    """The contact at a peak, its losses and the damper's motion: of a path by the balance, of the
+    last period of a sweep; of the whole contact where only that is known.
+    """
+    scene, answer, i = solution.plan.scene, curve.answer, peak.sample
+    at = replace(curve.case, peak=peak.number, mode=peak.mode)
+    marched = next((one for one in solution.marched if one.case == at), None)
+    if isinstance(answer, FrequencyResponse):
+        model = solution.models[curve.stiffness]
+        normal = answer.contact_force[i, :, 0, 0]
+        for k, side in enumerate(SIDES):
+            yield q.STATIC_NORMAL.of(normal[model.face == k].sum(), replace(at, side=side))
+        state, energy = answer.state[i], float(answer.energy[i].sum())
+        motion = [of[i] for of in measures.damper_motion(answer, model)]
+    elif marched is not None:
+        state, energy = marched.period.share, marched.period.energy
+        motion = list(marched_damper(solution, marched))
+    else:
+        for of, value in zip(q.SHARES, np.roll(answer.share[i], -1), strict=True):
+            yield of.of(value, at)
+        yield q.FRICTION_ENERGY.of(answer.energy[i, 2], at)
+        return
+    yield from _shares(at, state, solution.places(curve.stiffness))
+    yield q.CONTACT_SLIP.of(state[:, 1].mean(), at)
+    yield q.CONTACT_LIFT.of(state[:, 2].mean(), at)
+    yield q.FRICTION_ENERGY.of(energy, at)
+    if scene.wants("contact_state"):
+        # Their mean traction remembers where the sliders began.
+        yield q.POINTS_ALWAYS_STUCK.of((state[:, 0] == 1.0).sum(), at)
+    if scene.wants("hysteresis"):
+        yield q.FRICTION_POWER.of(energy * curve.frequency[i], at)
+    if scene.wants("damper_motion"):
+        yield from motion_results(at, *motion)
 
 
 def _folds(curve: ForcedCurve[Any]) -> Iterator[Result]:
@@ -280,44 +287,6 @@ def _reduction(solution: ForcedSolution, curve: ForcedCurve[Any], blade: Side) -
     return [quantity.of(1.0 - highest / top, case)]
 
 
-def _at_point(
-    solution: ForcedSolution, curve: PointCurve, model: Model, at: Case, i: int
-) -> list[Result]:
-    """Contact state, losses and damper motion at point i of the path."""
-    scene, answer = solution.plan.scene, curve.answer
-    mean, normal = answer.state[i].mean(axis=0), answer.contact_force[i, :, 0, 0]
-    results = [
-        *(
-            q.STATIC_NORMAL.of(normal[model.face == k].sum(), replace(at, side=side))
-            for k, side in enumerate(SIDES)
-        ),
-        *_shares(at, answer.state[i], solution.places(curve.stiffness)),
-        q.CONTACT_SLIP.of(mean[1], at),
-        q.CONTACT_LIFT.of(mean[2], at),
-        *_losses(
-            scene,
-            at,
-            answer.state[i],
-            float(answer.energy[i].sum()),
-            1e3 * float(measures.power(answer)[i].sum()),
-        ),
-    ]
-    if scene.wants("damper_motion"):
-        results += motion_results(at, *(of[i] for of in measures.damper_motion(answer, model)))
-    return results
-
-
-def _at_marched(solution: ForcedSolution, one: MarchedPeak) -> list[Result]:
-    """Contact state of each face, loss and damper motion at a peak of a sweep."""
-    scene, at, energy = solution.plan.scene, one.case, one.period.energy
-    results = list(_losses(scene, at, one.period.share, energy, energy * one.frequency))
-    if scene.wants("contact_state"):
-        results += _shares(at, one.period.share, one.places)
-    if scene.wants("damper_motion"):
-        results += motion_results(at, *marched_damper(solution, one))
-    return results
-
-
 def _shares(at: Case, state: Array, places: ContactPlaces) -> Iterator[Result]:
     """Shares of the cycle of each face, from those (n_point, 3) of its points."""
     for side, share in zip(
@@ -327,26 +296,7 @@ def _shares(at: Case, state: Array, places: ContactPlaces) -> Iterator[Result]:
             yield quantity.of(value, replace(at, side=side))
 
 
-def _losses(
-    scene: ForcedScene, at: Case, state: Array, energy: float, power: float
-) -> Iterator[Result]:
-    """Loss of all points, N mm and mW, and how many of them stick all the time."""
-    yield q.FRICTION_ENERGY.of(energy, at)
-    if scene.wants("contact_state"):
-        # Their mean traction remembers where the sliders began.
-        yield q.POINTS_ALWAYS_STUCK.of((state[:, 0] == 1.0).sum(), at)
-    if scene.wants("hysteresis"):
-        yield q.FRICTION_POWER.of(power, at)
-
-
 # -- numbers of peaks and of the damper's motion ---------------------------------------------------
-
-
-def _peak(case: Case, peak: CurvePeak, blade: Side) -> Iterator[Result]:
-    """A numbered peak with friction."""
-    yield from peak_results(case, peak, blade)
-    if blade == "right":
-        yield q.PEAK_MAC.of(peak.mac, replace(case, mode=peak.mode), n=peak.number)
 
 
 def _with_measured_peaks(solution: ForcedSolution, results: Sequence[Result]) -> list[Result]:
@@ -399,8 +349,3 @@ def printed_of(plan: ForcedPlan) -> Lookup:
         return look_up(name, case) if free or same else ()
 
     return under_load
-
-
-def measured_peaks(plan: ForcedPlan) -> tuple[Printed, ...]:
-    """Peaks in Hz measured with the damper."""
-    return printed_of(plan)(MEASURED_PEAK, {})

@@ -14,32 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from upd.analyses.base import Resolved, keeping
-from upd.analyses.forced.again import (
-    MESH,
-    Run,
-    Variant,
-    level_variations,
-    make_variant,
-    run_curve,
-    solve_again,
-)
-from upd.analyses.forced.curves import (
-    ForcedCurve,
-    LinearCurves,
-    SweptCurve,
-    balance_curve,
-    both_ways,
-    linear_of,
-    linear_of_faces,
-)
-from upd.analyses.forced.inputs import (
-    along_changes,
-    along_the_damper,
-    effects_of,
-    elastic_changes,
-    few_harmonics,
-    input_variants,
-)
+from upd.analyses.forced import again, curves, inputs, measures, performance
+from upd.analyses.forced.curves import ForcedCurve, LinearCurves, SweptCurve
 from upd.analyses.forced.interface_model import (
     INTERFACE,
     WholeFaces,
@@ -47,33 +23,12 @@ from upd.analyses.forced.interface_model import (
     make_springs,
     make_whole_faces,
 )
-from upd.analyses.forced.measures import (
-    MOTIONS,
-    CurvePeak,
-    Loop,
-    in_faces,
-    loop_along_main,
-    losing_most,
-)
+from upd.analyses.forced.measures import CurvePeak, Loop
 from upd.analyses.forced.model import Array, Model, make_model, preloaded, quiet
 from upd.analyses.forced.peaks import solve_curve
-from upd.analyses.forced.performance import (
-    ModeCurve,
-    Performance,
-    RatioPoint,
-    further_points,
-    harmonics_of,
-    mode_over_amplitude,
-    peaks_at,
-    performance_of,
-    ratios_of,
-    with_curves,
-)
-from upd.analyses.forced.plan import (
-    ForcedPlan,
-    excitation_of,
-)
-from upd.analyses.forced.statics import admissible, face_laws, same
+from upd.analyses.forced.performance import ModeCurve, Performance, RatioPoint
+from upd.analyses.forced.plan import ForcedPlan, excitation_of
+from upd.analyses.forced.statics import admissible, face_laws
 from upd.analyses.seated.bodies import Bodies, make_bodies
 from upd.errors import InputError, UpdError, one_line
 from upd.hbm.faces.state import InterfaceModel, InterfaceState
@@ -93,7 +48,6 @@ log = logging.getLogger(__name__)
 _MODULES = ("upd.analyses.forced.inputs", "upd.analyses.forced.performance")
 #: other starts of the sliders of a band
 STARTS = ("mid", "upper", "lower")
-_TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
@@ -142,14 +96,6 @@ class MarchedPeak:
         """What its numbers belong to."""
         return replace(self.sweep.case, peak=self.peak.number, mode=self.peak.mode)
 
-    @property
-    def off(self) -> float:
-        """Of the losses of all nodes from that of the sweep at this point, over the work of the
-        excitation and all losses there.
-        """
-        own = self.sweep.answer.energy[self.peak.sample]
-        return abs(self.period.energy - float(own[2])) / max(float(np.abs(own).sum()), _TINY)
-
 
 @dataclass
 class ForcedSolution:
@@ -183,11 +129,11 @@ class ForcedSolution:
         """Of the contact points, or of the nodes of whole faces."""
         if stiffness in self.faces:
             of = self.faces[stiffness].of
-            along, up = in_faces(of.position, of.face, of.frame)
+            along, up = measures.in_faces(of.position, of.face, of.frame)
             return ContactPlaces(of.face, along, up, of.area, np.zeros(of.n))
         model, law = self.models[stiffness], self.models[stiffness].contacts.law
         frames = [model.faces[side].frame for side in SIDES]
-        along, up = in_faces(model.position, model.face, frames)
+        along, up = measures.in_faces(model.position, model.face, frames)
         springs = np.divide(1.0, law.k_t, out=np.zeros_like(law.k_t), where=law.k_t > 0.0)
         return ContactPlaces(model.face, along, up, law.k_n, springs)
 
@@ -209,16 +155,6 @@ class ForcedSolution:
 WANTS = ("contact_state", "hysteresis", "damper_motion")
 
 
-def march_peaks(solution: ForcedSolution, name: str, stages: Stages) -> None:
-    """Add the last period of every sweep of a stiffness at every peak of the right blade."""
-    if not any(solution.plan.scene.wants(one) for one in WANTS):
-        return
-    for sweep in (c for c in solution.curves if c.stiffness == name):
-        for top in sweep.peaks["right"]:
-            with stages("time march", f"{sweep.case}, peak {top.number}: its last period"):
-                solution.marched.append(marched_peak(solution, sweep, top))
-
-
 def marched_peak(solution: ForcedSolution, sweep: SweptCurve, peak: CurvePeak) -> MarchedPeak:
     """The last period of a sweep at one of its peaks, integrated again and kept."""
     name = sweep.stiffness
@@ -230,7 +166,7 @@ def marched_peak(solution: ForcedSolution, sweep: SweptCurve, peak: CurvePeak) -
         damper = solution.models[name].damper
         rest, kept = np.zeros(damper.n_dof), list(damper.kept)
     period = period_of_sweep(sweep.answer, peak.sample, by_coulomb)
-    motion = np.zeros((len(period.motion), MOTIONS))
+    motion = np.zeros((len(period.motion), measures.MOTIONS))
     motion[:, kept] = period.motion - rest
     return MarchedPeak(sweep, peak, period, solution.places(name), motion)
 
@@ -250,12 +186,12 @@ def marched_loops(one: MarchedPeak, count: int) -> list[Loop]:
     """
     period, out = one.period, []
     friction = one.sweep.answer.model.friction
-    for p in losing_most(period.loss, count):
+    for p in measures.losing_most(period.loss, count):
         traction = period.force[:, 1:, p].T
         motion = period.slip[:, :, p].T + one.places.compliance[p] * traction
         motion -= motion.mean(axis=1, keepdims=True)
         limit = friction[p] * period.force[:, 0, p]
-        out.append(loop_along_main(int(p), motion, traction, limit, float(period.loss[p])))
+        out.append(measures.loop_along_main(int(p), motion, traction, limit, float(period.loss[p])))
     return out
 
 
@@ -308,13 +244,16 @@ def _whole_faces(solution: ForcedSolution, stages: Stages) -> None:
     faces = make_whole_faces(plan, solution.bodies, stages)
     solution.faces[INTERFACE] = faces
     with stages("free and stuck", f"{faces.of.n} nodes"):
-        solution.linear[INTERFACE] = linear_of_faces(plan, faces.march)
+        e = plan.scene.excitation
+        given = faces.march, excitation_of(e), e.stop
+        limits = (curves.faces_limit(*given, stuck) for stuck in (False, True))
+        solution.linear[INTERFACE] = curves.linear_curves(plan, *limits)
     if plan.scene.balance.method == "march":
         _sweep(solution, INTERFACE, faces.march, faces.start, stages)
         return
     for ratio in plan.scene.excitation.centrifugal_to_force:
         with stages("friction", f"F_C/F_E {ratio:g}: {faces.of.n} nodes"):
-            solution.curves.append(balance_curve(plan, INTERFACE, faces, ratio))
+            solution.curves.append(curves.balance_curve(plan, INTERFACE, faces, ratio))
 
 
 def _sweep(
@@ -327,8 +266,13 @@ def _sweep(
     """Sweeps up and down at every F_C/F_E, and their peaks."""
     for ratio in solution.plan.scene.excitation.centrifugal_to_force:
         with stages("sweeps", f"{name}, F_C/F_E {ratio:g}: up and down"):
-            solution.curves += both_ways(solution.plan, name, ratio, march, start)
-    march_peaks(solution, name, stages)
+            solution.curves += curves.both_ways(solution.plan, name, ratio, march, start)
+    if not any(solution.plan.scene.wants(one) for one in WANTS):
+        return
+    for sweep in (c for c in solution.curves if c.stiffness == name):
+        for top in sweep.peaks["right"]:
+            with stages("time march", f"{sweep.case}, peak {top.number}: its last period"):
+                solution.marched.append(marched_peak(solution, sweep, top))
 
 
 def _models(solution: ForcedSolution, stages: Stages) -> None:
@@ -342,7 +286,7 @@ def _models(solution: ForcedSolution, stages: Stages) -> None:
         with stages("reduction", f"{name}: {scene.reduction.modes} modes a blade"):
             solution.models[name] = model = make_model(plan, solution.bodies, law)
         with stages("free and stuck", name), threads_for(len(model.M)):
-            solution.linear[name] = linear_of(plan, model)
+            solution.linear[name] = curves.linear_of(plan, model)
 
 
 # -- harmonic balance ------------------------------------------------------------------------------
@@ -382,18 +326,18 @@ def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: St
     plan, bodies = solution.plan, solution.bodies
     assert bodies is not None
     scene, names = plan.scene, list(solution.models)
-    variants: dict[str, list[Variant]] = {name: [] for name in names}
+    variants: dict[str, list[again.Variant | SolvedVariation]] = {name: [] for name in names}
     points: list[RatioPoint] = []
     work: list[_Work] = []
     for name in names if scene.estimates else ():
         model = solution.models[name]
-        for of in level_variations(plan):
+        for of in again.level_variations(plan):
             given = with_totals(plan, name, model), name, model
-            if of.source != MESH:
-                variants[name].append(make_variant(*given, bodies, of))
+            if of.source != again.MESH:
+                variants[name].append(again.make_variant(*given, bodies, of))
             else:
                 into = variants[name].append
-                work.append(_Work(into, make_variant, (*given, None, of), needed=True))
+                work.append(_Work(into, again.make_variant, (*given, None, of), needed=True))
     order = list(scene.excitation.centrifugal_to_force)
     for name, model in solution.models.items():
         # those with most slip first
@@ -401,10 +345,10 @@ def _balanced_points(solution: ForcedSolution, beside: SideProcesses, stages: St
             curve = plan, model, solution.linear[name], name, ratio
             work.append(_Work(solution.curves.append, solve_curve, curve, needed=True))
     if scene.wants("performance"):
-        highest = harmonics_of(plan)
-        for ratio in ratios_of(plan):
+        highest = performance.harmonics_of(plan)
+        for ratio in performance.ratios_of(plan):
             point = plan, solution.models[names[0]], ratio, highest
-            work.append(_Work(points.append, peaks_at, point))
+            work.append(_Work(points.append, performance.peaks_at, point))
     work += _mode_work(solution)
     with stages("friction", f"{len(names) * len(order)} curves, {len(work)} pieces"), quiet():
         _done(beside, work)
@@ -426,12 +370,14 @@ def _mode_work(solution: ForcedSolution) -> Iterator[_Work]:
     ):
         for in_phase in (True, False):
             mode = solution.plan, model, solution.linear[name], name, in_phase
-            yield _Work(solution.nonlinear_modes.append, mode_over_amplitude, mode, needed=True)
+            yield _Work(
+                solution.nonlinear_modes.append, performance.mode_over_amplitude, mode, needed=True
+            )
 
 
 def _around(
     solution: ForcedSolution,
-    variants: Mapping[str, Sequence[Variant]],
+    variants: Mapping[str, Sequence[again.Variant | SolvedVariation]],
     points: Sequence[RatioPoint],
     beside: SideProcesses,
 ) -> None:
@@ -443,13 +389,17 @@ def _around(
     for name, model in solution.models.items():
         mine = tuple(c for c in solution.curves if c.stiffness == name and not c.empty)
         given = with_totals(plan, name, model), name, model, solution.linear[name]
-        run = Run(*given, tuple(run_curve(one) for one in mine))
-        work += [_Work(solution.levels.append, solve_again, (run, one)) for one in variants[name]]
+        run = again.Run(*given, tuple(again.run_curve(one) for one in mine))
+        work += [
+            _Work(solution.levels.append, again.solve_again, (run, one)) for one in variants[name]
+        ]
         if scene.left_out.solves:
-            solution.omissions += elastic_changes(run, bodies)
+            solution.omissions += inputs.elastic_changes(run, bodies)
         if name == first:
             if scene.wants("performance"):
-                jobs = further_points(plan, model, with_curves(points, mine), points)
+                jobs = performance.further_points(
+                    plan, model, performance.with_curves(points, mine), points
+                )
                 work += [_Work(further.append, *job) for job in jobs]
             if scene.wants("inputs") or scene.left_out.solves:
                 work += _at_few_harmonics(solution, run, bodies)
@@ -458,23 +408,27 @@ def _around(
     _done(beside, work)
     if scene.wants("performance"):
         mine = tuple(c for c in solution.curves if c.stiffness == first)
-        solution.performances[first] = performance_of(
-            solution.linear[first], with_curves(points, mine), further
+        solution.performances[first] = performance.performance_of(
+            solution.linear[first], performance.with_curves(points, mine), further
         )
 
 
-def _at_few_harmonics(solution: ForcedSolution, run: Run, bodies: Bodies) -> Iterator[_Work]:
+def _at_few_harmonics(solution: ForcedSolution, run: again.Run, bodies: Bodies) -> Iterator[_Work]:
     """Inputs, and sliding along the damper, on the curve with the lowest F_C/F_E."""
-    scene, few = solution.plan.scene, few_harmonics(run)
+    scene, few = solution.plan.scene, inputs.few_harmonics(run)
     if few is None:
         return
-    for variant in input_variants(few, bodies) if scene.wants("inputs") else ():
+    for variant in inputs.input_variants(few, bodies) if scene.wants("inputs") else ():
         yield _Work(
-            lambda one: solution.effects.extend(effects_of(few, one)), solve_again, (few, variant)
+            lambda one: solution.effects.extend(inputs.effects_of(few, one)),
+            again.solve_again,
+            (few, variant),
         )
-    if scene.left_out.solves and (along := along_the_damper(few, bodies)):
+    if scene.left_out.solves and (along := inputs.along_the_damper(few, bodies)):
         yield _Work(
-            lambda one: solution.omissions.extend(along_changes(few, one)), solve_again, along
+            lambda one: solution.omissions.extend(inputs.along_changes(few, one)),
+            again.solve_again,
+            along,
         )
 
 
@@ -482,11 +436,11 @@ def _band(solution: ForcedSolution, name: str) -> Iterator[_Work]:
     """Curves from every other named static state, and other starts of the sliders."""
     plan, model, bodies = solution.plan, solution.models[name], solution.bodies
     assert bodies is not None
-    scene, highest = plan.scene, harmonics_of(plan)
+    scene, highest = plan.scene, performance.harmonics_of(plan)
     choices: list[tuple[str, Model, str | None]] = []
     if model.state is not None:
         for state in admissible(plan, bodies, Stages()):
-            if not same(state, model.state, scene.damper.centrifugal):
+            if not state.same(model.state):
                 try:
                     choices.append((f"static {state.name}", preloaded(model, state), None))
                 except InputError as error:
@@ -495,7 +449,12 @@ def _band(solution: ForcedSolution, name: str) -> Iterator[_Work]:
     for ratio in scene.excitation.centrifugal_to_force:
         for choice, other, start in choices:
             point = plan, other, ratio, highest, start
-            yield _Work(partial(_into_band, solution, name, choice), peaks_at, point, needed=True)
+            yield _Work(
+                partial(_into_band, solution, name, choice),
+                performance.peaks_at,
+                point,
+                needed=True,
+            )
 
 
 def _into_band(solution: ForcedSolution, name: str, choice: str, point: RatioPoint) -> None:

@@ -253,6 +253,11 @@ class StaticState:
         """Faces that carry nothing: they just touch."""
         return [side for side, N in zip(SIDES, self.N, strict=True) if N == 0.0]
 
+    def same(self, other: StaticState) -> bool:
+        """Whether another state has the same forces, to what the balance is checked to."""
+        off = np.abs([self.N - other.N, self.T - other.T]).max()
+        return bool(off <= BALANCE * np.abs(self.N).sum())
+
 
 def face_frames(bodies: Bodies) -> Array:
     """(2, 3, 3) of each face, unit rows: normal into the blade, along the damper, up the slope."""
@@ -302,11 +307,10 @@ def static_state(
         known = equilibrium(*face_angles(frames), F, c.friction, chosen)
     except InputError as error:
         raise InputError(f'contact.static: "{chosen}" does not exist here: {error}') from None
-    closed = np.array([known.normal_left, known.normal_right])
-    # a face that carries less than the balance resolves is empty
-    ratios = np.where(closed > BALANCE * F, known.ratio, np.nan)
-    N = _normals(frames, F, ratios)
-    T = N * np.where(np.isnan(ratios), 0.0, _ratios(frames, ratios))
+    N, T = (
+        np.array([getattr(known, f"{way}_{side}") for side in SIDES])
+        for way in ("normal", "tangential")
+    )
     return _checked(StaticState(chosen, N, T, known), frames, F, c.friction)
 
 
@@ -323,36 +327,16 @@ def admissible(plan: Plan[ForcedScene], bodies: Bodies, stages: Stages) -> list[
     return out
 
 
-def same(a: StaticState, b: StaticState, F: float) -> bool:
-    """Whether two states have the same forces, to the share of F_C to which the balance is
-    checked.
-    """
-    return bool(np.abs(np.concatenate([a.N - b.N, a.T - b.T])).max() <= BALANCE * F)
-
-
 def imbalance(frames: Array, F: float, N: Array, T: Array) -> float:
     """Misfit of the faces' forces with F_C e_z in the plane of the slopes, relative to F_C."""
     total = N @ frames[:, 0] + T @ frames[:, 2] - np.array([0.0, 0.0, F])
     return float(np.abs(total[[_X, _Z]]).max() / F)
 
 
-def _ratios(frames: Array, ratios: Array) -> Array:
-    """T/N with the one that an empty face leaves to the other: its resultant is vertical."""
-    out = ratios.copy()
-    if np.isnan(ratios).any():
-        on = ~np.isnan(ratios)
-        out[on] = -frames[on, 0, _X] / frames[on, 2, _X]
-    return out
-
-
 def _normals(frames: Array, F: float, ratios: Array) -> Array:
-    """N of both faces from their T/N, nan for an empty one."""
-    on = ~np.isnan(ratios)
-    t = _ratios(frames, ratios)[on]
-    A = (frames[on, 0] + t[:, None] * frames[on, 2])[:, [_X, _Z]].T
-    N = np.zeros(len(ratios))
-    N[on] = np.linalg.lstsq(A, np.array([0.0, F]), rcond=None)[0]
-    return N
+    """N of both faces from their T/N."""
+    A = (frames[:, 0] + ratios[:, None] * frames[:, 2])[:, [_X, _Z]].T
+    return np.asarray(np.linalg.lstsq(A, np.array([0.0, F]), rcond=None)[0])
 
 
 def _given(frames: Array, F: float, mu: float, chosen: Mapping[str, Any]) -> StaticState:
