@@ -16,7 +16,7 @@ from typing import Any
 
 import upd
 from upd.fitting import Fit
-from upd.reference.thesis import THESIS_CONTACT_STIFFNESS, THESIS_FREQUENCIES
+from upd.reference.printed import THESIS_CONTACT_STIFFNESS, THESIS_FREQUENCIES
 
 #: half-widths of the printed numbers
 STIFFNESS, FREQUENCY = "10 %", "1 Hz"

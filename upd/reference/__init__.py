@@ -2,7 +2,7 @@
 
 hertz, mindlin, yielding, half_space, half_space_stress: elastic contact; friction, den_hartog:
 oscillators with dry friction;
-thesis: printed values of the source; printed: the same by scene and number.
+printed: printed values of the source, by scene and number.
 """
 
 from upd.reference.den_hartog import (
@@ -66,19 +66,17 @@ from upd.reference.mindlin import reloading as mindlin_reloading
 from upd.reference.mindlin import traction as mindlin_traction
 from upd.reference.mindlin import unloading as mindlin_unloading
 from upd.reference.mindlin import unloading_traction as mindlin_unloading_traction
-from upd.reference.printed import Printed, printed_values
-from upd.reference.spence import sticking_part
-from upd.reference.thesis import (
-    THESIS,
+from upd.reference.printed import (
     THESIS_COMPRESSION,
     THESIS_CONTACT_STIFFNESS,
     THESIS_FREQUENCIES,
     THESIS_HERTZ,
-    THESIS_HERTZ_ROWS,
     THESIS_STEEL,
     THESIS_STIFFNESS,
-    ThesisValue,
+    Printed,
+    printed_values,
 )
+from upd.reference.spence import sticking_part
 from upd.reference.yielding import (
     YieldPoint,
     hertz_axis_stress,
@@ -87,17 +85,14 @@ from upd.reference.yielding import (
 )
 
 __all__ = [
-    "THESIS",
     "THESIS_COMPRESSION",
     "THESIS_CONTACT_STIFFNESS",
     "THESIS_FREQUENCIES",
     "THESIS_HERTZ",
-    "THESIS_HERTZ_ROWS",
     "THESIS_STEEL",
     "THESIS_STIFFNESS",
     "HertzPoint",
     "Printed",
-    "ThesisValue",
     "YieldPoint",
     "boussinesq",
     "boussinesq_stress",
