@@ -17,6 +17,8 @@ import pytest
 from hypothesis import settings
 from rigs import SET_LINES
 
+from tests.pictures import no_figures
+
 if TYPE_CHECKING:
     from upd.report.notebook import RunResult
 
@@ -124,6 +126,18 @@ def _estimates_where_asked(request: pytest.FixtureRequest) -> Iterator[None]:
         yield
 
 
+@pytest.fixture
+def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs, sweeps and studies without figures and pages, which take longer than small scenes."""
+    for name, written in {
+        "upd.runner.write_figures": lambda *_: [],
+        "upd.plot.matplotlib.write_sheet": lambda *_: [],
+        "upd.batch.sweeps.write_report": lambda folder: folder / "report.html",
+        "upd.report.sweep_page.write_study_report": lambda folder, *_: folder / "report.html",
+    }.items():
+        monkeypatch.setattr(name, written)
+
+
 #: Ready scene -> overrides that leave every kind of number, array and chart in it and take a second
 #: or two.
 SMALL: Mapping[str, Mapping[str, Any]] = {
@@ -179,19 +193,20 @@ def small_scenes() -> Mapping[str, Mapping[str, Any]]:
 
 @pytest.fixture(scope="session")
 def small_run(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], RunResult]:
-    """``small_run("hertz")`` is that small scene's result with its run folder (no page), solved
-    once a session: leave both as they are.
+    """``small_run("hertz")`` is that small scene's result with its run folder (no page, no
+    figures), solved once a session: leave both as they are.
     """
 
     @cache
     def solved(scene: str) -> RunResult:
         from upd import run
 
-        return run(
-            scene,
-            overrides=dict(SMALL[scene]),
-            out=tmp_path_factory.mktemp("small") / scene,
-            report=False,
-        )
+        with no_figures():
+            return run(
+                scene,
+                overrides=dict(SMALL[scene]),
+                out=tmp_path_factory.mktemp("small") / scene,
+                report=False,
+            )
 
     return solved

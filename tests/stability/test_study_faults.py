@@ -22,6 +22,8 @@ from upd.errors import InputError, UpdError
 from upd.vary.ladder import StudyReport
 from upd.vary.variation import Variation
 
+pytestmark = pytest.mark.usefixtures("without_pictures")
+
 TINY = {
     "geometry.divisions": 8,
     "want": ["normal"],

@@ -29,6 +29,8 @@ from upd.batch.sweeps import sweep
 from upd.errors import InputError, UpdError
 from upd.vary.outcome import Outcome, read_outcome
 
+pytestmark = pytest.mark.usefixtures("without_pictures")
+
 TINY = {
     "geometry.divisions": 8,
     "want": ["normal", "tangential"],
