@@ -22,7 +22,7 @@ import tomllib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import tomli_w
@@ -31,7 +31,7 @@ from scipy.stats import qmc
 
 from upd.analyses import analysis_of, make_plan
 from upd.analyses.base import Needs, Plan
-from upd.batch.engine import Workers, check_address, check_numbers, fitting
+from upd.batch.engine import Workers, WorkersAsked, check_who, fitting
 from upd.batch.point import Task, load_point
 from upd.batch.store import PointStore
 from upd.cache.arrays import cache_limit
@@ -85,11 +85,6 @@ def parse_axes(texts: Sequence[str], scene: Mapping[str, Any]) -> tuple[Paramete
 def places(axes: Sequence[Parameter]) -> list[Place]:
     """Full factorial of the axes, the last one fastest."""
     return list(itertools.product(*(range(len(axis.values)) for axis in axes)))
-
-
-def values_at(axes: Sequence[Parameter], place: Place) -> dict[str, Any]:
-    """Path -> value of one point, as tables have it."""
-    return {axis.path: axis.values[k] for axis, k in zip(axes, place, strict=True)}
 
 
 def settings(axes: Sequence[Parameter], place: Place) -> dict[str, Any]:
@@ -320,9 +315,7 @@ def plan_sweep(
     *,
     sample: int | None = None,
     seed: int | None = None,
-    workers: int | None = None,
-    threads: int = 1,
-    cluster: str = "",
+    **who: Unpack[WorkersAsked],
 ) -> SweepPlan:
     """Plan the full factorial of ``vary``, or a sample of the scene's uncertain inputs.
 
@@ -336,35 +329,33 @@ def plan_sweep(
         Points drawn from the limits of the uncertain inputs, in place of ``vary``.
     seed
         Of the draw; None: that of the sample in the folder, else 0.
-    workers
-        Processes side by side, at most as threads allow; None: as many as cores and memory allow;
-        0: this process.
-    cluster
-        "local:4" or "tcp://host:port".
+    who
+        workers: processes side by side, at most as threads allow; None: as many as cores and memory
+        allow; 0: this process. threads: of each, 1 by default. cluster: "tcp://host:port".
 
     Raises
     ------
     InputError
         For a bad grid or sample, for both together, and when the scene allows none of the points.
     """
-    if cluster:
-        check_address(cluster)
-    check_numbers(workers, threads)
+    workers, cluster = who.get("workers"), who.get("cluster", "")
+    threads = 1 if (given := who.get("threads")) is None else given
+    check_who(workers, threads, cluster)
     store = PointStore(folder, "sweep")
     drawn = _drawn(scene, vary, store, sample, seed)
     if drawn is None:
         axes = parse_axes(vary, tomllib.loads(scene.text))
         grid = tuple(places(axes))
-        given = [(scene.text, settings(axes, place)) for place in grid]
+        points = [(scene.text, settings(axes, place)) for place in grid]
     else:
         axes = sample_axes(drawn)
         # the k-th value of every input together, point by point
         grid = tuple((k,) * len(axes) for k in range(len(drawn.shifts)))
-        given = [(text, {}) for text in sample_texts(scene, drawn, axes)]
+        points = [(text, {}) for text in sample_texts(scene, drawn, axes)]
     code = source_digest(scene.recipe)
     limit = cache_limit()
     tasks = tuple(
-        Task(text, changed, threads, limit, scene.recipe, code) for text, changed in given
+        Task(text, changed, threads, limit, scene.recipe, code) for text, changed in points
     )
     kept = store.finished(tasks)
     needs, refused = point_needs(tasks, kept)

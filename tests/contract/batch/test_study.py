@@ -132,7 +132,7 @@ def test_who_solves_a_study(monkeypatch: pytest.MonkeyPatch) -> None:
     assert study_workers(scene, planned, 2) == Workers(2, 2, fresh=True)
     assert study_workers(scene, planned, 64, 2).count == 2
     assert study_workers(scene, planned, 1, 3) == Workers(1, 3, fresh=True)
-    assert study_workers(scene, planned, cluster="local:2").threads == 1
+    assert study_workers(scene, planned, cluster="tcp://host:1").threads == 1
     monkeypatch.setattr(select, "memory_left", lambda: 1.0)
     assert study_workers(scene, planned, 3).count == 1
     for bad in ({"workers": -1}, {"threads": 5}, {"threads": 0}, {"cluster": "nowhere"}):
