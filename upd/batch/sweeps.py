@@ -200,8 +200,9 @@ def run_sweep(
         result = SweepResult(plan, found, columns, seconds, folder, sampled=sampled)
         with store.writing():
             files = write_outputs(store, result)
-            # Of an earlier call, perhaps.
-            (folder / "report.html").unlink(missing_ok=True)
+            # Of an earlier call, perhaps; other pictures there are the user's.
+            for name in ("report.html", *(f"{name}.png" for name in FIGURES)):
+                (folder / name).unlink(missing_ok=True)
         pictures: dict[str, Callable[[], list[Path]]] = {
             "figures": lambda: draw(folder, plan.axes, columns, sampled),
             "report.html": lambda: [write_report(folder)],
@@ -253,13 +254,7 @@ def draw(
     columns: Sequence[Column],
     sampled: Sequence[SampledNumber] = (),
 ) -> list[Path]:
-    """Write the figures into ``folder``, of a grid or of a sample. Returns their paths.
-
-    Those of an earlier call are removed, which may have followed other numbers; other pictures
-    there are the user's.
-    """
-    for name in FIGURES:
-        (folder / f"{name}.png").unlink(missing_ok=True)
+    """Write the figures into ``folder``, of a grid or of a sample. Returns their paths."""
     # slow to import
     from upd.plot.matplotlib import write_sheets
 
