@@ -332,9 +332,7 @@ FLAT = {
 
 @pytest.mark.usefixtures("without_pictures")
 def test_flat_contact_stiffness_converges_and_edge_pressure_is_none_of_it(tmp_path: Path) -> None:
-    found = study(
-        "symmetric", "mesh", levels=(4, 6, 8, 12), overrides=FLAT, out=tmp_path, workers=0
-    )
+    found = study("symmetric", "mesh", levels=(4, 6, 8), overrides=FLAT, out=tmp_path, workers=0)
     curves = {c.name: c for c in found.report.curves}
     assert "max_pressure" not in curves, "it has no limit"
     assert curves["K_N_secant_raw"].verdict.startswith("converges, order")
