@@ -50,7 +50,7 @@ def test_determined_targets_are_recovered_and_the_written_scene_has_them(
 ) -> None:
     vary, factors = [f"{RIGHT}=x0.2:x10", f"{LEFT}=x0.01:x10"], [0.4, 0.07]
     made = numbers(scene, "stuck_in_phase,stuck_out_of_phase", vary, factors)
-    found = upd.fit(scene, MODES.format(*made, w=""), vary, out=tmp_path / "fit")
+    found = upd.fit(scene, MODES.format(*made, w=""), vary, starts=4, out=tmp_path / "fit")
     assert found.status == "found"
     assert found.value(RIGHT) == pytest.approx(0.4 * 1.5e5, rel=1e-6)
     assert found.value(LEFT) == pytest.approx(0.07 * 1e6, rel=1e-6)
