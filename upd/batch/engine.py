@@ -57,6 +57,10 @@ _SCHEDULER = re.compile(r"(tcp|tls)://.+:\d+")
 _MISSING = (
     '--cluster needs Dask: pip install "updampers[cluster]", or leave it out to use this machine'
 )
+_KILLED = (
+    "the worker was killed {} times, most likely for lack of memory: use fewer --workers, a "
+    'coarser mesh or solver.name = "amg"; the next call tries again'
+)
 _LOST = "the connection to the cluster's scheduler was lost"
 _AGAIN = ", then the same command; it takes up where it stood"
 
@@ -601,7 +605,7 @@ def dispatch(
             if deaths[number] < ATTEMPTS:
                 waiting[groups.get(number, "")].appendleft(number)
             else:
-                record(number, Outcome(failure=_killed(deaths[number]), final=False))
+                record(number, Outcome(failure=_KILLED.format(deaths[number]), final=False))
 
 
 def _text(future: Future[str], executor: Executor) -> str | None:
@@ -615,13 +619,6 @@ def _text(future: Future[str], executor: Executor) -> str | None:
             f"a worker cannot run points ({type(error).__name__}: {error}): install the same upd "
             "there as here"
         ) from error
-
-
-def _killed(times: int) -> str:
-    return (
-        f"the worker was killed {times} times, most likely for lack of memory: "
-        'use fewer --workers, a coarser mesh or solver.name = "amg"; the next call tries again'
-    )
 
 
 def _checked(outcome: Outcome) -> Outcome:

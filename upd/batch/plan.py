@@ -106,17 +106,13 @@ def _axis(text: str, scene: Mapping[str, Any]) -> Parameter:
     if len(ends) == 2:
         values = _range(path, parts, ends, own)
     else:
-        values = [_with_unit(value_of(part), own) for part in _listed(given)]
+        listed = [part.strip() for part in given.split(",")]
+        if not all(listed):
+            raise InputError(f"--vary {given!r}: a value between the commas is missing")
+        values = [_with_unit(value_of(part), own) for part in listed]
     if len(set(map(str, values))) < len(values):
         raise InputError(f"--vary {path}: a value is duplicated")
     return Parameter(path, tuple(values), wrapped)
-
-
-def _listed(given: str) -> list[str]:
-    parts = [part.strip() for part in given.split(",")]
-    if not all(parts):
-        raise InputError(f"--vary {given!r}: a value between the commas is missing")
-    return parts
 
 
 def _range(

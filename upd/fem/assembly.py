@@ -244,7 +244,9 @@ class _Pattern:
 
     def matrix(self, data: FloatArray, size: int) -> csr_array:
         """CSR matrix of the scattered data, `size` rows and columns per node."""
-        n, dtype = self.nodes.shape[0], _index_dtype(len(data))
+        n = self.nodes.shape[0]
+        # what scipy and the direct solvers expect: 32 bits as long as they suffice
+        dtype: Any = np.int32 if len(data) <= np.iinfo(np.int32).max else np.int64
         columns = (
             size * self.nodes.indices.astype(dtype)[:, None] + np.arange(size, dtype=dtype)
         ).ravel()
@@ -254,11 +256,6 @@ class _Pattern:
         )
         repeated = rows[np.repeat(np.arange(n, dtype=dtype), size)]
         return csr_array((data, repeated.indices, repeated.indptr), shape=(size * n, size * n))
-
-
-def _index_dtype(largest: int) -> type[np.signedinteger[Any]]:
-    """The index type scipy and the direct solvers expect: 32 bits as long as they suffice."""
-    return np.int32 if largest <= np.iinfo(np.int32).max else np.int64
 
 
 def _three_components(A: csr_array) -> csr_array:

@@ -193,7 +193,13 @@ def printed_values(recipe: str, geometry: Mapping[str, Any], materials: Iterable
     (Printed(value=1560000.0, source='thesis, Table XI'),)
     """
     bodies = list(materials)
-    mine = [t for t in PRINTED if t.recipe == recipe and _is_of(t, geometry, bodies)]
+    mine = [
+        table
+        for table in PRINTED
+        if table.recipe == recipe
+        and table.geometry.items() <= geometry.items()
+        and all(getattr(body, k) == v for body in bodies for k, v in table.material.items())
+    ]
 
     def lookup(name: str, case: Mapping[str, Any]) -> tuple[Printed, ...]:
         for table in mine:
@@ -207,10 +213,3 @@ def printed_values(recipe: str, geometry: Mapping[str, Any], materials: Iterable
         return ()
 
     return lookup
-
-
-def _is_of(table: PrintedTable, geometry: Mapping[str, Any], bodies: Iterable[Any]) -> bool:
-    same_shape = all(geometry.get(key) == value for key, value in table.geometry.items())
-    return same_shape and all(
-        getattr(body, key) == value for body in bodies for key, value in table.material.items()
-    )
