@@ -22,7 +22,7 @@ import tomllib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 import tomli_w
@@ -31,7 +31,7 @@ from scipy.stats import qmc
 
 from upd.analyses import analysis_of, make_plan
 from upd.analyses.base import Needs, Plan
-from upd.batch.engine import Workers, WorkersAsked, check_who, fitting
+from upd.batch.engine import Workers, check_who, fitting
 from upd.batch.point import Task, load_point
 from upd.batch.store import PointStore
 from upd.cache.arrays import cache_limit
@@ -311,7 +311,9 @@ def plan_sweep(
     *,
     sample: int | None = None,
     seed: int | None = None,
-    **who: Unpack[WorkersAsked],
+    workers: int | None = None,
+    threads: int | None = None,
+    cluster: str = "",
 ) -> SweepPlan:
     """Plan the full factorial of ``vary``, or a sample of the scene's uncertain inputs.
 
@@ -325,17 +327,20 @@ def plan_sweep(
         Points drawn from the limits of the uncertain inputs, in place of ``vary``.
     seed
         Of the draw; None: that of the sample in the folder, else 0.
-    who
-        workers: processes side by side, at most as threads allow; None: as many as cores and memory
-        allow; 0: this process. threads: of each, 1 by default. cluster: "tcp://host:port".
+    workers
+        Processes side by side, at most as threads allow; None: as many as cores and memory allow;
+        0: this process.
+    threads
+        Of each; None: 1.
+    cluster
+        "tcp://host:port".
 
     Raises
     ------
     InputError
         For a bad grid or sample, for both together, and when the scene allows none of the points.
     """
-    workers, cluster = who.get("workers"), who.get("cluster", "")
-    threads = 1 if (given := who.get("threads")) is None else given
+    threads = 1 if threads is None else threads
     check_who(workers, threads, cluster)
     store = PointStore(folder, "sweep")
     drawn = _drawn(scene, vary, store, sample, seed)

@@ -578,6 +578,8 @@ def test_a_sweep_is_a_function_of_the_package(tmp_path: Path) -> None:
     assert "sweep" in dir(upd)
     with pytest.raises(InputError, match="--vary: is missing"):
         upd.sweep("hertz", [], out=tmp_path / "s")
+    with pytest.raises(TypeError, match="wokers"):
+        upd.sweep("hertz", ["contact.friction=0.2,0.4"], out=tmp_path / "s", wokers=2)
 
 
 def test_command_prints_plan_and_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -326,7 +326,7 @@ ROOM_LINES = {
     "report": 1910,
     "fitting": 1444,
     "sizing": 1329,
-    "batch": 1469,
+    "batch": 1470,
     "mesh": 1409,
     "vary": 1287,
     "reference": 915,
