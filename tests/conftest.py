@@ -17,6 +17,8 @@ import pytest
 from hypothesis import settings
 from rigs import SET_LINES
 
+from tests.pictures import no_figures
+
 if TYPE_CHECKING:
     from upd.report.notebook import RunResult
 
@@ -31,14 +33,16 @@ WORKERS = 2
 #: Files that compile most loops, of the faces and of the springs: one begins each worker, so that
 #: none compiles what the other does.
 COMPILING = ("test_interface_balance", "test_choice")
-#: Files of tens of seconds: begun then, no worker is left with one of them at the end.
-LONG = {
-    *("test_readme", "test_fit", "test_measured_fit", "test_sweep_faults"),
-    *("test_default_estimates", "test_response_estimates", "test_input_effects", "test_answer"),
-    *("test_study_faults", "test_scene_studies", "test_report", "test_report_browser"),
-    *("test_interface_march", "test_forced_scene", "test_contact_left_out", "test_doctests"),
-    *("test_confirmed_peaks", "test_seated_estimates", "test_accuracy_rounds"),
-}
+#: Files of ten seconds or more, the longest first: begun then, none keeps one worker at the end.
+LONG = (
+    *("test_fit", "test_readme", "test_sweep_faults", "test_hertz_scene"),
+    *("test_study", "test_answer", "test_measured_fit", "test_default_estimates"),
+    *("test_response_estimates", "test_input_effects", "test_study_faults", "test_report"),
+    *("test_scene_studies", "test_report_browser", "test_interface_march", "test_forced_scene"),
+    *("test_contact_left_out", "test_doctests", "test_confirmed_peaks", "test_seated_estimates"),
+    *("test_accuracy_rounds", "test_damping_over_amplitude", "test_sweep"),
+    *("test_measured_runs", "test_input_uncertainty"),
+)
 #: Read by the libraries when they are loaded, which in a worker is after this file.
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 _OWN_CACHE = "UPD_TESTS_CACHE"
@@ -87,7 +91,7 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Workers take the files that compile first, then the long ones."""
-    order = {name: k for k, name in enumerate(COMPILING)} | dict.fromkeys(LONG, len(COMPILING))
+    order = {name: k for k, name in enumerate((*COMPILING, *LONG))}
     if "PYTEST_XDIST_WORKER" in os.environ:
         items.sort(key=lambda item: order.get(item.path.stem, len(order)))
 
@@ -122,6 +126,18 @@ def _estimates_where_asked(request: pytest.FixtureRequest) -> Iterator[None]:
         asked = property(lambda scene: scene.accuracy not in (None, UNKNOWN))
         patch.setattr(SceneBase, "estimates", asked)
         yield
+
+
+@pytest.fixture
+def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs, sweeps and studies without figures and pages, which take longer than small scenes."""
+    for name, written in {
+        "upd.runner.write_figures": lambda *_: [],
+        "upd.plot.matplotlib.write_sheets": lambda *_, **__: [],
+        "upd.batch.sweeps.write_report": lambda folder: folder / "report.html",
+        "upd.report.sweep_page.write_study_report": lambda folder, *_: folder / "report.html",
+    }.items():
+        monkeypatch.setattr(name, written)
 
 
 #: Ready scene -> overrides that leave every kind of number, array and chart in it and take a second
@@ -179,19 +195,20 @@ def small_scenes() -> Mapping[str, Mapping[str, Any]]:
 
 @pytest.fixture(scope="session")
 def small_run(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], RunResult]:
-    """``small_run("hertz")`` is that small scene's result with its run folder (no page), solved
-    once a session: leave both as they are.
+    """``small_run("hertz")`` is that small scene's result with its run folder (no page, no
+    figures), solved once a session: leave both as they are.
     """
 
     @cache
     def solved(scene: str) -> RunResult:
         from upd import run
 
-        return run(
-            scene,
-            overrides=dict(SMALL[scene]),
-            out=tmp_path_factory.mktemp("small") / scene,
-            report=False,
-        )
+        with no_figures():
+            return run(
+                scene,
+                overrides=dict(SMALL[scene]),
+                out=tmp_path_factory.mktemp("small") / scene,
+                report=False,
+            )
 
     return solved

@@ -135,10 +135,10 @@ def test_thesis_errors(load, name):
     Mechanics, 1985, equations (4.22) to (4.24).
     """
     printed = EXACT_ERRORS[load][name]
-    assert 100 * ref.THESIS_HERTZ_ROWS[load][name].error == pytest.approx(
+    exact = getattr(ref.hertz_sphere(load, R, E_STAR), name)
+    assert 100 * (ref.THESIS_HERTZ[load][name] / exact - 1) == pytest.approx(
         float(printed), rel=0, abs=half_digit(printed)
     )
-    assert ref.THESIS_HERTZ[load][name] == ref.THESIS_HERTZ_ROWS[load][name].value
 
 
 @pytest.mark.parametrize(("load", "cells"), [(50.0, 69), (200.0, 181)])
@@ -152,17 +152,13 @@ def test_thesis_areas_are_whole_cells(load, cells):
     assert ref.THESIS_HERTZ[load]["area"] == pytest.approx(area, abs=5e-5)
 
 
-@pytest.mark.parametrize(
-    ("load", "before", "after"), [(50.0, 2.68e4, 2.88e4), (200.0, 4.23e4, 4.62e4)]
-)
-def test_thesis_stiffness_follows_from_its_approach(load, before, after):
+@pytest.mark.parametrize(("load", "stiffness"), [(50.0, 2.88e4), (200.0, 4.62e4)])
+def test_thesis_stiffness_does_not_follow_from_its_approach(load, stiffness):
     """Thesis (Politecnico di Torino), Tables IX and X; dF/dd = 1.5 F/d by K. L. Johnson, Contact
     Mechanics, 1985, equation (4.23).
     """
-    row = ref.THESIS_COMPRESSION[load]
-    assert 1.5 * load / row.theory == pytest.approx(before, abs=50)
-    assert 1.5 * load / row.value == pytest.approx(after, abs=50)
-    assert row.value / row.theory - 1 == pytest.approx(row.difference, abs=5e-5)
+    assert 1.5 * load / ref.THESIS_COMPRESSION[load] == pytest.approx(stiffness, abs=50)
+    assert ref.THESIS_STIFFNESS[load] > 1.1 * stiffness
 
 
 def test_thesis_craig_bampton_is_an_upper_bound():

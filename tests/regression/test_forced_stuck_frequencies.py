@@ -1,7 +1,7 @@
 """Stuck frequencies of the rig with contact springs of printed stiffness, beside an independent
 solid model with a rigid damper.
 
-The stiffnesses are those of Tables XI and XII of the thesis (see `upd.reference.thesis`). The
+The stiffnesses are those of Tables XI and XII of the thesis (see `upd.reference.printed`). The
 frequencies were computed once with another program of our own, solid elements and distributed
 springs; nobody has published them, so this is no test of literature.
 """

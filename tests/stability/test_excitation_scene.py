@@ -8,6 +8,7 @@ import pytest
 from rigs import LINES
 
 import upd
+from tests.pictures import no_figures
 from upd.analyses import make_plan
 from upd.errors import InputError
 from upd.report import write_report
@@ -46,7 +47,8 @@ def both(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
         "excitation.centrifugal_to_force": [ratio],
     }
     folder = tmp_path_factory.mktemp("page") if request.param == "balance" else None
-    return upd.run("symmetric-response", overrides=CHEAP | changes, out=folder, report=False)
+    with no_figures():
+        return upd.run("symmetric-response", overrides=CHEAP | changes, out=folder, report=False)
 
 
 def test_both_blades_have_their_free_peaks_and_both_harmonics(both: RunResult) -> None:

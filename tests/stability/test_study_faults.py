@@ -22,6 +22,8 @@ from upd.errors import InputError, UpdError
 from upd.vary.ladder import StudyReport
 from upd.vary.variation import Variation
 
+pytestmark = pytest.mark.usefixtures("without_pictures")
+
 TINY = {
     "geometry.divisions": 8,
     "want": ["normal"],
@@ -78,7 +80,6 @@ def quiet(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     [
         pytest.param({"workers": 1}, id="fresh", marks=pytest.mark.full),
         pytest.param({"workers": 2}, id="side by side"),
-        pytest.param({"cluster": "local:2"}, id="dask"),
     ],
 )
 def test_ladder_gives_the_same_numbers_whoever_solves_it(
@@ -90,7 +91,7 @@ def test_ladder_gives_the_same_numbers_whoever_solves_it(
     assert numbers(tmp_path / "s") == quiet
     processes = {one.outcome.where for one in found.solved}
     assert f":{os.getpid()}" not in {where[where.index(":") :] for where in processes}
-    assert len(processes) == (len(LEVELS) if "workers" in who else 2)
+    assert len(processes) == len(LEVELS)
     # nothing is taken from other points: a study measures
     assert not any(one.outcome.shared for one in found.solved)
     assert found.solved[0].outcome.memory_mb > 50.0
@@ -102,7 +103,6 @@ def test_ladder_gives_the_same_numbers_whoever_solves_it(
     [
         # of every day: `test_sweep_faults`, on the same engine
         pytest.param({"workers": 1}, id="fresh", marks=pytest.mark.full),
-        pytest.param({"cluster": "local:1"}, id="dask", marks=pytest.mark.full),
     ],
 )
 def test_points_that_kill_their_workers(tmp_path: Path, who: dict[str, Any]) -> None:

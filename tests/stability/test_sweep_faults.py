@@ -23,11 +23,13 @@ import pytest
 from upd import load_scene
 from upd.batch import engine
 from upd.batch import store as point_store
-from upd.batch.engine import ATTEMPTS, Job, Progress, dispatch
+from upd.batch.engine import ATTEMPTS, Progress, dispatch
 from upd.batch.point import OTHER_CODE, Task, solve_task
 from upd.batch.sweeps import sweep
 from upd.errors import InputError, UpdError
 from upd.vary.outcome import Outcome, read_outcome
+
+pytestmark = pytest.mark.usefixtures("without_pictures")
 
 TINY = {
     "geometry.divisions": 8,
@@ -286,8 +288,8 @@ def test_cluster_that_goes_away_is_told_and_what_was_solved_is_kept(
 @pytest.mark.parametrize(
     ("address", "told"),
     [
-        ("local:0", "write local:4"),
-        ("elsewhere", "write local:4"),
+        ("local:2", "tcp://host:port; on this machine alone use --workers"),
+        ("elsewhere", "write the address of a Dask scheduler"),
         ("tcp://127.0.0.1:9", "no scheduler answers"),
     ],
 )
@@ -302,7 +304,7 @@ def test_bad_cluster_is_told(
 def test_missing_dask_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"updampers\[cluster\]"):
-        sweep("hertz", VARY, overrides=TINY, out=tmp_path, cluster="local:2")
+        sweep("hertz", VARY, overrides=TINY, out=tmp_path, cluster="tcp://127.0.0.1:9")
 
 
 def test_disk_full_in_mid_sweep_is_one_clear_error_and_keeps_what_was_there(
@@ -445,9 +447,9 @@ class Script:
 
 def test_workers_stay_with_their_group_then_open_another_then_help() -> None:
     fine = Outcome().text()
-    jobs = [Job(k, group, group) for k, group in enumerate("xyxyxyzzz")]
+    groups = dict(enumerate("xyxyxyzzz"))
     executor = Script({group: [fine] * 3 for group in "xyz"})
-    dispatch(jobs, executor, lambda number, outcome: None, lambda: None)
+    dispatch(groups, groups, executor, lambda number, outcome: None, lambda: None)
     a, b = ("".join(task for worker, task in executor.log if worker == name) for name in "ab")
     assert len(a + b) == 9
     # One change of group each; the last group is shared.
@@ -460,7 +462,8 @@ def test_each_point_is_recorded_once_whoever_dies() -> None:
     recorded: list[tuple[int, str]] = []
     executor = Script({"0": [None, fine], "1": [None] * ATTEMPTS, "2": [fine]})
     dispatch(
-        [Job(k, str(k), "g") for k in range(3)],
+        {k: str(k) for k in range(3)},
+        {},
         executor,
         lambda k, outcome: recorded.append((k, outcome.failure)),
         lambda: None,
@@ -482,8 +485,9 @@ def test_a_worker_that_goes_away_loses_its_point_to_another() -> None:
 
     fine, recorded = Outcome().text(), list[int]()
     executor = Leaving({"0": [fine, fine], "1": [fine]})
-    jobs = [Job(k, str(k), "g") for k in range(2)]
-    dispatch(jobs, executor, lambda number, _: recorded.append(number), lambda: None)
+    dispatch(
+        {0: "0", 1: "1"}, {}, executor, lambda number, _: recorded.append(number), lambda: None
+    )
     assert sorted(recorded) == [0, 1]
     assert ("a", "0") in executor.log
     assert ("b", "0") in executor.log
@@ -497,7 +501,7 @@ def test_a_worker_that_cannot_run_points_ends_the_sweep() -> None:
             return future
 
     with pytest.raises(UpdError, match=r"cannot run points \(ModuleNotFoundError: No module"):
-        dispatch([Job(0, "", "g")], Lacking({}), lambda *_: None, lambda: None)
+        dispatch({0: ""}, {}, Lacking({}), lambda *_: None, lambda: None)
 
 
 def test_worker_with_other_sources_ends_the_sweep() -> None:
@@ -507,7 +511,8 @@ def test_worker_with_other_sources_ends_the_sweep() -> None:
     assert not outcome.final
     with pytest.raises(InputError, match="different codes"):
         dispatch(
-            [Job(0, "", "g")],
+            {0: ""},
+            {},
             Script({"": [outcome.text()]}),
             lambda number, found: None,
             lambda: None,

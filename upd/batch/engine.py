@@ -1,8 +1,8 @@
 """Points to workers, outcomes to files as they come: what sweeps and studies run on.
 
 Points of one group follow each other on one worker, a dead worker's point is given out again. Who
-solves them is this process, processes of this machine, or the workers of a Dask cluster: `local:N`
-on this machine, or of the scheduler at `tcp://host:port`.
+solves them is this process, processes of this machine, or the workers of a Dask cluster, of the
+scheduler at `tcp://host:port`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from concurrent.futures import (
 )
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, TypedDict
 
 from upd.batch.point import OTHER_CODE, Task, forget, solve_task
 from upd.batch.store import PointStore
@@ -53,16 +53,20 @@ ATTEMPTS = 3
 _LOOK_S = 1.0
 #: Seconds to wait for the first worker, and for one to come back when all are gone.
 PATIENCE_S = 60.0
-_LOCAL, _SCHEDULER = re.compile(r"local:([1-9]\d*)"), re.compile(r"(tcp|tls)://.+:\d+")
+_SCHEDULER = re.compile(r"(tcp|tls)://.+:\d+")
 _MISSING = (
     '--cluster needs Dask: pip install "updampers[cluster]", or leave it out to use this machine'
+)
+_KILLED = (
+    "the worker was killed {} times, most likely for lack of memory: use fewer --workers, a "
+    'coarser mesh or solver.name = "amg"; the next call tries again'
 )
 _LOST = "the connection to the cluster's scheduler was lost"
 _AGAIN = ", then the same command; it takes up where it stood"
 
 
-class Executor(Protocol):
-    """Workers that take a JSON task each.
+class InProcess:
+    """This process itself, one point at a time.
 
     Attributes
     ----------
@@ -70,32 +74,20 @@ class Executor(Protocol):
         What the future of a task raises whose worker died.
     """
 
-    deaths: tuple[type[BaseException], ...]
-
-    def workers(self) -> Sequence[str]:
-        """Names of the workers there are. Raises UpdError when none will come."""
-
-    def submit(self, worker: str, task: str) -> Future[str]:
-        """Let a worker that has nothing to do solve the task: the future of its JSON outcome."""
-
-    def close(self) -> None:
-        """End the workers, at once."""
-
-
-class InProcess:
-    """This process itself, one point at a time."""
-
     deaths: tuple[type[BaseException], ...] = ()
 
     def workers(self) -> Sequence[str]:
+        """Names of the workers there are. Raises UpdError when none will come."""
         return ["here"]
 
     def submit(self, worker: str, task: str) -> Future[str]:
+        """Let a worker that has nothing to do solve the task: the future of its JSON outcome."""
         future = Future[str]()
         future.set_result(solve_task(task))
         return future
 
     def close(self) -> None:
+        """End the workers, at once."""
         forget()
 
 
@@ -194,7 +186,7 @@ class DaskCluster:
     Parameters
     ----------
     address
-        "local:4" (workers on this machine) or "tcp://host:port".
+        Of the scheduler, "tcp://host:port".
 
     Raises
     ------
@@ -210,19 +202,8 @@ class DaskCluster:
         self._executors: dict[str, Any] = {}
         self._known: tuple[float, list[str]] = (-_LOOK_S, [])
         self._seen = time.monotonic()
-        self._local: Any = None
-        local = _LOCAL.fullmatch(address)
-        if local is not None:
-            self._local = dask.LocalCluster(
-                n_workers=int(local[1]),
-                threads_per_worker=1,
-                host="127.0.0.1",
-                # any free port: without an address dask takes 8787, which another may have
-                dashboard_address=":0",
-                worker_dashboard_address=None,
-            )
         try:
-            self._client = dask.Client(self._local or address, timeout=min(self._patience, 15.0))
+            self._client = dask.Client(address, timeout=min(self._patience, 15.0))
         except OSError as error:
             raise InputError(
                 f"--cluster {address}: no scheduler answers there ({type(error).__name__}): start "
@@ -269,7 +250,7 @@ class DaskCluster:
 
     def close(self) -> None:
         try:
-            if self._local is None and self._client.status == "running":
+            if self._client.status == "running":
                 for executor in self._executors.values():
                     executor.shutdown(wait=False)
                 # Other people's workers keep nothing of ours.
@@ -277,10 +258,12 @@ class DaskCluster:
         except OSError:
             pass
         self._client.close(timeout=5)
-        if self._local is not None:
-            self._local.close(timeout=10)
         for logger, level in self._levels.items():
             logger.setLevel(level)
+
+
+#: who solves points: names of workers, `submit`, `close`
+Executor = InProcess | Processes | DaskCluster
 
 
 def _quiet() -> dict[logging.Logger, int]:
@@ -298,13 +281,21 @@ def _quiet() -> dict[logging.Logger, int]:
 
 def check_address(address: str) -> None:
     """Raise InputError for an address that is none, or when Dask is missing."""
-    if not (_LOCAL.fullmatch(address) or _SCHEDULER.fullmatch(address)):
+    if not _SCHEDULER.fullmatch(address):
         raise InputError(
-            f"--cluster {address}: write local:4 (workers on this machine) or the "
-            "scheduler's address, tcp://host:port"
+            f"--cluster {address}: write the address of a Dask scheduler, tcp://host:port; on this "
+            "machine alone use --workers"
         )
     if importlib.util.find_spec("distributed") is None:
         raise InputError(_MISSING)
+
+
+class WorkersAsked(TypedDict, total=False):
+    """Who shall solve the points, as a user gives it: see `upd.sweep` and `upd.study`."""
+
+    workers: int | None
+    threads: int | None
+    cluster: str
 
 
 @dataclass(frozen=True)
@@ -318,7 +309,7 @@ class Workers:
     threads
         Threads of each; 0: as many as the libraries take by themselves.
     cluster
-        "local:4" or "tcp://host:port": the workers of a Dask cluster instead.
+        "tcp://host:port": the workers of a Dask scheduler instead.
     fresh
         A new process for every point, so that its seconds and memory are its own.
     """
@@ -364,8 +355,12 @@ Watcher = Callable[[Progress], None]
 _NONE = Outcome()
 
 
-def check_numbers(workers: int | None, threads: int) -> None:
-    """Raise InputError unless workers and threads are numbers this machine can have."""
+def check_who(workers: int | None, threads: int, cluster: str) -> None:
+    """Raise InputError unless workers and threads are numbers this machine can have, and the
+    cluster, where one is asked for, an address.
+    """
+    if cluster:
+        check_address(cluster)
     cores = select.threads()
     if workers is not None and workers < 0:
         raise InputError(f"--workers {workers}: give 1 or more")
@@ -502,12 +497,8 @@ def run_points(
         When the disk is full or the cluster has gone.
     """
     outcomes, tasks = dict(batch.known), batch.tasks
-    jobs = [
-        Job(k, task.text(), batch.groups.get(k, ""))
-        for k, task in enumerate(tasks)
-        if k not in outcomes
-    ]
-    numbers, finished = [job.number for job in jobs], set[int]()
+    missing = {k: task.text() for k, task in enumerate(tasks) if k not in outcomes}
+    finished = set[int]()
     begin = time.perf_counter()
 
     def show(label: str = "", outcome: Outcome = _NONE) -> None:
@@ -519,7 +510,7 @@ def run_points(
                     total=len(tasks),
                     failed=sum(bool(one.failure) for one in outcomes.values()),
                     rate=len(finished) / max(passed, 1e-9),
-                    left_s=time_left(numbers, finished, passed, side_by_side, batch.seconds),
+                    left_s=time_left(list(missing), finished, passed, side_by_side, batch.seconds),
                     label=label,
                     seconds=outcome.seconds,
                     failure=outcome.failure,
@@ -534,46 +525,44 @@ def run_points(
         finished.add(number)
         show(batch.label(number), outcome)
 
-    if jobs:
+    if missing:
         executor = batch.workers.open()
         try:
-            dispatch(jobs, executor, record, show)
+            dispatch(missing, batch.groups, executor, record, show)
         finally:
             executor.close()
     return tuple(outcomes[k] for k in range(len(tasks)))
 
 
-@dataclass(frozen=True)
-class Job:
-    """A point to solve: its number, its task, and the group of points that share what is costly."""
-
-    number: int
-    task: str
-    group: str
-
-
-def _take(waiting: dict[str, deque[Job]], own: str, opened: set[str]) -> Job:
-    """The next job of a worker: of its own group, else of an unopened one, else of the largest."""
+def _take(waiting: dict[str, deque[int]], own: str, opened: set[str]) -> tuple[str, int]:
+    """Group and number of a worker's next point: of its own group, else of an unopened one, else of
+    the largest.
+    """
     largest = max(waiting, key=lambda group: len(waiting[group]))
     fresh = next((group for group in waiting if group not in opened), largest)
     group = own if own in waiting else fresh
     opened.add(group)
-    job = waiting[group].popleft()
+    number = waiting[group].popleft()
     if not waiting[group]:
         del waiting[group]
-    return job
+    return group, number
 
 
 def dispatch(
-    jobs: Sequence[Job],
+    tasks: Mapping[int, str],
+    groups: Mapping[int, str],
     executor: Executor,
     record: Callable[[int, Outcome], None],
     tick: Callable[[], None],
 ) -> None:
-    """Have all jobs solved.
+    """Have all points solved.
 
     Parameters
     ----------
+    tasks
+        Number of the point -> its JSON task.
+    groups
+        Number -> what it shares with others.
     record
         Called with each point's number and outcome, once.
     tick
@@ -584,39 +573,39 @@ def dispatch(
     InputError, UpdError
         When a worker has other sources, or cannot run points; and whatever ``record`` raises.
     """
-    waiting, opened = defaultdict[str, deque[Job]](deque), set[str]()
-    for job in jobs:
-        waiting[job.group].append(job)
-    groups: dict[str, str] = {}
-    running: dict[Future[str], tuple[str, Job]] = {}
+    waiting, opened = defaultdict[str, deque[int]](deque), set[str]()
+    for number in tasks:
+        waiting[groups.get(number, "")].append(number)
+    #: worker -> group of its last point
+    own: dict[str, str] = {}
+    running: dict[Future[str], tuple[str, int]] = {}
     deaths: Counter[int] = Counter()
     while waiting or running:
         there = executor.workers()
         busy = {worker for worker, _ in running.values()}
         for worker in there:
             if waiting and worker not in busy:
-                job = _take(waiting, groups.get(worker, ""), opened)
-                groups[worker] = job.group
-                running[executor.submit(worker, job.task)] = (worker, job)
+                own[worker], number = _take(waiting, own.get(worker, ""), opened)
+                running[executor.submit(worker, tasks[number])] = (worker, number)
         tick()
         done = wait(running, _LOOK_S, FIRST_COMPLETED).done
         if not running:
             time.sleep(_LOOK_S)
-        for future, (worker, job) in list(running.items()):
+        for future, (worker, number) in list(running.items()):
             # A worker that is gone does not come back under its name.
             if future not in done and worker in there:
                 continue
             del running[future]
             text = _text(future, executor) if future in done else None
             if text is not None:
-                record(job.number, _checked(read_outcome(text)))
+                record(number, _checked(read_outcome(text)))
                 continue
             future.cancel()
-            deaths[job.number] += 1
-            if deaths[job.number] < ATTEMPTS:
-                waiting[job.group].appendleft(job)
+            deaths[number] += 1
+            if deaths[number] < ATTEMPTS:
+                waiting[groups.get(number, "")].appendleft(number)
             else:
-                record(job.number, Outcome(failure=_killed(deaths[job.number]), final=False))
+                record(number, Outcome(failure=_KILLED.format(deaths[number]), final=False))
 
 
 def _text(future: Future[str], executor: Executor) -> str | None:
@@ -630,13 +619,6 @@ def _text(future: Future[str], executor: Executor) -> str | None:
             f"a worker cannot run points ({type(error).__name__}: {error}): install the same upd "
             "there as here"
         ) from error
-
-
-def _killed(times: int) -> str:
-    return (
-        f"the worker was killed {times} times, most likely for lack of memory: "
-        'use fewer --workers, a coarser mesh or solver.name = "amg"; the next call tries again'
-    )
 
 
 def _checked(outcome: Outcome) -> Outcome:

@@ -31,7 +31,7 @@ from scipy.stats import qmc
 
 from upd.analyses import analysis_of, make_plan
 from upd.analyses.base import Needs, Plan
-from upd.batch.engine import Workers, check_address, check_numbers, fitting
+from upd.batch.engine import Workers, check_who, fitting
 from upd.batch.point import Task, load_point
 from upd.batch.store import PointStore
 from upd.cache.arrays import cache_limit
@@ -87,11 +87,6 @@ def places(axes: Sequence[Parameter]) -> list[Place]:
     return list(itertools.product(*(range(len(axis.values)) for axis in axes)))
 
 
-def values_at(axes: Sequence[Parameter], place: Place) -> dict[str, Any]:
-    """Path -> value of one point, as tables have it."""
-    return {axis.path: axis.values[k] for axis, k in zip(axes, place, strict=True)}
-
-
 def settings(axes: Sequence[Parameter], place: Place) -> dict[str, Any]:
     """Path -> value of one point."""
     return {axis.path: axis.setting(k) for axis, k in zip(axes, place, strict=True)}
@@ -111,17 +106,13 @@ def _axis(text: str, scene: Mapping[str, Any]) -> Parameter:
     if len(ends) == 2:
         values = _range(path, parts, ends, own)
     else:
-        values = [_with_unit(value_of(part), own) for part in _listed(given)]
+        listed = [part.strip() for part in given.split(",")]
+        if not all(listed):
+            raise InputError(f"--vary {given!r}: a value between the commas is missing")
+        values = [_with_unit(value_of(part), own) for part in listed]
     if len(set(map(str, values))) < len(values):
         raise InputError(f"--vary {path}: a value is duplicated")
     return Parameter(path, tuple(values), wrapped)
-
-
-def _listed(given: str) -> list[str]:
-    parts = [part.strip() for part in given.split(",")]
-    if not all(parts):
-        raise InputError(f"--vary {given!r}: a value between the commas is missing")
-    return parts
 
 
 def _range(
@@ -321,7 +312,7 @@ def plan_sweep(
     sample: int | None = None,
     seed: int | None = None,
     workers: int | None = None,
-    threads: int = 1,
+    threads: int | None = None,
     cluster: str = "",
 ) -> SweepPlan:
     """Plan the full factorial of ``vary``, or a sample of the scene's uncertain inputs.
@@ -339,32 +330,33 @@ def plan_sweep(
     workers
         Processes side by side, at most as threads allow; None: as many as cores and memory allow;
         0: this process.
+    threads
+        Of each; None: 1.
     cluster
-        "local:4" or "tcp://host:port".
+        "tcp://host:port".
 
     Raises
     ------
     InputError
         For a bad grid or sample, for both together, and when the scene allows none of the points.
     """
-    if cluster:
-        check_address(cluster)
-    check_numbers(workers, threads)
+    threads = 1 if threads is None else threads
+    check_who(workers, threads, cluster)
     store = PointStore(folder, "sweep")
     drawn = _drawn(scene, vary, store, sample, seed)
     if drawn is None:
         axes = parse_axes(vary, tomllib.loads(scene.text))
         grid = tuple(places(axes))
-        given = [(scene.text, settings(axes, place)) for place in grid]
+        points = [(scene.text, settings(axes, place)) for place in grid]
     else:
         axes = sample_axes(drawn)
         # the k-th value of every input together, point by point
         grid = tuple((k,) * len(axes) for k in range(len(drawn.shifts)))
-        given = [(text, {}) for text in sample_texts(scene, drawn, axes)]
+        points = [(text, {}) for text in sample_texts(scene, drawn, axes)]
     code = source_digest(scene.recipe)
     limit = cache_limit()
     tasks = tuple(
-        Task(text, changed, threads, limit, scene.recipe, code) for text, changed in given
+        Task(text, changed, threads, limit, scene.recipe, code) for text, changed in points
     )
     kept = store.finished(tasks)
     needs, refused = point_needs(tasks, kept)

@@ -8,15 +8,15 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from upd.analyses import analysis_of, ladders_of
 from upd.batch.engine import (
     Batch,
     Watcher,
     Workers,
-    check_address,
-    check_numbers,
+    WorkersAsked,
+    check_who,
     fitting,
     run_points,
 )
@@ -141,10 +141,8 @@ def study(
     at: float | str | None = None,
     overrides: Sequence[str] | Mapping[str, Any] = (),
     out: str | Path,
-    workers: int = 1,
-    threads: int | None = None,
-    cluster: str = "",
     watch: Watcher | None = None,
+    **who: Unpack[WorkersAsked],
 ) -> StudyResult:
     """Run a study of ``scene``: a ladder of meshes or models, a parameter study, or sensitivities.
 
@@ -160,16 +158,14 @@ def study(
         text with a unit.
     out
         Folder; called again with the same one, only missing points run.
-    workers
-        Points side by side, each in a fresh process; 0: one after the other in this process. With
-        more than one, seconds and memory bandwidth are shared: fine for numbers, not for what
-        accuracy costs. A script that has any needs ``if __name__ == "__main__":``.
-    threads
-        Threads of each; None: all there are, divided by the workers; 1 on a cluster.
-    cluster
-        "local:4" or "tcp://host:port" for Dask.
     watch
         Called with an `upd.batch.engine.Progress`.
+    who
+        workers: points side by side, each in a fresh process, 1 by default; 0: one after the other
+        in this process. With more than one, seconds and memory bandwidth are shared: fine for
+        numbers, not for what accuracy costs. A script that has any needs
+        ``if __name__ == "__main__":``. threads: of each; None: all there are, divided by the
+        workers; 1 on a cluster. cluster: "tcp://host:port" for Dask.
 
     Raises
     ------
@@ -184,8 +180,8 @@ def study(
     """
     loaded = scene_at(load_scene(scene, overrides), at)
     planned = plan_study(loaded, vary, None if levels is None else tuple(levels))
-    who = study_workers(loaded, planned, workers, threads, cluster)
-    return run_study(loaded, planned, Path(out), workers=who, watch=watch)
+    workers = study_workers(loaded, planned, **who)
+    return run_study(loaded, planned, Path(out), workers=workers, watch=watch)
 
 
 def plan_study(scene: AnyScene, vary: str, asked: Asked = None) -> Study:
@@ -221,7 +217,11 @@ def point_task(one: Variation, scene: AnyScene, threads: int, code: str) -> Task
 
 
 def study_workers(
-    scene: AnyScene, planned: Study, workers: int = 1, threads: int | None = None, cluster: str = ""
+    scene: AnyScene,
+    planned: Study,
+    workers: int | None = None,
+    threads: int | None = None,
+    cluster: str = "",
 ) -> Workers:
     """Who solves the points.
 
@@ -238,11 +238,9 @@ def study_workers(
     InputError
         For numbers this machine cannot have, and an address that is none.
     """
-    if cluster:
-        check_address(cluster)
-    side_by_side = max(workers, 1)
-    each = 1 if cluster else max(1, select.threads() // side_by_side)
-    check_numbers(workers, each if threads is None else threads)
+    workers = 1 if workers is None else workers
+    each = 1 if cluster else max(1, select.threads() // max(workers, 1))
+    check_who(workers, each if threads is None else threads, cluster)
     if workers < 2 or cluster:
         # Alone it has what a single run takes.
         default = each if cluster else 0

@@ -11,14 +11,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from upd.batch.engine import Batch, Watcher, run_points
-from upd.batch.plan import Sample, SweepPlan, plan_sweep, values_at
+from upd.analyses import analysis_of
+from upd.batch.engine import Batch, Watcher, WorkersAsked, run_points
+from upd.batch.plan import Sample, SweepPlan, plan_sweep, settings
 from upd.batch.store import PointStore
-from upd.batch.table import as_csv, check_follow, csv_text, make_columns, patterns, reasons
+from upd.batch.table import as_csv, check_follow, csv_text, make_columns, reasons
 from upd.cache.files import json_text, write_text
 from upd.cache.sources import versions
 from upd.errors import InputError, one_line
@@ -105,11 +106,9 @@ def sweep(
     seed: int | None = None,
     overrides: Sequence[str] | Mapping[str, Any] = (),
     out: str | Path,
-    workers: int | None = None,
-    threads: int = 1,
-    cluster: str = "",
     follow: Sequence[str] = (),
     watch: Watcher | None = None,
+    **who: Unpack[WorkersAsked],
 ) -> SweepResult:
     """Run ``scene`` over the full factorial of ``vary``, or over a sample of its uncertain inputs.
 
@@ -124,17 +123,14 @@ def sweep(
         Of the draw; None: that of the sample in ``out``, else 0.
     out
         Folder; called again with the same one, only missing points run.
-    workers
-        Processes (0: this process; None: as many as cores and memory allow). A script that has any
-        needs ``if __name__ == "__main__":``.
-    threads
-        Threads of each process.
-    cluster
-        "local:4" or "tcp://host:port" for Dask.
     follow
         Names of the numbers for table and figures (shell patterns).
     watch
         Called with an `upd.batch.engine.Progress`.
+    who
+        workers: processes (0: this process; None: as many as cores and memory allow). A script that
+        has any needs ``if __name__ == "__main__":``. threads: of each process, 1 by default.
+        cluster: "tcp://host:port" for Dask.
 
     Raises
     ------
@@ -150,16 +146,7 @@ def sweep(
     folder = Path(out)
     loaded = load_scene(scene, overrides)
     PointStore(folder, "sweep").check()
-    plan = plan_sweep(
-        loaded,
-        vary,
-        folder,
-        sample=sample,
-        seed=seed,
-        workers=workers,
-        threads=threads,
-        cluster=cluster,
-    )
+    plan = plan_sweep(loaded, vary, folder, sample=sample, seed=seed, **who)
     return run_sweep(plan, folder, follow=follow, watch=watch)
 
 
@@ -206,14 +193,16 @@ def run_sweep(
         known = plan.kept | plan.refused
         batch = Batch(plan.tasks, plan.workers, known, plan.label, plan.groups, plan.seconds)
         found = run_points(batch, store, check=check, watch=watch)
-        columns = tuple(make_columns(found, patterns(plan.scene, follow)))
+        followed = follow or analysis_of(plan.scene).headline_names
+        columns = tuple(make_columns(found, followed))
         sampled = () if plan.sample is None else _sampled(plan.sample, columns)
         seconds = time.perf_counter() - begin
         result = SweepResult(plan, found, columns, seconds, folder, sampled=sampled)
         with store.writing():
             files = write_outputs(store, result)
-            # Of an earlier call, perhaps.
-            (folder / "report.html").unlink(missing_ok=True)
+            # Of an earlier call, perhaps; other pictures there are the user's.
+            for name in ("report.html", *(f"{name}.png" for name in FIGURES)):
+                (folder / name).unlink(missing_ok=True)
         pictures: dict[str, Callable[[], list[Path]]] = {
             "figures": lambda: draw(folder, plan.axes, columns, sampled),
             "report.html": lambda: [write_report(folder)],
@@ -244,7 +233,6 @@ def _sampled(sample: Sample, columns: Sequence[Column]) -> tuple[SampledNumber, 
 def write_outputs(store: PointStore, result: SweepResult) -> list[Path]:
     """Write the numbers; returns the paths, the table first.
 
-    The figures of an earlier call, which may have followed other numbers, are removed.
     Raises OSError when the disk does not take it.
     """
     folder, plan = store.folder, result.plan
@@ -252,7 +240,6 @@ def write_outputs(store: PointStore, result: SweepResult) -> list[Path]:
     write_text(table, csv_text(plan.axes, plan.places, result.outcomes, result.columns))
     write_netcdf(arrays, {"": Group(_arrays(result))})
     write_text(data, json_text(_summary(store, result)))
-    _remove_figures(folder)
     if plan.sample is None:
         return [table, arrays, data]
     compared = folder / "sample.csv"
@@ -267,24 +254,14 @@ def draw(
     columns: Sequence[Column],
     sampled: Sequence[SampledNumber] = (),
 ) -> list[Path]:
-    """Write the figures into ``folder``, of a grid or of a sample; earlier ones are removed.
-
-    Returns their paths.
-    """
+    """Write the figures into ``folder``, of a grid or of a sample. Returns their paths."""
     # slow to import
     from upd.plot.matplotlib import write_sheets
 
-    _remove_figures(folder)
     if sampled:
         values = [column.values for column in columns]
         return write_sheets(sample_charts(sampled, values), folder)
     return write_sheets(sweep_charts(axes, columns), folder)
-
-
-def _remove_figures(folder: Path) -> None:
-    """Remove the figures of a sweep; other pictures there are the user's."""
-    for name in FIGURES:
-        (folder / f"{name}.png").unlink(missing_ok=True)
 
 
 def dimension(axis: Parameter, axes: Sequence[Parameter]) -> str:
@@ -394,7 +371,7 @@ def _point(store: PointStore, result: SweepResult, number: int, reason: str) -> 
     kept = outcome.final and number not in plan.refused
     file = store.path(plan.tasks[number]).relative_to(store.folder).as_posix() if kept else ""
     return {
-        "set": dict(plan.tasks[number].settings) or values_at(plan.axes, plan.places[number]),
+        "set": settings(plan.axes, plan.places[number]),
         "values": values,
         "status": "failed" if outcome.failure else "ok",
         "reason": reason,

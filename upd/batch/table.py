@@ -13,23 +13,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses import analysis_of
 from upd.batch.plan import Place
 from upd.errors import InputError
 from upd.plot.sweep_charts import Column, Parameter
 from upd.results import Case, Result, shared_label
-from upd.scene import AnyScene
 from upd.vary.outcome import Outcome
 
 Array = NDArray[np.float64]
 
 #: Columns when nothing is named and nothing usual is found.
 _FEW = 12
-
-
-def patterns(scene: AnyScene, follow: Sequence[str]) -> tuple[str, ...]:
-    """What the user follows, or what is usual for the scene's analysis."""
-    return tuple(follow) or analysis_of(scene).headline_names
 
 
 def check_follow(outcome: Outcome, follow: Sequence[str]) -> None:

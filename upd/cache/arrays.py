@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.cache.files import whole_file
-from upd.cache.sources import key_of
 from upd.errors import InputError
 from upd.units import parse_quantity
 
@@ -212,15 +211,3 @@ def sharing(store: Store) -> Iterator[Store]:
         yield store
     finally:
         _active.remove(store)
-
-
-def shared(kind: str, parts: Mapping[str, Any], make: Callable[[], Found]) -> Found:
-    """What `make` gives; inside a sweep it is kept for the next point whose ``parts`` (all it
-    depends on) are the same.
-    """
-    store = active()
-    return (
-        make()
-        if store is None
-        else store.remembered(kind, key_of({**parts, "threads": store.threads}), make)
-    )

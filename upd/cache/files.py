@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import math
-import shutil
 import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from filelock import FileLock, Timeout
@@ -63,45 +64,27 @@ def placed_file(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def whole_files(folder: Path) -> Iterator[Path]:
-    """A temporary folder whose files go to ``folder`` together at the end.
+    """A temporary folder whose files go to ``folder`` at the end, once all are written.
 
-    When anything fails, ``folder`` is as it was.
-
-    ``folder`` is made when only itself is missing. Raises OSError as the file system does.
+    When that fails, ``folder`` is as it was. It is made when only itself is missing. Raises OSError
+    as the file system does.
     """
     made = not folder.exists()
-    stage = folder / f".{uuid.uuid4().hex}"
     try:
         if made:
             folder.mkdir()
-        stage.mkdir()
-        yield stage
-        _place(stage, folder)
-        made = False
+        with TemporaryDirectory(prefix=".", dir=folder) as name:
+            yield Path(name)
+            files = sorted(Path(name).iterdir())
+            if blocked := [f.name for f in files if (folder / f.name).is_dir()]:
+                raise IsADirectoryError(errno.EISDIR, "it is a folder", blocked[0])
+            for file in files:
+                file.replace(folder / file.name)
+            made = False
     finally:
-        shutil.rmtree(stage, ignore_errors=True)
         if made:
             with suppress(OSError):
                 folder.rmdir()
-
-
-def _place(stage: Path, folder: Path) -> None:
-    """Move the files; on a failure those moved leave again and the ones they replaced come back."""
-    old = stage / "old"
-    files = sorted(stage.iterdir())
-    old.mkdir()
-    try:
-        for file in files:
-            if (folder / file.name).is_file():
-                (folder / file.name).replace(old / file.name)
-            file.replace(folder / file.name)
-    except BaseException:
-        for file in files:
-            if not file.exists():
-                (folder / file.name).unlink(missing_ok=True)
-            if (old / file.name).exists():
-                (old / file.name).replace(folder / file.name)
-        raise
 
 
 def write_text(path: Path, text: str) -> None:

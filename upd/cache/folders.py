@@ -139,7 +139,9 @@ def own_folder(
     if real.exists() and not real.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, "it is a file")
     real.parent.mkdir(parents=True, exist_ok=True)
-    base = _base(real)
+    # where the folder lies while it is written: beside its place, on the same disk
+    inside = real.is_dir() and (real.is_mount() or not os.access(real.parent, os.W_OK))
+    base = real if inside else real.parent
     with _turn(base):
         for candidate in numbered(place) if number else [place]:
             holder = _holder(candidate.resolve())
@@ -167,12 +169,6 @@ def numbered(place: Path) -> Iterator[Path]:
 
 def _part_name(name: str) -> str:
     return f".{name}.part-{os.getpid()}-{uuid.uuid4().hex[:8]}"
-
-
-def _base(place: Path) -> Path:
-    """Where the folder lies while it is written: beside its place, on the same disk."""
-    inside = place.is_dir() and (place.is_mount() or not os.access(place.parent, os.W_OK))
-    return place if inside else place.parent
 
 
 def _locked(folder: Path) -> int | None:

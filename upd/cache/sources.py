@@ -48,7 +48,7 @@ def _ours() -> str:
 
 
 @cache
-def _libraries() -> str:
+def library_versions() -> str:
     return json.dumps({name: version_of(name) for name in _LIBRARIES})
 
 
@@ -61,7 +61,7 @@ def source_digest(recipe: str = "") -> str:
     OSError
         When the recipe's file cannot be read.
     """
-    digest = hashlib.sha256(f"{_ours()}{_libraries()}".encode())
+    digest = hashlib.sha256(f"{_ours()}{library_versions()}".encode())
     if recipe.lower().endswith((".py", ".msh", ".inp")):
         for file in user_files(Path(recipe)):
             digest.update(file.read_bytes())

@@ -74,8 +74,7 @@ class WhoSolves:
         Threads of each process, on which the last digits of numbers depend. Of a sweep by default
         one; of a study all there are, divided by the workers.
     cluster
-        Dask: local:4 (workers on this machine) or tcp://host:port (a scheduler); needs
-        updampers[cluster].
+        Of a Dask scheduler, tcp://host:port; needs updampers[cluster].
     """
 
     workers: int | None = None
@@ -258,8 +257,7 @@ def study(
     with Live() as live:
         live("planning", "the points", None)
         planned = plan_study(loaded, vary, tuple(levels) if levels else None)
-        count = 1 if who.workers is None else who.workers
-        workers = study_workers(loaded, planned, count, who.threads, who.cluster)
+        workers = study_workers(loaded, planned, **asdict(who))
     print_study_plan(terminal.console, f"{loaded.title or loaded.name}, {vary}", planned, workers)
     folder = out or Path("runs") / f"study-{loaded.name}-{vary}{load}"
     with terminal.batch_progress() as watch:
@@ -316,8 +314,7 @@ def sweep(
         PointStore(folder, "sweep").check()
     with Live() as live:
         live("planning", "what the points share", None)
-        asked = asdict(who) | ({"threads": 1} if who.threads is None else {})
-        planned = plan_sweep(loaded, vary or (), folder, sample=sample, seed=seed, **asked)
+        planned = plan_sweep(loaded, vary or (), folder, sample=sample, seed=seed, **asdict(who))
     print_sweep_plan(terminal.console, planned)
     if plan_only:
         return OK

@@ -1,22 +1,13 @@
 """Mesh -> K, M: elements, materials, assembly, surface integrals."""
 
-from upd.fem.assembly import mass, modal_damping, stiffness
-from upd.fem.box import box_mesh
-from upd.fem.elements import ELEMENTS
-from upd.fem.inertia import MassProperties, mass_properties, rigid_body_modes
-from upd.fem.material import Material
-from upd.fem.surface import face_mass, traction_weights
-
-__all__ = [
-    "ELEMENTS",
-    "MassProperties",
-    "Material",
-    "box_mesh",
-    "face_mass",
-    "mass",
-    "mass_properties",
-    "modal_damping",
-    "rigid_body_modes",
-    "stiffness",
-    "traction_weights",
-]
+from upd.fem.assembly import mass as mass
+from upd.fem.assembly import modal_damping as modal_damping
+from upd.fem.assembly import stiffness as stiffness
+from upd.fem.box import box_mesh as box_mesh
+from upd.fem.elements import ELEMENTS as ELEMENTS
+from upd.fem.inertia import MassProperties as MassProperties
+from upd.fem.inertia import mass_properties as mass_properties
+from upd.fem.inertia import rigid_body_modes as rigid_body_modes
+from upd.fem.material import Material as Material
+from upd.fem.surface import face_mass as face_mass
+from upd.fem.surface import traction_weights as traction_weights

@@ -53,7 +53,8 @@ def box_mesh(x: ArrayLike, y: ArrayLike, z: ArrayLike, n_node: int = 8) -> Mesh:
     if any(line.ndim != 1 or len(line) < 2 or not (np.diff(line) > 0).all() for line in lines):
         raise InputError("box_mesh needs at least two increasing planes in each direction.")
     steps = 1 if n_node == 8 else 2
-    lines = [_with_midpoints(line) if steps == 2 else line for line in lines]
+    if steps == 2:
+        lines = [np.insert(x, np.arange(1, len(x)), (x[1:] + x[:-1]) / 2.0) for x in lines]
     nx, ny, nz = (len(line) for line in lines)
     first = (
         np.arange(nx * ny * nz)
@@ -71,11 +72,6 @@ def box_mesh(x: ArrayLike, y: ArrayLike, z: ArrayLike, n_node: int = 8) -> Mesh:
         for side in (0, 1)
     }
     return Mesh(points, hexes, faces, {name: np.unique(face) for name, face in faces.items()})
-
-
-def _with_midpoints(line: FloatArray) -> FloatArray:
-    """The planes with one more halfway between neighbours."""
-    return np.insert(line, np.arange(1, len(line)), (line[1:] + line[:-1]) / 2.0)
 
 
 def _side(points: FloatArray, hexes: IntArray, axis: int, side: int) -> IntArray:

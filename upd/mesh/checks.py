@@ -23,6 +23,11 @@ PURPOSE = {
     "plane_x": "the mirror plane x = 0",
     "plane_y": "the mirror plane y = 0",
 }
+#: ending of a mesh file -> where its sets get their names
+_NAMED_IN = {
+    "inp": "name these nodes in the file, *NSET, NSET=BODY_SET (faces follow from the nodes)",
+    "msh": "name these physical surfaces BODY_SET in gmsh and write the file again",
+}
 #: largest offset of two paired nodes along the contact, relative to the contact's extent: rounding
 #: of coordinates, far below any element
 OUT_OF_LINE = 1e-9
@@ -147,20 +152,10 @@ def require_sets(
                         f"found: {message}"
                     )
     if problems:
+        remedy = _NAMED_IN.get(recipe.lower().rpartition(".")[2], "name these sets in build()")
         raise OwnMeshError(
-            f"recipe {recipe!r}: {_how_to_name(recipe)}\n"
-            + "\n".join(f"  {problem}" for problem in problems)
+            f"recipe {recipe!r}: {remedy}\n" + "\n".join(f"  {problem}" for problem in problems)
         )
-
-
-def _how_to_name(recipe: str) -> str:
-    """Where the sets of a recipe or of a mesh file get their names."""
-    ending = recipe.lower().rpartition(".")[2]
-    if ending == "inp":
-        return "name these nodes in the file, *NSET, NSET=BODY_SET (faces follow from the nodes)"
-    if ending == "msh":
-        return "name these physical surfaces BODY_SET in gmsh and write the file again"
-    return "name these sets in build()"
 
 
 # -- pairs -----------------------------------------------------------------------------------------

@@ -6,8 +6,7 @@ Meshio is used here only.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import partial
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -41,10 +40,20 @@ def write_mesh(meshes: Mapping[str, Mesh], path: Path | str, *, element: str | N
     that does not fit, or a file that cannot be written.
     """
     path = Path(path)
-    writer = _writer(path, element)
+    ending = path.suffix.lower()
+    if ending not in ENDINGS:
+        raise InputError(f"{path}: the ending {path.suffix!r} is not known; use .msh, .vtu or .inp")
+    if element is not None and ending != ".inp":
+        raise InputError(
+            f"{path}: an element type ({element}) belongs to .inp files only; leave it out"
+        )
     _check(meshes)
     with placed_file(path) as temporary:
-        writer(meshes, temporary)
+        if ending == ".inp":
+            with temporary.open("w", encoding="ascii", newline="\n") as file:
+                file.writelines(line + "\n" for line in _inp(meshes, element))
+        else:
+            (_write_msh if ending == ".msh" else _write_vtu)(meshes, temporary)
 
 
 def write_fields(path: Path | str, meshes: Mapping[str, Mesh], point_data: Fields) -> None:
@@ -62,21 +71,6 @@ def write_fields(path: Path | str, meshes: Mapping[str, Mesh], point_data: Field
     data = _merged(meshes, point_data)
     with placed_file(path) as temporary:
         _write_vtu(meshes, temporary, data)
-
-
-def _writer(path: Path, element: str | None) -> Callable[[Mapping[str, Mesh], Path], None]:
-    ending = path.suffix.lower()
-    if ending == ".inp":
-        return partial(_write_inp, element=element)
-    if element is not None:
-        raise InputError(
-            f"{path}: an element type ({element}) belongs to .inp files only; leave it out"
-        )
-    if ending == ".msh":
-        return _write_msh
-    if ending == ".vtu":
-        return _write_vtu
-    raise InputError(f"{path}: the ending {path.suffix!r} is not known; use .msh, .vtu or .inp")
 
 
 def _check(meshes: Mapping[str, Mesh]) -> None:
@@ -154,11 +148,6 @@ def _write_msh(meshes: Mapping[str, Mesh], path: Path) -> None:
     points = np.vstack([mesh.points for mesh in meshes.values()])
     data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
     meshio.Mesh(points, cells, cell_data=data, field_data=groups).write(path, file_format="gmsh22")
-
-
-def _write_inp(meshes: Mapping[str, Mesh], path: Path, element: str | None) -> None:
-    with path.open("w", encoding="ascii", newline="\n") as file:
-        file.writelines(line + "\n" for line in _inp(meshes, element))
 
 
 def _inp(meshes: Mapping[str, Mesh], element: str | None) -> Iterator[str]:

@@ -74,11 +74,8 @@ def read_inp(path: Path) -> tuple[FloatArray, list[NamedElements]]:
     return points, list(deck.groups(labels, points))
 
 
-class _Line(NamedTuple):
-    """A data line: its place in the file, from 1, and what stands between its commas."""
-
-    place: int
-    cells: list[str]
+#: a data line: its place in the file, from 1, and what stands between its commas
+_Line = tuple[int, list[str]]
 
 
 class _Block(NamedTuple):
@@ -130,7 +127,7 @@ class _Deck:
                 first, last, *step = _integers(line)
                 found.extend(range(first, last + 1, step[0] if step else 1))
                 continue
-            for k, word in enumerate(line.cells):
+            for k, word in enumerate(line[1]):
                 if word.lower() in known:
                     found.extend(known[word.lower()])
                 elif word:
@@ -180,20 +177,19 @@ _Kind = TypeVar("_Kind", int, float)
 
 def _number(kind: type[_Kind], line: _Line, column: int) -> _Kind:
     """One number of a line. Raises ValueError, which names the line."""
+    place, cells = line
     try:
-        number = kind(line.cells[column])
+        number = kind(cells[column])
     except (ValueError, IndexError):
-        found = ", ".join(line.cells)
-        raise ValueError(
-            f"line {line.place}: {found!r} has no number in column {column + 1}"
-        ) from None
+        found = ", ".join(cells)
+        raise ValueError(f"line {place}: {found!r} has no number in column {column + 1}") from None
     if kind is int and abs(number) > _MOST:
-        raise ValueError(f"line {line.place}: {number} is too large; labels go up to {_MOST}")
+        raise ValueError(f"line {place}: {number} is too large; labels go up to {_MOST}")
     return number
 
 
 def _integers(line: _Line) -> list[int]:
-    return [_number(int, line, k) for k, x in enumerate(line.cells) if x]
+    return [_number(int, line, k) for k, x in enumerate(line[1]) if x]
 
 
 def _numbered(wanted: list[int], known: IntArray, name: str) -> IntArray:
@@ -222,7 +218,7 @@ def _blocks(data: bytes) -> Iterator[_Block]:
             options = {key.strip().upper(): value.strip().lower() for key, _, value in pairs}
             block = _Block(place, first.upper(), options, [])
         else:
-            block.lines.append(_Line(place, [cell.strip() for cell in line.split(",")]))
+            block.lines.append((place, [cell.strip() for cell in line.split(",")]))
     yield block
 
 
@@ -312,8 +308,10 @@ def recipe_of(path: Path, read_msh: Reader) -> ModuleType:
     rig = set(_BLADES) <= set(meshes)
     sector = all(set(mesh.nodes) >= _FACES for mesh in meshes.values())
 
-    def build_rig(params: RigFile) -> dict[str, Mesh]:
-        names = [_GLUED] if params.damper == "glued" else list(_BLADES)
+    def build(params: MeshFile) -> dict[str, Mesh]:
+        names = list(meshes)
+        if isinstance(params, RigFile):
+            names = [_GLUED] if params.damper == "glued" else list(_BLADES)
         if not set(names) <= set(meshes):
             raise OwnMeshError(
                 f"there is no body {_GLUED!r}, the blades with the damper glued in; leave "
@@ -321,13 +319,9 @@ def recipe_of(path: Path, read_msh: Reader) -> ModuleType:
             )
         return _scaled({name: meshes[name] for name in names}, params)
 
-    def build_sector(params: SectorFile) -> dict[str, Mesh]:
-        return _scaled(meshes, params)
-
-    def build(params: MeshFile) -> dict[str, Mesh]:
-        return _scaled(meshes, params)
-
-    vars(module)["build"] = build_rig if rig else build_sector if sector else build
+    # what a scene may give
+    build.__annotations__["params"] = RigFile if rig else SectorFile if sector else MeshFile
+    vars(module)["build"] = build
     other = "bladed disk" if sector else _contact_analysis(meshes)
     vars(module)["ANALYSIS"] = "rig" if rig else other
     return module

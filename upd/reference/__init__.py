@@ -2,154 +2,70 @@
 
 hertz, mindlin, yielding, half_space, half_space_stress: elastic contact; friction, den_hartog:
 oscillators with dry friction;
-thesis: printed values of the source; printed: the same by scene and number.
+printed: printed values of the source, by scene and number.
 """
 
-from upd.reference.den_hartog import (
-    den_hartog_amplitude,
-    den_hartog_functions,
-    den_hartog_phase,
-    den_hartog_stop_limit,
-)
-from upd.reference.friction import (
-    critical_amplitude,
-    jenkins_force,
-    jenkins_frequencies,
-    jenkins_harmonic,
-    jenkins_loop_area,
-    jenkins_optimum,
-    jenkins_optimum_frequency,
-    jenkins_peak,
-    jenkins_peak_frequency,
-)
-from upd.reference.half_space import (
-    boussinesq,
-    boussinesq_stress,
-    cerruti,
-    cerruti_rectangle,
-    cerruti_stress,
-    half_space_compliance,
-    love_rectangle,
-    pressure_shift_rectangle,
-)
-from upd.reference.half_space_stress import (
-    cerruti_rectangle_stress,
-    love_rectangle_stress,
-    von_mises,
-)
-from upd.reference.hertz import (
-    HertzPoint,
-    contact_modulus,
-    dundurs_alpha,
-    dundurs_beta,
-    effective_radius,
-    hertz_axial_displacement,
-    hertz_load,
-    hertz_pressure,
-    hertz_sphere,
-    hertz_surface_displacement,
-    punch_load,
-    punch_pressure,
-    sphere_gap,
-)
-from upd.reference.mindlin import cycle_energy as mindlin_cycle_energy
-from upd.reference.mindlin import displacement as mindlin_displacement
-from upd.reference.mindlin import (
-    initial_tangential_stiffness,
-    shear_modulus,
-    stick_radius,
-    stiffness_ratio,
-    tangential_compliance_modulus,
-)
-from upd.reference.mindlin import loop as mindlin_loop
-from upd.reference.mindlin import reloading as mindlin_reloading
-from upd.reference.mindlin import traction as mindlin_traction
-from upd.reference.mindlin import unloading as mindlin_unloading
-from upd.reference.mindlin import unloading_traction as mindlin_unloading_traction
-from upd.reference.printed import Printed, printed_values
-from upd.reference.spence import sticking_part
-from upd.reference.thesis import (
-    THESIS,
-    THESIS_COMPRESSION,
-    THESIS_CONTACT_STIFFNESS,
-    THESIS_FREQUENCIES,
-    THESIS_HERTZ,
-    THESIS_HERTZ_ROWS,
-    THESIS_STEEL,
-    THESIS_STIFFNESS,
-    ThesisValue,
-)
-from upd.reference.yielding import (
-    YieldPoint,
-    hertz_axis_stress,
-    hertz_yield_load,
-    hertz_yield_point,
-)
+from upd.reference import mindlin as mindlin
+from upd.reference.den_hartog import den_hartog_amplitude as den_hartog_amplitude
+from upd.reference.den_hartog import den_hartog_functions as den_hartog_functions
+from upd.reference.den_hartog import den_hartog_phase as den_hartog_phase
+from upd.reference.den_hartog import den_hartog_stop_limit as den_hartog_stop_limit
+from upd.reference.friction import critical_amplitude as critical_amplitude
+from upd.reference.friction import jenkins_force as jenkins_force
+from upd.reference.friction import jenkins_frequencies as jenkins_frequencies
+from upd.reference.friction import jenkins_harmonic as jenkins_harmonic
+from upd.reference.friction import jenkins_loop_area as jenkins_loop_area
+from upd.reference.friction import jenkins_optimum as jenkins_optimum
+from upd.reference.friction import jenkins_optimum_frequency as jenkins_optimum_frequency
+from upd.reference.friction import jenkins_peak as jenkins_peak
+from upd.reference.friction import jenkins_peak_frequency as jenkins_peak_frequency
+from upd.reference.half_space import boussinesq as boussinesq
+from upd.reference.half_space import boussinesq_stress as boussinesq_stress
+from upd.reference.half_space import cerruti as cerruti
+from upd.reference.half_space import cerruti_rectangle as cerruti_rectangle
+from upd.reference.half_space import cerruti_stress as cerruti_stress
+from upd.reference.half_space import half_space_compliance as half_space_compliance
+from upd.reference.half_space import love_rectangle as love_rectangle
+from upd.reference.half_space import pressure_shift_rectangle as pressure_shift_rectangle
+from upd.reference.half_space_stress import cerruti_rectangle_stress as cerruti_rectangle_stress
+from upd.reference.half_space_stress import love_rectangle_stress as love_rectangle_stress
+from upd.reference.half_space_stress import von_mises as von_mises
+from upd.reference.hertz import HertzPoint as HertzPoint
+from upd.reference.hertz import contact_modulus as contact_modulus
+from upd.reference.hertz import dundurs_alpha as dundurs_alpha
+from upd.reference.hertz import dundurs_beta as dundurs_beta
+from upd.reference.hertz import effective_radius as effective_radius
+from upd.reference.hertz import hertz_axial_displacement as hertz_axial_displacement
+from upd.reference.hertz import hertz_load as hertz_load
+from upd.reference.hertz import hertz_pressure as hertz_pressure
+from upd.reference.hertz import hertz_sphere as hertz_sphere
+from upd.reference.hertz import hertz_surface_displacement as hertz_surface_displacement
+from upd.reference.hertz import punch_load as punch_load
+from upd.reference.hertz import punch_pressure as punch_pressure
+from upd.reference.hertz import sphere_gap as sphere_gap
+from upd.reference.mindlin import initial_tangential_stiffness as initial_tangential_stiffness
+from upd.reference.mindlin import shear_modulus as shear_modulus
+from upd.reference.mindlin import stick_radius as stick_radius
+from upd.reference.mindlin import stiffness_ratio as stiffness_ratio
+from upd.reference.mindlin import tangential_compliance_modulus as tangential_compliance_modulus
+from upd.reference.printed import THESIS_COMPRESSION as THESIS_COMPRESSION
+from upd.reference.printed import THESIS_CONTACT_STIFFNESS as THESIS_CONTACT_STIFFNESS
+from upd.reference.printed import THESIS_FREQUENCIES as THESIS_FREQUENCIES
+from upd.reference.printed import THESIS_HERTZ as THESIS_HERTZ
+from upd.reference.printed import THESIS_STEEL as THESIS_STEEL
+from upd.reference.printed import THESIS_STIFFNESS as THESIS_STIFFNESS
+from upd.reference.printed import Printed as Printed
+from upd.reference.printed import printed_values as printed_values
+from upd.reference.spence import sticking_part as sticking_part
+from upd.reference.yielding import YieldPoint as YieldPoint
+from upd.reference.yielding import hertz_axis_stress as hertz_axis_stress
+from upd.reference.yielding import hertz_yield_load as hertz_yield_load
+from upd.reference.yielding import hertz_yield_point as hertz_yield_point
 
-__all__ = [
-    "THESIS",
-    "THESIS_COMPRESSION",
-    "THESIS_CONTACT_STIFFNESS",
-    "THESIS_FREQUENCIES",
-    "THESIS_HERTZ",
-    "THESIS_HERTZ_ROWS",
-    "THESIS_STEEL",
-    "THESIS_STIFFNESS",
-    "HertzPoint",
-    "Printed",
-    "ThesisValue",
-    "YieldPoint",
-    "boussinesq",
-    "boussinesq_stress",
-    "cerruti",
-    "cerruti_rectangle",
-    "cerruti_rectangle_stress",
-    "cerruti_stress",
-    "contact_modulus",
-    "critical_amplitude",
-    "den_hartog_amplitude",
-    "den_hartog_functions",
-    "den_hartog_phase",
-    "den_hartog_stop_limit",
-    "dundurs_alpha",
-    "dundurs_beta",
-    "effective_radius",
-    "half_space_compliance",
-    "hertz_axial_displacement",
-    "hertz_axis_stress",
-    "hertz_load",
-    "hertz_pressure",
-    "hertz_sphere",
-    "hertz_surface_displacement",
-    "hertz_yield_load",
-    "hertz_yield_point",
-    "initial_tangential_stiffness",
-    "jenkins_force",
-    "jenkins_frequencies",
-    "jenkins_harmonic",
-    "jenkins_loop_area",
-    "jenkins_optimum",
-    "jenkins_optimum_frequency",
-    "jenkins_peak",
-    "jenkins_peak_frequency",
-    "love_rectangle",
-    "love_rectangle_stress",
-    "mindlin_cycle_energy",
-    "mindlin_displacement",
-    "mindlin_loop",
-    "mindlin_reloading",
-    "mindlin_traction",
-    "mindlin_unloading",
-    "mindlin_unloading_traction",
-    "pressure_shift_rectangle",
-    "printed_values",
-    "punch_load",
-    "punch_pressure",
-    "shear_modulus",
-    "sphere_gap",
-    "stick_radius",
-    "sticking_part",
-    "stiffness_ratio",
-    "tangential_compliance_modulus",
-    "von_mises",
-]
+mindlin_cycle_energy = mindlin.cycle_energy
+mindlin_displacement = mindlin.displacement
+mindlin_loop = mindlin.loop
+mindlin_reloading = mindlin.reloading
+mindlin_traction = mindlin.traction
+mindlin_unloading = mindlin.unloading
+mindlin_unloading_traction = mindlin.unloading_traction

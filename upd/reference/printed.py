@@ -1,6 +1,13 @@
 """Printed values of a scene.
 
-Which publication printed which number of the same bodies under the same load, and where.
+Which publication printed which number of the same bodies under the same load, and where. The theory
+behind each is recomputed, not copied.
+
+References
+----------
+.. [1] "Investigation of the dynamic behaviour of underplatform dampers" (master's thesis,
+   Politecnico di Torino). The text at hand names neither author nor year; the experiments it uses
+   were made at the LAQ AERMEC laboratory, Politecnico di Torino, in 2005.
 """
 
 from __future__ import annotations
@@ -8,18 +15,55 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from typing import Any, Protocol
+from typing import Any
 
-from upd.reference.thesis import (
-    THESIS_COMPRESSION,
-    THESIS_CONTACT_STIFFNESS,
-    THESIS_FREQUENCIES,
-    THESIS_HERTZ,
-    THESIS_HERTZ_ROWS,
-    THESIS_RADIUS,
-    THESIS_STEEL,
-    THESIS_STIFFNESS,
-)
+# Of the thesis, in mm, N, MPa, N/mm, Hz.
+
+#: steel of Table I, its "200 MPa" read as 200 GPa: MPa, -, t/mm3
+THESIS_STEEL: Mapping[str, float] = {"E": 200_000.0, "nu": 0.3, "rho": 7.8e-9}
+#: radius (mm) of the half-sphere: the one that gives the Hertz columns of Tables VII and VIII
+THESIS_RADIUS = 5.0
+#: Tables VII and VIII, numerical method: load (N) -> field of HertzPoint -> value; the areas are 69
+#: and 181 lattice cells
+THESIS_HERTZ: Mapping[float, Mapping[str, float]] = {
+    50.0: {
+        "radius": 0.117,
+        "approach": 2.73e-3,
+        "area": 4.31e-2,
+        "max_pressure": 1800.0,
+        "mean_pressure": 1160.0,
+    },
+    200.0: {
+        "radius": 0.189,
+        "approach": 6.98e-3,
+        "area": 0.1131,
+        "max_pressure": 2930.0,
+        "mean_pressure": 1767.0,
+    },
+}
+#: Table IX: load (N) -> approach corrected for the bodies beyond depth 3a; 23 % of a half-space's
+#: own displacement is beyond it too, so not comparable with Hertz
+THESIS_COMPRESSION: Mapping[float, float] = {50.0: 2.60e-3, 200.0: 6.50e-3}
+#: Table X: load (N) -> normal stiffness with that approach; its unit "um" read as N/mm. At 200 N it
+#: is a copy of Table IX: 1.5 F/d gives 4.62e4
+THESIS_STIFFNESS: Mapping[float, float] = {50.0: 3.3e4, 200.0: 6.50e4}
+#: Tables XI and XII: damper -> contact stiffness (N/mm), body flexibility included; of the
+#: asymmetric damper's two pads that of one (section 8.4)
+THESIS_CONTACT_STIFFNESS: Mapping[str, Mapping[str, float]] = {
+    "symmetric": {"K_N": 1.56e6, "K_T": 4.90e5},
+    "asymmetric": {"K_N": 4.71e5, "K_T": 1.50e5},
+}
+#: Tables II to VI: natural frequencies (Hz); the caption of Table V has "forced" for the glued
+#: condition
+THESIS_FREQUENCIES: Mapping[str, tuple[float, ...]] = {
+    "experiment_free": (295.0,),
+    "experiment_symmetric": (340.0,),
+    "experiment_asymmetric": (377.0, 440.0),
+    "free_symmetric": (294.88, 295.19, 783.88, 784.94),
+    "free_asymmetric": (294.77, 294.78, 784.06, 784.29),
+    "glued_symmetric": (446.60, 463.92, 783.97, 1030.10),
+    "craig_bampton_symmetric": (294.89, 295.20, 784.08, 784.98),
+}
 
 
 @dataclass(frozen=True)
@@ -59,18 +103,6 @@ class Printed:
     source: str
 
 
-class Elastic(Protocol):
-    """A material: E in MPa, and nu."""
-
-    @property
-    def E(self) -> float:
-        """Young's modulus, MPa."""
-
-    @property
-    def nu(self) -> float:
-        """Poisson's ratio."""
-
-
 #: name of a number, fields of its case -> what was printed of it
 Lookup = Callable[[str, Mapping[str, Any]], tuple[Printed, ...]]
 
@@ -89,18 +121,17 @@ _PEAKS = {"symmetric": "II", "asymmetric": "III"}
 
 
 def _thesis_tables() -> Iterable[PrintedTable]:
-    for load, row in THESIS_HERTZ.items():
-        values = {name: row[key] * unit for name, (key, unit) in _HERTZ.items()}
-        source = f"thesis, Table {THESIS_HERTZ_ROWS[load]['radius'].table}"
-        sphere = {"radius": THESIS_RADIUS, "block": 10.0}
-        yield PrintedTable(source, "sphere_block", values, sphere, _STEEL, {"load": load})
-        corrected = {
-            "IX": {"approach_within_3a": THESIS_COMPRESSION[load].value * 1e3},
-            "X": {"K_N_tangent_3a": THESIS_STIFFNESS[load].value},
+    sphere = {"radius": THESIS_RADIUS, "block": 10.0}
+    for load, table in ((50.0, "VII"), (200.0, "VIII")):
+        row = THESIS_HERTZ[load]
+        tables = {
+            table: {name: row[key] * unit for name, (key, unit) in _HERTZ.items()},
+            "IX": {"approach_within_3a": THESIS_COMPRESSION[load] * 1e3},
+            "X": {"K_N_tangent_3a": THESIS_STIFFNESS[load]},
         }
-        for table, numbers in corrected.items():
-            source = f"thesis, Table {table}"
-            yield PrintedTable(source, "sphere_block", numbers, sphere, _STEEL, {"load": load})
+        for name, values in tables.items():
+            source = f"thesis, Table {name}"
+            yield PrintedTable(source, "sphere_block", values, sphere, _STEEL, {"load": load})
     for damper, (recipe, table) in _DAMPERS.items():
         K = THESIS_CONTACT_STIFFNESS[damper]
         # From section 8.4 on the thesis looks at one of the two pads alone.
@@ -140,9 +171,7 @@ def _thesis_tables() -> Iterable[PrintedTable]:
 PRINTED: tuple[PrintedTable, ...] = tuple(_thesis_tables())
 
 
-def printed_values(
-    recipe: str, geometry: Mapping[str, Any], materials: Iterable[Elastic]
-) -> Lookup:
+def printed_values(recipe: str, geometry: Mapping[str, Any], materials: Iterable[Any]) -> Lookup:
     """Look up what was printed of these bodies.
 
     Parameters
@@ -150,7 +179,7 @@ def printed_values(
     recipe, geometry
         Name of the geometry and its parameters, mm.
     materials
-        Of every body.
+        Of every body, with ``E`` in MPa and ``nu``.
 
     Returns
     -------
@@ -164,7 +193,13 @@ def printed_values(
     (Printed(value=1560000.0, source='thesis, Table XI'),)
     """
     bodies = list(materials)
-    mine = [t for t in PRINTED if t.recipe == recipe and _is_of(t, geometry, bodies)]
+    mine = [
+        table
+        for table in PRINTED
+        if table.recipe == recipe
+        and table.geometry.items() <= geometry.items()
+        and all(getattr(body, k) == v for body in bodies for k, v in table.material.items())
+    ]
 
     def lookup(name: str, case: Mapping[str, Any]) -> tuple[Printed, ...]:
         for table in mine:
@@ -178,10 +213,3 @@ def printed_values(
         return ()
 
     return lookup
-
-
-def _is_of(table: PrintedTable, geometry: Mapping[str, Any], bodies: Iterable[Elastic]) -> bool:
-    same_shape = all(geometry.get(key) == value for key, value in table.geometry.items())
-    return same_shape and all(
-        getattr(body, key) == value for body in bodies for key, value in table.material.items()
-    )

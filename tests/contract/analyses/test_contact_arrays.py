@@ -10,6 +10,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from tests.pictures import no_figures
 from upd import run
 from upd.plot.common import case_of, scalar, with_content
 from upd.reference import (
@@ -51,10 +52,11 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, RunResult]:
         ],
     }
     scenes["asymmetric"] = PADS
-    return {
-        scene: run(scene, overrides=given, out=path / scene, report=False)
-        for scene, given in scenes.items()
-    }
+    with no_figures():
+        return {
+            scene: run(scene, overrides=given, out=path / scene, report=False)
+            for scene, given in scenes.items()
+        }
 
 
 @pytest.fixture(scope="module")

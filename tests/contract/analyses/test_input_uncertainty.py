@@ -11,6 +11,7 @@ import pytest
 from rigs import LINES
 
 import upd
+from tests.pictures import no_figures
 from upd.analyses import analysis_of
 from upd.analyses.forced.solve import ForcedSolution
 from upd.progress import Stages
@@ -79,7 +80,8 @@ def test_sphere_in_closed_form(tmp_path: Path) -> None:
     like bodies E* takes half. Solved again at both ends of the intervals, on half the divisions.
     """
     inputs = {"loads.normal": ["200 N +- 10 N"], "materials.sphere.E": "200 GPa +- 5 %"}
-    result = upd.run("hertz", overrides=SPHERE | inputs, out=tmp_path / "run", report=False)
+    with no_figures():
+        result = upd.run("hertz", overrides=SPHERE | inputs, out=tmp_path / "run", report=False)
     force, modulus = 0.05, 0.025
     for name, of_force, of_modulus in (
         ("max_pressure", 1 / 3, 2 / 3),

@@ -9,6 +9,7 @@ import pytest
 from rigs import undeclared
 
 import upd
+from tests.pictures import no_figures
 from upd.errors import InputError
 from upd.results import Result
 
@@ -116,7 +117,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> upd.RunResult:
         "left_out.solve": "no",
     }
     folder = tmp_path_factory.mktemp("rig")
-    first = upd.run("rig", overrides=toy | {"accuracy": "unknown"}, out=folder / "a", report=False)
+    first = upd.run("rig", overrides=toy | {"accuracy": "unknown"})
     more: dict[str, object] = {"response.damping": "measured"}
     for kind, state in (("free", "free"), ("glued", "stuck")):
         group = first.arrays[f"response {kind}"]
@@ -133,7 +134,8 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> upd.RunResult:
     (folder / "left.csv").write_text(other, encoding="utf-8")
     more["measured.left"] = {"file": str(folder / "left.csv")}
     more["accuracy"] = "unknown"
-    return upd.run("rig", overrides=toy | more, out=folder / "b", report=False)
+    with no_figures():
+        return upd.run("rig", overrides=toy | more, out=folder / "b", report=False)
 
 
 def test_a_rig_beside_measured_curves(rig: upd.RunResult) -> None:

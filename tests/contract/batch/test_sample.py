@@ -76,6 +76,7 @@ def test_hertz_within_five_per_cent(narrow: SweepResult) -> None:
         np.testing.assert_allclose(values / values[0], closed, rtol=5e-3)
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_an_interval_of_nine_tenths_differs(tmp_path: Path) -> None:
     """F^(1/3) between a tenth and nearly twice the load: both ends are 45 % apart to either side,
     the deviation is 35 / sqrt(3) % and the mean 4 % less (closed forms).
@@ -115,6 +116,7 @@ def test_points_know_their_inputs_exactly_and_estimate_nothing() -> None:
     assert other.tasks[1:] != plan.tasks[1:]
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_what_is_missing_of_a_stopped_sample_runs_with_the_same_points(tmp_path: Path) -> None:
     """The seed lies in the folder; another one is another sample."""
 

@@ -301,6 +301,7 @@ def test_time_steps_are_of_the_sweeps_and_samples_of_the_balance() -> None:
         assert {one.balance.method for one in made} == {method}
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_ladder_of_accuracies_tells_estimated_and_true_errors(tmp_path: Path) -> None:
     arguments = ["study", "hertz", "--vary", "accuracy", "--levels", "20", "8.5"]
     arguments += ["--at", "200 N", "--workers", "0", "--out", str(tmp_path)]

@@ -19,7 +19,7 @@ from upd.batch.engine import Progress
 from upd.batch.plan import parse_axes, places, settings
 from upd.batch.point import Task, solve_task
 from upd.batch.store import PointStore
-from upd.batch.sweeps import draw, sweep
+from upd.batch.sweeps import sweep
 from upd.batch.table import csv_text, make_columns, reasons
 from upd.cache.arrays import Store, active
 from upd.cli import main
@@ -28,6 +28,8 @@ from upd.reduction.guyan import stored_condensation
 from upd.results import Case, Result
 from upd.results.case import shared_label
 from upd.vary.outcome import Outcome, read_outcome
+
+pytestmark = pytest.mark.usefixtures("without_pictures")
 
 SCENE = {
     "contact": {"friction": 0.6},
@@ -576,30 +578,8 @@ def test_a_sweep_is_a_function_of_the_package(tmp_path: Path) -> None:
     assert "sweep" in dir(upd)
     with pytest.raises(InputError, match="--vary: is missing"):
         upd.sweep("hertz", [], out=tmp_path / "s")
-
-
-def test_figures_of_one_two_and_three_parameters(tmp_path: Path) -> None:
-    for vary in (
-        ["a=1:3:3"],
-        ["a=1:3:3", "b=1:2:2"],
-        ["a=1:3:3", "b=x,y"],
-        ["a=1:3:3", "b=1:2:2", "c=x,y"],
-        ["b=x,y"],
-    ):
-        axes = parse_axes(vary, {})
-        grid = places(axes)
-        outcomes = [
-            rows(("p", Case(), float(k)), ("flat", Case(), 1.0)) if k else Outcome(failure="no")
-            for k in range(len(grid))
-        ]
-        columns = make_columns(outcomes, ["*"])
-        written = draw(tmp_path, axes, columns)
-        assert len(written) == 1
-        assert sorted(tmp_path.glob("*.png")) == sorted(written), (
-            "figures of the grid before are gone"
-        )
-        assert all(path.stat().st_size > 5_000 for path in written)
-        assert csv_text(axes, grid, outcomes, columns).count("\n") == len(grid) + 1
+    with pytest.raises(TypeError, match="wokers"):
+        upd.sweep("hertz", ["contact.friction=0.2,0.4"], out=tmp_path / "s", wokers=2)
 
 
 def test_command_prints_plan_and_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

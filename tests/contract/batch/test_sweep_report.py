@@ -20,12 +20,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from upd.batch.sweeps import sweep
+from upd.batch.plan import parse_axes, places
+from upd.batch.sweeps import draw, sweep
+from upd.batch.table import csv_text, make_columns
 from upd.cli import main
 from upd.errors import InputError
 from upd.plot.sweep_charts import sweep_charts
 from upd.report import sweep_page, write_comparison, write_report
 from upd.report.sweep_page import MOST_ROWS, grouped, read_sweep, sweep_panels, verdict
+from upd.results import Case, Result
+from upd.vary.outcome import Outcome
 
 EVIL = '</script><script>alert("x")</script>'
 TINY = {"title": EVIL, "geometry.divisions": 8, "want": ["normal"], "geometry.core_depth": 0.2}
@@ -381,3 +385,29 @@ def test_a_number_without_a_value_at_any_point_has_no_column(tmp_path: Path) -> 
     assert "approach" in head and "maximum pressure" not in head
     assert "reason or warnings" not in head, "no point failed or warned"
     assert "Without a value at every point: maximum pressure." in html
+
+
+def test_figures_of_one_two_and_three_parameters(tmp_path: Path) -> None:
+    for vary in (
+        ["a=1:3:3"],
+        ["a=1:3:3", "b=1:2:2"],
+        ["a=1:3:3", "b=x,y"],
+        ["a=1:3:3", "b=1:2:2", "c=x,y"],
+        ["b=x,y"],
+    ):
+        axes = parse_axes(vary, {})
+        grid = places(axes)
+        outcomes = [
+            Outcome((Result("p", Case(), float(k), "N"), Result("flat", Case(), 1.0, "N")))
+            if k
+            else Outcome(failure="no")
+            for k in range(len(grid))
+        ]
+        columns = make_columns(outcomes, ["*"])
+        written = draw(tmp_path, axes, columns)
+        assert len(written) == 1
+        assert sorted(tmp_path.glob("*.png")) == sorted(written), (
+            "figures of the grid before are gone"
+        )
+        assert all(path.stat().st_size > 5_000 for path in written)
+        assert csv_text(axes, grid, outcomes, columns).count("\n") == len(grid) + 1

@@ -56,7 +56,7 @@ def test_recipe_and_libraries_count(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     recipe.write_text("a = 2\n")
     assert sources.source_digest(str(recipe)) != before
     # read once per process: a fresh look, and none of it left behind
-    monkeypatch.setattr(sources, "_libraries", sources._libraries.__wrapped__)
+    monkeypatch.setattr(sources, "library_versions", sources.library_versions.__wrapped__)
     assert sources.source_digest("sphere_block") == ready
     monkeypatch.setattr(sources, "version_of", lambda _: "0.0")
     assert sources.source_digest("sphere_block") != ready

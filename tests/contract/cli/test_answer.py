@@ -15,6 +15,7 @@ import rigs
 from rich.console import Console
 
 import upd
+from tests.pictures import no_figures
 from upd import cli
 from upd.cli.tables import print_result, print_table
 from upd.report.answer import LINES
@@ -87,7 +88,8 @@ def toy(
         if scene not in TOYS:
             return small_run(scene)
         out = tmp_path_factory.mktemp("toys") / scene
-        return upd.run(scene, overrides=dict(TOYS[scene]), out=out, report=False)
+        with no_figures():
+            return upd.run(scene, overrides=dict(TOYS[scene]), out=out, report=False)
 
     return solved
 

@@ -16,7 +16,6 @@ NEEDS = {
     "bench_pyharm_response": "pip install pyHarm-os",
     "bench_tmdsimpy_response": "clone github.com/tmd-lab/tmdsimpy",
     "bench_octave_response": "apt-get install octave",
-    "bench_calculix_iterative": "apt-get install calculix-ccx",
 }
 #: a code that answers with a curve up to the frequency given as its argument
 ANSWER = """

@@ -50,7 +50,7 @@ def test_determined_targets_are_recovered_and_the_written_scene_has_them(
 ) -> None:
     vary, factors = [f"{RIGHT}=x0.2:x10", f"{LEFT}=x0.01:x10"], [0.4, 0.07]
     made = numbers(scene, "stuck_in_phase,stuck_out_of_phase", vary, factors)
-    found = upd.fit(scene, MODES.format(*made, w=""), vary, out=tmp_path / "fit")
+    found = upd.fit(scene, MODES.format(*made, w=""), vary, starts=4, out=tmp_path / "fit")
     assert found.status == "found"
     assert found.value(RIGHT) == pytest.approx(0.4 * 1.5e5, rel=1e-6)
     assert found.value(LEFT) == pytest.approx(0.07 * 1e6, rel=1e-6)
@@ -161,24 +161,27 @@ def test_half_widths_become_intervals(scene: ForcedScene) -> None:
 
 
 def test_an_interval_that_is_not_of_first_order_is_the_profile_s(scene: ForcedScene) -> None:
-    """Ends at which one number is off by its half-width, where first order has others."""
-    to, vary = "peak_2_accelerance@100={:.12g} (m/s2)/N +- {:.12g} (m/s2)/N", ["contact.friction"]
-    height = numbers(scene, "peak_2_accelerance@100", vary, [1.0])[0]
-    width = 0.3 * height
-    found = upd.fit(scene, to.format(height, width), vary, starts=1)
+    """Ends at which the number is off by its half-width, where first order has others."""
+    made, width = numbers(scene, "stuck_in_phase", [RIGHT], [1.0])[0], 2.0
+    found = upd.fit(scene, f"stuck_in_phase={made:.12g} Hz +- {width} Hz", [RIGHT], starts=1)
     (ends,) = found.ends
     assert found.known.rises is not None and found.known.error is not None
     first = found.answers[0][0] + np.array([-1.0, 1.0]) * found.known.error[0]
     off = [
-        numbers(scene, "peak_2_accelerance@100", vary, [math.exp(z)])[0] - height
-        for z in (*ends, *first)
+        numbers(scene, "stuck_in_phase", [RIGHT], [math.exp(z)])[0] - made for z in (*ends, *first)
     ]
     told = np.abs(off) / width
-    inside = np.abs(ends) < math.log(2.0)
-    assert inside.any()
-    assert told[:2][inside] == pytest.approx(1.0, abs=0.02)
+    assert told[:2] == pytest.approx(1.0, abs=0.02)
     assert np.abs(told[2:] - 1.0).max() > 0.1
     assert "By profiles, in the same multiple" in " ".join(found.table().split())
+
+
+def test_the_slope_of_a_peak_with_friction_is_that_of_differences(scene: ForcedScene) -> None:
+    targets = read_targets(["peak_2_accelerance@100=1 (m/s2)/N"])
+    responses = FitResponses(scene, targets, read_parameters(scene, ["contact.friction"]))
+    slope = responses.at(np.zeros(1))[1]
+    change = responses.value(np.array([0.01])) - responses.value(np.array([-0.01]))
+    assert slope[:, 0] == pytest.approx(change / 0.02, rel=1e-2)
 
 
 def test_what_a_target_within_limits_cannot_tell_is_unknown(scene: ForcedScene) -> None:

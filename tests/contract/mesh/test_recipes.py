@@ -98,7 +98,7 @@ def test_only_what_matters_makes_a_new_mesh(
     assert cached(dict(reversed(SMALL.items())))
     assert not cached({**SMALL, "radius": 5.0 + 1e-12})
     # read once per process: a fresh look, and none of it left behind
-    monkeypatch.setattr(sources, "_libraries", sources._libraries.__wrapped__)
+    monkeypatch.setattr(sources, "library_versions", sources.library_versions.__wrapped__)
     assert cached(SMALL)
     monkeypatch.setattr(sources, "version_of", lambda _: "0.0")
     assert not cached(SMALL), "another gmsh"

@@ -73,6 +73,7 @@ def runs() -> ModuleType:
     return module
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_worst_peaks_are_those_of_runs(
     found: BestDamper, runs: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -280,6 +281,7 @@ def test_several_parameters_are_chosen_and_stood(
         assert known == pytest.approx([(z - y) / math.log(b / a)])
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_grid_of_one_of_several(
     runs: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
