@@ -1,8 +1,7 @@
 """Effects left out of a contact, each verified on a number of the run: solved again with it.
 
 All are solved on the plan's companion, a coarser whole model with all three directions condensed
-together, once without the effect and once with it switched on. Large displacements have no switch:
-the gap is taken at the places that the displacement carries the faces to.
+together, once without the effect and once with it switched on.
 """
 
 from __future__ import annotations
@@ -12,27 +11,24 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upd.analyses.base import Resolved
 from upd.analyses.contact import plan as planned
 from upd.analyses.contact.bodies import prepare
-from upd.analyses.contact.loading import LOAD_STEP
-from upd.analyses.contact.plan import ACROSS, ALONG, NORMAL, ContactPlan
+from upd.analyses.contact.plan import ContactPlan
 from upd.analyses.contact.results import make_results
 from upd.analyses.contact.solution import ContactSolution
-from upd.analyses.contact.solve import press, solve_plan
+from upd.analyses.contact.solve import solve_plan
 from upd.contact.checks import few_threads
 from upd.contact.model import ContactModel
 from upd.errors import InputError, UpdError
 from upd.progress import Stages
-from upd.results import Case, Result
+from upd.results import Result
 from upd.results import quantities as q
 from upd.scene import Scene
 from upd.vary.solve import changed
 from upd.vary.variation import Key
 
-Array = NDArray[np.float64]
 _NORMAL = ("K_N_tangent_raw",), ("approach",)
 _SHEAR = ("K_T_initial_raw", "K_Tx_initial_raw", "K_Ty_initial_raw")
 _AREAS = ("contact_area", "stick_area")
@@ -40,7 +36,6 @@ _AREAS = ("contact_area", "stick_area")
 #: changes areas
 _SHOWN: Mapping[str, tuple[tuple[str, ...], ...]] = {
     planned.TILT: _NORMAL,
-    planned.LARGE: _NORMAL,
     planned.COUPLING: (
         (*_NORMAL[0], *_SHEAR),
         ("approach", "K_T_secant_raw", "cycle_energy"),
@@ -130,50 +125,7 @@ def _numbers(plan: ContactPlan, model: ContactModel, *switch: tuple[str, object]
 
 def _with(effect: str, plan: ContactPlan, model: ContactModel) -> list[Result]:
     """The companion's numbers with an effect; InputError where its upper body tips over."""
-    if effect == planned.LARGE:
-        return _displaced(plan, model)
     if effect == planned.TILT and plan.scene.coupled:
         # with friction it would not
         _numbers(plan, model, _SWITCHES[effect], ("contact.coupling", "uncoupled"))
     return _numbers(plan, model, _SWITCHES[effect])
-
-
-def _displaced(plan: ContactPlan, model: ContactModel) -> list[Result]:
-    """Tangent stiffness and approach of the companion between displaced faces."""
-    companion = ContactSolution(plan, model)
-
-    def approach(load: float) -> float:
-        force = press(companion, [load])[load].solution.force
-        displaced = replace(companion, model=replace(model, gap=displaced_gap(model, force)))
-        return press(displaced, [load])[load].solution.approach
-
-    out = []
-    for F in (load for load in planned.normal_loads(plan.scene) if load > 0.0):
-        low, own, high = (approach(F * (1.0 + s)) for s in (-LOAD_STEP, 0.0, LOAD_STEP))
-        stiffness, case = 2.0 * LOAD_STEP * F / (high - low), Case(load=F)
-        out += [q.K_N_TANGENT_RAW.of(stiffness, case), q.APPROACH.of(own, case)]
-    return out
-
-
-def displaced_gap(model: ContactModel, force: Array) -> Array:
-    """(n,) gap in mm before the load, with the faces where the displacement carries their nodes.
-
-    Node pairs that the normal forces (n,) in N move apart by s along the faces are no longer on
-    one normal: across the slope of the deformed faces the gap is smaller by grad(zeta) . s, the
-    mean of both faces.
-    """
-    slope = np.zeros((len(force), 2))
-    places = model.multipliers.nodes
-    pushed = {
-        b.name: b.side * (model.compliance(NORMAL, body=b) @ force)
-        for b in (model.upper, model.lower)
-    }
-    height = 0.5 * sum(
-        (b.mesh.points[b.contact[places], 2] + pushed[b.name] for b in (model.upper, model.lower)),
-        np.zeros(len(force)),
-    )
-    for patch in model.patches.values():
-        for k, rise in enumerate(patch.slopes(height)):
-            slope[patch.order, k] = rise.ravel()[: len(patch.order)]
-    moved = np.column_stack([model.compliance(c, NORMAL) @ force for c in (ALONG, ACROSS)])
-    return np.asarray(model.gap - (slope * moved).sum(axis=1))

@@ -28,11 +28,10 @@ NORMAL, ALONG, ACROSS = 2, 0, 1
 #: all three, in the order of a coupled contact
 COMPONENTS = (NORMAL, ALONG, ACROSS)
 
-TILT, DIRECTIONS, COUPLING, LARGE = (
+TILT, DIRECTIONS, COUPLING = (
     "tilt of the damper",
     "slip in two directions",
     "normal-tangential coupling",
-    "large displacement",
 )
 #: why coupled contact slips in two directions
 _TOGETHER = "pressure and shear are solved at once"
@@ -42,7 +41,6 @@ REMEDIES = {
     "another contact.distant set",
     DIRECTIONS: "set contact.directions = 2",
     COUPLING: 'set contact.coupling = "coupled", or trust the number to this change only',
-    LARGE: "the contact is too large for small-displacement theory: lower the load",
 }
 
 
@@ -241,12 +239,11 @@ def make_effects(scene: Scene, symmetry: str, why: str, loaded: bool) -> tuple[E
         ),
         _effect("inertia", False, "every output is static: M is not assembled"),
         _effect(
-            LARGE,
+            "large displacement",
             False,
             "the contact is small against the body"
             if curved
             else "the approach is small against the patch",
-            shows=loaded,
         ),
     )
 
