@@ -331,15 +331,6 @@ def solve_inside(solution: ContactSolution) -> None:
                 case.mesh_error = _mesh_error(solution, case, frictionless)
             if solution.plan.effect("friction"):
                 _shear_shares(solution, case)
-    for case in solution.curve if sphere else ():
-        nodal = solution.model.nodal(case.solution.force)
-        for body in (solution.model.upper, solution.model.lower):
-            u = body.side * body.displacement(NORMAL, body.side * nodal)[:, 2]
-            axis = body.mesh.nodes["axis"]
-            depth = np.abs(body.mesh.points[axis, 2])
-            case.compression[body.name] = float(
-                np.interp(3.0 * case.measures.radius_moment, depth, u[axis])
-            )
 
 
 def _displaced(solution: ContactSolution, case: NormalCase, sphere: bool) -> dict[str, Array]:

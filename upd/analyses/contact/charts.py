@@ -66,7 +66,6 @@ def curved_charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
         ),
         *(_approach(group) for group in with_content(arrays, "force-approach")),
         *(_over_load(group, *quantity) for group in curves for quantity in _OVER_LOAD),
-        *(_compressions(group) for group in curves if _beyond_3a(group)),
         *(_loop(group) for group in reversed(with_content(arrays, "cycle"))),
     ]
 
@@ -248,32 +247,6 @@ def _over_load(group: Group, title: str, closed: str, name: str, unit: str, scal
         traces.append(Trace("Hertz", *line, closed=True))
     axes, more = (_FORCE, Axis(title.lower(), unit, low=0.0)), {"figure": "over_load", "columns": 3}
     return Chart(f"{title} over load", *axes, tuple(traces), **more)  # type: ignore[arg-type]
-
-
-def _beyond_3a(group: Group) -> dict[str, str]:
-    """Variable -> body whose compression beyond depth 3a it is."""
-    return {k: str(v.attributes["body"]) for k, v in group.items() if "body" in v.attributes}
-
-
-def _compressions(group: Group) -> Chart:
-    """What lies beyond depth 3a in each body, per cent of the approach (thesis, Figure 50);
-    half-spaces have it too.
-    """
-    F, approach = values(group, "load"), values(group, "loaded_approach")
-    traces: list[Trace] = []
-    for colour, (name, body) in enumerate(_beyond_3a(group).items()):
-        share = 100.0 * values(group, name) / approach
-        traces.append(Trace(body, F, share, "both", colour))
-        if f"hertz_{name}" in group:
-            # Hertz's approach goes with F^(2/3): straight in it, so interpolation is exact.
-            points = values(group, "hertz_normal_force") ** (2.0 / 3.0)
-            total = np.interp(F ** (2.0 / 3.0), points, values(group, "hertz_approach"))
-            closed = 100.0 * values(group, f"hertz_{name}") / total
-            traces.append(Trace(f"{body}, half-space", F, closed, closed=True, entry="half-space"))
-    top = 1.4 * max(float(t.y.max()) for t in traces)
-    axes = _FORCE, Axis("share of the approach beyond 3a", "%", low=0.0, high=top)
-    title = "Compression of the bodies over load"
-    return Chart(title, *axes, tuple(traces), figure="over_load", columns=3)
 
 
 def _tractions(normal: Group, tangential: Sequence[Group]) -> Chart:

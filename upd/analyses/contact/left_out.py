@@ -120,7 +120,7 @@ def _numbers(plan: ContactPlan, model: ContactModel, *switch: tuple[str, object]
     """Of the companion, with an effect switched on."""
     switched = replace(plan, scene=changed(plan.scene, switch))
     with few_threads(model.gap):
-        return _under_load(make_results(solve_plan(switched, Stages(), model, companion=True)))
+        return _under_load(make_results(solve_plan(switched, Stages(), model)))
 
 
 def _with(effect: str, plan: ContactPlan, model: ContactModel) -> list[Result]:

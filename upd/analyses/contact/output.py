@@ -16,7 +16,6 @@ from upd.analyses.contact.faces import FaceLattice, corner, lattices
 from upd.analyses.contact.loading import LoadPath
 from upd.analyses.contact.results import printed_of
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
-from upd.labels import file_name
 from upd.mesh import recipes
 from upd.reference import hertz_pressure, mindlin
 from upd.results import Case, Group, variable
@@ -122,16 +121,11 @@ def _tangential(solution: ContactSolution, k: FaceLattice, t: TangentialCase) ->
 
 
 def _approach_split(case: NormalCase) -> Variables:
-    """The approach, what the bodies add to it, and what of it lies beyond depth 3a in each."""
+    """The approach, and what the bodies add to it."""
     out: Variables = {"approach": variable("", case.approach, "mm")}
     if case.shares:
-        out["finite_body"] = variable(
-            "", case.finite_body, "mm", "approach of the finite, held bodies"
-        )
-        for body, share in case.shares.items():
-            out[f"compression_{file_name(body)}"] = variable(
-                "", share.compression, "mm", "approach beyond depth 3a", body=body
-            )
+        words = "approach of the finite, held bodies"
+        out["finite_body"] = variable("", case.finite_body, "mm", words)
     return out
 
 
@@ -222,22 +216,13 @@ def _approach_over_load(solution: ContactSolution, d: Array, F: Array) -> Variab
 
 
 def _along(solution: ContactSolution) -> Variables:
-    """Contact area, largest pressure and each body's compression at the loaded points."""
+    """Contact area and largest pressure at the loaded points."""
     points, dims = solution.curve, "loaded_point"
-    area, pressure = zip(*((p.measures.area, p.measures.max_pressure) for p in points), strict=True)
-    out: Variables = {
+    return {
         "load": variable(dims, [p.force for p in points], "N"),
-        "contact_area": variable(dims, area, "mm2"),
-        "max_pressure": variable(dims, pressure, "MPa"),
-        "loaded_approach": variable(dims, [p.approach for p in points], "mm"),
+        "contact_area": variable(dims, [p.measures.area for p in points], "mm2"),
+        "max_pressure": variable(dims, [p.measures.max_pressure for p in points], "MPa"),
     }
-    closed, words = [solution.beyond_3a(p.force) for p in points], "approach beyond depth 3a"
-    for body in points[0].compression:
-        name, beyond = f"compression_{file_name(body)}", [p.compression[body] for p in points]
-        out[name] = variable(dims, beyond, "mm", words, body=body)
-        if all(closed):
-            out[f"hertz_{name}"] = variable(dims, [c[body] for c in closed], "mm")
-    return out
 
 
 # -- of flat faces ---------------------------------------------------------------------------------

@@ -194,7 +194,7 @@ def _add_loads(cost: CostModel, scene: Scene, on: Collection[str]) -> None:
         cost.seconds += coupled * (_COUPLED_S + dense_s(one)) + dense_s(m**3 / 3.0)
         cost.kept_bytes += _KEPT * 8.0 * m**2
     if "internal displacement" in on:
-        cost.seconds += (n_load * (1 + ("friction" in on)) + n_curve) * nodes * _INSIDE_S
+        cost.seconds += n_load * (1 + ("friction" in on)) * nodes * _INSIDE_S
         cost.kept_bytes += 48.0 * n_load * nodes
 
 

@@ -54,8 +54,6 @@ def solve_plan(
     plan: ContactPlan,
     stages: Stages,
     model: ContactModel | None = None,
-    *,
-    companion: bool = False,
 ) -> ContactSolution:
     """Run everything the plan calls for, but for the effects it leaves out.
 
@@ -65,14 +63,12 @@ def solve_plan(
     ----------
     model
         None: the plan's own.
-    companion
-        Whether it is one: its march to the tangential loads takes few steps.
     """
     solution = ContactSolution(plan, prepare(plan, stages) if model is None else model)
     with keeping(solution):
         solve_normal(solution, stages)
         if plan.effect("friction"):
-            solve_tangential(solution, stages, companion=companion)
+            solve_tangential(solution, stages)
         if plan.effect("internal displacement"):
             with stages("internal displacement", "back-substitution"):
                 solve_inside(solution)
@@ -208,27 +204,12 @@ def _bodies_alone(solution: ContactSolution) -> tuple[Body, ...]:
 # -- tangential loads ------------------------------------------------------------------------------
 
 
-def march_shares(plan: ContactPlan, curved: bool, *, companion: bool = False) -> Array:
-    """Shares of mu N that the march to the tangential loads takes: of flat faces to gross slip, for
-    a curve.
-
-    On a companion that march takes four steps to the largest load: exact along one direction; along
-    two the slip turns a little from step to step. Coupled, which nodes stick depends on the steps:
-    the run's.
-    """
-    ratio = planned.largest_ratio(plan.scene)
-    if curved:
-        return np.asarray(_SHARES[ratio > _SHARES])
-    if not companion:
-        return PATH_SHARES
-    few = ratio * np.array([0.25, 0.5, 0.75])
-    return np.asarray(PATH_SHARES[ratio > PATH_SHARES] if plan.scene.coupled else few)
-
-
-def solve_tangential(solution: ContactSolution, stages: Stages, *, companion: bool = False) -> None:
+def solve_tangential(solution: ContactSolution, stages: Stages) -> None:
     """Stiffness, tangential loads, curve and cycle of every direction after every normal load."""
-    plan, scene = solution.plan, solution.plan.scene
-    shares = march_shares(plan, solution.curved, companion=companion)
+    scene = solution.plan.scene
+    # The march to the loads: of flat faces to gross slip, for a curve.
+    below = _SHARES[planned.largest_ratio(scene) > _SHARES]
+    shares = below if solution.curved else PATH_SHARES
     with stages("tangential contact", f"{len(solution.normal)} normal loads"):
         loaded = [case for case in solution.normal if case.solution.force.any()]
         # Twice: what one load teaches changes the answers of the others within the tolerance.

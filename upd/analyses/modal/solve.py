@@ -14,8 +14,6 @@ from scipy.sparse.linalg import spsolve
 from upd.analyses.base import Resolved, keeping
 from upd.analyses.modal.plan import MODES_ABOVE, MORE_MODES, ModalPlan, configurations, parameters
 from upd.dynamics import (
-    ModalSystem,
-    find_peaks,
     frequency_response,
     modal_system,
     peak_response,
@@ -122,13 +120,8 @@ class RigResponse:
         Modal damping ratio.
     peak
         Frequency in Hz and height in (m/s2)/N of the free right blade's peak in the band, if any.
-    half_power
-        Damping ratio read from that peak's half-power points; NaN without a peak.
     participation
         phi_force phi_output of the peak's mode, 1/kg.
-    modal_error
-        Largest relative difference of the undamped modal response from a direct solve, off
-        resonance.
     against_full
         Part of the first frequency -> accelerance of the reduced and of the full right blade.
     """
@@ -138,9 +131,7 @@ class RigResponse:
     accelerance: dict[str, dict[str, NDArray[np.complex128]]]
     damping: float
     peak: tuple[float, float] | None
-    half_power: float
     participation: float
-    modal_error: float
     against_full: dict[float, tuple[float, float]]
 
 
@@ -352,9 +343,7 @@ def _response(solution: ModalSolution) -> RigResponse:
         curves,
         zeta,
         peak,
-        _half_power(system, force, output, at, zeta) if peak else float("nan"),
         1e-3 * abs(float(nearest[force] * nearest[output])),
-        modal_error(free, body, family),
         _against_full(solution),
     )
 
@@ -396,17 +385,6 @@ def _unlocked(solution: ModalSolution) -> Iterator[Resolved]:
     )
 
 
-def _half_power(system: ModalSystem, force: int, output: int, at: float, zeta: float) -> float:
-    """Damping ratio picked from the half-power points around the peak, on a grid as fine as the
-    peak is narrow.
-    """
-    around = np.linspace(max(at * (1.0 - 20.0 * zeta), 0.1 * at), at * (1.0 + 20.0 * zeta), 801)
-    peaks = find_peaks(
-        around, frequency_response(system, force, [output], around).magnitude[:, 0], above=0.9
-    )
-    return float(peaks.zeta[0]) if len(peaks.zeta) else float("nan")
-
-
 def _glued(found: ModeSet, zeta: float, grid: Array) -> dict[str, NDArray[np.complex128]]:
     own, body, family = _system_modes(found, ("rig",))
     mesh = body.mesh
@@ -434,25 +412,6 @@ def _static(body: RigBody, family: str) -> Callable[[Array], Array]:
         return u
 
     return displacement
-
-
-def modal_error(own: Modes, body: RigBody, family: str) -> float:
-    """Undamped modal response, static correction included, against direct solves of K - w^2 M off
-    resonance: what the band leaves out.
-    """
-    free, (force, output) = body.free(FAMILIES.get(family, ())), probes(body.mesh)
-    f = np.zeros(3 * body.mesh.n_node)
-    f[force] = 1.0
-    natural, rest = (2.0 * np.pi * own.frequency) ** 2, _static(body, family)(f)
-    direct = _undamped(body, free)
-    worst = 0.0
-    for part in OFF_RESONANCE:
-        w2 = (part**2) * natural[0]
-        u = (0.5 if family else 1.0) * direct(w2)
-        share = own.shapes[force]
-        modal = own.shapes[output] @ (share / (natural - w2) - share / natural) + rest[output]
-        worst = max(worst, abs(float(modal) / u - 1.0))
-    return worst
 
 
 def _undamped(body: RigBody, free: NDArray[np.int64]) -> Callable[[float], float]:
