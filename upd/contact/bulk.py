@@ -171,7 +171,7 @@ def half_space_mean(patch: Patch, forces: Array, E: float, nu: float) -> float:
 
 @dataclass(frozen=True)
 class BodyShare:
-    """What one body adds to the approach (or to the tangential displacement).
+    """What one body adds to the approach.
 
     Attributes
     ----------
@@ -198,6 +198,29 @@ class BodyShare:
     def over(self, load: float) -> BodyShare:
         """The same per load [mm/N]."""
         return BodyShare(self.compression / load, self.finite_body / load, self.fitted / load)
+
+
+def body_share(
+    body: Body,
+    displacement: Array,
+    forces: Array,
+    patch: Patch,
+    radius: float,
+    E: float,
+    nu: float,
+) -> BodyShare:
+    """What a body adds to the approach, from its displacement under normal forces.
+
+    Parameters, and MeshError, as of `finite_body_share` and `axis_share`.
+    """
+    axis = body.mesh.nodes["axis"]
+    depth = np.abs(body.mesh.points[axis, 2])
+    half_space, inside = np.zeros(len(depth)), depth > 0.5 * radius
+    half_space[inside] = axis_half_space(depth[inside], patch.points(), forces.ravel(), E, nu)
+    along = body.side * displacement[axis, 2]
+    compression, fitted = axis_share(depth, along, half_space, radius)
+    finite = finite_body_share(body, displacement, forces, patch, radius, E, nu, tangential=False)
+    return BodyShare(compression, finite, fitted)
 
 
 def axis_share(
@@ -255,10 +278,8 @@ def axis_share(
     return float(np.interp(3.0 * radius, depth, displacement)), float(curve[-1])
 
 
-def axis_half_space(
-    depth: Array, positions: Array, forces: Array, E: float, nu: float, *, tangential: bool
-) -> Array:
-    """Displacement of a half-space along the load, on the axis below the origin.
+def axis_half_space(depth: Array, positions: Array, forces: Array, E: float, nu: float) -> Array:
+    """Displacement of a half-space under normal forces, on the axis below the origin.
 
     Parameters
     ----------
@@ -270,8 +291,6 @@ def axis_half_space(
         Forces [N].
     E, nu : float
         Young's modulus [MPa] and Poisson's ratio.
-    tangential : bool
-        Whether the forces act along x (Cerruti) or normal to the surface (Boussinesq).
 
     Returns
     -------
@@ -285,8 +304,6 @@ def axis_half_space(
     loaded = forces != 0.0
     x, y, f = -positions[loaded, 0], -positions[loaded, 1], forces[loaded]
     z = depth[:, None]
-    if tangential:
-        return np.asarray(cerruti(x, y, z, 1.0, E, nu)[0] @ f)
     return np.asarray(boussinesq(x, y, z, 1.0, E, nu)[2] @ f)
 
 

@@ -95,7 +95,7 @@ class NormalCase(PressedContact):
     displacement: dict[str, Array] = field(default_factory=dict)
     reaction: dict[str, float] = field(default_factory=dict)
     shares: dict[str, BodyShare] = field(default_factory=dict)
-    shear_shares: dict[str, BodyShare] = field(default_factory=dict)
+    shear_shares: dict[str, float] = field(default_factory=dict)
     mesh_error: tuple[float, float] | None = None
 
     @property
@@ -116,7 +116,7 @@ class NormalCase(PressedContact):
     @property
     def finite_body_shear(self) -> float:
         """What the finite bodies add to the tangential displacement, mm per N."""
-        return sum(s.finite_body for s in self.shear_shares.values())
+        return sum(self.shear_shares.values())
 
 
 @dataclass
