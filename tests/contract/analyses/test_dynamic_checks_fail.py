@@ -220,9 +220,9 @@ def _mode(s: ModalSolution, **values: Any) -> ModalSolution:
 
 def _missed(s: ModalSolution) -> ModalSolution:
     found = s.sets[0]
-    body, family, m = found.found[0]
+    body, m = found.found[0]
     bad = replace(m, missed=1, message="one of two was found")
-    return replace(s, sets=[replace(found, found=[(body, family, bad), *found.found[1:]])])
+    return replace(s, sets=[replace(found, found=[(body, bad), *found.found[1:]])])
 
 
 def _reduced(s: ModalSolution) -> ModalSolution:

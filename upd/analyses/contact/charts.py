@@ -322,20 +322,14 @@ def face_pressure(case: str, groups: list[Group], *, sheet: bool) -> Chart:
 
 
 def _per_length(normal: Faces) -> Chart:
-    traces, bands = [], []
+    traces = []
     for k, (case, groups) in enumerate(normal.items()):
         for group in groups:
             x, F = values(group, "x"), values(group, "normal_force").sum(axis=1)
             # Length a lattice line stands for: half way to its neighbours.
             edges = np.concatenate([[x[0]], 0.5 * (x[1:] + x[:-1]), [x[-1]]])
             traces.append(Trace(case.label, x, F / np.diff(edges), "both", k))
-    group = next(iter(normal.values()))[0]
-    if "worn_zone_middle" in group:
-        bands = [
-            Band("middle of our loaded bands", "x", at, at, dashed=True)
-            for at in values(group, "worn_zone_middle").tolist()
-        ]
-    more = FACE | {"y": Axis("force per length", "N/mm", low=0.0), "bands": tuple(bands)}
+    more = FACE | {"y": Axis("force per length", "N/mm", low=0.0)}
     more |= {"figure": "pressure", "columns": 3}
     return Chart("Normal force per length", traces=tuple(traces), **more)
 

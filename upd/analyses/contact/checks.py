@@ -204,9 +204,8 @@ def _rim_check(solution: ContactSolution, case: NormalCase) -> Check:
     half = 0.5 * min(np.ptp(patch.X), np.ptp(patch.Y))
     # The gap gives the radius of curvature, h = r^2 / 2R at the rim; a flat patch (to rounding of
     # its coordinates) has none.
-    gap = patch.whole(solution.model.gap)
-    rim = gap[0, len(patch.Y) // 2] if patch.quads is None else gap[patch.rim()].min()
-    corner = float(rim - gap.min())
+    gap = patch.whole(solution.model.gap).ravel()
+    corner = float(gap[patch.rim()].min() - gap.min())
     if corner <= 1e-9 * half:
         return Check("patch rim", case.case, 0, 0, "the contact is flat: its rim belongs to it")
     radius = half**2 / (2.0 * corner)

@@ -4,8 +4,7 @@ the axes they are reported in.
 Report axes: of a curved contact those of the model, of a flat one with the origin at the bottom
 left corner of all patches together, x along the damper, y up the slope, as in the source thesis.
 
-Of flat faces the contact points of a dynamic model, where the pressure peaks, and the bands of the
-damper that the load comes from.
+Of flat faces the contact points of a dynamic model, and where the pressure peaks.
 """
 
 from __future__ import annotations
@@ -160,11 +159,8 @@ def tractions(solution: ContactSolution, t: TangentialCase) -> list[Array]:
 
 def rim_nodes(solution: ContactSolution, case: NormalCase) -> int:
     """How many nodes of the rim of a curved contact's patch carry force."""
-    force = solution.model.patch.whole(case.solution.force)
-    if solution.model.patch.quads is not None:
-        return int((force[solution.model.patch.rim()] > 0.0).sum())
-    rim = np.concatenate([force[0], force[-1], force[:, 0], force[:, -1]])
-    return int((rim > 0.0).sum())
+    patch = solution.model.patch
+    return int((patch.whole(case.solution.force).ravel()[patch.rim()] > 0.0).sum())
 
 
 def corner(solution: ContactSolution) -> Array:
@@ -233,30 +229,7 @@ def _whole(
     )
 
 
-# -- peaks of the pressure of flat faces, and the bands that the load comes from -------------------
-
-
-def band_middles(solution: ContactSolution) -> list[float]:
-    """Middles along x (report axes, mm) of the parts of the damper's distant set, which the loads
-    come from, both sides of a mirror.
-    """
-    upper = solution.model.upper.mesh
-    nodes = upper.nodes["distant"]
-    x, weights = upper.points[nodes, 0], upper.weights.get("distant")
-    found = []  # lower and upper end, middle
-    for part in joined(upper.hexes, nodes):
-        # A set without weights is as wide as its nodes lie apart.
-        low, high = float(x[part].min()), float(x[part].max())
-        middle = 0.5 * (low + high)
-        if weights is not None:
-            middle = float(weights[part] @ x[part] / weights[part].sum())
-        if 0 not in solution.plan.mirrors:
-            found.append((low, high, middle))
-        elif low > 0.0:
-            found += [(low, high, middle), (-high, -low, -middle)]
-        else:
-            found.append((-high, high, 0.0))
-    return [float(middle - corner(solution)[0]) for _, _, middle in sorted(found)]
+# -- peaks of the pressure of flat faces ----------------------------------------------------------
 
 
 def joined(cells: IntArray, nodes: IntArray) -> list[IntArray]:

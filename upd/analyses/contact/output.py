@@ -79,15 +79,7 @@ def _normal(solution: ContactSolution, k: FaceLattice, case: NormalCase) -> Vari
     if case.state is not None:
         traction = [pressure(c, on) for c in case.state.force[:, 1:].T]
         out |= _sheared(k, traction, list(case.state.found.slip[-1].T), case.stick)
-    if solution.curved:
-        return out | _approach_split(case) | _hertz(solution, case)
-    out["worn_zone_middle"] = variable(
-        "worn_zone",
-        faces.band_middles(solution),
-        "mm",
-        "middle of the bands of the damper that the load comes from",
-    )
-    return out
+    return out | _approach_split(case) | _hertz(solution, case) if solution.curved else out
 
 
 def _sheared(

@@ -323,19 +323,13 @@ def _tangent_within_3a(solution: ContactSolution, case: NormalCase, known: Refer
 
 
 def _worn_zones(solution: ContactSolution, case: NormalCase) -> list[Result]:
-    """Where the pressure peaks, beside the bands of the damper that the load comes from.
-
-    The worn areas themselves are printed nowhere; the bands are the scene's own. Without lattice
-    lines no peak is sought, and none is counted.
-    """
+    """Where the pressure peaks. Without lattice lines no peak is sought, and none is counted."""
     if case.force <= 0.0 or not all(k.lattice for k in lattices(solution)):
         return []
-    peaks, bands = faces.pressure_peaks(solution, case), faces.band_middles(solution)
+    peaks = faces.pressure_peaks(solution, case)
     out = [q.PRESSURE_PEAKS.of(len(peaks), case.case)]
     for i, (x, y) in enumerate(peaks):
-        nearest = min(bands, key=lambda c: abs(c - x)) if len(bands) == len(peaks) else None
-        source = "middle of the scene's loaded band" if nearest else ""
-        out.append(q.PRESSURE_PEAK_X.of(x, case.case, nearest, source, n=i + 1, exact=False))
+        out.append(q.PRESSURE_PEAK_X.of(x, case.case, n=i + 1))
         out.append(q.PRESSURE_PEAK_Y.of(y, case.case, n=i + 1))
     return out
 

@@ -14,7 +14,6 @@ import numpy as np
 from upd.analyses.base import printed_of, with_printed
 from upd.analyses.measured import FREE, Computed, ComputedPeak, fit_checks, measured_results
 from upd.analyses.modal.solve import (
-    FAMILIES,
     ModalSolution,
     ModeSet,
     ReducedBlade,
@@ -181,10 +180,10 @@ def _reduced_response(response: RigResponse) -> list[Check]:
 def _modes_checks(found: ModeSet) -> list[Check]:
     """Residual and orthogonality of the modes as they are written, from K and M; none missed."""
     case, report = found.case, "report this mesh"
-    families = [_family(found, body, family, m) for body, family, m in found.found]
+    families = [_family(found, body, m) for body, m in found.found]
     residual, off = (max(worst, default=0.0) for worst in zip(*families, strict=True))
     statement = "||K x - lambda M x|| / ||lambda M x|| beyond rounding"
-    searches = [(f"{body.name} {family}".strip(), m) for body, family, m in found.found]
+    searches = [(f"{body.name} {body.family}".strip(), m) for body, m in found.found]
     return [
         Check("mode residual", case, residual, RESIDUAL_LIMIT, statement, report),
         Check("orthogonality", case, off, 1e-8, "largest |X'MX - 1|", report),
@@ -208,14 +207,13 @@ def no_mode_missed(case: Case, found: Sequence[tuple[str, Modes]]) -> Check:
     )
 
 
-def _family(found: ModeSet, body: RigBody, family: str, solved: Modes) -> tuple[float, float]:
+def _family(found: ModeSet, body: RigBody, solved: Modes) -> tuple[float, float]:
     """Largest residual beyond rounding and largest off-orthogonality of one body's modes."""
-    mine = [m for m in found.modes if m.body is body and m.family == family]
+    mine = [m for m in found.modes if m.body is body]
     if not mine:
         return 0.0, 0.0
-    free = body.free(FAMILIES.get(family, ()))
-    X = np.column_stack([m.shape.ravel()[free] for m in mine])
-    KX, MX = body.K.submatrix(free) @ X, body.M.submatrix(free) @ X
+    X = np.column_stack([m.shape.ravel()[body.free] for m in mine])
+    KX, MX = (matrix @ X for matrix in body.matrices)
     inertia = (2.0 * np.pi * np.array([m.frequency for m in mine])) ** 2 * MX
     size = np.linalg.norm(inertia, axis=0)
     residual = np.linalg.norm(KX - inertia, axis=0) / np.where(size > 0.0, size, 1.0)
