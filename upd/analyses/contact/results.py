@@ -194,18 +194,16 @@ def _normal(solution: ContactSolution, case: NormalCase, known: References) -> l
 
 def _of_faces(solution: ContactSolution, case: NormalCase) -> list[Result]:
     """Share of the faces in contact, what each body takes of the approach, and tilts."""
-    at, model, answer = case.case, solution.model, case.solution
+    at, model = case.case, solution.model
     whole = sum(float(k.area().sum()) for k in lattices(solution))
     out = [q.CLOSED_SHARE.of(100.0 * case.measures.area_nodes / whole, at)]
-    for body in (model.upper, model.lower):
-        if case.state is None:
-            # f . (h + C f - d e) = 0, so the approach is the sum of the bodies' energies over the
-            # load (and of the gaps closed).
-            f, total = answer.force, float(answer.force.sum())
-            taken = float(f @ model.compliance(NORMAL, body=body) @ f) / total if total else 0.0
-        else:
-            taken = pressed_by(model, body, case.state.force)
-        out.append(q.APPROACH_OF.of(taken, at, n=body.name))
+    # f . (h + C f - d e) = 0, so the approach is the sum of the bodies' energies over the load (and
+    # of the gaps closed).
+    forces = case.solution.force[:, None] if case.state is None else case.state.force
+    out += [
+        q.APPROACH_OF.of(pressed_by(model, body, forces), at, n=body.name)
+        for body in (model.upper, model.lower)
+    ]
     if case.tilt is not None:
         out += [q.TILT_ABOUT_Y.of(case.tilt[0], at), q.TILT_ABOUT_X.of(case.tilt[1], at)]
     return out
