@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from upd.analyses.base import conditions
 from upd.analyses.contact import loading
 from upd.analyses.contact.bodies import product_checks
-from upd.analyses.contact.faces import lattices, rim_nodes, tractions
+from upd.analyses.contact.faces import lattices, on_lines, rim_nodes, tractions
 from upd.analyses.contact.plan import NORMAL, REMEDIES, beta_of, wider_patch
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
 from upd.contact.model import ContactModel
@@ -241,11 +241,11 @@ def _flat_resolution_check(solution: ContactSolution) -> Check:
     nodes lie as near as those of two and four hex8i, it is 0.8 % too high and 0.9 % too low.
     """
     edges: list[tuple[int, str]] = []
-    for k in lattices(solution):
+    for k in lattices(solution).values():
         lines = (len(k.Y) - 1, len(k.X) - 1)
-        if not k.lattice:
+        if k.quads is not None:
             # of a square of as many elements
-            lines = (round(len(k.patch.cells()) ** 0.5),) * 2
+            lines = (round(len(k.cells()) ** 0.5),) * 2
         edges += zip(lines, ("divisions", "divisions_long"), strict=True)
     fewest, name = min(edges)
     scene = solution.plan.scene
@@ -309,7 +309,7 @@ def yield_checks(solution: ContactSolution) -> Iterator[Check]:
         shear[list(t.nodes.components)] = tractions(solution, t)
         loads.append((t.case, [pressure(np.maximum(t.pressed, 0.0)), *shear]))
     for case, fields in loads:
-        faces = [k.even(fields) for k in lattices(solution)]
+        faces = [on_lines(k, fields) for k in lattices(solution).values()]
         for body in limited:
             material = scene.materials[body.name]
             assert material.yield_stress is not None

@@ -83,8 +83,8 @@ class LoadPath:
 
     Attributes
     ----------
-    case, normal
-        Its own case, and that of the normal load.
+    case
+        Of the normal load, with the direction.
     load, displacement
         (n_step,) N and mm along the load, from zero on.
     cycle
@@ -94,7 +94,6 @@ class LoadPath:
     """
 
     case: Case
-    normal: Case
     load: Array
     displacement: Array
     cycle: bool = False

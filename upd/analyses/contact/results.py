@@ -115,7 +115,7 @@ def make_results(solution: ContactSolution, *, misfits: bool = True) -> list[Res
             out += _law(solution, case)
         for t in (t for t in solution.tangential if t.normal is case):
             out += _tangential(solution, t, misfits=misfits)
-        for path in (p for p in solution.paths if p.cycle and p.normal == case.case):
+        for path in (p for p in solution.paths if p.cycle and p.case.load == case.force):
             out += _beside(path.case, known, (q.CYCLE_ENERGY, path.slip_work))
     return base.with_printed(out, printed_of(scene))
 
@@ -195,7 +195,7 @@ def _normal(solution: ContactSolution, case: NormalCase, known: References) -> l
 def _of_faces(solution: ContactSolution, case: NormalCase) -> list[Result]:
     """Share of the faces in contact, what each body takes of the approach, and tilts."""
     at, model = case.case, solution.model
-    whole = sum(float(k.area().sum()) for k in lattices(solution))
+    whole = sum(float(k.area().sum()) for k in lattices(solution).values())
     out = [q.CLOSED_SHARE.of(100.0 * case.measures.area_nodes / whole, at)]
     # f . (h + C f - d e) = 0, so the approach is the sum of the bodies' energies over the load (and
     # of the gaps closed).
@@ -322,7 +322,7 @@ def _tangent_within_3a(solution: ContactSolution, case: NormalCase, known: Refer
 
 def _worn_zones(solution: ContactSolution, case: NormalCase) -> list[Result]:
     """Where the pressure peaks. Without lattice lines no peak is sought, and none is counted."""
-    if case.force <= 0.0 or not all(k.lattice for k in lattices(solution)):
+    if case.force <= 0.0 or not all(k.quads is None for k in lattices(solution).values()):
         return []
     peaks = faces.pressure_peaks(solution, case)
     out = [q.PRESSURE_PEAKS.of(len(peaks), case.case)]

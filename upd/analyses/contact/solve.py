@@ -244,7 +244,7 @@ def _sheared(solution: ContactSolution, case: NormalCase, direction: float, shar
     for ratios in marches:
         load, moved, at = way.march(ratios)
         if not solution.curved:
-            solution.paths.append(loading.LoadPath(own, case.case, load, moved))
+            solution.paths.append(loading.LoadPath(own, load, moved))
         for ratio in (r for r in loads if r in ratios):
             solution.tangential.append(at(int(np.searchsorted(ratios, ratio)), ratio))
     if scene.wants("cycle"):
@@ -358,7 +358,7 @@ class Frozen:
         T, d, work = self.loop(self.loads.cycle_amplitude * shares)
         area = abs(float(np.trapezoid(T[begin:], d[begin:])))
         slip_work = float(work[begin:].sum())
-        return loading.LoadPath(case, self.case.case, T, d, True, slip_work, area)
+        return loading.LoadPath(case, T, d, True, slip_work, area)
 
     def learn(self) -> None:
         """Show bodies that learn the tractions of every tangential load and of the cycle.
