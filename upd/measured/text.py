@@ -145,10 +145,8 @@ def _lines(path: Path) -> list[tuple[int, str]]:
 
 def _separator(lines: Sequence[tuple[int, str]]) -> str:
     """What parts the cells of most lines."""
-    for mark in _SEPARATORS:
-        if 2 * sum(mark in line for _, line in lines) > len(lines):
-            return mark
-    return ","
+    most = (m for m in _SEPARATORS if 2 * sum(m in line for _, line in lines) > len(lines))
+    return next(most, ",")
 
 
 def _number(cell: str, separator: str) -> float | None:

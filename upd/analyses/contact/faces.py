@@ -13,14 +13,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
 from upd.contact.law import ContactLaw, contact_points
 from upd.contact.normal import NormalContact
 from upd.contact.patch import ContactMeasures, LocatedArea, Patch, located_area, measure
-from upd.mesh import IntArray
 
 Array = NDArray[np.float64]
 
@@ -173,18 +170,6 @@ def _whole(
 
 
 # -- peaks of the pressure of flat faces ----------------------------------------------------------
-
-
-def joined(cells: IntArray, nodes: IntArray) -> list[IntArray]:
-    """Positions in ``nodes``, part by part, of those that cells (n, nodes of each) join."""
-    number = np.full(int(max(cells.max(), nodes.max())) + 1, -1)
-    number[nodes] = np.arange(len(nodes))
-    at = number[cells]
-    first = np.broadcast_to(at.max(axis=1, keepdims=True), at.shape)
-    both = at >= 0
-    links = coo_array((np.ones(both.sum()), (first[both], at[both])), shape=(len(nodes),) * 2)
-    count, part = connected_components(links, directed=False)
-    return [np.flatnonzero(part == k) for k in range(count)]
 
 
 def pressure_peaks(solution: ContactSolution, case: NormalCase) -> list[tuple[float, float]]:

@@ -11,13 +11,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from upd.analyses.contact.faces import joined
 from upd.analyses.seated.plan import AGAIN, LOWERED, RAISED
 from upd.analyses.seated.results import platform_force
 from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, STICK
 from upd.contact.patch import Patch, make_patch
+from upd.mesh import IntArray
 from upd.results import Group, variable
 from upd.scene.forced_contact import SIDES, Side
 
@@ -128,7 +130,7 @@ def _faces(solution: SeatedSolution) -> list[tuple[Side, str, Patch]]:
         points = np.column_stack([along, up - up[mine].min()])
         found = []
         quads = solution.bodies.blades[side].mesh.faces["patch"][:, :4]
-        for part in joined(quads, np.unique(quads)):
+        for part in _joined(quads, np.unique(quads)):
             # the line on the plane once
             on_plane = half and bool((along[mine[part]] == 0.0).any())
             patch = make_patch(points, of.area, (on_plane, False), mine[part])
@@ -137,6 +139,18 @@ def _faces(solution: SeatedSolution) -> list[tuple[Side, str, Patch]]:
         names = [f"pad {i + 1}" for i in range(len(found))] if len(found) > 1 else [""]
         out += [(side, name, one) for name, one in zip(names, found, strict=True)]
     return out
+
+
+def _joined(cells: IntArray, nodes: IntArray) -> list[IntArray]:
+    """Positions in ``nodes``, part by part, of those that cells (n, nodes of each) join."""
+    number = np.full(int(max(cells.max(), nodes.max())) + 1, -1)
+    number[nodes] = np.arange(len(nodes))
+    at = number[cells]
+    first = np.broadcast_to(at.max(axis=1, keepdims=True), at.shape)
+    both = at >= 0
+    links = coo_array((np.ones(both.sum()), (first[both], at[both])), shape=(len(nodes),) * 2)
+    count, part = connected_components(links, directed=False)
+    return [np.flatnonzero(part == k) for k in range(count)]
 
 
 def write_files(solution: SeatedSolution, folder: Path) -> None:
