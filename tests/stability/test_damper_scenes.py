@@ -184,13 +184,12 @@ def test_printed_stiffness_is_that_of_one_pad() -> None:
     assert not any(r.name.endswith("_per_pad") for r in run(want=["stiffness"]).rows)
 
 
-def test_peaks_are_compared_with_what_is_printed_and_with_our_own_bands() -> None:
+def test_peaks_are_compared_with_what_is_printed() -> None:
     """Two spots of high pressure are printed; where the worn areas lie is not."""
     result = run(loads__normal=["155 N"], want=["normal", "worn_zones"])
     found = {r.name: r for r in result.rows}
     assert found["pressure_peaks"].reference == 2.0
     assert found["pressure_peaks"].source == "thesis, section 7.4"
-    assert found["peak_1_x"].source == "middle of the scene's loaded band"
     # "in the lower part of the contact area"
     assert max(found[f"peak_{k}_y"].value for k in (1, 2)) < 7.5
 

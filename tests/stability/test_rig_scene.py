@@ -158,7 +158,6 @@ def test_main_numbers_are_the_lowest_frequencies_and_the_peak() -> None:
         "f2_reduced",
         "peak_frequency",
         "peak_accelerance",
-        "half_power_damping",
     ]
 
 

@@ -171,7 +171,7 @@ def half_space_mean(patch: Patch, forces: Array, E: float, nu: float) -> float:
 
 @dataclass(frozen=True)
 class BodyShare:
-    """What one body adds to the approach (or to the tangential displacement).
+    """What one body adds to the approach.
 
     Attributes
     ----------
@@ -200,94 +200,57 @@ class BodyShare:
         return BodyShare(self.compression / load, self.finite_body / load, self.fitted / load)
 
 
-def axis_share(
-    depth: Array, displacement: Array, half_space: Array, radius: float
-) -> tuple[float, float]:
-    """Displacement at depth 3a, and share of one body read off the displacement along its axis.
+def body_share(
+    body: Body, displacement: Array, forces: Array, patch: Patch, radius: float, E: float, nu: float
+) -> BodyShare:
+    """What a body with an axis adds to the approach, from its displacement under normal forces.
 
     Parameters
     ----------
-    depth : (k,) ndarray
-        Increasing depths on the axis [mm].
-    displacement : (k,) ndarray
-        Displacements of the body there, relative to the far-field support [mm].
-    half_space : (k,) ndarray
-        Displacements of the half-space there, relative to infinity [mm].
-    radius : float
-        Contact radius a [mm].
-
-    Returns
-    -------
-    compression, fitted : float
-        As `BodyShare` has them [mm].
+    body, displacement, forces, patch, radius, E, nu
+        As `finite_body_share` takes them.
 
     Raises
     ------
     MeshError
-        With fewer than two nodes between a tenth and a third of the body's depth and below 2a.
+        As `finite_body_share`, and with fewer than two nodes between a tenth and a third of the
+        body's depth and below 2a.
 
     Notes
     -----
-    The difference of the two fields solves the equations of elasticity without the concentrated
-    load: it is smooth at the contact, so a parabola through a tenth to a third of the body's depth
-    gives it at the surface, free of the mesh near the contact, but not of the mesh beyond. At depth
-    3a, 23 % of a half-space's displacement is still to come, so ``compression`` alone cannot be
-    compared with Hertz's approach.
+    The difference of its field and a half-space's, relative to the far-field support and to
+    infinity, solves the equations of elasticity without the concentrated load: it is smooth at the
+    contact, so a parabola through a tenth to a third of the body's depth gives it at the surface,
+    free of the mesh near the contact, but not of the mesh beyond. At depth 3a, 23 % of a
+    half-space's displacement is still to come, so ``compression`` alone cannot be compared with
+    Hertz's approach.
 
     References
     ----------
-    K. L. Johnson, Contact Mechanics (1985), section 3.4.
+    K. L. Johnson, Contact Mechanics (1985), sections 3.2 and 3.4.
     """
-    body = float(depth.max())
-    chosen = (depth >= max(_NEAR * body, 2.0 * radius)) & (depth <= _FAR * body)
+    axis, loaded = body.mesh.nodes["axis"], forces.ravel() != 0.0
+    depth, along = np.abs(body.mesh.points[axis, 2]), body.side * displacement[axis, 2]
+    deepest = float(depth.max())
+    chosen = (depth >= max(_NEAR * deepest, 2.0 * radius)) & (depth <= _FAR * deepest)
     if chosen.sum() < 2:
         raise MeshError(
             f"{int(chosen.sum())} nodes on the axis between a tenth and a third of the "
-            f"body's depth {body:.4g} mm and below 2a "
+            f"body's depth {deepest:.4g} mm and below 2a "
             f"(a = {radius:.4g} mm): the body is too small or too coarse to separate its "
             "own compression; "
             "lower geometry.growth or leave out body_compression and stiffness"
         )
+    x, y = -patch.points()[loaded].T
+    z = depth[chosen]
+    half_space = boussinesq(x, y, z[:, None], 1.0, E, nu)[2] @ forces.ravel()[loaded]
     # A straight line when a coarse mesh has only two nodes there.
-    curve = np.polyfit(
-        depth[chosen], (displacement - half_space)[chosen], min(2, int(chosen.sum()) - 1)
+    curve = np.polyfit(z, along[chosen] - half_space, min(2, len(z) - 1))
+    return BodyShare(
+        float(np.interp(3.0 * radius, depth, along)),
+        finite_body_share(body, displacement, forces, patch, radius, E, nu, tangential=False),
+        float(curve[-1]),
     )
-    return float(np.interp(3.0 * radius, depth, displacement)), float(curve[-1])
-
-
-def axis_half_space(
-    depth: Array, positions: Array, forces: Array, E: float, nu: float, *, tangential: bool
-) -> Array:
-    """Displacement of a half-space along the load, on the axis below the origin.
-
-    Parameters
-    ----------
-    depth : (k,) ndarray
-        Depths below the origin [mm].
-    positions : (n, 2) ndarray
-        Places of the forces on the surface [mm].
-    forces : (n,) ndarray
-        Forces [N].
-    E, nu : float
-        Young's modulus [MPa] and Poisson's ratio.
-    tangential : bool
-        Whether the forces act along x (Cerruti) or normal to the surface (Boussinesq).
-
-    Returns
-    -------
-    (k,) ndarray
-        Displacement along the load [mm].
-
-    References
-    ----------
-    K. L. Johnson, Contact Mechanics (1985), sections 3.2 and 3.6.
-    """
-    loaded = forces != 0.0
-    x, y, f = -positions[loaded, 0], -positions[loaded, 1], forces[loaded]
-    z = depth[:, None]
-    if tangential:
-        return np.asarray(cerruti(x, y, z, 1.0, E, nu)[0] @ f)
-    return np.asarray(boussinesq(x, y, z, 1.0, E, nu)[2] @ f)
 
 
 def without_body(stiffness: float, body_compliance: float) -> float:

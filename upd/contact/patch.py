@@ -22,7 +22,7 @@ the face ends, and the area with it: a face wholly in contact has its own area e
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -132,6 +132,13 @@ class Patch:
             Areas [mm2].
         """
         return self.whole(self.weights, extensive=True)
+
+    def image(self) -> Patch:
+        """Its mirror image about x = 0."""
+        if self.quads is not None:
+            return replace(self, x=-self.x)
+        order = self.order.reshape(len(self.x), len(self.y))[::-1].ravel()
+        return replace(self, x=-self.x[::-1], order=order)
 
     def slopes(self, field: ArrayLike) -> list[Array]:
         """Derivatives along x and y of a field of the model's nodes, on the whole patch.

@@ -5,8 +5,8 @@ in brackets, as the files that a run leaves in its folder ``curves`` do:
 
     frequency [Hz], accelerance real [(m/s2)/N], accelerance imaginary [(m/s2)/N]
 
-A response is one column of magnitudes or of complex numbers (``1.2-0.3j``), two of real and
-imaginary part, or two of magnitude and phase; a column in deg or rad is a phase. Without names the
+A response is one column of magnitudes, two of real and imaginary part, or two of magnitude and
+phase; a column in deg or rad is a phase. Without names the
 columns are frequency in Hz and magnitudes, or frequency, real and imaginary part. Where semicolons
 or tabs part the cells, a decimal comma is understood.
 
@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -101,7 +101,7 @@ def read_text(path: Path, asked: AskedCurve, faults: Faults) -> ReadCurve:
     InputError
         Where something is wrong.
     """
-    lines = _lines(path, faults)
+    lines = _lines(path)
     separator = _separator(lines)
     split = [(n, [cell.strip().strip('"') for cell in text.split(separator)]) for n, text in lines]
     columns, body, head = _columns(split, separator)
@@ -112,9 +112,9 @@ def read_text(path: Path, asked: AskedCurve, faults: Faults) -> ReadCurve:
     at = [n for n, _ in body]
     if len(at) < LEAST_POINTS:
         last = at[-1] if at else head
-        words = f"ends with {len(at)} points; a curve has {LEAST_POINTS} or more"
-        faults.add(f"line {last}", words)
-        faults.check()
+        raise InputError(
+            f"line {last}: ends with {len(at)} points; a curve has {LEAST_POINTS} or more"
+        )
 
     def place(what: str, k: int) -> str:
         return _cell(at[k], parts[what].place, parts[what].name or what)
@@ -127,37 +127,26 @@ def read_text(path: Path, asked: AskedCurve, faults: Faults) -> ReadCurve:
     )
 
 
-def _lines(path: Path, faults: Faults) -> list[tuple[int, str]]:
+def _lines(path: Path) -> list[tuple[int, str]]:
     """Lines with something in them and their numbers from 1, without comments."""
-    text = ""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         line = path.read_bytes()[: error.start].count(b"\n") + 1
-        faults.add(f"line {line}", "is no text in UTF-8; save the file as CSV in UTF-8")
-    if "\0" in text:
-        faults.add("line 1", "holds NUL, so it is no text; save the file as CSV in UTF-8")
-    faults.check()
+        raise InputError(
+            f"line {line}: is no text in UTF-8; save the file as CSV in UTF-8"
+        ) from None
     numbered = enumerate(text.splitlines(), 1)
     lines = [(n, one) for n, one in numbered if one.strip() and not one.lstrip().startswith("#")]
-    if [one.strip() for _, one in lines[:2]] == ["-1", "58"]:
-        faults.add(
-            f"line {lines[0][0]}",
-            "is a universal file (data set 58); export it as CSV with the columns frequency, real "
-            "and imaginary, each with its unit",
-        )
     if not lines:
-        faults.add("line 1", "no values; give lines of frequency and response")
-    faults.check()
+        raise InputError("line 1: no values; give lines of frequency and response")
     return lines
 
 
 def _separator(lines: Sequence[tuple[int, str]]) -> str:
     """What parts the cells of most lines."""
-    for mark in _SEPARATORS:
-        if 2 * sum(mark in line for _, line in lines) > len(lines):
-            return mark
-    return ","
+    most = (m for m in _SEPARATORS if 2 * sum(m in line for _, line in lines) > len(lines))
+    return next(most, ",")
 
 
 def _number(cell: str, separator: str) -> float | None:
@@ -170,14 +159,6 @@ def _number(cell: str, separator: str) -> float | None:
         return None
 
 
-def _complex(cell: str) -> complex | None:
-    """``1.2-0.3j``, also in parentheses, with i, or with blanks."""
-    try:
-        return complex("".join(cell.split()).strip("()").replace("i", "j"))
-    except ValueError:
-        return None
-
-
 def _columns(
     split: Sequence[tuple[int, list[str]]], separator: str
 ) -> tuple[list[FileColumn], list[tuple[int, list[str]]], int]:
@@ -185,8 +166,7 @@ def _columns(
     line, first = split[0]
     named = all(_number(cell, separator) is None for cell in first)
     if named:
-        columns = _paired([_column(k, cell) for k, cell in enumerate(first)])
-        return columns, list(split[1:]), line
+        return [_column(k, cell) for k, cell in enumerate(first)], list(split[1:]), line
     usual = ("magnitude",) if len(first) <= 2 else ("real", "imaginary")
     columns = [FileColumn(0, "", "frequency", "Hz")]
     return (
@@ -216,28 +196,14 @@ def _column(place: int, head: str) -> FileColumn:
     return FileColumn(place, rest, part, unit)
 
 
-def _paired(columns: list[FileColumn]) -> list[FileColumn]:
-    """The only phase of a file belongs to its only magnitudes, however they are named."""
-    phases = [c for c in columns if c.part == "phase"]
-    others = [c for c in columns if c.name and c.part != "phase"]
-    names = {c.name for c in others if _is_response(c, None)} or {c.name for c in others}
-    if len(phases) != 1 or len(names) != 1:
-        return columns
-    return [replace(c, name=min(names)) if c in phases else c for c in columns]
-
-
 def _chosen(
     columns: Sequence[FileColumn], asked: AskedCurve, line: int, faults: Faults
 ) -> tuple[dict[str, FileColumn], float, str]:
     """The columns of frequency and of the response by their parts, factor to Hz, unit."""
     axis, unit = [c for c in columns if c.part == "frequency"], asked.unit
     if len(axis) != 1:
-        faults.add(
-            f"line {line}",
-            f"{len(axis) or 'no'} column{'s' * (len(axis) > 1)} of frequency; name one "
-            '"frequency [Hz]"',
-        )
-        faults.check()
+        many = f"{len(axis) or 'no'} column{'s' * (len(axis) > 1)}"
+        raise InputError(f'line {line}: {many} of frequency; name one "frequency [Hz]"')
     scale = 1.0
     with faults.at(_cell(line, axis[0].place, "frequency")):
         scale = _factor(axis[0].unit, ["frequency"])
@@ -351,15 +317,13 @@ def _numbers(
     width: int,
 ) -> dict[str, FloatArray]:
     """The cells of the columns that count, as numbers."""
-    out: dict[str, list[complex]] = {kind: [] for kind in parts}
+    out: dict[str, list[float]] = {kind: [] for kind in parts}
     for line, cells in body:
         if len(cells) > width and any(cells[width:]):
             faults.add(f"line {line}", f"{len(cells)} cells where there are {width} columns")
         for kind, c in parts.items():
             cell = cells[c.place] if c.place < len(cells) else ""
-            value: complex | None = _number(cell, separator)
-            if value is None and kind == "magnitude" and "phase" not in parts:
-                value = _complex(cell)
+            value = _number(cell, separator)
             if value is not None and np.isfinite(value):
                 out[kind].append(value)
                 continue

@@ -156,11 +156,6 @@ def test_shares_of_the_approach_and_the_bodies_are_the_results(hertz: RunFolder)
         assert 1e3 * (scalar(group, "finite_body") or 0.0) == pytest.approx(
             numbers["approach_finite_body", case]
         )
-        for body in ("sphere", "block"):
-            assert group[f"compression_{body}"].attributes["body"] == body
-            assert 1e3 * (scalar(group, f"compression_{body}") or 0.0) == pytest.approx(
-                numbers[f"compression_3a_{body}", case]
-            )
 
 
 def test_quantities_over_the_load_and_their_closed_forms(hertz: RunFolder) -> None:
@@ -173,15 +168,6 @@ def test_quantities_over_the_load_and_their_closed_forms(hertz: RunFolder) -> No
         assert np.abs(curve[name].data[-1] / exact[-1] - 1.0) < 0.1
         closed = np.interp(loads, curve["hertz_normal_force"].data, curve[f"hertz_{field}"].data)
         assert closed[-1] == pytest.approx(exact[-1])
-    group = next(g for g in with_content(hertz.arrays, "normal") if case_of(g).load == F)
-    for body in ("sphere", "block"):
-        # The last point of the curve is the largest load.
-        assert curve[f"compression_{body}"].data[-1] == pytest.approx(
-            scalar(group, f"compression_{body}"), rel=1e-9
-        )
-        half_space = curve[f"hertz_compression_{body}"].data[-1]
-        approach = hertz_sphere(F, RADIUS, modulus).approach
-        assert half_space / approach == pytest.approx(0.23327 / 2.0, rel=1e-4)
 
 
 def test_what_a_dampers_charts_draw_lies_in_the_file(folders: dict[str, RunResult]) -> None:
@@ -196,6 +182,3 @@ def test_what_a_dampers_charts_draw_lies_in_the_file(folders: dict[str, RunResul
     (curve,) = with_content(found.arrays, "force-approach")
     (first, *_) = with_content(found.arrays, "normal")
     assert scalar(curve, "stiffness") == numbers["K_N_tangent_raw", case_of(first).label]["value"]
-    # The damper is pressed at two bands, one the mirror image of the other about mid-length.
-    left, right = first["worn_zone_middle"].data
-    assert left + right == pytest.approx(float(first["x"].data[-1]), rel=1e-12)

@@ -14,8 +14,7 @@ import pytest
 from upd import load_scene, make_plan, run
 from upd.analyses import ladders_of
 from upd.analyses.base import Plan
-from upd.analyses.contact.ladders import parameter_points
-from upd.analyses.contact.varied import PROBLEM
+from upd.analyses.contact.varied import PROBLEM, parameter_points
 from upd.batch.engine import Progress, Workers
 from upd.batch.store import PointStore
 from upd.batch.studies import plan_study, point_task, run_study, study, study_workers

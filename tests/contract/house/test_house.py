@@ -317,9 +317,9 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 12131,
+    "analyses": 12052,
     "hbm": 6315,
-    "contact": 3535,
+    "contact": 3527,
     "linalg": 2997,
     "scene": 2238,
     "plot": 1525,
@@ -331,7 +331,7 @@ ROOM_LINES = {
     "vary": 1280,
     "reference": 915,
     "cli": 869,
-    "measured": 913,
+    "measured": 883,
     "reduction": 1135,
     "results": 822,
     "fem": 673,

@@ -10,9 +10,10 @@ from functools import partial
 from typing import Any
 
 from upd.analyses.base import Analysis
-from upd.analyses.contact import charts, checks, ladders, left_out, output, results
+from upd.analyses.contact import charts, checks, output, results
 from upd.analyses.contact.bodies import needs
-from upd.analyses.contact.varied import PROBLEM, coarsened
+from upd.analyses.contact.solve import solve_left_out
+from upd.analyses.contact.varied import LADDERS, PROBLEM, coarsened
 from upd.plot.chart import Chart
 from upd.results import Arrays
 
@@ -39,9 +40,9 @@ def _analysis(name: str, headline: tuple[str, ...], make_charts: Charts, *, last
         write_files=output.write_files,
         charts=make_charts,
         headline=partial(results.pick, names=headline, last=last),
-        ladders=ladders.LADDERS,
+        ladders=LADDERS,
         verdict_names=() if last else ("K_N_per_pad", "K_N_secant_raw", "approach"),
-        solve_left_out=left_out.solve,
+        solve_left_out=solve_left_out,
         coarsened=coarsened,
     )
 

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.base import Needs
-from upd.analyses.contact.faces import lattices
 from upd.analyses.contact.plan import (
     ALONG,
     COMPONENTS,
@@ -324,22 +323,7 @@ def solve_inside(solution: ContactSolution) -> None:
     for case in solution.normal:
         frictionless = _displaced(solution, case, sphere)
         if sphere and case.force > 0.0:
-            (face,) = lattices(solution)
-            force = face.field(case.solution.force, extensive=True)
-            case.shares = _shares(solution, case, frictionless, force)
-            if case.shares:
-                case.mesh_error = _mesh_error(solution, case, frictionless)
-            if solution.plan.effect("friction"):
-                _shear_shares(solution, case)
-    for case in solution.curve if sphere else ():
-        nodal = solution.model.nodal(case.solution.force)
-        for body in (solution.model.upper, solution.model.lower):
-            u = body.side * body.displacement(NORMAL, body.side * nodal)[:, 2]
-            axis = body.mesh.nodes["axis"]
-            depth = np.abs(body.mesh.points[axis, 2])
-            case.compression[body.name] = float(
-                np.interp(3.0 * case.measures.radius_moment, depth, u[axis])
-            )
+            _add_shares(solution, case, frictionless)
 
 
 def _displaced(solution: ContactSolution, case: NormalCase, sphere: bool) -> dict[str, Array]:
@@ -352,23 +336,31 @@ def _displaced(solution: ContactSolution, case: NormalCase, sphere: bool) -> dic
     return pressed(model, case.solution.force, copies)[0]
 
 
-def _shares(
-    solution: ContactSolution,
-    case: NormalCase,
-    displacement: Mapping[str, Array],
-    force: Array,
-    *,
-    tangential: bool = False,
-) -> dict[str, bulk.BodyShare]:
-    """Of both bodies, from their displacements under the forces of the whole patch; empty where one
-    is not known.
+def _add_shares(
+    solution: ContactSolution, case: NormalCase, displacement: Mapping[str, Array]
+) -> None:
+    """What each body adds to the approach and, per N, to the tangential displacement, with the
+    error of its mesh; nothing where one is not known.
     """
-    found = {
-        body.name: _share(solution, case, body, displacement[body.name], force, tangential)
-        for body in (solution.model.upper, solution.model.lower)
-    }
-    shares = {name: share for name, share in found.items() if share is not None}
-    return shares if len(shares) == len(found) else {}
+    model, scene = solution.model, solution.plan.scene
+    force, mu = model.patch.whole(case.solution.force, extensive=True), scene.contact.friction
+    # full slip t = mu f: the bodies' far field knows the total force only
+    sliding = model.nodal(mu * case.solution.force)
+    for body in (model.upper, model.lower):
+        data = scene.materials[body.name]
+        place = model.patch, case.measures.radius_moment, data.E, data.nu
+        try:
+            case.shares[body.name] = bulk.body_share(body, displacement[body.name], force, *place)
+            if solution.plan.effect("friction"):
+                u = body.displacement(ALONG, sliding)
+                finite = bulk.finite_body_share(body, u, mu * force, *place, tangential=True)
+                case.shear_shares[body.name] = finite / (mu * float(force.sum()))
+        except MeshError as error:
+            # The numbers with the bulk compliance removed are left out, the others stand.
+            solution.no_shares = f"{body.name}: {error}"
+            case.shares, case.shear_shares = {}, {}
+            return
+    case.mesh_error = _mesh_error(solution, case, displacement)
 
 
 def _mesh_error(
@@ -400,51 +392,3 @@ def _mesh_error(
         whole += mean - share.finite_body - bulk.half_space_mean(patch, force, data.E, data.nu)
         far += share.far_mesh
     return whole - far, far
-
-
-def _share(
-    solution: ContactSolution,
-    case: NormalCase,
-    body: Body,
-    displacement: Array,
-    force: Array,
-    tangential: bool,
-) -> bulk.BodyShare | None:
-    radius = case.measures.radius_moment
-    along = displacement[:, ALONG] if tangential else body.side * displacement[:, NORMAL]
-    axis = body.mesh.nodes["axis"]
-    depth = np.abs(body.mesh.points[axis, 2])
-    patch = solution.model.patch
-    data = solution.plan.scene.materials[body.name]
-    inside = depth > 0.5 * radius
-    half_space = np.zeros(len(depth))
-    half_space[inside] = bulk.axis_half_space(
-        depth[inside],
-        patch.points(),
-        force.ravel(),
-        data.E,
-        data.nu,
-        tangential=tangential,
-    )
-    try:
-        compression, fitted = bulk.axis_share(depth, along[axis], half_space, radius)
-        finite = bulk.finite_body_share(
-            body, displacement, force, patch, radius, data.E, data.nu, tangential=tangential
-        )
-    except MeshError as error:
-        # The numbers with the bulk compliance removed are left out, the others stand.
-        solution.no_shares = f"{body.name}: {error}"
-        return None
-    return bulk.BodyShare(compression, finite, fitted)
-
-
-def _shear_shares(solution: ContactSolution, case: NormalCase) -> None:
-    """Shear of both bodies per N, from full slip t = mu f: their far field knows the total force
-    only.
-    """
-    model = solution.model
-    forces = solution.plan.scene.contact.friction * case.solution.force
-    whole, nodal = model.patch.whole(forces, extensive=True), model.nodal(forces)
-    moved = {b.name: b.displacement(ALONG, nodal) for b in (model.upper, model.lower)}
-    found = _shares(solution, case, moved, whole, tangential=True)
-    case.shear_shares = {name: one.over(float(whole.sum())) for name, one in found.items()}

@@ -66,7 +66,6 @@ def curved_charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
         ),
         *(_approach(group) for group in with_content(arrays, "force-approach")),
         *(_over_load(group, *quantity) for group in curves for quantity in _OVER_LOAD),
-        *(_compressions(group) for group in curves if _beyond_3a(group)),
         *(_loop(group) for group in reversed(with_content(arrays, "cycle"))),
     ]
 
@@ -250,32 +249,6 @@ def _over_load(group: Group, title: str, closed: str, name: str, unit: str, scal
     return Chart(f"{title} over load", *axes, tuple(traces), **more)  # type: ignore[arg-type]
 
 
-def _beyond_3a(group: Group) -> dict[str, str]:
-    """Variable -> body whose compression beyond depth 3a it is."""
-    return {k: str(v.attributes["body"]) for k, v in group.items() if "body" in v.attributes}
-
-
-def _compressions(group: Group) -> Chart:
-    """What lies beyond depth 3a in each body, per cent of the approach (thesis, Figure 50);
-    half-spaces have it too.
-    """
-    F, approach = values(group, "load"), values(group, "loaded_approach")
-    traces: list[Trace] = []
-    for colour, (name, body) in enumerate(_beyond_3a(group).items()):
-        share = 100.0 * values(group, name) / approach
-        traces.append(Trace(body, F, share, "both", colour))
-        if f"hertz_{name}" in group:
-            # Hertz's approach goes with F^(2/3): straight in it, so interpolation is exact.
-            points = values(group, "hertz_normal_force") ** (2.0 / 3.0)
-            total = np.interp(F ** (2.0 / 3.0), points, values(group, "hertz_approach"))
-            closed = 100.0 * values(group, f"hertz_{name}") / total
-            traces.append(Trace(f"{body}, half-space", F, closed, closed=True, entry="half-space"))
-    top = 1.4 * max(float(t.y.max()) for t in traces)
-    axes = _FORCE, Axis("share of the approach beyond 3a", "%", low=0.0, high=top)
-    title = "Compression of the bodies over load"
-    return Chart(title, *axes, tuple(traces), figure="over_load", columns=3)
-
-
 def _tractions(normal: Group, tangential: Sequence[Group]) -> Chart:
     computed: list[Trace] = []
     closed: list[Trace] = []
@@ -349,20 +322,14 @@ def face_pressure(case: str, groups: list[Group], *, sheet: bool) -> Chart:
 
 
 def _per_length(normal: Faces) -> Chart:
-    traces, bands = [], []
+    traces = []
     for k, (case, groups) in enumerate(normal.items()):
         for group in groups:
             x, F = values(group, "x"), values(group, "normal_force").sum(axis=1)
             # Length a lattice line stands for: half way to its neighbours.
             edges = np.concatenate([[x[0]], 0.5 * (x[1:] + x[:-1]), [x[-1]]])
             traces.append(Trace(case.label, x, F / np.diff(edges), "both", k))
-    group = next(iter(normal.values()))[0]
-    if "worn_zone_middle" in group:
-        bands = [
-            Band("middle of our loaded bands", "x", at, at, dashed=True)
-            for at in values(group, "worn_zone_middle").tolist()
-        ]
-    more = FACE | {"y": Axis("force per length", "N/mm", low=0.0), "bands": tuple(bands)}
+    more = FACE | {"y": Axis("force per length", "N/mm", low=0.0)}
     more |= {"figure": "pressure", "columns": 3}
     return Chart("Normal force per length", traces=tuple(traces), **more)
 

@@ -16,14 +16,13 @@ from numpy.typing import NDArray
 from upd.analyses.base import conditions
 from upd.analyses.contact import loading
 from upd.analyses.contact.bodies import product_checks
-from upd.analyses.contact.faces import lattices, rim_nodes, tractions
+from upd.analyses.contact.faces import lattices, on_lines, rim_nodes, tractions
 from upd.analyses.contact.plan import NORMAL, REMEDIES, beta_of, wider_patch
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
-from upd.contact.subsurface import most_stressed, partial_slip_ratio
+from upd.contact.subsurface import most_stressed
 from upd.mesh import recipes
-from upd.reference import hertz_yield_load, hertz_yield_point
 from upd.results import NO_CASE, Case, Check
 from upd.scene import Scene
 
@@ -205,9 +204,8 @@ def _rim_check(solution: ContactSolution, case: NormalCase) -> Check:
     half = 0.5 * min(np.ptp(patch.X), np.ptp(patch.Y))
     # The gap gives the radius of curvature, h = r^2 / 2R at the rim; a flat patch (to rounding of
     # its coordinates) has none.
-    gap = patch.whole(solution.model.gap)
-    rim = gap[0, len(patch.Y) // 2] if patch.quads is None else gap[patch.rim()].min()
-    corner = float(rim - gap.min())
+    gap = patch.whole(solution.model.gap).ravel()
+    corner = float(gap[patch.rim()].min() - gap.min())
     if corner <= 1e-9 * half:
         return Check("patch rim", case.case, 0, 0, "the contact is flat: its rim belongs to it")
     radius = half**2 / (2.0 * corner)
@@ -243,11 +241,11 @@ def _flat_resolution_check(solution: ContactSolution) -> Check:
     nodes lie as near as those of two and four hex8i, it is 0.8 % too high and 0.9 % too low.
     """
     edges: list[tuple[int, str]] = []
-    for k in lattices(solution):
+    for k in lattices(solution).values():
         lines = (len(k.Y) - 1, len(k.X) - 1)
-        if not k.lattice:
+        if k.quads is not None:
             # of a square of as many elements
-            lines = (round(len(k.patch.cells()) ** 0.5),) * 2
+            lines = (round(len(k.cells()) ** 0.5),) * 2
         edges += zip(lines, ("divisions", "divisions_long"), strict=True)
     fewest, name = min(edges)
     scene = solution.plan.scene
@@ -264,18 +262,8 @@ def _flat_resolution_check(solution: ContactSolution) -> Check:
 
 
 def _curved_checks(solution: ContactSolution) -> list[Check]:
-    """Of a curved contact as a whole: symmetric, and small against its curvature."""
-    plan, scene, checks = solution.plan, solution.plan.scene, []
-    lattice = solution.model.patch.quads is None
-    mirrored = recipes.has_parameter(scene.recipe, "symmetry")
-    if lattice and mirrored and not plan.effect("mirror symmetry"):
-        text, remedy = "|f - mirrored f| / max f", "the mesh or the load is not symmetric"
-        checks += [
-            Check("symmetric pressure", c.case, _asymmetry(solution, c), 1e-6, text, remedy)
-            for c in solution.normal
-            if c.force > 0.0
-        ]
-    checks.append(_steepness_check(solution))
+    """Of a curved contact as a whole: small against its curvature, and split from its bodies."""
+    checks = [_steepness_check(solution)]
     if solution.no_shares:
         text, remedy = solution.no_shares, "use a larger or finer body"
         checks.append(_warning("body compression", NO_CASE, 1, 0, text, remedy))
@@ -299,69 +287,38 @@ def _steepness_check(solution: ContactSolution) -> Check:
     return Check("slope in the contact", NO_CASE, slope, 0.2, text, remedy)
 
 
-def _asymmetry(solution: ContactSolution, case: NormalCase) -> float:
-    f = solution.model.patch.whole(case.solution.force, extensive=True)
-    return float(max(np.abs(f - f[::-1]).max(), np.abs(f - f[:, ::-1]).max()) / f.max())
-
-
 # -- onset of yield --------------------------------------------------------------------------------
 
 
 def yield_checks(solution: ContactSolution) -> Iterator[Check]:
     """Von Mises stress against the yield stress of the bodies that have one.
 
-    The contact itself stays elastic: the check shows where that ends. Of a sphere by Hertz's
-    pressure, under a tangential load with Cattaneo's traction; of other contacts by the computed
-    pressure and tractions on half-spaces.
+    The contact itself stays elastic: the check shows where that ends. The computed pressure and
+    tractions act on half-spaces.
     """
     scene, model = solution.plan.scene, solution.model
     limited = [b for b in (model.upper, model.lower) if scene.materials[b.name].yield_stress]
+    if not limited:
+        return
     pressure = model.multipliers.pressure
-    loads: list[tuple[NormalCase | TangentialCase, float, bool, list[Array]]] = [
-        (c, c.force, True, [pressure(c.solution.force)]) for c in solution.normal if c.force > 0.0
+    loads: list[tuple[Case, list[Array]]] = [
+        (c.case, [pressure(c.solution.force)]) for c in solution.normal if c.force > 0.0
     ]
     for t in solution.tangential:
         shear = np.zeros((2, len(t.pressed)))
         shear[list(t.nodes.components)] = tractions(solution, t)
-        closed = solution.closed_form_traction(t) is not None
-        fields = [pressure(np.maximum(t.pressed, 0.0)), *shear]
-        loads.append((t, t.normal.force, closed, fields))
-    for one, force, closed, fields in loads if limited else ():
-        by_hertz = closed and solution.hertz_of(force) is not None
-        faces = [] if by_hertz else [k.even(fields) for k in lattices(solution)]
+        loads.append((t.case, [pressure(np.maximum(t.pressed, 0.0)), *shear]))
+    for case, fields in loads:
+        faces = [on_lines(k, fields) for k in lattices(solution).values()]
         for body in limited:
-            limit = scene.materials[body.name].yield_stress
-            assert limit is not None
-            if by_hertz:
-                stress, what = _hertz_stress(solution, one.case, force, body.name)
-            else:
-                # the upper body feels the tractions the other way round
-                sign = -1.0 if body is model.upper else 1.0
-                stress, what = _half_space_stress(faces, sign, scene.materials[body.name].nu)
+            material = scene.materials[body.name]
+            assert material.yield_stress is not None
+            # the upper body feels the tractions the other way round
+            sign = -1.0 if body is model.upper else 1.0
+            stress, what = _half_space_stress(faces, sign, material.nu)
             what = f"largest von Mises stress / yield stress of {body.name}, {what}"
-            case = replace(one.case, body=body.name)
-            yield _warning("onset of yield", case, stress / limit, 1.0, what, _YIELDS)
-
-
-def _hertz_stress(
-    solution: ContactSolution, case: Case, force: float, body: str
-) -> tuple[float, str]:
-    """MPa in a body of a sphere's contact, and what it is."""
-    scene, hertz = solution.plan.scene, solution.hertz_of(force)
-    material, radius = scene.materials[body], scene.sphere_radius
-    assert hertz is not None and radius is not None and material.yield_stress is not None
-    worst = hertz_yield_point(material.nu)
-    if case.ratio is None:
-        stress = worst.ratio * hertz.max_pressure
-        begins = hertz_yield_load(material.yield_stress, material.nu, radius, solution.modulus)
-        return stress, (
-            f"Hertz without friction: {stress:.4g} MPa at depth {worst.depth * hertz.radius:.3g} "
-            f"mm; yields from {begins:.4g} N"
-        )
-    ratio = partial_slip_ratio(scene.contact.friction, case.ratio, material.nu)
-    # friction never relieves the most stressed place
-    stress = max(ratio, worst.ratio) * hertz.max_pressure
-    return stress, f"Hertz's pressure and Cattaneo's traction on a half-space: {stress:.4g} MPa"
+            at, value = replace(case, body=body.name), stress / material.yield_stress
+            yield _warning("onset of yield", at, value, 1.0, what, _YIELDS)
 
 
 def _half_space_stress(

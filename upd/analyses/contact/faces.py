@@ -4,107 +4,52 @@ the axes they are reported in.
 Report axes: of a curved contact those of the model, of a flat one with the origin at the bottom
 left corner of all patches together, x along the damper, y up the slope, as in the source thesis.
 
-Of flat faces the contact points of a dynamic model, where the pressure peaks, and the bands of the
-damper that the load comes from.
+Of flat faces the contact points of a dynamic model, and where the pressure peaks.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from numpy.typing import NDArray
 
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
 from upd.contact.law import ContactLaw, contact_points
 from upd.contact.normal import NormalContact
 from upd.contact.patch import ContactMeasures, LocatedArea, Patch, located_area, measure
-from upd.mesh import IntArray
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class FaceLattice:
-    """One patch of the whole contact: lattice lines in contact axes, mm.
-
-    Attributes
-    ----------
-    flipped
-        It is the mirror image of the model's.
-    """
-
-    name: str
-    patch: Patch
-    flipped: bool
-
-    @property
-    def X(self) -> Array:
-        """Lattice lines along the damper."""
-        return self._turned(-self.patch.X) if self.flipped else self.patch.X
-
-    @property
-    def Y(self) -> Array:
-        """Lattice lines up the slope."""
-        return self.patch.Y
-
-    def field(self, values: ArrayLike, *, extensive: bool = False) -> Array:
-        """(len(X), len(Y)) of a field of the model's contact nodes (n,) that is even about the
-        mirror plane.
-        """
-        out = self.patch.whole(values, extensive=extensive)
-        return self._turned(out) if self.flipped else out
-
-    def _turned(self, field: Array) -> Array:
-        """Lines from left to right; nodes without lines keep their order."""
-        return field[::-1] if self.lattice else field
-
-    def even(self, fields: Sequence[Array]) -> tuple[Array, Array, list[Array]]:
-        """Lattice lines and fields of the model's nodes on them; without lines on as many even
-        ones as there are nodes, linear between the nodes and zero off the patch.
-        """
-        whole = [self.field(one) for one in fields]
-        if self.lattice:
-            return self.X, self.Y, whole
-        # slow to import: only where it is called
-        from scipy.interpolate import LinearNDInterpolator
-
-        n = int(np.ceil(np.sqrt(self.X.size)))
-        x, y = (np.linspace(v.min(), v.max(), n) for v in self.nodes())
-        between = LinearNDInterpolator(np.column_stack(self.nodes()), np.column_stack(whole), 0.0)
-        found = between(*np.meshgrid(x, y, indexing="ij"))
-        return x, y, list(np.moveaxis(found, -1, 0))
-
-    @property
-    def lattice(self) -> bool:
-        """Whether the nodes lie on lines."""
-        return self.patch.quads is None
-
-    def nodes(self) -> tuple[Array, Array]:
-        """x and y of every node, mm, each of the shape of a field."""
-        if not self.lattice:
-            return self.X, self.Y
-        X, Y = np.meshgrid(self.X, self.Y, indexing="ij")
-        return X, Y
-
-    def area(self) -> Array:
-        """Tributary areas in mm2."""
-        return self.field(self.patch.weights, extensive=True)
-
-
-def lattices(solution: ContactSolution) -> list[FaceLattice]:
-    """The patches of the whole contact, from left to right."""
-    found = [FaceLattice(name, patch, False) for name, patch in solution.model.patches.items()]
+def lattices(solution: ContactSolution) -> dict[str, Patch]:
+    """The patches of the whole contact by name, from left to right."""
+    found = dict(solution.model.patches)
     if 0 in solution.plan.mirrors:
-        found += [
-            FaceLattice({"right": "left"}.get(k.name, f"{k.name} mirrored"), k.patch, True)
-            for k in found
-            if not k.patch.mirrored[0]
-        ]
-    return sorted(found, key=lambda k: float(k.X.min()))
+        found |= {
+            {"right": "left"}.get(name, f"{name} mirrored"): patch.image()
+            for name, patch in solution.model.patches.items()
+            if not patch.mirrored[0]
+        }
+    return dict(sorted(found.items(), key=lambda item: float(item[1].X.min())))
+
+
+def on_lines(patch: Patch, fields: Sequence[Array]) -> tuple[Array, Array, list[Array]]:
+    """Lattice lines and fields of the model's nodes on them; without lines on as many even ones as
+    there are nodes, linear between the nodes and zero off the patch.
+    """
+    whole = [patch.whole(one) for one in fields]
+    if patch.quads is None:
+        return patch.X, patch.Y, whole
+    # slow to import: only where it is called
+    from scipy.interpolate import LinearNDInterpolator
+
+    points = patch.points()
+    n = int(np.ceil(np.sqrt(len(points))))
+    x, y = (np.linspace(v.min(), v.max(), n) for v in points.T)
+    between = LinearNDInterpolator(points, np.column_stack(whole), 0.0)
+    found = between(*np.meshgrid(x, y, indexing="ij"))
+    return x, y, list(np.moveaxis(found, -1, 0))
 
 
 def measured(solution: ContactSolution, answer: NormalContact, load: float) -> ContactMeasures:
@@ -112,17 +57,17 @@ def measured(solution: ContactSolution, answer: NormalContact, load: float) -> C
 
     The edge is located between the nodes, but of a sphere, whose area is that of Hertz's pressure.
     """
-    faces = lattices(solution)
-    forces = [k.field(answer.force, extensive=True) for k in faces]
+    faces = list(lattices(solution).values())
+    forces = [k.whole(answer.force, extensive=True) for k in faces]
     pressure = solution.model.multipliers.pressure(answer.force)
     located = None
     if solution.plan.scene.sphere_radius is None:
         found = [
             located_area(
-                np.column_stack([v.ravel() for v in k.nodes()]),
-                k.patch.cells(),
+                k.points(),
+                k.cells(),
                 (f / k.area()).ravel(),
-                k.field(answer.gap).ravel(),
+                k.whole(answer.gap).ravel(),
                 (f > 0.0).ravel(),
                 solution.modulus,
             )
@@ -130,7 +75,7 @@ def measured(solution: ContactSolution, answer: NormalContact, load: float) -> C
         ]
         located = LocatedArea(sum(a.area for a in found), sum(a.resolution for a in found))
     if solution.curved:
-        return measure(solution.model.patch, forces[0], located, faces[0].field(pressure))
+        return measure(solution.model.patch, forces[0], located, faces[0].whole(pressure))
     assert located is not None
     none = float("nan")
     return ContactMeasures(
@@ -147,9 +92,7 @@ def measured(solution: ContactSolution, answer: NormalContact, load: float) -> C
 
 def area_of(solution: ContactSolution, nodes: NDArray[np.bool_]) -> float:
     """Tributary area of nodes (n,) on the whole contact, mm2."""
-    return sum(
-        float(k.area()[k.field(nodes.astype(float)) > 0.0].sum()) for k in lattices(solution)
-    )
+    return sum(float(k.area()[k.whole(nodes) > 0.0].sum()) for k in lattices(solution).values())
 
 
 def tractions(solution: ContactSolution, t: TangentialCase) -> list[Array]:
@@ -160,18 +103,15 @@ def tractions(solution: ContactSolution, t: TangentialCase) -> list[Array]:
 
 def rim_nodes(solution: ContactSolution, case: NormalCase) -> int:
     """How many nodes of the rim of a curved contact's patch carry force."""
-    force = solution.model.patch.whole(case.solution.force)
-    if solution.model.patch.quads is not None:
-        return int((force[solution.model.patch.rim()] > 0.0).sum())
-    rim = np.concatenate([force[0], force[-1], force[:, 0], force[:, -1]])
-    return int((rim > 0.0).sum())
+    patch = solution.model.patch
+    return int((patch.whole(case.solution.force).ravel()[patch.rim()] > 0.0).sum())
 
 
 def corner(solution: ContactSolution) -> Array:
     """(2,) origin of the report axes in contact axes, mm."""
     if solution.curved:
         return np.zeros(2)
-    found = lattices(solution)
+    found = lattices(solution).values()
     return np.array([min(k.X.min() for k in found), min(k.Y.min() for k in found)])
 
 
@@ -221,54 +161,15 @@ def _whole(
     """Points, areas and extensive fields of the whole contact, and the nodes of each patch in
     them.
     """
-    faces = lattices(solution)
-    points = [k.nodes() for k in faces]
-    ends = np.cumsum([X.size for X, _ in points])
-    whole = [np.concatenate([k.field(f, extensive=True).ravel() for k in faces]) for f in fields]
-    return (
-        np.vstack([np.column_stack([X.ravel(), Y.ravel()]) for X, Y in points]),
-        np.concatenate([k.area().ravel() for k in faces]),
-        whole,
-        np.split(np.arange(ends[-1]), ends[:-1]),
-    )
+    faces = list(lattices(solution).values())
+    points = [k.points() for k in faces]
+    ends = np.cumsum([len(one) for one in points])
+    whole = [np.concatenate([k.whole(f, extensive=True).ravel() for k in faces]) for f in fields]
+    areas = np.concatenate([k.area().ravel() for k in faces])
+    return np.vstack(points), areas, whole, np.split(np.arange(ends[-1]), ends[:-1])
 
 
-# -- peaks of the pressure of flat faces, and the bands that the load comes from -------------------
-
-
-def band_middles(solution: ContactSolution) -> list[float]:
-    """Middles along x (report axes, mm) of the parts of the damper's distant set, which the loads
-    come from, both sides of a mirror.
-    """
-    upper = solution.model.upper.mesh
-    nodes = upper.nodes["distant"]
-    x, weights = upper.points[nodes, 0], upper.weights.get("distant")
-    found = []  # lower and upper end, middle
-    for part in joined(upper.hexes, nodes):
-        # A set without weights is as wide as its nodes lie apart.
-        low, high = float(x[part].min()), float(x[part].max())
-        middle = 0.5 * (low + high)
-        if weights is not None:
-            middle = float(weights[part] @ x[part] / weights[part].sum())
-        if 0 not in solution.plan.mirrors:
-            found.append((low, high, middle))
-        elif low > 0.0:
-            found += [(low, high, middle), (-high, -low, -middle)]
-        else:
-            found.append((-high, high, 0.0))
-    return [float(middle - corner(solution)[0]) for _, _, middle in sorted(found)]
-
-
-def joined(cells: IntArray, nodes: IntArray) -> list[IntArray]:
-    """Positions in ``nodes``, part by part, of those that cells (n, nodes of each) join."""
-    number = np.full(int(max(cells.max(), nodes.max())) + 1, -1)
-    number[nodes] = np.arange(len(nodes))
-    at = number[cells]
-    first = np.broadcast_to(at.max(axis=1, keepdims=True), at.shape)
-    both = at >= 0
-    links = coo_array((np.ones(both.sum()), (first[both], at[both])), shape=(len(nodes),) * 2)
-    count, part = connected_components(links, directed=False)
-    return [np.flatnonzero(part == k) for k in range(count)]
+# -- peaks of the pressure of flat faces ----------------------------------------------------------
 
 
 def pressure_peaks(solution: ContactSolution, case: NormalCase) -> list[tuple[float, float]]:
@@ -284,8 +185,8 @@ def pressure_peaks(solution: ContactSolution, case: NormalCase) -> list[tuple[fl
     from scipy.signal import find_peaks, peak_widths
 
     found, origin = [], corner(solution)
-    for lattice in (k for k in lattices(solution) if k.lattice):
-        force = lattice.field(case.solution.force, extensive=True)[1:-1]
+    for lattice in (k for k in lattices(solution).values() if k.quads is None):
+        force = lattice.whole(case.solution.force, extensive=True)[1:-1]
         # normal force per length along x, N/mm: over the length each column stands for
         X, lengths = lattice.X[1:-1], lattice.area().sum(axis=1)[1:-1] / np.ptp(lattice.Y)
         p = force.sum(axis=1) / lengths

@@ -83,8 +83,8 @@ class LoadPath:
 
     Attributes
     ----------
-    case, normal
-        Its own case, and that of the normal load.
+    case
+        Of the normal load, with the direction.
     load, displacement
         (n_step,) N and mm along the load, from zero on.
     cycle
@@ -94,7 +94,6 @@ class LoadPath:
     """
 
     case: Case
-    normal: Case
     load: Array
     displacement: Array
     cycle: bool = False
@@ -260,15 +259,13 @@ def as_normal(state: CoupledState, stiffness: float) -> NormalContact:
 
 
 def pressed_by(model: ContactModel, body: Body, force: Array) -> float:
-    """Mean approach in mm that a body takes under the forces (n, 3) in N, weighted by the
+    """Mean approach in mm that a body takes under the forces (n, 1 or 3) in N, weighted by the
     pressure.
     """
     f = force[:, 0]
-    moved = sum(
-        (model.compliance(NORMAL, c, body) @ force[:, k] for k, c in enumerate(COMPONENTS)),
-        np.zeros(len(f)),
-    )
-    return float(f @ moved) / float(f.sum())
+    parts = zip(COMPONENTS, force.T, strict=False)
+    moved = sum((model.compliance(NORMAL, c, body) @ part for c, part in parts), np.zeros(len(f)))
+    return float(f @ moved) / float(f.sum()) if f.any() else 0.0
 
 
 def opened_by_shear(model: ContactModel, state: CoupledState) -> Array:

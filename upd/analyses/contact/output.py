@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upd.analyses.contact import faces
-from upd.analyses.contact.faces import FaceLattice, corner, lattices
+from upd.analyses.contact.faces import corner, lattices
 from upd.analyses.contact.loading import LoadPath
 from upd.analyses.contact.results import printed_of
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
-from upd.labels import file_name
+from upd.contact.patch import Patch
 from upd.mesh import recipes
 from upd.reference import hertz_pressure, mindlin
 from upd.results import Case, Group, variable
@@ -33,7 +33,7 @@ def sizes(solution: ContactSolution) -> dict[str, int]:
     """Contact pairs of the model and of all patches, mirror images included."""
     return {
         "n_pairs": len(solution.model.gap),
-        "n_pairs_whole_patch": sum(k.area().size for k in lattices(solution)),
+        "n_pairs_whole_patch": sum(k.area().size for k in lattices(solution).values()),
     }
 
 
@@ -41,15 +41,15 @@ def arrays(solution: ContactSolution) -> dict[str, Group]:
     """Fields of every case and patch with their closed forms; curves, paths and contact points."""
     out: dict[str, Group] = {}
     patches, (x, y) = lattices(solution), corner(solution)
-    for k in patches:
-        face: dict[str, str] = {"patch": k.name} if len(patches) > 1 else {}
+    for patch, k in patches.items():
+        face: dict[str, str] = {"patch": patch} if len(patches) > 1 else {}
         # Without a lattice every node has its own x and y.
-        own = ("x", "y") if k.lattice else ("node", "node")
+        own = ("x", "y") if k.quads is None else ("node", "node")
         lines = {"x": variable(own[0], k.X - x, "mm"), "y": variable(own[1], k.Y - y, "mm")}
         cases = [("normal", c.case, _normal(solution, k, c)) for c in solution.normal]
         cases += [("tangential", t.case, _tangential(solution, k, t)) for t in solution.tangential]
         for content, case, fields in cases:
-            name = case.label + f" {k.name}" * bool(face)
+            name = case.label + f" {patch}" * bool(face)
             out[name] = Group(lines | fields, content=content, case=case, **face)
     for path in solution.paths:
         content = "cycle" if path.cycle else "path"
@@ -64,57 +64,49 @@ def arrays(solution: ContactSolution) -> dict[str, Group]:
     return out | _laws(solution)
 
 
-def _dims(k: FaceLattice) -> str:
-    return "x y" if k.lattice else "node"
+def _dims(k: Patch) -> str:
+    return "x y" if k.quads is None else "node"
 
 
-def _normal(solution: ContactSolution, k: FaceLattice, case: NormalCase) -> Variables:
+def _normal(solution: ContactSolution, k: Patch, case: NormalCase) -> Variables:
     """Fields under a normal load, (n_x, n_y) in MPa, N and mm."""
     on, pressure, XY = case.solution.contact, solution.model.multipliers.pressure, _dims(k)
     out: Variables = {
-        "pressure": variable(XY, k.field(pressure(case.solution.force)), "MPa"),
-        "normal_force": variable(XY, k.field(case.solution.force, extensive=True), "N"),
-        "gap": variable(XY, k.field(case.solution.gap), "mm"),
-        "contact": variable(XY, k.field(on) > 0.0, flag_meanings="open contact"),
+        "pressure": variable(XY, k.whole(pressure(case.solution.force)), "MPa"),
+        "normal_force": variable(XY, k.whole(case.solution.force, extensive=True), "N"),
+        "gap": variable(XY, k.whole(case.solution.gap), "mm"),
+        "contact": variable(XY, k.whole(on) > 0.0, flag_meanings="open contact"),
     }
     if case.state is not None:
         traction = [pressure(c, on) for c in case.state.force[:, 1:].T]
         out |= _sheared(k, traction, list(case.state.found.slip[-1].T), case.stick)
-    if solution.curved:
-        return out | _approach_split(case) | _hertz(solution, case)
-    out["worn_zone_middle"] = variable(
-        "worn_zone",
-        faces.band_middles(solution),
-        "mm",
-        "middle of the bands of the damper that the load comes from",
-    )
-    return out
+    return out | _approach_split(case) | _hertz(solution, case) if solution.curved else out
 
 
 def _sheared(
-    k: FaceLattice, traction: Sequence[Array], slip: Sequence[Array], stick: NDArray[np.bool_]
+    k: Patch, traction: Sequence[Array], slip: Sequence[Array], stick: NDArray[np.bool_]
 ) -> Variables:
     """Fields under a tangential load, (n_x, n_y, n_direction) in MPa and mm."""
     XY = _dims(k)
     dims = f"{XY} direction"
     return {
-        "traction": variable(dims, np.stack([k.field(c) for c in traction], -1), "MPa"),
-        "slip": variable(dims, np.stack([k.field(c) for c in slip], -1), "mm"),
-        "stick": variable(XY, k.field(stick) > 0.0, flag_meanings="slip_or_open stick"),
+        "traction": variable(dims, np.stack([k.whole(c) for c in traction], -1), "MPa"),
+        "slip": variable(dims, np.stack([k.whole(c) for c in slip], -1), "mm"),
+        "stick": variable(XY, k.whole(stick) > 0.0, flag_meanings="slip_or_open stick"),
     }
 
 
-def _tangential(solution: ContactSolution, k: FaceLattice, t: TangentialCase) -> Variables:
+def _tangential(solution: ContactSolution, k: Patch, t: TangentialCase) -> Variables:
     traction, XY = faces.tractions(solution, t), _dims(k)
     out = _sheared(k, traction, list(t.slip.T), t.stick)
     if solution.curved and len(traction) == 1:
         # One direction has no dimension of its own.
-        out["traction"] = variable(XY, k.field(traction[0]), "MPa")
-        out["slip"] = variable(XY, k.field(t.slip[:, 0]), "mm")
+        out["traction"] = variable(XY, k.whole(traction[0]), "MPa")
+        out["slip"] = variable(XY, k.whole(t.slip[:, 0]), "mm")
     if t.state is not None:
         # which coupled contact moves
         pressure = solution.model.multipliers.pressure(np.maximum(t.pressed, 0.0))
-        out["pressure"] = variable(XY, k.field(pressure), "MPa")
+        out["pressure"] = variable(XY, k.whole(pressure), "MPa")
     return out | _cattaneo(solution, t)
 
 
@@ -122,16 +114,11 @@ def _tangential(solution: ContactSolution, k: FaceLattice, t: TangentialCase) ->
 
 
 def _approach_split(case: NormalCase) -> Variables:
-    """The approach, what the bodies add to it, and what of it lies beyond depth 3a in each."""
+    """The approach, and what the bodies add to it."""
     out: Variables = {"approach": variable("", case.approach, "mm")}
     if case.shares:
-        out["finite_body"] = variable(
-            "", case.finite_body, "mm", "approach of the finite, held bodies"
-        )
-        for body, share in case.shares.items():
-            out[f"compression_{file_name(body)}"] = variable(
-                "", share.compression, "mm", "approach beyond depth 3a", body=body
-            )
+        words = "approach of the finite, held bodies"
+        out["finite_body"] = variable("", case.finite_body, "mm", words)
     return out
 
 
@@ -168,7 +155,7 @@ def _cattaneo(solution: ContactSolution, t: TangentialCase) -> Variables:
 
 def _deresiewicz(solution: ContactSolution, cycle: LoadPath) -> Variables:
     """The closed loop +T* -> -T* -> +T*, and the bodies' share of the displacement."""
-    normal = next(case for case in solution.normal if case.case == cycle.normal)
+    normal = next(case for case in solution.normal if case.force == cycle.case.load)
     out: Variables = {}
     if normal.shear_shares:
         out["finite_body_compliance"] = variable(
@@ -222,22 +209,13 @@ def _approach_over_load(solution: ContactSolution, d: Array, F: Array) -> Variab
 
 
 def _along(solution: ContactSolution) -> Variables:
-    """Contact area, largest pressure and each body's compression at the loaded points."""
+    """Contact area and largest pressure at the loaded points."""
     points, dims = solution.curve, "loaded_point"
-    area, pressure = zip(*((p.measures.area, p.measures.max_pressure) for p in points), strict=True)
-    out: Variables = {
+    return {
         "load": variable(dims, [p.force for p in points], "N"),
-        "contact_area": variable(dims, area, "mm2"),
-        "max_pressure": variable(dims, pressure, "MPa"),
-        "loaded_approach": variable(dims, [p.approach for p in points], "mm"),
+        "contact_area": variable(dims, [p.measures.area for p in points], "mm2"),
+        "max_pressure": variable(dims, [p.measures.max_pressure for p in points], "MPa"),
     }
-    closed, words = [solution.beyond_3a(p.force) for p in points], "approach beyond depth 3a"
-    for body in points[0].compression:
-        name, beyond = f"compression_{file_name(body)}", [p.compression[body] for p in points]
-        out[name] = variable(dims, beyond, "mm", words, body=body)
-        if all(closed):
-            out[f"hertz_{name}"] = variable(dims, [c[body] for c in closed], "mm")
-    return out
 
 
 # -- of flat faces ---------------------------------------------------------------------------------
@@ -245,7 +223,7 @@ def _along(solution: ContactSolution) -> Variables:
 
 def _limit(solution: ContactSolution, path: LoadPath) -> Variables:
     """Load of gross slip, and the printed stiffness."""
-    limit = solution.plan.scene.contact.friction * (path.normal.load or 0.0)
+    limit = solution.plan.scene.contact.friction * (path.case.load or 0.0)
     name = f"K_T{path.case.direction}"
     return {
         "friction_limit": variable("", limit, "N"),

@@ -28,11 +28,10 @@ NORMAL, ALONG, ACROSS = 2, 0, 1
 #: all three, in the order of a coupled contact
 COMPONENTS = (NORMAL, ALONG, ACROSS)
 
-TILT, DIRECTIONS, COUPLING, LARGE = (
+TILT, DIRECTIONS, COUPLING = (
     "tilt of the damper",
     "slip in two directions",
     "normal-tangential coupling",
-    "large displacement",
 )
 #: why coupled contact slips in two directions
 _TOGETHER = "pressure and shear are solved at once"
@@ -42,7 +41,6 @@ REMEDIES = {
     "another contact.distant set",
     DIRECTIONS: "set contact.directions = 2",
     COUPLING: 'set contact.coupling = "coupled", or trust the number to this change only',
-    LARGE: "the contact is too large for small-displacement theory: lower the load",
 }
 
 
@@ -195,12 +193,12 @@ def make_families(scene: Scene, symmetry: str) -> tuple[Family, ...]:
 # -- effects ---------------------------------------------------------------------------------------
 
 
-def _effect(name: str, on: bool, why: str, *switch: str, shows: bool = False) -> Effect:
-    """An effect; one left out has its check where that ``shows`` something, and else does not
-    apply.
+def _switched(name: str, on: bool, why: str, switch: str, shows: bool) -> Effect:
+    """An effect that a key of the scene switches on; left out, its check ``shows`` something, or it
+    does not apply.
     """
     check = name if shows and not on else ""
-    return Effect(name, on, why, check, () if on else switch, on or shows)
+    return Effect(name, on, why, check, () if on else (switch,), on or shows)
 
 
 def make_effects(scene: Scene, symmetry: str, why: str, loaded: bool) -> tuple[Effect, ...]:
@@ -213,58 +211,43 @@ def make_effects(scene: Scene, symmetry: str, why: str, loaded: bool) -> tuple[E
     loaded
         Whether any normal load presses the bodies.
     """
-    curved, curve, inside = is_curved(scene), scene.wants("curve"), ", ".join(_inside(scene))
-    free = scene.contact.tilt == "free"
-    tilt = "no moment about the load line" if free else "its distant set only translates"
+    either, inside = Effect.either, ", ".join(_inside(scene))
+    if is_curved(scene):
+        tilts = []
+        gap = "the gap is curved: the contact set depends on the load"
+        small = "the contact is small against the body"
+    else:
+        free = scene.contact.tilt == "free"
+        tilt = "no moment about the load line" if free else "its distant set only translates"
+        tilts = [_switched(TILT, free, tilt, "contact.tilt=free", loaded)]
+        gap = "edges may lift off; one linear solve when none does"
+        small = "the approach is small against the patch"
+    displaced = f"a back-substitution per load for {inside}"
     return (
-        Effect(
-            "unilateral contact",
-            True,
-            "the gap is curved: the contact set depends on the load"
-            if curved
-            else "edges may lift off; one linear solve when none does",
-        ),
-        *([] if curved else [_effect(TILT, free, tilt, "contact.tilt=free", shows=loaded)]),
+        Effect("unilateral contact", True, gap),
+        *tilts,
         *_friction_effects(scene, loaded),
-        _effect("mirror symmetry", symmetry != "full", why),
-        _effect(
-            "load curve",
-            curve,
-            f"{scene.loads.curve_points} points asked for" if curve else "single loads only",
-        ),
-        _effect(
+        either("mirror symmetry", symmetry != "full", why, why),
+        either(
             "internal displacement",
             bool(inside),
-            f"a back-substitution per load for {inside}"
-            if inside
-            else "no output asks for it: contact nodes only",
+            displaced,
+            "no output asks for it: contact nodes only",
         ),
-        _effect("inertia", False, "every output is static: M is not assembled"),
-        _effect(
-            LARGE,
-            False,
-            "the contact is small against the body"
-            if curved
-            else "the approach is small against the patch",
-            shows=loaded,
-        ),
+        either("inertia", False, "", "every output is static: M is not assembled"),
+        either("large displacement", False, "", small),
     )
 
 
 def _friction_effects(scene: Scene, loaded: bool) -> list[Effect]:
-    curved, mu, coupled = is_curved(scene), scene.contact.friction, scene.coupled
+    curved, mu = is_curved(scene), scene.contact.friction
     coupling = _coupling_effect(scene, loaded)
     if not friction_on(scene):
         asked = scene.wants(*FRICTION_WANTS)
         why = "mu = 0: no tangential force can be carried" if asked else "no output asks for it"
-        return [_effect("friction", False, why), *[coupling] * (mu > 0.0)]
+        return [Effect.either("friction", False, "", why), *[coupling] * (mu > 0.0)]
     outputs = ", ".join(w for w in scene.want if w in FRICTION_WANTS)
-    stepped, steps = True, "first loading, in small steps"
-    if scene.wants("cycle"):
-        steps = "a full cycle is asked for"
-    elif curved and not coupled:
-        stepped, steps = False, "first loading only"
-    two, why = scene.slip_directions == 2, _TOGETHER if coupled else "asked for"
+    two, why = scene.slip_directions == 2, _TOGETHER if scene.coupled else "asked for"
     if not two:
         why = "the load has one direction" if curved else "loads run along the axes"
     # a number of a curved contact that depends on the directions of slip
@@ -275,10 +258,9 @@ def _friction_effects(scene: Scene, loaded: bool) -> list[Effect]:
     )
     shows = loaded and (not curved or depends)
     return [
-        _effect("friction", True, f"mu = {mu:g} and the outputs {outputs}"),
-        _effect(DIRECTIONS, two, why, "contact.directions=2", shows=shows),
+        Effect("friction", True, f"mu = {mu:g} and the outputs {outputs}"),
+        _switched(DIRECTIONS, two, why, "contact.directions=2", shows),
         coupling,
-        _effect("load history", stepped, steps),
     ]
 
 
@@ -292,7 +274,7 @@ def _coupling_effect(scene: Scene, loaded: bool) -> Effect:
             "contact.coupling = coupled"
         )
     how = "asked for" if coupled else frozen
-    return _effect(COUPLING, coupled, how, "contact.coupling=coupled", shows=loaded)
+    return _switched(COUPLING, coupled, how, "contact.coupling=coupled", loaded)
 
 
 def _inside(scene: Scene) -> list[str]:

@@ -115,7 +115,7 @@ def make_results(solution: ContactSolution, *, misfits: bool = True) -> list[Res
             out += _law(solution, case)
         for t in (t for t in solution.tangential if t.normal is case):
             out += _tangential(solution, t, misfits=misfits)
-        for path in (p for p in solution.paths if p.cycle and p.normal == case.case):
+        for path in (p for p in solution.paths if p.cycle and p.case.load == case.force):
             out += _beside(path.case, known, (q.CYCLE_ENERGY, path.slip_work))
     return base.with_printed(out, printed_of(scene))
 
@@ -194,18 +194,16 @@ def _normal(solution: ContactSolution, case: NormalCase, known: References) -> l
 
 def _of_faces(solution: ContactSolution, case: NormalCase) -> list[Result]:
     """Share of the faces in contact, what each body takes of the approach, and tilts."""
-    at, model, answer = case.case, solution.model, case.solution
-    whole = sum(float(k.area().sum()) for k in lattices(solution))
+    at, model = case.case, solution.model
+    whole = sum(float(k.area().sum()) for k in lattices(solution).values())
     out = [q.CLOSED_SHARE.of(100.0 * case.measures.area_nodes / whole, at)]
-    for body in (model.upper, model.lower):
-        if case.state is None:
-            # f . (h + C f - d e) = 0, so the approach is the sum of the bodies' energies over the
-            # load (and of the gaps closed).
-            f, total = answer.force, float(answer.force.sum())
-            taken = float(f @ model.compliance(NORMAL, body=body) @ f) / total if total else 0.0
-        else:
-            taken = pressed_by(model, body, case.state.force)
-        out.append(q.APPROACH_OF.of(taken, at, n=body.name))
+    # f . (h + C f - d e) = 0, so the approach is the sum of the bodies' energies over the load (and
+    # of the gaps closed).
+    forces = case.solution.force[:, None] if case.state is None else case.state.force
+    out += [
+        q.APPROACH_OF.of(pressed_by(model, body, forces), at, n=body.name)
+        for body in (model.upper, model.lower)
+    ]
     if case.tilt is not None:
         out += [q.TILT_ABOUT_Y.of(case.tilt[0], at), q.TILT_ABOUT_X.of(case.tilt[1], at)]
     return out
@@ -323,19 +321,13 @@ def _tangent_within_3a(solution: ContactSolution, case: NormalCase, known: Refer
 
 
 def _worn_zones(solution: ContactSolution, case: NormalCase) -> list[Result]:
-    """Where the pressure peaks, beside the bands of the damper that the load comes from.
-
-    The worn areas themselves are printed nowhere; the bands are the scene's own. Without lattice
-    lines no peak is sought, and none is counted.
-    """
-    if case.force <= 0.0 or not all(k.lattice for k in lattices(solution)):
+    """Where the pressure peaks. Without lattice lines no peak is sought, and none is counted."""
+    if case.force <= 0.0 or not all(k.quads is None for k in lattices(solution).values()):
         return []
-    peaks, bands = faces.pressure_peaks(solution, case), faces.band_middles(solution)
+    peaks = faces.pressure_peaks(solution, case)
     out = [q.PRESSURE_PEAKS.of(len(peaks), case.case)]
     for i, (x, y) in enumerate(peaks):
-        nearest = min(bands, key=lambda c: abs(c - x)) if len(bands) == len(peaks) else None
-        source = "middle of the scene's loaded band" if nearest else ""
-        out.append(q.PRESSURE_PEAK_X.of(x, case.case, nearest, source, n=i + 1, exact=False))
+        out.append(q.PRESSURE_PEAK_X.of(x, case.case, n=i + 1))
         out.append(q.PRESSURE_PEAK_Y.of(y, case.case, n=i + 1))
     return out
 

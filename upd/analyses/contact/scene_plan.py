@@ -147,7 +147,7 @@ def _products(scene: Scene, on: Collection[str], family: Family) -> int:
     loads, cases = len(scene.loads.normal), 0
     if NORMAL in family.components:
         cases += loads * (3 if scene.wants("stiffness") else 1)
-        cases += scene.loads.curve_points * ("load curve" in on)
+        cases += scene.loads.curve_points * scene.wants("curve")
     if ALONG in family.components:
         sheared = len(scene.loads.tangential) if scene.wants("tangential") else 0
         cases += loads * (2 + sheared + _CYCLE_CASES * scene.wants("cycle"))
@@ -171,7 +171,7 @@ def _add_loads(cost: CostModel, scene: Scene, on: Collection[str]) -> None:
     """Seconds and bytes of all loads, with the effects ``on``."""
     nodes, k = cost.nodes, max(count["contact"] for count in cost.size.values())
     curved, n_load = is_curved(scene), len(scene.loads.normal)
-    n_curve = scene.loads.curve_points * ("load curve" in on)
+    n_curve = scene.loads.curve_points * scene.wants("curve")
     # A stiffness is a slope between two more loads.
     forces = n_load * (3 if scene.wants("stiffness") else 1) + n_curve
     lines = n_load * len(scene.loads.directions) * ("friction" in on)
@@ -194,7 +194,7 @@ def _add_loads(cost: CostModel, scene: Scene, on: Collection[str]) -> None:
         cost.seconds += coupled * (_COUPLED_S + dense_s(one)) + dense_s(m**3 / 3.0)
         cost.kept_bytes += _KEPT * 8.0 * m**2
     if "internal displacement" in on:
-        cost.seconds += (n_load * (1 + ("friction" in on)) + n_curve) * nodes * _INSIDE_S
+        cost.seconds += n_load * (1 + ("friction" in on)) * nodes * _INSIDE_S
         cost.kept_bytes += 48.0 * n_load * nodes
 
 
@@ -215,13 +215,15 @@ def _with_companion(plan: ContactPlan) -> ContactPlan:
     """
     if not plan.shown:
         return plan
-    off = ("load curve", "internal displacement")
-    effects = [replace(e, on=e.on and e.name not in off) for e in plan.effects]
-    # It goes through a cycle only where nothing else is sheared.
-    sheared = plan.scene.wants("stiffness", "tangential")
-    want = tuple(w for w in plan.scene.want if w != "cycle" or not sheared)
+    effects = [replace(e, on=e.on and e.name != "internal displacement") for e in plan.effects]
+    # It is sheared as far as the run is, and goes through a cycle only where nothing else is.
+    ratio = planned.largest_ratio(plan.scene)
+    want = [w for w in ("stiffness", "tangential") if plan.scene.wants(w)]
+    if plan.scene.wants("cycle") and "stiffness" not in want and not ratio > 0.0:
+        want.append("cycle")
+    looked_at = ("want", tuple(want)), ("loads.tangential", (ratio,))
     # What couples the directions is looked up in the whole compliance.
-    scene = changed(plan.scene, (("want", want), ("solver.route", "condensed"), *ALONE))
+    scene = changed(plan.scene, (*looked_at, ("solver.route", "condensed"), *ALONE))
     whole, family = _whole_parameters(scene), (Family(planned.COMPONENTS),)
     try:
         companion = contact_plan(scene, "full", family, effects, whole | _coarse(scene, whole))

@@ -81,8 +81,6 @@ class NormalCase(PressedContact):
         contact at once of a small load in that direction.
     displacement, reaction
         By body: (n_node, 3) mm, N on its distant set.
-    compression
-        By body: displacement at depth 3a, mm.
     shares, shear_shares
         By body: its share of the approach, and of the tangential displacement in mm per N.
     mesh_error
@@ -96,9 +94,8 @@ class NormalCase(PressedContact):
     stuck: dict[float, tuple[float, dict[str, float]]] = field(default_factory=dict)
     displacement: dict[str, Array] = field(default_factory=dict)
     reaction: dict[str, float] = field(default_factory=dict)
-    compression: dict[str, float] = field(default_factory=dict)
     shares: dict[str, BodyShare] = field(default_factory=dict)
-    shear_shares: dict[str, BodyShare] = field(default_factory=dict)
+    shear_shares: dict[str, float] = field(default_factory=dict)
     mesh_error: tuple[float, float] | None = None
 
     @property
@@ -119,7 +116,7 @@ class NormalCase(PressedContact):
     @property
     def finite_body_shear(self) -> float:
         """What the finite bodies add to the tangential displacement, mm per N."""
-        return sum(s.finite_body for s in self.shear_shares.values())
+        return sum(self.shear_shares.values())
 
 
 @dataclass
@@ -228,19 +225,13 @@ class ContactSolution:
         mu, N = self.plan.scene.contact.friction, case.normal.force
         return lambda r: mindlin.traction(r, hertz.radius, c, mu, N)
 
-    def beyond_3a(self, load: float) -> dict[str, float]:
-        """Displacement of each half-space at depth 3a under a normal load in N: body -> mm, empty
-        without a closed form.
-        """
-        hertz, model = self.hertz_of(load), self.model
-        if hertz is None:
-            return {}
-        out = {}
-        for name in (model.upper.name, model.lower.name):
-            data = self.plan.scene.materials[name]
-            a, p0 = hertz.radius, hertz.max_pressure
-            out[name] = float(hertz_axial_displacement(3.0 * a, a, p0, data.E, data.nu))
-        return out
+    def _within_3a(self, hertz: HertzPoint[float]) -> float:
+        """Hertz's approach less the displacement of both half-spaces at depth 3a, mm."""
+        within, a, p0 = hertz.approach, hertz.radius, hertz.max_pressure
+        for body in (self.model.upper, self.model.lower):
+            data = self.plan.scene.materials[body.name]
+            within -= float(hertz_axial_displacement(3.0 * a, a, p0, data.E, data.nu))
+        return within
 
     def normal_references(self, case: NormalCase) -> References:
         """Closed forms of the numbers of a normal load, of its stiffnesses and of a cycle after it;
@@ -249,7 +240,7 @@ class ContactSolution:
         hertz, F = self.hertz_of(case.force), case.force
         if hertz is None:
             return {}
-        C, within = self.shear_compliance(), hertz.approach - sum(self.beyond_3a(F).values())
+        C, within = self.shear_compliance(), self._within_3a(hertz)
         K_T, K_N = mindlin.initial_tangential_stiffness(hertz.radius, C), hertz.tangent_stiffness
         by_hertz = (
             (hertz.radius, (q.RADIUS_MOMENT, q.RADIUS_AREA, q.RADIUS_OUTERMOST)),

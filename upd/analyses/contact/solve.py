@@ -7,19 +7,22 @@ tangential contact at once, where the pressure follows the shear. Arrays in, arr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from upd.analyses.base import keeping
+from upd.analyses.base import Resolved, keeping
 from upd.analyses.contact import loading
 from upd.analyses.contact import plan as planned
 from upd.analyses.contact.bodies import learns, prepare, show_normal, solve_inside
 from upd.analyses.contact.faces import measured
 from upd.analyses.contact.plan import NORMAL, ContactPlan
+from upd.analyses.contact.results import make_results
 from upd.analyses.contact.solution import (
     ContactSolution,
     NormalCase,
@@ -27,13 +30,18 @@ from upd.analyses.contact.solution import (
     TangentialCase,
 )
 from upd.contact import tangential_contact, tangential_path
+from upd.contact.checks import few_threads
 from upd.contact.model import Body, ContactModel
 from upd.contact.normal import normal_contact, normal_curve
 from upd.contact.products import KNOWN, KNOWN_STIFFNESS, settled
 from upd.contact.tangential import TangentialContact, TangentialPath
 from upd.contact.tilt import tilted_contact
+from upd.errors import InputError, UpdError
 from upd.progress import Stages
-from upd.results import Case
+from upd.results import Case, Result
+from upd.results import quantities as q
+from upd.vary.solve import changed
+from upd.vary.variation import Key
 
 Array = NDArray[np.float64]
 #: loads in N of the whole contact and displacements in mm along them, from zero on; what the k-th
@@ -54,8 +62,6 @@ def solve_plan(
     plan: ContactPlan,
     stages: Stages,
     model: ContactModel | None = None,
-    *,
-    companion: bool = False,
 ) -> ContactSolution:
     """Run everything the plan calls for, but for the effects it leaves out.
 
@@ -65,14 +71,12 @@ def solve_plan(
     ----------
     model
         None: the plan's own.
-    companion
-        Whether it is one: its march to the tangential loads takes few steps.
     """
     solution = ContactSolution(plan, prepare(plan, stages) if model is None else model)
     with keeping(solution):
         solve_normal(solution, stages)
         if plan.effect("friction"):
-            solve_tangential(solution, stages, companion=companion)
+            solve_tangential(solution, stages)
         if plan.effect("internal displacement"):
             with stages("internal displacement", "back-substitution"):
                 solve_inside(solution)
@@ -117,7 +121,7 @@ def _curve_loads(plan: ContactPlan, largest: float, curved: bool) -> list[float]
     """
     loads = plan.scene.loads
     top = largest if loads.curve_to is None else loads.curve_to
-    if not plan.effect("load curve") or not top > 0.0:
+    if not plan.scene.wants("curve") or not top > 0.0:
         return []
     n = loads.curve_points
     if curved:
@@ -208,27 +212,12 @@ def _bodies_alone(solution: ContactSolution) -> tuple[Body, ...]:
 # -- tangential loads ------------------------------------------------------------------------------
 
 
-def march_shares(plan: ContactPlan, curved: bool, *, companion: bool = False) -> Array:
-    """Shares of mu N that the march to the tangential loads takes: of flat faces to gross slip, for
-    a curve.
-
-    On a companion that march takes four steps to the largest load: exact along one direction; along
-    two the slip turns a little from step to step. Coupled, which nodes stick depends on the steps:
-    the run's.
-    """
-    ratio = planned.largest_ratio(plan.scene)
-    if curved:
-        return np.asarray(_SHARES[ratio > _SHARES])
-    if not companion:
-        return PATH_SHARES
-    few = ratio * np.array([0.25, 0.5, 0.75])
-    return np.asarray(PATH_SHARES[ratio > PATH_SHARES] if plan.scene.coupled else few)
-
-
-def solve_tangential(solution: ContactSolution, stages: Stages, *, companion: bool = False) -> None:
+def solve_tangential(solution: ContactSolution, stages: Stages) -> None:
     """Stiffness, tangential loads, curve and cycle of every direction after every normal load."""
-    plan, scene = solution.plan, solution.plan.scene
-    shares = march_shares(plan, solution.curved, companion=companion)
+    scene = solution.plan.scene
+    # The march to the loads: of flat faces to gross slip, for a curve.
+    below = _SHARES[planned.largest_ratio(scene) > _SHARES]
+    shares = below if solution.curved else PATH_SHARES
     with stages("tangential contact", f"{len(solution.normal)} normal loads"):
         loaded = [case for case in solution.normal if case.solution.force.any()]
         # Twice: what one load teaches changes the answers of the others within the tolerance.
@@ -255,7 +244,7 @@ def _sheared(solution: ContactSolution, case: NormalCase, direction: float, shar
     for ratios in marches:
         load, moved, at = way.march(ratios)
         if not solution.curved:
-            solution.paths.append(loading.LoadPath(own, case.case, load, moved))
+            solution.paths.append(loading.LoadPath(own, load, moved))
         for ratio in (r for r in loads if r in ratios):
             solution.tangential.append(at(int(np.searchsorted(ratios, ratio)), ratio))
     if scene.wants("cycle"):
@@ -369,7 +358,7 @@ class Frozen:
         T, d, work = self.loop(self.loads.cycle_amplitude * shares)
         area = abs(float(np.trapezoid(T[begin:], d[begin:])))
         slip_work = float(work[begin:].sum())
-        return loading.LoadPath(case, self.case.case, T, d, True, slip_work, area)
+        return loading.LoadPath(case, T, d, True, slip_work, area)
 
     def learn(self) -> None:
         """Show bodies that learn the tractions of every tangential load and of the cycle.
@@ -460,3 +449,99 @@ class _Coupled(Frozen):
         found = self.state.found.go_on(load=loading.loads_along(self.state, values, self.unit))
         moved = (found.displacement[:, 1:3] - before.motion[1:3]) @ self.unit
         return np.insert(values, 0, 0.0), np.insert(moved, 0, 0.0), found.friction_loss(before)
+
+
+# -- effects left out ------------------------------------------------------------------------------
+#
+# Each is verified on a number of the run, solved again with it on the plan's companion, a coarser
+# whole model with all three directions condensed together: once without the effect and once with it
+# switched on.
+
+_NORMAL = ("K_N_tangent_raw",), ("approach",)
+_SHEAR = ("K_T_initial_raw", "K_Tx_initial_raw", "K_Ty_initial_raw")
+_AREAS = ("contact_area", "stick_area")
+#: effect -> numbers that show what it changes: the first row of which a run has some; coupling also
+#: changes areas
+_SHOWN: Mapping[str, tuple[tuple[str, ...], ...]] = {
+    planned.TILT: _NORMAL,
+    planned.COUPLING: (
+        (*_NORMAL[0], *_SHEAR),
+        ("approach", "K_T_secant_raw", "cycle_energy"),
+    ),
+    planned.DIRECTIONS: ((*_SHEAR, "K_T_secant_raw", "cycle_energy"), ("K_T_tangent_raw",)),
+}
+_SWITCHES: Mapping[str, tuple[str, object]] = {
+    planned.TILT: ("contact.tilt", "free"),
+    planned.COUPLING: ("contact.coupling", "coupled"),
+    planned.DIRECTIONS: ("contact.directions", 2),
+}
+#: of a damper that tips over when its tilt is free
+_TIPS = (
+    "the load line runs beside the contact, so that a damper free to tilt tips over: give a "
+    "contact.load_point inside the contact, or choose another contact.distant set"
+)
+
+
+def solve_left_out(solution: ContactSolution, stages: Stages) -> None:
+    """Numbers again with the effects that the plan leaves out."""
+    companion = solution.plan.companion
+    if companion is not None:
+        with stages("effects left out", "on a coarser whole model"):
+            solution.left_out += _left_out(solution, companion)
+
+
+def _left_out(solution: ContactSolution, companion: ContactPlan) -> Iterator[Resolved]:
+    """Every number that shows what an effect left out changes."""
+    without, model = _under_load(make_results(solution)), None
+    with suppress(UpdError):
+        model = prepare(companion, Stages(), "companion")
+        without = _numbers(companion, model)
+    for effect in solution.plan.shown:
+        included, remedy = dict[Key, float](), ""
+        try:
+            if model is not None:
+                included = {(r.name, r.case): r.value for r in _with(effect, companion, model)}
+        except InputError:
+            remedy = _TIPS
+        except (UpdError, np.linalg.LinAlgError):
+            pass
+        yield from _changes(effect, without, included, remedy)
+
+
+def _changes(
+    effect: str, without: Sequence[Result], included: Mapping[Key, float], remedy: str
+) -> Iterator[Resolved]:
+    """The numbers that an effect changes; NaN where none was found with it.
+
+    A body that tips over has neither stiffness nor approach: 0 N/mm, or NaN.
+    """
+    areas = {r.case.load: r.value for r in without if r.name == q.CONTACT_AREA.name}
+    known = [r for r in without if (r.name, r.case) in included or not included]
+    had = {r.name for r in known}
+    names = next((row for row in _SHOWN[effect] if had.intersection(row)), ())
+    names += _AREAS if effect == planned.COUPLING else ()
+    for r in (one for one in known if one.name in names):
+        none = 0.0 if remedy and r.unit == "N/mm" else float("nan")
+        value, area = included.get((r.name, r.case), none), areas.get(r.case.load, 0.0)
+        over = (area, q.STICK_AREA.part_of) if r.name == q.STICK_AREA.name and area else None
+        yield Resolved(effect, r.name, r.case, r.value, value, r.unit, remedy, over=over)
+
+
+def _under_load(found: Sequence[Result]) -> list[Result]:
+    """Numbers of the loads that press: an effect changes nothing else."""
+    return [one for one in found if one.case.load and not one.withheld]
+
+
+def _numbers(plan: ContactPlan, model: ContactModel, *switch: tuple[str, object]) -> list[Result]:
+    """Of the companion, with an effect switched on."""
+    switched = replace(plan, scene=changed(plan.scene, switch))
+    with few_threads(model.gap):
+        return _under_load(make_results(solve_plan(switched, Stages(), model)))
+
+
+def _with(effect: str, plan: ContactPlan, model: ContactModel) -> list[Result]:
+    """The companion's numbers with an effect; InputError where its upper body tips over."""
+    if effect == planned.TILT and plan.scene.coupled:
+        # with friction it would not
+        _numbers(plan, model, _SWITCHES[effect], ("contact.coupling", "uncoupled"))
+    return _numbers(plan, model, _SWITCHES[effect])

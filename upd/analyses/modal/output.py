@@ -68,7 +68,9 @@ def _modes(found: ModeSet) -> Group:
     variables: dict[str, Any] = {
         "frequency": variable("mode", [m.frequency for m in found.modes], "Hz"),
         "family": variable(
-            "mode", [{"x": 0, "y": 1}.get(m.family, -1) for m in found.modes], flag_meanings="x y"
+            "mode",
+            [{"x": 0, "y": 1}.get(m.body.family, -1) for m in found.modes],
+            flag_meanings="x y",
         ),
     }
     return Group(variables, content=MODES, case=found.case)
@@ -100,7 +102,8 @@ def write_files(solution: ModalSolution, folder: Path) -> None:
             )
             # The rows after these are modal coordinates.
             write_dof_map(
-                folder / "matrices" / f"{name}.mapping", DofMap.of_dofs(r.free[r.model.boundary])
+                folder / "matrices" / f"{name}.mapping",
+                DofMap.of_dofs(r.body.free[r.model.boundary]),
             )
     if scene.wants("pictures"):
         _write_shapes(solution, folder)
@@ -154,7 +157,9 @@ def whole_shapes(
     meshes, _ = recipes.build_mesh(
         scene.recipe, parameters(scene, found.arrangement, found.kind, "full")
     )
-    maps = {m.body.name: _onto(m.body.mesh, meshes[m.body.name]) for m in found.modes if m.family}
+    maps = {
+        m.body.name: _onto(m.body.mesh, meshes[m.body.name]) for m in found.modes if m.body.family
+    }
     return meshes, [
         (m, {m.body.name: _on_whole(m, meshes[m.body.name], maps)}) for m in found.modes
     ]
@@ -173,11 +178,11 @@ def _onto(half: Mesh, mesh: Mesh) -> IntArray:
 
 
 def _on_whole(mode: RigMode, mesh: Mesh, maps: dict[str, IntArray]) -> Array:
-    if not mode.family:
+    if not mode.body.family:
         return mode.shape
     u = mode.shape[maps[mode.body.name]].copy()
     # Even modes: x and z alike on both sides, y opposite; odd modes the other way round.
-    signs = np.array([1.0, -1.0, 1.0]) * (1.0 if mode.family == "x" else -1.0)
+    signs = np.array([1.0, -1.0, 1.0]) * (1.0 if mode.body.family == "x" else -1.0)
     other = mesh.points[:, 1] < 0.0
     u[other] *= signs
     return np.asarray(u)

@@ -66,17 +66,13 @@ def _add_more(cost: CostModel, scene: RigScene, arrangement: str) -> None:
             kept = 3 * (count["contact"] + 2)
             cost.reduction(f"{body}, reduction", count, kept, scene.reduction.count)
             if scene.wants("response") and body == "right":
-                cost.seconds += _direct_seconds(count["nodes"])
+                # two solutions off resonance
+                cost.seconds += 2.0 * _DIRECT_S * (3.0 * count["nodes"]) ** _DIRECT_POWER
     right = cost.size.get(f"right, {arrangement}")
     if scene.wants("response") and right is not None:
-        cost.seconds += 0.3 + _direct_seconds(right["nodes"])
+        cost.seconds += 0.3
         if scene.left_out.solves:
             cost.modes(f"right, {arrangement}, modes", right)
-
-
-def _direct_seconds(nodes: int) -> float:
-    """Two solutions off resonance."""
-    return float(2.0 * _DIRECT_S * (3.0 * nodes) ** _DIRECT_POWER)
 
 
 def _sizes(scene: RigScene, found: list[tuple[str, str]], symmetry: str) -> dict[str, Count]:

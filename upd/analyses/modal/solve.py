@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,6 @@ from scipy.sparse.linalg import spsolve
 from upd.analyses.base import Resolved, keeping
 from upd.analyses.modal.plan import MODES_ABOVE, MORE_MODES, ModalPlan, configurations, parameters
 from upd.dynamics import (
-    ModalSystem,
-    find_peaks,
     frequency_response,
     modal_system,
     peak_response,
@@ -35,8 +33,9 @@ from upd.scene import RigScene
 
 Array = NDArray[np.float64]
 
-#: mirror family -> components the plane y = 0 holds: x and z move evenly in "x", y does in "y"
-FAMILIES = {"x": (1,), "y": (0, 2)}
+#: mirror family -> components the plane y = 0 holds: x and z move evenly in "x", y does in "y";
+#: "" of a whole body
+FAMILIES: dict[str, tuple[int, ...]] = {"": (), "x": (1,), "y": (0, 2)}
 _AXIS_X = 0
 #: parts of the first frequency at which the reduced model is compared with the full one
 OFF_RESONANCE = (0.5, 1.2)
@@ -44,47 +43,56 @@ OFF_RESONANCE = (0.5, 1.2)
 
 @dataclass(frozen=True)
 class RigBody:
-    """One body of one configuration: mesh (half or whole), K and M with all dofs."""
+    """One body of one configuration: mesh (half or whole), K and M with all dofs, and the mirror
+    family of its motion.
+    """
 
     name: str
     mesh: Mesh
     K: Symmetric
     M: Symmetric
+    family: str = ""
 
-    def free(self, held: tuple[int, ...]) -> NDArray[np.int64]:
-        """Dofs left when the clamped faces are held, and the components ``held`` on the mirror
-        plane.
-        """
+    @cached_property
+    def free(self) -> NDArray[np.int64]:
+        """Dofs left when the clamped faces are held, and the mirror plane as its family has it."""
         fixed = np.zeros((self.mesh.n_node, 3), bool)
         fixed[self.mesh.nodes["clamped"]] = True
-        for c in held:
+        for c in FAMILIES[self.family]:
             fixed[self.mesh.nodes["plane_y"], c] = True
         return np.flatnonzero(~fixed.ravel())
+
+    @property
+    def matrices(self) -> tuple[Symmetric, Symmetric]:
+        """K and M of the free dofs."""
+        return self.K.submatrix(self.free), self.M.submatrix(self.free)
+
+    def whole(self, u: Array) -> Array:
+        """Values (n, ...) of the free dofs on all dofs."""
+        out = np.zeros((3 * self.mesh.n_node, *u.shape[1:]))
+        out[self.free] = u
+        return out
 
 
 @dataclass(frozen=True)
 class RigMode:
-    """One mode: frequency in Hz, its body and mirror family ("" without one), its displacement
-    (n_node, 3) on the body's mesh.
-    """
+    """One mode: frequency in Hz, its body, its displacement (n_node, 3) on the body's mesh."""
 
     frequency: float
     body: RigBody
-    family: str
     shape: Array
 
 
 @dataclass
 class ModeSet:
-    """Modes of one configuration, rising, and the answers of their solver.
-
-    (body, mirror family, modes).
+    """Modes of one configuration, rising, and the answers of their solver by body and mirror
+    family.
     """
 
     arrangement: str
     kind: str
     modes: list[RigMode]
-    found: list[tuple[RigBody, str, Modes]]
+    found: list[tuple[RigBody, Modes]]
 
     @property
     def case(self) -> Case:
@@ -94,13 +102,9 @@ class ModeSet:
 
 @dataclass(frozen=True)
 class ReducedBlade:
-    """Craig-Bampton model of one blade.
-
-    Its free dofs, the model, its first frequencies and those of the full blade in Hz.
-    """
+    """Craig-Bampton model of one blade, its first frequencies and those of the full blade in Hz."""
 
     body: RigBody
-    free: NDArray[np.int64]
     model: ReducedModel
     frequency: Array
     full: Array
@@ -122,13 +126,8 @@ class RigResponse:
         Modal damping ratio.
     peak
         Frequency in Hz and height in (m/s2)/N of the free right blade's peak in the band, if any.
-    half_power
-        Damping ratio read from that peak's half-power points; NaN without a peak.
     participation
         phi_force phi_output of the peak's mode, 1/kg.
-    modal_error
-        Largest relative difference of the undamped modal response from a direct solve, off
-        resonance.
     against_full
         Part of the first frequency -> accelerance of the reduced and of the full right blade.
     """
@@ -138,9 +137,7 @@ class RigResponse:
     accelerance: dict[str, dict[str, NDArray[np.complex128]]]
     damping: float
     peak: tuple[float, float] | None
-    half_power: float
     participation: float
-    modal_error: float
     against_full: dict[float, tuple[float, float]]
 
 
@@ -203,39 +200,25 @@ def _bodies(plan: ModalPlan, arrangement: str, kind: str, symmetry: str) -> list
 def _mode_set(plan: ModalPlan, arrangement: str, kind: str, stages: Stages) -> ModeSet:
     with stages("mesh and assembly", f"{kind}, {arrangement}"):
         bodies = _bodies(plan, arrangement, kind, plan.symmetry)
-    families = FAMILIES if plan.symmetry == "half" else {"": ()}
-    jobs = [(body, family, held) for body in bodies for family, held in families.items()]
     sizes = ", ".join(f"{b.name} {3 * b.mesh.n_node} dofs" for b in bodies)
+    families = ("x", "y") if plan.symmetry == "half" else ("",)
+    jobs = [replace(body, family=family) for body in bodies for family in families]
     with stages("modes", f"{kind}, {arrangement}: {sizes}"):
         found = in_parallel(
-            [partial(_modes, plan, body, held) for body, _, held in jobs], plan.workers
+            [partial(_modes, plan, body, plan.scene.modes.below) for body in jobs], plan.workers
         )
-    out: list[RigMode] = []
-    for (body, family, held), one in zip(jobs, found, strict=True):
-        free = body.free(held)
-        for f, x in zip(one.frequency, one.shapes.T, strict=True):
-            u = np.zeros(3 * body.mesh.n_node)
-            u[free] = x
-            out.append(RigMode(float(f), body, family, u.reshape(-1, 3)))
+    pairs = list(zip(jobs, found, strict=True))
+    out = [
+        RigMode(float(f), body, body.whole(x).reshape(-1, 3))
+        for body, one in pairs
+        for f, x in zip(one.frequency, one.shapes.T, strict=True)
+    ]
     out.sort(key=lambda m: m.frequency)
-    return ModeSet(
-        arrangement,
-        kind,
-        out,
-        [(b, family, m) for (b, family, _), m in zip(jobs, found, strict=True)],
-    )
+    return ModeSet(arrangement, kind, out, pairs)
 
 
-def _modes(
-    plan: ModalPlan, body: RigBody, held: tuple[int, ...], below: float | None = None
-) -> Modes:
-    free = body.free(held)
-    return modes(
-        body.K.submatrix(free),
-        body.M.submatrix(free),
-        below_hz=plan.scene.modes.below if below is None else below,
-        solver=plan.scene.solver.name,
-    )
+def _modes(plan: ModalPlan, body: RigBody, below: float) -> Modes:
+    return modes(*body.matrices, below_hz=below, solver=plan.scene.solver.name)
 
 
 def _reduce(solution: ModalSolution, stages: Stages) -> None:
@@ -255,9 +238,8 @@ def _reduce(solution: ModalSolution, stages: Stages) -> None:
 
 def _reduced(solution: ModalSolution, body: RigBody) -> ReducedBlade:
     scene = solution.plan.scene
-    free = body.free(())
     kept = np.concatenate([body.mesh.nodes[name] for name in ("patch", "force", "accelerometer")])
-    boundary = np.searchsorted(free, (3 * np.unique(kept)[:, None] + np.arange(3)).ravel())
+    boundary = np.searchsorted(body.free, (3 * np.unique(kept)[:, None] + np.arange(3)).ravel())
     free_modes = free_set(solution, scene.modes.arrangements[0]).modes
     full = [m.frequency for m in free_modes if m.body.name == body.name]
     if not full:
@@ -266,14 +248,13 @@ def _reduced(solution: ModalSolution, body: RigBody) -> ReducedBlade:
             "Hz; raise it"
         )
     model = craig_bampton(
-        body.K.submatrix(free),
-        body.M.submatrix(free),
+        *body.matrices,
         boundary,
         **_wanted(scene, len(full)),
         rows=boundary,
         solver=scene.solver.name,
     )
-    return ReducedBlade(body, free, model, model.modes(count=len(full)).frequency, np.array(full))
+    return ReducedBlade(body, model, model.modes(count=len(full)).frequency, np.array(full))
 
 
 def _wanted(scene: RigScene, n_full: int) -> dict[str, Any]:
@@ -292,24 +273,22 @@ def free_set(solution: ModalSolution, arrangement: str) -> ModeSet:
     return next(s for s in solution.sets if s.arrangement == arrangement and s.kind == "free")
 
 
-def _system_modes(found: ModeSet, names: tuple[str, ...]) -> tuple[Modes, RigBody, str]:
-    """The modes of the named bodies whose plane y = 0 moves in itself, the only ones a force in
-    that plane excites; body and family.
+def _system_modes(found: ModeSet, name: str) -> tuple[Modes, RigBody]:
+    """The modes of the named body whose plane y = 0 moves in itself, the only ones a force in that
+    plane excites.
     """
-    mine = [m for m in found.modes if m.body.name in names and m.family in ("x", "")]
-    if not mine:
-        raise InputError(
-            f"modes.below: no mode of {', '.join(names)} below it moves along x; raise it"
-        )
-    first = next(m for b, family, m in found.found if b.name in names and family in ("x", ""))
-    # Half a rig has half the modal mass: its shapes are those of the whole times sqrt 2.
-    scale = np.sqrt(0.5) if mine[0].family else 1.0
-    shapes = scale * np.column_stack([m.shape.ravel() for m in mine])
-    return (
-        replace(first, frequency=np.array([m.frequency for m in mine]), shapes=shapes),
-        mine[0].body,
-        mine[0].family,
-    )
+    body, mine = next((b, m) for b, m in found.found if b.name == name and b.family != "y")
+    if not len(mine.frequency):
+        raise InputError(f"modes.below: no mode of {name} below it moves along x; raise it")
+    return _on_rig(body, mine), body
+
+
+def _on_rig(body: RigBody, found: Modes) -> Modes:
+    """Modes with their shapes on all dofs.
+
+    Half a rig has half the modal mass: its shapes are those of the whole times sqrt 2.
+    """
+    return replace(found, shapes=body.whole(found.shapes) * (np.sqrt(0.5) if body.family else 1.0))
 
 
 def probe(mesh: Mesh, name: str) -> int:
@@ -326,8 +305,8 @@ def _response(solution: ModalSolution) -> RigResponse:
     scene = solution.plan.scene
     choice, arrangement = scene.response, scene.modes.arrangements[0]
     grid = np.linspace(choice.start, choice.stop, choice.points)
-    free, body, family = _system_modes(free_set(solution, arrangement), ("right",))
-    static, (force, output) = _static(body, family), probes(body.mesh)
+    free, body = _system_modes(free_set(solution, arrangement), "right")
+    static, (force, output) = _static(body), probes(body.mesh)
     band = (choice.start, choice.stop)
     system = modal_system(free, choice.damping, static=static)
     zeta = choice.damping
@@ -352,9 +331,7 @@ def _response(solution: ModalSolution) -> RigResponse:
         curves,
         zeta,
         peak,
-        _half_power(system, force, output, at, zeta) if peak else float("nan"),
         1e-3 * abs(float(nearest[force] * nearest[output])),
-        modal_error(free, body, family),
         _against_full(solution),
     )
 
@@ -364,14 +341,9 @@ def _more_modes(solution: ModalSolution) -> Iterator[Resolved]:
     response, scene = solution.response, solution.plan.scene
     if response is None or response.peak is None:
         return
-    _, body, family = _system_modes(free_set(solution, response.arrangement), ("right",))
-    held = FAMILIES.get(family, ())
-    found = _modes(solution.plan, body, held, MORE_MODES * scene.modes.below)
-    shapes = np.zeros((3 * body.mesh.n_node, len(found.frequency)))
-    shapes[body.free(held)] = found.shapes * (np.sqrt(0.5) if family else 1.0)
-    system = modal_system(
-        replace(found, shapes=shapes), response.damping, static=_static(body, family)
-    )
+    _, body = _system_modes(free_set(solution, response.arrangement), "right")
+    found = _on_rig(body, _modes(solution.plan, body, MORE_MODES * scene.modes.below))
+    system = modal_system(found, response.damping, static=_static(body))
     force, output = probes(body.mesh)
     band, of = (scene.response.start, scene.response.stop), q.FREE_PEAK_ACCELERANCE
     height = float(peak_response(system, force, [output], band)[1])
@@ -388,7 +360,7 @@ def _unlocked(solution: ModalSolution) -> Iterator[Resolved]:
     first, data = free.modes[0], plan.scene.material
     material = Material(data.E, data.nu, data.density)
     K = Symmetric.of(stiffness(first.body.mesh, material, "hex8i"))
-    found = _modes(plan, replace(first.body, K=K), FAMILIES.get(first.family, ()), first.frequency)
+    found = _modes(plan, replace(first.body, K=K), first.frequency)
     lowest, of = float(found.frequency.min(initial=np.inf)), q.F_FREE
     remedy = 'fully integrated hex8 is too stiff in bending: use mesh.element = "hex20" or "hex8i"'
     yield Resolved(
@@ -396,23 +368,12 @@ def _unlocked(solution: ModalSolution) -> Iterator[Resolved]:
     )
 
 
-def _half_power(system: ModalSystem, force: int, output: int, at: float, zeta: float) -> float:
-    """Damping ratio picked from the half-power points around the peak, on a grid as fine as the
-    peak is narrow.
-    """
-    around = np.linspace(max(at * (1.0 - 20.0 * zeta), 0.1 * at), at * (1.0 + 20.0 * zeta), 801)
-    peaks = find_peaks(
-        around, frequency_response(system, force, [output], around).magnitude[:, 0], above=0.9
-    )
-    return float(peaks.zeta[0]) if len(peaks.zeta) else float("nan")
-
-
 def _glued(found: ModeSet, zeta: float, grid: Array) -> dict[str, NDArray[np.complex128]]:
-    own, body, family = _system_modes(found, ("rig",))
+    own, body = _system_modes(found, "rig")
     mesh = body.mesh
     outputs = [probe(mesh, f"{side}_accelerometer") for side in ("left", "right")]
     H = frequency_response(
-        modal_system(own, zeta, static=_static(body, family)),
+        modal_system(own, zeta, static=_static(body)),
         probe(mesh, "right_force"),
         outputs,
         grid,
@@ -420,48 +381,13 @@ def _glued(found: ModeSet, zeta: float, grid: Array) -> dict[str, NDArray[np.com
     return {"left": H[:, 0], "right": H[:, 1]}
 
 
-def _static(body: RigBody, family: str) -> Callable[[Array], Array]:
+def _static(body: RigBody) -> Callable[[Array], Array]:
     """K^-1 f of the whole body on the nodes of the model: what the modes left out contribute.
 
     Half a model carries half the force.
     """
-    free = body.free(FAMILIES.get(family, ()))
-    factor, part = factorise(body.K.submatrix(free)), 0.5 if family else 1.0
-
-    def displacement(f: Array) -> Array:
-        u = np.zeros(3 * body.mesh.n_node)
-        u[free] = factor.solve(part * f[free])
-        return u
-
-    return displacement
-
-
-def modal_error(own: Modes, body: RigBody, family: str) -> float:
-    """Undamped modal response, static correction included, against direct solves of K - w^2 M off
-    resonance: what the band leaves out.
-    """
-    free, (force, output) = body.free(FAMILIES.get(family, ())), probes(body.mesh)
-    f = np.zeros(3 * body.mesh.n_node)
-    f[force] = 1.0
-    natural, rest = (2.0 * np.pi * own.frequency) ** 2, _static(body, family)(f)
-    direct = _undamped(body, free)
-    worst = 0.0
-    for part in OFF_RESONANCE:
-        w2 = (part**2) * natural[0]
-        u = (0.5 if family else 1.0) * direct(w2)
-        share = own.shapes[force]
-        modal = own.shapes[output] @ (share / (natural - w2) - share / natural) + rest[output]
-        worst = max(worst, abs(float(modal) / u - 1.0))
-    return worst
-
-
-def _undamped(body: RigBody, free: NDArray[np.int64]) -> Callable[[float], float]:
-    """w^2 -> displacement of the accelerometer per unit force, by a direct solve of K - w^2 M."""
-    K, M = body.K.submatrix(free), body.M.submatrix(free)
-    force, output = np.searchsorted(free, probes(body.mesh))
-    f = np.zeros(len(free))
-    f[force] = 1.0
-    return lambda w2: float(spsolve(whole(combined(K, -w2, M)).tocsc(), f)[output])
+    factor, part = factorise(body.K.submatrix(body.free)), 0.5 if body.family else 1.0
+    return lambda f: body.whole(factor.solve(part * f[body.free]))
 
 
 def _against_full(solution: ModalSolution) -> dict[float, tuple[float, float]]:
@@ -471,11 +397,14 @@ def _against_full(solution: ModalSolution) -> dict[float, tuple[float, float]]:
     one = next((r for r in solution.reductions if r.body.name == "right"), None)
     if one is None:
         return {}
-    force, output = (int(at) for at in np.searchsorted(one.free, probes(one.body.mesh)))
-    direct = _undamped(one.body, one.free)
-    out = {}
+    force, output = (int(at) for at in np.searchsorted(one.body.free, probes(one.body.mesh)))
+    K, M = one.body.matrices
+    f, out = np.zeros(len(one.body.free)), {}
+    f[force] = 1.0
     for part in OFF_RESONANCE:
         w2 = (2.0 * np.pi * part * float(one.full[0])) ** 2
         moved = np.linalg.solve(one.model.K - w2 * one.model.M, one.model.at([force])[0])
-        out[part] = (-1e-3 * w2 * float(one.model.at([output])[0] @ moved), -1e-3 * w2 * direct(w2))
+        direct = spsolve(whole(combined(K, -w2, M)).tocsc(), f)[output]
+        reduced = one.model.at([output])[0] @ moved
+        out[part] = (-1e-3 * w2 * float(reduced), -1e-3 * w2 * float(direct))
     return out

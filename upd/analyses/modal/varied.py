@@ -51,36 +51,23 @@ def levels(plan: ModalPlan) -> Levels:
 
 
 def _corrected(solution: ModalSolution, numbers: Sequence[Result], found: Estimates) -> Estimates:
-    """The errors by the mesh, and of the reduced model by the modes it keeps."""
-    # The reduced model has the mesh of the full one.
-    of_full = {
-        (r.name, r.case): found[full.name, full.case]
-        for r in numbers
-        if r.case == REDUCED and (full := _full(r, numbers)) is not None
-    }
-    return merged({**found, **of_full}, _by_modes(solution, numbers))
-
-
-def _full(reduced: Result, numbers: Sequence[Result]) -> Result | None:
-    """The frequency of the full model that a reduced one stands for."""
-    quantity, n = quantity_of(reduced.name)
-    wanted = quantity.full.format(n=n)
-    return next((r for r in numbers if r.name == wanted), None)
-
-
-def _by_modes(solution: ModalSolution, numbers: Sequence[Result]) -> Estimates:
-    """What the modes left out change: known against the full model, or solved again."""
-    out = {}
-    for one in numbers:
-        full = _full(one, numbers) if one.case == REDUCED else None
+    """The errors by the mesh, and by the modes left out: of the reduced model, which has the mesh
+    of the full one, against that; of the peak solved again.
+    """
+    by_mesh, by_modes = dict(found), {}
+    for one in (r for r in numbers if r.case == REDUCED):
+        quantity, n = quantity_of(one.name)
+        full = next((r for r in numbers if r.name == quantity.full.format(n=n)), None)
         if full is not None:
+            by_mesh[one.name, one.case] = found[full.name, full.case]
             error = abs(one.value / full.value - 1.0)
-            out[one.name, one.case] = (ErrorPart(KEPT, error, "against the full model"),)
+            part = ErrorPart(KEPT, error, "against the full model")
+            by_modes[one.name, one.case] = (part,)
     for again in (one for one in solution.left_out if one.effect == MODES_ABOVE):
         error = abs(again.included / again.without - 1.0)
         basis = "solved again with the modes up to twice the limit"
-        out[again.quantity, again.case] = (ErrorPart(KEPT, error, basis),)
-    return out
+        by_modes[again.quantity, again.case] = (ErrorPart(KEPT, error, basis),)
+    return merged(by_mesh, by_modes)
 
 
 # -- an accuracy that is wanted --------------------------------------------------------------------

@@ -16,11 +16,6 @@ from upd.results import Arrays, Group
 from upd.scene.forced_contact import SIDES
 
 _STYLES: dict[str, Style] = dict(zip(SEATING, ("line", "dashed", "dotted"), strict=True))
-#: how the variables of a motion begin, title, how its axis is named, unit and its scale
-_MOTIONS = (
-    ("u", "Shift of the damper", "along", "µm", UM),
-    ("r", "Turn of the damper", "about", "µrad", 1e6),
-)
 _F_C, _FORCE = Axis("centrifugal force F_C", "N", low=0.0), Axis("force on the face", "N")
 #: open, stick, slip of the solver -> open, slip, stick of maps
 _ORDER = np.array([0.0, 2.0, 1.0])
@@ -28,7 +23,7 @@ _ORDER = np.array([0.0, 2.0, 1.0])
 
 def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     """Forces while F_C is raised and lowered, pressure, stick and slip, hysteresis of a blade
-    moved, motion of the damper.
+    moved.
     """
     histories = {case_of(g).name: g for g in with_content(arrays, HISTORY, MOVED)}
     faces: dict[tuple[str, str], list[Group]] = {}
@@ -36,9 +31,8 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
         case = case_of(group)
         faces.setdefault((case.name, case.side), []).append(group)
     moved = with_content(arrays, MOVED)
-    seating = [histories[name] for name in SEATING if name in histories]
     return [
-        *(_seating(histories, summary, side) for side in SIDES if len(seating) == len(SEATING)),
+        *(_seating(histories, summary, side) for side in SIDES if set(SEATING) <= set(histories)),
         *(
             face_pressure(f"{name}, {side} face", groups, sheet=name == RAISED)
             for (name, side), groups in faces.items()
@@ -46,7 +40,6 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
         *(_states(name, side, groups) for (name, side), groups in faces.items()),
         # what the scene moves first, then the vibration of a way of loading
         *(_moved(group) for group in sorted(moved, key=lambda one: case_of(one).name in WAYS)),
-        *(_damper(seating, *kind) for kind in _MOTIONS if seating),
     ]
 
 
@@ -120,23 +113,3 @@ def _moved(group: Group) -> Chart:
         figure="hysteresis",
         sheet=name not in WAYS,
     )
-
-
-def _damper(
-    seating: list[Group], kind: str, title: str, way: str, unit: str, scale: float
-) -> Chart:
-    """Shifts or turns of the damper while F_C is raised and lowered."""
-    F = np.concatenate([[0.0], *(values(g, "centrifugal") for g in seating)])
-    names = [n for n in seating[0] if n.startswith(f"damper_{kind}")]
-    traces = tuple(
-        Trace(
-            f"{way} {name[-1]}",
-            F,
-            np.concatenate([[0.0], *(values(g, name, scale) for g in seating)]),
-            "line",
-            k,
-        )
-        for k, name in enumerate(names)
-    )
-    ordinate = Axis(title.split(" ")[0].lower(), unit)
-    return Chart(title, _F_C, ordinate, traces, figure="damper_motion")

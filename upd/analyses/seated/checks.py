@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from upd.analyses.base import conditions
 from upd.analyses.seated.interface import Array, Interface
-from upd.analyses.seated.plan import RAISED
 from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, SLIP
 from upd.results import Check
@@ -22,7 +19,6 @@ WORK_ROUNDING = 1e-8
 def check_solution(solution: SeatedSolution) -> list[Check]:
     """All self-checks."""
     checks = [check for phase in solution.phases.values() for check in _phase(solution, phase)]
-    checks += _proportional(solution)
     limits = solution.plan.scene.left_out
     return checks + [one.check(limits) for one in solution.omissions]
 
@@ -144,20 +140,3 @@ def _energy_misfit(solution: SeatedSolution, phase: Phase, gap: Array, step: Arr
     moves = np.abs(np.diff(motion, axis=0)) @ np.abs(of.columns.T)
     size = float((np.abs(f[1:]) * moves).sum())
     return float(np.abs(found.work - elastic - friction - closing).max() / size)
-
-
-def _proportional(solution: SeatedSolution) -> Iterator[Check]:
-    """Faces that fit take forces in proportion to F_C as long as it only rises."""
-    phase = solution.phases.get(RAISED)
-    if phase is None or solution.plan.scene.contact.worn > 0.0:
-        return
-    per = phase.found.force / phase.centrifugal[:, None, None]
-    yield Check(
-        "proportional loading",
-        phase.case,
-        float(np.abs(per - per[-1]).max() / np.abs(per[-1]).max()),
-        1e-6,
-        "forces / F_C of all steps against the last",
-        "more seating.steps",
-        fatal=False,
-    )

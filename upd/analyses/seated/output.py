@@ -11,13 +11,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from upd.analyses.contact.faces import FaceLattice, joined
 from upd.analyses.seated.plan import AGAIN, LOWERED, RAISED
 from upd.analyses.seated.results import platform_force
 from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, STICK
-from upd.contact.patch import make_patch
+from upd.contact.patch import Patch, make_patch
+from upd.mesh import IntArray
 from upd.results import Group, variable
 from upd.scene.forced_contact import SIDES, Side
 
@@ -52,13 +54,13 @@ def arrays(solution: SeatedSolution) -> dict[str, Group]:
         )
     faces = _faces(solution)
     for phase in solution.phases.values():
-        for side, face in faces:
-            name = f"face {side} {face.name} {phase.name}".replace("  ", " ")
+        for side, part, face in faces:
+            name = f"face {side} {part} {phase.name}".replace("  ", " ")
             out[name] = Group(
                 _face(solution, face, phase),
                 content=FACE,
                 case=replace(phase.case, side=side),
-                **({"patch": face.name} if face.name else {}),
+                **({"patch": part} if part else {}),
             )
     return out
 
@@ -94,29 +96,29 @@ def _history(solution: SeatedSolution, phase: Phase) -> Variables:
     return out
 
 
-def _face(solution: SeatedSolution, k: FaceLattice, phase: Phase) -> Variables:
+def _face(solution: SeatedSolution, k: Patch, phase: Phase) -> Variables:
     """Pressure, traction, slip and state on a face's lattice after a phase."""
     of, found, place = solution.interface, phase.found, "x y"
     force, slip = found.force[-1], found.slip[-1]
-    area, normal = (k.field(one, extensive=True) for one in (of.area, force[:, 0]))
+    area, normal = (k.whole(one, extensive=True) for one in (of.area, force[:, 0]))
     out: Variables = {
         "x": variable("x", k.X, "mm", "along the damper, from its middle"),
         "y": variable("y", k.Y, "mm", "up the slope, from the lower edge"),
         "normal_force": variable(place, normal, "N"),
         "pressure": variable(place, normal / area, "MPa"),
-        "gap": variable(place, k.field(found.gap[-1]), "mm"),
-        "state": variable(place, k.field(found.state[-1]), flag_meanings=_STATES),
+        "gap": variable(place, k.whole(found.gap[-1]), "mm"),
+        "state": variable(place, k.whole(found.state[-1]), flag_meanings=_STATES),
     }
     # the mirror image has the opposite along the damper
     image = np.where((k.X < 0.0) & (of.copies > 1), -1.0, 1.0)[:, None]
     for j, name, sign in ((0, "along", image), (1, "up", np.ones_like(image))):
-        shear = sign * k.field(force[:, 1 + j], extensive=True)
+        shear = sign * k.whole(force[:, 1 + j], extensive=True)
         out[f"traction_{name}"] = variable(place, shear / area, "MPa")
-        out[f"slip_{name}"] = variable(place, sign * k.field(slip[:, j]), "mm")
+        out[f"slip_{name}"] = variable(place, sign * k.whole(slip[:, j]), "mm")
     return out
 
 
-def _faces(solution: SeatedSolution) -> list[tuple[Side, FaceLattice]]:
+def _faces(solution: SeatedSolution) -> list[tuple[Side, str, Patch]]:
     """The parts of both faces, left first, along the damper; "pad 1" and so on where they are
     several.
     """
@@ -128,19 +130,27 @@ def _faces(solution: SeatedSolution) -> list[tuple[Side, FaceLattice]]:
         points = np.column_stack([along, up - up[mine].min()])
         found = []
         quads = solution.bodies.blades[side].mesh.faces["patch"][:, :4]
-        for part in joined(quads, np.unique(quads)):
+        for part in _joined(quads, np.unique(quads)):
             # the line on the plane once
             on_plane = half and bool((along[mine[part]] == 0.0).any())
             patch = make_patch(points, of.area, (on_plane, False), mine[part])
-            images = (False, True) if half and not on_plane else (False,)
-            found += [FaceLattice("", patch, flipped) for flipped in images]
+            found += [patch, patch.image()] if half and not on_plane else [patch]
         found.sort(key=lambda one: float(one.X[0]))
-        several = len(found) > 1
-        out += [
-            (side, replace(one, name=f"pad {i + 1}" if several else ""))
-            for i, one in enumerate(found)
-        ]
+        names = [f"pad {i + 1}" for i in range(len(found))] if len(found) > 1 else [""]
+        out += [(side, name, one) for name, one in zip(names, found, strict=True)]
     return out
+
+
+def _joined(cells: IntArray, nodes: IntArray) -> list[IntArray]:
+    """Positions in ``nodes``, part by part, of those that cells (n, nodes of each) join."""
+    number = np.full(int(max(cells.max(), nodes.max())) + 1, -1)
+    number[nodes] = np.arange(len(nodes))
+    at = number[cells]
+    first = np.broadcast_to(at.max(axis=1, keepdims=True), at.shape)
+    both = at >= 0
+    links = coo_array((np.ones(both.sum()), (first[both], at[both])), shape=(len(nodes),) * 2)
+    count, part = connected_components(links, directed=False)
+    return [np.flatnonzero(part == k) for k in range(count)]
 
 
 def write_files(solution: SeatedSolution, folder: Path) -> None:
