@@ -35,19 +35,10 @@ def stiffness(
     ----------
     mesh : Mesh
         The body; 8, 20 or 27 nodes per hexahedron, as the element asks.
-<<<<<<< HEAD
-    material : Material or sequence of Material
-        One material, or several with `regions`.
+    material : Material
     element : {"hex8i", "hex8", "hex20", "hex20r", "hex27"}, default "hex8i"
         "hex8i" has 8 nodes with nine incompatible modes condensed; "hex20r" has 2 x 2 x 2 points
         and does not lock in thin bodies.
-    regions : (n_hex,) array of int, optional
-        Material number of each hexahedron.
-=======
-    material : Material
-    element : {"hex8i", "hex8", "hex20", "hex27"}, default "hex8i"
-        "hex8i" has 8 nodes with nine incompatible modes condensed.
->>>>>>> 52a57213c9baf007183e5803020fd8b878778d0c
 
     Returns
     -------
@@ -112,19 +103,10 @@ def mass(
     ----------
     mesh : Mesh
         The body.
-<<<<<<< HEAD
-    material : Material or sequence of Material
-        One material, or several with `regions`.
+    material : Material
     element : str, optional
         Checked against the mesh; its mass is that of the plain element of the mesh (the
         incompatible modes carry none).
-    regions : (n_hex,) array of int, optional
-        Material number of each hexahedron.
-=======
-    material : Material
-    element : {"hex8i", "hex8", "hex20", "hex27"}, optional
-        None takes the plain element of the mesh (the incompatible modes carry no mass).
->>>>>>> 52a57213c9baf007183e5803020fd8b878778d0c
 
     Returns
     -------
@@ -148,14 +130,9 @@ def mass(
     >>> print(f"{along_x @ (M @ along_x):.3e} t")
     7.800e-08 t
     """
-<<<<<<< HEAD
     if element is not None:
         hex_element(element, mesh)
     chosen = hex_element(None, mesh)
-    rho = _per_hex(mesh, material, regions, "rho")
-=======
-    chosen = hex_element(element, mesh)
->>>>>>> 52a57213c9baf007183e5803020fd8b878778d0c
     maker = BasisMaker(mesh, chosen)
     pattern = _Pattern.of(maker.nodes, mesh.n_node)
     data = np.zeros(pattern.nodes.nnz)

@@ -497,7 +497,7 @@ def _solvers(plan: Plan[Any], levels: Sequence[int]) -> list[Variation]:
 def _on_mesh(
     source: str, element: str, divisions: int, plan: Plan[Any], *extra: tuple[str, Any]
 ) -> Variation:
-    per_edge = 2 if element in ("hex20", "hex27") else 1
+    per_edge = 2 if NODES[element] > 8 else 1
     own = level_geometry(plan.parameters, divisions, per_edge=per_edge)
     label = f"{own.get('divisions_long', divisions)} x {divisions}"
     overrides = (*of_geometry(own), ("mesh.element", element), *extra)
