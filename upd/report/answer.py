@@ -75,12 +75,12 @@ def answer(
     analysis = analysis_named(str(size.get("analysis", "")))
     own = analysis is not None and analysis.answer is not None
     tables = answer_tables(size, entries) if own or not full else []
-    blocks = [_table(table, width, cut=not own) for table in tables]
+    blocks = [table_lines(table, width, cut=not own) for table in tables]
     if tables and not own and sum(map(len, (lines, *blocks[:2], end))) >= LINES:
         # no room for the first cases: the main numbers that are among them too
         whole = number_table(MAIN, reached_numbers(size, entries))
         whole = replace(whole, note=tables[0].note)
-        blocks = [_table(whole, width, cut=True), *blocks[tables[0].heading == MAIN :]]
+        blocks = [table_lines(whole, width, cut=True), *blocks[tables[0].heading == MAIN :]]
     for k, block in enumerate(blocks):
         # the tables of an analysis are whole; of others those that fit on a screen
         if own or k == 0 or sum(map(len, (lines, block, end))) < LINES:
@@ -93,7 +93,7 @@ def answer(
             checks_table(summary["checks"]),
             stage_table(summary["cost"].get("stages", {})),
         ):
-            lines += _table(table, width)
+            lines += table_lines(table, width)
     return lines + end
 
 
@@ -120,11 +120,13 @@ def short_answer(summary: Mapping[str, Any], width: int, folder: Path | None) ->
     return [*(line.rstrip() for line in lines), *end][:SHORT]
 
 
-def _table(table: AnswerTable, width: int, *, cut: bool = False) -> list[AnswerLine]:
-    """A table with its heading and its note."""
+def table_lines(table: AnswerTable, width: int, *, cut: bool = False) -> list[AnswerLine]:
+    """A table with its heading and its note; where it may be ``cut``, without the last columns that
+    find no room.
+    """
     if not table.rows:
         return []
-    lines = [AnswerLine(""), AnswerLine(table.heading, TITLE)]
+    lines = [AnswerLine(""), *[AnswerLine(table.heading, TITLE)] * bool(table.heading)]
     lines += map(AnswerLine, whole_table(table, width, cut=cut))
     return lines + _wrapped(table.note, width)
 

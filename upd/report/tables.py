@@ -29,7 +29,7 @@ from upd.results.answer_table import AnswerTable
 from upd.results.check import worst_check, worst_checks
 from upd.results.number import from_json
 from upd.results.quantities import CLOSED_FORM_ERROR, number_label, number_title
-from upd.results.sampled import SampledNumber
+from upd.results.sampled import SampledNumber, sample_sentence
 
 #: numbers of a run whose analysis is not known
 _MOST = 8
@@ -39,7 +39,6 @@ _CASES = 8
 _WHOLE = "whole run"
 #: heading of the main numbers
 MAIN = "Main numbers"
-SAMPLE_HEADING = "Bands by the inputs, to first order and sampled"
 #: notes beside an answer; what matters less is folded, or counted
 MOST_NOTES = 3
 
@@ -302,7 +301,8 @@ def sample_table(numbers: Sequence[SampledNumber]) -> AnswerTable:
         "# points": [str(n.count) for n in numbers],
         "compared": [n.verdict for n in numbers],
     }
-    return filled(SAMPLE_HEADING, columns)
+    note = sample_sentence(numbers) + " sample.csv has all digits."
+    return filled("Bands by the inputs, to first order and sampled", columns, note)
 
 
 # ---------------------------------------------------------------- sentences
