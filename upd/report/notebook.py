@@ -16,9 +16,9 @@ from upd.errors import ConvergenceError, InputError, did_you_mean
 from upd.report.answer import AnswerLine, answer, short_answer
 from upd.report.columns import text_width
 from upd.report.folder import read_run
-from upd.report.tables import analysis_charts, answer_tables
+from upd.report.tables import analysis_charts
 from upd.results import Case, Check, Result
-from upd.results.check import FAILED, OK, outcome_of
+from upd.results.check import outcome_of
 from upd.results.number import from_json, read_result
 
 if TYPE_CHECKING:
@@ -179,19 +179,6 @@ class RunResult:
         return "\n".join(short_answer(self.summary(), text_width(), self.folder))
 
     __str__ = __repr__
-
-    def _repr_html_(self) -> str:
-        """As a notebook shows it: the tables of its answer."""
-        # templates are slow to import
-        from upd.report.page import rendered
-
-        return rendered(
-            "notebook.html.j2",
-            result=self,
-            tables=answer_tables(self.size, [r.as_dict() for r in self.results]),
-            colour={OK: "#1a7f37", FAILED: "#b42318"}.get(self.outcome, "#9a6700"),
-            passed=sum(check.passed for check in self.checks),
-        )
 
 
 def charts(result: RunResult) -> list[Chart]:

@@ -113,7 +113,7 @@ def _loaded(
 ) -> AnyScene:
     data, place, folder = _data(source)
     pairs, problems = read_overrides(overrides)
-    nul = [path for path, value in _leaves("", data | dict(pairs)) if "\0" in str(value)]
+    nul = [path for path, value in leaves("", data | dict(pairs)) if "\0" in str(value)]
     if nul:
         # no path may hold it, nor what becomes text of files and figures
         raise InputError(
@@ -178,14 +178,14 @@ def _find(source: str | Path) -> Path:
     )
 
 
-def _leaves(path: str, value: Any) -> Iterator[tuple[str, Any]]:
+def leaves(path: str, value: Any) -> Iterator[tuple[str, Any]]:
     """Every value that is no table or list, with its path."""
     if isinstance(value, Mapping):
         for key, inner in value.items():
-            yield from _leaves(f"{path}.{key}" if path else str(key), inner)
+            yield from leaves(f"{path}.{key}" if path else str(key), inner)
     elif isinstance(value, list):
         for k, inner in enumerate(value):
-            yield from _leaves(f"{path}[{k}]", inner)
+            yield from leaves(f"{path}[{k}]", inner)
     else:
         yield path, value
 
@@ -243,7 +243,7 @@ def _validate(data: dict[str, Any]) -> tuple[AnyScene | None, list[str]]:
     problems = [f"{k}: not a key of a scene" for k in data if k not in own]
     problems += [
         f"{path}: {message}"
-        for path, value in _leaves("", own)
+        for path, value in leaves("", own)
         if (message := never(value)) and not path.startswith("geometry.")
     ]
     scene: AnyScene | None = None

@@ -398,7 +398,7 @@ def test_names_tell_runs_apart(folder: Path, other: Path, hertz: RunFolder) -> N
 
 def test_only_entries_that_differ_are_shown() -> None:
     assert differences([{"t": {"a": 1}, "b": [1, 2]}, {"t": {"a": 1}, "b": [1, 3], "c": 4}]) == (
-        ("b", "1, 2", "1, 3"),
+        ("b[1]", "2", "3"),
         ("c", "–", "4"),
     )
 
