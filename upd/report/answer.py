@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -73,16 +72,12 @@ def answer(
     analysis = analysis_named(str(size.get("analysis", "")))
     own = analysis is not None and analysis.answer is not None
     tables = answer_tables(size, entries) if own or not full else []
-    blocks = [table_lines(table, width, cut=not own) for table in tables]
-    if tables and not own and sum(map(len, (lines, *blocks[:2], end))) >= LINES:
-        # no room for the first cases: the main numbers that are among them too
-        whole = number_table(MAIN, reached_numbers(size, entries))
-        whole = replace(whole, note=tables[0].note)
-        blocks = [table_lines(whole, width, cut=True), *blocks[tables[0].heading == MAIN :]]
-    for k, block in enumerate(blocks):
+    room = LINES - len(lines) - len(end)
+    for k, table in enumerate(tables):
+        block = table_lines(table, width, cut=not own)
         # the tables of an analysis are whole; of others those that fit on a screen
-        if own or k == 0 or sum(map(len, (lines, block, end))) < LINES:
-            lines += block
+        if own or k == 0 or len(block) < room:
+            lines, room = lines + block, room - len(block)
     if full:
         for table in (
             *all_numbers(entries),

@@ -16,7 +16,8 @@ from upd.cache.files import whole_files
 from upd.cache.sources import versions
 from upd.errors import InputError, one_line
 from upd.plot.chart import Chart
-from upd.report.columns import SHORT, whole_table, wrapped
+from upd.report.answer import table_lines
+from upd.report.columns import SHORT, wrapped
 from upd.report.page import Section, Verdict, image_uri, make_panels, page_text, versions_text
 from upd.results.answer_table import AnswerTable
 from upd.scene import AnyScene
@@ -155,9 +156,7 @@ class FigureAnswer(ABC):
         """Its verdict, all its tables and its notes as text."""
         lines = wrapped(self.verdict, WIDTH)
         for table in self.tables:
-            if table.rows:
-                rows = [f"  {line}" for line in whole_table(table, WIDTH - 2)]
-                lines += ["", f"{table.heading}:", *rows, *wrapped(table.note, WIDTH, "  ")]
+            lines += [line.text for line in table_lines(table, WIDTH)]
         lines += [""] * bool(self.notes)
         return "\n".join([*lines, *(line for note in self.notes for line in wrapped(note, WIDTH))])
 

@@ -44,17 +44,12 @@ def text_width() -> int:
     return max(_LEAST_WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
 
 
-def wrapped(text: str, width: int, indent: str = "") -> list[str]:
-    """A text on lines of ``width`` characters, its further lines indented by two more; words and
-    paths stay whole.
+def wrapped(text: str, width: int) -> list[str]:
+    """A text on lines of ``width`` characters, its further lines indented by two; words and paths
+    stay whole.
     """
     return textwrap.wrap(
-        text,
-        width,
-        initial_indent=indent,
-        subsequent_indent="  " + indent,
-        break_on_hyphens=False,
-        break_long_words=False,
+        text, width, subsequent_indent="  ", break_on_hyphens=False, break_long_words=False
     )
 
 

@@ -18,9 +18,8 @@ from upd.report.folder import RunFolder, read_run
 from upd.report.page import Section, make_panels, page_text, write_page
 from upd.report.run_page import verdict
 from upd.report.tables import analysis_charts, filled, main_numbers
-from upd.results import Case, shared_label
 from upd.results.answer_table import AnswerTable
-from upd.results.quantities import F_N, number_label
+from upd.results.quantities import number_label
 from upd.scene.read import leaves
 
 
@@ -48,21 +47,8 @@ def run_names(runs: Sequence[RunFolder]) -> list[str]:
 
 def comparison_sections(runs: Sequence[RunFolder], names: Sequence[str]) -> list[Section]:
     """The page of several runs."""
-    meant = [meanings(run.summary["results"]) for run in runs]
-    results = [
-        [{**row, "case": mine.get(row["case"], row["case"])} for row in run.summary["results"]]
-        for run, mine in zip(runs, meant, strict=True)
-    ]
-    charts = overlaid(
-        [
-            [
-                replace(c, case=mine.get(c.case, c.case))
-                for c in analysis_charts(run.arrays, run.summary)
-            ]
-            for run, mine in zip(runs, meant, strict=True)
-        ],
-        names,
-    )
+    results = [run.summary["results"] for run in runs]
+    charts = overlaid([analysis_charts(run.arrays, run.summary) for run in runs], names)
     scenes = [run.summary["scene_file"] for run in runs]
     differ = differences(scenes)
     main = {
@@ -93,23 +79,6 @@ def comparison_sections(runs: Sequence[RunFolder], names: Sequence[str]) -> list
             for name, run in zip(names, runs, strict=True)
         ),
     ]
-
-
-def meanings(rows: Sequence[Entry]) -> dict[str, str]:
-    """Cases of a run -> what they mean in any run: a load that the damper's equilibrium gives is
-    named by the friction it mobilises, not by its force.
-    """
-    cases = {row["case"]: Case(**row.get("case_fields", {})) for row in rows}
-    states = {
-        row["value"]: cases[row["case"]].friction
-        for row in rows
-        if row["name"] == F_N.name and cases[row["case"]].friction
-    }
-    return {
-        label: f"{shared_label([case], ['load'])}, friction {states[case.load]}"
-        for label, case in cases.items()
-        if case.load in states
-    }
 
 
 def _runs_table(runs: Sequence[RunFolder], names: Sequence[str]) -> AnswerTable:

@@ -80,12 +80,7 @@ def answer_tables(size: Mapping[str, Any], entries: Sequence[Entry]) -> list[Ans
     if any(table.rows for table in own):
         return [table for table in own if table.rows]
     cases = _alike(entries, analysis.headline_names if analysis else ())
-    there = {(entry["name"], entry["case"]) for rows in cases[:1] for row in rows for entry in row}
-    main = [
-        entry
-        for entry in reached_numbers(size, entries)
-        if entry["reference"] is not None or (entry["name"], entry["case"]) not in there
-    ]
+    main = reached_numbers(size, entries)
     tables = [number_table(MAIN, main)] if main else []
     tables += [_case_table(rows) for rows in cases]
     note = _not_estimated([*main, *(entry for rows in cases for row in rows for entry in row)])

@@ -26,12 +26,11 @@ from upd.plot.chart import Chart
 from upd.plot.plotly import figure, pack
 from upd.reference import mindlin
 from upd.report import write_comparison, write_report
-from upd.report.compare import differences, meanings, numbers, overlaid, run_names
+from upd.report.compare import differences, numbers, overlaid, run_names
 from upd.report.folder import RunFolder, read_run
 from upd.report.page import fitting
 from upd.report.run_page import run_surfaces
 from upd.report.tables import all_numbers, analysis_charts, filled, main_numbers, warnings
-from upd.results import Case
 from upd.results.check import worst_checks
 from upd.results.quantities import number_label
 
@@ -350,22 +349,6 @@ def test_comparison_shows_both_runs_and_their_difference(
             r for r in read_run(run_folder).summary["results"] if r["name"] == "max_pressure"
         )
         assert number(row["value"]) in html
-
-
-def test_loads_of_the_equilibrium_are_compared_by_the_friction_they_mobilise() -> None:
-    def row(name: str, value: float, case: Case) -> dict[str, Any]:
-        return {"name": name, "case": case.label, "value": value, "case_fields": case.given()}
-
-    def rows(load: float) -> list[dict[str, Any]]:
-        state = Case(name="equilibrium", friction="opposing")
-        at = (Case(load=load), Case(load=load, direction="x", ratio=0.5), Case(load=50.0))
-        return [row("F_N", load, state), *(row("approach", 1.0, case) for case in at)]
-
-    a, b = meanings(rows(154.7)), meanings(rows(176.8))
-    assert list(a.values()) == list(b.values())
-    assert a["F=154.7 N"] == "F=* N, friction opposing"
-    assert "T_x/muN=0.5" in a["F=154.7 N T_x/muN=0.5"]
-    assert "F=50 N" not in a, "a load of the scene keeps its force"
 
 
 def test_rows_hold_one_value_per_run(hertz: RunFolder, other: Path) -> None:
