@@ -287,23 +287,9 @@ def _remove_figures(folder: Path) -> None:
         (folder / f"{name}.png").unlink(missing_ok=True)
 
 
-def dimension(axis: Parameter, axes: Sequence[Parameter]) -> str:
-    """Short name of an axis.
-
-    The last word of its path, or the whole path when that would not be its own.
-    """
-    last = [other.path.rpartition(".")[2] for other in axes]
-    own = axis.path.rpartition(".")[2]
-    return (
-        own
-        if last.count(own) == 1 and own not in ("status", "seconds")
-        else axis.path.replace(".", "_")
-    )
-
-
 def _arrays(result: SweepResult) -> dict[str, Any]:
     plan, axes = result.plan, result.plan.axes
-    names = tuple(dimension(axis, axes) for axis in axes)
+    names = tuple(axis.short.replace(" ", "_") for axis in axes)
     if plan.sample is None:
         shape, dims = tuple(len(axis.values) for axis in axes), names
     else:

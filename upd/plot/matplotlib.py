@@ -50,15 +50,6 @@ _SIZE, _DPI = (5.6, 4.4), 130
 _PAGE_DPI = 110
 
 
-def own_axes(ax: Axes | None) -> Axes:
-    """The axes given, or new ones in a figure of their own."""
-    if ax is not None:
-        return ax
-    figure = Figure(figsize=(6, 4.5), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure.add_subplot()
-
-
 def draw_sheet(
     drawings: Sequence[Drawing],
     columns: int,
@@ -99,22 +90,9 @@ _OVER = 0.45
 _BESIDE, _ABOVE = 1.05, 2.0
 
 
-def draw(chart: Chart, ax: Axes | None = None) -> Axes:
-    """Draw a chart on matplotlib axes, or on new ones.
-
-    Parameters
-    ----------
-    chart
-        What to draw.
-    ax
-        Where; axes in a figure of their own when None.
-
-    Returns
-    -------
-    Axes
-        The axes drawn on.
-    """
-    ax, chart = own_axes(ax), with_room(chart)
+def draw(chart: Chart, ax: Axes) -> Axes:
+    """Draw a chart on matplotlib axes; returns them."""
+    chart = with_room(chart)
     _grid(chart, ax)
     _draw_maps(chart, ax)
     for area in chart.areas:

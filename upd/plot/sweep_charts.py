@@ -98,14 +98,13 @@ class Parameter:
 def told_apart(parameters: Sequence[Parameter]) -> tuple[Parameter, ...]:
     """The parameters, each with as many last words of its path as no other has."""
 
-    def words(steps: list[str]) -> int:
-        others = [p.path.split(".") for p in parameters if p.path.split(".") != steps]
-        return next(
-            (n for n in range(1, len(steps)) if all(one[-n:] != steps[-n:] for one in others)),
-            len(steps),
-        )
+    paths = [p.path.split(".") for p in parameters]
 
-    return tuple(replace(p, words=words(p.path.split("."))) for p in parameters)
+    def words(path: list[str]) -> int:
+        own = (n for n in range(1, len(path)) if [one[-n:] for one in paths].count(path[-n:]) == 1)
+        return next(own, len(path))
+
+    return tuple(replace(p, words=words(path)) for p, path in zip(parameters, paths, strict=True))
 
 
 @dataclass(frozen=True)
