@@ -144,19 +144,22 @@ def page_text(
         found = [first, *(_folded(s, shown) for s in found[1:])]
         found = [section for section in found if not section.is_empty]
     bodies, left_out = fitting(surfaces)
-    return rendered(
-        "page.html.j2",
-        title=title,
-        verdict=verdict,
-        sections=found,
-        footer=footer,
-        most_notes=MOST_NOTES,
-        surfaces=bodies,
-        surfaces_left_out=left_out,
-        style=(_PARTS / "page.css").read_text("utf-8"),
-        plotly=_packed_plotly(),
-        script=(_PARTS / "page.js").read_text("utf-8"),
-        page_data=_packed(_json({"panels": _data(panels), "surfaces": bodies})),
+    return (
+        _environment()
+        .get_template("page.html.j2")
+        .render(
+            title=title,
+            verdict=verdict,
+            sections=found,
+            footer=footer,
+            most_notes=MOST_NOTES,
+            surfaces=bodies,
+            surfaces_left_out=left_out,
+            style=(_PARTS / "page.css").read_text("utf-8"),
+            plotly=_packed_plotly(),
+            script=(_PARTS / "page.js").read_text("utf-8"),
+            page_data=_packed(_json({"panels": _data(panels), "surfaces": bodies})),
+        )
     )
 
 
@@ -168,13 +171,9 @@ def _folded(section: Section, shown: Sequence[Panel]) -> Section:
     return section._replace(panels=panels, folded=folded, each_folded=each or section.each_folded)
 
 
-def rendered(template: str, **content: Any) -> str:
-    """A template of the folder parts with its content; every text is escaped."""
-    return _environment().get_template(template).render(**content)
-
-
 @cache
 def _environment() -> Environment:
+    """Of the templates in the folder parts; every text is escaped."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     made = Environment(
@@ -280,19 +279,15 @@ def fitting(surfaces: Iterable[dict[str, Any]]) -> tuple[list[dict[str, Any]], l
     """
     shown, left_out, room = list[dict[str, Any]](), list[str](), MOST_LETTERS
     for surface in surfaces:
-        fields = surface["fields"]
-        for n in range(len(fields), -1, -1):
-            made = surface | {"fields": fields[:n]}
-            if not n:
-                made |= {"motions": []}
-            if (size := len(_json(made))) <= room:
-                shown.append(made)
-                room -= size
-                break
-        else:
-            left_out.append(f"{surface['label']}: too large for this page")
-            continue
-        left_out += [f"{field['label']}: too large for this page" for field in fields[n:]]
+        fields, made = list(surface["fields"]), surface
+        while (size := len(_json(made))) > room and fields:
+            fields.pop()
+            made = surface | {"fields": [*fields]} | ({} if fields else {"motions": []})
+        lost = surface["fields"][len(fields) :] if size <= room else [surface]
+        left_out += [f"{one['label']}: too large for this page" for one in lost]
+        if size <= room:
+            shown.append(made)
+            room -= size
     return shown, left_out
 
 

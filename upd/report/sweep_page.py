@@ -307,7 +307,6 @@ def write_study_report(
     notes: Sequence[str],
     tables: Iterable[AnswerTable],
     charts: Iterable[Chart],
-    figures: Iterable[Path],
 ) -> Path:
     """Write report.html into a study folder; returns its path.
 
@@ -317,8 +316,6 @@ def write_study_report(
         Points without an answer.
     notes
         Sentences the page opens with, as which level is enough.
-    charts, figures
-        What is drawn, and the PNG files that show the same.
 
     Raises
     ------
@@ -327,19 +324,9 @@ def write_study_report(
     """
     text = " ".join([*([f"{counted(failed, 'point')} failed."] if failed else []), *notes])
     verdict = Verdict(*("warning", "Done in part") if failed else ("passed", "Done"), text)
-    panels = make_panels(charts, {path.stem: path for path in figures})
-    sections = [Section("Figures", panels=panels)]
-    for one in map(_shown, tables):
-        sections.append(Section(one.heading, [one], kind="tall", folded=len(sections) > 1))
+    sections = [Section("Figures", panels=make_panels(charts, {}))]
+    for one in tables:
+        columns = dict(zip(one.columns, zip(*one.rows, strict=True), strict=False))
+        table = filled(one.heading, columns)
+        sections.append(Section(one.heading, [table], kind="tall", folded=len(sections) > 1))
     return write_page(folder / "report.html", page_text(title, sections, verdict=verdict))
-
-
-def _shown(table: AnswerTable) -> AnswerTable:
-    """Its columns but those of many words, which study.md has."""
-    cells = list(zip(*table.rows, strict=True)) or [()] * len(table.columns)
-    columns = {
-        head.replace("\n", " "): mine
-        for head, mine in zip(table.columns, cells, strict=True)
-        if head not in table.spare
-    }
-    return filled(table.heading, columns)
