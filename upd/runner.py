@@ -14,7 +14,7 @@ from typing import Any
 
 from upd.analyses import analysis_of, make_plan
 from upd.analyses.base import Analysis, Plan
-from upd.cache.files import json_text, write_text
+from upd.cache.files import write_text
 from upd.cache.folders import OwnFolder, own_folder
 from upd.cache.sources import versions
 from upd.errors import ConvergenceError, InputError, UpdError, disk_fault, one_line
@@ -22,7 +22,7 @@ from upd.labels import check_words
 from upd.progress import Listener, Stages, silent
 from upd.report import write_report
 from upd.report.files import write_curves, write_figures
-from upd.report.folder import OWN_DIGEST, check_replaceable, digest_of, is_run_file
+from upd.report.folder import check_replaceable, is_run_file, sealed
 from upd.report.notebook import RunResult
 from upd.results import Check, Estimates, Result, write_netcdf
 from upd.results.check import FAILED, OK, WARNED, status_of, worst_check
@@ -279,7 +279,7 @@ def _write_summary(result: RunResult, folder: Path) -> None:
     data, arrays = result.summary(), folder / "result.nc"
     if arrays.is_file():
         data = {**data, DIGEST: file_digest(arrays)}
-    write_text(folder / "summary.json", json_text({**data, OWN_DIGEST: digest_of(data)}))
+    write_text(folder / "summary.json", sealed(data))
 
 
 def _effects(plan: Plan[Any], checks: Sequence[Check]) -> list[dict[str, Any]]:

@@ -19,7 +19,7 @@ from upd.batch.engine import Batch, Watcher, run_points
 from upd.batch.plan import Sample, SweepPlan, plan_sweep, values_at
 from upd.batch.store import PointStore
 from upd.batch.table import as_csv, check_follow, csv_text, make_columns, patterns, reasons
-from upd.cache.files import json_text, write_text
+from upd.cache.files import write_text
 from upd.cache.sources import versions
 from upd.errors import InputError, one_line
 from upd.labels import file_name
@@ -32,6 +32,7 @@ from upd.plot.sweep_charts import (
     sweep_charts,
 )
 from upd.report import write_report
+from upd.report.folder import sealed
 from upd.results import Group, write_netcdf
 from upd.results.sampled import SampledNumber, sampled_number
 from upd.scene import load_scene
@@ -251,7 +252,7 @@ def write_outputs(store: PointStore, result: SweepResult) -> list[Path]:
     table, arrays, data = (folder / f"{name}" for name in ("table.csv", "sweep.nc", "sweep.json"))
     write_text(table, csv_text(plan.axes, plan.places, result.outcomes, result.columns))
     write_netcdf(arrays, {"": Group(_arrays(result))})
-    write_text(data, json_text(_summary(store, result)))
+    write_text(data, sealed(_summary(store, result)))
     _remove_figures(folder)
     if plan.sample is None:
         return [table, arrays, data]

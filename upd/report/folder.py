@@ -10,7 +10,7 @@ import hashlib
 import json
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -25,8 +25,8 @@ from upd.results import Arrays, read_netcdf
 
 _LOG_LINE = re.compile(r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$")
 _VERSIONS = "versions: "
-#: key of summary.json: SHA-256 of what else it has
-OWN_DIGEST = "sha256"
+#: key of a JSON file: SHA-256 of what else it has
+_DIGEST = "sha256"
 _PNG = b"\x89PNG\r\n\x1a\n"
 #: names of the figures a run may leave, without their ending
 FIGURES = (
@@ -211,14 +211,7 @@ def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
 
 
 def _summary(folder: Path) -> dict[str, Any]:
-    path = folder / "summary.json"
-    found, _ = read_json(path, _Summary, "run")
-    # folders of earlier versions have none
-    if found.get(OWN_DIGEST, "") not in ("", digest_of(found)):
-        raise InputError(
-            f"{path}: is not as the run wrote it, its SHA-256 is another; {_AGAIN['run']}"
-        )
-    return found
+    return read_json(folder / "summary.json", _Summary, "run")[0]
 
 
 def _text(path: Path, missing: list[str]) -> str:
@@ -257,10 +250,9 @@ class _Summary:
     results: list[dict[str, Any]]
 
 
-def digest_of(summary: Mapping[str, Any]) -> str:
-    """SHA-256 of what summary.json holds beside its own digest."""
-    content = {key: value for key, value in summary.items() if key != OWN_DIGEST}
-    return hashlib.sha256(json_text(content).encode()).hexdigest()
+def sealed(data: Mapping[str, Any]) -> str:
+    """Data as JSON with its SHA-256, by which a file that was changed is known."""
+    return json_text({**data, _DIGEST: hashlib.sha256(json_text(data).encode()).hexdigest()})
 
 
 def read_json(path: Path, schema: type[Kept], kind: Kind) -> tuple[dict[str, Any], Kept]:
@@ -296,14 +288,16 @@ def read_json(path: Path, schema: type[Kept], kind: Kind) -> tuple[dict[str, Any
         ) from None
     except ValidationError as problem:
         places = [".".join(map(str, e["loc"])) or "the whole" for e in problem.errors()]
-        raise damaged_file(path, dict.fromkeys(places), kind) from None
+        names = list(dict.fromkeys(places))
+        more = f" and {len(names) - _MOST} more" if len(names) > _MOST else ""
+        raise InputError(
+            f"{path}: is damaged in {', '.join(names[:_MOST])}{more}; {_AGAIN[kind]}"
+        ) from None
     except (ValueError, RecursionError) as problem:
         raise InputError(f"{path}: is not JSON ({problem}); {_AGAIN[kind]}") from None
+    # folders of earlier versions have no digest
+    if _DIGEST in found and json_text(found) != sealed(
+        {k: found[k] for k in found if k != _DIGEST}
+    ):
+        raise InputError(f"{path}: is not as upd {kind} wrote it (SHA-256); {_AGAIN[kind]}")
     return dict(found), checked
-
-
-def damaged_file(path: Path, places: Iterable[str], kind: Kind) -> InputError:
-    """The error of a file that is damaged in these places."""
-    names = list(places)
-    more = f" and {len(names) - _MOST} more" if len(names) > _MOST else ""
-    return InputError(f"{path}: is damaged in {', '.join(names[:_MOST])}{more}; {_AGAIN[kind]}")

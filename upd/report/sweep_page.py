@@ -24,7 +24,7 @@ from upd.plot.sweep_charts import (
     sweep_charts,
     told_apart,
 )
-from upd.report.folder import damaged_file, read_json
+from upd.report.folder import read_json
 from upd.report.page import (
     Panel,
     Section,
@@ -44,25 +44,12 @@ _FEW = 8
 
 
 @dataclass
-class _SweepFollowed:
-    name: str
-    case: str
-    unit: str
-
-
-@dataclass
 class _SweepPoint:
     values: list[float | None]
     status: str
     reason: str
     warnings: list[str]
     seconds: float
-
-
-@dataclass
-class _SweepCost:
-    peak_rss_mb: float | None = None
-    stages_s: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -79,9 +66,9 @@ class SweepFolder:
     scene: str
     title: str
     axes: Sequence[Parameter]
-    followed: list[_SweepFollowed]
+    followed: list[dict[str, str]]
     plan: dict[str, Any]
-    cost: _SweepCost
+    cost: dict[str, Any]
     points: list[_SweepPoint]
     text: str
     sample: _SweepSample | None = None
@@ -94,7 +81,7 @@ class SweepFolder:
         table = np.array([point.values for point in self.points], float)
         values = table.reshape(len(self.points), len(self.followed)).T
         known = zip(self.followed, values, strict=True)
-        return [Column(c.name, c.case, c.unit, mine) for c, mine in known]
+        return [Column(one["name"], one["case"], one["unit"], mine) for one, mine in known]
 
     @property
     def places(self) -> list[tuple[int, ...]]:
@@ -108,14 +95,7 @@ class SweepFolder:
 
 def read_sweep(folder: Path) -> SweepFolder:
     """Read sweep.json. Raises InputError when it is missing or damaged."""
-    path = folder / "sweep.json"
-    _, found = read_json(path, SweepFolder, "sweep")
-    counts, m = [len(axis.values) for axis in found.axes], len(found.followed)
-    n = min(counts, default=0) if found.sample else math.prod(counts)
-    damaged = ["points"] * (len(found.points) != n or any(len(p.values) != m for p in found.points))
-    damaged += ["sample"] * (found.sample is not None and len(found.sample.numbers) != m)
-    if damaged:
-        raise damaged_file(path, damaged, "sweep")
+    _, found = read_json(folder / "sweep.json", SweepFolder, "sweep")
     return replace(found, path=folder, axes=told_apart(found.axes))
 
 
@@ -152,7 +132,12 @@ def sweep_sections(sweep: SweepFolder) -> list[Section]:
         *(Section(table.heading, [table], kind="grid") for table in before),
         Section("Figures", panels=panels, texts=[] if panels else [none]),
         Section(points.heading, [points], kind="tall"),
-        Section("Cost", [stage_table(sweep.cost.stages_s)], texts=[_costs(sweep)], kind="grid"),
+        Section(
+            "Cost",
+            [stage_table(sweep.cost.get("stages_s", {}))],
+            texts=[_costs(sweep)],
+            kind="grid",
+        ),
         Section("Scene file", texts=scene, file=sweep.text),
     ]
 
@@ -289,7 +274,7 @@ def _points_table(sweep: SweepFolder, most: int) -> AnswerTable:
 def _costs(sweep: SweepFolder) -> str:
     """Seconds of the points, memory."""
     seconds = [p.seconds for p in sweep.points] or [0.0]
-    total, memory = math.fsum(seconds), sweep.cost.peak_rss_mb
+    total, memory = math.fsum(seconds), sweep.cost.get("peak_rss_mb")
     text = (
         f"{total / len(seconds):.2f} s per point ({min(seconds):.2f} to {max(seconds):.2f} s), "
         f"{total:.1f} s for all points together"
