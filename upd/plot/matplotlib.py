@@ -131,33 +131,15 @@ def chart_png(charts: Sequence[Chart]) -> bytes:
     return out.getvalue()
 
 
-def write_sheet(charts: Sequence[Chart], path: Path) -> list[Path]:
-    """Write the charts of one figure as one PNG, whole or not at all.
-
-    Parameters
-    ----------
-    charts
-        Those of a sheet (`Chart.sheet`) are drawn, at most `MOST_PANELS`, with the
-        columns and the size of the first.
-    path
-        PNG file.
-
-    Returns
-    -------
-    list of Path
-        ``path``, or nothing when no chart belongs to a sheet.
-    """
-    shown = [chart for chart in charts if chart.sheet]
-    return write_png(_sheet(shown, _DPI), path) if shown else []
-
-
 def write_sheets(charts: Iterable[Chart], folder: Path, *, keep: bool = False) -> list[Path]:
-    """Write the charts of every figure (`Chart.figure`) as ``<figure>.png`` into ``folder``.
+    """Write the charts of every figure (`Chart.figure`) as ``<figure>.png`` into ``folder``, whole
+    or not at all.
 
     Parameters
     ----------
     charts
-        Those without a figure are left out.
+        Those of a figure that belong to its sheet (`Chart.sheet`) are drawn, at most
+        `MOST_PANELS`, with the columns and the size of the first.
     keep
         Leave files that are there already as they are.
 
@@ -166,17 +148,12 @@ def write_sheets(charts: Iterable[Chart], folder: Path, *, keep: bool = False) -
     list of Path
         The files written.
     """
-    sheets: dict[str, list[Chart]] = {}
+    sheets: dict[Path, list[Chart]] = {}
     for chart in charts:
-        if chart.figure:
-            sheets.setdefault(chart.figure, []).append(chart)
-    files = {folder / f"{name}.png": group for name, group in sheets.items()}
-    return [
-        made
-        for path, group in files.items()
-        if not (keep and path.exists())
-        for made in write_sheet(group, path)
-    ]
+        if chart.figure and chart.sheet:
+            sheets.setdefault(folder / f"{chart.figure}.png", []).append(chart)
+    missing = [path for path in sheets if not (keep and path.exists())]
+    return [made for path in missing for made in write_png(_sheet(sheets[path], _DPI), path)]
 
 
 def _sheet(charts: Sequence[Chart], dpi: int) -> Figure:

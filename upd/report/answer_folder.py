@@ -127,7 +127,7 @@ class FigureAnswer(ABC):
             When it cannot be written.
         """
         # matplotlib is slow to import
-        from upd.plot.matplotlib import write_sheet
+        from upd.plot.matplotlib import write_sheets
 
         charts, folder = self.charts, Path(out)
         summary = json.dumps(self.as_dict(), indent=1, allow_nan=False) + "\n"
@@ -139,7 +139,7 @@ class FigureAnswer(ABC):
             with whole_files(folder) as stage:
                 for file, content in files.items():
                     (stage / file).write_text(content, encoding="utf-8")
-                write_sheet(charts, stage / f"{self.figure}.png")
+                write_sheets(charts, stage)
         except OSError as error:
             raise InputError(
                 f"{folder}: cannot be written ({one_line(error)}); choose another with --out"
