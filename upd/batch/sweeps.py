@@ -18,7 +18,7 @@ import numpy as np
 from upd.batch.engine import Batch, Watcher, run_points
 from upd.batch.plan import Sample, SweepPlan, plan_sweep, values_at
 from upd.batch.store import PointStore
-from upd.batch.table import as_csv, check_follow, csv_text, make_columns, patterns, reasons
+from upd.batch.table import check_follow, csv_text, make_columns, patterns, reasons
 from upd.cache.files import write_text
 from upd.cache.sources import versions
 from upd.errors import InputError, one_line
@@ -32,6 +32,7 @@ from upd.plot.sweep_charts import (
     sweep_charts,
 )
 from upd.report import write_report
+from upd.report.files import as_csv
 from upd.report.folder import sealed
 from upd.results import Group, write_netcdf
 from upd.results.sampled import SampledNumber, sampled_number
