@@ -168,7 +168,7 @@ def _grid(sweep: SweepFolder) -> Section:
         "values": [_values(p) for p in sweep.axes],
     }
     points, sample = counted(len(sweep.points), "point"), sweep.sample
-    text = f"Every value with every other: {points}."
+    text = f"{points}{': every value with every other' * (len(sweep.axes) > 1)}."
     if sample is not None:
         given = ", ".join(f"{path} = {value}" for path, value in sample.inputs.items())
         text = (
