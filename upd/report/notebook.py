@@ -8,7 +8,6 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -146,17 +145,9 @@ class RunResult:
         return "\n".join(line.text for line in self.answer(text_width(), full=True))
 
     def to_xarray(self) -> dict[str, Any]:
-        """Case -> xarray.Dataset, with dimensions, coordinates and units.
+        """Case -> xarray.Dataset, with dimensions, coordinates and units; needs xarray."""
+        import xarray
 
-        Raises InputError when xarray is not installed.
-        """
-        try:
-            xarray = import_module("xarray")
-        except ImportError:
-            raise InputError(
-                "to_xarray needs the package xarray: pip install xarray; without it, .arrays "
-                "has the same numbers"
-            ) from None
         return {
             case: xarray.Dataset(
                 {name: (v.dims, v.data, dict(v.attributes)) for name, v in group.items()},

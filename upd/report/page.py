@@ -18,7 +18,6 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from upd.cache.files import placed_file
-from upd.errors import InputError
 from upd.labels import sentence
 from upd.plot.chart import Chart
 from upd.plot.plotly import figure
@@ -194,13 +193,8 @@ def _packed_plotly() -> str:
     The package itself is slow to import and not needed.
     """
     spec = find_spec("plotly")
-    for place in (spec.submodule_search_locations or ()) if spec else ():
-        path = Path(place) / "package_data" / "plotly.min.js"
-        if path.exists():
-            return _packed(path.read_text("utf-8"))
-    raise InputError(
-        "plotly.min.js is missing: the report needs the package plotly; pip install plotly"
-    )
+    assert spec is not None and spec.origin is not None, "plotly comes with upd"
+    return _packed((Path(spec.origin).parent / "package_data" / "plotly.min.js").read_text("utf-8"))
 
 
 def _packed(text: str) -> str:

@@ -147,12 +147,6 @@ def test_a_name_or_case_that_is_nearly_right_is_named(sphere: RunResult) -> None
     assert "maximum pressure" in sphere.table()
 
 
-def test_missing_xarray_is_told(sphere: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(InputError, match="pip install xarray"):
-        sphere.to_xarray()
-
-
 def test_datasets_have_dimensions_and_units(
     sphere: RunResult, monkeypatch: pytest.MonkeyPatch
 ) -> None:
