@@ -143,22 +143,19 @@ def page_text(
         found = [first, *(_folded(s, shown) for s in found[1:])]
         found = [section for section in found if not section.is_empty]
     bodies, left_out = fitting(surfaces)
-    return (
-        _environment()
-        .get_template("page.html.j2")
-        .render(
-            title=title,
-            verdict=verdict,
-            sections=found,
-            footer=footer,
-            most_notes=MOST_NOTES,
-            surfaces=bodies,
-            surfaces_left_out=left_out,
-            style=(_PARTS / "page.css").read_text("utf-8"),
-            plotly=_packed_plotly(),
-            script=(_PARTS / "page.js").read_text("utf-8"),
-            page_data=_packed(_json({"panels": _data(panels), "surfaces": bodies})),
-        )
+    page = _environment().get_template("page.html.j2")
+    return page.render(
+        title=title,
+        verdict=verdict,
+        sections=found,
+        footer=footer,
+        most_notes=MOST_NOTES,
+        surfaces=bodies,
+        surfaces_left_out=left_out,
+        style=(_PARTS / "page.css").read_text("utf-8"),
+        plotly=_packed_plotly(),
+        script=(_PARTS / "page.js").read_text("utf-8"),
+        page_data=_packed(_json({"panels": _data(panels), "surfaces": bodies})),
     )
 
 
