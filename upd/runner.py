@@ -19,7 +19,7 @@ from upd.cache.folders import OwnFolder, own_folder
 from upd.cache.sources import versions
 from upd.errors import ConvergenceError, InputError, UpdError, disk_fault, one_line
 from upd.labels import check_words
-from upd.progress import Listener, Stages, silent
+from upd.progress import Listener, Stages, forget_peak, silent
 from upd.report import write_report
 from upd.report.files import write_curves, write_figures
 from upd.report.folder import check_replaceable, is_run_file, sealed
@@ -75,6 +75,7 @@ def run(
     loaded = as_scene(scene, overrides)
     plan = make_plan(loaded)
     plan.refuse_oversize()
+    forget_peak()
     stages = Stages(progress)
     packages = "versions: " + ", ".join(f"{name} {one}" for name, one in versions().items())
     if out is None:
