@@ -45,27 +45,28 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from upd import (
-        contact,
-        dynamics,
-        hbm,
-        linalg,
-        matrices,
-        measured,
-        own_matrices,
-        reduction,
-        reference,
-    )
-    from upd.analyses import make_plan
-    from upd.analyses.base import Plan
-    from upd.batch.studies import study
-    from upd.batch.sweeps import sweep
-    from upd.fitting import fit
-    from upd.measured import fit_damping, read_measured
-    from upd.report.notebook import RunResult, load
-    from upd.runner import run
-    from upd.scene import Scene, load_scene
-    from upd.sizing import design
+    from upd import contact as contact
+    from upd import dynamics as dynamics
+    from upd import hbm as hbm
+    from upd import linalg as linalg
+    from upd import matrices as matrices
+    from upd import measured as measured
+    from upd import own_matrices as own_matrices
+    from upd import reduction as reduction
+    from upd import reference as reference
+    from upd.analyses import make_plan as make_plan
+    from upd.analyses.base import Plan as Plan
+    from upd.batch.studies import study as study
+    from upd.batch.sweeps import sweep as sweep
+    from upd.fitting import fit as fit
+    from upd.measured import fit_damping as fit_damping
+    from upd.measured import read_measured as read_measured
+    from upd.report.notebook import RunResult as RunResult
+    from upd.report.notebook import load as load
+    from upd.runner import run as run
+    from upd.scene import Scene as Scene
+    from upd.scene import load_scene as load_scene
+    from upd.sizing import design as design
 
 __version__ = "0.2.0"
 
@@ -86,31 +87,8 @@ _HOME = {
     "Plan": "upd.analyses.base",
 }
 
-__all__ = [
-    "Plan",
-    "RunResult",
-    "Scene",
-    "__version__",
-    "contact",
-    "design",
-    "dynamics",
-    "fit",
-    "fit_damping",
-    "hbm",
-    "linalg",
-    "load",
-    "load_scene",
-    "make_plan",
-    "matrices",
-    "measured",
-    "own_matrices",
-    "read_measured",
-    "reduction",
-    "reference",
-    "run",
-    "study",
-    "sweep",
-]
+_ROOMS = "contact dynamics hbm linalg matrices measured own_matrices reduction reference"
+__all__ = ["__version__", *_HOME, *_ROOMS.split()]
 
 
 def __getattr__(name: str) -> Any:

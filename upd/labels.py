@@ -82,14 +82,7 @@ def file_name(title: str) -> str:
 
 
 #: unit in the files -> the same in print
-_UNITS = {
-    "um": "µm",
-    "um2": "µm²",
-    "mm2": "mm²",
-    "(m/s2)/N": "(m/s²)/N",
-    "N mm": "N mm",
-    "mJ": "mJ",
-}
+_UNITS = {"um": "µm", "um2": "µm²", "mm2": "mm²", "(m/s2)/N": "(m/s²)/N"}
 
 
 def unit_label(unit: str) -> str:

@@ -8,18 +8,15 @@ from __future__ import annotations
 import logging
 import resource
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 log = logging.getLogger("upd")
 
 #: Called with (stage, detail, seconds since the stage began, or None when it begins).
 Listener = Callable[[str, str, float | None], None]
-
-#: seconds between two samples of the memory
-_PERIOD_S = 0.05
 
 
 def silent(stage: str, detail: str, seconds: float | None) -> None:
@@ -33,12 +30,6 @@ class Stages:
         self._listener = listener
         self._start = time.perf_counter()
         self.seconds: dict[str, float] = {}
-        self._peak, self._stop = [_resident_mb()], threading.Event()
-        # the thread does not know this object: it ends when nobody asks any more
-        threading.Thread(target=_watch, args=(self._peak, self._stop), daemon=True).start()
-
-    def __del__(self) -> None:
-        self._stop.set()
 
     @contextmanager
     def __call__(self, stage: str, detail: str = "") -> Iterator[None]:
@@ -59,26 +50,29 @@ class Stages:
         return time.perf_counter() - self._start
 
     def cost(self) -> dict[str, float | dict[str, float]]:
-        """Seconds per stage, their total by the clock, and the largest resident memory during this
-        run in MB: sampled on Linux (the kernel's own peak counts earlier runs), else the process's
-        peak.
+        """Seconds per stage, their total by the clock, and the largest resident memory in MB since
+        `forget_peak`.
         """
         return {
             "stages": {k: round(v, 4) for k, v in self.seconds.items()},
             "total_s": round(self.elapsed(), 4),
-            "peak_rss_mb": round(max(*self._peak, _resident_mb()), 1),
+            "peak_rss_mb": round(_peak_mb(), 1),
         }
 
 
-def _watch(peak: list[float], stop: threading.Event) -> None:
-    while not stop.wait(_PERIOD_S):
-        peak[0] = max(peak[0], _resident_mb())
+def forget_peak() -> None:
+    """Let the kernel's peak of the resident memory begin anew; where it cannot (no Linux), it is
+    that of the whole process.
+    """
+    with suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
 
 
-def _resident_mb() -> float:
+def _peak_mb() -> float:
     try:
-        with open("/proc/self/statm", encoding="ascii") as f:  # noqa: PTH123 - read twenty times a second
-            return int(f.read().split()[1]) * resource.getpagesize() / 1e6
-    except OSError:
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        return peak / 1e6 if sys.platform == "darwin" else peak / 1e3
+        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+        (peak,) = (line.split()[1] for line in lines if line.startswith("VmHWM"))
+        return int(peak) * 1024 / 1e6
+    except (OSError, ValueError):
+        size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        return size / 1e6 if sys.platform == "darwin" else size / 1e3

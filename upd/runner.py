@@ -10,19 +10,19 @@ from contextlib import suppress
 from dataclasses import asdict, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from upd.analyses import analysis_of, make_plan
 from upd.analyses.base import Analysis, Plan
-from upd.cache.files import json_text, write_text
+from upd.cache.files import write_text
 from upd.cache.folders import OwnFolder, own_folder
 from upd.cache.sources import versions
 from upd.errors import ConvergenceError, InputError, UpdError, disk_fault, one_line
 from upd.labels import check_words
-from upd.progress import Listener, Stages, silent
+from upd.progress import Listener, Stages, forget_peak, silent
 from upd.report import write_report
 from upd.report.files import write_curves, write_figures
-from upd.report.folder import check_replaceable, is_run_file
+from upd.report.folder import check_replaceable, is_run_file, sealed
 from upd.report.notebook import RunResult
 from upd.results import Check, Estimates, Result, write_netcdf
 from upd.results.check import FAILED, OK, WARNED, status_of, worst_check
@@ -73,22 +73,23 @@ def run(
         When the disk does not take the numbers or their arrays.
     """
     loaded = as_scene(scene, overrides)
-    analysis = analysis_of(loaded)
     plan = make_plan(loaded)
     plan.refuse_oversize()
+    forget_peak()
     stages = Stages(progress)
+    packages = "versions: " + ", ".join(f"{name} {one}" for name, one in versions().items())
     if out is None:
-        log.info(_versions())
-        return _solved(_Run(analysis, stages, None, None), plan)
+        log.info(packages)
+        return _solved(plan, stages, None)
     own, handler = _begin(Path(out), numbered, loaded)
     if own.replaces:
         for seconds in (None, 0.0):
             progress("folder", f"replaces the earlier run in {own.place}", seconds)
-    log.info(_versions())
+    log.info(packages)
     # matplotlib takes a while to import: meanwhile the solver computes.
     threading.Thread(target=import_module, args=("upd.plot.matplotlib",), daemon=True).start()
     try:
-        result = _solved(_Run(analysis, stages, own.path, own.place), plan)
+        result = _solved(plan, stages, own)
         if report:
             result = _leave_report(own, result, stages)
     except BaseException as error:
@@ -106,10 +107,6 @@ def run(
                 error.result = replace(error.result, folder=place)
         raise
     return replace(result, folder=_end(own, handler))
-
-
-def _versions() -> str:
-    return "versions: " + ", ".join(f"{name} {version}" for name, version in versions().items())
 
 
 def _leave_report(own: OwnFolder, result: Any, stages: Stages) -> Any:
@@ -136,22 +133,14 @@ def _with_fault(result: RunResult, fault: str, folder: Path) -> RunResult:
     return result
 
 
-class _Run(NamedTuple):
-    """A run that is under way: where it writes (None: nowhere), and where its folder will be."""
-
-    analysis: Analysis
-    stages: Stages
-    folder: Path | None
-    place: Path | None
-
-
-def _solved(run: _Run, plan: Plan[Any]) -> RunResult:
+def _solved(plan: Plan[Any], stages: Stages, own: OwnFolder | None) -> RunResult:
     """Solve and check; the result, with what the run folder then holds.
 
     An error leaves what converged in the folder.
     """
+    analysis = analysis_of(plan.scene)
     try:
-        solution = run.analysis.solve(plan, run.stages)
+        solution = analysis.solve(plan, stages)
     except BaseException as error:
         if isinstance(error, UpdError):
             log.error("failed: %s", error)
@@ -159,15 +148,17 @@ def _solved(run: _Run, plan: Plan[Any]) -> RunResult:
         else:
             log.exception("stopped")
             status = f"stopped: {type(error).__name__}"
-        if run.folder is not None:
+        if own is not None:
             partial, estimates = (getattr(error, name, None) for name in ("partial", "estimates"))
-            _leave(run, _collected(run, plan, partial, status, (), estimates or {}), partial)
+            result = _collected(plan, partial, status, (), estimates or {}, stages)
+            _leave(own, result, plan, partial, stages)
         raise
-    with run.stages("self-checks"):
-        checks = run.analysis.check_solution(solution)
+    with stages("self-checks"):
+        checks = analysis.check_solution(solution)
     failed = [c for c in checks if not c.passed and c.fatal]
-    result = _collected(run, solution.plan, solution, "", checks, None)
-    result, fault = _leave(run, result, solution)
+    result, fault = _collected(solution.plan, solution, "", checks, None, stages), ""
+    if own is not None:
+        result, fault = _leave(own, result, plan, solution, stages)
     if fault:
         log.error(fault)
         disk = UpdError(fault)
@@ -175,7 +166,7 @@ def _solved(run: _Run, plan: Plan[Any]) -> RunResult:
         raise disk
     if result.outcome == FAILED:
         log.error(result.status)
-        inputs = failed and all(c.name in run.analysis.input_checks for c in failed)
+        inputs = failed and all(c.name in analysis.input_checks for c in failed)
         text = "\n".join(["self-check failed", *(c.sentence for c in failed)])
         failure = (InputError if inputs else ConvergenceError)(
             text if failed else result.status.removeprefix("failed: ")
@@ -186,12 +177,12 @@ def _solved(run: _Run, plan: Plan[Any]) -> RunResult:
 
 
 def _collected(
-    run: _Run,
     plan: Plan[Any],
     solution: Any,
     status: str,
     checks: Sequence[Check],
     estimates: Estimates | None,
+    stages: Stages,
 ) -> RunResult:
     """The result of a run.
 
@@ -204,7 +195,7 @@ def _collected(
     estimates
         Errors of the numbers of a run that failed; None: they are estimated.
     """
-    analysis, stages = run.analysis, run.stages
+    analysis = analysis_of(plan.scene)
     with stages("numbers"):
         arrays = analysis.arrays(solution) if solution is not None else {}
         made = analysis.make_results(solution) if solution is not None else ()
@@ -225,13 +216,14 @@ def _collected(
         size=_size(analysis, plan, solution)
         | {"analysis": analysis.name, "mesh": dict(plan.parameters), "solver": dict(plan.solver)},
         arrays=arrays,
-        folder=run.place,
         scene_text=scene_as_run(plan.scene),
         cost=stages.cost(),
     )
 
 
-def _leave(run: _Run, result: RunResult, solution: Any) -> tuple[RunResult, str]:
+def _leave(
+    own: OwnFolder, result: RunResult, plan: Plan[Any], solution: Any, stages: Stages
+) -> tuple[RunResult, str]:
     """Write the run folder, numbers first and pictures last.
 
     Returns
@@ -240,16 +232,15 @@ def _leave(run: _Run, result: RunResult, solution: Any) -> tuple[RunResult, str]
         The result, and what the disk did not take of numbers, arrays and meshes; "" when all is
         there. Pictures that are missing stand in the status.
     """
-    folder, place, stages = run.folder, run.place, run.stages
-    if folder is None:
-        return result, ""
+    folder, place = own.path, own.place
+    result = replace(result, folder=place)
     try:
         _write_summary(result, folder)
         if solution is not None:
             with stages("files", str(place)):
                 write_netcdf(folder / "result.nc", result.arrays)
                 write_curves(result.arrays, folder)
-                run.analysis.write_files(solution, folder)
+                analysis_of(plan.scene).write_files(solution, folder)
     except (OSError, UpdError) as error:
         if disk_fault(error) is None:
             raise
@@ -289,7 +280,7 @@ def _write_summary(result: RunResult, folder: Path) -> None:
     data, arrays = result.summary(), folder / "result.nc"
     if arrays.is_file():
         data = {**data, DIGEST: file_digest(arrays)}
-    write_text(folder / "summary.json", json_text(data))
+    write_text(folder / "summary.json", sealed(data))
 
 
 def _effects(plan: Plan[Any], checks: Sequence[Check]) -> list[dict[str, Any]]:
@@ -321,7 +312,7 @@ def _begin(place: Path, numbered: bool, scene: AnyScene) -> tuple[OwnFolder, log
     try:
         own = own_folder(place, check=check_replaceable, ours=is_run_file, number=numbered)
         write_text(own.path / "scene.toml", scene_as_run(scene))
-        handler = _RunLog(own.path / "run.log", mode="w", encoding="utf-8")
+        handler = logging.FileHandler(own.path / "run.log", mode="w", encoding="utf-8")
     except OSError as error:
         if own is not None:
             place = own.place
@@ -330,6 +321,8 @@ def _begin(place: Path, numbered: bool, scene: AnyScene) -> tuple[OwnFolder, log
             f"the run folder {place} cannot be written ({one_line(error)}): choose another with "
             "--out"
         ) from None
+    # on a full disk it loses lines without a word: the run itself reports its disk
+    handler.handleError = lambda record: None  # type: ignore[method-assign]
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(name)s: %(message)s"))
     log.addHandler(handler)
     log.setLevel(logging.INFO)
@@ -339,17 +332,6 @@ def _begin(place: Path, numbered: bool, scene: AnyScene) -> tuple[OwnFolder, log
 def _end(own: OwnFolder, handler: logging.Handler) -> Path:
     """Close the log and put the folder into its place."""
     log.removeHandler(handler)
-    handler.close()
+    with suppress(OSError):
+        handler.close()
     return own.move_in()
-
-
-class _RunLog(logging.FileHandler):
-    """The log of a run; on a full disk it loses lines, without a word on the terminal."""
-
-    def handleError(self, record: logging.LogRecord) -> None:
-        """Do nothing: the run itself reports its disk."""
-
-    def close(self) -> None:
-        """Close the file, whatever the disk does with its last lines."""
-        with suppress(OSError):
-            super().close()

@@ -28,7 +28,7 @@ from choice_grid import GridCheck, check_by_grid
 
 import upd
 from upd.plot.chart import Trace
-from upd.plot.matplotlib import write_sheet
+from upd.plot.matplotlib import write_sheets
 from upd.sizing import BestDamper
 from upd.sizing.choice import GROWTHS
 
@@ -164,7 +164,8 @@ def main(names: Sequence[str]) -> None:
         points = Trace(f"grid of {len(grid.values)}", grid.values, grid.heights, "points", 7)
         first, *others = found.charts
         charts = [replace(first, traces=(*first.traces, points)), *others]
-        write_sheet(charts, Path(__file__).parent / f"choice_{name}.png")
+        mine = [replace(one, figure=f"choice_{name}") for one in charts]
+        write_sheets(mine, Path(__file__).parent)
 
 
 if __name__ == "__main__":

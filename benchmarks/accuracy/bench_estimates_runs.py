@@ -13,7 +13,7 @@ import csv
 import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ import numpy as np
 
 import upd
 from upd.plot.chart import Axis, Chart, Trace
-from upd.plot.matplotlib import write_sheet
+from upd.plot.matplotlib import write_sheets
 
 PICTURE = Path(__file__).parent / "estimates.png"
 POINTS = PICTURE.with_suffix(".csv")
@@ -195,7 +195,8 @@ def run(scenes: Sequence[str] = ()) -> Iterator[Row]:
         store(every)
         yield from rows(f"{setting.scene}, {setting.name}", mine)
     yield from rows("all", every)
-    write_sheet([chart([*every, *responses()])], PICTURE)
+    drawn = replace(chart([*every, *responses()]), figure=PICTURE.stem)
+    write_sheets([drawn], PICTURE.parent)
 
 
 def stored() -> list[Judged]:

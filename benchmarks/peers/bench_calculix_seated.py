@@ -406,7 +406,7 @@ def draw(folder: Path, case: Case) -> Path:
     """Both maps of open, sticking and slipping nodes, left and right face, beside each other."""
     from upd.plot.chart import STATES as NAMES
     from upd.plot.chart import Axis, Chart, Map
-    from upd.plot.matplotlib import write_sheet
+    from upd.plot.matplotlib import write_sheets
 
     ours = solve_ours(case)
     theirs = solve_calculix(ours, case, case.springs[-1])
@@ -429,10 +429,11 @@ def draw(folder: Path, case: Case) -> Path:
                         case=f"friction {case.friction:g}, {told}",
                         columns=4,
                         equal=True,
+                        figure="calculix_seated",
                     )
                 )
     folder.mkdir(parents=True, exist_ok=True)
-    return write_sheet(charts, folder / "calculix_seated.png")[0]
+    return write_sheets(charts, folder)[0]
 
 
 if __name__ == "__main__":

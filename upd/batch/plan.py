@@ -37,7 +37,7 @@ from upd.batch.store import PointStore
 from upd.cache.arrays import cache_limit
 from upd.cache.sources import source_digest
 from upd.errors import InputError
-from upd.plot.sweep_charts import Parameter
+from upd.plot.sweep_charts import Parameter, told_apart
 from upd.scene import AnyScene
 from upd.scene.quantities import Uncertainty
 from upd.scene.toml import put_back, value_of
@@ -370,7 +370,7 @@ def plan_sweep(
     shared = [one for one, _ in needs.values()]
     return SweepPlan(
         scene=scene,
-        axes=axes,
+        axes=told_apart(axes),
         places=grid,
         tasks=tasks,
         kept=kept,

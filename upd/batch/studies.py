@@ -91,7 +91,7 @@ class Study:
 
         figures = write_sheets(charts, folder)
         failed = sum(bool(one.outcome.failure) for one in solved)
-        page = write_study_report(folder, self.title, failed, report.notes, tables, charts, figures)
+        page = write_study_report(folder, self.title, failed, report.notes, tables, charts)
         return [table, data, *figures, page]
 
 

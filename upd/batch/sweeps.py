@@ -19,8 +19,8 @@ from upd.analyses import analysis_of
 from upd.batch.engine import Batch, Watcher, WorkersAsked, run_points
 from upd.batch.plan import Sample, SweepPlan, plan_sweep, settings
 from upd.batch.store import PointStore
-from upd.batch.table import as_csv, check_follow, csv_text, make_columns, reasons
-from upd.cache.files import json_text, write_text
+from upd.batch.table import check_follow, csv_text, make_columns, reasons
+from upd.cache.files import write_text
 from upd.cache.sources import versions
 from upd.errors import InputError, one_line
 from upd.labels import file_name
@@ -33,6 +33,8 @@ from upd.plot.sweep_charts import (
     sweep_charts,
 )
 from upd.report import write_report
+from upd.report.files import as_csv
+from upd.report.folder import sealed
 from upd.results import Group, write_netcdf
 from upd.results.sampled import SampledNumber, sampled_number
 from upd.scene import load_scene
@@ -239,7 +241,7 @@ def write_outputs(store: PointStore, result: SweepResult) -> list[Path]:
     table, arrays, data = (folder / f"{name}" for name in ("table.csv", "sweep.nc", "sweep.json"))
     write_text(table, csv_text(plan.axes, plan.places, result.outcomes, result.columns))
     write_netcdf(arrays, {"": Group(_arrays(result))})
-    write_text(data, json_text(_summary(store, result)))
+    write_text(data, sealed(_summary(store, result)))
     if plan.sample is None:
         return [table, arrays, data]
     compared = folder / "sample.csv"
@@ -264,23 +266,9 @@ def draw(
     return write_sheets(sweep_charts(axes, columns), folder)
 
 
-def dimension(axis: Parameter, axes: Sequence[Parameter]) -> str:
-    """Short name of an axis.
-
-    The last word of its path, or the whole path when that would not be its own.
-    """
-    last = [other.path.rpartition(".")[2] for other in axes]
-    own = axis.path.rpartition(".")[2]
-    return (
-        own
-        if last.count(own) == 1 and own not in ("status", "seconds")
-        else axis.path.replace(".", "_")
-    )
-
-
 def _arrays(result: SweepResult) -> dict[str, Any]:
     plan, axes = result.plan, result.plan.axes
-    names = tuple(dimension(axis, axes) for axis in axes)
+    names = tuple(axis.short.replace(" ", "_") for axis in axes)
     if plan.sample is None:
         shape, dims = tuple(len(axis.values) for axis in axes), names
     else:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from typing import Any
@@ -16,6 +14,7 @@ from numpy.typing import NDArray
 from upd.batch.plan import Place
 from upd.errors import InputError
 from upd.plot.sweep_charts import Column, Parameter
+from upd.report.files import as_csv
 from upd.results import Case, Result, shared_label
 from upd.vary.outcome import Outcome
 
@@ -202,10 +201,3 @@ def csv_text(
             ]
         )
     return as_csv(rows)
-
-
-def as_csv(rows: Iterable[Iterable[Any]]) -> str:
-    """Rows as CSV; what is not known is empty."""
-    out = io.StringIO()
-    csv.writer(out, lineterminator="\n").writerows(rows)
-    return out.getvalue()

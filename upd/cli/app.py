@@ -305,7 +305,7 @@ def sweep(
     from upd.batch.plan import plan_sweep
     from upd.batch.store import PointStore
     from upd.batch.sweeps import run_sweep
-    from upd.cli.batch import print_sample, print_sweep, print_sweep_plan
+    from upd.cli.batch import print_sweep, print_sweep_plan
 
     loaded = _loaded(scene, set)
     kind = "sweep" if sample is None else "sample"
@@ -321,7 +321,7 @@ def sweep(
     names = [name.strip() for name in follow.split(",") if name.strip()]
     with terminal.batch_progress() as watch:
         result = run_sweep(planned, folder, follow=names, watch=watch)
-    (print_sweep if planned.sample is None else print_sample)(terminal.console, result)
+    print_sweep(terminal.console, result)
     for fault in result.faults:
         warn(fault, "yellow")
     return OK if len(result.failed) < len(result.outcomes) else FAILED

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections import Counter
-
 from rich.console import Console
 
 from upd.batch.engine import Workers
@@ -14,16 +11,10 @@ from upd.batch.sweeps import SweepResult
 from upd.cli.tables import print_table
 from upd.cli.terminal import duration
 from upd.labels import counted
-from upd.plot.sweep_charts import is_constant
-from upd.report.columns import fitting
-from upd.report.tables import filled, sample_table, with_unit
-from upd.results.quantities import number_title
-from upd.results.sampled import sample_sentence
+from upd.report.sweep_page import read_sweep, sweep_tables
 
 #: rows shown; the files hold all
 _ROWS = 30
-#: most different reasons of failures that are shown
-_REASONS = 5
 #: ending of a study's file -> what it is
 _KINDS = {
     ".md": "Table",
@@ -64,52 +55,13 @@ def print_sweep_plan(console: Console, plan: SweepPlan) -> None:
 
 
 def print_sweep(console: Console, result: SweepResult) -> None:
-    """The table, as far as it fits, and where the rest is."""
-    plan = result.plan
-    places = plan.places[:_ROWS]
-    columns = {axis.header: [axis.shown(p[k]) for p in places] for k, axis in enumerate(plan.axes)}
-    columns["status"] = ["failed" if one.failure else "" for one in result.outcomes[: len(places)]]
-    # what varies first
-    for column in sorted(result.columns, key=lambda one: is_constant(one.values)):
-        values = column.values[: len(places)]
-        head = with_unit(number_title(column.name, column.case), column.unit)
-        columns[f"# {head}"] = ["" if math.isnan(v) else f"{v:.4g}" for v in values]
-    table = filled("Points", columns)
-    shown = fitting(table, console.width)
-    print_table(console, shown)
-    points = max(len(plan.places) - _ROWS, 0)
-    hidden = {"point": points, "number": len(table.columns) - len(shown.columns)}
-    text = " and ".join(counted(count, what) for what, count in hidden.items() if count)
-    if text:
-        console.print(f"Not shown: {text}; see the table's file")
-    _print_end(console, result)
-
-
-def print_sample(console: Console, result: SweepResult) -> None:
-    """What the sample makes of every number, and where the rest is."""
-    print_table(console, sample_table(result.sampled))
-    console.print(sample_sentence(result.sampled))
-    _print_end(console, result)
-
-
-def _print_end(console: Console, result: SweepResult) -> None:
-    """Failures, warnings, files and seconds."""
-    reasons = Counter(result.outcomes[k].failure for k in result.failed)
-    lines = [
-        f"{counted(count, 'point')} failed: {reason}"
-        for reason, count in list(reasons.items())[:_REASONS]
-    ]
-    if len(reasons) > _REASONS:
-        lines.append(f"and {len(reasons) - _REASONS} other reasons, in the table's column reason")
-    warned = [outcome.warnings for outcome in result.outcomes if outcome.warnings]
-    if warned:
-        names = ", ".join(sorted({name for names in warned for name in names}))
-        points = counted(len(warned), "point")
-        lines.append(f"{points} with warnings ({names}): see the table's column warnings")
-    lines += [f"{'Figure' if p.suffix == '.png' else 'File'}: {p}" for p in result.files]
+    """The tables of its page, as far as they fit, and where the rest is."""
+    for table in sweep_tables(read_sweep(result.folder), _ROWS):
+        print_table(console, table, cut=True)
+    for path in result.files:
+        console.print(f"{'Figure' if path.suffix == '.png' else 'File'}: {path}")
     fine, total = len(result.plan.places) - len(result.failed), len(result.plan.places)
-    for line in (*lines, f"{fine} of {total} points ok, {duration(result.seconds)}"):
-        console.print(line)
+    console.print(f"{fine} of {total} points ok, {duration(result.seconds)}")
 
 
 def print_study_plan(console: Console, title: str, study: Study, workers: Workers) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from rich.console import Console
@@ -10,8 +11,7 @@ from rich.text import Text
 from upd.analyses.base import Plan, fitting
 from upd.analyses.cost import memory_limit
 from upd.labels import counted
-from upd.report.answer import TITLE
-from upd.report.columns import whole_table
+from upd.report.answer import TITLE, AnswerLine, table_lines
 from upd.report.notebook import RunResult
 from upd.results.answer_table import AnswerTable
 from upd.results.check import FAILED, OK, WARNED
@@ -22,19 +22,20 @@ _STYLES = {OK: "green", WARNED: "yellow", FAILED: "red", TITLE: "bold"}
 
 def print_result(console: Console, result: RunResult, *, full: bool = False) -> None:
     """Print the answer of a run; with all numbers, checks and sources of errors when ``full``."""
-    for line in result.answer(console.width, full=full):
+    _print_lines(console, result.answer(console.width, full=full))
+
+
+def print_table(console: Console, table: AnswerTable, *, cut: bool = False) -> None:
+    """Print a table with its heading and its note, as wide as the console; where it may be ``cut``,
+    without the last columns that find no room.
+    """
+    _print_lines(console, table_lines(table, console.width, cut=cut))
+
+
+def _print_lines(console: Console, lines: Iterable[AnswerLine]) -> None:
+    for line in lines:
         # a path longer than the terminal is wide stays one line, to be copied
         console.print(Text(line.text, style=_STYLES.get(line.mood, "")), soft_wrap=True)
-
-
-def print_table(console: Console, table: AnswerTable) -> None:
-    """Print a table with its heading, as wide as the console."""
-    if table.rows:
-        console.print()
-        if table.heading:
-            console.print(Text(table.heading, "bold"))
-        for line in whole_table(table, console.width):
-            console.print(Text(line), soft_wrap=True)
 
 
 def print_plan(console: Console, plan: Plan[Any]) -> None:

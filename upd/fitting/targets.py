@@ -385,7 +385,7 @@ def _parameter(
     wide = _WIDE if set(kinds) == {_STIFFNESS} else _NARROW
     low, high = 1.0 / wide, wide
     if bounds:
-        low, high = (end.factor for end in read_range(bounds, kinds[0], values[0]))
+        low, high = (end / values[0] for end in read_range(bounds, kinds[0], values[0]))
     return VariedInput(paths, tuple(values), kinds[0], low, high)
 
 

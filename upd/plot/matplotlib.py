@@ -50,15 +50,6 @@ _SIZE, _DPI = (5.6, 4.4), 130
 _PAGE_DPI = 110
 
 
-def own_axes(ax: Axes | None) -> Axes:
-    """The axes given, or new ones in a figure of their own."""
-    if ax is not None:
-        return ax
-    figure = Figure(figsize=(6, 4.5), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure.add_subplot()
-
-
 def draw_sheet(
     drawings: Sequence[Drawing],
     columns: int,
@@ -99,22 +90,9 @@ _OVER = 0.45
 _BESIDE, _ABOVE = 1.05, 2.0
 
 
-def draw(chart: Chart, ax: Axes | None = None) -> Axes:
-    """Draw a chart on matplotlib axes, or on new ones.
-
-    Parameters
-    ----------
-    chart
-        What to draw.
-    ax
-        Where; axes in a figure of their own when None.
-
-    Returns
-    -------
-    Axes
-        The axes drawn on.
-    """
-    ax, chart = own_axes(ax), with_room(chart)
+def draw(chart: Chart, ax: Axes) -> Axes:
+    """Draw a chart on matplotlib axes; returns them."""
+    chart = with_room(chart)
     _grid(chart, ax)
     _draw_maps(chart, ax)
     for area in chart.areas:
@@ -153,33 +131,15 @@ def chart_png(charts: Sequence[Chart]) -> bytes:
     return out.getvalue()
 
 
-def write_sheet(charts: Sequence[Chart], path: Path) -> list[Path]:
-    """Write the charts of one figure as one PNG, whole or not at all.
-
-    Parameters
-    ----------
-    charts
-        Those of a sheet (`Chart.sheet`) are drawn, at most `MOST_PANELS`, with the
-        columns and the size of the first.
-    path
-        PNG file.
-
-    Returns
-    -------
-    list of Path
-        ``path``, or nothing when no chart belongs to a sheet.
-    """
-    shown = [chart for chart in charts if chart.sheet]
-    return write_png(_sheet(shown, _DPI), path) if shown else []
-
-
 def write_sheets(charts: Iterable[Chart], folder: Path, *, keep: bool = False) -> list[Path]:
-    """Write the charts of every figure (`Chart.figure`) as ``<figure>.png`` into ``folder``.
+    """Write the charts of every figure (`Chart.figure`) as ``<figure>.png`` into ``folder``, whole
+    or not at all.
 
     Parameters
     ----------
     charts
-        Those without a figure are left out.
+        Those of a figure that belong to its sheet (`Chart.sheet`) are drawn, at most
+        `MOST_PANELS`, with the columns and the size of the first.
     keep
         Leave files that are there already as they are.
 
@@ -188,17 +148,12 @@ def write_sheets(charts: Iterable[Chart], folder: Path, *, keep: bool = False) -
     list of Path
         The files written.
     """
-    sheets: dict[str, list[Chart]] = {}
+    sheets: dict[Path, list[Chart]] = {}
     for chart in charts:
-        if chart.figure:
-            sheets.setdefault(chart.figure, []).append(chart)
-    files = {folder / f"{name}.png": group for name, group in sheets.items()}
-    return [
-        made
-        for path, group in files.items()
-        if not (keep and path.exists())
-        for made in write_sheet(group, path)
-    ]
+        if chart.figure and chart.sheet:
+            sheets.setdefault(folder / f"{chart.figure}.png", []).append(chart)
+    missing = [path for path in sheets if not (keep and path.exists())]
+    return [made for path in missing for made in write_png(_sheet(sheets[path], _DPI), path)]
 
 
 def _sheet(charts: Sequence[Chart], dpi: int) -> Figure:

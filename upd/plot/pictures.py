@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from upd.mesh import FloatArray, IntArray, Mesh
 from upd.mesh.hexmesh import boundary_quads
-from upd.plot.matplotlib import Drawing, draw_sheet, own_axes
+from upd.plot.matplotlib import Drawing, draw_sheet
 from upd.plot.style import COLOURS
 from upd.plot.surface import SCALE
 
@@ -50,7 +50,7 @@ _FAR, _NEAR = (0.15, 0.45, 0.02), (0.35, 0.8, 0.25)
 def draw_mode(
     meshes: Mapping[str, Mesh],
     shapes: Mapping[str, FloatArray],
-    ax: Axes | None = None,
+    ax: Axes,
     *,
     title: str = "",
     view: tuple[float, float] = _VIEW,
@@ -65,7 +65,6 @@ def draw_mode(
     view
         Azimuth and elevation of the viewer in degrees, about z.
     """
-    ax = own_axes(ax)
     axes = _view_axes(*view)
     points, faces, body = _together(meshes)
     u = np.vstack([shapes.get(name, np.zeros((m.n_node, 3))) for name, m in meshes.items()])

@@ -40,11 +40,14 @@ class Parameter:
         As the scene takes them.
     wrapped
         The scene's entry is a list; a value stands there alone in it.
+    words
+        Last words of the path that tell it from the other parameters.
     """
 
     path: str
     values: tuple[Any, ...]
     wrapped: bool = False
+    words: int = 1
 
     @cached_property
     def _parsed(self) -> tuple[tuple[float, ...] | None, str]:
@@ -66,8 +69,8 @@ class Parameter:
 
     @property
     def short(self) -> str:
-        """Last word of the path."""
-        return self.path.rpartition(".")[2].replace("_", " ")
+        """The last words of the path."""
+        return " ".join(self.path.split(".")[-self.words :]).replace("_", " ")
 
     @property
     def header(self) -> str:
@@ -84,12 +87,24 @@ class Parameter:
         return str(self.values[k]) if self.numbers is None else f"{self.numbers[k]:.6g}"
 
     def with_unit(self, k: int) -> str:
-        """Value `k` with the unit, after the last word of the path."""
+        """Value `k` with the unit, after the last words of the path."""
         return f"{self.short} {self.shown(k)} {unit_label(self.unit)}".rstrip()
 
     def setting(self, k: int) -> Any:
         """What the scene is given for value `k`."""
         return [self.values[k]] if self.wrapped else self.values[k]
+
+
+def told_apart(parameters: Sequence[Parameter]) -> tuple[Parameter, ...]:
+    """The parameters, each with as many last words of its path as no other has."""
+
+    paths = [p.path.split(".") for p in parameters]
+
+    def words(path: list[str]) -> int:
+        own = (n for n in range(1, len(path)) if [one[-n:] for one in paths].count(path[-n:]) == 1)
+        return next(own, len(path))
+
+    return tuple(replace(p, words=words(path)) for p, path in zip(parameters, paths, strict=True))
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,7 @@
 
 from __future__ import annotations
 
-import re
-import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -75,16 +72,12 @@ def answer(
     analysis = analysis_named(str(size.get("analysis", "")))
     own = analysis is not None and analysis.answer is not None
     tables = answer_tables(size, entries) if own or not full else []
-    blocks = [_table(table, width, cut=not own) for table in tables]
-    if tables and not own and sum(map(len, (lines, *blocks[:2], end))) >= LINES:
-        # no room for the first cases: the main numbers that are among them too
-        whole = number_table(MAIN, reached_numbers(size, entries))
-        whole = replace(whole, note=tables[0].note)
-        blocks = [_table(whole, width, cut=True), *blocks[tables[0].heading == MAIN :]]
-    for k, block in enumerate(blocks):
+    room = LINES - len(lines) - len(end)
+    for k, table in enumerate(tables):
+        block = table_lines(table, width, cut=not own)
         # the tables of an analysis are whole; of others those that fit on a screen
-        if own or k == 0 or sum(map(len, (lines, block, end))) < LINES:
-            lines += block
+        if own or k == 0 or len(block) < room:
+            lines, room = lines + block, room - len(block)
     if full:
         for table in (
             *all_numbers(entries),
@@ -93,38 +86,31 @@ def answer(
             checks_table(summary["checks"]),
             stage_table(summary["cost"].get("stages", {})),
         ):
-            lines += _table(table, width)
+            lines += table_lines(table, width)
     return lines + end
 
 
 def short_answer(summary: Mapping[str, Any], width: int, folder: Path | None) -> list[str]:
-    """Verdict, main numbers, checks, cost and the first warning, on at most ten lines."""
+    """Verdict, main numbers, checks, cost and how much warns, on at most ten lines."""
     size, results = summary["size"], summary["results"]
-    cost = _cost(summary).partition(";")[0]
-    end = [_checked(summary).partition(". Left out")[0]]
-    end += [f"{cost}; all {len(results)} numbers: .table()".removeprefix("; ")]
-    end += [f"Run folder: {folder}"] * (folder is not None)
-    if outcome_of(summary["status"]) != FAILED:
-        noted = warnings(summary["checks"], results, 1)
-        names = "; ".join(re.split(r" \(|: ", text, maxsplit=1)[0] for text in noted)
-        text = f"Warnings, with what to do in .table(): {names}"
-        end += [textwrap.shorten(text, width, placeholder=" ...")] * bool(noted)
     lines = [line.text for line in _verdict(summary, width)]
-    first = _most_important(summary)
-    for entry in main_numbers(size, results):
-        if entry is not first and len(lines) + len(end) < SHORT:
-            case = f"{entry['case']}: " * bool(entry["case"])
-            text = f"  {case}{number_label(entry['name'])} {shown(entry)} {plus_minus(entry)}"
-            beside = f" {_beside(entry)}" if entry["reference"] is not None else ""
-            lines.append(text + beside if len(text + beside) <= width else text)
-    return [*(line.rstrip() for line in lines), *end][:SHORT]
+    end = [checked(summary).partition(". Left out")[0], _cost(summary, ".table()")]
+    end += [f"Run folder: {folder}"] * (folder is not None)
+    noted = warnings(summary["checks"], results)
+    if noted and outcome_of(summary["status"]) != FAILED:
+        end.append(f"Warnings: {len(noted)}, with what to do in .table()")
+    table = number_table(MAIN, reached_numbers(size, results))
+    numbers = whole_table(table, width, cut=True) if table.rows else []
+    return [*lines, *numbers[: max(SHORT - len(lines) - len(end), 0)], *end][:SHORT]
 
 
-def _table(table: AnswerTable, width: int, *, cut: bool = False) -> list[AnswerLine]:
-    """A table with its heading and its note."""
+def table_lines(table: AnswerTable, width: int, *, cut: bool = False) -> list[AnswerLine]:
+    """A table with its heading and its note; where it may be ``cut``, without the last columns that
+    find no room.
+    """
     if not table.rows:
         return []
-    lines = [AnswerLine(""), AnswerLine(table.heading, TITLE)]
+    lines = [AnswerLine(""), *[AnswerLine(table.heading, TITLE)] * bool(table.heading)]
     lines += map(AnswerLine, whole_table(table, width, cut=cut))
     return lines + _wrapped(table.note, width)
 
@@ -170,7 +156,7 @@ def _end(
 ) -> list[AnswerLine]:
     """Chosen levels, sources of the main error, checks, cost and files; at last what warns."""
     lines = [AnswerLine("")]
-    for text in (_accuracy(summary), _budget(summary), _checked(summary), _cost(summary)):
+    for text in (_accuracy(summary), _budget(summary), checked(summary), _cost(summary, "--full")):
         lines += _wrapped(text, width)
     has_page = folder is not None and (folder / "report.html").is_file()
     if folder is not None:
@@ -207,7 +193,7 @@ def _budget(summary: Mapping[str, Any]) -> str:
     return ""
 
 
-def _checked(summary: Mapping[str, Any]) -> str:
+def checked(summary: Mapping[str, Any]) -> str:
     """How many checks passed, and the largest change by an effect left out."""
     checks, effects = summary["checks"], summary["effects"]
     good = sum(check["verdict"] == "passed" for check in checks)
@@ -225,17 +211,15 @@ def _checked(summary: Mapping[str, Any]) -> str:
     return f"{text}. Left out, worth at most {value} of {what} (limit {limit}): {', '.join(names)}"
 
 
-def _cost(summary: Mapping[str, Any]) -> str:
-    """Seconds, memory and size."""
+def _cost(summary: Mapping[str, Any], whole: str) -> str:
+    """Seconds, memory and size, and what shows the ``whole`` answer."""
     size, cost = summary["size"], summary["cost"]
-    if not cost:
-        return ""
-    parts = [f"{cost['total_s']:.1f} s", f"{cost['peak_rss_mb']:.0f} MB"]
+    parts = [f"{cost['total_s']:.1f} s", f"{cost['peak_rss_mb']:.0f} MB"] if cost else []
     if dofs := sum(size.get("n_dof", {}).values()):
         parts.append(f"{dofs} dofs")
     if size.get("n_pairs") is not None:
         parts.append(f"{size['n_pairs']} contact pairs")
-    return f"Cost: {', '.join(parts)}; all {len(summary['results'])} numbers: --full"
+    return f"Cost: {', '.join(parts)}; all {len(summary['results'])} numbers: {whole}"
 
 
 def _wrapped(text: str, width: int, mood: str = "") -> list[AnswerLine]:

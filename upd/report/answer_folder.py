@@ -16,7 +16,8 @@ from upd.cache.files import whole_files
 from upd.cache.sources import versions
 from upd.errors import InputError, one_line
 from upd.plot.chart import Chart
-from upd.report.columns import SHORT, whole_table, wrapped
+from upd.report.answer import table_lines
+from upd.report.columns import SHORT, wrapped
 from upd.report.page import Section, Verdict, image_uri, make_panels, page_text, versions_text
 from upd.results.answer_table import AnswerTable
 from upd.scene import AnyScene
@@ -126,7 +127,7 @@ class FigureAnswer(ABC):
             When it cannot be written.
         """
         # matplotlib is slow to import
-        from upd.plot.matplotlib import write_sheet
+        from upd.plot.matplotlib import write_sheets
 
         charts, folder = self.charts, Path(out)
         summary = json.dumps(self.as_dict(), indent=1, allow_nan=False) + "\n"
@@ -138,7 +139,7 @@ class FigureAnswer(ABC):
             with whole_files(folder) as stage:
                 for file, content in files.items():
                     (stage / file).write_text(content, encoding="utf-8")
-                write_sheet(charts, stage / f"{self.figure}.png")
+                write_sheets(charts, stage)
         except OSError as error:
             raise InputError(
                 f"{folder}: cannot be written ({one_line(error)}); choose another with --out"
@@ -155,9 +156,7 @@ class FigureAnswer(ABC):
         """Its verdict, all its tables and its notes as text."""
         lines = wrapped(self.verdict, WIDTH)
         for table in self.tables:
-            if table.rows:
-                rows = [f"  {line}" for line in whole_table(table, WIDTH - 2)]
-                lines += ["", f"{table.heading}:", *rows, *wrapped(table.note, WIDTH, "  ")]
+            lines += [line.text for line in table_lines(table, WIDTH)]
         lines += [""] * bool(self.notes)
         return "\n".join([*lines, *(line for note in self.notes for line in wrapped(note, WIDTH))])
 

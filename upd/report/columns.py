@@ -44,17 +44,12 @@ def text_width() -> int:
     return max(_LEAST_WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
 
 
-def wrapped(text: str, width: int, indent: str = "") -> list[str]:
-    """A text on lines of ``width`` characters, its further lines indented by two more; words and
-    paths stay whole.
+def wrapped(text: str, width: int) -> list[str]:
+    """A text on lines of ``width`` characters, its further lines indented by two; words and paths
+    stay whole.
     """
     return textwrap.wrap(
-        text,
-        width,
-        initial_indent=indent,
-        subsequent_indent="  " + indent,
-        break_on_hyphens=False,
-        break_long_words=False,
+        text, width, subsequent_indent="  ", break_on_hyphens=False, break_long_words=False
     )
 
 
@@ -66,22 +61,15 @@ def folded_head(words: str, least: int = 8) -> str:
     return "\n".join(lines)
 
 
-def fitting(table: AnswerTable, width: int) -> AnswerTable:
-    """The table without the last columns that ``width`` has no room for; the first two stay."""
-    columns = _columns(table)
-    while len(columns) > 2 and _wide(columns) > width:
-        columns.pop()
-    n = len(columns)
-    return replace(table, columns=table.columns[:n], rows=tuple(row[:n] for row in table.rows))
-
-
 def whole_table(table: AnswerTable, width: int, *, cut: bool = False) -> list[str]:
     """Lines of a table with all its columns, at most ``width`` characters each.
 
     Words are folded where that is enough; else the columns that find no room stand below, beside
     the first ones again, or, where the table may be ``cut``, its last ones are left out.
     """
-    columns = _columns(fitting(table, width) if cut else table)
+    columns = _columns(table)
+    while cut and len(columns) > 2 and _wide(columns) > width:
+        columns.pop()
     whole = _folded(columns, width)
     if _wide(whole) <= width:
         return _lines(whole)

@@ -4,6 +4,7 @@ which the scenes differ.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,15 +12,15 @@ from typing import Any
 
 from upd.errors import InputError
 from upd.labels import number, percent, shown, unit_label
-from upd.plot.chart import Axis, Chart, Entry
+from upd.plot.chart import Chart, Entry
 from upd.plot.style import colour_range
 from upd.report.folder import RunFolder, read_run
 from upd.report.page import Section, make_panels, page_text, write_page
 from upd.report.run_page import verdict
 from upd.report.tables import analysis_charts, filled, main_numbers
-from upd.results import Case, shared_label
 from upd.results.answer_table import AnswerTable
-from upd.results.quantities import F_N, number_label
+from upd.results.quantities import number_label
+from upd.scene.read import leaves
 
 
 def write_comparison(folders: Sequence[str | Path], path: str | Path) -> Path:
@@ -36,33 +37,18 @@ def write_comparison(folders: Sequence[str | Path], path: str | Path) -> Path:
 
 
 def run_names(runs: Sequence[RunFolder]) -> list[str]:
-    """Names of the run folders, with as much of their paths as makes them different."""
+    """Names of the run folders, from the folder that holds them all."""
     paths = [run.path.resolve() for run in runs]
     if len(set(paths)) < len(paths):
         raise InputError("a folder is duplicated; to fix it: give each folder once")
-    depth = 1
-    while len({p.parts[-depth:] for p in paths}) < len(paths):
-        depth += 1
-    return [str(Path(*p.parts[-depth:])) for p in paths]
+    common = os.path.commonpath(paths)
+    return [str(path.relative_to(common)) for path in paths]
 
 
 def comparison_sections(runs: Sequence[RunFolder], names: Sequence[str]) -> list[Section]:
     """The page of several runs."""
-    meant = [meanings(run.summary["results"]) for run in runs]
-    results = [
-        [{**row, "case": mine.get(row["case"], row["case"])} for row in run.summary["results"]]
-        for run, mine in zip(runs, meant, strict=True)
-    ]
-    charts = overlaid(
-        [
-            [
-                replace(c, case=mine.get(c.case, c.case))
-                for c in analysis_charts(run.arrays, run.summary)
-            ]
-            for run, mine in zip(runs, meant, strict=True)
-        ],
-        names,
-    )
+    results = [run.summary["results"] for run in runs]
+    charts = overlaid([analysis_charts(run.arrays, run.summary) for run in runs], names)
     scenes = [run.summary["scene_file"] for run in runs]
     differ = differences(scenes)
     main = {
@@ -93,23 +79,6 @@ def comparison_sections(runs: Sequence[RunFolder], names: Sequence[str]) -> list
             for name, run in zip(names, runs, strict=True)
         ),
     ]
-
-
-def meanings(rows: Sequence[Entry]) -> dict[str, str]:
-    """Cases of a run -> what they mean in any run: a load that the damper's equilibrium gives is
-    named by the friction it mobilises, not by its force.
-    """
-    cases = {row["case"]: Case(**row.get("case_fields", {})) for row in rows}
-    states = {
-        row["value"]: cases[row["case"]].friction
-        for row in rows
-        if row["name"] == F_N.name and cases[row["case"]].friction
-    }
-    return {
-        label: f"{shared_label([case], ['load'])}, friction {states[case.load]}"
-        for label, case in cases.items()
-        if case.load in states
-    }
 
 
 def _runs_table(runs: Sequence[RunFolder], names: Sequence[str]) -> AnswerTable:
@@ -223,8 +192,12 @@ def _together(mine: Sequence[tuple[int, Chart]], names: Sequence[str]) -> Chart:
     return replace(
         first,
         figure=first.title,
-        x=_axis([c.x for _, c in mine]),
-        y=_axis([c.y for _, c in mine]),
+        x=first.x
+        if all(c.x == first.x for _, c in mine)
+        else replace(first.x, low=None, high=None),
+        y=first.y
+        if all(c.y == first.y for _, c in mine)
+        else replace(first.y, low=None, high=None),
         detail=first.detail if all(c.detail == first.detail for _, c in mine) else "",
         traces=tuple(
             replace(t, label=f"{names[k]}: {t.label}", entry=names[k], colour=k, closed=False)
@@ -239,35 +212,11 @@ def _together(mine: Sequence[tuple[int, Chart]], names: Sequence[str]) -> Chart:
     )
 
 
-def _axis(axes: Sequence[Axis]) -> Axis:
-    """The first axis with ends beyond those of all."""
-    lows, highs = (
-        [a.low for a in axes if a.low is not None],
-        [a.high for a in axes if a.high is not None],
-    )
-    low, high = (
-        min(lows) if len(lows) == len(axes) else None,
-        max(highs) if len(highs) == len(axes) else None,
-    )
-    return replace(axes[0], low=low, high=high)
-
-
 def differences(scenes: Sequence[Mapping[str, Any]]) -> tuple[tuple[str, ...], ...]:
     """Entries of the scene files that are not the same in all runs: path and the value of every
     run.
     """
-    flat = [_flat(scene) for scene in scenes]
+    flat = [{path: str(value) for path, value in leaves("", scene)} for scene in scenes]
     paths = dict.fromkeys(path for entries in flat for path in entries)
     rows = ((path, *(entries.get(path, "–") for entries in flat)) for path in paths)
     return tuple(row for row in rows if len(set(row[1:])) > 1)
-
-
-def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
-    out: dict[str, str] = {}
-    for key, value in table.items():
-        path = f"{prefix}{key}"
-        if isinstance(value, Mapping):
-            out |= _flat(value, f"{path}.")
-        else:
-            out[path] = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
-    return out

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import csv
+import io
 import logging
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.cache.files import whole_file
+from upd.cache.files import write_text
 from upd.errors import UpdError
 from upd.labels import file_name
 from upd.mesh import recipes
@@ -92,19 +94,17 @@ def write_curves(arrays: Arrays, folder: Path) -> list[Path]:
             stem = begin + (f"-{file_name(dimension)}" if k else "")
             path = folder / FOLDER / f"{stem}.csv"
             path.parent.mkdir(exist_ok=True)
-            _write(path, columns)
+            heads, data = zip(*columns, strict=True)
+            write_text(path, as_csv([heads, *zip(*(one.tolist() for one in data), strict=True)]))
             files.append(path)
     return files
 
 
-def _write(path: Path, columns: Sequence[Column]) -> None:
-    with (
-        whole_file(path) as temporary,
-        Path(temporary).open("w", encoding="utf-8", newline="") as file,
-    ):
-        writer = csv.writer(file)
-        writer.writerow([head for head, _ in columns])
-        writer.writerows(zip(*(data.tolist() for _, data in columns), strict=True))
+def as_csv(rows: Iterable[Iterable[Any]]) -> str:
+    """Rows as CSV; what is not known is empty."""
+    out = io.StringIO()
+    csv.writer(out, lineterminator="\n").writerows(rows)
+    return out.getvalue()
 
 
 def _tables(group: Group) -> Iterator[tuple[str, list[Column]]]:

@@ -6,25 +6,27 @@ Nothing of it is trusted to be whole.
 from __future__ import annotations
 
 import fnmatch
+import hashlib
 import json
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, dataclass, fields
-from functools import cache
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeVar, get_type_hints
+from typing import Any, Literal, TypeVar
 
-from pydantic import TypeAdapter, ValidationError, create_model
+from pydantic import TypeAdapter, ValidationError
 
-from upd.analyses.base import Effect
+from upd.cache.files import json_text
 from upd.cache.folders import plain_name
 from upd.errors import InputError
 from upd.labels import sentence
-from upd.results import Arrays, Case, Check, ErrorPart, InputPart, Result, read_netcdf
+from upd.results import Arrays, read_netcdf
 
 _LOG_LINE = re.compile(r"^(?P<time>\S+ \S+) (?P<level>[A-Z]+) +(?P<where>\S+): (?P<text>.*)$")
 _VERSIONS = "versions: "
+#: key of a JSON file: SHA-256 of what else it has
+_DIGEST = "sha256"
 _PNG = b"\x89PNG\r\n\x1a\n"
 #: names of the figures a run may leave, without their ending
 FIGURES = (
@@ -210,7 +212,7 @@ def read_run(folder: Path, *, whole: bool = False) -> RunFolder:
 
 
 def _summary(folder: Path) -> dict[str, Any]:
-    return read_json(folder / "summary.json", _summary_schema(), "run")[0]
+    return read_json(folder / "summary.json", _Summary, "run")[0]
 
 
 def _text(path: Path, missing: list[str]) -> str:
@@ -235,66 +237,23 @@ def is_png(path: Path) -> bool:
 # ---------------------------------------------------------------- JSON files, checked once
 
 
-def _many(kind: type[Any], **others: Any) -> Any:
-    """Schema of a list of what summary.json has of a dataclass: its fields, of which a number may
-    be null, and others in their place or beside them.
-    """
-    hints, many = get_type_hints(kind), list
-    own = {
-        f.name: (
-            float | None if hints[f.name] is float else hints[f.name],
-            ... if f.default is MISSING else f.default,
-        )
-        for f in fields(kind)
-    }
-    model: Any = create_model(kind.__name__, **own | others)
-    return many[model]
+@dataclass
+class _Summary:
+    """What summary.json must have; there may be more, and its digest holds all of it."""
+
+    scene: str
+    title: str
+    status: str
+    effects: list[dict[str, Any]]
+    checks: list[dict[str, Any]]
+    size: dict[str, Any]
+    cost: dict[str, Any]
+    results: list[dict[str, Any]]
 
 
-@cache
-def _summary_schema() -> Any:
-    """What summary.json must have; there may be more."""
-    text: Any = (str, ...)
-    free: Any = (dict[str, Any], {})
-    case = {"case": text, "case_fields": (Case, ...)}
-    number, maybe = (float | None, ...), (float | None, None)
-    size = create_model(
-        "Size",
-        symmetry=(str, ""),
-        n_dof=(dict[str, int], {}),
-        n_pairs=(int | None, None),
-        analysis=(str, ""),
-        n_hex=(dict[str, int], {}),
-        mesh=free,
-        solver=free,
-    )
-    cost = create_model(
-        "Cost", total_s=(float, ...), peak_rss_mb=(float, ...), stages=(dict[str, float], {})
-    )
-    return create_model(
-        "Summary",
-        scene=text,
-        title=text,
-        status=text,
-        effects=(_many(Effect, verdict=text), ...),
-        checks=(_many(Check, **case, verdict=(Literal["passed", "warning", "failed"], ...)), ...),
-        size=(size, ...),
-        cost=(cost, ...),
-        results=(
-            _many(
-                Result,
-                **case,
-                reference=number,
-                error=maybe,
-                thesis_error=maybe,
-                error_parts=(_many(ErrorPart), []),
-                input_error=maybe,
-                input_parts=(_many(InputPart, share=number), []),
-            ),
-            ...,
-        ),
-        result_nc_sha256=(str, ""),
-    )
+def sealed(data: Mapping[str, Any]) -> str:
+    """Data as JSON with its SHA-256, by which a file that was changed is known."""
+    return json_text({**data, _DIGEST: hashlib.sha256(json_text(data).encode()).hexdigest()})
 
 
 def read_json(path: Path, schema: type[Kept], kind: Kind) -> tuple[dict[str, Any], Kept]:
@@ -330,14 +289,16 @@ def read_json(path: Path, schema: type[Kept], kind: Kind) -> tuple[dict[str, Any
         ) from None
     except ValidationError as problem:
         places = [".".join(map(str, e["loc"])) or "the whole" for e in problem.errors()]
-        raise damaged_file(path, dict.fromkeys(places), kind) from None
+        names = list(dict.fromkeys(places))
+        more = f" and {len(names) - _MOST} more" if len(names) > _MOST else ""
+        raise InputError(
+            f"{path}: is damaged in {', '.join(names[:_MOST])}{more}; {_AGAIN[kind]}"
+        ) from None
     except (ValueError, RecursionError) as problem:
         raise InputError(f"{path}: is not JSON ({problem}); {_AGAIN[kind]}") from None
+    # folders of earlier versions have no digest
+    if _DIGEST in found and json_text(found) != sealed(
+        {k: found[k] for k in found if k != _DIGEST}
+    ):
+        raise InputError(f"{path}: is not as upd {kind} wrote it (SHA-256); {_AGAIN[kind]}")
     return dict(found), checked
-
-
-def damaged_file(path: Path, places: Iterable[str], kind: Kind) -> InputError:
-    """The error of a file that is damaged in these places."""
-    names = list(places)
-    more = f" and {len(names) - _MOST} more" if len(names) > _MOST else ""
-    return InputError(f"{path}: is damaged in {', '.join(names[:_MOST])}{more}; {_AGAIN[kind]}")

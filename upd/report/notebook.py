@@ -6,9 +6,8 @@ Text, table, figure of the main curves, xarray.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +15,9 @@ from upd.errors import ConvergenceError, InputError, did_you_mean
 from upd.report.answer import AnswerLine, answer, short_answer
 from upd.report.columns import text_width
 from upd.report.folder import read_run
-from upd.report.tables import analysis_charts, answer_tables
+from upd.report.tables import analysis_charts
 from upd.results import Case, Check, Result
-from upd.results.check import FAILED, OK, outcome_of
+from upd.results.check import outcome_of
 from upd.results.number import from_json, read_result
 
 if TYPE_CHECKING:
@@ -79,24 +78,20 @@ class RunResult:
         ConvergenceError
             When it was not reached, with the reason.
         """
-        rows = [
-            r for r in self.results if r.name == name and (case is None or r.case.matches(case))
-        ]
+        mine = [r for r in self.results if r.name == name]
+        rows = [r for r in mine if case is None or r.case.matches(case)]
+        if not mine:
+            raise _unknown("result", name, sorted({r.name for r in self.results}))
+        if not rows:
+            raise _unknown(f"result {name!r} for case", str(case), [str(r.case) for r in mine])
+        row = rows[0]
         if case is None and len(rows) > 1:
             cases = ", ".join(f'"{r.case}"' for r in rows)
             raise InputError(f'{name} has several cases: write value("{name}", case) with {cases}')
-        for row in rows:
-            if row.withheld:
-                label = f" of {row.case}" if row.case.label else ""
-                raise ConvergenceError(f"{name}{label} was not reached: {row.withheld}")
-            return row.value
-        names = sorted({r.name for r in self.results})
-        if name in names:
-            known = [str(r.case) for r in self.results if r.name == name]
-            near = did_you_mean(case, known, f"there are {', '.join(map(repr, known))}")
-            raise InputError(f"no result {name!r} for case {str(case)!r}{near}")
-        near = did_you_mean(name, names, f"there are {', '.join(names)}")
-        raise InputError(f"no result {name!r}{near}")
+        if row.withheld:
+            label = f" of {row.case}" if row.case.label else ""
+            raise ConvergenceError(f"{name}{label} was not reached: {row.withheld}")
+        return row.value
 
     def summary(self) -> dict[str, Any]:
         """The content of summary.json."""
@@ -150,17 +145,9 @@ class RunResult:
         return "\n".join(line.text for line in self.answer(text_width(), full=True))
 
     def to_xarray(self) -> dict[str, Any]:
-        """Case -> xarray.Dataset, with dimensions, coordinates and units.
+        """Case -> xarray.Dataset, with dimensions, coordinates and units; needs xarray."""
+        import xarray
 
-        Raises InputError when xarray is not installed.
-        """
-        try:
-            xarray = import_module("xarray")
-        except ImportError:
-            raise InputError(
-                "to_xarray needs the package xarray: pip install xarray; without it, .arrays "
-                "has the same numbers"
-            ) from None
         return {
             case: xarray.Dataset(
                 {name: (v.dims, v.data, dict(v.attributes)) for name, v in group.items()},
@@ -180,19 +167,6 @@ class RunResult:
 
     __str__ = __repr__
 
-    def _repr_html_(self) -> str:
-        """As a notebook shows it: the tables of its answer."""
-        # templates are slow to import
-        from upd.report.page import rendered
-
-        return rendered(
-            "notebook.html.j2",
-            result=self,
-            tables=answer_tables(self.size, [r.as_dict() for r in self.results]),
-            colour={OK: "#1a7f37", FAILED: "#b42318"}.get(self.outcome, "#9a6700"),
-            passed=sum(check.passed for check in self.checks),
-        )
-
 
 def charts(result: RunResult) -> list[Chart]:
     """All charts of the run, the most important first."""
@@ -208,15 +182,18 @@ def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Cha
         return list({chart.title: chart for chart in reversed(found)}.values())[::-1][:_MOST_CHARTS]
     mine = [c for c in found if title is None or title.casefold() in c.title.casefold()]
     if not mine:
-        titles = list(dict.fromkeys(c.title for c in found))
-        near = did_you_mean(title, titles, f"there are {', '.join(titles)}")
-        raise InputError(f"plot: no chart {title!r}{near}")
+        raise _unknown("chart", str(title), [c.title for c in found])
     cases = [c for c in mine if case is None or c.case == case]
     if not cases:
-        known = list(dict.fromkeys(c.case for c in mine if c.case))
-        near = did_you_mean(case, known, f"there are {', '.join(known) or 'none'}")
-        raise InputError(f"plot: no chart of the case {case!r}{near}")
+        raise _unknown("chart of the case", str(case), [c.case for c in mine if c.case])
     return cases[:_MOST_CHARTS] if case is None else cases
+
+
+def _unknown(what: str, word: str, known: Iterable[str]) -> InputError:
+    """The error of a name that none has: the nearest, or all that there are."""
+    names = list(dict.fromkeys(known))
+    near = did_you_mean(word, names, f"there are {', '.join(names) or 'none'}")
+    return InputError(f"no {what} {word!r}{near}")
 
 
 # -- read back from its folder --------------------------------------------------------------------

@@ -18,7 +18,6 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from upd.cache.files import placed_file
-from upd.errors import InputError
 from upd.labels import sentence
 from upd.plot.chart import Chart
 from upd.plot.plotly import figure
@@ -144,8 +143,8 @@ def page_text(
         found = [first, *(_folded(s, shown) for s in found[1:])]
         found = [section for section in found if not section.is_empty]
     bodies, left_out = fitting(surfaces)
-    return rendered(
-        "page.html.j2",
+    page = _environment().get_template("page.html.j2")
+    return page.render(
         title=title,
         verdict=verdict,
         sections=found,
@@ -168,13 +167,9 @@ def _folded(section: Section, shown: Sequence[Panel]) -> Section:
     return section._replace(panels=panels, folded=folded, each_folded=each or section.each_folded)
 
 
-def rendered(template: str, **content: Any) -> str:
-    """A template of the folder parts with its content; every text is escaped."""
-    return _environment().get_template(template).render(**content)
-
-
 @cache
 def _environment() -> Environment:
+    """Of the templates in the folder parts; every text is escaped."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     made = Environment(
@@ -195,13 +190,8 @@ def _packed_plotly() -> str:
     The package itself is slow to import and not needed.
     """
     spec = find_spec("plotly")
-    for place in (spec.submodule_search_locations or ()) if spec else ():
-        path = Path(place) / "package_data" / "plotly.min.js"
-        if path.exists():
-            return _packed(path.read_text("utf-8"))
-    raise InputError(
-        "plotly.min.js is missing: the report needs the package plotly; pip install plotly"
-    )
+    assert spec is not None and spec.origin is not None, "plotly comes with upd"
+    return _packed((Path(spec.origin).parent / "package_data" / "plotly.min.js").read_text("utf-8"))
 
 
 def _packed(text: str) -> str:
@@ -280,19 +270,15 @@ def fitting(surfaces: Iterable[dict[str, Any]]) -> tuple[list[dict[str, Any]], l
     """
     shown, left_out, room = list[dict[str, Any]](), list[str](), MOST_LETTERS
     for surface in surfaces:
-        fields = surface["fields"]
-        for n in range(len(fields), -1, -1):
-            made = surface | {"fields": fields[:n]}
-            if not n:
-                made |= {"motions": []}
-            if (size := len(_json(made))) <= room:
-                shown.append(made)
-                room -= size
-                break
-        else:
-            left_out.append(f"{surface['label']}: too large for this page")
-            continue
-        left_out += [f"{field['label']}: too large for this page" for field in fields[n:]]
+        fields, made = list(surface["fields"]), surface
+        while (size := len(_json(made))) > room and fields:
+            fields.pop()
+            made = surface | {"fields": [*fields]} | ({} if fields else {"motions": []})
+        lost = surface["fields"][len(fields) :] if size <= room else [surface]
+        left_out += [f"{one['label']}: too large for this page" for one in lost]
+        if size <= room:
+            shown.append(made)
+            room -= size
     return shown, left_out
 
 

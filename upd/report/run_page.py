@@ -9,6 +9,7 @@ from typing import Any
 
 from upd.labels import sentence
 from upd.plot.surface import read_surface
+from upd.report.answer import checked
 from upd.report.folder import RunFolder, read_run
 from upd.report.page import Section, Verdict, make_panels, page_text, write_page
 from upd.report.tables import (
@@ -24,7 +25,7 @@ from upd.report.tables import (
     warnings,
 )
 from upd.results.answer_table import AnswerTable
-from upd.results.check import FAILED, outcome_of
+from upd.results.check import FAILED, WARNED, outcome_of
 
 log = logging.getLogger("upd.report")
 
@@ -109,18 +110,13 @@ def _mesh_table(size: Mapping[str, Any]) -> AnswerTable:
 
 def verdict(summary: Mapping[str, Any]) -> Verdict:
     """How a run ended, with its self-checks."""
-    status, checks = str(summary["status"]), summary["checks"]
-    if outcome_of(status) == FAILED:
+    status = str(summary["status"])
+    if (outcome := outcome_of(status)) == FAILED:
         return Verdict("failed", "Failed", status.removeprefix("failed: "))
-    counts = {kind: sum(c["verdict"] == kind for c in checks) for kind in ("passed", "warning")}
-    missing = sum(bool(entry.get("withheld")) for entry in summary["results"])
-    text = f"{counts['passed']} of {len(checks)} self-checks passed"
-    text += f", {counts['warning']} with a warning" if counts["warning"] else ""
-    text += f"; numbers not reached: {missing}" if missing else ""
-    # A folder from before whose status is "ok" may have checks that warn.
-    if counts["warning"] or missing:
-        return Verdict("warning", "Done, with warnings", f"{text}.")
-    return Verdict("passed", "Passed", f"{text}.")
+    text = f"{checked(summary)}."
+    if outcome == WARNED:
+        return Verdict("warning", "Done, with warnings", text)
+    return Verdict("passed", "Passed", text)
 
 
 def page_warnings(run: RunFolder) -> list[str]:

@@ -16,8 +16,15 @@ import numpy as np
 
 from upd.labels import counted, number, sentence, unit_label
 from upd.plot.chart import Chart
-from upd.plot.sweep_charts import FIGURES, Column, Parameter, sample_charts, sweep_charts
-from upd.report.folder import damaged_file, is_png, read_json
+from upd.plot.sweep_charts import (
+    Column,
+    Parameter,
+    is_constant,
+    sample_charts,
+    sweep_charts,
+    told_apart,
+)
+from upd.report.folder import read_json
 from upd.report.page import (
     Panel,
     Section,
@@ -27,20 +34,13 @@ from upd.report.page import (
     versions_text,
     write_page,
 )
-from upd.report.tables import SAMPLE_HEADING, filled, sample_table, stage_table, with_unit
+from upd.report.tables import filled, sample_table, stage_table, with_unit
 from upd.results.answer_table import AnswerTable
 from upd.results.quantities import number_title
-from upd.results.sampled import SampledNumber, sample_sentence
+from upd.results.sampled import SampledNumber
 
 #: values of a parameter written one by one
 _FEW = 8
-
-
-@dataclass
-class _SweepFollowed:
-    name: str
-    case: str
-    unit: str
 
 
 @dataclass
@@ -50,13 +50,6 @@ class _SweepPoint:
     reason: str
     warnings: list[str]
     seconds: float
-
-
-@dataclass
-class _SweepCost:
-    this_call_s: float | None = None
-    peak_rss_mb: float | None = None
-    stages_s: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -72,10 +65,10 @@ class SweepFolder:
 
     scene: str
     title: str
-    axes: list[Parameter]
-    followed: list[_SweepFollowed]
+    axes: Sequence[Parameter]
+    followed: list[dict[str, str]]
     plan: dict[str, Any]
-    cost: _SweepCost
+    cost: dict[str, Any]
     points: list[_SweepPoint]
     text: str
     sample: _SweepSample | None = None
@@ -83,18 +76,12 @@ class SweepFolder:
     path: Path = Path()
 
     @property
-    def figures(self) -> dict[str, Path]:
-        """Name -> PNG file."""
-        files = {name: self.path / f"{name}.png" for name in FIGURES}
-        return {name: file for name, file in files.items() if is_png(file)}
-
-    @property
     def columns(self) -> list[Column]:
         """The followed numbers with their values, NaN where there is none."""
         table = np.array([point.values for point in self.points], float)
         values = table.reshape(len(self.points), len(self.followed)).T
         known = zip(self.followed, values, strict=True)
-        return [Column(c.name, c.case, c.unit, mine) for c, mine in known]
+        return [Column(one["name"], one["case"], one["unit"], mine) for one, mine in known]
 
     @property
     def places(self) -> list[tuple[int, ...]]:
@@ -108,22 +95,14 @@ class SweepFolder:
 
 def read_sweep(folder: Path) -> SweepFolder:
     """Read sweep.json. Raises InputError when it is missing or damaged."""
-    path = folder / "sweep.json"
-    _, found = read_json(path, SweepFolder, "sweep")
-    counts, m = [len(axis.values) for axis in found.axes], len(found.followed)
-    n = min(counts, default=0) if found.sample else math.prod(counts)
-    damaged = ["points"] * (len(found.points) != n or any(len(p.values) != m for p in found.points))
-    damaged += ["sample"] * (found.sample is not None and len(found.sample.numbers) != m)
-    if damaged:
-        raise damaged_file(path, damaged, "sweep")
-    return replace(found, path=folder)
+    _, found = read_json(folder / "sweep.json", SweepFolder, "sweep")
+    return replace(found, path=folder, axes=told_apart(found.axes))
 
 
 #: rows of the table on the page; all of them are in table.csv
 MOST_ROWS = 500
 #: different reasons of failures, and points named with each
 _REASONS, _NAMED = 30, 8
-_WARN = "Self-checks that warn"
 
 
 def write_sweep_report(folder: Path) -> Path:
@@ -144,22 +123,40 @@ def write_sweep_report(folder: Path) -> Path:
 
 def sweep_sections(sweep: SweepFolder) -> list[Section]:
     """The page of a sweep."""
-    numbers = sweep.sample.numbers if sweep.sample else []
-    reasons = [[p.reason or "no reason given"] * (p.status != "ok") for p in sweep.points]
-    compared = [f"{sample_sentence(numbers)} sample.csv has all digits."] if numbers else []
     panels = sweep_panels(sweep)
     none = "The sweep left no figures: nothing varies, or no point was solved."
     scene = ["The scene of all points; the parameters above replace its entries."]
-    stages = stage_table(sweep.cost.stages_s)
+    *before, points = sweep_tables(sweep, MOST_ROWS)
     return [
         _grid(sweep),
-        Section(SAMPLE_HEADING, [sample_table(numbers)], texts=compared, kind="grid"),
-        Section("Failed points", [grouped("Failed points", sweep, reasons)]),
-        Section(_WARN, [grouped(_WARN, sweep, [p.warnings for p in sweep.points])]),
+        *(Section(table.heading, [table], kind="grid") for table in before),
         Section("Figures", panels=panels, texts=[] if panels else [none]),
-        Section("Table", [_points_table(sweep)], kind="tall"),
-        Section("Cost", [stages], texts=_costs(sweep), kind="grid"),
+        Section(points.heading, [points], kind="tall"),
+        Section(
+            "Cost",
+            [stage_table(sweep.cost.get("stages_s", {}))],
+            texts=[_costs(sweep)],
+            kind="grid",
+        ),
         Section("Scene file", texts=scene, file=sweep.text),
+    ]
+
+
+def sweep_tables(sweep: SweepFolder, most: int) -> list[AnswerTable]:
+    """What a sample makes of the numbers, which points failed or warn, at last the points.
+
+    Parameters
+    ----------
+    most
+        Points in the last one.
+    """
+    numbers = sweep.sample.numbers if sweep.sample else []
+    reasons = [[p.reason or "no reason given"] * (p.status != "ok") for p in sweep.points]
+    return [
+        sample_table(numbers),
+        grouped("Failed points", sweep, reasons),
+        grouped("Self-checks that warn", sweep, [p.warnings for p in sweep.points]),
+        _points_table(sweep, most),
     ]
 
 
@@ -171,27 +168,22 @@ def _grid(sweep: SweepFolder) -> Section:
         "values": [_values(p) for p in sweep.axes],
     }
     points, sample = counted(len(sweep.points), "point"), sweep.sample
-    if sample is None:
-        every = "Every value with every other: " if len(sweep.axes) > 1 else ""
-        return Section("Grid", [filled("Grid", columns)], texts=[f"{every}{points}."])
-    given = ", ".join(f"{path} = {value}" for path, value in sample.inputs.items())
-    text = (
-        "Drawn evenly between the limits that the half-widths give, with seed "
-        f"{sample.seed} (Latin hypercube), after the scene itself: {given}; {points}."
-    )
-    return Section("Sample", [filled("Sample", columns)], texts=[text])
+    text = f"{points}{': every value with every other' * (len(sweep.axes) > 1)}."
+    if sample is not None:
+        given = ", ".join(f"{path} = {value}" for path, value in sample.inputs.items())
+        text = (
+            "Drawn evenly between the limits that the half-widths give, with seed "
+            f"{sample.seed} (Latin hypercube), after the scene itself: {given}; {points}."
+        )
+    heading, notes = "Sample" if sample else "Grid", map(sentence, sweep.plan.get("notes", []))
+    return Section(heading, [filled(heading, columns)], texts=[text, *notes])
 
 
 def _values(parameter: Parameter) -> str:
-    """The values of a parameter with their unit."""
+    """The values of a parameter with their unit, of many the first and the last."""
     shown = [parameter.shown(k) for k in range(len(parameter.values))]
-    unit = f" {unit_label(parameter.unit)}" if parameter.unit else ""
-    if len(shown) <= _FEW:
-        return ", ".join(shown) + unit
-    if parameter.numbers is None:
-        return f"{', '.join(shown[:_FEW])} and {len(shown) - _FEW} more"
-    low, high = min(parameter.numbers), max(parameter.numbers)
-    return f"{len(shown)} values from {low:.5g} to {high:.5g}{unit}"
+    shown = shown if len(shown) <= _FEW else [*shown[:3], "...", shown[-1]]
+    return f"{', '.join(shown)} {unit_label(parameter.unit)}".rstrip()
 
 
 def sweep_panels(sweep: SweepFolder) -> list[Panel]:
@@ -199,10 +191,10 @@ def sweep_panels(sweep: SweepFolder) -> list[Panel]:
     columns = sweep.columns
     if sweep.sample:
         charts = sample_charts(sweep.sample.numbers, [c.values for c in columns])
-        return make_panels(charts, sweep.figures)
+        return make_panels(charts, {})
     varied = [p.short for p in sweep.axes if len(p.values) > 1]
     over = f"Followed numbers over {' and '.join(varied)}"
-    panels = make_panels(sweep_charts(sweep.axes, columns), sweep.figures)
+    panels = make_panels(sweep_charts(sweep.axes, columns), {})
     return [replace(panel, heading=over) for panel in panels]
 
 
@@ -244,16 +236,18 @@ def grouped(heading: str, sweep: SweepFolder, texts: Iterable[Iterable[str]]) ->
     return filled(heading, columns)
 
 
-def _points_table(sweep: SweepFolder) -> AnswerTable:
-    """A row per point; numbers without a value at any point have no column."""
-    points, places = sweep.points[:MOST_ROWS], sweep.places[:MOST_ROWS]
+def _points_table(sweep: SweepFolder, most: int) -> AnswerTable:
+    """A row for each of the first points, the numbers that vary first; those without a value have
+    no column.
+    """
+    points, places = sweep.points[:most], sweep.places[:most]
     columns = {
         f"# {with_unit(p.short, p.unit)}": [p.shown(place[k]) for place in places]
         for k, p in enumerate(sweep.axes)
     }
     empty = []
-    for one in sweep.columns:
-        title, values = number_title(one.name, one.case), one.values[:MOST_ROWS]
+    for one in sorted(sweep.columns, key=lambda column: is_constant(column.values)):
+        title, values = number_title(one.name, one.case), one.values[:most]
         if np.isnan(values).all():
             empty.append(title)
             continue
@@ -277,23 +271,15 @@ def _points_table(sweep: SweepFolder) -> AnswerTable:
     return filled("Table", columns, " ".join(notes))
 
 
-def _costs(sweep: SweepFolder) -> list[str]:
-    """Seconds of the points and of the last call, memory, workers."""
+def _costs(sweep: SweepFolder) -> str:
+    """Seconds of the points, memory."""
     seconds = [p.seconds for p in sweep.points] or [0.0]
-    total, cost, plan = math.fsum(seconds), sweep.cost, sweep.plan
+    total, memory = math.fsum(seconds), sweep.cost.get("peak_rss_mb")
     text = (
         f"{total / len(seconds):.2f} s per point ({min(seconds):.2f} to {max(seconds):.2f} s), "
         f"{total:.1f} s for all points together"
     )
-    if cost.peak_rss_mb is not None:
-        text += f", {cost.peak_rss_mb:.0f} MB of memory at most"
-    if cost.this_call_s is not None:
-        workers, kept = plan.get("workers", 0), plan.get("kept", 0)
-        where = f"the cluster {workers}" if isinstance(workers, str) else f"processes: {workers}"
-        text += f". Last call: {cost.this_call_s:.1f} s; {where}"
-        text += f"; threads of each: {plan.get('threads', 1)}"
-        text += f"; points kept from earlier calls: {kept}" if kept else ""
-    return [f"{text}.", *map(sentence, plan.get("notes", []))]
+    return f"{text}." if memory is None else f"{text}, {memory:.0f} MB of memory at most."
 
 
 # ---------------------------------------------------------------- a study
@@ -306,7 +292,6 @@ def write_study_report(
     notes: Sequence[str],
     tables: Iterable[AnswerTable],
     charts: Iterable[Chart],
-    figures: Iterable[Path],
 ) -> Path:
     """Write report.html into a study folder; returns its path.
 
@@ -316,8 +301,6 @@ def write_study_report(
         Points without an answer.
     notes
         Sentences the page opens with, as which level is enough.
-    charts, figures
-        What is drawn, and the PNG files that show the same.
 
     Raises
     ------
@@ -326,19 +309,9 @@ def write_study_report(
     """
     text = " ".join([*([f"{counted(failed, 'point')} failed."] if failed else []), *notes])
     verdict = Verdict(*("warning", "Done in part") if failed else ("passed", "Done"), text)
-    panels = make_panels(charts, {path.stem: path for path in figures})
-    sections = [Section("Figures", panels=panels)]
-    for one in map(_shown, tables):
-        sections.append(Section(one.heading, [one], kind="tall", folded=len(sections) > 1))
+    sections = [Section("Figures", panels=make_panels(charts, {}))]
+    for one in tables:
+        columns = dict(zip(one.columns, zip(*one.rows, strict=True), strict=False))
+        table = filled(one.heading, columns)
+        sections.append(Section(one.heading, [table], kind="tall", folded=len(sections) > 1))
     return write_page(folder / "report.html", page_text(title, sections, verdict=verdict))
-
-
-def _shown(table: AnswerTable) -> AnswerTable:
-    """Its columns but those of many words, which study.md has."""
-    cells = list(zip(*table.rows, strict=True)) or [()] * len(table.columns)
-    columns = {
-        head.replace("\n", " "): mine
-        for head, mine in zip(table.columns, cells, strict=True)
-        if head not in table.spare
-    }
-    return filled(table.heading, columns)

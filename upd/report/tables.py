@@ -29,7 +29,7 @@ from upd.results.answer_table import AnswerTable
 from upd.results.check import worst_check, worst_checks
 from upd.results.number import from_json
 from upd.results.quantities import CLOSED_FORM_ERROR, number_label, number_title
-from upd.results.sampled import SampledNumber
+from upd.results.sampled import SampledNumber, sample_sentence
 
 #: numbers of a run whose analysis is not known
 _MOST = 8
@@ -39,7 +39,6 @@ _CASES = 8
 _WHOLE = "whole run"
 #: heading of the main numbers
 MAIN = "Main numbers"
-SAMPLE_HEADING = "Bands by the inputs, to first order and sampled"
 #: notes beside an answer; what matters less is folded, or counted
 MOST_NOTES = 3
 
@@ -81,12 +80,7 @@ def answer_tables(size: Mapping[str, Any], entries: Sequence[Entry]) -> list[Ans
     if any(table.rows for table in own):
         return [table for table in own if table.rows]
     cases = _alike(entries, analysis.headline_names if analysis else ())
-    there = {(entry["name"], entry["case"]) for rows in cases[:1] for row in rows for entry in row}
-    main = [
-        entry
-        for entry in reached_numbers(size, entries)
-        if entry["reference"] is not None or (entry["name"], entry["case"]) not in there
-    ]
+    main = reached_numbers(size, entries)
     tables = [number_table(MAIN, main)] if main else []
     tables += [_case_table(rows) for rows in cases]
     note = _not_estimated([*main, *(entry for rows in cases for row in rows for entry in row)])
@@ -302,7 +296,8 @@ def sample_table(numbers: Sequence[SampledNumber]) -> AnswerTable:
         "# points": [str(n.count) for n in numbers],
         "compared": [n.verdict for n in numbers],
     }
-    return filled(SAMPLE_HEADING, columns)
+    note = sample_sentence(numbers) + " sample.csv has all digits."
+    return filled("Bands by the inputs, to first order and sampled", columns, note)
 
 
 # ---------------------------------------------------------------- sentences

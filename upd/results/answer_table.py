@@ -33,15 +33,12 @@ class AnswerTable:
         One cell for every column.
     note : str
         Below it.
-    spare : tuple of str
-        Heads of columns of many words, which a page and a narrow terminal leave out.
     """
 
     heading: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
-    spare: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """As JSON takes it: numbers with all their digits, null where they are infinite."""

@@ -91,11 +91,8 @@ class Check:
 
     def as_dict(self) -> dict[str, Any]:
         """The check as it stands in summary.json."""
-        data = as_json(self, case=self.case.label, verdict=self.verdict)
-        if not self.quantity:
-            for name in ("quantity", "without", "included"):
-                del data[name]
-        return data | {"case_fields": self.case.given()}
+        given = self.case.given()
+        return as_json(self, case=self.case.label, verdict=self.verdict, case_fields=given)
 
     @property
     def sentence(self) -> str:

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
 from upd.results.case import Case
 
 Kept = TypeVar("Kept")
+#: fields of a number that have other names in summary.json
+_INSIDE = ("parts", "inputs", "printed_error")
 
 
 def as_json(one: Any, **others: Any) -> dict[str, Any]:
-    """The fields of a part or a check as summary.json has them, with some of its own: what is not
-    finite is null.
+    """The fields of a number, a part or a check as summary.json has them, with some of its own:
+    what is not finite is null.
     """
+    found = {f.name: getattr(one, f.name) for f in fields(one)} | others
     return {
         name: None if isinstance(value, float) and not math.isfinite(value) else value
-        for name, value in (asdict(one) | others).items()
+        for name, value in found.items()
     }
 
 
@@ -179,32 +182,17 @@ class Result:
         ``case`` in words, its attributes under ``case_fields``; the value of a withheld number is
         null.
         """
-        out: dict[str, Any] = {
-            "name": self.name,
-            "case": self.case.label,
-            "value": None if self.withheld else self.value,
-            "unit": self.unit,
-            "reference": self.reference,
-            "source": self.source,
-            "error": self.error,
-            "thesis_error": self.printed_error,
-        }
-        known = {
-            "estimated_error": self.estimated_error,
-            "error_parts": list(map(as_json, self.parts)) or None,
-            "input_parts": [
-                as_json(one) | {"share": abs(one.change) if one.known else None}
-                for one in self.inputs
-            ]
-            or None,
-            "withheld": self.withheld or None,
-        }
-        return (
-            out
-            | ({"input_error": self.input_error} if self.inputs else {})
-            | {key: value for key, value in known.items() if value is not None}
-            | {"case_fields": self.case.given()}
+        found = as_json(
+            self,
+            case=self.case.label,
+            error=self.error,
+            thesis_error=self.printed_error,
+            error_parts=list(map(as_json, self.parts)),
+            input_error=self.input_error,
+            input_parts=[as_json(one, share=one.share) for one in self.inputs],
+            case_fields=self.case.given(),
         )
+        return {name: found[name] for name in found if name not in _INSIDE}
 
 
 def with_inputs(results: Iterable[Result], found: InputParts) -> tuple[Result, ...]:

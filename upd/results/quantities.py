@@ -268,18 +268,12 @@ CURVE_SECONDS = Quantity("curve_seconds", "s", "time for the curve")
 PEAK_FREQUENCY = Quantity("peak_{n}_frequency", "Hz", "peak {n}, frequency")
 PEAK_ACCELERANCE = Quantity("peak_{n}_accelerance", "(m/s2)/N", "peak {n}, accelerance")
 PEAK_MAC = Quantity("peak_{n}_mac", words="peak {n}, MAC with its stuck mode", is_error=True)
-SWEEP_UP_FREQUENCY = Quantity(
-    "peak_{n}_sweep_up_frequency", "Hz", "peak {n}, frequency that a sweep up reaches"
-)
+SWEEP_UP_FREQUENCY = Quantity("peak_{n}_sweep_up_frequency", "Hz", "peak {n}, sweep up, frequency")
 SWEEP_UP_ACCELERANCE = Quantity(
-    "peak_{n}_sweep_up_accelerance", "(m/s2)/N", "peak {n}, accelerance that a sweep up reaches"
+    "peak_{n}_sweep_up_accelerance", "(m/s2)/N", "peak {n}, sweep up, accelerance"
 )
-FREQUENCY_CHANGE = Quantity(
-    "peak_{n}_frequency_change", "%", "peak {n}, change of the frequency by an input"
-)
-ACCELERANCE_CHANGE = Quantity(
-    "peak_{n}_accelerance_change", "%", "peak {n}, change of the accelerance by an input"
-)
+FREQUENCY_CHANGE = Quantity("peak_{n}_frequency_change", "%", "peak {n}, change of frequency")
+ACCELERANCE_CHANGE = Quantity("peak_{n}_accelerance_change", "%", "peak {n}, change of accelerance")
 BAND_FREQUENCY = Quantity("band_peak_{n}_frequency", "Hz")
 BAND_ACCELERANCE = Quantity("band_peak_{n}_accelerance", "(m/s2)/N")
 HARMONIC_FREQUENCY = Quantity("harmonic_{n}_frequency", "Hz")
@@ -306,26 +300,18 @@ TWICE_THE_BEST = Quantity("twice_the_best_ratio", "%", "worst peak at twice the 
 BEST = (BEST_RATIO, BEST_PEAK, BEST_FREQUENCY, BEST_REDUCTION, HALF_OF_BEST, TWICE_THE_BEST)
 
 LARGEST_DAMPING = Quantity("largest_damping", "%", "largest damping ratio over the amplitude")
-DAMPING_ACCELERATION = Quantity(
-    "damping_acceleration", "m/s2", "amplitude of the largest damping, right accelerometer"
-)
+DAMPING_ACCELERATION = Quantity("damping_acceleration", "m/s2", "amplitude of the largest damping")
 DAMPING_FREQUENCY = Quantity("damping_frequency", "Hz", "frequency at the largest damping")
 DAMPING_SHIFT = Quantity("damping_shift", "%", "its change from the stuck mode")
-FORCE_FOR_DAMPING = Quantity(
-    "force_for_damping", "N/(m/s2)", "F_C per amplitude that is damped most"
-)
+FORCE_FOR_DAMPING = Quantity("force_for_damping", "N/(m/s2)", "F_C per amplitude damped most")
 
 # -- beside measured curves ------------------------------------------------------------------------
 
 FRAC = Quantity("frac", words="FRAC with the measured curve")
-MAGNITUDE_CORRELATION = Quantity(
-    "magnitude_correlation", words="correlation of magnitudes with the measured curve"
-)
-COMPUTED_FREQUENCY = Quantity(
-    "computed_peak_frequency", "Hz", "computed peak beside the measured, frequency"
-)
+MAGNITUDE_CORRELATION = Quantity("magnitude_correlation", words="correlation of magnitudes")
+COMPUTED_FREQUENCY = Quantity("computed_peak_frequency", "Hz", "computed peak, frequency")
 COMPUTED_ACCELERANCE = Quantity(
-    "computed_peak_accelerance", "(m/s2)/N", "computed peak beside the measured, accelerance"
+    "computed_peak_accelerance", "(m/s2)/N", "computed peak, accelerance"
 )
 FREQUENCY_DIFFERENCE = Quantity(
     "peak_frequency_difference", "Hz", "computed less measured peak, frequency", is_error=True
@@ -333,14 +319,10 @@ FREQUENCY_DIFFERENCE = Quantity(
 HALF_POWER_DAMPING = Quantity("half_power_damping", "%", "damping ratio by half power")
 FITTED_DAMPING = Quantity("fitted_damping", "%", "damping ratio fitted to the measured curve")
 DAMPING_ERROR = Quantity("fitted_damping_error", "%", "its standard error", is_error=True)
-FITTED_FREQUENCY = Quantity(
-    "fitted_frequency", "Hz", "natural frequency fitted to the measured curve"
-)
+FITTED_FREQUENCY = Quantity("fitted_frequency", "Hz", "natural frequency fitted to the curve")
 FREQUENCY_ERROR = Quantity("fitted_frequency_error", "Hz", "its standard error", is_error=True)
 FITTED_NOISE = Quantity("fitted_noise", "%", "noise of the measured curve, part of the value")
-NOISE_CONSTANT = Quantity(
-    "fitted_noise_constant", "(m/s2)/N", "noise of the measured curve, constant"
-)
+NOISE_CONSTANT = Quantity("fitted_noise_constant", "(m/s2)/N", "noise of the curve, constant")
 
 DECLARED = {one.name: one for one in list(vars().values()) if isinstance(one, Quantity)}
 

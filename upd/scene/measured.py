@@ -213,21 +213,15 @@ def fitted_modes(
     return tuple(out)
 
 
+@cache
 def fit_of(choice: MeasuredChoice) -> DampingFit:
-    """Damping fitted to a measured curve; one that did not change is fitted once.
+    """Damping fitted to a measured curve; one that did not change, by its digest, is fitted once.
 
     Raises
     ------
     InputError
         As `upd.measured.fit_damping` does.
     """
-    return _fit(digest_of_file(Path(choice.file)), choice)
-
-
-@cache
-def _fit(digest: str, choice: MeasuredChoice) -> DampingFit:
-    """The digest tells that the file is the same."""
-    del digest
     return fit_damping(choice.read())
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from upd.errors import InputError, one_line
 from upd.scene.forced import ForcedScene
@@ -48,15 +48,8 @@ class InputProblems:
             raise InputError(("\n" + "  " * len(head)).join([*head, *self.lines]))
 
 
-class RangeEnd(NamedTuple):
-    """An end of a range: in the unit inside, and over the scene's value."""
-
-    value: float
-    factor: float
-
-
-def read_range(text: str, kind: str, value: float) -> tuple[RangeEnd, RangeEnd]:
-    """Both ends of "low:high": quantities, numbers in the unit inside, or factors, "x0.1:x10".
+def read_range(text: str, kind: str, value: float) -> tuple[float, float]:
+    """Both ends of "low:high" in the unit inside: quantities, numbers, or factors, "x0.1:x10".
 
     Parameters
     ----------
@@ -73,18 +66,13 @@ def read_range(text: str, kind: str, value: float) -> tuple[RangeEnd, RangeEnd]:
     ends = [end.strip() for end in text.split(":")]
     if len(ends) != 2:
         raise InputError(f"{text!r} is no range; write low:high, quantities or x0.1:x10")
-    low, high = (_end(end, kind, value) for end in ends)
-    if not 0.0 < low.value < high.value:
+    low, high = (
+        bare_quantity(end[1:], "fraction") * value if end[:1] == "x" else bare_quantity(end, kind)
+        for end in ends
+    )
+    if not 0.0 < low < high:
         raise InputError(f"{text!r}: write two values above 0, the lower one first")
     return low, high
-
-
-def _end(text: str, kind: str, value: float) -> RangeEnd:
-    if text.startswith("x"):
-        factor = bare_quantity(text[1:], "fraction")
-        return RangeEnd(factor * value, factor)
-    found = bare_quantity(text, kind)
-    return RangeEnd(found, found / value)
 
 
 def bare_quantity(text: str, kind: str) -> float:

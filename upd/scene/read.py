@@ -113,7 +113,7 @@ def _loaded(
 ) -> AnyScene:
     data, place, folder = _data(source)
     pairs, problems = read_overrides(overrides)
-    nul = [path for path, value in _leaves("", data | dict(pairs)) if "\0" in str(value)]
+    nul = [path for path, value in leaves("", data | dict(pairs)) if "\0" in str(value)]
     if nul:
         # no path may hold it, nor what becomes text of files and figures
         raise InputError(
@@ -178,14 +178,14 @@ def _find(source: str | Path) -> Path:
     )
 
 
-def _leaves(path: str, value: Any) -> Iterator[tuple[str, Any]]:
+def leaves(path: str, value: Any) -> Iterator[tuple[str, Any]]:
     """Every value that is no table or list, with its path."""
     if isinstance(value, Mapping):
         for key, inner in value.items():
-            yield from _leaves(f"{path}.{key}" if path else str(key), inner)
+            yield from leaves(f"{path}.{key}" if path else str(key), inner)
     elif isinstance(value, list):
         for k, inner in enumerate(value):
-            yield from _leaves(f"{path}[{k}]", inner)
+            yield from leaves(f"{path}[{k}]", inner)
     else:
         yield path, value
 
@@ -243,7 +243,7 @@ def _validate(data: dict[str, Any]) -> tuple[AnyScene | None, list[str]]:
     problems = [f"{k}: not a key of a scene" for k in data if k not in own]
     problems += [
         f"{path}: {message}"
-        for path, value in _leaves("", own)
+        for path, value in leaves("", own)
         if (message := never(value)) and not path.startswith("geometry.")
     ]
     scene: AnyScene | None = None
@@ -426,7 +426,7 @@ def _fault(error: Any, location: Sequence[Any], scene: type[Any]) -> str:
     if kind in ("missing", "missing_argument"):
         return f"is missing{_addition(location, scene)}"
     wanted = hint_at(scene, location)
-    example = _example(wanted, _default(location, scene))
+    example = _example(wanted)
     if kind == "too_long":
         return f"has {len(value)} values; write {example}"
     if kind == "literal_error":
@@ -462,34 +462,25 @@ def _other_choice(value: Any, wanted: Any) -> str:
     return f"{value!r} is none of its values{meant}; write one of {', '.join(choices)}"
 
 
-def _default(location: Sequence[Any], scene: type[Any]) -> Any:
-    """The default of a key, None when it has none."""
-    table = without_notes(hint_at(scene, location[:-1]))
-    if not location or not is_dataclass(table):
-        return None
-    found = next((f.default for f in fields(table) if f.name == location[-1]), None)
-    return None if found is MISSING else found
-
-
 def _keys(wanted: Any) -> list[str]:
     """Keys of the table at a place; none when its keys are free."""
     cls = without_notes(wanted)
     return [f.name for f in fields(cls) if f.name not in INSIDE] if is_dataclass(cls) else []
 
 
-def _example(wanted: Any, default: Any = None) -> str:
+def _example(wanted: Any) -> str:
     """TOML that would do."""
-    return _items(wanted, default)[0]
+    return _items(wanted)[0]
 
 
-def _items(wanted: Any, default: Any = None) -> tuple[str, ...]:
+def _items(wanted: Any) -> tuple[str, ...]:
     """TOML of one or more values that would do."""
     origin, inside = get_origin(wanted), get_args(wanted)
     if origin is Annotated:
         given = next((note for note in wanted.__metadata__ if isinstance(note, Example)), None)
-        return given.values if given else _items(inside[0], default)
+        return given.values if given else _items(inside[0])
     if origin in (Union, types.UnionType):
-        return _items(next(kind for kind in inside if kind is not type(None)), default)
+        return _items(next(kind for kind in inside if kind is not type(None)))
     if origin is Literal:
         return tuple(map(toml_value, inside))
     if origin is tuple:
@@ -498,18 +489,9 @@ def _items(wanted: Any, default: Any = None) -> tuple[str, ...]:
     if origin is Mapping:
         return (f"{{ key = {_example(inside[1])} }}",)
     if is_dataclass(wanted):
-        return (_table(wanted),)
-    usual = {int: "12", float: "0.5", str: '"text"'}
-    plain = isinstance(default, (int, float, str)) and not isinstance(default, bool) and default
-    return (toml_value(default) if plain else usual.get(wanted, '"text"'),)
-
-
-def _table(cls: Any) -> str:
-    """An inline table with the keys that must be there, or with the first one."""
-    known: tuple[Field[Any], ...] = fields(cls)
-    needed = [f for f in known if must_be_given(f)]
-    keys = [
-        f"{f.name} = {_example(hints(cls)[f.name], None if f.default is MISSING else f.default)}"
-        for f in needed or known[:1]
-    ]
-    return f"{{ {', '.join(keys)} }}"
+        # with the keys that must be there, or with the first one
+        known: tuple[Field[Any], ...] = fields(wanted)
+        needed = [f for f in known if must_be_given(f)] or known[:1]
+        keys = [f"{f.name} = {_example(hints(wanted)[f.name])}" for f in needed]
+        return (f"{{ {', '.join(keys)} }}",)
+    return ({int: "12", float: "0.5"}.get(wanted, '"text"'),)

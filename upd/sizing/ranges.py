@@ -220,7 +220,7 @@ def _texts(given: str | Sequence[str] | Mapping[str, str]) -> list[str]:
 
 def _range(scene: ForcedScene, path: str, ends: str) -> InputRange:
     kind, nominal = _input(scene, path)
-    low, high = (end.value for end in read_range(ends, kind, nominal))
+    low, high = read_range(ends, kind, nominal)
     found = InputRange(path, kind, low, high, nominal)
     if path not in (FORCE, CENTRIFUGAL):
         check_ends(

@@ -286,13 +286,11 @@ def make_curve(
 TableColumn = tuple[str, Callable[[Any], str]]
 
 
-def make_table(
-    title: str, columns: Sequence[TableColumn], rows: Iterable[Any], spare: tuple[str, ...] = ()
-) -> AnswerTable:
+def make_table(title: str, columns: Sequence[TableColumn], rows: Iterable[Any]) -> AnswerTable:
     """A table of rows of any kind."""
     heads, cells = zip(*columns, strict=True)
     made = tuple(tuple(cell(row) for cell in cells) for row in rows)
-    return AnswerTable(title, heads, made, spare=spare)
+    return AnswerTable(title, heads, made)
 
 
 def markdown_table(table: AnswerTable) -> list[str]:
@@ -380,7 +378,6 @@ def convergence_tables(
             ("error on each level", _levels_text),
         ),
         curves,
-        spare=("against", "verdict", "error on each level"),
     )
     at = {
         (c.curve, label): error

@@ -268,6 +268,15 @@ def test_all_failed(tmp_path: Path) -> None:
     assert "no &lt;b&gt;luck" in text and "no <b>luck" not in text
 
 
+def test_parameters_of_one_last_word_have_titles_of_their_own(tmp_path: Path) -> None:
+    axes = {"a.left.K_T": [1, 2], "a.right.K_T": [3, 4], "friction": [0.1, 0.2]}
+    made = read_sweep(_made(tmp_path / "s", axes))
+    assert [axis.short for axis in made.axes] == ["left K T", "right K T", "friction"]
+    html = write_report(made.path).read_text("utf-8")
+    head = html[html.index("<h2>Table") :].partition("</thead>")[0]
+    assert "left K T" in head and "right K T" in head
+
+
 def test_reasons_are_told_once_with_their_points(tmp_path: Path) -> None:
     made = read_sweep(_made(tmp_path / "s", {"F": [f"{k} N" for k in range(12)]}))
     table = grouped("t", made, [["rare"] if k == 0 else ["often"] for k in range(12)])
@@ -290,17 +299,17 @@ def test_verdict(failed: int, warned: int, kind: str) -> None:
 @pytest.mark.parametrize(
     ("more", "told"),
     [
-        ({"points": []}, "points"),
-        ({"axes": [{"path": 1}]}, "axes"),
-        ({"cost": 3}, "cost"),
-        ({"cost": {"stages_s": {"a": "b"}}}, "cost"),
+        ({"points": [3]}, "damaged in points"),
+        ({"axes": [{"path": 1}]}, "damaged in axes"),
+        ({"cost": 3}, "damaged in cost"),
+        ({"points": [], "sha256": "1"}, "not as upd sweep wrote it"),
     ],
 )
 def test_damaged_sweep_is_told(tmp_path: Path, more: dict[str, Any], told: str) -> None:
     made = _made(tmp_path / "s", {"a": [1, 2]})
     whole = json.loads((made / "sweep.json").read_text("utf-8"))
     (made / "sweep.json").write_text(json.dumps(whole | more), "utf-8")
-    with pytest.raises(InputError, match=f"damaged in {told}"):
+    with pytest.raises(InputError, match=told):
         write_report(made)
     assert not (made / "report.html").exists()
 
@@ -353,7 +362,8 @@ def test_pictures_of_the_user_stay_in_the_folder_and_off_the_page(
     sweep("hertz", ["loads.normal=40 N,60 N,5000 N"], overrides=TINY, out=copy, workers=0)
     assert (copy / "sweep-notes.png").read_bytes() == (folder / "sweep.png").read_bytes()
     assert (copy / "sweep_photo.png").read_bytes() == b"a photograph"
-    assert list(read_sweep(copy).figures) == ["sweep"]
+    html = (copy / "report.html").read_text("utf-8")
+    assert html.count("<figure") == 1 and "a photograph" not in html
 
 
 def test_a_page_that_fails_is_logged_and_the_sweep_ends_well(
@@ -379,6 +389,7 @@ def test_a_number_without_a_value_at_any_point_has_no_column(tmp_path: Path) -> 
     data["followed"].append({"name": "max_pressure", "case": "", "unit": "MPa"})
     for point in data["points"]:
         point["values"].append(None)
+    data.pop("sha256", None)
     (folder / "sweep.json").write_text(json.dumps(data))
     html = write_report(folder).read_text("utf-8")
     head = html[html.index("<h2>Table") :].partition("</thead>")[0]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from html import unescape
 
 import pytest
 from rich.console import Console
@@ -178,18 +177,6 @@ def test_what_warns_is_named_with_its_worst_case_first() -> None:
         "Truncation (F_C/F_E 9; and 1 more): motion = 9 (limit 1). Take 9.",
         "F; and 1 more: not reached, the path ended.",
     ]
-
-
-def test_a_notebook_shows_the_tables(told: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:
-    html = told._repr_html_()
-    for table in (PEAKS, BEST, DEPENDS):
-        assert table.heading in html and table.note in unescape(html)
-        assert all(cell in unescape(html) for row in table.rows for cell in row)
-    assert "maximum pressure" not in html
-    evil = replace(BEST, heading="<b>", rows=(("<i>", "1"),))
-    monkeypatch.setitem(ANALYSES, "hertz", replace(ANALYSES["hertz"], answer=lambda _: [evil]))
-    html = told._repr_html_()
-    assert "<i>" not in html and "<b><b>" not in html and "&lt;i&gt;" in html
 
 
 def test_the_levels_that_an_accuracy_chose_stand_beside_the_tables(told: RunResult) -> None:

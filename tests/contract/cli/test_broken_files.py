@@ -272,9 +272,9 @@ SUMMARIES: dict[str, tuple[bytes | None, str]] = {
     "a list": (b"[1, 2]", "damaged"),
     "keys missing": (b'{"scene": "a"}', "damaged in title"),
     "wrong kinds": (json.dumps({**SUMMARY, "results": [1], "size": 3}).encode(), "summary.json"),
-    "nothing in tables": (
-        json.dumps({**SUMMARY, "checks": [{}], "results": [{}]}).encode(),
-        "summary.json",
+    "changed": (
+        json.dumps({**SUMMARY, "checks": [{}], "results": [{}], "sha256": "1"}).encode(),
+        "summary.json: is not as the run wrote it",
     ),
 }
 

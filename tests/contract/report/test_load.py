@@ -70,6 +70,7 @@ def test_withheld_number_stays_withheld(run: RunResult, tmp_path: Path) -> None:
     assert run.folder is not None
     summary = json.loads((run.folder / "summary.json").read_text(encoding="utf-8"))
     summary["results"][0] |= {"value": None, "withheld": "the path stopped"}
+    del summary["sha256"]
     (tmp_path / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
     again = upd.load(tmp_path)
     assert again.results[0].withheld == "the path stopped"

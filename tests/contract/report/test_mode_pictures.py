@@ -5,13 +5,16 @@ behind.
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
 
 from upd.fem import box_mesh
 from upd.mesh import FloatArray, Mesh
@@ -36,6 +39,10 @@ def bent(mesh: Mesh) -> FloatArray:
     u = np.zeros((mesh.n_node, 3))
     u[:, 0] = mesh.points[:, 2] ** 2
     return u
+
+
+def drawn(meshes: Mapping[str, Mesh], shapes: Mapping[str, FloatArray], **more: Any) -> Axes:
+    return draw_mode(meshes, shapes, Figure().add_subplot(), **more)
 
 
 def collections(ax: Axes) -> tuple[PolyCollection, LineCollection]:
@@ -63,7 +70,7 @@ def test_boundary_of_one_hexahedron() -> None:
 
 def test_only_sides_to_the_viewer_are_drawn_far_ones_first() -> None:
     mesh = box()
-    faces, lines = collections(draw_mode({"box": mesh}, {}))
+    faces, lines = collections(drawn({"box": mesh}, {}))
     # from x > 0, y < 0, above: three sides of the box, and the nine edges of these, cell by cell
     assert len(faces.get_paths()) == 2 * 3 + 3 * 4 + 4 * 2
     assert len(lines.get_segments()) == 3 * (2 + 3 + 4)
@@ -76,9 +83,7 @@ def test_only_sides_to_the_viewer_are_drawn_far_ones_first() -> None:
         (("low", "high"), True),
     ):
         moving = "low" if grey_last else "high"
-        faces, _ = collections(
-            draw_mode({k: slabs[k] for k in order}, {moving: u}, view=(-90.0, 90.0))
-        )
+        faces, _ = collections(drawn({k: slabs[k] for k in order}, {moving: u}, view=(-90.0, 90.0)))
         grey = np.ptp(np.asarray(faces.get_facecolor())[:, :3], axis=1) < 1e-12
         assert len(grey) == 2 * 2 * 3
         assert grey.tolist() == (
@@ -97,7 +102,7 @@ def test_one_scale_for_all_bodies() -> None:
         "right": np.tile(-2.5e3 * up, (left.n_node, 1)),
     }
     # from the front: x to the right, z upwards
-    faces, lines = collections(draw_mode(meshes, shapes, view=(-90.0, 0.0)))
+    faces, lines = collections(drawn(meshes, shapes, view=(-90.0, 0.0)))
     corners = np.vstack([path.vertices for path in faces.get_paths()])
     at_left = corners[:, 0] < 5.0
     assert corners[at_left, 1].max() == pytest.approx(4.0 + 0.08 * diagonal, rel=1e-12)
@@ -108,8 +113,8 @@ def test_one_scale_for_all_bodies() -> None:
 
 def test_colours_follow_the_displacement_and_limits_the_bodies() -> None:
     mesh = box(20)
-    ax = draw_mode({"box": mesh}, {"box": bent(mesh)}, title="first bending")
-    again = draw_mode({"box": mesh}, {"box": -1e6 * bent(mesh)})
+    ax = drawn({"box": mesh}, {"box": bent(mesh)}, title="first bending")
+    again = drawn({"box": mesh}, {"box": -1e6 * bent(mesh)})
     assert ax.get_title() == "first bending"
     assert ax.get_aspect() == 1.0
     assert not ax.axison
@@ -134,15 +139,15 @@ def test_outline_leaves_out_gentle_turns() -> None:
         # where they are
         front = (points[:, 1] == 0.0) & (points[:, 2] > 3.0)
         points[front, 1] -= 2.0 * np.tan(np.radians(angle))
-        _, lines = collections(draw_mode({"box": mesh.with_points(points)}, {}, view=(-90.0, 0.0)))
+        _, lines = collections(drawn({"box": mesh.with_points(points)}, {}, view=(-90.0, 0.0)))
         # the front's two uprights of two cells each, its lower and upper end, and the fold
         assert len(lines.get_segments()) == 4 + 2 + extra
 
 
 def test_rest_and_zero_shapes_are_drawn_at_rest() -> None:
     mesh = box()
-    zero, _ = collections(draw_mode({"box": mesh}, {"box": np.zeros((mesh.n_node, 3))}))
-    rest, _ = collections(draw_mode({"box": mesh}, {}))
+    zero, _ = collections(drawn({"box": mesh}, {"box": np.zeros((mesh.n_node, 3))}))
+    rest, _ = collections(drawn({"box": mesh}, {}))
     for a, b in zip(zero.get_paths(), rest.get_paths(), strict=True):
         assert np.array_equal(a.vertices, b.vertices)
 

@@ -9,8 +9,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from html import unescape
-from pathlib import Path
 from types import ModuleType
 
 import matplotlib as mpl
@@ -21,9 +19,8 @@ from upd.errors import InputError
 from upd.report import notebook
 from upd.report.folder import read_run
 from upd.report.notebook import RunResult
-from upd.report.tables import analysis_charts, main_numbers
+from upd.report.tables import analysis_charts
 from upd.results.check import status_of
-from upd.results.quantities import number_label
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +46,7 @@ def test_text_says_how_it_ended_and_the_main_numbers(sphere: RunResult) -> None:
     n = len(sphere.checks)
     assert f"Self-checks: {n} of {n} passed" in repr(sphere)
     assert f"Run folder: {sphere.folder}" in lines
-    assert any(line.startswith("  F=200 N: radius, second moment ") for line in lines)
+    assert any(line.startswith("radius, second moment ") for line in lines)
 
 
 @pytest.mark.parametrize("columns", [80, 120])
@@ -64,7 +61,7 @@ def test_print_has_ten_lines_and_the_table_all(
         lines = repr(result).splitlines()
         assert 5 < len(lines) <= 10
         assert all(len(line) <= columns for line in lines if "folder" not in line)
-    assert lines[-1].startswith("Warnings, with what to do in .table(): ")
+    assert lines[-1].startswith("Warnings: ") and lines[-1].endswith(" in .table()")
     assert len(sphere.table().splitlines()) > 40
 
 
@@ -77,19 +74,6 @@ def test_a_number_of_several_cases_asks_for_one(sphere: RunResult) -> None:
     assert two.value("max_pressure", "F=1 N") == 1.0
 
 
-def test_table_escapes_what_a_scene_can_hold(sphere: RunResult) -> None:
-    bad = replace(
-        sphere, title="<script>alert(1)</script>", status="failed: <b>x</b>", folder=Path("<i>")
-    )
-    table = bad._repr_html_()
-    for word in ("<script", "<b>x", "<i>"):
-        assert word not in table
-    assert "&lt;script&gt;" in table
-    for entry in main_numbers(sphere.size, sphere.summary()["results"]):
-        assert number_label(entry["name"]) in unescape(table)
-    assert "µm" in table
-
-
 def test_failed_checks_are_named(sphere: RunResult) -> None:
     first = replace(sphere.checks[0], value=2.0, limit=1.0)
     checks = (first, *sphere.checks[1:])
@@ -97,14 +81,12 @@ def test_failed_checks_are_named(sphere: RunResult) -> None:
     bad = replace(sphere, checks=checks, status=status)
     assert repr(bad).startswith(f"hertz: failed: {first.name}")
     n = len(sphere.checks)
-    assert f"failed: {first.name}" in bad._repr_html_()
-    assert f"{n - 1} of {n} self-checks passed" in bad._repr_html_()
+    assert f"{n - 1} of {n} passed" in repr(bad)
 
 
 def test_result_without_rows_and_arrays(sphere: RunResult) -> None:
     empty = replace(sphere, results=(), arrays={}, checks=(), folder=None)
     assert "all 0 numbers" in repr(empty)
-    assert "0 numbers, 0 groups" in empty._repr_html_() and "<table>" not in empty._repr_html_()
     with pytest.raises(InputError, match="no arrays to draw"):
         empty.plot()
 
@@ -163,12 +145,6 @@ def test_a_name_or_case_that_is_nearly_right_is_named(sphere: RunResult) -> None
     with pytest.raises(InputError, match="for case 'F=201 N', did you mean 'F=200 N'"):
         sphere.value("max_pressure", "F=201 N")
     assert "maximum pressure" in sphere.table()
-
-
-def test_missing_xarray_is_told(sphere: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(InputError, match="pip install xarray"):
-        sphere.to_xarray()
 
 
 def test_datasets_have_dimensions_and_units(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,7 @@ from upd.plot.chart import (
     Style,
     Trace,
 )
-from upd.plot.matplotlib import draw, write_sheet, write_sheets
+from upd.plot.matplotlib import draw, write_sheets
 from upd.plot.plotly import figure
 from upd.plot.style import (
     CLOSED,
@@ -54,6 +55,10 @@ from upd.report.compare import overlaid
 X, Y = Axis("x", "mm"), Axis("y", "N")
 T = np.array([0.0, 1.0, 2.0])
 CURVE = Trace("a", T, np.array([1.0, 4.0, 2.0]))
+
+
+def write_sheet(charts: Sequence[Chart], path: Path) -> list[Path]:
+    return write_sheets([replace(chart, figure=path.stem) for chart in charts], path.parent)
 
 
 def drawn(chart: Chart) -> Axes:
