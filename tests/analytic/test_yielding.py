@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from upd.contact.subsurface import most_stressed
+from upd.contact.subsurface import most_stressed, partial_slip_ratio
 from upd.reference import (
     boussinesq_stress,
     contact_modulus,
@@ -119,3 +119,11 @@ def test_friction_brings_the_most_stressed_place_to_the_surface(mu: float) -> No
     assert 0.94 * largest < found.value < largest
     turned = most_stressed(lines, lines, [pressure, 0.0 * pressure, mu * pressure], 0.3)
     assert turned.value == pytest.approx(found.value, rel=1e-9)
+
+
+def test_partial_slip_lies_between_no_friction_and_sliding() -> None:
+    none, most = (partial_slip_ratio(0.6, ratio, 0.3) for ratio in (0.0, 0.999))
+    assert none == pytest.approx(hertz_yield_point(0.3).ratio, rel=0.01)
+    lines, pressure = hertz_pressure(40)
+    sliding = most_stressed(lines, lines, [pressure, 0.6 * pressure, 0.0 * pressure], 0.3).value
+    assert none < most == pytest.approx(sliding, rel=0.02)

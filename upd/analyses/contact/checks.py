@@ -21,8 +21,9 @@ from upd.analyses.contact.plan import NORMAL, REMEDIES, beta_of, wider_patch
 from upd.analyses.contact.solution import ContactSolution, NormalCase, TangentialCase
 from upd.contact.model import ContactModel
 from upd.contact.normal import NormalContact
-from upd.contact.subsurface import most_stressed
+from upd.contact.subsurface import most_stressed, partial_slip_ratio
 from upd.mesh import recipes
+from upd.reference import hertz_yield_load, hertz_yield_point
 from upd.results import NO_CASE, Case, Check
 from upd.scene import Scene
 
@@ -293,32 +294,58 @@ def _steepness_check(solution: ContactSolution) -> Check:
 def yield_checks(solution: ContactSolution) -> Iterator[Check]:
     """Von Mises stress against the yield stress of the bodies that have one.
 
-    The contact itself stays elastic: the check shows where that ends. The computed pressure and
-    tractions act on half-spaces.
+    The contact itself stays elastic: the check shows where that ends. Of a sphere by Hertz's
+    pressure, under a tangential load with Cattaneo's traction; of other contacts by the computed
+    pressure and tractions on half-spaces.
     """
     scene, model = solution.plan.scene, solution.model
     limited = [b for b in (model.upper, model.lower) if scene.materials[b.name].yield_stress]
-    if not limited:
-        return
     pressure = model.multipliers.pressure
-    loads: list[tuple[Case, list[Array]]] = [
-        (c.case, [pressure(c.solution.force)]) for c in solution.normal if c.force > 0.0
+    loads: list[tuple[NormalCase | TangentialCase, float, bool, list[Array]]] = [
+        (c, c.force, True, [pressure(c.solution.force)]) for c in solution.normal if c.force > 0.0
     ]
     for t in solution.tangential:
         shear = np.zeros((2, len(t.pressed)))
         shear[list(t.nodes.components)] = tractions(solution, t)
-        loads.append((t.case, [pressure(np.maximum(t.pressed, 0.0)), *shear]))
-    for case, fields in loads:
-        faces = [on_lines(k, fields) for k in lattices(solution).values()]
+        closed = solution.closed_form_traction(t) is not None
+        fields = [pressure(np.maximum(t.pressed, 0.0)), *shear]
+        loads.append((t, t.normal.force, closed, fields))
+    for one, force, closed, fields in loads if limited else ():
+        by_hertz = closed and solution.hertz_of(force) is not None
+        faces = [] if by_hertz else [on_lines(k, fields) for k in lattices(solution).values()]
         for body in limited:
-            material = scene.materials[body.name]
-            assert material.yield_stress is not None
-            # the upper body feels the tractions the other way round
-            sign = -1.0 if body is model.upper else 1.0
-            stress, what = _half_space_stress(faces, sign, material.nu)
+            limit = scene.materials[body.name].yield_stress
+            assert limit is not None
+            if by_hertz:
+                stress, what = _hertz_stress(solution, one.case, force, body.name)
+            else:
+                # the upper body feels the tractions the other way round
+                sign = -1.0 if body is model.upper else 1.0
+                stress, what = _half_space_stress(faces, sign, scene.materials[body.name].nu)
             what = f"largest von Mises stress / yield stress of {body.name}, {what}"
-            at, value = replace(case, body=body.name), stress / material.yield_stress
-            yield _warning("onset of yield", at, value, 1.0, what, _YIELDS)
+            case = replace(one.case, body=body.name)
+            yield _warning("onset of yield", case, stress / limit, 1.0, what, _YIELDS)
+
+
+def _hertz_stress(
+    solution: ContactSolution, case: Case, force: float, body: str
+) -> tuple[float, str]:
+    """MPa in a body of a sphere's contact, and what it is."""
+    scene, hertz = solution.plan.scene, solution.hertz_of(force)
+    material, radius = scene.materials[body], scene.sphere_radius
+    assert hertz is not None and radius is not None and material.yield_stress is not None
+    worst = hertz_yield_point(material.nu)
+    if case.ratio is None:
+        stress = worst.ratio * hertz.max_pressure
+        begins = hertz_yield_load(material.yield_stress, material.nu, radius, solution.modulus)
+        return stress, (
+            f"Hertz without friction: {stress:.4g} MPa at depth {worst.depth * hertz.radius:.3g} "
+            f"mm; yields from {begins:.4g} N"
+        )
+    ratio = partial_slip_ratio(scene.contact.friction, case.ratio, material.nu)
+    # friction never relieves the most stressed place
+    stress = max(ratio, worst.ratio) * hertz.max_pressure
+    return stress, f"Hertz's pressure and Cattaneo's traction on a half-space: {stress:.4g} MPa"
 
 
 def _half_space_stress(
