@@ -559,7 +559,7 @@ def admissible_forces(
     cone = start
     for row in half_spaces:
         cone = _clipped(cone, row)
-    finite = cone[:, 2] > 0.0
+    finite = cone[:, 2] > _ROUNDINGS * np.abs(cone).max(axis=1)
     at_one = cone[finite] / cone[finite, 2:]
     return AdmissibleForces(
         (at_one @ to_faces.T).reshape(-1, 2, 2), (cone[~finite] @ to_faces.T).reshape(-1, 2, 2)
