@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from upd.errors import InputError
 from upd.linalg.select import (
     PRODUCTS,
-    USUAL,
     Choice,
     Prediction,
     Solid,
@@ -18,7 +17,6 @@ from upd.linalg.select import (
     has_pardiso,
     memory_left,
     predict,
-    usual_seconds,
 )
 
 #: solutions with K that a first load takes, and each further load of any kind (what is known serves
@@ -36,22 +34,19 @@ _FIELD = 8.0
 
 @dataclass(frozen=True)
 class Route:
-    """One way, its predicted cost, and the seconds that ways are compared by.
+    """One way and its predicted cost.
 
     Attributes
     ----------
     name : str
         A solver that condenses, or "products by " and a solver.
     cost : Prediction
-    usual : float
-        s of a usual machine with one thread.
     why : str
         Why this solver, or for how many products.
     """
 
     name: str
     cost: Prediction
-    usual: float
     why: str
 
 
@@ -109,16 +104,11 @@ def contact_routes(
     taken = choose(n_dof, n_kept, solver=solver, memory_limit_bytes=memory_limit_bytes, solid=solid)
     dense = taken.name
     cost = predict(n_dof, n_kept, dense, solid)
-    found = [Route(dense, cost, usual_seconds(n_dof, n_kept, dense), taken.why)]
+    found = [Route(dense, cost, taken.why)]
     direct = "pardiso" if has_pardiso() else "superlu"
     for name in (direct, "amg") if solver == "auto" else (solver,):
         cost = predict_products(n_dof, name, products, solid)
-        if name == "amg":
-            usual = usual_seconds(n_dof, products, name)
-        else:
-            usual = usual_seconds(n_dof, 0, name)
-            usual += _SOLUTIONS * products * 16.0 * cost.factor_nnz / USUAL.solve_bytes
-        found.append(Route(PRODUCTS + name, cost, usual, f"{products} products"))
+        found.append(Route(PRODUCTS + name, cost, f"{products} products"))
     return found
 
 
@@ -156,12 +146,12 @@ def choose_route(
     limit = memory_limit_bytes if memory_limit_bytes is not None else memory_left()
     dense, *others = ways
     fit = [one for one in others if one.cost.bytes <= limit]
-    best = min(fit, key=lambda one: one.usual, default=None)
+    best = min(fit, key=lambda one: one.cost.seconds, default=None)
     if route == "condensed":
         return Choice(dense.name, dense.why), dense.cost
     if route == "auto":
         affordable = dense.cost.bytes <= limit
-        if affordable and (best is None or dense.usual <= WORTH * best.usual):
+        if affordable and (best is None or dense.cost.seconds <= WORTH * best.cost.seconds):
             return Choice(dense.name, dense.why), dense.cost
     taken = best if best is not None else min(others, key=lambda one: one.cost.bytes)
     why = (

@@ -230,18 +230,6 @@ def predict(n_dof: int, n_kept: int, solver: str, solid: Solid | None = None) ->
     )
 
 
-def usual_seconds(n_dof: int, n_kept: int, solver: str) -> float:
-    """Seconds that solvers are compared by: of cubes, whatever the shape of the body."""
-    n, k = float(n_dof), float(n_kept)
-    if solver == "pardiso":
-        flops = 16.0 * n**2 + 6.0 * k * n ** (4 / 3) + k**3 / 3
-        return float(2.0e-5 * n + flops / (17e9 * threads()))
-    nnz = _MMD_NNZ * n**_MMD_POWER
-    if solver == "superlu":
-        return float(_MMD_FACTOR * nnz**2 / n + 2 * nnz * k * _MMD_SOLVE)
-    return n * (_AMG_SETUP + _AMG_COLUMN * max(k, 1.0))
-
-
 def choose(
     n_dof: int,
     n_kept: int,
@@ -302,7 +290,7 @@ def choose(
             f"needs the least memory, {_size(costs[name].bytes)}, though more than the "
             f"{_size(limit)} it may use",
         )
-    name = min(fitting, key=lambda name: usual_seconds(n_dof, n_kept, name))
+    name = min(fitting, key=lambda name: costs[name].seconds)
     cost = costs[name]
     why = (
         f"the fastest that fits: about {cost.seconds:.2g} s and {_size(cost.bytes)} of "
