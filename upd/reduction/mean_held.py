@@ -92,7 +92,6 @@ def condense_held_in_mean(
     K : (n, n) Symmetric, sparse array or array_like
         N/mm, free in all of `motions`.
     kept : (k,) array_like of int
-        In any order.
     weights : (n,) array_like
         Of the dofs that hold the body: for consistent forces the integrals of their shape functions
         over a surface [mm2].
@@ -151,8 +150,7 @@ def condense_held_in_mean(
         u = np.zeros((n, *force.shape[1:]))
         u[inner] = found.recover(C_h @ force)
         u -= X @ (T @ force)
-        moved: FloatArray = u - R @ np.linalg.solve(mean.T, W.T @ u)
-        return moved
+        return np.asarray(u - R @ np.linalg.solve(mean.T, W.T @ u))
 
     return Condensed(S, recover, found.solver, found.factor_nnz, found.peak_bytes, n, [C])
 
