@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from upd.contact.bordered import Bordered
 from upd.contact.coulomb import Coulomb
 from upd.contact.coulomb_conditions import AskedStep, Iterate
 from upd.contact.coupled_systems import ClosedSystem, Stuck
@@ -53,6 +54,58 @@ def test_the_closed_system_solves_the_rows(seed: int, c: int, by_load: bool) -> 
             assert (off <= 1e-8 * row.T.ravel()).all()
             if target.load is not None:
                 np.testing.assert_allclose((B.T @ f).T, target.load.T, atol=1e-8 * size)
+
+
+@pytest.mark.parametrize("by_load", [False, True])
+@pytest.mark.parametrize("c", [2, 3])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_factor_with_a_border_solves_other_rows(seed: int, c: int, by_load: bool) -> None:
+    """P df + Q (C df - B ds) = left and B'df = p with the factor of rows of which one node has
+    opened since, one closed, one slips that stuck, one sticks that slipped, and others turned.
+    """
+    rng = np.random.default_rng(seed)
+    n = 40
+    m = c * n
+    V = np.linalg.qr(rng.standard_normal((m, m)))[0]
+    C = 1e-6 * V @ np.diag(np.logspace(0.0, -2.0, m)) @ V.T
+    B = np.column_stack((np.kron(np.eye(c), np.ones((n, 1))), rng.standard_normal(m)))
+    solver = Coulomb(0.5 * (C + C.T), B, np.full(n, 0.5))
+    # open: pulled; slipping: pushed along the face beyond friction
+    f = 1.0 + 0.1 * rng.random((c, n))
+    f[1:] *= 0.1
+    f[0, :6], f[1:, 6:20] = -1.0, 1.0 + rng.random((c - 1, 14))
+    y = np.zeros((c, n))
+    before = solver._rows(Iterate(f.ravel(), np.zeros(c + 1), y.ravel()))
+    f[0, 0], f[0, 20] = 1.0, -1.0
+    f[1:, 6], f[1:, 21] = 0.1, 2.0
+    f[1:, 7:20] *= 1.0 + 0.01 * rng.random((c - 1, 13))
+    y[1:, 7:20] = 1e-9 * rng.random((c - 1, 13))
+    rows = solver._rows(Iterate(f.ravel(), np.zeros(c + 1), y.ravel()))
+    opened = before.is_open != rows.is_open
+    assert np.flatnonzero(opened).tolist() == [0, 20]
+    assert (before.relaxed != rows.relaxed).any(axis=1)[[0, 6, 20, 21]].all()
+    bordered = Bordered(ClosedSystem(solver, before, by_load))
+    assert bordered.changed(rows) == 2 * c + 2 * (c - 1)
+    rho = np.column_stack((solver.rho_n, *[solver.rho_t] * (c - 1)))
+    weight = np.where(rows.relaxed, 1.0, rho)
+    left = rng.standard_normal((n, c)) / weight
+    left[rows.is_open & before.is_open] = 0.0
+    missing = rng.standard_normal(c + 1) if by_load else None
+    off, p = left, missing
+    f, s = np.zeros(m), np.zeros(c + 1)
+    for _ in range(4):
+        # each gains the digits that an inexact step takes away
+        found = bordered.step(rows, off, p, rho)
+        assert found is not None
+        f, s = f + found[0], s + found[1]
+        there = (C @ f - B @ s).reshape(c, n)
+        off = left - np.einsum("nij,jn->ni", rows.P, f.reshape(c, n))
+        off = off - np.einsum("nij,jn->ni", rows.Q, there)
+        p = None if missing is None else missing - B.T @ f
+        size = np.abs(weight * left).max() + np.abs(f).max()
+    np.testing.assert_allclose(weight * off, 0.0, atol=1e-9 * size)
+    if p is not None:
+        np.testing.assert_allclose(p, 0.0, atol=1e-9 * size)
 
 
 @pytest.mark.parametrize("by_load", [False, True])

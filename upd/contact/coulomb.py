@@ -35,6 +35,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, lstsq, lu_factor, lu_solve
 from scipy.optimize import linprog
 
+from upd.contact.bordered import Bordered
 from upd.contact.checks import EPS
 from upd.contact.coulomb_conditions import (
     AskedStep,
@@ -53,6 +54,8 @@ log = logging.getLogger(__name__)
 #: A step with the kept factor that gains less than this is made again with its own: that converges
 #: quadratically, and costs as much as a dozen of them.
 CHORD = 0.03
+#: Factors kept for Newton's steps with other states; a cycle of loading comes back to the same few.
+KEPT = 4
 #: Newton takes 3 to 10 steps from a fair start; a run this long is lost.
 NEWTON_STEPS = 40
 #: The fallback has no bound of its own where friction is so large that it need not converge.
@@ -70,6 +73,7 @@ class Coulomb(CoulombConditions):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._kept: NewtonSystem | None = None
+        self._bordered: list[Bordered] = []
 
     def twin(self) -> Coulomb:
         """The same contact with what is kept between iterates of its own: for another thread."""
@@ -80,7 +84,7 @@ class Coulomb(CoulombConditions):
 
     def _forget(self) -> None:
         """Drop what is kept between iterates: it may be the very thing that failed."""
-        self._kept = None
+        self._kept, self._bordered = None, []
 
     # -- answers -----------------------------------------------------------------------------------
 
@@ -179,6 +183,10 @@ class Coulomb(CoulombConditions):
             if hold and rows.relaxed.all():
                 # Rarely the answer, and a poor place to come from: once is refused.
                 rows, hold = self._held(step, at, rows), False
+            near = self._nearby(step, at, rows)
+            if near is not None:
+                at = near
+                continue
             near = self._chord(step, at, rows)
             if near is not None:
                 ahead = self._judged(step, near, used)
@@ -259,6 +267,11 @@ class Coulomb(CoulombConditions):
         rows = self._rows(start)
         if turned:
             rows = self._stuck_at(rows, ~rows.is_open)
+        s = start.s if step.motion is None else step.motion
+        y = self.C @ start.f - self.B @ s - step.b
+        near = self._nearby(step, Iterate(start.f, s, y, True), rows)
+        if near is not None:
+            return near
         kept = self._serving(step, rows)
         if kept is not None:
             # Its rows are those of an iterate as near as the step before converged.
@@ -267,6 +280,27 @@ class Coulomb(CoulombConditions):
             return self._linear(step, rows)
         except np.linalg.LinAlgError:
             return self._linear(step, self._stuck())
+
+    def _nearby(self, step: AskedStep, at: Iterate, rows: NewtonRows) -> Iterate | None:
+        """A step of Newton by a kept factor of rows whose states are nearly the same. None where
+        none are.
+        """
+        n, c = self.n, self.c
+        near = min(
+            (one for one in self._bordered if one.base.by_load == (step.load is not None)),
+            key=lambda one: one.changed(rows),
+            default=None,
+        )
+        if near is None:
+            return None
+        if at.f.reshape(c, n)[:, rows.is_open & near.rows.is_open].any():
+            return None
+        found = near.step(rows, *self._left(step, at, rows), self.rho.T)
+        if found is None:
+            return None
+        f, s = at.f + found[0], at.s + found[1]
+        f.reshape(c, n)[:, rows.is_open] = 0.0
+        return Iterate(f, s, self.C @ f - self.B @ s - step.b, True)
 
     def _chord(self, step: AskedStep, at: Iterate, rows: NewtonRows) -> Iterate | None:
         """A step of Newton with the kept factor, where the same nodes are open, stuck and slipping:
@@ -308,7 +342,10 @@ class Coulomb(CoulombConditions):
     def _linear(self, step: AskedStep, rows: NewtonRows) -> Iterate:
         """The new iterate: P f + Q (C f - B s - b) = rhs."""
         self._kept = system = self._system(rows, step.load is not None)
-        return Iterate(*system.refined(rows.rhs.T.ravel(), step), isinstance(system, ClosedSystem))
+        closed = isinstance(system, ClosedSystem)
+        if isinstance(system, ClosedSystem) and system.dear:
+            self._bordered = [*self._bordered, Bordered(system)][-KEPT:]
+        return Iterate(*system.refined(rows.rhs.T.ravel(), step), closed)
 
     def derivative(self, at: Iterate) -> FloatArray:
         """df/ds (m, r) with the states kept.

@@ -18,6 +18,8 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 NOT_CARRIED = "nothing touches and carries the load"
+#: A product of a matrix with a vector waits for memory and costs so much more, for weighing only.
+_PASS = 10.0
 #: Refinements behind the factor of C; each gains the digits that its condition leaves.
 _REFINED = 2
 
@@ -109,6 +111,11 @@ class ClosedSystem:
             reciprocal, _ = lapack.dgecon(lu, norm)
             if reciprocal <= len(M) * EPS:
                 raise np.linalg.LinAlgError(NOT_CARRIED)
+
+    @property
+    def dear(self) -> bool:
+        """Whether another factor costs more than a product with all of C."""
+        return self.q**3 / 3.0 > _PASS * len(self.of.C) ** 2
 
     def turned(self, right: FloatArray) -> FloatArray:
         """Q of the closed rows (q,) or (q, columns), in place."""
