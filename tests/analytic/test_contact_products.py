@@ -27,7 +27,7 @@ from upd.contact.products import (
 )
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.multigrid import AT_ONCE
-from upd.linalg.routes import choose_route, contact_routes
+from upd.linalg.select import choose_route, contact_routes
 from upd.progress import Stages
 from upd.reduction.learned import LearnedCompliance
 from upd.reference import half_space_compliance
