@@ -126,6 +126,8 @@ class CoulombConditions:
 
     def __post_init__(self) -> None:
         self.n = len(self.mu)
+        #: whether Newton's systems may be as soft as they are just below the limit of friction
+        self.near_limit = False
         #: first tangential component
         self.first = 1 if self.pressed is None else 0
         self.c = len(self.C) // self.n
