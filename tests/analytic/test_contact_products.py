@@ -26,8 +26,8 @@ from upd.contact.products import (
     unknown,
 )
 from upd.errors import ConvergenceError, InputError
-from upd.linalg.routes import choose_route, contact_routes
-from upd.linalg.sweeps import WIDTH
+from upd.linalg.multigrid import AT_ONCE
+from upd.linalg.select import choose_route, contact_routes
 from upd.progress import Stages
 from upd.reduction.learned import LearnedCompliance
 from upd.reference import half_space_compliance
@@ -131,7 +131,7 @@ def test_several_forces_are_learned_at_once(way: str) -> None:
     forces = np.random.default_rng(4).random((len(exact), 11))
     forces[:, 10] = forces[:, 0] + 1e-6 * forces[:, 1]
     learned.learn(forces, 1e-3)
-    assert learned.products == WIDTH
+    assert learned.products == AT_ONCE
     learned.learn(forces, 1e-3)
     # the last is known to a millionth from the first
     assert learned.products == 10 and (learned.unknown(forces) < 1e-3).all()

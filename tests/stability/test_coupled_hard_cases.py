@@ -236,6 +236,22 @@ def test_what_cannot_be_carried_is_never_converged(
             coupled_contact(C, h, 0.4, load=path)
 
 
+@pytest.mark.parametrize("seed", [5, 10, 13])
+@pytest.mark.parametrize("below", [1e-6, 1e-9])
+def test_just_below_what_friction_holds(seed: int, below: float) -> None:
+    """Slips of thousands of times the elastic shift leave Newton's systems regular, but for the
+    size of a column.
+    """
+    rng = np.random.default_rng(seed)
+    C = half_space_compliance(*rng.integers(4, 9, 2), 0.1, 0.15, 2e5, 0.3, "all")
+    n, mu, angle = len(C) // 3, rng.uniform(0.1, 0.8), rng.uniform(0.0, 6.0)
+    h = 1e-3 * np.linspace(-1.0, 1.0, n) ** 2
+    T = (1.0 - below) * 60.0 * mu
+    loads = [[60.0, 0.0, 0.0], [60.0, T * np.cos(angle), T * np.sin(angle)]]
+    found = coupled_contact(C, h, mu, load=loads)
+    assert laws(C, h, mu, found, asked=loads) < 1e-9
+
+
 @pytest.mark.parametrize("curved", [False, True])
 def test_unloaded_and_loaded_again(curved: bool) -> None:
     """Nothing is left of a contact without load, and the next load is carried again."""

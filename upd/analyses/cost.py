@@ -13,8 +13,7 @@ from dataclasses import dataclass, field
 
 from upd.errors import InputError
 from upd.linalg import select
-from upd.linalg.routes import choose_route, contact_routes
-from upd.linalg.select import USUAL, Prediction, Solid
+from upd.linalg.select import USUAL, Prediction, Solid, choose_route, contact_routes
 from upd.scene import AnyScene
 
 #: element -> nodes per hexahedron

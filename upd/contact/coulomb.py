@@ -142,10 +142,17 @@ class Coulomb(CoulombConditions):
             assert best is not None
             return replace(best, iterations=used)
         log.info("coupled contact: Newton did not converge in %d steps, the fallback runs", used)
-        if not self.mu.any():
-            answer = self._frictionless(step, start)
-            if answer.converged:
-                return replace(answer, iterations=used + answer.iterations, method="fallback")
+        self.near_limit = bool(self.mu.any())
+        answer = (
+            self._newton(step, None, NEWTON_STEPS)
+            if self.near_limit
+            else self._frictionless(step, start)
+        )
+        self.near_limit = False
+        self._forget()
+        used += answer.iterations
+        if answer.converged:
+            return replace(answer, iterations=used, method="fallback")
         convex = self.pressed is not None and load is not None
         answer = self._by_motion(step) if convex else self._by_multipliers(step, start)
         used += answer.iterations

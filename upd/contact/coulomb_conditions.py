@@ -23,6 +23,7 @@ from scipy.linalg import lapack
 from scipy.optimize import linprog
 
 from upd.contact.checks import EPS
+from upd.contact.qp import HALF_THE_DIGITS
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -125,6 +126,8 @@ class CoulombConditions:
 
     def __post_init__(self) -> None:
         self.n = len(self.mu)
+        #: whether Newton's systems may be as soft as they are just below the limit of friction
+        self.near_limit = False
         #: first tangential component
         self.first = 1 if self.pressed is None else 0
         self.c = len(self.C) // self.n
@@ -222,7 +225,8 @@ class CoulombConditions:
             reach += np.abs(at.f).max(initial=0.0) * np.abs(self.B).max(axis=0)
             residual = np.concatenate((residual, off))
             allowed = np.concatenate((allowed, 4.0 * (len(self.C) + 10) * EPS * reach))
-        return residual, allowed, size or 1.0
+        # Slips so large that rounding hides half of the digits of the forces are no answer.
+        return residual, np.minimum(allowed, HALF_THE_DIGITS * size), size or 1.0
 
     @staticmethod
     def _shrink(q: FloatArray, limit: FloatArray) -> FloatArray:

@@ -1,4 +1,10 @@
-"""Quasi-static contact of condensed elastic bodies with friction, normal and tangential at once."""
+"""Quasi-static contact of condensed elastic bodies with friction, normal and tangential at once.
+
+References
+----------
+.. [1] K. L. Johnson, Contact Mechanics (1985), sections 5.4 and 7.1.
+.. [2] S. Hueeber, G. Stadler and B. I. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572.
+"""
 
 from __future__ import annotations
 
@@ -214,11 +220,6 @@ def coupled_contact(
         For bad arguments; all problems at once.
     ConvergenceError
         When a load cannot be carried: a body lifts off, or slides as a whole.
-
-    References
-    ----------
-    .. [1] K. L. Johnson, Contact Mechanics (1985), sections 5.4 and 7.1.
-    .. [2] S. Hueeber, G. Stadler and B. I. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572.
 
     Examples
     --------

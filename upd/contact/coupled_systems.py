@@ -93,6 +93,14 @@ class ClosedSystem:
         if not (self.size > 0.0).all():
             raise np.linalg.LinAlgError(NOT_CARRIED)
         M /= self.size[:, None]
+        if by_load and of.near_limit:
+            # No slip row resists a shift by much there: by powers of two, exactly.
+            width = np.abs(M[:, q:]).max(axis=0)
+            if not (width > len(M) * EPS).all():
+                raise np.linalg.LinAlgError(NOT_CARRIED)
+            more = np.exp2(-np.floor(np.log2(width)))
+            M[:, q:] *= more
+            self.unit = self.unit * more
         norm = float(np.abs(M).sum(axis=1).max(initial=0.0))
         self.lu: tuple[FloatArray, IntArray] | None = None
         if q:

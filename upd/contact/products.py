@@ -20,6 +20,10 @@ The approach d at a given load F has d F = f' (h + C f), hence |d - d*| <= 2 max
 |delta|_{C^-1} / F. Both need no more than the errors in energy of the products, see
 `upd.linalg.schur`.
 
+What the bodies start from (`half_space_start`) decides how many products are needed, never what
+comes out. Where a measured column leaves it indefinite, the half-space stands without it, and for
+points whose half-space is, its diagonal.
+
 References
 ----------
 .. [1] K. L. Johnson, Contact Mechanics (1985), sections 3.2, 3.6 and 5.9 (the half-space).
@@ -68,9 +72,6 @@ def half_space_start(
     is given, the displacement under any other force is taken to be the same function of the
     distance: it has the elements' part near the force, which decides how many products are needed,
     and the rest of the body's as a constant.
-
-    A start decides how many products are needed, never what comes out. Where the column leaves it
-    indefinite, the half-space stands without it, and for points whose half-space is, its diagonal.
 
     Parameters
     ----------

@@ -265,53 +265,6 @@ def forces(
     )
 
 
-def force_limits(left: ArrayLike, right: ArrayLike, friction: ArrayLike) -> tuple[Array, Array]:
-    """Least and greatest N and T of both faces over F_C, of all states that friction admits.
-
-    Parameters
-    ----------
-    left, right : array_like
-        Inclinations to the horizontal [deg].
-    friction : array_like
-        Friction coefficient; all three broadcast together.
-
-    Returns
-    -------
-    N, T : (2, 2, ...) ndarray
-        By face (left first), least and greatest, over F_C; infinite where the damper jams, nan
-        where nothing holds it (upright faces without friction).
-    """
-    a, b, mu = np.broadcast_arrays(*(np.asarray(v, float) for v in (left, right, friction)))
-    phi = np.degrees(np.arctan(mu))
-    states = [_corner(a, b, mu, k, m) for k in (-1, 1) for m in (-1, 1)]
-    states += [_alone(a, b, phi, 0), _alone(a, b, phi, 1)]
-    known = np.array(states)  # (state, N or T, face, ...)
-    with np.errstate(invalid="ignore"):
-        least, greatest = np.fmin.reduce(known), np.fmax.reduce(known)
-    none = np.isnan(least[0, 0])
-    # forces that hold each other without F_C have T/N from -mu to tan(a + b + phi - 180 deg)
-    jammed = jams(a, b, mu) & ~none
-    upwards = (a + b + phi > 180.0 + _DEGREES) & jammed
-    N = np.stack([least[0], np.where(jammed, np.inf, greatest[0])], 1)
-    T = np.stack([np.where(jammed, -np.inf, least[1]), np.where(upwards, np.inf, greatest[1])], 1)
-    return N, T
-
-
-def _corner(a: Array, b: Array, mu: Array, left: int, right: int) -> Array:
-    """N and T of both faces, (2, 2, ...), friction at its limit on both; nan where no balance."""
-    N = np.array(forces(a, b, left * mu, right * mu))
-    signs = np.array([left, right]).reshape(2, *(1,) * a.ndim)
-    return np.array([N, signs * mu * N])
-
-
-def _alone(a: Array, b: Array, phi: Array, face: int) -> Array:
-    """N and T of both faces, (2, 2, ...), when one holds the damper alone; nan where it cannot."""
-    angle = (a, b)[face]
-    found = np.zeros((2, 2, *a.shape))
-    found[:, face] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    return np.where(phi >= angle - _DEGREES, found, np.nan)
-
-
 @dataclass(frozen=True)
 class FaceForces:
     """Forces on both faces.
@@ -606,7 +559,7 @@ def admissible_forces(
     cone = start
     for row in half_spaces:
         cone = _clipped(cone, row)
-    finite = cone[:, 2] > 0.0
+    finite = cone[:, 2] > _ROUNDINGS * np.abs(cone).max(axis=1)
     at_one = cone[finite] / cone[finite, 2:]
     return AdmissibleForces(
         (at_one @ to_faces.T).reshape(-1, 2, 2), (cone[~finite] @ to_faces.T).reshape(-1, 2, 2)

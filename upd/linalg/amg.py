@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike
 
 from upd.errors import InputError
 from upd.linalg.common import FloatArray, checked_dofs, checked_vectors, log
-from upd.linalg.multigrid import MAX_ITERATIONS, MultigridSolver
+from upd.linalg.multigrid import AT_ONCE, MAX_ITERATIONS, MultigridSolver
 from upd.linalg.schur import Solved
-from upd.linalg.sweeps import WIDTH
 from upd.linalg.symmetric import checked
 
 RTOL = 1e-10
@@ -128,8 +127,8 @@ def compliance_amg(
     solver = MultigridSolver(A, near_null_space, layout=layout, points=points)
     C = np.empty((len(b), len(b)))
     most = 0
-    for first in range(0, len(b), WIDTH):
-        some = b[first : first + WIDTH]
+    for first in range(0, len(b), AT_ONCE):
+        some = b[first : first + AT_ONCE]
         units = np.zeros((A.shape[0], len(some)))
         units[some, np.arange(len(some))] = 1.0
         for j, found in enumerate(solver.many(units, RTOL), start=first):

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,16 +30,20 @@ from scipy.sparse import bsr_array
 
 from upd.errors import ConvergenceError, InputError
 from upd.linalg.common import FloatArray, checked_vectors, log
-from upd.linalg.conjugate import UNSEEN, block_conjugate_gradients, conjugate_gradients
+from upd.linalg.conjugate import UNSEEN, LowestRitz, conjugate_gradients
 from upd.linalg.nodes import STRONG, aggregates, near_neighbours, padded, places, positions
+from upd.linalg.parallel import in_parallel
 from upd.linalg.schur import Solved
+from upd.linalg.select import threads_used
 from upd.linalg.smoothers import Smoother, in_order
-from upd.linalg.sweeps import WIDTH, Single, symmetric_product, width_of
-from upd.linalg.symmetric import Matrix, Symmetric
+from upd.linalg.sweeps import Single
+from upd.linalg.symmetric import Matrix
 
 #: the coarsest level is factorised densely: below this many blocks, of 6 dofs each, that is free
 COARSEST = 100
 MAX_ITERATIONS = 3000
+#: right-hand sides that are held at once
+AT_ONCE = 8
 MOST_LEVELS = 10
 #: levels from this one on, counted from 0, are visited twice from the one above. On stretched
 #: meshes it has 1 % of the dofs, so that is nearly free; the level before has a fifth
@@ -84,22 +89,13 @@ class Hierarchy:
             ) from error
         self.sizes = [*(level.P.shape[0] for level in levels), len(coarsest)]
 
-    def __call__(self, residuals: FloatArray) -> FloatArray:
-        """M R for one residual (n,), or up to `WIDTH` of them (n, k).
-
-        Each is scaled to one first: single precision has few powers of ten.
-        """
-        sizes = np.abs(residuals).max(axis=0)
-        sizes = np.where(sizes > 0.0, sizes, 1.0)
-        scaled = (residuals / sizes).astype(np.float32)
-        if residuals.ndim == 2:
-            scaled = np.pad(scaled, ((0, 0), (0, WIDTH - residuals.shape[1])))
-        out = self._cycle(0, scaled).astype(np.float64)
-        found: FloatArray = (out if out.ndim == 1 else out[:, : residuals.shape[1]]) * sizes
-        return found
+    def __call__(self, residual: FloatArray) -> FloatArray:
+        """M r, with r scaled to one first: single precision has few powers of ten."""
+        size = float(np.abs(residual).max()) or 1.0
+        out: FloatArray = self._cycle(0, (residual / size).astype(np.float32)).astype(np.float64)
+        return size * out
 
     def _cycle(self, depth: int, b: Single) -> Single:
-        """One right-hand side (n,), or (n, WIDTH)."""
         if depth == len(self._levels):
             x = np.zeros_like(b)
             x[self._real] = cho_solve(self._coarsest, b[self._real].astype(np.float64))
@@ -244,59 +240,34 @@ class MultigridSolver:
         self._lowest = UNSEEN
         log.info("multigrid of %d dofs: levels %s", n, self._cycle.sizes)
 
-    def _product(self, x: FloatArray) -> FloatArray:
-        """K x for one column (n,) or up to `WIDTH` (n, k): the compiler knows these widths."""
-        if not isinstance(self._K, Symmetric):
-            return np.asarray(self._K @ x)
-        wide = x[:, None]
-        if x.ndim == 2:
-            wide = np.zeros((len(x), WIDTH))
-            wide[:, : x.shape[1]] = x
-        U = self._K.upper
-        y = symmetric_product(U.indptr, U.indices, U.data, wide, width_of(wide))
-        return np.asarray(y[:, 0] if x.ndim == 1 else y[:, : x.shape[1]])
-
-    def _precondition(self, residuals: FloatArray) -> FloatArray:
-        whole = np.zeros((self._n_padded, *residuals.shape[1:]))
-        whole[self._place] = residuals
+    def _precondition(self, residual: FloatArray) -> FloatArray:
+        whole = np.zeros(self._n_padded)
+        whole[self._place] = residual
         return self._cycle(whole)[self._place]
 
     def many(self, rhs: FloatArray, accuracy: float) -> list[Solved]:
-        """K^-1 rhs for the columns of (n, m), `WIDTH` at a time; raises as for one."""
-        found: list[Solved] = []
-        for first in range(0, rhs.shape[1], WIDTH):
-            B = rhs[:, first : first + WIDTH]
-            if B.shape[1] <= WIDTH // 2:
-                # a block costs as much as four or five alone, however few it has
-                found += [self(np.ascontiguousarray(b), accuracy) for b in B.T]
-                continue
-            made = block_conjugate_gradients(
-                self._product,
+        """K^-1 rhs for the columns of (n, m), side by side; raises as for one."""
+
+        def run(b: FloatArray) -> tuple[Solved, LowestRitz]:
+            return conjugate_gradients(
+                lambda x: np.asarray(self._K @ x),
                 self._precondition,
-                B,
+                b,
                 accuracy=accuracy,
                 max_iterations=self._max_iterations,
-                lowest=self._lowest,
+                lowest=known,
             )
-            self._lowest = made.lowest
-            found += [
-                Solved(x, float(error), made.iterations)
-                for x, error in zip(made.x.T, made.error, strict=True)
-            ]
-        return found
+
+        # of all columns the same, so that none depends on which ends first
+        known = self._lowest
+        jobs = [partial(run, np.ascontiguousarray(b)) for b in rhs.T]
+        made = in_parallel(jobs, threads_used())
+        self._lowest = min([known, *(lowest for _, lowest in made)])
+        return [solved for solved, _ in made]
 
     def __call__(self, rhs: FloatArray, accuracy: float) -> Solved:
         """K^-1 rhs to a relative error in energy.
 
         Raises ConvergenceError where it is not reached.
         """
-        found = conjugate_gradients(
-            self._product,
-            self._precondition,
-            rhs,
-            accuracy=accuracy,
-            max_iterations=self._max_iterations,
-            lowest=self._lowest,
-        )
-        self._lowest = found.lowest
-        return Solved(found.x, float(found.error), found.iterations)
+        return self.many(rhs[:, None], accuracy)[0]

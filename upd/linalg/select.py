@@ -1,11 +1,13 @@
-"""Which solver is there, which to take, and what it will cost before anything is assembled."""
+"""Which solver is there, which to take, and what it will cost before anything is assembled; how a
+contact sees its bodies: condensed onto the contact dofs, or by products with a solver.
+"""
 
 from __future__ import annotations
 
 import importlib.util
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -41,6 +43,17 @@ _MMD_FACTOR, _MMD_SOLVE = 1.2e-10, 2.8e-10  # s per nnz^2 / n, s per entry
 # Multigrid: about 27 iterations per column, 0.26 us per dof each, where there are no slivers;
 # counted on the ready scene at 50 000 to 800 000 dofs, bytes while it is set up.
 _AMG_SETUP, _AMG_COLUMN, _AMG_BYTES_DOF = 1.8e-5, 7e-6, 2500.0
+#: solutions with K that a first load takes, and each further load of any kind (what is known serves
+#: them too); counted on the ready scene: 6 for one load, 22 for 18, 22 for 8 tangential loads and
+#: two cycles
+FIRST, EACH = 6, 1
+#: "auto" condenses unless that takes so many times as long as the fastest other route: the last
+#: digits of a run do not change for less
+WORTH = 2.0
+# Two triangular solutions of a product with a factor: the second refines it.
+_SOLUTIONS = 2
+# Bytes of the field of a product, per dof.
+_FIELD = 8.0
 
 
 @dataclass(frozen=True)
@@ -230,18 +243,6 @@ def predict(n_dof: int, n_kept: int, solver: str, solid: Solid | None = None) ->
     )
 
 
-def usual_seconds(n_dof: int, n_kept: int, solver: str) -> float:
-    """Seconds that solvers are compared by: of cubes, whatever the shape of the body."""
-    n, k = float(n_dof), float(n_kept)
-    if solver == "pardiso":
-        flops = 16.0 * n**2 + 6.0 * k * n ** (4 / 3) + k**3 / 3
-        return float(2.0e-5 * n + flops / (17e9 * threads()))
-    nnz = _MMD_NNZ * n**_MMD_POWER
-    if solver == "superlu":
-        return float(_MMD_FACTOR * nnz**2 / n + 2 * nnz * k * _MMD_SOLVE)
-    return n * (_AMG_SETUP + _AMG_COLUMN * max(k, 1.0))
-
-
 def choose(
     n_dof: int,
     n_kept: int,
@@ -302,7 +303,7 @@ def choose(
             f"needs the least memory, {_size(costs[name].bytes)}, though more than the "
             f"{_size(limit)} it may use",
         )
-    name = min(fitting, key=lambda name: usual_seconds(n_dof, n_kept, name))
+    name = min(fitting, key=lambda name: costs[name].seconds)
     cost = costs[name]
     why = (
         f"the fastest that fits: about {cost.seconds:.2g} s and {_size(cost.bytes)} of "
@@ -315,6 +316,135 @@ def choose(
 
 def _size(count: float) -> str:
     return f"{count / 1e9:.2g} GB"
+
+
+@dataclass(frozen=True)
+class Route:
+    """One way and its predicted cost.
+
+    Attributes
+    ----------
+    name : str
+        A solver that condenses, or "products by " and a solver.
+    cost : Prediction
+    why : str
+        Why this solver, or for how many products.
+    """
+
+    name: str
+    cost: Prediction
+    why: str
+
+
+def predict_products(
+    n_dof: int, solver: str, products: int, solid: Solid | None = None
+) -> Prediction:
+    """Memory and time of so many products with the compliance of a body.
+
+    Parameters
+    ----------
+    n_dof : int
+    solver : {"pardiso", "superlu", "amg"}
+    products : int
+    solid : Solid, optional
+
+    Returns
+    -------
+    Prediction
+    """
+    fields = _FIELD * n_dof * products
+    if solver == "amg":
+        columns = predict(n_dof, products, solver, solid)
+        return replace(columns, bytes=columns.bytes + fields)
+    factor = predict(n_dof, 0, solver, solid)
+    return replace(
+        factor,
+        bytes=factor.bytes + fields,
+        seconds=factor.seconds + _SOLUTIONS * products * factor.substitution(),
+    )
+
+
+def contact_routes(
+    n_dof: int,
+    n_kept: int,
+    products: int,
+    *,
+    solver: str = "auto",
+    memory_limit_bytes: float | None = None,
+    solid: Solid | None = None,
+) -> list[Route]:
+    """The ways open to a solver's name, the condensing one first.
+
+    Parameters
+    ----------
+    n_dof, n_kept, products : int
+    solver : {"auto", "pardiso", "superlu", "amg"}
+    memory_limit_bytes : float, optional
+        For the choice among the solvers that condense; None: what the machine has left.
+    solid : Solid, optional
+
+    Returns
+    -------
+    list of Route
+    """
+    taken = choose(n_dof, n_kept, solver=solver, memory_limit_bytes=memory_limit_bytes, solid=solid)
+    dense = taken.name
+    cost = predict(n_dof, n_kept, dense, solid)
+    found = [Route(dense, cost, taken.why)]
+    direct = "pardiso" if has_pardiso() else "superlu"
+    for name in (direct, "amg") if solver == "auto" else (solver,):
+        cost = predict_products(n_dof, name, products, solid)
+        found.append(Route(PRODUCTS + name, cost, f"{products} products"))
+    return found
+
+
+def choose_route(
+    ways: Sequence[Route],
+    products: int,
+    *,
+    route: str = "auto",
+    memory_limit_bytes: float | None = None,
+) -> tuple[Choice, Prediction]:
+    """The way to take, and its cost.
+
+    Parameters
+    ----------
+    ways : sequence of Route
+        From `contact_routes`.
+    products : int
+        What they were predicted for.
+    route : {"auto", "condensed", "products"}
+    memory_limit_bytes : float, optional
+        None: what the machine has left.
+
+    Returns
+    -------
+    Choice, Prediction
+        The name is that of a `Route`.
+
+    Raises
+    ------
+    InputError
+        For an unknown route.
+    """
+    if route not in ("auto", "condensed", "products"):
+        raise InputError(f'Unknown route {route!r}: choose "auto", "condensed" or "products".')
+    limit = memory_limit_bytes if memory_limit_bytes is not None else memory_left()
+    dense, *others = ways
+    fit = [one for one in others if one.cost.bytes <= limit]
+    best = min(fit, key=lambda one: one.cost.seconds, default=None)
+    if route == "condensed":
+        return Choice(dense.name, dense.why), dense.cost
+    if route == "auto":
+        affordable = dense.cost.bytes <= limit
+        if affordable and (best is None or dense.cost.seconds <= WORTH * best.cost.seconds):
+            return Choice(dense.name, dense.why), dense.cost
+    taken = best if best is not None else min(others, key=lambda one: one.cost.bytes)
+    why = (
+        f"about {taken.cost.seconds:.2g} s and {taken.cost.bytes / 1e9:.2g} GB for {products} "
+        f"products, {dense.cost.seconds:.2g} s and {dense.cost.bytes / 1e9:.2g} GB condensed"
+    )
+    return Choice(taken.name, why), taken.cost
 
 
 def memory_left() -> float:

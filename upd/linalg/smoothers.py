@@ -37,7 +37,6 @@ from upd.linalg.sweeps import (
     first_lines,
     last_cross,
     last_lines,
-    width_of,
 )
 
 
@@ -76,24 +75,19 @@ class Smoother:
             place = np.empty(n, np.int64)
             place[nodes] = np.arange(n)
             self._cross = (place[across], starts, *_factors(A, across, starts))
-        self._size = (0,) * size
 
     def first(self, b: Single) -> tuple[Single, Single]:
-        """A forward sweep from zero: x and b - A x, for (n,) or (n, w)."""
-        B = b.reshape(len(b), -1)
-        shape = (self._size, width_of(B))
-        x, r = first_lines(self._rows, self._lines, B, shape)
+        """A forward sweep from zero: x and b - A x."""
+        x, r = first_lines(self._rows, self._lines, b)
         if self._cross is not None:
-            first_cross(self._rows, self._cross, x, r, shape)
-        return x.reshape(b.shape), r.reshape(b.shape)
+            first_cross(self._rows, self._cross, x, r)
+        return x, r
 
     def last(self, b: Single, x: Single) -> None:
         """A backward sweep of x."""
-        B, X = b.reshape(len(b), -1), x.reshape(len(x), -1)
-        shape = (self._size, width_of(B))
         if self._cross is not None:
-            last_cross(self._rows, self._cross, B, X, shape)
-        last_lines(self._rows, self._lines, B, X, shape)
+            last_cross(self._rows, self._cross, b, x)
+        last_lines(self._rows, self._lines, b, x)
 
     def residual(self, b: Single, x: Single) -> Single:
         """b - A x, both in the smoother's order."""

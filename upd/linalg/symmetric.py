@@ -48,8 +48,8 @@ class Symmetric:
         return n, n
 
     def diagonal(self) -> FloatArray:
-        """(n,) diagonal."""
-        out: FloatArray = self.upper.diagonal()
+        """(n,) diagonal, the first entries of the rows."""
+        out: FloatArray = self.upper.data[self.upper.indptr[:-1]]
         return out
 
     def __matmul__(self, x: FloatArray) -> FloatArray:

@@ -60,7 +60,6 @@ def craig_bampton(
     below_hz: float | None = None,
     target: ErrorTarget | None = None,
     rows: ArrayLike | None = None,
-    rigid_modes: ArrayLike | None = None,
     solver: str = "auto",
 ) -> ReducedModel:
     """Reduce a body to boundary dofs and modes with the boundary held.
@@ -85,9 +84,6 @@ def craig_bampton(
         As few as make the first frequencies right, judged by the full model's own modes.
     rows : (n_row,) array_like of int, optional
         Dofs at which the way back is kept; None: all (n r doubles).
-    rigid_modes : (n, 6) array_like, optional
-        Of a floating body: takes the rounding of the six rigid motions out of the condensed
-        stiffness.
     solver : {"auto", "pardiso", "superlu"}
 
     Returns
@@ -125,12 +121,7 @@ def craig_bampton(
     kept = np.arange(n) if rows is None else checked_dofs(rows, n, "kept")
     _check(n, len(b), n_modes, below_hz, target)
     static = schur_complement(A, b, solver=solver)
-    S = (
-        static.S
-        if rigid_modes is None
-        else _free_of_rounding(static.S, checked_vectors(rigid_modes, n, "rigid-body modes")[b])
-    )
-    Psi = static.recover(np.eye(len(b)))
+    S, Psi = static.S, static.recover(np.eye(len(b)))
     # its factor is as large as the one that the modes take
     del static
     inner = np.setdiff1d(np.arange(n), b)
@@ -221,26 +212,6 @@ class _Static:
         return ReducedModel(
             K, M, self.boundary, frequency, self.rows, basis, np.concatenate([self.size, value]), n
         )
-
-
-def _free_of_rounding(S: FloatArray, R: FloatArray) -> FloatArray:
-    """S with the rigid motions R (k, 6) exactly in its null space.
-
-    They are there but for rounding, else an InputError.
-    """
-    Q, size, _ = np.linalg.svd(R.reshape(len(S), -1), full_matrices=False)
-    Q = Q[:, size > len(S) * EPS * size.max(initial=0.0)]
-    fault, norm = float(np.linalg.norm(S @ Q, 2)), float(np.linalg.norm(S, 2))
-    # Condensation subtracts numbers of the size of the diagonal of K: allow the square root of eps
-    # of it, far below any support.
-    if fault > np.sqrt(EPS) * norm:
-        raise InputError(
-            f"The rigid-body modes cost energy (|S R| = {fault:.1e}, |S| = {norm:.1e}): "
-            "the body is held; leave rigid_modes out."
-        )
-    SQ = S @ Q
-    out: FloatArray = S - SQ @ Q.T - Q @ SQ.T + Q @ (Q.T @ SQ) @ Q.T
-    return 0.5 * (out + out.T)
 
 
 def _reference(A: Matrix, M: Matrix, target: ErrorTarget, solver: str) -> Modes:

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from upd.errors import InputError
 from upd.linalg.common import EPS, FloatArray, IntArray, checked_dofs, checked_vectors, log
+from upd.linalg.multigrid import AT_ONCE
 from upd.linalg.schur import Solved, Solver
-from upd.linalg.sweeps import WIDTH
 
 #: relative error in energy of one product
 ACCURACY = 1e-10
@@ -142,8 +142,7 @@ class LearnedCompliance:
         """Solutions with K for what of forces (k,) or (k, m) is not known.
 
         Directions are added one by one, each that of the column of which most is unknown for its
-        limit, until no share that is unknown is above its limit (m,), or so many are added as the
-        solver works on at once.
+        limit, until no share that is unknown is above its limit (m,), or `AT_ONCE` are added.
 
         Raises ConvergenceError where the solver does not reach the accuracy.
         """
@@ -154,7 +153,7 @@ class LearnedCompliance:
         allowed = np.broadcast_to(limits, sizes.shape) * sizes
         allowed = np.maximum(allowed, len(F) * EPS * sizes)
         left, new = self._left(F), np.zeros((len(F), 0))
-        while new.shape[1] < WIDTH and left.shape[1]:
+        while new.shape[1] < AT_ONCE and left.shape[1]:
             over = self._size(left) / allowed
             worst = int(np.argmax(over))
             if not over[worst] > 1.0:

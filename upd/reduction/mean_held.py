@@ -1,4 +1,36 @@
-"""Condensation of a body that a weighted set of nodes holds in the mean."""
+"""Condensation of a body that a weighted set of nodes holds in the mean.
+
+With R the rigid motions and w the weights, W = diag(w) R, the body under forces f obeys
+
+    K u + W a = f,    W' u = 0:
+
+nothing moves in the mean, and the reaction is the traction over the weighted set that is linear
+in position, with which the force and the moments balance: R'f = R'W a. Both parts follow from
+any support that holds the rigid motions and no more, K_h u_h = f - W a: balanced forces leave
+it without a reaction, whatever its place, and u = u_h - R (W'R)^-1 W'u_h. With P = I - W
+(R'W)^-1 R' the compliance is P' K_h^-1 P, symmetric.
+
+References
+----------
+.. [1] Abaqus Theory Guide, "Distributing coupling elements" (the element RBE3 of NASTRAN): the
+   forces on the nodes of the set in proportion to their weights.
+.. [2] C. Farhat, F.-X. Roux, Int. J. Numer. Meth. Engng 32 (1991) 1205, section 3: balanced
+   loads on a floating body, solved on a statically determinate support.
+
+Examples
+--------
+A free spring of 1 kN/mm, held in the mean of its two ends, pulled at one: the other half of the
+force at the far end balances it, and half of the stretch is seen.
+
+>>> import numpy as np
+>>> from upd.reduction import condense_held_in_mean
+>>> K = 1e3 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+>>> found = condense_held_in_mean(K, [1], [1.0, 1.0], np.ones((2, 1)), solver="superlu")
+>>> print(f"{1e3 * found.compliance()[0, 0]:.3f} um/N")
+0.250 um/N
+>>> print(np.round(found.recover(np.array([1.0])), 9))
+[-1.  1.]
+"""
 
 from __future__ import annotations
 
@@ -55,22 +87,11 @@ def condense_held_in_mean(
 ) -> Condensed:
     """Condense a body onto some of its dofs, its rigid motions held in a weighted mean.
 
-    With R the rigid motions and w the weights, W = diag(w) R, the body under forces f obeys
-
-        K u + W a = f,    W' u = 0:
-
-    nothing moves in the mean, and the reaction is the traction over the weighted set that is linear
-    in position, with which the force and the moments balance: R'f = R'W a. Both parts follow from
-    any support that holds the rigid motions and no more, K_h u_h = f - W a: balanced forces leave
-    it without a reaction, whatever its place, and u = u_h - R (W'R)^-1 W'u_h. With P = I - W
-    (R'W)^-1 R' the compliance is P' K_h^-1 P, symmetric.
-
     Parameters
     ----------
     K : (n, n) Symmetric, sparse array or array_like
         N/mm, free in all of `motions`.
     kept : (k,) array_like of int
-        In any order.
     weights : (n,) array_like
         Of the dofs that hold the body: for consistent forces the integrals of their shape functions
         over a surface [mm2].
@@ -90,27 +111,6 @@ def condense_held_in_mean(
         For bad arguments, and for weights that leave a motion free.
     ConvergenceError
         When a part of the body floats.
-
-    References
-    ----------
-    .. [1] Abaqus Theory Guide, "Distributing coupling elements" (the element RBE3 of NASTRAN): the
-       forces on the nodes of the set in proportion to their weights.
-    .. [2] C. Farhat, F.-X. Roux, Int. J. Numer. Meth. Engng 32 (1991) 1205, section 3: balanced
-       loads on a floating body, solved on a statically determinate support.
-
-    Examples
-    --------
-    A free spring of 1 kN/mm, held in the mean of its two ends, pulled at one: the other half of the
-    force at the far end balances it, and half of the stretch is seen.
-
-    >>> import numpy as np
-    >>> from upd.reduction import condense_held_in_mean
-    >>> K = 1e3 * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    >>> found = condense_held_in_mean(K, [1], [1.0, 1.0], np.ones((2, 1)), solver="superlu")
-    >>> print(f"{1e3 * found.compliance()[0, 0]:.3f} um/N")
-    0.250 um/N
-    >>> print(np.round(found.recover(np.array([1.0])), 9))
-    [-1.  1.]
     """
     A = checked(K)
     n = A.shape[0]
@@ -150,8 +150,7 @@ def condense_held_in_mean(
         u = np.zeros((n, *force.shape[1:]))
         u[inner] = found.recover(C_h @ force)
         u -= X @ (T @ force)
-        moved: FloatArray = u - R @ np.linalg.solve(mean.T, W.T @ u)
-        return moved
+        return np.asarray(u - R @ np.linalg.solve(mean.T, W.T @ u))
 
     return Condensed(S, recover, found.solver, found.factor_nnz, found.peak_bytes, n, [C])
 

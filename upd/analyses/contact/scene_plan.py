@@ -15,7 +15,7 @@ from upd.analyses.contact import plan as planned
 from upd.analyses.contact.plan import ALONG, NORMAL, ContactPlan, Family, is_curved
 from upd.analyses.cost import NODES, START_BYTES, CostModel, dense_s, memory_limit
 from upd.errors import InputError, UpdError
-from upd.linalg.routes import EACH, FIRST
+from upd.linalg.select import EACH, FIRST
 from upd.mesh import recipes
 from upd.scene import Scene, friction_on
 from upd.vary.solve import changed
