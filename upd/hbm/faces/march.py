@@ -52,7 +52,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_solve, expm
 
 from upd.errors import ConvergenceError
-from upd.hbm.faces.kept import kept_inverses
 from upd.hbm.faces.period import Bases, Past, StepParts, march_steps, suit_bases
 from upd.hbm.faces.state import FloatArray, InterfaceModel, InterfaceState, factored, in_columns
 from upd.hbm.faces.step import OPEN, STICK, judge
@@ -239,7 +238,6 @@ class InterfaceMarch:
                 np.empty((samples, 3 * n)),
                 np.empty((samples, 3 * n)),
                 np.zeros((samples, n), int),
-                *kept_inverses(samples, n),
             )
             self.rebase(np.zeros(n, bool))
         else:
@@ -301,11 +299,11 @@ class InterfaceMarch:
         """
         N, n, past = self.samples, self.model.n, self.past
         out, sums = np.zeros((N, len(self.model.seen_modes))), np.zeros(4)
-        parts, motion, known = tuple(self.steps), at.arrays(), self.known
+        parts, bases = tuple(self.steps), (*self.bases, self.which)
+        held = at.arrays(), (*past, self.known), (self.x0, out, sums)
         done, given, fallbacks = 0, False, 0
         while done < N:
-            held = tuple(self.bases), self.which, motion, known, tuple(past)
-            done = march_steps(done, N, given, parts, *held, self.x0, out, sums)
+            done = march_steps(done, N, given, parts, bases, *held)
             given = done < N
             if given:
                 self.finish_step(done, at)
