@@ -66,8 +66,8 @@ def run() -> Iterator[dict[str, Any]]:
                 "case": case,
                 "value": float(H[i]),
                 "unit": "(m/s2)/N",
-                "note": f"at {found.frequency[i]:.2f} Hz; {share}; forces left out "
-                f"{100 * found.truncation[i]:.1f} %; {found.message}",
+                "note": f"at {found.frequency[i]:.2f} Hz; {share}; motion left out "
+                f"{100 * found.points[i].unresolved:.1f} %; {found.message}",
             }
             yield {
                 "name": "interface_balance_seconds",
@@ -76,7 +76,7 @@ def run() -> Iterator[dict[str, Any]]:
                 "unit": "s",
                 "target": most if ratio == 600.0 else None,
                 "note": f"by the clock, {threads_used()} threads; {seconds:.3g} s of processors; "
-                f"{len(found.frequency)} points, {int(found.iterations.sum())} derivatives",
+                f"{len(found.frequency)} points",
             }
 
 

@@ -55,8 +55,6 @@ class ContactPeriod:
         As `rigid` and `slip`, before the period.
     w : float
         rad/s.
-    fallbacks : int
-        Samples that the slow solver had to finish.
     """
 
     force: FloatArray
@@ -69,7 +67,6 @@ class ContactPeriod:
     rigid_before: FloatArray
     slip_before: FloatArray
     w: float
-    fallbacks: int
 
     @property
     def moving(self) -> NDArray[np.bool_]:
@@ -363,7 +360,7 @@ class InterfaceEquations:
         else:
             F, Y, S = known.force.copy(), known.relative.copy(), known.state.copy()
         end, x0 = rigid.copy(), np.zeros(3 * n)
-        done, given, fallbacks = 0, False, 0
+        done, given = 0, False
         rigid_rows = np.ascontiguousarray(step.Z[:, m : m + r].T)
         parts = (rigid_rows, step.W, model.columns, step.J, model.load)
         law, past = (model.friction, step.rho_n, step.rho_t), (F, Y, S, known is not None)
@@ -371,11 +368,11 @@ class InterfaceEquations:
             done = given_blades(done, given, pushes, parts, law, (end, c, x0), past)
             if done == N:
                 break
-            given, fallbacks = True, fallbacks + 1
+            given = True
             self._by_the_slow_way(x0, step, w, F[done], Y[done], S[done])
         after = slip + Y[:, n:].sum(axis=0)
         modal = F @ model.shapes
-        return ContactPeriod(F, Y, S, modal, end, after, q, rigid, slip, w, fallbacks)
+        return ContactPeriod(F, Y, S, modal, end, after, q, rigid, slip, w)
 
     def stiffness(self, w: float) -> tuple[FloatArray, FloatArray]:
         """Of each coefficient and mode at w rad/s: by itself, and by its turned partner (h, m)."""

@@ -145,8 +145,6 @@ class InterfacePeriod:
         Outputs after each step [mm].
     counts : (3,) ndarray
         Share of open, sticking and slipping nodes, over nodes and samples.
-    newton : float
-        Newton steps a time step.
     energy : (3,) ndarray
         Work of the excitation, lost by damping, lost by friction, of the whole [N mm].
     fallbacks : int
@@ -155,7 +153,6 @@ class InterfacePeriod:
 
     output: FloatArray
     counts: FloatArray
-    newton: float
     energy: FloatArray
     fallbacks: int
 
@@ -298,7 +295,7 @@ class InterfaceMarch:
             When a step has no answer that any of the solvers finds.
         """
         N, n, past = self.samples, self.model.n, self.past
-        out, sums = np.zeros((N, len(self.model.seen_modes))), np.zeros(4)
+        out, sums = np.zeros((N, len(self.model.seen_modes))), np.zeros(3)
         parts, bases = tuple(self.steps), (*self.bases, self.which)
         held = at.arrays(), (*past, self.known), (self.x0, out, sums)
         done, given, fallbacks = 0, False, 0
@@ -316,8 +313,7 @@ class InterfaceMarch:
             suit_bases(past.state, self.bases.open, self.which, np.inf)
         counts = np.array([(past.state == kind).sum() for kind in (OPEN, STICK)] + [0], float)
         counts[2] = n * N - counts.sum()
-        energy = self.model.copies * sums[:3]
-        return InterfacePeriod(out, counts / (n * N), float(sums[3]) / N, energy, fallbacks)
+        return InterfacePeriod(out, counts / (n * N), self.model.copies * sums, fallbacks)
 
     def _add(self, open_: NDArray[np.bool_]) -> None:
         """Add a base; where there are as many as may be, in place of another if that pays.

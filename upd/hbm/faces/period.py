@@ -405,7 +405,6 @@ def march_steps(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     first, last : int
-        Samples.
     given : bool
         Whether the first step was solved elsewhere: x0 (its forces), y and state hold its answer.
     parts : StepParts
@@ -417,8 +416,7 @@ def march_steps(  # type: ignore[no-untyped-def]
         `Past`, overwritten, and whether it holds a period: the steps start from its samples then.
     filled : tuple of ndarray
         Overwritten: x0 (3 n,), what the base gave of the last step; outputs (N, K) from `first`
-        on; added to (4,): work of the excitation, lost by damping and by friction [N mm], Newton
-        steps.
+        on; added to (3,): work of the excitation, lost by damping and by friction [N mm].
 
     Returns
     -------
@@ -449,7 +447,7 @@ def march_steps(  # type: ignore[no-untyped-def]
         for place in range(L):
             inputs[r + m + place] = drive[step + 1, place]
         put(f, before, 0)
-        used, one = 0, which[step]
+        one = which[step]
         if given and step == first:
             put(x0, f, 0)
             fetch_row(moves, step, slid)
@@ -460,8 +458,7 @@ def march_steps(  # type: ignore[no-untyped-def]
             add_rows(x0, 1.0, inputs, every, len(inputs), Z, one)
             put(y, slid, 0)
             put(state, was, 0)
-            used = solve_sample(step, x0, suited, one, law, nodes, past, scratch)
-            if used < 0:
+            if solve_sample(step, x0, suited, one, law, nodes, past, scratch) < 0:
                 put(before, f, 0)
                 # for whoever solves the step, and comes back
                 put_row(slid, moves, step)
@@ -477,7 +474,6 @@ def march_steps(  # type: ignore[no-untyped-def]
         put(y, moved, 0)
         touch(f, y, state, slid, was, springs, moved)
         _slide(before, f, moved, slip, sums)
-        sums[3] += used
         put_row(f, forces, step)
         put_row(moved, moves, step)
         put_row(state, states, step)
