@@ -52,7 +52,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_solve, expm
 
 from upd.errors import ConvergenceError
-from upd.hbm.faces.period import Bases, Past, StepParts, march_steps, suit_bases
+from upd.hbm.faces.period import Bases, Past, StepParts, march_steps
 from upd.hbm.faces.state import FloatArray, InterfaceModel, InterfaceState, factored, in_columns
 from upd.hbm.faces.step import OPEN, STICK, judge
 
@@ -133,6 +133,41 @@ MOST_BASES, BASES_BYTES = 8, 2**26
 #: Compliance A (3 n, 3 n), friction (n,) and w* - w_ref (3 n,) to forces f and y = (-g, dw) with
 #: w_ref + y = w* - A f, or None without an answer.
 Fallback = Callable[[FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray] | None]
+
+
+def suit_bases(
+    states: NDArray[np.int64], bases: NDArray[np.bool_], which: NDArray[np.int64]
+) -> int:
+    """For every sample the base that most of its nodes agree with.
+
+    Parameters
+    ----------
+    states : (N, n) ndarray of int
+        Of the period before.
+    bases : (B, n) ndarray of bool
+    which : (N,) ndarray of int
+        Overwritten.
+
+    Returns
+    -------
+    int
+        Sample whose open nodes would make a base that pays, or -1.
+    """
+    open_ = (states == OPEN).astype(float)
+
+    def apart(sets: FloatArray) -> FloatArray:
+        """(N, k) nodes in which samples differ from k sets."""
+        both = open_ @ sets.T
+        return np.asarray(open_.sum(axis=1)[:, None] + sets.sum(axis=1) - 2.0 * both)
+
+    nodes = apart(bases.astype(float))
+    which[:], least = nodes.argmin(axis=1), nodes.min(axis=1)
+    if least.sum() <= PAYS * len(states):
+        return -1
+    # what each set of open nodes would save as a base
+    gain = np.maximum(least[:, None] - apart(open_), 0.0).sum(axis=0)
+    best = int(gain.argmax())
+    return best if gain[best] > PAYS * len(states) else -1
 
 
 @dataclass(frozen=True)
@@ -307,10 +342,10 @@ class InterfaceMarch:
                 fallbacks += 1
         self.known = True
         # for every sample the base that most of its nodes agree with; a new one where it pays
-        best = suit_bases(past.state, self.bases.open, self.which, PAYS)
+        best = suit_bases(past.state, self.bases.open, self.which)
         if best >= 0:
             self._add(past.state[best] == OPEN)
-            suit_bases(past.state, self.bases.open, self.which, np.inf)
+            suit_bases(past.state, self.bases.open, self.which)
         counts = np.array([(past.state == kind).sum() for kind in (OPEN, STICK)] + [0], float)
         counts[2] = n * N - counts.sum()
         return InterfacePeriod(out, counts / (n * N), self.model.copies * sums, fallbacks)

@@ -1,6 +1,6 @@
 """A period in time, compiled: blades and damper of `upd.hbm.faces.march`, or the damper alone.
 
-`march_steps` takes the steps of a march, with the bases that suit them. `given_blades` solves a
+`march_steps` takes the steps of a march. `given_blades` solves a
 period under given motion of the blades. The damper's step is the same, WBZ-alpha with full damping
 at infinite frequency, there with time counted in steps: from s, u = dt s' and a = dt^2 s'' (the
 method's), with J = dt^2 M_D^-1 and the forces f of the step's end,
@@ -167,68 +167,6 @@ def begin(bases, gap, slip):  # type: ignore[no-untyped-def]
                 for e in range(3 * n):
                     c[one, e] -= ref * bases_Tt[one, d, e]
     return c, w
-
-
-@compiled
-def suit_bases(states, bases, which, pays):  # type: ignore[no-untyped-def]
-    """For every sample the base that most of its nodes agree with.
-
-    Parameters
-    ----------
-    states : (N, n) ndarray of int
-        Of the period before.
-    bases : (B, n) ndarray of bool
-    which : (N,) ndarray of int
-        Overwritten.
-    pays : float
-        Nodes a sample that a new base must spare.
-
-    Returns
-    -------
-    int
-        Sample whose open nodes would make a base that pays, or -1.
-    """
-    N, n = states.shape
-    least, total = np.empty(N, np.int64), 0
-    for t in range(N):
-        as_before = t > 0
-        for i in range(n):
-            if as_before and (states[t, i] == OPEN) != (states[t - 1, i] == OPEN):
-                as_before = False
-        if as_before:
-            least[t], which[t] = least[t - 1], which[t - 1]
-            total += least[t]
-            continue
-        least[t] = n + 1
-        for one in range(len(bases)):
-            off = 0
-            for i in range(n):
-                off += (states[t, i] == OPEN) != bases[one, i]
-            if off < least[t]:
-                least[t], which[t] = off, one
-        total += least[t]
-    if total <= pays * N:
-        return -1
-    # what each set of open nodes would save as a base
-    best, most = -1, pays * N
-    for k in range(N):
-        new = k == 0
-        for i in range(n):
-            if not new and (states[k, i] == OPEN) != (states[k - 1, i] == OPEN):
-                new = True
-        if not new:
-            continue
-        gain = 0
-        for t in range(N):
-            off = 0
-            for i in range(n):
-                if off >= least[t]:
-                    break
-                off += (states[t, i] == OPEN) != (states[k, i] == OPEN)
-            gain += max(least[t] - off, 0)
-        if gain > most:
-            best, most = k, float(gain)
-    return best
 
 
 @inlined
