@@ -556,7 +556,9 @@ def test_springs_that_slide_lose_what_a_jenkins_element_does() -> None:
     mu, N, k = 0.3, 100.0, 4e4
     model, start = jenkins(mu)
     found = stepped_sine(model, [50.0, 58.0], [300.0], start, samples=256, tolerance=1e-5)
-    X = found.peak[:, 0]
+    march = [InterfaceMarch(model, f, [300.0], 256) for f in found.frequency]
+    each = [one.period(at.copy()) for one, at in zip(march, found.starts, strict=True)]
+    X = np.array([0.5 * np.ptp(one.output[:, 0]) for one in each])
     assert found.status == "settled" and X.min() > 3.0 * mu * N / k
     np.testing.assert_allclose(found.energy[:, 2], 4.0 * mu * N * (X - mu * N / k), rtol=2e-3)
     into, damped, rubbed = found.energy.T
@@ -683,7 +685,7 @@ def stuck_at(sample: int, *rest: Any) -> int:
     # the step beyond on copies: leaves x0 as a step that fails does
     ahead = [copied(one) for one in rest]
     march_steps(sample, sample + 1, False, *ahead)
-    rest[6][:] = ahead[6]
+    rest[-1][0][:] = ahead[-1][0]
     return sample
 
 
@@ -695,7 +697,7 @@ def test_periods_in_a_row_are_those_one_by_one() -> None:
     march, other = (InterfaceMarch(model, 453.0, [-1j * F_C / 5.0], 16, by_coulomb) for _ in "ab")
     periods = [march.period(by_one) for _ in range(20)]
     found = settle(other, at, 1e-3, 20)
-    assert found.fallbacks == sum(one.fallbacks for one in periods) > 3
+    assert sum(one.fallbacks for one in periods) > 3
     assert len(other.bases.open) == len(march.bases.open) > 2
     np.testing.assert_array_equal(found.last.output, periods[-1].output)
     np.testing.assert_array_equal(found.last.energy, periods[-1].energy)

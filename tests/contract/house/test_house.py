@@ -318,7 +318,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
     "analyses": 12052,
-    "hbm": 6315,
+    "hbm": 6024,
     "contact": 3527,
     "linalg": 2719,
     "scene": 2216,

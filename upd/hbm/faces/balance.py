@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from upd.errors import ConvergenceError, InputError
 from upd.hbm.core.newton import Settings
@@ -65,14 +65,10 @@ class InterfaceResponse:
         Complex harmonics 0 to H of each output [mm].
     share : (k, 3) ndarray
         Of nodes and samples that are open, stick, slip.
-    truncation : (k,) ndarray
-        Share of the modal contact forces' variation that harmonics above H hold.
     energy : (k, 3) ndarray
         In a period, of the whole: work of the excitation, lost by damping, lost by friction
         [N mm]. The last is that of the samples' slips under the mean of the forces at the steps'
         ends, so that they close with the square of the step.
-    iterations : (k,) ndarray of int
-        Newton iterations.
     points : list of InterfacePoint
         The solutions.
     seconds : float
@@ -91,9 +87,7 @@ class InterfaceResponse:
     frequency: FloatArray
     amplitude: ComplexArray
     share: FloatArray
-    truncation: FloatArray
     energy: FloatArray
-    iterations: NDArray[np.int64]
     points: list[InterfacePoint]
     seconds: float
     jumps: tuple[int, ...]
@@ -192,9 +186,7 @@ def interface_response(
         np.array([one.frequency for one in points]),
         np.array([one.amplitude for one in points]).reshape(-1, harmonics + 1, outputs),
         np.array([one.share for one in points]).reshape(-1, 3),
-        np.array([one.truncation for one in points]),
         np.array([one.energy for one in points]).reshape(-1, 3),
-        np.array([one.iterations for one in points], int),
         points,
         time.perf_counter() - clock,
         tuple(curve.broken),
@@ -218,14 +210,10 @@ class InterfacePoint(NamedTuple):
         Damper's motion, velocity and acceleration before the period, time in steps.
     slip : (2 n,) ndarray
         Slips before the period [mm].
-    iterations : int
-        Of Newton's method.
     amplitude : (H + 1, K) ndarray
         Complex harmonics 0 to H of the outputs [mm].
     share : (3,) ndarray
         Of nodes and samples that are open, stick, slip.
-    truncation : float
-        Share of the modal contact forces' variation that harmonics above H hold.
     energy : (3,) ndarray
         In a period, of the whole: work of the excitation, lost by damping, by friction [N mm].
     nodes : (n, 3) ndarray
@@ -243,10 +231,8 @@ class InterfacePoint(NamedTuple):
     q: FloatArray
     rigid: FloatArray
     slip: FloatArray
-    iterations: int
     amplitude: ComplexArray
     share: FloatArray
-    truncation: float
     energy: FloatArray
     nodes: FloatArray
     loss: FloatArray
@@ -254,9 +240,7 @@ class InterfacePoint(NamedTuple):
     residual: float
 
 
-def read_point(
-    e: InterfaceEquations, period: ContactPeriod, frequency: float, iterations: int
-) -> InterfacePoint:
+def read_point(e: InterfaceEquations, period: ContactPeriod, frequency: float) -> InterfacePoint:
     """Read a point from its period; a period is large and is not kept.
 
     Parameters
@@ -264,8 +248,8 @@ def read_point(
     e : InterfaceEquations
     period : ContactPeriod
         That of the unknowns.
-    frequency, iterations
-        As in `InterfacePoint`.
+    frequency : float
+        Hz.
 
     Returns
     -------
@@ -278,10 +262,8 @@ def read_point(
         period.q,
         period.rigid_before,
         period.slip_before,
-        iterations,
         _outputs(e, period),
         nodes.mean(axis=0),
-        _left_out(period, e.highest),
         np.append(_energy(e, period), loss.sum()),
         nodes,
         loss,
@@ -332,16 +314,6 @@ def _outputs(e: InterfaceEquations, period: ContactPeriod) -> ComplexArray:
     out[0] = real[0]
     out[1:] = real[1::2] - 1j * real[2::2]
     return out
-
-
-def _left_out(period: ContactPeriod, highest: int) -> float:
-    """Share of the modal forces' variation that higher harmonics hold."""
-    modal = np.fft.rfft(period.modal, axis=0)
-    whole = float(np.linalg.norm(modal[1:]))
-    # sums of the samples' forces, rounded
-    if whole <= len(period.modal) * EPS * float(np.linalg.norm(modal[0])):
-        return 0.0
-    return float(np.linalg.norm(modal[1 + highest :])) / whole
 
 
 def _energy(e: InterfaceEquations, period: ContactPeriod) -> FloatArray:
@@ -442,7 +414,7 @@ class InterfaceCurve:
         e = self.equations
         period = e.march(at.x, 2.0 * np.pi * at.p)
         self.moving = e.state(period)
-        return read_point(e, period, at.p, at.iterations)
+        return read_point(e, period, at.p)
 
     def _told(self, missed: list[float]) -> str:
         """Where it jumped, and where nothing was found."""

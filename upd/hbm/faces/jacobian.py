@@ -126,7 +126,7 @@ def factor_period(  # type: ignore[no-untyped-def]
     first_sample, last_sample : int
         From the first on, up to the one before the last.
     samples : tuple of ndarray
-        Answers F, Y of all samples, as `upd.hbm.faces.kept.given_blades` leaves them, and states
+        Answers F, Y of all samples, as `upd.hbm.faces.period.given_blades` leaves them, and states
         with the verges.
     W : (3 n, 3 n) ndarray
         Inverse of A [N/mm]; symmetric.
@@ -214,7 +214,7 @@ def march_directions(  # type: ignore[no-untyped-def]
         States and rows, as in `factor_period`.
     step : tuple of ndarray
         W, Z as in `factor_period`, M = (Phi, B)' W (Phi, B), J as in
-        `upd.hbm.faces.kept.given_blades`, and dJ (p - B' f) of the samples (N, r).
+        `upd.hbm.faces.period.given_blades`, and dJ (p - B' f) of the samples (N, r).
     nodes : tuple of ndarray
         Tangents of the nodes that move (2 c,), first ones, then second ones, and the number (3 n,)
         of each dof among them, or -1.
@@ -231,7 +231,7 @@ def march_directions(  # type: ignore[no-untyped-def]
     """
     W, Z, M, J, late = step
     moved, place = nodes
-    at, square, cols, owner, P, left, keep, PZ, Z_rows, factors, pivots = rows
+    at = rows[0]
     motion, faster, verge = change
     R, slips = ends
     N, n, C = len(S), S.shape[1], len(faster)
@@ -239,13 +239,8 @@ def march_directions(  # type: ignore[no-untyped-def]
     most = 0
     for j in range(N):
         most = max(most, at[j + 1] - at[j])
-    right, answer = np.empty((most, C)), np.empty((most, C))
-    u, db, out, part = (
-        np.empty((wide, C)),
-        np.empty((r, C)),
-        np.empty((wide, C)),
-        np.empty((wide, C)),
-    )
+    work = np.empty((most, C)), np.empty((most, C)), np.empty((wide, C))
+    u, db, out = np.empty((wide, C)), np.empty((r, C)), np.empty((wide, C))
     # (Phi, B)' W of the slips of nodes that are held, and W of them in the rows of the others
     held, V = np.zeros((wide, C)), np.empty((3 * n, C))
     for i in range(len(moved)):
@@ -260,48 +255,13 @@ def march_directions(  # type: ignore[no-untyped-def]
         for i in range(r):
             for c in range(C):
                 u[m + i, c] = R[i, c] + R[r + i, c] + 0.5 * late[j, i] * faster[c]
-        _change_stretches(S[j], W, Z, moved, place, slips, held, V, on)
+        _change_stretches(S[j], W, Z, nodes, slips, held, V, on)
         np.dot(M, u, out)
         for e in range(wide):
             for c in range(C):
                 out[e, c] -= held[e, c]
-        a, b = at[j], at[j + 1]
-        k = b - a
-        if k > 0:
-            rhs, z = right[:k], answer[:k]
-            np.dot(PZ[a:b], u, rhs)
-            for row in range(k):
-                i = owner[a + row]
-                for d in range(3):
-                    weight, other = P[a + row, d], d * n + i
-                    if weight != 0.0:
-                        for c in range(C):
-                            rhs[row, c] -= weight * V[other, c]
-                for d in range(2):
-                    weight, other = keep[a + row, d], place[(1 + d) * n + i]
-                    if weight != 0.0:
-                        for c in range(C):
-                            rhs[row, c] += weight * slips[other, c]
-                # P (dF - W dy) = left
-                weight = left[a + row]
-                if weight != 0.0:
-                    for c in range(C):
-                        rhs[row, c] -= weight * verge[c]
-            matrix = factors[square[j] : square[j + 1]]
-            if inverted:
-                np.dot(matrix.reshape(k, k).T, rhs, z)
-            else:
-                z[:] = rhs
-                solve_columns(matrix, pivots[a:b], z)
-            np.dot(Z_rows[a:b].T, z, part)
-            for e in range(wide):
-                for c in range(C):
-                    out[e, c] -= part[e, c]
-            for row in range(k):
-                if cols[a + row] >= n:
-                    other = place[cols[a + row]]
-                    for c in range(C):
-                        slips[other, c] = z[row, c]
+        if at[j + 1] > at[j]:
+            _move_nodes(j, rows, inverted, place, u, (slips, V, verge), work, out)
         for i in range(m):
             for c in range(C):
                 forces[j, i, c] = out[i, c]
@@ -319,16 +279,71 @@ def march_directions(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _change_stretches(  # type: ignore[no-untyped-def]
-    state, W, Z, moved, place, slips, held, V, on
-):
+def _move_nodes(j, rows, inverted, place, u, change, work, out):  # type: ignore[no-untyped-def]
+    """Slips of the nodes that are not held at sample j, and what they take from `out`.
+
+    Parameters
+    ----------
+    j, rows, inverted, place
+        As in `march_directions`.
+    u : (m + r, C) ndarray
+        Changes of modes and damper.
+    change : tuple of ndarray
+        Slips, overwritten, V as in `_change_stretches`, and shares of the verges.
+    work : tuple of ndarray
+        Scratch.
+    out : (m + r, C) ndarray
+        (Phi, B)' times the changes of the forces; updated.
+    """
+    at, square, cols, owner, P, left, keep, PZ, Z_rows, factors, pivots = rows
+    slips, V, verge = change
+    a, b = at[j], at[j + 1]
+    k, n, C = b - a, len(V) // 3, len(verge)
+    rhs, z, part = work[0][:k], work[1][:k], work[2]
+    np.dot(PZ[a:b], u, rhs)
+    for row in range(k):
+        i = owner[a + row]
+        for d in range(3):
+            weight, other = P[a + row, d], d * n + i
+            if weight != 0.0:
+                for c in range(C):
+                    rhs[row, c] -= weight * V[other, c]
+        for d in range(2):
+            weight, other = keep[a + row, d], place[(1 + d) * n + i]
+            if weight != 0.0:
+                for c in range(C):
+                    rhs[row, c] += weight * slips[other, c]
+        # P (dF - W dy) = left
+        weight = left[a + row]
+        if weight != 0.0:
+            for c in range(C):
+                rhs[row, c] -= weight * verge[c]
+    matrix = factors[square[j] : square[j + 1]]
+    if inverted:
+        np.dot(matrix.reshape(k, k).T, rhs, z)
+    else:
+        z[:] = rhs
+        solve_columns(matrix, pivots[a:b], z)
+    np.dot(Z_rows[a:b].T, z, part)
+    for e in range(len(out)):
+        for c in range(C):
+            out[e, c] -= part[e, c]
+    for row in range(k):
+        if cols[a + row] >= n:
+            other = place[cols[a + row]]
+            for c in range(C):
+                slips[other, c] = z[row, c]
+
+
+@compiled
+def _change_stretches(state, W, Z, nodes, slips, held, V, on):  # type: ignore[no-untyped-def]
     """Let stretches of motion begin and end.
 
     Parameters
     ----------
     state : (n,) ndarray of int
         At the sample.
-    W, Z, moved, place
+    W, Z, nodes
         As in `march_directions`.
     slips : (2 c, C) ndarray
         Of the nodes that move in the period.
@@ -339,6 +354,7 @@ def _change_stretches(  # type: ignore[no-untyped-def]
     on : (n,) ndarray of bool
         Whether a node was not held at the sample before; overwritten.
     """
+    moved, place = nodes
     n, C, wide = len(state), slips.shape[1], Z.shape[1]
     changed, begun, going = 0, 0, 0
     for i in range(n):

@@ -52,8 +52,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_solve, expm
 
 from upd.errors import ConvergenceError
-from upd.hbm.faces.kept import kept_inverses
-from upd.hbm.faces.period import Bases, Past, StepParts, march_steps, suit_bases
+from upd.hbm.faces.period import Bases, Past, StepParts, march_steps
 from upd.hbm.faces.state import FloatArray, InterfaceModel, InterfaceState, factored, in_columns
 from upd.hbm.faces.step import OPEN, STICK, judge
 
@@ -136,6 +135,41 @@ MOST_BASES, BASES_BYTES = 8, 2**26
 Fallback = Callable[[FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray] | None]
 
 
+def suit_bases(
+    states: NDArray[np.int64], bases: NDArray[np.bool_], which: NDArray[np.int64]
+) -> int:
+    """For every sample the base that most of its nodes agree with.
+
+    Parameters
+    ----------
+    states : (N, n) ndarray of int
+        Of the period before.
+    bases : (B, n) ndarray of bool
+    which : (N,) ndarray of int
+        Overwritten.
+
+    Returns
+    -------
+    int
+        Sample whose open nodes would make a base that pays, or -1.
+    """
+    open_ = (states == OPEN).astype(float)
+
+    def apart(sets: FloatArray) -> FloatArray:
+        """(N, k) nodes in which samples differ from k sets."""
+        both = open_ @ sets.T
+        return np.asarray(open_.sum(axis=1)[:, None] + sets.sum(axis=1) - 2.0 * both)
+
+    nodes = apart(bases.astype(float))
+    which[:], least = nodes.argmin(axis=1), nodes.min(axis=1)
+    if least.sum() <= PAYS * len(states):
+        return -1
+    # what each set of open nodes would save as a base
+    gain = np.maximum(least[:, None] - apart(open_), 0.0).sum(axis=0)
+    best = int(gain.argmax())
+    return best if gain[best] > PAYS * len(states) else -1
+
+
 @dataclass(frozen=True)
 class InterfacePeriod:
     """One period of a march.
@@ -146,8 +180,6 @@ class InterfacePeriod:
         Outputs after each step [mm].
     counts : (3,) ndarray
         Share of open, sticking and slipping nodes, over nodes and samples.
-    newton : float
-        Newton steps a time step.
     energy : (3,) ndarray
         Work of the excitation, lost by damping, lost by friction, of the whole [N mm].
     fallbacks : int
@@ -156,7 +188,6 @@ class InterfacePeriod:
 
     output: FloatArray
     counts: FloatArray
-    newton: float
     energy: FloatArray
     fallbacks: int
 
@@ -239,7 +270,6 @@ class InterfaceMarch:
                 np.empty((samples, 3 * n)),
                 np.empty((samples, 3 * n)),
                 np.zeros((samples, n), int),
-                *kept_inverses(samples, n),
             )
             self.rebase(np.zeros(n, bool))
         else:
@@ -300,26 +330,25 @@ class InterfaceMarch:
             When a step has no answer that any of the solvers finds.
         """
         N, n, past = self.samples, self.model.n, self.past
-        out, sums = np.zeros((N, len(self.model.seen_modes))), np.zeros(4)
-        parts, motion, known = tuple(self.steps), at.arrays(), self.known
+        out, sums = np.zeros((N, len(self.model.seen_modes))), np.zeros(3)
+        parts, bases = tuple(self.steps), (*self.bases, self.which)
+        held = at.arrays(), (*past, self.known), (self.x0, out, sums)
         done, given, fallbacks = 0, False, 0
         while done < N:
-            held = tuple(self.bases), self.which, motion, known, tuple(past)
-            done = march_steps(done, N, given, parts, *held, self.x0, out, sums)
+            done = march_steps(done, N, given, parts, bases, *held)
             given = done < N
             if given:
                 self.finish_step(done, at)
                 fallbacks += 1
         self.known = True
         # for every sample the base that most of its nodes agree with; a new one where it pays
-        best = suit_bases(past.state, self.bases.open, self.which, PAYS)
+        best = suit_bases(past.state, self.bases.open, self.which)
         if best >= 0:
             self._add(past.state[best] == OPEN)
-            suit_bases(past.state, self.bases.open, self.which, np.inf)
+            suit_bases(past.state, self.bases.open, self.which)
         counts = np.array([(past.state == kind).sum() for kind in (OPEN, STICK)] + [0], float)
         counts[2] = n * N - counts.sum()
-        energy = self.model.copies * sums[:3]
-        return InterfacePeriod(out, counts / (n * N), float(sums[3]) / N, energy, fallbacks)
+        return InterfacePeriod(out, counts / (n * N), self.model.copies * sums, fallbacks)
 
     def _add(self, open_: NDArray[np.bool_]) -> None:
         """Add a base; where there are as many as may be, in place of another if that pays.

@@ -46,8 +46,6 @@ class SteppedSine:
         Hz; shorter than asked for where the march stopped.
     amplitude : (k, K) ndarray
         Complex first harmonic of each output, of the last period [mm].
-    peak : (k, K) ndarray
-        Half of what lies between the output's extremes, of the last period [mm].
     lowest, highest : (k, K) ndarray
         Of the first harmonic's modulus in the last window: where it is not settled, the range in
         which it wanders [mm].
@@ -83,7 +81,6 @@ class SteppedSine:
 
     frequency: FloatArray
     amplitude: ComplexArray
-    peak: FloatArray
     lowest: FloatArray
     highest: FloatArray
     share: FloatArray
@@ -167,7 +164,6 @@ def stepped_sine(
     return SteppedSine(
         f[:k],
         np.array([p.first_harmonic for p in points]).reshape(k, K),
-        np.array([0.5 * np.ptp(p.last.output, axis=0) for p in points]).reshape(k, K),
         np.array([p.lowest for p in points]).reshape(k, K),
         np.array([p.highest for p in points]).reshape(k, K),
         np.array([p.last.counts for p in points]).reshape(k, 3),
@@ -311,7 +307,6 @@ class SteadyPoint:
     remaining: float
     settled: bool
     periods: int
-    fallbacks: int
     seconds: float
     harmonics: ComplexArray
     start: InterfaceState
@@ -350,11 +345,11 @@ def settle(
     known: tuple[FloatArray, FloatArray] | None = None
     changes: list[list[float]] = []
     seen: list[FloatArray] = []
-    fallbacks, remaining = 0, np.inf
+    remaining = np.inf
     while len(seen) < most_periods and not remaining <= tolerance:
         start = at.copy()
         last = march.period(at)
-        out, fallbacks = last.output, fallbacks + last.fallbacks
+        out = last.output
         harmonics = Q @ out
         seen.append(np.abs(harmonics[0]))
         moved = np.concatenate([harmonics.view(float).ravel(), out.mean(axis=0)])
@@ -378,7 +373,6 @@ def settle(
         remaining,
         remaining <= tolerance,
         len(seen),
-        fallbacks,
         time.perf_counter() - begin,
         harmonics,
         start,

@@ -134,8 +134,9 @@ def _turned(T1, T2, L, M, D1, D2, rest):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _closed(T1, T2, a, b, D1, D2, mu, on_cone, plane, jacobian, out, P):  # type: ignore[no-untyped-def]
-    """A piece on which the contact is closed and slips at the end."""
+def _closed(passed, mu, on_cone, plane, jacobian, out, P):  # type: ignore[no-untyped-def]
+    """A piece on which the contact is closed and slips at the end; see `friction_event`."""
+    T1, T2, a, b, D1, D2 = passed
     L, M = mu * a, mu * b
     s, rate = _slip_begins(T1, T2, L, M, D1, D2, on_cone)
     K1, K2, limit = T1 + s * D1, T2 + s * D2, L + s * (M - L)
@@ -182,8 +183,9 @@ def _closed(T1, T2, a, b, D1, D2, mu, on_cone, plane, jacobian, out, P):  # type
 
 
 @compiled
-def _closing(a, b, D1, D2, mu, jacobian, out, P):  # type: ignore[no-untyped-def]
+def _closing(passed, mu, jacobian, out, P):  # type: ignore[no-untyped-def]
     """An open contact that closes: the slider starts where N crosses zero. Returns the state."""
+    _, _, a, b, D1, D2 = passed
     s, r = a / (a - b), b / (b - a)
     v, M = np.hypot(D1, D2), mu * b
     slips = r * v > M
@@ -207,8 +209,9 @@ def _closing(a, b, D1, D2, mu, jacobian, out, P):  # type: ignore[no-untyped-def
 
 
 @compiled
-def _opening(T1, T2, a, b, D1, D2, mu, on_cone, jacobian, out, P):  # type: ignore[no-untyped-def]
+def _opening(passed, mu, on_cone, jacobian, out, P):  # type: ignore[no-untyped-def]
     """A closed contact that opens: the traction slides down to the tip of the cone."""
+    T1, T2, a, b, D1, D2 = passed
     z, L = a / (a - b), mu * a
     Z1, Z2 = z * D1, z * D2
     share, rate = _slip_begins(T1, T2, L, 0.0, Z1, Z2, on_cone)
@@ -278,11 +281,10 @@ def friction_event(passed, mu, on_cone, plane, jacobian, out, P):  # type: ignor
     int
         State at the sample after: STICK, SLIP or LIFT.
     """
-    T1, T2, a, b, D1, D2 = passed
-    if a <= 0.0:
-        return _closing(a, b, D1, D2, mu, jacobian, out, P)
-    if b <= 0.0:
-        _opening(T1, T2, a, b, D1, D2, mu, on_cone, jacobian, out, P)
+    if passed[2] <= 0.0:
+        return _closing(passed, mu, jacobian, out, P)
+    if passed[3] <= 0.0:
+        _opening(passed, mu, on_cone, jacobian, out, P)
         return LIFT
-    _closed(T1, T2, a, b, D1, D2, mu, on_cone, plane, jacobian, out, P)
+    _closed(passed, mu, on_cone, plane, jacobian, out, P)
     return SLIP

@@ -146,7 +146,7 @@ class LinearPart:
             m = self.modal
             linear = m.eigenvalues, m.rigid, self.damping, self.Psi, self.transposed
             found: tuple[FloatArray, FloatArray] = residual_terms(
-                W, a, F, self.k, omega, self.offset == 1, linear, acting, slopes
+                W, a, F, self.k, omega, linear, acting, slopes
             )
             return found
         (loads, u0, rigid_load), o, w = acting, self.offset, self.k * omega

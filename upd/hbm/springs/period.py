@@ -32,11 +32,12 @@ def _interval(w, N, half, sign):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _first_trial(w, N, slope, E, k_t, mu, mode, slider, T, dT):  # type: ignore[no-untyped-def]
+def _first_trial(w, N, slope, E, point, T, dT):  # type: ignore[no-untyped-def]
     """Trial traction of sample 0 and its derivative, for the chosen start.
 
     w (1 + d, n), T (2,), dT (2, 1 + d, size).
     """
+    _, k_t, mu, mode, slider = point
     d = w.shape[0] - 1
     for i in range(d):
         T[i] = k_t * (w[1 + i, 0] - slider[i])
@@ -86,11 +87,12 @@ def _normal_forces(w, k_n, preload, gap, signed, force, weighed, slope):  # type
 
 
 @compiled
-def _first_sample(w, N, E, k_n, k_t, mu, mode, slider, T, dT):  # type: ignore[no-untyped-def]
+def _first_sample(w, N, E, point, T, dT):  # type: ignore[no-untyped-def]
     """Traction of sample 0 from the chosen start, and its derivative. Returns the state."""
+    k_n, _, mu, _, _ = point
     d, size = w.shape[0] - 1, E.shape[1]
     slope = np.where(N > 0.0, k_n, 0.0)
-    _first_trial(w, N, slope, E, k_t, mu, mode, slider, T, dT)
+    _first_trial(w, N, slope, E, point, T, dT)
     T[0], T[1], P11, P12, P22, n1, n2, state = step(T[0], T[1], N[0], mu)
     if state == LIFT:
         dT[:] = 0.0
@@ -169,7 +171,7 @@ def march_point(w, E, law, p, start, jacobian, filled):  # type: ignore[no-untyp
                 corner[:] = 0.0
                 corner_tangent[:] = 0.0
             if j == 0 and period == 0:
-                state[0] = _first_sample(w, N, E, k_n, k_t, mu, mode, slider, T, dT)
+                state[0] = _first_sample(w, N, E, (k_n, k_t, mu, mode, slider), T, dT)
             elif N[j] <= 0.0 and N[b] <= 0.0:
                 state[j] = LIFT
             else:

@@ -216,7 +216,7 @@ def changes(b: Balance, w: FloatArray, force: FloatArray) -> Changes:
     c, s, law = n_point * rows, n_point * (rows - 1), b.contacts.law
     out = Changes(*(np.zeros((n, *shape)) for shape in ((c, c), (c, s), (s, c), (s, s))))
     k_t = b.stuck_stiffness[:, 1:].max(axis=1, initial=0.0)
-    _fill(w, force, law.k_n, k_t, law.mu, law.preload, law.gap, *out)
+    _fill(w, force, law.arrays, k_t, tuple(out))
     return out
 
 
@@ -232,8 +232,9 @@ def _closed(here, beside):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _fill(w, force, k_n, k_t, mu, preload, gap, A, B, X, Y):  # type: ignore[no-untyped-def]
+def _fill(w, force, law, k_t, changes):  # type: ignore[no-untyped-def]
     """Fill the derivatives; a point without tangential stiffness has sliders that stay."""
+    (k_n, _, mu, preload, gap), (A, B, X, Y) = law, changes
     n_point, rows, n = w.shape
     d = rows - 1
     trial, direction, P = np.zeros(2), np.zeros(2), np.zeros((2, 2))
@@ -298,7 +299,8 @@ def period_map(
     else:
         S = np.linalg.inv(np.eye(len(L)) + 0.5 * dt * C + 0.25 * dt**2 * np.diagflat(L))
     with threads_for(len(Psi)):
-        return np.asarray(_map(np.ascontiguousarray(Psi), L, np.ascontiguousarray(C), S, *of, dt))
+        linear = np.ascontiguousarray(Psi), L, np.ascontiguousarray(C), S
+        return np.asarray(_map(linear, tuple(of), dt))
 
 
 @compiled
@@ -308,8 +310,9 @@ def _times(A, x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _map(Psi, L, C, S, A, B, X, Y, dt):  # type: ignore[no-untyped-def]
+def _map(linear, changes, dt):  # type: ignore[no-untyped-def]
     """The map, column by column of the deviation; Newmark's average acceleration."""
+    (Psi, L, C, S), (A, B, X, Y) = linear, changes
     n, c, s = B.shape
     m = len(L)
     D = np.eye(2 * m + s)

@@ -24,6 +24,7 @@ from upd.hbm.springs.terms import unit_sizes
 log = logging.getLogger(__name__)
 
 FloatArray = NDArray[np.float64]
+Linearised = tuple[FloatArray, BalanceJacobian | None, FloatArray]
 #: arclength unit of frequency, as a share of the mean frequency: a resonance of a few per cent is
 #: one unit wide
 FREQUENCY_SHARE = 0.05
@@ -138,7 +139,10 @@ def sweep(
         part = _stretch(b, f, slice(i, stop + 1), x, settings)
         if stop < len(f) and part.status == "complete":
             there = b.stuck(2 * np.pi * f[stop])
-            if float(np.abs((part.x[-1] - there) / sizes_of(b)(there)).max()) <= OTHER_BRANCH:
+            if (
+                float(np.abs((part.x[-1] - there) / scale_of(b, by_energy=False)(there)).max())
+                <= OTHER_BRANCH
+            ):
                 part = replace(part, p=part.p[:-1], x=part.x[:-1], exact=part.exact[:-1])
             else:
                 part, stop = _stretch(b, f, slice(i, len(f)), x, settings), len(f)
@@ -374,9 +378,7 @@ def over_frequency(b: Balance) -> Function:
         frequency.
     """
 
-    def function(
-        x: FloatArray, f: float, jacobian: bool
-    ) -> tuple[FloatArray, BalanceJacobian | None, FloatArray]:
+    def function(x: FloatArray, f: float, jacobian: bool) -> Linearised:
         residual, parts, slope = b.linearised(x, 2 * np.pi * f, jacobian)
         return residual, parts, 2 * np.pi * slope
 
@@ -402,16 +404,14 @@ def over_load(b: Balance, frequency: float) -> Function:
     zero = np.zeros(b.size)
     slope = b.linearised(zero, omega, False)[0] - none.linearised(zero, omega, False)[0]
 
-    def function(
-        x: FloatArray, s: float, jacobian: bool
-    ) -> tuple[FloatArray, BalanceJacobian | None, FloatArray]:
+    def function(x: FloatArray, s: float, jacobian: bool) -> Linearised:
         residual, parts, _ = none.linearised(x, omega, jacobian)
         return residual + s * slope, parts, slope
 
     return function
 
 
-def scale_of(b: Balance, least: FloatArray | None = None) -> Scale:
+def scale_of(b: Balance, least: FloatArray | None = None, *, by_energy: bool = True) -> Scale:
     """Units of the unknowns for the continuation: a path is measured by the energy of the springs.
 
     Every contact p with the largest coefficient m_p and the stiffness kappa_p = k_n + k_t counts in
@@ -420,46 +420,35 @@ def scale_of(b: Balance, least: FloatArray | None = None) -> Scale:
         |dw|^2 = sum_p kappa_p |dw_p|^2 / sum_p kappa_p m_p^2,
 
     so that a contact cut into parts, kappa_p with it, counts as before: the unit of its unknowns is
-    their `sizes_of` times sqrt(sum_q kappa_q (m_q/m)^2 / kappa_p), m the largest m_q.
+    their size times sqrt(sum_q kappa_q (m_q/m)^2 / kappa_p), m the largest m_q. Sizes are the
+    largest mean displacement, the largest dynamic one and the rigid amplitudes, each by its own.
 
     Parameters
     ----------
     b : Balance
     least : (n_unknown,) ndarray, optional
         An answer of typical size that keeps the unit when the solution starts from rest.
+    by_energy : bool
+        Otherwise the units are the sizes alone.
 
     Returns
     -------
     callable
         x (n_unknown,) -> units (n_unknown,).
     """
-    law = b.contacts.law
-    kappa = (law.k_n + law.k_t) / float((law.k_n + law.k_t).max())
-    return _sized(b, least, kappa)
-
-
-def sizes_of(b: Balance) -> Scale:
-    """Sizes of the unknowns.
-
-    The largest mean displacement, the largest dynamic one and the rigid amplitudes, each measured
-    by its own.
-
-    Parameters
-    ----------
-    b : Balance
-
-    Returns
-    -------
-    callable
-        x (n_unknown,) -> sizes (n_unknown,).
-    """
-    return _sized(b, None, np.zeros(0))
-
-
-def _sized(b: Balance, least: FloatArray | None, kappa: FloatArray) -> Scale:
-    o, rigid = b.harmonics.offset, b.rigid
-    # the motion below which the unit stays: that of a typical answer, or one that does not matter
-    floor = _floor(b) if least is None else float(np.abs(b.split(least)[0]).max())
+    law, o, rigid = b.contacts.law, b.harmonics.offset, b.rigid
+    kappa = np.zeros(0)
+    if by_energy:
+        kappa = (law.k_n + law.k_t) / float((law.k_n + law.k_t).max())
+    if least is None:
+        # a displacement below which nothing matters: rounding of the motions the loads cause across
+        # the contact springs
+        k = float(max(law.k_t.max(), law.k_n.max()))
+        force = max(float(np.abs(f).max()) for f in (b.static, b.dynamic))
+        force = max(force, float(law.preload.max()))
+        floor = float(max(1e4 * EPS * force / k, float(np.finfo(float).tiny) ** 0.5))
+    else:
+        floor = float(np.abs(b.split(least)[0]).max())
     # the mean is a difference of static terms: below their rounding, as the tolerance magnifies it,
     # it is not resolved
     resolved = STATIC_SHARE * float(np.abs(b.u0).max(initial=0.0))
@@ -470,20 +459,6 @@ def _sized(b: Balance, least: FloatArray | None, kappa: FloatArray) -> Scale:
         return D
 
     return scale
-
-
-def _floor(b: Balance) -> float:
-    """A displacement below which nothing matters.
-
-    Rounding of the motions the loads cause across the contact springs.
-    """
-    k = float(max(b.contacts.law.k_t.max(), b.contacts.law.k_n.max()))
-    force = max(
-        float(np.abs(b.static).max()),
-        float(np.abs(b.dynamic).max()),
-        float(b.contacts.law.preload.max()),
-    )
-    return float(max(1e4 * EPS * force / k, float(np.finfo(float).tiny) ** 0.5))
 
 
 def over_preload(b: Balance, frequency: float, P: FloatArray) -> Function:
@@ -506,9 +481,7 @@ def over_preload(b: Balance, frequency: float, P: FloatArray) -> Function:
     """
     omega = 2 * np.pi * frequency
 
-    def function(
-        x: FloatArray, q: float, jacobian: bool
-    ) -> tuple[FloatArray, BalanceJacobian | None, FloatArray]:
+    def function(x: FloatArray, q: float, jacobian: bool) -> Linearised:
         residual, parts, _ = b.pressed((1 - q) * P).linearised(x, omega, jacobian)
         h = EPS ** (1 / 3)
         if not jacobian:

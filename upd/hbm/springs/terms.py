@@ -160,9 +160,7 @@ def _modal_solve(w, right, eigenvalues, damping):  # type: ignore[no-untyped-def
 
 
 @compiled
-def residual_terms(  # type: ignore[no-untyped-def]
-    W, a, F, k, omega, static, linear, acting, slopes
-):
+def residual_terms(W, a, F, k, omega, linear, acting, slopes):  # type: ignore[no-untyped-def]
     """Residual w - u + G f and the rigid equilibrium, from modal amplitudes.
 
     Parameters
@@ -175,8 +173,6 @@ def residual_terms(  # type: ignore[no-untyped-def]
         Harmonics above 0.
     omega : float
         Angular frequency [rad/s].
-    static : bool
-        Whether harmonic 0 is among the coefficients.
     linear : tuple of ndarray
         Eigenvalues of the modes (m,), and which are rigid; modal damping (m, m), or one row (1, m)
         where it is diagonal; rows Psi (c, m) of the contacts on the modes, and their transpose.
@@ -195,7 +191,8 @@ def residual_terms(  # type: ignore[no-untyped-def]
     eigenvalues, rigid, damping, Psi, PsiT = linear
     loads, u0, rigid_load = acting
     c, size = W.shape
-    m, o, n = len(eigenvalues), int(static), c * size
+    m, o, n = len(eigenvalues), size - 2 * len(k), c * size
+    static = o == 1
     residual, by_frequency = np.zeros(n + len(a)), np.zeros(n + len(a))
     P = np.dot(PsiT, F)
     H = np.zeros((m, size))
