@@ -60,7 +60,7 @@ def stays(
 ) -> np.ndarray | None:
     model, curve = solution.models["thesis"], solution.curves[0]
     springs = make_springs(solution.plan, model)
-    found = peaks._stays(springs, model, curve, steps, x, f)
+    found = peaks.stays(springs, model, curve, steps, x, f)
     return None if found is None else found.heights
 
 
@@ -179,10 +179,10 @@ def confirm(
     peak = CurvePeak(float(f[top]), float(size[top]), top, 1)
     very_top = Top(float(f[top]), float(size[top]), np.array([-1.0]), True)
     motions: dict[int, Any] = {}
-    found = peaks._confirmed(motion, curve, "right", peak, very_top, motions)
+    found = peaks.confirmed_top(motion, curve, "right", peak, very_top, motions)
     count = len(tried)
     if not found.at_top:
-        left = peaks._confirmed(motion, curve, "left", peak, very_top, motions)
+        left = peaks.confirmed_top(motion, curve, "left", peak, very_top, motions)
         assert (left.sample, left.integrated) == (found.sample, found.balance) or not left.stays
         assert len(tried) == count + 1, "no more than the other blade's own top"
     return found, tried[:count]
@@ -233,15 +233,15 @@ def test_a_motion_is_followed_to_where_it_stays_too(slipping: ForcedSolution) ->
     i = int(np.flatnonzero(size > 0.6 * size.max())[8])
     x, f = curve.answer.x, curve.frequency
     given = springs, model, curve, peaks.STEPS
-    first = peaks._stays(*given, x[i], float(f[i]))
+    first = peaks.stays(*given, x[i], float(f[i]))
     assert first is not None
     # whatever the path has there
-    again = peaks._stays(*given, 3.0 * x[i + 1], float(f[i + 1]), first)
-    own = peaks._stays(*given, x[i + 1], float(f[i + 1]))
+    again = peaks.stays(*given, 3.0 * x[i + 1], float(f[i + 1]), first)
+    own = peaks.stays(*given, x[i + 1], float(f[i + 1]))
     assert again is not None and own is not None
     assert again.heights[1] == pytest.approx(own.heights[1], rel=5e-3)
     far = first._replace(heights=first.heights * [[1.0], [1.3]])
-    assert peaks._stays(*given, x[i + 1], float(f[i + 1]), far) is None, "a jump is no growth"
+    assert peaks.stays(*given, x[i + 1], float(f[i + 1]), far) is None, "a jump is no growth"
 
 
 def test_the_higher_of_both_flanks_is_taken() -> None:

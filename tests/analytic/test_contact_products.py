@@ -92,7 +92,7 @@ def test_the_bound_holds_where_products_are_rough() -> None:
             old, free = body.condensed[only]
             assert isinstance(old, LearnedCompliance)
             new = LearnedCompliance(
-                old._solver, old.n_dof, old._kept, old._start, accuracy=accuracy
+                old.body_solver, old.n_dof, old.kept, old.start, accuracy=accuracy
             )
             body.condensed[only] = (new, free)
         found = normal_contact_by_products(mine, load=50.0)

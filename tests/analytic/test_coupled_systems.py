@@ -26,10 +26,10 @@ def test_the_closed_system_solves_the_rows(seed: int, c: int, by_load: bool) -> 
     solver, rng = contact(seed, c)
     C, B, m = solver.C, solver.B, 8 * c
     at = Iterate(rng.standard_normal(m), np.zeros(c + 1), 1e-6 * rng.standard_normal(m))
-    rows = solver._rows(at)
+    rows = solver.rows_at(at)
     while int(rows.is_open.sum()) > 4 or not rows.is_open.any():
         at = Iterate(rng.standard_normal(m), np.zeros(c + 1), 1e-6 * rng.standard_normal(m))
-        rows = solver._rows(at)
+        rows = solver.rows_at(at)
     p, s = rng.standard_normal(c + 1), 1e-6 * rng.standard_normal(c + 1)
     for columns in ((), (3,)):
         b = 1e-6 * rng.standard_normal((m, *columns))
@@ -75,12 +75,12 @@ def test_a_factor_with_a_border_solves_other_rows(seed: int, c: int, by_load: bo
     f[1:] *= 0.1
     f[0, :6], f[1:, 6:20] = -1.0, 1.0 + rng.random((c - 1, 14))
     y = np.zeros((c, n))
-    before = solver._rows(Iterate(f.ravel(), np.zeros(c + 1), y.ravel()))
+    before = solver.rows_at(Iterate(f.ravel(), np.zeros(c + 1), y.ravel()))
     f[0, 0], f[0, 20] = 1.0, -1.0
     f[1:, 6], f[1:, 21] = 0.1, 2.0
     f[1:, 7:20] *= 1.0 + 0.01 * rng.random((c - 1, 13))
     y[1:, 7:20] = 1e-9 * rng.random((c - 1, 13))
-    rows = solver._rows(Iterate(f.ravel(), np.zeros(c + 1), y.ravel()))
+    rows = solver.rows_at(Iterate(f.ravel(), np.zeros(c + 1), y.ravel()))
     opened = before.is_open != rows.is_open
     assert np.flatnonzero(opened).tolist() == [0, 20]
     assert (before.relaxed != rows.relaxed).any(axis=1)[[0, 6, 20, 21]].all()
@@ -113,7 +113,7 @@ def test_everything_stuck(by_load: bool) -> None:
     solver, rng = contact(0, 3)
     b, p = 1e-6 * rng.standard_normal(24), rng.standard_normal(4)
     target = AskedStep(b, p if by_load else None, None if by_load else 1e-6 * p)
-    system = solver._system(solver._stuck(), by_load)
+    system = solver.system_of(solver.all_stuck(), by_load)
     assert isinstance(system, Stuck)
     f, s, _ = system.refined(np.zeros(24), target)
     np.testing.assert_allclose(solver.C @ f, solver.B @ s + b, atol=1e-12 * solver.C.max())
@@ -126,14 +126,14 @@ def test_what_carries_nothing_is_refused() -> None:
     solver, rng = contact(1, 3)
     f = -np.ones(24)
     f[[0, 8, 16]] = 1.0, 0.0, 0.0
-    rows = solver._rows(Iterate(f, np.zeros(4), np.zeros(24)))
+    rows = solver.rows_at(Iterate(f, np.zeros(4), np.zeros(24)))
     assert rows.is_open.sum() == 7
     with pytest.raises(np.linalg.LinAlgError, match="carries the load"):
-        solver._system(rows, True)
+        solver.system_of(rows, True)
     # two nodes that slip freely cannot hold the shifts either
     free = Coulomb(solver.C, np.kron(np.eye(3), np.ones((8, 1))), np.zeros(8))
     f = np.concatenate((np.ones(8), 1e3 * rng.standard_normal(16)))
-    rows = free._rows(Iterate(f, np.zeros(3), np.zeros(24)))
+    rows = free.rows_at(Iterate(f, np.zeros(3), np.zeros(24)))
     assert rows.relaxed[:, 1:].all()
     with pytest.raises(np.linalg.LinAlgError):
         ClosedSystem(free, rows, True)

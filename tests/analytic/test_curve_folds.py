@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from upd.analyses.forced.curves import ForcedCurve, PointCurve, rising
-from upd.analyses.forced.peaks import _folds
+from upd.analyses.forced.peaks import folds_of
 from upd.hbm import FrequencyResponse, contacts, frequency_response
 from upd.hbm.springs.time_integration import steady_state
 
@@ -43,14 +43,14 @@ def test_a_linear_peak_has_no_fold() -> None:
     w, A = duffing(0.0)
     assert w[A.argmax()] == pytest.approx(np.sqrt(1.0 - 2.0 * 0.02**2), rel=1e-4)
     assert rising(w).all()
-    assert not list(_folds(path(w, A)))
+    assert not list(folds_of(path(w, A)))
 
 
 @pytest.mark.parametrize("beta", [-0.08, 0.08])
 def test_folds_of_a_duffing_oscillator(beta: float) -> None:
     """Between them the motion is unstable; a sweep lands on the other branch."""
     w, A = duffing(beta)
-    one, other = _folds(path(w, A))
+    one, other = folds_of(path(w, A))
     assert one.up and not other.up
     assert other.frequency < one.frequency
     between = ~rising(w)
@@ -78,7 +78,7 @@ def test_a_sweep_that_lands_below_a_peak_goes_on_to_it() -> None:
     """Up from 4 Hz: it lands at 5.5 and climbs to 8 at 6 Hz; a later rise is another peak's."""
     f = [1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]
     height = [1.0, 1.2, 1.5, 2.0, 3.0, 3.5, 4.5, 5.5, 7.0, 8.0, 2.0, 9.0]
-    up, down = _folds(path(f, height))
+    up, down = folds_of(path(f, height))
     assert (up.frequency, up.up, up.before, up.reached, up.at) == (4.0, True, 2.0, 8.0, 6.0)
     assert (down.frequency, down.up, down.before) == (2.0, False, 3.5)
     # down the lower branch falls: what it lands on is what it reaches
@@ -87,7 +87,7 @@ def test_a_sweep_that_lands_below_a_peak_goes_on_to_it() -> None:
 
 def test_where_no_other_motion_is_known_there_is_no_landing() -> None:
     """A path that ended before it came back."""
-    assert not list(_folds(path([1.0, 2.0, 3.0, 2.5, 2.2], [1.0, 2.0, 3.0, 4.0, 5.0])))
+    assert not list(folds_of(path([1.0, 2.0, 3.0, 2.5, 2.2], [1.0, 2.0, 3.0, 4.0, 5.0])))
     assert rising(np.array([5.0])).tolist() == [True]
     assert rising(np.zeros(0)).tolist() == []
 
@@ -124,7 +124,7 @@ def test_a_sweep_up_jumps_at_the_fold_of_a_contact_that_opens(
     """
     size = softening.amplitude([1.0])
     curve = ForcedCurve("own", 1.0, 0.15, {"right": size.astype(complex)}, {}, {}, softening, 0.0)
-    up, down = _folds(curve)
+    up, down = folds_of(curve)
     assert up.up and not down.up
     assert up.reached > 2.5 * up.before
     i = int(np.argmin(np.abs(curve.frequency - up.frequency)))

@@ -175,7 +175,7 @@ def test_steps_that_grow_near_a_known_point_end(
 
     monkeypatch.setattr(corrector.PlaneSteps, "next", grown)
     of = corrector.InterfaceCorrector(e, Settings(tolerance=1e-12), 1.0)
-    known = of._factors(evaluate(e, x, w), of.across(1.0, x), of.scale(x))
+    known = of.factors_at(evaluate(e, x, w), of.across(1.0, x), of.scale(x))
     assert known is not None
     start = (x, w / (2.0 * np.pi), of.across(1.0, x), of.scale(x), e.split(x)[2])
     assert of.correct(*start, known if near else None) is None

@@ -149,7 +149,7 @@ def test_a_matrix_too_far_is_factored() -> None:
     assert (found.sign, found.ratio) == (own.sign, own.ratio)
     # and kept for the next one: one product
     of.near(*parts(M), 40).solve(r[:-1], r[-1])
-    assert of._newest == 2
+    assert of.newest == 2
 
 
 @pytest.mark.usefixtures("always")
@@ -168,7 +168,7 @@ def test_factors_are_renewed_when_waiting_costs_more() -> None:
     of, A = KeptFactors(), np.eye(1)
     dear, costs = 0.5 / kept_factors.SOLUTIONS, list[int]()
     of.near(*parts(np.eye(1)), 0)
-    of._spent = dear
+    of.spent = dear
     first = of.factors
     for cost in range(1, 100):
         of.near(*parts(A), 0)

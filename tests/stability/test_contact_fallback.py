@@ -76,8 +76,8 @@ def test_convex_search_alone(seed: int, level: float, monkeypatch: pytest.Monkey
     by_load = tangential_contact(C, s, load=load)
 
     def lost(solver: Coulomb, step: AskedStep, *_: object) -> CoupledStep:
-        at = solver._linear(step, solver._stuck())
-        return replace(solver._judged(step, at, 0), residual=np.inf, converged=False)
+        at = solver.linear_step(step, solver.all_stuck())
+        return replace(solver.judged(step, at, 0), residual=np.inf, converged=False)
 
     monkeypatch.setattr(Coulomb, "_newton", lost)
     given = tangential_contact(C, s, displacement=by_load.displacement)

@@ -197,7 +197,7 @@ def test_fallback_alone_finds_the_answer() -> None:
         step = {"load": np.array(load), "motion": None}
         newton = solver.solve(np.zeros(36), load=np.array(load))
 
-        alone = solver._fallback(AskedStep(np.zeros(36), **step))
+        alone = solver.fall_back(AskedStep(np.zeros(36), **step))
         assert alone.converged
         np.testing.assert_allclose(alone.at.f, newton.at.f, atol=1e-8 * newton.at.f.max())
 
@@ -209,7 +209,7 @@ def test_spoiled_answer_is_no_answer() -> None:
 
     step = AskedStep(np.zeros(36), np.array([100.0, 20.0, 0.0]), None)
     found = solver.solve(step.b, load=step.load)
-    assert solver._judged(step, found.at, 1).converged
+    assert solver.judged(step, found.at, 1).converged
     f, s = found.at.f, found.at.s
     for spoiled in (
         Iterate(f * (1.0 + 1e-6), s, found.at.y),
@@ -217,7 +217,7 @@ def test_spoiled_answer_is_no_answer() -> None:
         Iterate(f, s * (1.0 + 1e-6), found.at.y),
         Iterate(np.where(np.arange(36) == 3, -f, f), s, found.at.y),
     ):
-        assert not solver._judged(step, spoiled, 1).converged
+        assert not solver.judged(step, spoiled, 1).converged
 
 
 @pytest.mark.parametrize("shape", [(2, 1), (4, 4), (6, 5)])

@@ -55,13 +55,13 @@ def test_cycle_is_symmetric_and_no_step_too_long() -> None:
     solver = MultigridSolver(K, modes, layout=free)
     rng = np.random.default_rng(0)
     x, y = rng.standard_normal((2, K.shape[0]))
-    Mx, My = solver._precondition(x), solver._precondition(y)
+    Mx, My = solver.precondition(x), solver.precondition(y)
     scale = np.sqrt((x @ Mx) * (y @ My))
     assert abs(y @ Mx - x @ My) < 1e-5 * scale
     for _ in range(40):
-        x = solver._precondition(K @ x)
+        x = solver.precondition(K @ x)
         x /= np.sqrt(x @ (K @ x))
-    assert x @ (K @ solver._precondition(K @ x)) < 1.0 + 1e-4
+    assert x @ (K @ solver.precondition(K @ x)) < 1.0 + 1e-4
 
 
 @pytest.mark.parametrize("with_modes", [True, False])
@@ -73,12 +73,12 @@ def test_levels_visited_twice_keep_the_cycle_symmetric_and_positive(
     K, modes, free = clamped(n=8)
     modes = modes if with_modes else None
     solver = MultigridSolver(K, modes, layout=free)
-    assert len(solver._cycle.sizes) == 3
+    assert len(solver.cycle.sizes) == 3
     lowest = []
     root = np.linalg.cholesky(K.toarray())
     for visited_twice in (1, multigrid.MOST_LEVELS):
         monkeypatch.setattr(multigrid, "TWICE", visited_twice)
-        M = np.column_stack([solver._precondition(e) for e in np.eye(K.shape[0])])
+        M = np.column_stack([solver.precondition(e) for e in np.eye(K.shape[0])])
         assert np.abs(M - M.T).max() < 1e-5 * np.abs(M).max()
         eigenvalues = np.linalg.eigvalsh(root.T @ (0.5 * (M + M.T)) @ root)
         assert eigenvalues[-1] < 1.0 + 1e-4

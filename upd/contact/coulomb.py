@@ -135,7 +135,7 @@ class Coulomb(CoulombConditions):
             best = answer if best is None or answer.residual < best.residual else best
         self._forget()
         if load is not None and not load.any() and self.pressed is None:
-            answer = self._judged(step, self._let_go(step, start), used)
+            answer = self.judged(step, self._let_go(step, start), used)
             if answer.converged:
                 return answer
         if not may_fall_back():
@@ -157,7 +157,7 @@ class Coulomb(CoulombConditions):
         answer = self._by_motion(step) if convex else self._by_multipliers(step, start)
         used += answer.iterations
         if not answer.converged:
-            answer = self._fallback(step)
+            answer = self.fall_back(step)
             used += answer.iterations
         if not answer.converged and best is not None and best.residual < answer.residual:
             answer = best
@@ -167,7 +167,9 @@ class Coulomb(CoulombConditions):
         self, step: AskedStep, start: Iterate | None, limit: int, turned: bool = False
     ) -> CoupledStep:
         at = (
-            self._linear(step, self._stuck()) if start is None else self._moved(step, start, turned)
+            self.linear_step(step, self.all_stuck())
+            if start is None
+            else self._moved(step, start, turned)
         )
         best: CoupledStep | None = None
         ahead: CoupledStep | None = None
@@ -175,7 +177,7 @@ class Coulomb(CoulombConditions):
         hold = step.load is not None and self.pressed is not None
         for used in range(1, limit + 1):
             answer = (
-                self._judged(step, at, used) if ahead is None else replace(ahead, iterations=used)
+                self.judged(step, at, used) if ahead is None else replace(ahead, iterations=used)
             )
             ahead = None
             if best is not None and best.converged:
@@ -186,7 +188,7 @@ class Coulomb(CoulombConditions):
                 best = answer
                 if answer.residual <= fine or self.pressed is not None:
                     break
-            rows = self._rows(at)
+            rows = self.rows_at(at)
             if hold and rows.relaxed.all():
                 # Rarely the answer, and a poor place to come from: once is refused.
                 rows, hold = self._held(step, at, rows), False
@@ -196,13 +198,13 @@ class Coulomb(CoulombConditions):
                 continue
             near = self._chord(step, at, rows)
             if near is not None:
-                ahead = self._judged(step, near, used)
+                ahead = self.judged(step, near, used)
                 if answer.converged or ahead.residual < CHORD * answer.residual:
                     at = near
                     continue
                 ahead = None
             try:
-                at = self._linear(step, rows)
+                at = self.linear_step(step, rows)
             except np.linalg.LinAlgError:
                 self._forget()
                 break
@@ -262,7 +264,7 @@ class Coulomb(CoulombConditions):
         if abs(scale - 1.0) <= len(self.C) * EPS:
             ways.append(lstsq(self.B[closed], there[closed])[0])
         for s in ways:
-            answer = self._judged(step, Iterate(f, s, there - self.B @ s, True), 0)
+            answer = self.judged(step, Iterate(f, s, there - self.B @ s, True), 0)
             if answer.converged:
                 return answer
         return None
@@ -271,7 +273,7 @@ class Coulomb(CoulombConditions):
         """The state before as a start: the same rows, solved for the new step; closed ones stick
         where the load turned.
         """
-        rows = self._rows(start)
+        rows = self.rows_at(start)
         if turned:
             rows = self._stuck_at(rows, ~rows.is_open)
         s = start.s if step.motion is None else step.motion
@@ -284,9 +286,9 @@ class Coulomb(CoulombConditions):
             # Its rows are those of an iterate as near as the step before converged.
             return Iterate(*kept.refined(kept.rows.rhs.T.ravel(), step))
         try:
-            return self._linear(step, rows)
+            return self.linear_step(step, rows)
         except np.linalg.LinAlgError:
-            return self._linear(step, self._stuck())
+            return self.linear_step(step, self.all_stuck())
 
     def _nearby(self, step: AskedStep, at: Iterate, rows: NewtonRows) -> Iterate | None:
         """A step of Newton by a kept factor of rows whose states are nearly the same. None where
@@ -339,16 +341,16 @@ class Coulomb(CoulombConditions):
             return None
         return kept if kept.rows.same_states(rows) else None
 
-    def _system(self, rows: NewtonRows, by_load: bool) -> NewtonSystem:
+    def system_of(self, rows: NewtonRows, by_load: bool) -> NewtonSystem:
         """The rows, factored.
 
         Raises LinAlgError where the states carry no load.
         """
         return (ClosedSystem if rows.relaxed.any() else Stuck)(self, rows, by_load)
 
-    def _linear(self, step: AskedStep, rows: NewtonRows) -> Iterate:
+    def linear_step(self, step: AskedStep, rows: NewtonRows) -> Iterate:
         """The new iterate: P f + Q (C f - B s - b) = rhs."""
-        self._kept = system = self._system(rows, step.load is not None)
+        self._kept = system = self.system_of(rows, step.load is not None)
         closed = isinstance(system, ClosedSystem)
         if isinstance(system, ClosedSystem) and system.dear:
             self._bordered = [*self._bordered, Bordered(system)][-KEPT:]
@@ -359,9 +361,9 @@ class Coulomb(CoulombConditions):
 
         Raises LinAlgError where the states leave no unique answer.
         """
-        rows, r = self._rows(at), self.B.shape[1]
+        rows, r = self.rows_at(at), self.B.shape[1]
         zero = np.zeros((len(self.C), r))
-        return self._system(rows, False).solve(zero, AskedStep(zero, None, np.eye(r)))[0]
+        return self.system_of(rows, False).solve(zero, AskedStep(zero, None, np.eye(r)))[0]
 
     # -- fallback ----------------------------------------------------------------------------------
 
@@ -444,7 +446,7 @@ class Coulomb(CoulombConditions):
                 if falls or np.linalg.norm(rest) <= 0.5 * np.linalg.norm(missing):
                     break
                 length *= 0.5
-            answer, at = self._judged(step, new, used), new
+            answer, at = self.judged(step, new, used), new
             if answer.converged or length <= EPS:
                 break
         return answer
@@ -467,7 +469,7 @@ class Coulomb(CoulombConditions):
             )
         except ConvergenceError:
             # nothing carries the load, or the least squares ran out of steps
-            return self._judged(step, self._linear(step, self._stuck()), 0)
+            return self.judged(step, self.linear_step(step, self.all_stuck()), 0)
         s = s.copy() if step.motion is None else step.motion
         if step.motion is None:
             s[moved] = found.motion / size[moved]
@@ -477,10 +479,10 @@ class Coulomb(CoulombConditions):
 
     def _ended(self, step: AskedStep, at: Iterate) -> CoupledStep:
         """An iterate that answers, or where Newton leads from it."""
-        answer = self._judged(step, at, 0)
+        answer = self.judged(step, at, 0)
         return answer if answer.converged else self._newton(step, at, NEWTON_STEPS)
 
-    def _fallback(self, step: AskedStep) -> CoupledStep:
+    def fall_back(self, step: AskedStep) -> CoupledStep:
         """Alternating directions for f in Coulomb's cone, u + mu |u_t| in its dual; Newton ends.
 
         With the shift mu |u_t| held, the problem is convex and the iteration converges; the shift

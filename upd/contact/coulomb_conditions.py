@@ -185,7 +185,7 @@ class CoulombConditions:
         """y (m,) of the forces and the motion."""
         return at.y if at.unprocessed else self.C @ at.f - self.B @ at.s - step.b
 
-    def _judged(self, step: AskedStep, at: Iterate, used: int) -> CoupledStep:
+    def judged(self, step: AskedStep, at: Iterate, used: int) -> CoupledStep:
         residual, allowed, size = self._residual(step, at)
         state = self.states(at)
         return CoupledStep(
@@ -237,7 +237,7 @@ class CoulombConditions:
         out[far] = limit[far] / length[far]
         return out
 
-    def _stuck(self) -> NewtonRows:
+    def all_stuck(self) -> NewtonRows:
         n, c = self.n, self.c
         one = np.broadcast_to(np.eye(c), (n, c, c)).copy()
         free = np.zeros((n, c), bool)
@@ -245,12 +245,12 @@ class CoulombConditions:
 
     def _stuck_at(self, rows: NewtonRows, nodes: NDArray[Any]) -> NewtonRows:
         """The rows with some nodes stuck, in place."""
-        stuck = self._stuck()
+        stuck = self.all_stuck()
         for part in ("P", "Q", "rhs", "relaxed", "is_open"):
             getattr(rows, part)[nodes] = getattr(stuck, part)[nodes]
         return rows
 
-    def _rows(self, at: Iterate) -> NewtonRows:
+    def rows_at(self, at: Iterate) -> NewtonRows:
         """Rows of the stabilised Jacobian at an iterate.
 
         Open: f = 0. Closed: g = 0, and dw = 0 where it sticks. Where it slips, with
@@ -266,7 +266,7 @@ class CoulombConditions:
         with mu v f_n on the right where f_n is given.
         """
         n, c = self.n, self.c
-        rows = self._stuck()
+        rows = self.all_stuck()
         f, y = at.f.reshape(c, n), at.y.reshape(c, n)
         state = self.states(at)
         is_open, slips = state == OPEN, state == SLIP

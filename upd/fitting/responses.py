@@ -494,7 +494,7 @@ class FitResponses:
         z = np.asarray(z, float)
         key = z.tobytes()
         if key not in self._found:
-            self._found[key] = found = self._solved(z)
+            self._found[key] = found = self.solved_at(z)
             if self._journal is not None:
                 self._journal.keep([z.tolist(), *(one.tolist() for one in found)])
         return self._found[key]
@@ -504,7 +504,7 @@ class FitResponses:
         z = np.asarray(z, float)
         return self._evaluate(z, *self.source.at(z))
 
-    def _solved(self, z: Array) -> tuple[Array, Array]:
+    def solved_at(self, z: Array) -> tuple[Array, Array]:
         value = self.value(z)
         slope = np.zeros((len(value), len(self.parameters)))
         for k, step in enumerate(self.source.steps):

@@ -47,14 +47,14 @@ def compiled(function: Callable[..., Any], **more: Any) -> Callable[..., Any]:
         Further options of numba's.
     """
     options: Any = numba.config
-    usual, folder = options.CACHE_DIR, _folder(function.__module__)
+    usual, folder = options.CACHE_DIR, folder_of(function.__module__)
     if folder is not None:
         options.CACHE_DIR = str(folder)
     try:
         made: Any = numba.njit(error_model="numpy", nogil=True, **more)(function)
         made._cache = _Kept(function)
     except RuntimeError:
-        _not_kept("no folder for them can be written")
+        warn_not_kept("no folder for them can be written")
     finally:
         options.CACHE_DIR = usual
     return cast("Callable[..., Any]", made)
@@ -86,12 +86,12 @@ class _Kept(_FunctionCache):  # type: ignore[misc]
         try:
             super().save_overload(sig, data)
         except Exception as error:  # a full disk, or a damaged index that could not be replaced
-            _not_kept(getattr(error, "strerror", None) or type(error).__name__)
+            warn_not_kept(getattr(error, "strerror", None) or type(error).__name__)
 
 
 def kept_in(module: str) -> Path | None:
     """Folder of the compiled functions of a module; None where none can be written."""
-    folder = _folder(module)
+    folder = folder_of(module)
     if folder is None:
         with contextlib.suppress(RuntimeError):
             folder = Path(_FunctionCache(sources_digest).cache_path)
@@ -99,7 +99,7 @@ def kept_in(module: str) -> Path | None:
 
 
 @cache
-def _not_kept(reason: str) -> None:
+def warn_not_kept(reason: str) -> None:
     log.warning(
         "compiled functions cannot be kept on disk (%s): every start compiles them again, about "
         "a minute; to fix it: set NUMBA_CACHE_DIR to a folder that can be written",
@@ -108,7 +108,7 @@ def _not_kept(reason: str) -> None:
 
 
 @cache
-def _folder(module: str) -> Path | None:
+def folder_of(module: str) -> Path | None:
     """Where the compiled functions of a module are kept; None for the compiler's own choice."""
     file = getattr(sys.modules.get(module), "__file__", None)
     if file is None or "NUMBA_CACHE_DIR" in os.environ:

@@ -323,19 +323,19 @@ class Eigenproblem(Shown):
         asked = min(self.n_massive, count + 2 + count // 8)
         if 2 * asked > self.n_massive:
             return self._dense(count)
-        return self._some(self._placed(self._factor(), asked), asked, MAX_BLOCKS)
+        return self.some_modes(self._placed(self._factor(), asked), asked, MAX_BLOCKS)
 
     def _placed(self, inverse: _Inverse, count: int) -> _Inverse:
         """The factor, its guessed shift moved to where a few blocks show the spectrum to begin."""
         for _ in range(0 if inverse.placed else _SHIFTS):
-            sigma = _better_shift(self._some(inverse, count, _PROBE_BLOCKS), inverse.sigma)
+            sigma = _better_shift(self.some_modes(inverse, count, _PROBE_BLOCKS), inverse.sigma)
             if sigma == inverse.sigma:
                 break
             inverse = _Inverse(self._shifted(sigma), sigma)
         self._inverse[:] = [replace(inverse, placed=True)]
         return self._inverse[0]
 
-    def _some(self, inverse: _Inverse, count: int, max_blocks: int) -> Modes:
+    def some_modes(self, inverse: _Inverse, count: int, max_blocks: int) -> Modes:
         """Modes of one Lanczos run."""
         X = self._krylov(inverse, count, None, 0, _TOLERANCE, max_blocks)
         # One inverse more: it takes out what high modes are left in the vectors and sets massless

@@ -92,10 +92,10 @@ class Hierarchy:
     def __call__(self, residual: FloatArray) -> FloatArray:
         """M r, with r scaled to one first: single precision has few powers of ten."""
         size = float(np.abs(residual).max()) or 1.0
-        out: FloatArray = self._cycle(0, (residual / size).astype(np.float32)).astype(np.float64)
+        out: FloatArray = self.cycle(0, (residual / size).astype(np.float32)).astype(np.float64)
         return size * out
 
-    def _cycle(self, depth: int, b: Single) -> Single:
+    def cycle(self, depth: int, b: Single) -> Single:
         if depth == len(self._levels):
             x = np.zeros_like(b)
             x[self._real] = cho_solve(self._coarsest, b[self._real].astype(np.float64))
@@ -117,7 +117,7 @@ class Hierarchy:
         """One cycle from zero, in the order of the level's smoother."""
         level = self._levels[depth]
         x, residual = level.smoother.first(b)
-        x += level.P @ self._cycle(depth + 1, np.ascontiguousarray(level.R @ residual))
+        x += level.P @ self.cycle(depth + 1, np.ascontiguousarray(level.R @ residual))
         level.smoother.last(b, x)
         return x
 
@@ -235,15 +235,15 @@ class MultigridSolver:
         self._place, self._n_padded = places(n, layout)
         blocks, B = padded(K, modes, self._place, self._n_padded, whole_blocks=layout is not None)
         at = None if points is None else positions(points, n, layout)
-        self._cycle = hierarchy(blocks, B, at)
+        self.cycle = hierarchy(blocks, B, at)
         self._max_iterations = max_iterations
         self._lowest = UNSEEN
-        log.info("multigrid of %d dofs: levels %s", n, self._cycle.sizes)
+        log.info("multigrid of %d dofs: levels %s", n, self.cycle.sizes)
 
-    def _precondition(self, residual: FloatArray) -> FloatArray:
+    def precondition(self, residual: FloatArray) -> FloatArray:
         whole = np.zeros(self._n_padded)
         whole[self._place] = residual
-        return self._cycle(whole)[self._place]
+        return self.cycle(whole)[self._place]
 
     def many(self, rhs: FloatArray, accuracy: float) -> list[Solved]:
         """K^-1 rhs for the columns of (n, m), side by side; raises as for one."""
@@ -251,7 +251,7 @@ class MultigridSolver:
         def run(b: FloatArray) -> tuple[Solved, LowestRitz]:
             return conjugate_gradients(
                 lambda x: np.asarray(self._K @ x),
-                self._precondition,
+                self.precondition,
                 b,
                 accuracy=accuracy,
                 max_iterations=self._max_iterations,

@@ -92,16 +92,16 @@ class LearnedCompliance:
         InputError
             For bad dofs or a C_0 of another size.
         """
-        self._solver, self._start, self.accuracy = solver, start, accuracy
-        self._kept: IntArray = checked_dofs(kept, n_dof)
-        k = len(self._kept)
+        self.body_solver, self.start, self.accuracy = solver, start, accuracy
+        self.kept: IntArray = checked_dofs(kept, n_dof)
+        k = len(self.kept)
         if start.shape != (k, k):
             raise InputError(f"The approximate compliance is {start.shape}: give ({k}, {k}).")
         self.n_dof = n_dof
         self.solver = solver.name
         self._P, self._Z, self._Y = (np.zeros((k, 0)) for _ in range(3))
         self._fields: list[FloatArray] = []
-        self._errors: list[float] = []
+        self.errors: list[float] = []
         self.iterations: list[int] = []
         self._known: FloatArray | None = None
 
@@ -113,7 +113,7 @@ class LearnedCompliance:
     def compliance(self) -> FloatArray:
         """C_m (k, k), mm/N, exactly symmetric, read-only."""
         if self._known is None:
-            C = self._start.copy()
+            C = self.start.copy()
             if self._P.shape[1]:
                 values, vectors = np.linalg.eigh(self._gram())
                 V = self._Y @ (vectors / np.sqrt(values))
@@ -133,7 +133,7 @@ class LearnedCompliance:
 
         |f - P P' C_0 f| / |f| in the norm of C_0.
         """
-        F = forces.reshape(len(self._kept), -1)
+        F = forces.reshape(len(self.kept), -1)
         size = self._size(F)
         left = self._size(self._left(F))
         return np.asarray(np.divide(left, size, out=np.zeros_like(size), where=size > 0.0))
@@ -146,7 +146,7 @@ class LearnedCompliance:
 
         Raises ConvergenceError where the solver does not reach the accuracy.
         """
-        F = checked_vectors(np.asarray(forces), len(self._kept), "forces at the kept dofs")
+        F = checked_vectors(np.asarray(forces), len(self.kept), "forces at the kept dofs")
         F = F.reshape(len(F), -1)
         sizes = self._size(F)
         F, sizes = F[:, sizes > 0.0], sizes[sizes > 0.0]
@@ -162,23 +162,23 @@ class LearnedCompliance:
             new = np.column_stack((new, p))
             # twice is enough, as in `_left`
             for _ in range(2):
-                left = left - np.outer(p, (self._start @ p) @ left)
+                left = left - np.outer(p, (self.start @ p) @ left)
         if not new.shape[1]:
             return
         solved = self._solved(new)
         u = np.column_stack([one.x for one in solved])
         self._P, self._Z, self._Y = (
             np.column_stack((old, v))
-            for old, v in ((self._P, new), (self._Z, self._start @ new), (self._Y, u[self._kept]))
+            for old, v in ((self._P, new), (self._Z, self.start @ new), (self._Y, u[self.kept]))
         )
         self._fields += list(u.T)
-        self._errors += [one.error for one in solved]
+        self.errors += [one.error for one in solved]
         self._known = None
 
     def _solved(self, P: FloatArray) -> list[Solved]:
         load = np.zeros((self.n_dof, P.shape[1]))
-        load[self._kept] = P
-        found = self._solver.many(load, self.accuracy)
+        load[self.kept] = P
+        found = self.body_solver.many(load, self.accuracy)
         self.iterations += [one.iterations for one in found]
         log.info(
             "%d products of %d dofs by %s: %d iterations, error in energy %.1e",
@@ -212,8 +212,8 @@ class LearnedCompliance:
         largest eigenvalue that C_0^-1 C has shown.
         """
         share = self._Z.T @ force
-        inner = float(np.abs(share) @ np.array(self._errors)) if self._errors else 0.0
-        stretch = float(np.linalg.eigvalsh(self._gram())[-1]) if self._errors else 1.0
+        inner = float(np.abs(share) @ np.array(self.errors)) if self.errors else 0.0
+        stretch = float(np.linalg.eigvalsh(self._gram())[-1]) if self.errors else 1.0
         outer = 2.0 * float(self._size(self._left(force[:, None]))[0]) * np.sqrt(stretch)
         size = float(np.sqrt(force @ (self.compliance() @ force)))
         return (inner + outer) / size if size > 0.0 else 0.0
@@ -226,4 +226,4 @@ class LearnedCompliance:
 
     def _size(self, F: FloatArray) -> FloatArray:
         """Norms of the columns of F in C_0."""
-        return np.asarray(np.sqrt(np.maximum(np.einsum("ij,ij->j", F, self._start @ F), 0.0)))
+        return np.asarray(np.sqrt(np.maximum(np.einsum("ij,ij->j", F, self.start @ F), 0.0)))

@@ -255,7 +255,7 @@ def careless(s: Any) -> None:
     """Products with K of one body that were solved to a thousandth."""
     condensed = {k: (copy.copy(one), at) for k, (one, at) in s.model.upper.condensed.items()}
     for one, _ in condensed.values():
-        one._errors = [1e-3] * len(one._errors)
+        one.errors = [1e-3] * len(one.errors)
     s.model = replace(s.model, upper=replace(s.model.upper, condensed=condensed))
 
 

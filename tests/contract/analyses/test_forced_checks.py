@@ -14,7 +14,7 @@ def test_points_that_are_not_periodic_are_counted() -> None:
         periodic=np.array([True, False, True, False]), frequency=np.arange(4.0), status="complete"
     )
     curve = ForcedCurve("own", 60.0, 1.0, {}, {}, {}, answer, 0.0)
-    check = checks._path(curve)
+    check = checks.path_check(curve)
     assert check.value == 2
     assert not check.passed
     assert "at 2 points" in check.remedy

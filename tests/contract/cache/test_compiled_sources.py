@@ -39,7 +39,7 @@ def test_compiled_functions_lie_in_the_folder_of_their_sources(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    folder = room._folder.__wrapped__(interface_step.__name__)
+    folder = room.folder_of.__wrapped__(interface_step.__name__)
     digest = sources_digest(Path(interface_step.__file__), ROOT)[:16]
     assert folder is not None and folder.name == f"step-{digest}"
     assert str(folder) in str(interface_step.judge.stats.cache_path)
@@ -62,9 +62,9 @@ def test_folders_of_older_sources_are_removed(
     file.parent.mkdir()
     file.write_text("import numpy\n")
     monkeypatch.setattr(interface_step, "__file__", str(file))
-    first = room._folder.__wrapped__(interface_step.__name__)
+    first = room.folder_of.__wrapped__(interface_step.__name__)
     other = first.parent / "one_more-0123456789abcdef"
     other.mkdir()
     file.write_text("import numpy as np\n")
-    second = room._folder.__wrapped__(interface_step.__name__)
+    second = room.folder_of.__wrapped__(interface_step.__name__)
     assert first != second and not first.exists() and second.is_dir() and other.is_dir()

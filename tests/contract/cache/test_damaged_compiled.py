@@ -27,7 +27,7 @@ def twice(x):
 def load(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], ModuleType]:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kept"))
     monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path / "kept"))
-    room._not_kept.cache_clear()
+    room.warn_not_kept.cache_clear()
     file = tmp_path / "own_loops.py"
     file.write_text(SOURCE)
 

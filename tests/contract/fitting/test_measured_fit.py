@@ -168,7 +168,7 @@ def test_a_fit_that_was_stopped_goes_on(
 ) -> None:
     """What was found before is not solved again, and the answer is the same; then it is removed."""
     monkeypatch.setenv("UPD_CACHE", str(tmp_path))
-    real, count = FitResponses._solved, [0]
+    real, count = FitResponses.solved_at, [0]
 
     def stopped(self: FitResponses, z: np.ndarray) -> Any:
         count[0] += 1
@@ -176,11 +176,11 @@ def test_a_fit_that_was_stopped_goes_on(
             raise KeyboardInterrupt
         return real(self, z)
 
-    monkeypatch.setattr(FitResponses, "_solved", stopped)
+    monkeypatch.setattr(FitResponses, "solved_at", stopped)
     with pytest.raises(KeyboardInterrupt):
         upd.fit(scene, data, VARY, starts=1)
     assert len(list(tmp_path.glob("fit-*.jsonl"))) == 1
-    monkeypatch.setattr(FitResponses, "_solved", real)
+    monkeypatch.setattr(FitResponses, "solved_at", real)
     told: list[str] = []
     found = upd.fit(scene, data, VARY, starts=1, progress=lambda _, text, __: told.append(text))
     assert "continues from 4 evaluations of an earlier call" in told

@@ -196,7 +196,7 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve[Any]) -> Iterator
     if isinstance(answer, SteppedSine):
         yield from _sweep_checks(curve)
         return
-    yield _path(curve)
+    yield path_check(curve)
     if curve.empty:
         return
     if isinstance(answer, InterfaceResponse):
@@ -207,7 +207,7 @@ def _curve_checks(solution: ForcedSolution, curve: ForcedCurve[Any]) -> Iterator
     yield from _integrated(curve)
 
 
-def _path(curve: ForcedCurve[Any]) -> Check:
+def path_check(curve: ForcedCurve[Any]) -> Check:
     if curve.stopped:
         return _check("path complete, stopped", curve.case, 1.0, message=curve.answer.message)
     astray = int((~curve.answer.periodic).sum()) if hasattr(curve.answer, "periodic") else 0

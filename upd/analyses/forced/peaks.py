@@ -83,7 +83,7 @@ def solve_curve(
     if curve.empty:
         return curve
     curve = with_tops(plan, model, linear, curve)
-    curve = replace(curve, folds=tuple(_folds(curve)))
+    curve = replace(curve, folds=tuple(folds_of(curve)))
     return confirmed(plan, model, curve)
 
 
@@ -154,7 +154,7 @@ def climbed(
 # -- folds -----------------------------------------------------------------------------------------
 
 
-def _folds(curve: PointCurve) -> Iterator[Fold]:
+def folds_of(curve: PointCurve) -> Iterator[Fold]:
     """Where the path turns back, with the height that a slow sweep jumps to."""
     f, size = curve.frequency, np.abs(curve.accelerance["right"])
     up = rising(f)
@@ -190,13 +190,13 @@ def confirmed(plan: ForcedPlan, model: Model, curve: PointCurve) -> PointCurve:
         return curve
     springs = make_springs(plan, model)
     steps = max(STEPS, time_steps(plan.scene))
-    integrate = partial(_stays, springs, model, curve, steps)
+    integrate = partial(stays, springs, model, curve, steps)
     peaks = {side: list(curve.peaks[side]) for side in SIDES}
     motions: dict[int, list[_Reached]] = {}
     checked: list[TimeCheck] = []
     for (side, number), top in loose:
         place = next(k for k, p in enumerate(peaks[side]) if p.number == number)
-        found = _confirmed(integrate, curve, side, peaks[side][place], top, motions)
+        found = confirmed_top(integrate, curve, side, peaks[side][place], top, motions)
         checked.append(found)
         if found.stays and not found.at_top:
             peaks[side][place] = peaks[side][place]._replace(
@@ -220,7 +220,7 @@ class _Steady(NamedTuple):
 _Reached = tuple[int, int, Array]
 
 
-def _confirmed(
+def confirmed_top(
     integrate: Callable[..., _Steady | None],
     curve: PointCurve,
     side: Side,
@@ -301,7 +301,7 @@ def _downhill(curve: PointCurve, size: Array, top: int) -> list[list[int]]:
     return [way for _, way in sorted(ways, key=lambda one: -one[0])]
 
 
-def _stays(
+def stays(
     springs: SpringMarch,
     model: Model,
     curve: PointCurve,

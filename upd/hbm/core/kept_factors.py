@@ -67,7 +67,7 @@ class KeptFactors:
     def __init__(self) -> None:
         self.factors: BorderedFactors | None = None
         self.sizes = np.zeros(0)
-        self._spent, self._uses, self._newest = 0.0, 0, 0.0
+        self.spent, self._uses, self.newest = 0.0, 0, 0.0
 
     def near(self, J: KeptJacobian, border: Border, unknowns: int) -> BorderedFactors:
         """Factors of a matrix, or what solves with it from those that are kept.
@@ -84,16 +84,16 @@ class KeptFactors:
         BorderedFactors
         """
         same = len(self.sizes) == len(border.normal)
-        dear = self._newest * max(self._uses, 1) > self._spent
+        dear = self.newest * max(self._uses, 1) > self.spent
         if not same or self.factors is None or self.factors.singular or dear:
             return self.renewed(J, border, unknowns)
-        self._uses, self._newest = self._uses + 1, 0.0
+        self._uses, self.newest = self._uses + 1, 0.0
         return _Near(self, J, border, unknowns)
 
     def renewed(self, J: KeptJacobian, border: Border, unknowns: int) -> BorderedFactors:
         """Factors of the matrix, kept from now on; parameters as of `near`."""
         self.factors, self.sizes = J.factored(border), border.sizes
-        self._spent, self._uses, self._newest = unknowns / SOLUTIONS, 1, 0.0
+        self.spent, self._uses, self.newest = unknowns / SOLUTIONS, 1, 0.0
         return self.factors
 
     def forget(self) -> None:
@@ -106,8 +106,8 @@ class KeptFactors:
 
     def note(self, solutions: int) -> None:
         """Count solutions that a correction took."""
-        self._spent += solutions
-        self._newest += solutions
+        self.spent += solutions
+        self.newest += solutions
 
 
 class _Near:

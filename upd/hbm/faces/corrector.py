@@ -219,7 +219,7 @@ class InterfaceCorrector:
             if step is None:
                 if count == 0:
                     sizes = [np.inf, np.inf]
-                known = self._factors(found, normal, D)
+                known = self.factors_at(found, normal, D)
                 if known is None:
                     return None
                 steps = PlaneSteps(known, normal, D, len(D) < MANY)
@@ -244,7 +244,7 @@ class InterfaceCorrector:
                 steps = PlaneSteps(steps.known, normal, D, len(D) < MANY)
             if float(np.abs(step).max()) * len(step) ** 0.5 <= s.tolerance:
                 # the way on is that of the answer, not of the point whose factors led to it
-                here = steps.known if steps.known.of is found else self._factors(found, normal, D)
+                here = steps.known if steps.known.of is found else self.factors_at(found, normal, D)
                 if here is None:
                     return None
                 return InterfacePlace(x, p, here.factors.tangent(), 0.0, count + 1, here, e.mobile)
@@ -309,7 +309,7 @@ class InterfaceCorrector:
         units[places] = D
         return more, units, np.append(e.widened(normal[:-1], places, 0.0), normal[-1])
 
-    def _factors(
+    def factors_at(
         self, found: InterfaceEvaluation, normal: FloatArray, D: FloatArray
     ) -> KnownFactors | None:
         """Of the derivative at a point; None where it has none, or is singular."""
