@@ -136,12 +136,20 @@ def test_turned_moved_and_about_another_point():
     np.testing.assert_allclose(here.about(here.centre), here.inertia, rtol=1e-15)
 
 
-def test_mass_is_that_of_the_mass_matrix():
+def test_two_materials_and_the_mass_matrix():
     mesh = box_mesh(np.linspace(0, 4, 5), [0, 1.0, 2.0], [0, 3.0])
-    found = mass_properties(mesh, STEEL)
-    np.testing.assert_allclose(found.mass, 7.8e-9 * 24.0, rtol=1e-14)
+    regions = (mesh.points[mesh.hexes].mean(axis=1)[:, 0] > 2.0).astype(int)
+    materials = [STEEL, Material(70e3, 0.3, 2.7e-9)]
+    found = mass_properties(mesh, materials, regions)
+    light, heavy = 2.7e-9 * 12.0, 7.8e-9 * 12.0
+    np.testing.assert_allclose(found.mass, light + heavy, rtol=1e-14)
+    np.testing.assert_allclose(
+        found.centre[0], (heavy * 1.0 + light * 3.0) / (light + heavy), rtol=1e-14
+    )
     ones = np.tile([1.0, 0.0, 0.0], mesh.n_node)
-    np.testing.assert_allclose(ones @ mass(mesh, STEEL) @ ones, found.mass, rtol=1e-13)
+    np.testing.assert_allclose(
+        ones @ mass(mesh, materials, regions=regions) @ ones, found.mass, rtol=1e-13
+    )
 
 
 def test_inverted_hexahedra_are_refused():

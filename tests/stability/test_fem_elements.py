@@ -141,6 +141,10 @@ def test_wrong_arguments_are_refused_with_the_remedy() -> None:
     for kwargs, words in (
         ({"element": "tet10"}, "use one of hex8, hex8i, hex20, hex20r, hex27"),
         ({"element": "hex20"}, "needs 20 nodes per hexahedron, the mesh has 8: use hex8 or hex8i"),
+        ({"material": (STEEL, STEEL)}, "2 materials are given without regions"),
+        ({"regions": np.array([0, 1])}, "first: number 1 at hexahedron 1, 1 materials given"),
+        ({"regions": np.zeros(3, int)}, "give 2 integers"),
+        ({"regions": np.zeros(2)}, "type float64"),
     ):
         with pytest.raises(InputError, match=words):
             stiffness(mesh, **({"material": STEEL} | kwargs))  # type: ignore[arg-type]

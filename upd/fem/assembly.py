@@ -6,7 +6,7 @@ numbering: 3 * node + component, nodes as in the mesh.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,8 +26,9 @@ _BLOCK_BYTES = 2 * 2**20
 
 def stiffness(
     mesh: Mesh,
-    material: Material,
+    material: Material | Sequence[Material],
     element: str = "hex8i",
+    regions: IntArray | None = None,
 ) -> csr_array:
     """Stiffness matrix of a mesh, full and exactly symmetric, its rows sorted.
 
@@ -35,10 +36,13 @@ def stiffness(
     ----------
     mesh : Mesh
         The body; 8, 20 or 27 nodes per hexahedron, as the element asks.
-    material : Material
+    material : Material or sequence of Material
+        One material, or several with `regions`.
     element : {"hex8i", "hex8", "hex20", "hex20r", "hex27"}, default "hex8i"
         "hex8i" has 8 nodes with nine incompatible modes condensed; "hex20r" has 2 x 2 x 2 points
         and does not lock in thin bodies.
+    regions : (n_hex,) array of int, optional
+        Material number of each hexahedron.
 
     Returns
     -------
@@ -48,7 +52,7 @@ def stiffness(
     Raises
     ------
     InputError
-        For an unknown or unfitting element.
+        For an unknown or unfitting element, or materials and regions that do not fit.
     MeshError
         For inverted or collapsed hexahedra, nodes out of range or without a hexahedron.
 
@@ -83,19 +87,21 @@ def stiffness(
     200.000000 N
     """
     chosen = hex_element(element, mesh)
+    lam, mu = _per_hex(mesh, material, regions, "lam"), _per_hex(mesh, material, regions, "mu")
     maker = BasisMaker(mesh, chosen)
     pattern = _Pattern.of(maker.nodes, mesh.n_node)
     data = np.zeros(9 * pattern.nodes.nnz)
     for block in _blocks(mesh.n_hex, 3 * chosen.n_node):
-        K = _element_stiffness(maker, block, material.lam, material.mu)
+        K = _element_stiffness(maker, block, lam[block], mu[block])
         np.add.at(data, pattern.positions(block, 3).ravel(), K.ravel())
     return pattern.matrix(data, 3)
 
 
 def mass(
     mesh: Mesh,
-    material: Material,
+    material: Material | Sequence[Material],
     element: str | None = None,
+    regions: IntArray | None = None,
 ) -> csr_array:
     """Consistent mass matrix of a mesh, full and exactly symmetric, its rows sorted.
 
@@ -103,10 +109,13 @@ def mass(
     ----------
     mesh : Mesh
         The body.
-    material : Material
+    material : Material or sequence of Material
+        One material, or several with `regions`.
     element : str, optional
         Checked against the mesh; its mass is that of the plain element of the mesh (the
         incompatible modes carry none).
+    regions : (n_hex,) array of int, optional
+        Material number of each hexahedron.
 
     Returns
     -------
@@ -133,18 +142,21 @@ def mass(
     if element is not None:
         hex_element(element, mesh)
     chosen = hex_element(None, mesh)
+    rho = _per_hex(mesh, material, regions, "rho")
     maker = BasisMaker(mesh, chosen)
     pattern = _Pattern.of(maker.nodes, mesh.n_node)
     data = np.zeros(pattern.nodes.nnz)
     phi = chosen.values_at(chosen.quadrature[0]).T
     pairs = (phi[:, :, None] * phi[:, None, :]).reshape(len(phi), -1)
     for block in _blocks(mesh.n_hex, chosen.n_node):
-        M = (material.rho * maker.basis(block).dx) @ pairs
+        M = (rho[block, None] * maker.basis(block).dx) @ pairs
         np.add.at(data, pattern.positions(block, 1).ravel(), M.ravel())
     return _three_components(pattern.matrix(data, 1))
 
 
-def _element_stiffness(maker: BasisMaker, block: slice, lam: float, mu: float) -> FloatArray:
+def _element_stiffness(
+    maker: BasisMaker, block: slice, lam: FloatArray, mu: FloatArray
+) -> FloatArray:
     """(n, 3 n_node, 3 n_node) element matrices of a block of hexahedra, exactly symmetric."""
     element = maker.element
     G = _weighted_gradients(maker, block)
@@ -152,9 +164,10 @@ def _element_stiffness(maker: BasisMaker, block: slice, lam: float, mu: float) -
     flat = G.reshape(n, -1, 3 * n_function)
     # One operand and its own transpose: numpy calls syrk, so H is symmetric to the last bit.
     H = np.matmul(flat.transpose(0, 2, 1), flat).reshape(n, n_function, 3, n_function, 3)
+    lam, mu = lam[:, None, None, None, None], mu[:, None, None, None, None]
     K = lam * H
     K += mu * H.transpose(0, 1, 4, 3, 2)
-    trace = mu * (H[:, :, 0, :, 0] + H[:, :, 1, :, 1] + H[:, :, 2, :, 2])
+    trace = mu[:, :, 0, :, 0] * (H[:, :, 0, :, 0] + H[:, :, 1, :, 1] + H[:, :, 2, :, 2])
     for i in range(3):
         K[:, :, i, :, i] += trace
     K = K.reshape(n, 3 * n_function, 3 * n_function)
@@ -278,6 +291,38 @@ def _blocks(n_hex: int, n_dof: int) -> Iterator[slice]:
     """Slices of hexahedra whose n_dof x n_dof element matrices fill a block."""
     step = max(1, _BLOCK_BYTES // (8 * n_dof**2))
     return (slice(k, min(k + step, n_hex)) for k in range(0, n_hex, step))
+
+
+def _per_hex(
+    mesh: Mesh, material: Material | Sequence[Material], regions: IntArray | None, name: str
+) -> FloatArray:
+    """(n_hex,) one material property of each hexahedron.
+
+    Raises InputError when regions and materials do not fit.
+    """
+    materials = [material] if isinstance(material, Material) else list(material)
+    values = np.array([getattr(m, name) for m in materials], dtype=np.float64)
+    if regions is None:
+        if len(values) != 1:
+            raise InputError(
+                f"{len(values)} materials are given without regions: pass regions, one "
+                "material number per hexahedron."
+            )
+        return np.full(mesh.n_hex, values[0])
+    regions = np.asarray(regions)
+    if regions.shape != (mesh.n_hex,) or not np.issubdtype(regions.dtype, np.integer):
+        raise InputError(
+            f"regions has shape {regions.shape} and type {regions.dtype}: give "
+            f"{mesh.n_hex} integers, one material number per hexahedron."
+        )
+    wrong = np.flatnonzero((regions < 0) | (regions >= len(values)))
+    if wrong.size:
+        raise InputError(
+            f"regions names {wrong.size} times a material that is not there (first: number "
+            f"{regions[wrong[0]]} at hexahedron {wrong[0]}, "
+            f"{len(values)} materials given): use 0 to {len(values) - 1}."
+        )
+    return values[regions]
 
 
 # -- damping ---------------------------------------------------------------------------------------

@@ -18,18 +18,18 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array, eye_array, kron
 
 from upd.errors import InputError, MeshError
-from upd.fem.assembly import _blocks, _Pattern, _three_components, _weighted_gradients
+from upd.fem.assembly import _blocks, _Pattern, _per_hex, _three_components, _weighted_gradients
 from upd.fem.elements import BasisMaker, gauss, hex_element
 from upd.fem.material import Material
 from upd.labels import Shown
-from upd.mesh import FloatArray, Mesh
+from upd.mesh import FloatArray, IntArray, Mesh
 
 # Gauss points per direction that integrate rho x_i x_j |J| exactly: |J| has degree 2 (8 nodes) or 5
 # per direction, x_i x_j 2 or 4.
@@ -99,7 +99,9 @@ class MassProperties(Shown):
         )
 
 
-def mass_properties(mesh: Mesh, material: Material) -> MassProperties:
+def mass_properties(
+    mesh: Mesh, material: Material | Sequence[Material], regions: IntArray | None = None
+) -> MassProperties:
     """Mass, volume, centre and inertia tensor of a mesh.
 
     The quadrature is exact for trilinear and triquadratic hexahedra, hence equal to the closed form
@@ -109,8 +111,10 @@ def mass_properties(mesh: Mesh, material: Material) -> MassProperties:
     ----------
     mesh : Mesh
         The body.
-    material : Material
-        Only the density counts.
+    material : Material or sequence of Material
+        One material, or several with `regions`; only the density counts.
+    regions : (n_hex,) array of int, optional
+        Material number of each hexahedron.
 
     Returns
     -------
@@ -119,6 +123,8 @@ def mass_properties(mesh: Mesh, material: Material) -> MassProperties:
 
     Raises
     ------
+    InputError
+        For materials and regions that do not fit.
     MeshError
         For inverted hexahedra.
 
@@ -137,6 +143,7 @@ def mass_properties(mesh: Mesh, material: Material) -> MassProperties:
     108.3333 mm2
     """
     element = hex_element(None, mesh)
+    rho = _per_hex(mesh, material, regions, "rho")
     maker = BasisMaker(mesh, element)
     X, weights = gauss(_POINTS[mesh.order], 3)
     # Coordinates from a point of the body: far from the origin the parallel axes would cancel
@@ -148,7 +155,7 @@ def mass_properties(mesh: Mesh, material: Material) -> MassProperties:
         det = mapping.detDF(X)
         _refuse_inverted(det, block.start)
         dV = det * weights
-        dm = material.rho * dV
+        dm = rho[block, None] * dV
         x = np.stack([mapping.Fmap(i, X) for i in range(3)]) - origin[:, None, None]
         volume += float(dV.sum())
         mass += float(dm.sum())
