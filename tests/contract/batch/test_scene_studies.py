@@ -173,7 +173,7 @@ def test_what_the_mesh_ladder_of_a_response_sets() -> None:
         load_scene("symmetric-response", {**LINES, **dict(p.overrides)})
         for p in response_meshes(scene, None, vary="element")
     ]
-    assert {one.mesh.element for one in made} == {"hex8", "hex8i", "hex20", "hex27"}
+    assert {one.mesh.element for one in made} == {"hex8", "hex8i", "hex20", "hex20r", "hex27"}
     for one in made:
         assert one.excitation.centrifugal_to_force == (194.0,)
         assert one.contact.lines("left") == one.contact.lines("right") == (4, 2)

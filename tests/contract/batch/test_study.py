@@ -191,7 +191,6 @@ def test_bad_study_arguments() -> None:
     for name, vary in (
         ("symmetric", "parameters"),
         ("rig", "dimensions"),
-        ("symmetric-response", "contacts"),
     ):
         with pytest.raises(InputError, match="leave it out"):
             plan_study(load_scene(name), vary, (2, 4))

@@ -274,7 +274,7 @@ SUMMARIES: dict[str, tuple[bytes | None, str]] = {
     "wrong kinds": (json.dumps({**SUMMARY, "results": [1], "size": 3}).encode(), "summary.json"),
     "changed": (
         json.dumps({**SUMMARY, "checks": [{}], "results": [{}], "sha256": "1"}).encode(),
-        "summary.json: is not as the run wrote it",
+        "summary.json: is not as upd run wrote it",
     ),
 }
 

@@ -119,7 +119,7 @@ STEP = 1e-4
 #: numbers a ladder follows beside those the analysis names first
 _NUMBERS = ("f?_free", "f?_glued", "f?_reduced", "response_below", "response_above")
 #: elements beside each other, and refinements that are affordable
-_ELEMENTS, _REFINE = ("hex8", "hex8i", "hex20", "hex27"), (1, 2, 3)
+_ELEMENTS, _REFINE = ("hex8", "hex8i", "hex20", "hex20r", "hex27"), (1, 2, 3)
 MODES_ONLY: Overrides = (("want", ["free", "glued"]), ("modes.arrangements", ["symmetric"]))
 _REDUCED: Overrides = (
     ("want", ["free", "reduction", "response"]),
@@ -142,9 +142,9 @@ _AS_GIVEN, _OF_MODES = "as given", ("_free", "_glued")
 
 
 def _meshes(scene: RigScene, asked: Asked, *, all_elements: bool) -> Iterator[Variation]:
-    """geometry.refine with the scene's element, or with all four: quadratic ones to refine 2."""
+    """geometry.refine with the scene's element, or with all: quadratic ones to refine 2."""
     for element in _ELEMENTS if all_elements else (scene.mesh.element,):
-        most = 2 if element == "hex27" or (all_elements and element == "hex20") else 3
+        most = 2 if element == "hex27" or (all_elements and element in _QUADRATIC) else 3
         for refine in refinements(asked) or _REFINE[:most]:
             overrides = (*MODES_ONLY, ("geometry.refine", refine), ("mesh.element", element))
             yield Variation(element, f"refine {refine:g}", overrides, 1.0 / refine)
