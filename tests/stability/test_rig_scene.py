@@ -192,7 +192,7 @@ def test_ladders(tmp_path: Path) -> None:
     few, many = (abs(one.errors["f3_reduced", Case(name="Craig-Bampton")]) for one in found.solved)
     assert many < 1e-3 < few
     points = plan_study(scene, "element").points
-    assert {p.source for p in points} == {"hex8", "hex8i", "hex20", "hex27"}
+    assert {p.source for p in points} == {"hex8", "hex8i", "hex20", "hex20r", "hex27"}
     with pytest.raises(InputError, match="--vary patch"):
         plan_study(scene, "patch")
 
