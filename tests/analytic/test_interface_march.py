@@ -685,7 +685,7 @@ def stuck_at(sample: int, *rest: Any) -> int:
     # the step beyond on copies: leaves x0 as a step that fails does
     ahead = [copied(one) for one in rest]
     march_steps(sample, sample + 1, False, *ahead)
-    rest[-1][0][:] = ahead[-1][0]
+    rest[6][:] = ahead[6]
     return sample
 
 

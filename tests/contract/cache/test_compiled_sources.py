@@ -19,7 +19,7 @@ LOOPS = "upd/hbm/faces/period.py"
     ("changed", "told"),
     [
         ("upd/hbm/faces/period.py", True),
-        ("upd/hbm/faces/step.py", True),
+        ("upd/hbm/faces/kept.py", True),
         # two imports away
         ("upd/linalg/compiled.py", True),
         ("upd/hbm/springs/balance.py", False),

@@ -2,7 +2,7 @@ r"""Equations of the balance of blades in frequency with contact and damper in t
 
 Unknowns are the harmonics 0 to H of the blades' modes q(t), coefficients as in
 `upd.hbm.core.fourier`, the damper's state and the slips before the period. Under q(t) one period of
-contact and damper is integrated (`upd.hbm.faces.period`): this gives the forces f at N samples and
+contact and damper is integrated (`upd.hbm.faces.kept`): this gives the forces f at N samples and
 the state after it:
 
     (omega^2 - (k w)^2 + 2 i zeta omega k w) q_k = (Phi' f)_k + P F_k,      state after = before.
@@ -24,8 +24,8 @@ from scipy.linalg import cho_solve
 
 from upd.errors import ConvergenceError, InputError
 from upd.hbm.core.fourier import analysis, harmonics, synthesis
+from upd.hbm.faces.kept import given_blades, kept_inverses
 from upd.hbm.faces.march import Fallback
-from upd.hbm.faces.period import given_blades
 from upd.hbm.faces.state import FloatArray, InterfaceModel, InterfaceState, factored, in_columns
 from upd.hbm.faces.step import STICK, judge
 from upd.linalg.parallel import SideBySide
@@ -164,6 +164,8 @@ class InterfaceEquations:
         self.slip = start.slip.copy()
         #: guess of every sample
         self.known: ContactPeriod | None = None
+        #: inverses of the samples' matrices, and for which states
+        self.kept = kept_inverses(samples, model.n)
         self._at: tuple[FloatArray, float] | None = None
         self._step: tuple[float, Step] | None = None
         factor = factored(model.compliance, "interface balance: the compliance of the faces")
@@ -362,10 +364,12 @@ class InterfaceEquations:
         end, x0 = rigid.copy(), np.zeros(3 * n)
         done, given = 0, False
         rigid_rows = np.ascontiguousarray(step.Z[:, m : m + r].T)
-        parts = (rigid_rows, step.W, model.columns, step.J, model.load)
-        law, past = (model.friction, step.rho_n, step.rho_t), (F, Y, S, known is not None)
+        parts = (rigid_rows, step.W, model.columns, step.J)
+        law, past = (model.friction, step.rho_n, step.rho_t), (F, Y, S, *self.kept)
         while True:
-            done = given_blades(done, given, pushes, parts, law, (end, c, x0), past)
+            done = given_blades(
+                done, given, known is not None, pushes, parts, law, model.load, end, c, past, x0
+            )
             if done == N:
                 break
             given = True

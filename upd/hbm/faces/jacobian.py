@@ -126,7 +126,7 @@ def factor_period(  # type: ignore[no-untyped-def]
     first_sample, last_sample : int
         From the first on, up to the one before the last.
     samples : tuple of ndarray
-        Answers F, Y of all samples, as `upd.hbm.faces.period.given_blades` leaves them, and states
+        Answers F, Y of all samples, as `upd.hbm.faces.kept.given_blades` leaves them, and states
         with the verges.
     W : (3 n, 3 n) ndarray
         Inverse of A [N/mm]; symmetric.
@@ -214,7 +214,7 @@ def march_directions(  # type: ignore[no-untyped-def]
         States and rows, as in `factor_period`.
     step : tuple of ndarray
         W, Z as in `factor_period`, M = (Phi, B)' W (Phi, B), J as in
-        `upd.hbm.faces.period.given_blades`, and dJ (p - B' f) of the samples (N, r).
+        `upd.hbm.faces.kept.given_blades`, and dJ (p - B' f) of the samples (N, r).
     nodes : tuple of ndarray
         Tangents of the nodes that move (2 c,), first ones, then second ones, and the number (3 n,)
         of each dof among them, or -1.

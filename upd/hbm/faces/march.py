@@ -52,6 +52,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_solve, expm
 
 from upd.errors import ConvergenceError
+from upd.hbm.faces.kept import kept_inverses
 from upd.hbm.faces.period import Bases, Past, StepParts, march_steps
 from upd.hbm.faces.state import FloatArray, InterfaceModel, InterfaceState, factored, in_columns
 from upd.hbm.faces.step import OPEN, STICK, judge
@@ -180,6 +181,8 @@ class InterfacePeriod:
         Outputs after each step [mm].
     counts : (3,) ndarray
         Share of open, sticking and slipping nodes, over nodes and samples.
+    newton : float
+        Newton steps a time step.
     energy : (3,) ndarray
         Work of the excitation, lost by damping, lost by friction, of the whole [N mm].
     fallbacks : int
@@ -188,6 +191,7 @@ class InterfacePeriod:
 
     output: FloatArray
     counts: FloatArray
+    newton: float
     energy: FloatArray
     fallbacks: int
 
@@ -270,6 +274,7 @@ class InterfaceMarch:
                 np.empty((samples, 3 * n)),
                 np.empty((samples, 3 * n)),
                 np.zeros((samples, n), int),
+                *kept_inverses(samples, n),
             )
             self.rebase(np.zeros(n, bool))
         else:
@@ -330,12 +335,12 @@ class InterfaceMarch:
             When a step has no answer that any of the solvers finds.
         """
         N, n, past = self.samples, self.model.n, self.past
-        out, sums = np.zeros((N, len(self.model.seen_modes))), np.zeros(3)
-        parts, bases = tuple(self.steps), (*self.bases, self.which)
-        held = at.arrays(), (*past, self.known), (self.x0, out, sums)
+        out, sums = np.zeros((N, len(self.model.seen_modes))), np.zeros(4)
+        parts, motion, known = tuple(self.steps), at.arrays(), self.known
         done, given, fallbacks = 0, False, 0
         while done < N:
-            done = march_steps(done, N, given, parts, bases, *held)
+            held = tuple(self.bases), self.which, motion, known, tuple(past)
+            done = march_steps(done, N, given, parts, *held, self.x0, out, sums)
             given = done < N
             if given:
                 self.finish_step(done, at)
@@ -348,7 +353,8 @@ class InterfaceMarch:
             suit_bases(past.state, self.bases.open, self.which)
         counts = np.array([(past.state == kind).sum() for kind in (OPEN, STICK)] + [0], float)
         counts[2] = n * N - counts.sum()
-        return InterfacePeriod(out, counts / (n * N), self.model.copies * sums, fallbacks)
+        energy = self.model.copies * sums[:3]
+        return InterfacePeriod(out, counts / (n * N), float(sums[3]) / N, energy, fallbacks)
 
     def _add(self, open_: NDArray[np.bool_]) -> None:
         """Add a base; where there are as many as may be, in place of another if that pays.

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from upd.linalg.compiled import compiled, inlined, joined
+from upd.linalg.compiled import compiled, inlined
 
 OPEN, STICK, SLIP = 0, 1, 2
 #: Newton takes 1 to 6 steps from the sample before; a run this long is cycling.
@@ -458,45 +458,3 @@ def contact_step(x0, bases, one, law, node, warm, scratch):  # type: ignore[no-u
                         y[n + i], y[2 * n + i] = 0.0, 0.0
             return used
     return -1
-
-
-@joined
-def solve_sample(  # type: ignore[no-untyped-def]
-    sample, x0, bases, one, law, nodes, past, scratch
-):
-    """One step of contact, from whatever is near and leads to an answer.
-
-    Parameters
-    ----------
-    sample : int
-        Of the period.
-    x0, bases, one, law, scratch
-        As in `contact_step`.
-    nodes : tuple of tuple
-        As `contact_step` has them: to be overwritten, and those of the step before.
-    past : tuple
-        Forces and relative motions (N, 3 n) and states (N, n) of the samples a period ago, and
-        whether they hold a period.
-
-    Returns
-    -------
-    int
-        Newton steps; -1 without an answer.
-    """
-    node, before = nodes
-    forces, moves, states, known = past
-    used = -1
-    # from the sample a period ago, from the step before, from nothing
-    for start in range(0 if known else 1, 3):
-        if start == 0:
-            fetch_row(forces, sample, node[0])
-            fetch_row(moves, sample, node[1])
-            fetch_row(states, sample, node[2])
-        elif start == 1:
-            put(before[0], node[0], 0)
-            put(before[1], node[1], 0)
-            put(before[2], node[2], 0)
-        used = contact_step(x0, bases, one, law, node, start < 2, scratch)
-        if used >= 0:
-            break
-    return used
