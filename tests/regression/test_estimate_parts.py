@@ -63,6 +63,8 @@ SCENES: dict[str, tuple[Any, dict[str, Any]]] = {
             "mesh.element": "hex8i",
             "geometry.refine": 0.8,
             "modes.arrangements": ["symmetric"],
+            # one part is 1e-5 and the difference of two frequencies: pardiso's depend on threads
+            "solver.name": "superlu",
         },
     ),
     "seated": (
@@ -105,8 +107,7 @@ def test_parts_of_errors_stay(name: str) -> None:
     for one, other in zip(found, kept, strict=True):
         assert [type(item) for item in one] == [type(item) for item in other], one[:2]
         for item, old in zip(one, other, strict=True):
-            # a part may be the difference of two frequencies that are known to 1e-10
-            near = pytest.approx(old, rel=1e-6, abs=1e-10) if isinstance(old, float) else old
+            near = pytest.approx(old, rel=1e-6, abs=1e-12) if isinstance(old, float) else old
             assert item == near, one[:2]
 
 

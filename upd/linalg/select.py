@@ -306,10 +306,7 @@ def choose(
     # the only one that serves several bodies side by side, and beyond small ones the fastest
     name = "pardiso" if "pardiso" in fitting else min(fitting, key=lambda name: costs[name].seconds)
     cost = costs[name]
-    why = (
-        f"the fastest that fits: about {cost.seconds:.2g} s and {_size(cost.bytes)} of "
-        f"{_size(limit)}"
-    )
+    why = f"it fits: about {cost.seconds:.2g} s and {_size(cost.bytes)} of {_size(limit)}"
     if not has_pardiso():
         why += "; pip install updampers[mkl] for a faster one"
     return Choice(name, why)

@@ -197,7 +197,7 @@ def checked(summary: Mapping[str, Any]) -> str:
     """How many checks passed, and the largest change by an effect left out."""
     checks, effects = summary["checks"], summary["effects"]
     good = sum(check["verdict"] == "passed" for check in checks)
-    text = f"Self-checks: {good} of {len(checks)} passed"
+    text = f"Self-checks: {good} of {len(checks)} passed" if checks else "No self-checks"
     names = [str(e["name"]) for e in effects if not e["on"] and e.get("applies", True)]
     solved = [check for check in checks if check.get("quantity")]
     if not names:

@@ -61,7 +61,7 @@ def run_sections(run: RunFolder, surfaces: Sequence[dict[str, Any]]) -> list[Sec
         "Estimated errors (±) bound what mesh and methods leave in a number; the error budget "
         "shows their sources."
         if known
-        else 'No errors were estimated: leave accuracy = "unknown" out to see them.',
+        else "No errors were estimated.",
         "A number without a unit is a ratio or a count.",
     ]
     figures = Section(
