@@ -101,7 +101,11 @@ def short_answer(summary: Mapping[str, Any], width: int, folder: Path | None) ->
         end.append(f"Warnings: {len(noted)}, with what to do in .table()")
     table = number_table(MAIN, reached_numbers(size, results))
     numbers = whole_table(table, width, cut=True) if table.rows else []
-    return [*lines, *numbers[: max(SHORT - len(lines) - len(end), 0)], *end][:SHORT]
+    numbers = numbers[: max(SHORT - len(lines) - len(end), 0)]
+    # a case whose numbers find no room
+    if numbers and numbers[-1] in [row[0] for row in table.rows if not any(row[1:])]:
+        numbers.pop()
+    return [*lines, *numbers, *end][:SHORT]
 
 
 def table_lines(table: AnswerTable, width: int, *, cut: bool = False) -> list[AnswerLine]:
