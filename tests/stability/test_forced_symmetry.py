@@ -13,6 +13,7 @@ import pytest
 from rigs import LINES
 
 from upd.analyses.forced import measures
+from upd.analyses.forced.blade_parts import MirrorPairs, even_modes
 from upd.analyses.forced.model import Model, make_model, respond
 from upd.analyses.forced.plan import ForcedPlan, make_plan
 from upd.analyses.forced.statics import face_laws
@@ -98,3 +99,17 @@ def test_half_the_rig_answers_as_the_whole_with_slip_and_lift_off(name: str) -> 
         np.testing.assert_allclose(u[0], u[1], rtol=1e-6)
     losses = [a.energy[i].sum(axis=1) for a, i in zip((half, whole), at, strict=True)]
     np.testing.assert_allclose(losses[0], losses[1], rtol=1e-4, atol=1e-6 * losses[1].max())
+
+
+def test_a_mixed_pair_of_equal_frequencies_is_no_half_model() -> None:
+    """One mode moves two image points alike, the other against each other; any two mixtures of them
+    are modes as well where their frequencies are equal.
+    """
+    rows = np.zeros((2, 3, 2))
+    rows[:, 0] = [[1.0, 1.0], [1.0, -1.0]]
+    pairs = MirrorPairs(np.array([0]), np.array([1]))
+    pure = even_modes(rows, pairs, np.eye(2))
+    assert pure is not None and pure.tolist() == [[1.0], [0.0]]
+    for angle in (0.01, 0.25 * np.pi, 1.5):
+        c, s = np.cos(angle), np.sin(angle)
+        assert even_modes(rows, pairs, np.array([[c, -s], [s, c]])) is None

@@ -317,6 +317,8 @@ def _rectangle(
 EVEN_DOFS = (0, 2, 4)
 #: signs of the mirror image's displacement: normal, along the damper, up the slope
 MIRROR_SIGNS = np.array([1.0, -1.0, 1.0])
+#: share of odd motion below which a mode counts as even, above one minus which as odd
+PARITY = 1e-4
 
 
 @dataclass(frozen=True)
@@ -374,8 +376,9 @@ def mirror_pairs(face: FacePoints) -> MirrorPairs | None:
     return MirrorPairs(kept, image[kept])
 
 
-def even_modes(rows: FloatArray, pairs: MirrorPairs, shapes: FloatArray) -> FloatArray:
-    """Of mode shapes (r, k) those with more motion even about y = 0 at the contact points than odd.
+def even_modes(rows: FloatArray, pairs: MirrorPairs, shapes: FloatArray) -> FloatArray | None:
+    """Of mode shapes (r, k) those that are even about y = 0 at the contact points; None when one is
+    neither even nor odd: its pair of equal frequencies is mixed.
 
     Parameters
     ----------
@@ -386,7 +389,10 @@ def even_modes(rows: FloatArray, pairs: MirrorPairs, shapes: FloatArray) -> Floa
         np.linalg.norm(part.reshape(-1, part.shape[-1]) @ shapes, axis=0)
         for part in (pairs.part(rows), pairs.part(rows, -1.0))
     )
-    return np.asarray(shapes[:, odd < even])
+    share = odd / np.maximum(np.hypot(even, odd), np.finfo(float).tiny)
+    if ((share > PARITY) & (share < np.sqrt(1.0 - PARITY**2))).any():
+        return None
+    return np.asarray(shapes[:, share <= PARITY])
 
 
 #: modes of the whole blade beside the ones kept, of those that points off the nodes are put on
@@ -427,19 +433,21 @@ def reduced_blades(
         [partial(_reduced, plan.scene, bodies, side, faces[side]) for side in SIDES], plan.workers
     )
     half = plan.symmetry == "half" and not bodies.half
-    found = {side: mirror_pairs(faces[side]) if half else None for side in SIDES}
-    pairs = {side: one for side, one in found.items() if one is not None}
-    if len(pairs) < len(SIDES):
-        whole = [
-            part if faces[side].at_nodes else ritz(part, _lowest(part), part.rows)
-            for side, part in zip(SIDES, parts, strict=True)
-        ]
-        return faces, whole, None
-    small = [
-        ritz(part, even_modes(part.rows, mine, _lowest(part)), mine.part(part.rows))
-        for part, mine in zip(parts, pairs.values(), strict=True)
+    pairs: dict[Side, MirrorPairs] = {}
+    small: list[BladePart] = []
+    for side, part in zip(SIDES, parts, strict=True) if half else ():
+        mine = mirror_pairs(faces[side])
+        even = None if mine is None else even_modes(part.rows, mine, _lowest(part))
+        if mine is not None and even is not None:
+            pairs[side] = mine
+            small.append(ritz(part, even, mine.part(part.rows)))
+    if len(pairs) == len(SIDES):
+        return faces, small, pairs
+    whole = [
+        part if faces[side].at_nodes else ritz(part, _lowest(part), part.rows)
+        for side, part in zip(SIDES, parts, strict=True)
     ]
-    return faces, small, pairs
+    return faces, whole, None
 
 
 def _face(scene: ForcedScene, bodies: Bodies, side: Side) -> FacePoints:
