@@ -87,7 +87,9 @@ def test_condensed_correction_is_that_of_the_whole_matrix(
     whole = evaluate(b, x, omega)
     residual, parts, slope = b.linearised(x, omega)
     assert parts is not None
-    assert list(parts.state) == [seen_state(one) for one in whole.contact.march.state]
+    # a point that slipped before it stuck for good is taken for a moving one
+    seen = [seen_state(one) for one in whole.contact.march.state]
+    assert all(int(s) in (one, MOVES) for s, one in zip(parts.state, seen, strict=True))
     assume([int(s) for s in parts.state] == kinds)
     size = np.abs(whole.residual).max()
     np.testing.assert_allclose(

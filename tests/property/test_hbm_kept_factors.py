@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from tests.literature.test_hbm_blade_damper_blade import Y2, response
 from tests.property.test_hbm_condensed import MOVES, OPEN, STICKS, problem
 from tests.stability.test_hbm_hard_cases import gap_oscillator
-from tests.whole_balance import evaluate
+from tests.whole_balance import Whole, evaluate
 from upd.hbm.core import kept_factors
 from upd.hbm.core.kept_factors import LEFT, LEFT_OF_TANGENT, KeptFactors
 from upd.hbm.core.newton import Border, bordered_factors
@@ -36,6 +36,12 @@ def parts(A: np.ndarray) -> tuple[Dense, Border]:
     """A bordered matrix: all unknowns of size one."""
     n = len(A) - 1
     return Dense(A[:n, :n]), Border(A[:n, n], np.ones(n), 1.0, A[n])
+
+
+def whole_matrix(whole: Whole, D: np.ndarray, p_scale: float, normal: np.ndarray) -> np.ndarray:
+    """Jacobian of scaled unknowns with its border."""
+    top = np.column_stack([whole.jacobian * D, whole.by_frequency * p_scale])
+    return np.vstack([top, normal[None]])
 
 
 @pytest.fixture
@@ -83,8 +89,9 @@ def test_corrections_from_an_earlier_point_are_those_of_the_matrix(
         patch.setattr(kept_factors, "LEFT", LEFT_OF_TANGENT)
         _, J, slope = b.linearised(x, 1.3)
         assert J is not None
-        D = rng.uniform(0.5, 2, b.size)
-        J.bordered(Border(slope, D, 0.8, rng.normal(size=b.size + 1)))
+        D, normal = rng.uniform(0.5, 2, b.size), rng.normal(size=b.size + 1)
+        J.bordered(Border(slope, D, 0.8, normal))
+        P, sizes = whole_matrix(evaluate(b, x, 1.3), D, 0.8, normal), np.append(D, 0.8)
         _, J, slope = b.linearised(other, 1.31)
         assert J is not None
         D, normal, right = rng.uniform(0.5, 2, b.size), rng.normal(size=b.size + 1), rng.normal()
@@ -94,12 +101,13 @@ def test_corrections_from_an_earlier_point_are_those_of_the_matrix(
         correction, tangent = found.solve(r, right), found.tangent()
         sign = found.sign
     whole = evaluate(b, other, 1.31)
-    top = np.column_stack([whole.jacobian * D, whole.by_frequency * p_scale])
-    A = np.vstack([top, normal[None]])
+    A = whole_matrix(whole, D, p_scale, normal)
     wanted = np.linalg.solve(A, np.append(r, right))
-    condition = np.linalg.cond(A)
     size = np.linalg.norm(wanted)
-    limit = 100 * (LEFT_OF_TANGENT + 1e-14 * condition)
+    # GMRES measures what is left after the earlier factors, in the unknowns of now
+    preconditioned = np.linalg.solve(P * (np.append(D, p_scale) / sizes), A)
+    rounding = 1e-13 * np.linalg.cond(A)
+    limit = 2 * LEFT_OF_TANGENT * np.linalg.cond(preconditioned) + rounding
     assert np.linalg.norm(correction - wanted) <= limit * size
     along = np.linalg.solve(A, np.append(np.zeros(b.size), 1.0))
     along /= np.linalg.norm(along)
