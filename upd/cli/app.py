@@ -486,10 +486,10 @@ def describe(
     """
     from upd.cli.describe import described, print_keys, write_drawing
 
-    title, keys, geometry = described(what, set or [])
+    title, keys = described(what, set or [])
     print_keys(terminal.console, title, keys, key)
     if drawing is not None:
-        terminal.console.print(f"Drawing: {write_drawing(*geometry, drawing)}")
+        terminal.console.print(f"Drawing: {write_drawing(what, set or [], drawing)}")
 
 
 @app.command

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from importlib import resources
 from itertools import groupby
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
 
 from rich.console import Console
 from rich.text import Text
@@ -25,7 +23,6 @@ from upd.scene.keys import (
     SceneKey,
     absent_keys,
     chosen_keys,
-    params_of,
     recipe_keys,
     scene_keys,
     scene_to_start_from,
@@ -38,19 +35,15 @@ UNCERTAINTY = '"VALUE +- HALF-WIDTH" or "VALUE +- 10 %"'
 _EXAMPLES = Path(str(resources.files("upd"))) / "scenes" / "examples"
 
 
-def described(
-    what: str, overrides: Sequence[str] = ()
-) -> tuple[str, list[SceneKey], tuple[str, Any]]:
-    """Title and keys of a scene or a recipe, the recipe with its own object. Raises InputError for
-    what is neither.
-    """
+def described(what: str, overrides: Sequence[str] = ()) -> tuple[str, list[SceneKey]]:
+    """Title and keys of a scene or a recipe. Raises InputError for what is neither."""
     if what in READY or is_file(what):
         if overrides:
             raise InputError("--set is for scenes: leave it out of a recipe")
-        return f"Recipe {what}", recipe_keys(what), (what, recipes.made(what, {}))
+        return f"Recipe {what}", recipe_keys(what)
     scene = load_scene(what, overrides)
     title = f"Scene {scene.name}: {scene.title}" if scene.title else f"Scene {scene.name}"
-    return title, scene_keys(scene) + absent_keys(scene), (scene.recipe, params_of(scene))
+    return title, scene_keys(scene) + absent_keys(scene)
 
 
 def print_keys(console: Console, title: str, keys: Sequence[SceneKey], asked: str) -> None:
@@ -98,13 +91,18 @@ def _print_one(console: Console, key: SceneKey) -> None:
             console.print(Text(line))
 
 
-def write_drawing(recipe: str, params: Any, path: Path) -> Path:
-    """Draw the geometry with its dimensions. Raises InputError for a place that is no .png file."""
+def write_drawing(what: str, overrides: Sequence[str], path: Path) -> Path:
+    """Draw the geometry of a scene or a recipe with its dimensions.
+
+    Raises InputError for a place that is no .png file.
+    """
     check_ending(path, "--drawing", ".png")
-    # matplotlib takes a while to import
+    # matplotlib and the analyses take a while to import
+    from upd.analyses.meshing import mesh_request
     from upd.plot.drawing import draw_sections
 
-    meshes, views = recipes.drawing(recipe, asdict(params))
+    request = mesh_request(what, overrides)
+    meshes, views = recipes.drawing(request.recipe, request.given)
     with placed_file(path) as temporary:
         draw_sections(meshes, views).savefig(temporary, format="png")
     return path

@@ -16,6 +16,7 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, is_dataclass, replace
 from itertools import groupby
 from textwrap import wrap
+from types import SimpleNamespace
 from typing import Any, Literal, get_args, get_origin
 
 from upd.errors import InputError
@@ -156,7 +157,7 @@ def recipe_keys(recipe: str, params: Any = None, path: Steps = ()) -> list[Scene
     recipe
         Ready name or the path of a .py file.
     params
-        The recipe's own object.
+        Its values by attributes.
     path
         Tables in front of every name: of a scene, "geometry".
     """
@@ -166,12 +167,6 @@ def recipe_keys(recipe: str, params: Any = None, path: Steps = ()) -> list[Scene
         replace(key, meaning=_UNIT.sub("", key.meaning), given=key.value != key.default)
         for key in _walk(recipes.parameters(recipe), made, None, path, {})
     ]
-
-
-def params_of(scene: Any) -> Any:
-    """The recipe's own object of a loaded scene; what "auto" stands for has its default."""
-    numbers = {k: v for k, v in scene.geometry.items() if k != "recipe" and v != "auto"}
-    return recipes.made(scene.recipe, numbers)
 
 
 def entries(cls: type[Any]) -> dict[str, str]:
@@ -329,7 +324,11 @@ def _geometry(scene: Any, given: Mapping[str, Any]) -> Iterator[SceneKey]:
         True,
     )
     values = {k: v for k, v in scene.geometry.items() if k != "recipe"}
-    for key in recipe_keys(scene.recipe, params_of(scene), ("geometry",)):
+    # not the recipe's own object: what "auto" stands for follows from the loads
+    numbers = {name: None if value == "auto" else value for name, value in values.items()}
+    known = dict.fromkeys(f.name for f in fields(recipes.parameters(scene.recipe)))
+    params = SimpleNamespace(**known | numbers)
+    for key in recipe_keys(scene.recipe, params, ("geometry",)):
         if key.name not in values:
             # what another table chooses: the elements of the mesh, its symmetry
             continue

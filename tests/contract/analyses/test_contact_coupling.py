@@ -141,6 +141,23 @@ def test_coupling_is_no_effect_left_out_any_more(toy: str) -> None:
         make_plan(as_scene(scene, {**overrides, **COUPLED, **half}))
 
 
+def test_loops_that_shake_down_are_closed() -> None:
+    """Unlike materials and little shear: slip fades from loop to loop, to rounding."""
+    unlike = {
+        "materials.sphere.E": "3.42 GPa",
+        "materials.block.nu": 0.0,
+        "contact.friction": 0.03,
+        "loads.normal": ("1 N",),
+        "loads.cycle_amplitude": 0.1,
+        "geometry.divisions": 6,
+        "want": ("normal", "cycle"),
+    }
+    solution = solved("curved", *unlike.items())
+    (path,) = (one for one in solution.paths if one.cycle)
+    assert abs(path.slip_work) < 1e-2 * path.most_work
+    assert "loop area" not in failures(solution)
+
+
 def test_without_friction_there_is_nothing_to_couple() -> None:
     scene, overrides = TOYS["flat"]
     plan: Any = make_plan(as_scene(scene, {**overrides, **COUPLED, "contact.friction": 0.0}))

@@ -156,6 +156,12 @@ def test_what_was_given_is_written_as_it_was_given() -> None:
     assert again.loads.normal == (50.0,)
 
 
+def test_what_auto_stands_for_needs_no_default_that_fits() -> None:
+    """The default of the patch is too large for this sphere; the loads size another."""
+    text = scene_as_run(load_scene("hertz", {"geometry.radius": "1 mm", "geometry.patch": "auto"}))
+    assert 'patch = "auto"\n' in text
+
+
 @pytest.mark.parametrize(
     ("scene", "changes"),
     [

@@ -99,7 +99,7 @@ def test_describe_tells_it(capsys: pytest.CaptureFixture[str]) -> None:
     """A key that may carry it says so, a choice does not, and a value shows it."""
     from rich.console import Console
 
-    title, keys, _ = described(RIG, ["contact.friction=0.6 +- 0.1"])
+    title, keys = described(RIG, ["contact.friction=0.6 +- 0.1"])
     for key, expected in (("contact.friction", True), ("excitation.points", False)):
         print_keys(Console(width=200), title, keys, key)
         told = capsys.readouterr().out

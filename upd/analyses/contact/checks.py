@@ -146,8 +146,11 @@ def tangential_checks(case: Case, model: ContactModel, t: loading.Sheared) -> li
 
 
 def _loop_check(path: loading.LoadPath) -> Check:
-    """Area of a cycle's loop against the work of slip."""
-    error = abs(path.loop_area / path.slip_work - 1.0) if path.slip_work else path.loop_area
+    """Area of a cycle's loop against the work of slip; where nothing slips, against the product of
+    the largest load and displacement.
+    """
+    size = path.most_work or float(np.abs(path.load).max() * np.abs(path.displacement).max())
+    error = abs(path.loop_area - path.slip_work) / size
     remedy = "the loop is drawn with too few steps: raise loads.cycle_steps"
     return Check("loop area", path.case, error, 1e-2, "|loop area / slip work - 1|", remedy)
 

@@ -91,6 +91,9 @@ class LoadPath:
         First loading to +T*, then the closed loop +T* -> -T* -> +T*; otherwise first loading only.
     slip_work, loop_area
         N mm over the closed loop.
+    most_work
+        Slip work of the loop that has most, N mm: of coupled contact it may fade from loop to loop
+        (shakedown).
     """
 
     case: Case
@@ -99,6 +102,7 @@ class LoadPath:
     cycle: bool = False
     slip_work: float = 0.0
     loop_area: float = 0.0
+    most_work: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -138,15 +142,15 @@ class Sheared:
     terms: Array | float = 0.0
 
 
-def cycle_shares(steps: int, loops: int) -> tuple[Array, int]:
+def cycle_shares(steps: int, loops: int) -> tuple[Array, int, int]:
     """Loads of a cycle over its peak, the first loading and so many loops, and how many of them are
-    before the last loop.
+    before the loops and in each.
     """
     quarter = max(2, steps // 5)
     half = (steps - quarter) // 2
     back, forth = np.linspace(1.0, -1.0, half + 1)[1:], np.linspace(-1.0, 1.0, half + 1)[1:]
     first = np.linspace(0.0, 1.0, quarter + 1)[1:]
-    return np.concatenate([first, *(back, forth) * loops]), quarter + 2 * half * (loops - 1)
+    return np.concatenate([first, *(back, forth) * loops]), quarter, 2 * half
 
 
 # -- normal and tangential contact at once ---------------------------------------------------------

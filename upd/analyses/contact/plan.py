@@ -334,7 +334,9 @@ def auto_core_depth(scene: Scene, patch: float) -> float:
     """
     radius = hertz_radius(scene, max(scene.loads.forces))
     assert scene.sphere_radius is not None
-    curvature = 2.0 * float(sphere_gap(patch / np.sqrt(2.0), scene.sphere_radius)) / patch
+    # the recipe refuses a patch beyond the sphere
+    corner = min(patch / np.sqrt(2.0), scene.sphere_radius)
+    curvature = 2.0 * float(sphere_gap(corner, scene.sphere_radius)) / patch
     return float(max(0.15, curvature, min(0.5, radius / patch)))
 
 

@@ -354,11 +354,13 @@ class Frozen:
 
     def cycle(self, case: Case) -> loading.LoadPath:
         """First loading to +T*, then closed loops +T* -> -T* -> +T*, of which the last counts."""
-        shares, begin = loading.cycle_shares(self.loads.cycle_steps, self.loops)
+        shares, first, steps = loading.cycle_shares(self.loads.cycle_steps, self.loops)
         T, d, work = self.loop(self.loads.cycle_amplitude * shares)
-        area = abs(float(np.trapezoid(T[begin:], d[begin:])))
-        slip_work = float(work[begin:].sum())
-        return loading.LoadPath(case, T, d, True, slip_work, area)
+        area = abs(float(np.trapezoid(T[-steps - 1 :], d[-steps - 1 :])))
+        slip_work = work[first:].reshape(self.loops, steps).sum(axis=1)
+        return loading.LoadPath(
+            case, T, d, True, float(slip_work[-1]), area, float(slip_work.max())
+        )
 
     def learn(self) -> None:
         """Show bodies that learn the tractions of every tangential load and of the cycle.
@@ -394,7 +396,7 @@ class Frozen:
         for ratio in scene.loads.tangential if scene.wants("tangential") else ():
             settled(model, self.components, partial(single, ratio * self.total * self.unit), both)
         if scene.wants("cycle"):
-            shares, _ = loading.cycle_shares(self.loads.cycle_steps, self.loops)
+            shares, *_ = loading.cycle_shares(self.loads.cycle_steps, self.loops)
             shown(lambda: self._path(self.loads.cycle_amplitude * shares).force.T)
 
     def _spread(self, values: Array) -> Array:
