@@ -37,8 +37,8 @@ RIG: dict[str, Any] = LINES | {
 
 
 @cache
-def solved(centrifugal: str = "350 N", friction: float = 0.6) -> ForcedSolution:
-    scene = RIG | {"damper.centrifugal": centrifugal, "contact.friction": friction}
+def solved(centrifugal: str = "350 N") -> ForcedSolution:
+    scene = RIG | {"damper.centrifugal": centrifugal}
     plan = make_plan(load_scene("asymmetric-response", scene))
     found: Any = forced.ANALYSIS.solve(plan, Stages(silent))
     return found  # type: ignore[no-any-return]
@@ -87,6 +87,9 @@ def test_first_slip_by_hand() -> None:
         [[1.0]], [[0.0]], [[1.0]], jenkins, mode=1, amplitudes=[0.1], harmonics=(0, 1)
     ).balance
     assert first_slip(b, np.ones(1), 1.0) == pytest.approx(4.0, rel=1e-12)
+    slides = contacts([[0.0]], [[1.0]], k_n=0.0, k_t=0.25, mu=0.0, preload=1.0)
+    with pytest.raises(InputError, match="no point sticks at rest"):
+        first_slip(replace(b, contacts=slides), np.ones(1), 1.0)
 
 
 def test_numbers_name_the_largest_damping_unless_it_still_rises() -> None:
@@ -111,8 +114,8 @@ def test_sweeps_have_their_modes_too() -> None:
 
 
 def test_without_friction_there_is_nothing_to_damp() -> None:
-    with pytest.raises(InputError, match="no point sticks at rest"):
-        solved(friction=0.0)
+    with pytest.raises(InputError, match="leaves no point that sticks"):
+        load_scene("asymmetric-response", RIG | {"contact.friction": 0.0})
 
 
 def test_a_run_leaves_curves_chart_and_table(

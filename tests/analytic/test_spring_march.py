@@ -77,6 +77,21 @@ def test_nothing_moves_without_a_force(solution: ForcedSolution) -> None:
     assert np.abs(at.q - before).max() < 1e-9 * np.abs(before).max()
 
 
+@pytest.mark.parametrize("mu", [0.0, 0.6])
+def test_faces_that_fit_without_load_carry_the_damper_at_rest(
+    solution: ForcedSolution, mu: float
+) -> None:
+    worn = make_springs(solution.plan, solution.models["thesis"])
+    model = replace(worn.march, gap=np.zeros(worn.march.n), friction=np.full(worn.march.n, mu))
+    at = replace(worn, march=model, rest=np.zeros_like(worn.rest)).at_rest()
+    f = at.f.reshape(3, -1)
+    assert model.columns.T @ at.f == pytest.approx(model.load, abs=1e-9 * np.abs(f).max())
+    assert (np.hypot(*f[1:]) <= mu * f[0] + 1e-9 * f[0].max()).all()
+    before = at.q.copy()
+    InterfaceMarch(model, 430.0, [0.0], 64).period(at)
+    assert np.abs(at.q - before).max() < 1e-9 * np.abs(before).max()
+
+
 def test_rest_needs_forces_that_carry_the_damper(solution: ForcedSolution) -> None:
     springs = make_springs(solution.plan, solution.models["thesis"])
     with pytest.raises(InputError, match="static state"):

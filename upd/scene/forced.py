@@ -359,6 +359,8 @@ def _springs_problems(scene: ForcedScene) -> Iterator[str]:
             f"contact.fit: {c.worn:g} is for whole faces; springs fit loaded or unloaded: write "
             'one of these, or contact.model = "interface"'
         )
+    if scene.wants("nonlinear_modes") and not c.friction:
+        yield "contact.friction: 0 leaves no point that sticks, for nonlinear modes; give friction"
     if gauss and c.share != "area":
         yield 'contact.share: Gauss points have their own shares; write "area"'
     if gauss and not all(isinstance(one, int) for side in SIDES for one in c.lines(side)):

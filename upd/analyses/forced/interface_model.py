@@ -356,16 +356,28 @@ class SpringMarch:
     def at_rest(self) -> InterfaceState:
         """Nothing moves, every point carries its static force.
 
+        Faces that fit without load carry none before F_C: it then acts with friction from there.
+
         Raises
         ------
         InputError
-            When these forces are none: the faces then fit without load, and F_C is not carried.
+            When they cannot carry it.
         """
         model = self.march
         whole = model.compliance + (model.shapes / model.omega**2) @ model.shapes.T
-        w = -(whole @ self.rest.T.ravel()).reshape(3, -1)
-        still = np.zeros(len(model.load))
-        return resting(model, self.rest, w[1:].T, np.zeros(model.n), still)
+        if self.rest.any():
+            w = -(whole @ self.rest.T.ravel()).reshape(3, -1)
+            still = np.zeros(len(model.load))
+            return resting(model, self.rest, w[1:].T, np.zeros(model.n), still)
+        b = np.concatenate([-model.gap, np.zeros(2 * model.n)])
+        found = Coulomb(whole, model.columns, model.friction).solve(b, load=model.load)
+        if not found.converged:
+            raise InputError(
+                'contact.fit: faces that fit "unloaded" do not carry F_C here; to fix it: '
+                'contact.fit = "loaded"'
+            )
+        f, y = (v.reshape(3, -1) for v in (found.at.f, found.at.y))
+        return resting(model, f.T, -y[1:].T, y[0], found.at.s)
 
 
 def spring_march(model: Model, damping: ArrayLike, count: int, seen: int) -> SpringMarch:
