@@ -34,6 +34,8 @@ from upd.vary.wanted import plan_wanted, solve_wanted
 
 #: names of the effect with the levels that a run chose; the second is that of older folders
 CHOSEN_BY_ACCURACY = ("levels chosen by accuracy", "mesh chosen by accuracy")
+#: how many names of a pattern an engineer asks for first
+_FEW = 2
 #: symmetry -> how many copies of the model make the whole
 COPIES = {"full": 1, "half": 2, "quarter": 4}
 
@@ -141,6 +143,38 @@ def keeping(solution: object) -> Iterator[None]:
     except BaseException as error:
         error.partial = solution  # type: ignore[attr-defined]
         raise
+
+
+def first_numbers(results: Sequence[Entry], names: Sequence[str]) -> list[Entry]:
+    """The numbers an engineer asks for first, those of one case side by side.
+
+    Of every name those of the first case where it is not zero, on all its sides.
+
+    Parameters
+    ----------
+    results
+        As in summary.json.
+    names
+        Most important first; of a shell pattern the first two that there are.
+    """
+    first: dict[str, Entry] = {}
+    for entry in sorted(results, key=lambda entry: not entry["value"]):
+        first.setdefault(entry["name"], entry)
+    found = [name for one in names for name in [n for n in first if fnmatchcase(n, one)][:_FEW]]
+    rank = {name: k for k, name in enumerate(found)}
+    mine = [
+        entry
+        for entry in results
+        if entry["name"] in rank and _any_side(entry) == _any_side(first[entry["name"]])
+    ]
+    order = list(dict.fromkeys(entry["case"] for entry in mine))
+    least = {case: min(rank[e["name"]] for e in mine if e["case"] == case) for case in order}
+    return sorted(mine, key=lambda e: (least[e["case"]], order.index(e["case"]), rank[e["name"]]))
+
+
+def _any_side(entry: Entry) -> dict[str, Any]:
+    """What both faces share of a number's case."""
+    return {key: value for key, value in entry["case_fields"].items() if key != "side"}
 
 
 S = TypeVar("S", bound=AnyScene)

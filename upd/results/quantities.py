@@ -206,8 +206,6 @@ DAMPING = Quantity("damping", "%", "damping ratio")
 FREE_PEAK_FREQUENCY = Quantity("peak_frequency", "Hz")
 FREE_PEAK_ACCELERANCE = Quantity("peak_accelerance", "(m/s2)/N")
 PARTICIPATION = Quantity("participation", "1/kg", "participation phi_force phi_output")
-RESPONSE_BELOW = Quantity("response_below", "(m/s2)/N", "accelerance at 0.5 f1, reduced")
-RESPONSE_ABOVE = Quantity("response_above", "(m/s2)/N", "accelerance at 1.2 f1, reduced")
 
 # -- bladed disk ---------------------------------------------------------------------------------
 

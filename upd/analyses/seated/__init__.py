@@ -5,14 +5,15 @@ Coupled contact on every matching node of both faces: forces, stick and slip, st
 
 from __future__ import annotations
 
-from upd.analyses.base import Analysis, rig_needs
+from functools import partial
+
+from upd.analyses.base import Analysis, first_numbers, rig_needs
 from upd.analyses.seated import charts, checks, output, results, varied
 from upd.vary.inputs import coarsened_rig
 
 ANALYSIS = Analysis(
     name="seated",
     headline_names=results.HEADLINE,
-    input_checks=(),
     problem=varied.PROBLEM,
     needs=lambda plan, threads: rig_needs(plan, threads, "blades"),
     check_solution=checks.check_solution,
@@ -20,7 +21,7 @@ ANALYSIS = Analysis(
     sizes=output.sizes,
     write_files=output.write_files,
     charts=charts.charts,
-    headline=results.headline,
+    headline=partial(first_numbers, names=results.HEADLINE),
     ladders=varied.LADDERS,
     verdict_names=("face_N",),
     coarsened=lambda plan: coarsened_rig(plan, ("seating", "stiffness", "moved")),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,6 @@ from upd.analyses.seated.bodies import rigid_balance
 from upd.analyses.seated.plan import AGAIN, LOWERED, RAISED, SHAKEN, SMOOTH, WAYS
 from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, SLIP
-from upd.plot.chart import Entry
 from upd.results import Case, Result
 from upd.results import quantities as q
 from upd.scene.forced_contact import SIDES
@@ -33,7 +32,6 @@ HELD = Case(name="platforms held")
 #: by the axis along which a platform is moved: away from the other, along the damper, up
 _FACE = (q.FACE_K_N, q.FACE_K_T_ALONG, q.FACE_K_T)
 _LEG = (q.LEG_K_N, q.LEG_K_T_ALONG, q.LEG_K_T)
-_STIFFNESSES = {one.name for one in (*_FACE, *_LEG)}
 #: rigid damper that slips on both faces, and in which sense friction acts, by phase
 _BALANCES = {RAISED: "opposing", LOWERED: "reversed", AGAIN: "opposing", SMOOTH: "frictionless"}
 #: state of the damper -> the rigid one beside it; of the seated one friction opposes all it can
@@ -43,32 +41,6 @@ RIGID = {
     "reversed": "rigid damper, full friction along F_C",
     "frictionless": "rigid damper without friction",
 }
-
-
-def headline(results: Sequence[Entry]) -> list[Entry]:
-    """Forces of both faces when F_C is raised, their band, stiffness between the platforms, loss of
-    the first motion.
-    """
-    first: dict[str, tuple[str, str]] = {}
-    for entry in results:
-        # nothing touches on a face that F_C empties
-        if entry["value"] or entry["name"] not in _STIFFNESSES:
-            first.setdefault(entry["name"], _group(entry))
-    mine = [
-        entry
-        for entry in results
-        if entry["name"] in HEADLINE and _group(entry) == first.get(entry["name"])
-    ]
-    order = list(dict.fromkeys(entry["case"] for entry in mine))
-    rank = {name: HEADLINE.index(name) for name in first if name in HEADLINE}
-    least = {case: min(rank[e["name"]] for e in mine if e["case"] == case) for case in order}
-    return sorted(mine, key=lambda e: (least[e["case"]], order.index(e["case"]), rank[e["name"]]))
-
-
-def _group(entry: Entry) -> tuple[str, str]:
-    """What the faces share of a number's case."""
-    fields = entry["case_fields"]
-    return fields.get("name", ""), fields.get("choice", "")
 
 
 def make_results(solution: SeatedSolution) -> list[Result]:
