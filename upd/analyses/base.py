@@ -467,12 +467,13 @@ def printed_of(scene: AnyScene) -> Lookup:
 
 def ready_scene(scene: AnyScene) -> Any:
     """The ready scene of the same kind, recipe and arrangement; None when there is none."""
-    return next((one for one in _ready() if _kind(one) == _kind(scene)), None)
+    return _ready().get(_kind(scene))
 
 
 @cache
-def _ready() -> list[AnyScene]:
-    return [load_scene(name) for name in ready_scenes()]
+def _ready() -> dict[tuple[str, str, str], AnyScene]:
+    """The ready scenes, by kind, recipe and arrangement."""
+    return {_kind(scene): scene for scene in map(load_scene, ready_scenes())}
 
 
 def _kind(scene: AnyScene) -> tuple[str, str, str]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from upd.analyses.measured import FREE, STUCK, damping_charts, measured_traces
+from upd.analyses.measured import FREE, STUCK, measured_traces
 from upd.analyses.modal.output import RESPONSE
 from upd.plot.chart import Axis, Chart, Mark, Trace
 from upd.plot.common import frequency_of, magnitude, scalar, with_content
@@ -23,7 +23,6 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
     responses = with_content(arrays, RESPONSE)
     return [
         *(chart for blade in _BLADES for chart in _response(arrays, responses, blade)),
-        *damping_charts(arrays),
     ]
 
 

@@ -5,21 +5,19 @@ Modes, responses, reduced models, pictures of the mode shapes.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.spatial import cKDTree
 
 from upd.analyses.measured import accelerance_array, measured_arrays
-from upd.analyses.modal.plan import parameters
 from upd.analyses.modal.results import REDUCED, reduced_frequencies
 from upd.analyses.modal.solve import Array, ModalSolution, ModeSet, RigMode, RigResponse
-from upd.errors import MeshError
 from upd.matrices import DofMap, Matrices, write_dof_map, write_matrices
-from upd.mesh import IntArray, Mesh, recipes
+from upd.mesh import Mesh
 from upd.plot.matplotlib import Drawing, draw_sheet, write_png
 from upd.plot.pictures import draw_mode
 from upd.results import Case, Group, variable
@@ -27,6 +25,11 @@ from upd.results import Case, Group, variable
 #: modes drawn of each configuration
 _DRAWN = 4
 _SIZE = (4.2, 5.2)
+#: the mirror image of a half: its name, and its coordinates over those of the half
+_IMAGE, _MIRRORED = ", mirrored", np.array([1.0, -1.0, 1.0])
+#: nodes of a hexahedron in VTK order, turned inside out
+_TURNED = [1, 0, 3, 2, 5, 4, 7, 6, 8, 11, 10, 9, 12, 15, 14, 13, 17, 16, 19, 18]
+_TURNED += [21, 20, 22, 23, 24, 25, 26]
 
 
 #: what the groups of result.nc hold, their attribute ``content``
@@ -118,7 +121,7 @@ def _write_shapes(solution: ModalSolution, folder: Path) -> None:
 
     drawings: dict[str, list[Drawing]] = {}
     for found in solution.sets:
-        meshes, shapes = whole_shapes(solution, found)
+        meshes, shapes = shapes_of(found)
         data: dict[str, dict[str, Array]] = {name: {} for name in meshes}
         for k, (mode, shape) in enumerate(shapes, 1):
             for name, u in shape.items():
@@ -133,13 +136,8 @@ def _write_shapes(solution: ModalSolution, folder: Path) -> None:
         write_png(draw_sheet(mine, _DRAWN, _SIZE), folder / f"modes_{kind}.png")
 
 
-# -- mode shapes on whole bodies: what half a rig saves is mirrored about y = 0 --------------------
-
-
-def whole_shapes(
-    solution: ModalSolution, found: ModeSet
-) -> tuple[dict[str, Mesh], list[tuple[RigMode, dict[str, Array]]]]:
-    """Whole bodies, and every mode's displacement on them.
+def shapes_of(found: ModeSet) -> tuple[dict[str, Mesh], list[tuple[RigMode, dict[str, Array]]]]:
+    """Bodies, halves with their mirror images about y = 0, and every mode's displacement on them.
 
     Returns
     -------
@@ -147,42 +145,19 @@ def whole_shapes(
         Body -> mesh.
     list
         Of every mode, lowest first: the mode, and body -> (n_node, 3) displacement.
-
-    Raises
-    ------
-    MeshError
-        When the half model's nodes are not those of the whole one.
     """
-    scene = solution.plan.scene
-    meshes, _ = recipes.build_mesh(
-        scene.recipe, parameters(scene, found.arrangement, found.kind, "full")
-    )
-    maps = {
-        m.body.name: _onto(m.body.mesh, meshes[m.body.name]) for m in found.modes if m.body.family
-    }
-    return meshes, [
-        (m, {m.body.name: _on_whole(m, meshes[m.body.name], maps)}) for m in found.modes
-    ]
-
-
-def _onto(half: Mesh, mesh: Mesh) -> IntArray:
-    """Node of the half model at each node of the whole one, or at its mirror image."""
-    mirrored = mesh.points.copy()
-    mirrored[:, 1] = np.abs(mirrored[:, 1])
-    distance, node = cKDTree(half.points).query(mirrored)
-    if float(np.max(distance)) > 1e-9 * float(np.ptp(mesh.points, axis=0).max()):
-        raise MeshError(
-            "the half model's nodes are not those of the whole one: make the recipe mirror its mesh"
-        )
-    return np.asarray(node, np.int64)
-
-
-def _on_whole(mode: RigMode, mesh: Mesh, maps: dict[str, IntArray]) -> Array:
-    if not mode.body.family:
-        return mode.shape
-    u = mode.shape[maps[mode.body.name]].copy()
-    # Even modes: x and z alike on both sides, y opposite; odd modes the other way round.
-    signs = np.array([1.0, -1.0, 1.0]) * (1.0 if mode.body.family == "x" else -1.0)
-    other = mesh.points[:, 1] < 0.0
-    u[other] *= signs
-    return np.asarray(u)
+    meshes: dict[str, Mesh] = {}
+    for body, _ in found.found:
+        meshes[body.name] = body.mesh
+        if body.family:
+            points, hexes = body.mesh.points * _MIRRORED, body.mesh.hexes
+            turned = hexes[:, _TURNED[: hexes.shape[1]]]
+            meshes[body.name + _IMAGE] = replace(body.mesh, points=points, hexes=turned)
+    shapes = []
+    for mode in found.modes:
+        shape, name = {mode.body.name: mode.shape}, mode.body.name + _IMAGE
+        if mode.body.family:
+            # even modes: x and z alike on both sides, y opposite; odd modes the other way round
+            shape[name] = mode.shape * _MIRRORED * (1.0 if mode.body.family == "x" else -1.0)
+        shapes.append((mode, shape))
+    return meshes, shapes

@@ -12,8 +12,6 @@ from upd.results import Check
 
 #: to which the conditions of contact and the balance hold, of the largest force or motion
 ROUNDING = 1e-9
-#: the same of works
-WORK_ROUNDING = 1e-8
 
 
 def check_solution(solution: SeatedSolution) -> list[Check]:
@@ -34,7 +32,6 @@ def _phase(solution: SeatedSolution, phase: Phase) -> list[Check]:
     reach = float(np.abs(of.columns[: of.n]).max()) * moves
     overlap = np.maximum(-gap, np.where(normal > 0.0, np.abs(gap), 0.0)).max() / reach
     slip = _stick_misfit(found.state, found.force[..., 1:], step) / reach if mu else 0.0
-    work = _energy_misfit(solution, phase, gap, step)
     return conditions(
         phase.case,
         "report this scene",
@@ -61,12 +58,6 @@ def _phase(solution: SeatedSolution, phase: Phase) -> list[Check]:
             slip,
             ROUNDING,
             "slip of sticking nodes, or slip against its friction / motion of the damper",
-        ),
-        (
-            "energy balance",
-            work,
-            WORK_ROUNDING,
-            "work in less elastic energy and friction / work of all forces",
         ),
     )
 
@@ -120,23 +111,3 @@ def _stick_misfit(state: np.ndarray, shear: Array, step: Array) -> float:
     share = size[..., 0] / size.max(initial=np.finfo(float).tiny)
     aside = share * np.linalg.norm(step - follows[..., None] * way, axis=-1)
     return float(max(stuck, aside[state == SLIP].max(initial=0.0)))
-
-
-def _energy_misfit(solution: SeatedSolution, phase: Phase, gap: Array, step: Array) -> float:
-    """Work of F_C and of the moved blade against elastic energy, friction and closing gaps.
-
-    By the trapezoidal rule, under which the balance is exact: f' dw = p' ds - f' du - d(f'C f)/2.
-    """
-    of, found, before = solution.interface, phase.found, phase.before
-    force = np.concatenate((before.force[None], found.force))
-    gaps = np.vstack((before.gap, gap))
-    mean = 0.5 * (force[1:] + force[:-1])
-    friction = (mean[..., 1:] * step).sum(axis=(1, 2))
-    closing = -(mean[..., 0] * np.diff(gaps, axis=0)).sum(axis=1)
-    f = force.transpose(0, 2, 1).reshape(len(force), -1)
-    elastic = 0.5 * np.diff(((f @ of.compliance) * f).sum(axis=1))
-    # What the forces do in motions that cancel is the measure: a damper carried along does no work.
-    motion = np.vstack((before.motion, found.displacement))
-    moves = np.abs(np.diff(motion, axis=0)) @ np.abs(of.columns.T)
-    size = float((np.abs(f[1:]) * moves).sum())
-    return float(np.abs(found.work - elastic - friction - closing).max() / size)

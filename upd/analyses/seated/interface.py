@@ -213,13 +213,16 @@ class Interface:
         """
         if any(not closed[self.face == k].any() for k in range(len(SIDES))):
             return np.zeros((len(self.directions),) * 2)
-        on = np.tile(closed, 3)
-        U = self.shifts(1)[:, list(self.directions)]
-        X = np.hstack([self.columns, U])[on]
-        S = X.T @ cho_solve(cho_factor(self.compliance[np.ix_(on, on)], lower=True), X)
+        S = self._stuck(closed, np.hstack([self.columns, self.shifts(1)[:, list(self.directions)]]))
         r = len(self.kept)
         K = S[r:, r:] - S[r:, :r] @ np.linalg.solve(S[:r, :r], S[:r, r:])
         return np.asarray(self.copies * 0.5 * (K + K.T))
+
+    def _stuck(self, closed: NDArray[np.bool_], X: Array) -> Array:
+        """X' G^-1 X of motions (3 n, k), G the compliance of the closed nodes."""
+        on = np.tile(closed, 3)
+        factor = cho_factor(self.compliance[np.ix_(on, on)], lower=True)
+        return np.asarray(X[on].T @ cho_solve(factor, X[on]))
 
     def face_stiffness(self, side: int, closed: NDArray[np.bool_]) -> Array:
         """(normal, along, up) N/mm of one face of the whole, its closed nodes stuck.
@@ -231,9 +234,7 @@ class Interface:
         mine = closed & (self.face == side)
         if not mine.any():
             return np.array([0.0, np.nan if self.copies > 1 else 0.0, 0.0])
-        on = np.tile(mine, 3)
-        U = np.repeat(np.eye(3), int(mine.sum()), axis=0)
-        S = U.T @ cho_solve(cho_factor(self.compliance[np.ix_(on, on)], lower=True), U)
+        S = self._stuck(mine, np.repeat(np.eye(3), self.n, axis=0))
         out = self.copies * np.diagonal(S).copy()
         if self.copies > 1:
             out[1] = np.nan
