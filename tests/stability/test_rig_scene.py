@@ -123,7 +123,6 @@ def test_cases_are_data_and_come_back_from_the_file(whole: RunResult) -> None:
     expected = {
         "modes free symmetric": {"content": "modes"} | free,
         "response free": {"content": "response"} | free,
-        "reduction": {"content": "reduction", "name": "Craig-Bampton"},
     }
     assert {name: vars(group)["attributes"] for name, group in whole.arrays.items()} == expected
     kept = read_netcdf(whole.folder / "result.nc")

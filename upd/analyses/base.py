@@ -245,21 +245,11 @@ class Plan(Generic[S]):
         """
         limit = memory_limit(self.scene)
         if self.memory_bytes > limit:
-            mesh = ", ".join(
-                f"{name} {self.parameters[name]}"
-                for name in ("divisions", "refine")
-                if name in self.parameters
-            )
-            coarser = (
-                "(geometry.divisions or geometry.refine), a patch sized from the load, loads "
-                "nearer to each other, ask for less accuracy,"
-            )
-            counts = f" ({mesh})" if mesh else ""
             raise InputError(
-                f"the mesh needs about {self.memory_bytes / 1e9:.3g} GB{counts}, there are "
+                f"the mesh needs about {self.memory_bytes / 1e9:.3g} GB, there are "
                 f"{limit / 1e9:.3g} GB{fitting(self, limit)}: use a coarser mesh "
-                f"{coarser if mesh else ''}".rstrip()
-                + " or close other programs"
+                "(geometry.divisions or geometry.refine), a patch sized from the load, loads "
+                "nearer to each other, ask for less accuracy, or close other programs"
             )
 
     @classmethod
@@ -372,11 +362,11 @@ class Analysis:
     needs: Callable[[Any, int], Needs]
     check_solution: Callable[[Any], list[Check]]
     arrays: Callable[[Any], dict[str, Group]]
-    sizes: Callable[[Any], dict[str, int]]
     charts: Callable[[Arrays, Mapping[str, Any]], list[Chart]]
     headline: Callable[[Sequence[Entry]], list[Entry]]
     ladders: Mapping[str, Ladder]
     input_checks: tuple[str, ...] = ()
+    sizes: Callable[[Any], dict[str, int]] = lambda solution: {}
     write_files: Callable[[Any, Path], None] = lambda solution, folder: None
     answer: Callable[[Sequence[Entry]], list[AnswerTable]] | None = None
     verdict_names: tuple[str, ...] = ()

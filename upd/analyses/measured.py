@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from upd.analyses.base import conditions
 from upd.dynamics import find_peaks
 from upd.errors import InputError
 from upd.measured import (
@@ -37,6 +38,12 @@ FREE, STUCK = "free", "stuck"
 MEASURED_CURVE = "measured curve"
 #: half-power widths on each side of a computed peak, and points in one, for its damping
 _WIDTHS, _POINTS = 4, 25
+
+
+_NOT_WHITE = (
+    "the curve has what its modes have not (a mode more, a nonlinear joint), so errors are too "
+    "small: measure a narrower band or with a smaller force"
+)
 
 
 class ComputedPeak(NamedTuple):
@@ -228,7 +235,7 @@ def _half_power(
 
 def fit_checks(measured: MeasuredChoices) -> list[Check]:
     """Whether what fits leave of the measured free curves are independent errors."""
-    checks = []
+    checks = list[Check]()
     for name, choice in measured.items():
         if choice.state != FREE:
             continue
@@ -236,17 +243,10 @@ def fit_checks(measured: MeasuredChoices) -> list[Check]:
             fit = fit_of(choice)
         except InputError:
             continue  # the number is withheld with the reason
-        checks.append(
-            Check(
-                "measured damping",
-                Case(name=name, kind=FREE, blade=choice.blade),
-                abs(fit.correlation),
-                fit.correlation_limit,
-                "correlation of neighbouring residuals of the fit",
-                "the curve has what its modes have not (a mode more, a nonlinear joint), so "
-                "standard errors are too small: measure a narrower band or with a smaller force",
-                fatal=False,
-            )
+        what = "correlation of neighbouring residuals of the fit"
+        row = "measured damping", abs(fit.correlation), fit.correlation_limit, what
+        checks += conditions(
+            Case(name=name, kind=FREE, blade=choice.blade), _NOT_WHITE, row, fatal=False
         )
     return checks
 

@@ -23,7 +23,6 @@ ANALYSIS = Analysis(
     needs=rig_needs,
     check_solution=output.check_solution,
     arrays=output.arrays,
-    sizes=output.sizes,
     write_files=output.write_files,
     charts=charts.charts,
     headline=partial(first_numbers, names=output.HEADLINE),

@@ -161,12 +161,6 @@ def _farther(proof: Proof) -> np.ndarray:
     return np.asarray(np.where(farther, one, other))
 
 
-def sizes(solution: BladedDiskSolution) -> dict[str, int]:
-    """Nodes of a cyclic face and modes found."""
-    face = 0 if solution.sector is None else len(solution.sector.low)
-    return {"n_face_nodes": face, "n_modes": solution.at_rest.size}
-
-
 def arrays(solution: BladedDiskSolution) -> dict[str, Group]:
     """Frequencies by nodal diameter, at rest and at speed; over the speed; crossings."""
     scene, out = solution.plan.scene, dict[str, Group]()

@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import partial
 
 from upd.analyses.base import Analysis, first_numbers, rig_needs
-from upd.analyses.modal import charts, output, results, varied
+from upd.analyses.modal import output, results, varied
 from upd.vary.inputs import coarsened_rig
 
 ANALYSIS = Analysis(
@@ -18,9 +18,8 @@ ANALYSIS = Analysis(
     needs=lambda plan, threads: rig_needs(plan, threads, "reduction"),
     check_solution=results.check_solution,
     arrays=output.arrays,
-    sizes=output.sizes,
     write_files=output.write_files,
-    charts=charts.charts,
+    charts=output.charts,
     headline=partial(first_numbers, names=results.HEADLINE),
     ladders=varied.LADDERS,
     coarsened=lambda plan: coarsened_rig(plan, ("free", "glued", "response")),

@@ -5,6 +5,7 @@ Modes, responses, reduced models, pictures of the mode shapes.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,14 +14,15 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
-from upd.analyses.measured import accelerance_array, measured_arrays
-from upd.analyses.modal.results import REDUCED, reduced_frequencies
+from upd.analyses.measured import FREE, STUCK, accelerance_array, measured_arrays, measured_traces
 from upd.analyses.modal.solve import Array, ModalSolution, ModeSet, RigMode, RigResponse
 from upd.matrices import DofMap, Matrices, write_dof_map, write_matrices
 from upd.mesh import Mesh
+from upd.plot.chart import Axis, Chart, Mark, Trace
+from upd.plot.common import frequency_of, magnitude, scalar, with_content
 from upd.plot.matplotlib import Drawing, draw_sheet, write_png
 from upd.plot.pictures import draw_mode
-from upd.results import Case, Group, variable
+from upd.results import Arrays, Case, Group, variable
 
 #: modes drawn of each configuration
 _DRAWN = 4
@@ -33,22 +35,16 @@ _TURNED += [21, 20, 22, 23, 24, 25, 26]
 
 
 #: what the groups of result.nc hold, their attribute ``content``
-MODES, RESPONSE, REDUCTION = "modes", "response", "reduction"
-
-
-def sizes(solution: ModalSolution) -> dict[str, int]:
-    """Modes found."""
-    return {"n_modes": sum(len(s.modes) for s in solution.sets)}
+MODES, RESPONSE = "modes", "response"
 
 
 def arrays(solution: ModalSolution) -> dict[str, Group]:
-    """Frequencies of every configuration, responses, and frequencies of the reduced blades.
+    """Frequencies of every configuration, and responses.
 
     Returns
     -------
     dict
-        Group -> variable -> (dimensions, array, attributes). Contents: "modes", "response",
-        "reduction".
+        Group -> variable -> (dimensions, array, attributes). Contents: "modes", "response".
     """
     out = {f"modes {found.kind} {found.arrangement}": _modes(found) for found in solution.sets}
     if solution.response is not None:
@@ -57,26 +53,12 @@ def arrays(solution: ModalSolution) -> dict[str, Group]:
             for kind in solution.response.accelerance
         }
         out |= measured_arrays(solution.plan.scene.measured)
-    if solution.reductions:
-        full, reduced = np.array(reduced_frequencies(solution.reductions)).T
-        variables = {
-            "frequency": variable("mode", reduced, "Hz"),
-            "full": variable("mode", full, "Hz", source="full model"),
-        }
-        out["reduction"] = Group(variables, content=REDUCTION, case=REDUCED)
     return out
 
 
 def _modes(found: ModeSet) -> Group:
-    variables: dict[str, Any] = {
-        "frequency": variable("mode", [m.frequency for m in found.modes], "Hz"),
-        "family": variable(
-            "mode",
-            [{"x": 0, "y": 1}.get(m.body.family, -1) for m in found.modes],
-            flag_meanings="x y",
-        ),
-    }
-    return Group(variables, content=MODES, case=found.case)
+    frequencies = variable("mode", [m.frequency for m in found.modes], "Hz")
+    return Group({"frequency": frequencies}, content=MODES, case=found.case)
 
 
 def _response(response: RigResponse, kind: str) -> Group:
@@ -90,6 +72,60 @@ def _response(response: RigResponse, kind: str) -> Group:
         group["peak_frequency_right"] = variable("peak_right", [at], "Hz")
         group["peak_accelerance_right"] = variable("peak_right", [height], "(m/s2)/N")
     return Group(group, content=RESPONSE, case=Case(kind=kind, arrangement=response.arrangement))
+
+
+# -- charts, from the run folder's arrays alone ----------------------------------------------------
+
+#: the blade that is excited first
+_BLADES = ("right", "left")
+
+
+def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
+    """Responses of both blades; a blade that hears nothing has none."""
+    del summary
+    found = [_blade_chart(arrays, blade) for blade in _BLADES]
+    return [chart for chart in found if chart is not None]
+
+
+def _blade_chart(arrays: Arrays, blade: str) -> Chart | None:
+    """Accelerance of one blade, free and glued."""
+    name = f"accelerance_{blade}"
+    groups = enumerate(with_content(arrays, RESPONSE))
+    curves = [(k, g, magnitude(g[name])) for k, g in groups if name in g and g[name].data.any()]
+    if not curves:
+        return None
+    # a glued damper is what a stuck one is to the measured curve
+    colours = {STUCK if g.attributes["kind"] == "glued" else FREE: k for k, g, _ in curves}
+    # lines lie over the measured points
+    traces = measured_traces(arrays, blade, colours) + tuple(
+        Trace(g.attributes["kind"], frequency_of(g), np.where(H > 0.0, H, np.nan), colour=k)
+        for k, g, H in curves
+    )
+    first = curves[0][1]
+    f, damping = frequency_of(first), scalar(first, "damping")
+    return Chart(
+        "Frequency response",
+        Axis("frequency", "Hz", low=float(f[0]), high=float(f[-1])),
+        Axis("accelerance", first[name].units.replace("m/s2", "m/s²"), log=True),
+        traces,
+        case=f"{blade} blade",
+        figure="response",
+        marks=tuple(mark for k, g, _ in curves for mark in _peaks(g, blade, k)),
+        detail="" if damping is None else f"damping {100.0 * damping:.3g} %",
+    )
+
+
+def _peaks(group: Group, blade: str, colour: int) -> list[Mark]:
+    names = (f"peak_frequency_{blade}", f"peak_accelerance_{blade}")
+    if not set(names) <= set(group):
+        return []
+    pairs = zip(*(group[name].data for name in names), strict=True)
+    return [
+        Mark(float(f), float(height), f"{f:.2f} Hz\n{height:.3g}", colour) for f, height in pairs
+    ]
+
+
+# -- files -----------------------------------------------------------------------------------------
 
 
 def write_files(solution: ModalSolution, folder: Path) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import partial
 
 from upd.analyses.base import Analysis, first_numbers, rig_needs
-from upd.analyses.seated import charts, checks, output, results, varied
+from upd.analyses.seated import charts, output, results, varied
 from upd.vary.inputs import coarsened_rig
 
 ANALYSIS = Analysis(
@@ -16,7 +16,7 @@ ANALYSIS = Analysis(
     headline_names=results.HEADLINE,
     problem=varied.PROBLEM,
     needs=lambda plan, threads: rig_needs(plan, threads, "blades"),
-    check_solution=checks.check_solution,
+    check_solution=results.check_solution,
     arrays=output.arrays,
     sizes=output.sizes,
     write_files=output.write_files,

@@ -29,8 +29,8 @@ FAMILIES = {"x": [1], "y": [0, 2]}
 
 @dataclass(frozen=True)
 class Blade:
-    """A clamped body of a rig, one blade or both with the damper glued between them: mesh, K and M
-    on its free dofs, their numbers in the mesh, and the mirror family of its motion, "" of a whole.
+    """A body of a rig, a blade, the damper, or all glued: mesh, K and M on its free dofs, their
+    numbers in the mesh, and the mirror family of its motion, "" of a whole.
     """
 
     name: str
@@ -117,7 +117,7 @@ def make_blade(
     M = Symmetric.of(mass(mesh, material))
     out = []
     for family in families if is_half(mesh) else ("",):
-        free = free_dofs(mesh, mesh.nodes["clamped"], family)
+        free = free_dofs(mesh, mesh.nodes.get("clamped", np.zeros(0, np.int64)), family)
         out.append(Blade(name, mesh, K.submatrix(free), M.submatrix(free), free, family))
     return out
 

@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, qr
 
 from upd.analyses.base import Plan
-from upd.analyses.seated.bodies import Blade, Bodies, free_dofs, is_half, lattice, patch_frame
+from upd.analyses.seated.bodies import Blade, Bodies, is_half, lattice, make_blade, patch_frame
 from upd.contact import CoupledContact, coupled_contact
 from upd.errors import InputError
-from upd.fem import Material, mass, stiffness
+from upd.fem import Material
 from upd.linalg import factorise
 from upd.linalg.least_distance import least_positive
 from upd.linalg.parallel import in_parallel
-from upd.linalg.symmetric import Symmetric
 from upd.mesh import IntArray
 from upd.reduction import condense
 from upd.scene.forced_contact import SIDES
@@ -62,8 +61,6 @@ class Interface:
         Of each face, unit rows: normal, along the damper, up the slope.
     copies : int
         Models that make the whole: 2 of a half.
-    damper : (3 n, 3 n) ndarray
-        The damper's share of the compliance, mm/N.
     """
 
     compliance: Array
@@ -74,7 +71,6 @@ class Interface:
     area: Array
     frame: Array
     copies: int
-    damper: Array
 
     @property
     def n(self) -> int:
@@ -241,28 +237,15 @@ class Interface:
         return np.asarray(out)
 
 
-def make_interface(
-    plan: Plan[Any], bodies: Bodies, held: str = "bases", like: Interface | None = None
-) -> Interface:
-    """The contact of both faces from a rig's bodies.
+def make_interface(plan: Plan[Any], bodies: Bodies, held: str = "bases") -> Interface:
+    """The contact of both faces from a rig's bodies, of elements whose faces have four nodes.
 
     Parameters
     ----------
     held
         "bases": blades elastic down to the clamped faces of their bases; "platforms": held where
         the platforms' sides join the blades.
-
-    Raises
-    ------
-    InputError
-        For elements whose faces have more than four nodes, whose nodal forces are no pressures.
     """
-    for side in SIDES:
-        if bodies.blades[side].mesh.faces["patch"].shape[1] != 4:
-            raise InputError(
-                f"mesh.element: the seated damper needs faces of four nodes, not those of "
-                f'{plan.scene.mesh.element}; set mesh.element = "hex8i"'
-            )
     blades = [bodies.blades[side] for side in SIDES]
     patches = [lattice(blade.mesh) for blade in blades]
     nodes = [patch.nodes for patch in patches]
@@ -279,9 +262,7 @@ def make_interface(
     for k, part in enumerate(found):
         on = np.flatnonzero(face == k)
         C[:, on[:, None], :, on[None, :]] += part.transpose(1, 3, 0, 2)
-    own, columns = (
-        damper_compliance(plan, bodies, nodes) if like is None else (like.damper, like.columns)
-    )
+    own, columns = damper_compliance(plan, bodies, nodes)
     total = C.reshape(3 * n, 3 * n) + own
     position = np.vstack([b.mesh.points[one] for b, one in zip(blades, nodes, strict=True)])
     half = is_half(bodies.damper_mesh)
@@ -294,9 +275,8 @@ def make_interface(
         face,
         position,
         np.concatenate([patch.area for patch in patches]),
-        np.stack([patch_frame(b.mesh) for b in blades]),
+        np.stack([patch.frame for patch in patches]),
         2 if half else 1,
-        own,
     )
 
 
@@ -342,9 +322,8 @@ def damper_compliance(
     """
     mesh, m, solver = bodies.damper_mesh, plan.scene.material, plan.scene.solver.name
     material = Material(m.E, m.nu, plan.scene.damper.density or m.density)
-    moves = free_dofs(mesh, np.zeros(0, np.int64))
-    K = Symmetric.of(stiffness(mesh, material, plan.scene.mesh.element)).submatrix(moves)
-    M = Symmetric.of(mass(mesh, material)).submatrix(moves)
+    (body,) = make_blade("damper", mesh, material, plan.scene.mesh.element)
+    K, M, moves = body.K, body.M, body.free
     whole = _rigid(mesh.points - bodies.damper.centre)
     if is_half(mesh):
         whole = whole[:, list(EVEN)]
@@ -380,13 +359,8 @@ def damper_compliance(
 
 def _rigid(arms: Array) -> Array:
     """(3 n_node, 6) shifts, and turns theta x arm about the centre."""
-    x, y, z = arms.T
-    none = np.zeros(len(arms))
-    turns = np.array([[none, -z, y], [z, none, -x], [-y, x, none]])
-    R = np.zeros((len(arms), 3, MOTIONS))
-    R[:, :, :3] = np.eye(3)
-    R[:, :, 3:] = turns.transpose(2, 1, 0)
-    return R.reshape(-1, MOTIONS)
+    turns = [np.cross(axis, arms).ravel() for axis in np.eye(3)]
+    return np.column_stack([np.tile(np.eye(3), (len(arms), 1)), *turns])
 
 
 def _damper_nodes(bodies: Bodies, nodes: Sequence[IntArray]) -> list[IntArray]:

@@ -85,12 +85,8 @@ def _history(solution: SeatedSolution, phase: Phase) -> Variables:
             f"stick_{side}": variable(step, (found.state[:, mine] == STICK) @ area, "1"),
         }
     for j in of.kept:
-        axis_name = "xyz"[j % 3]
-        out |= (
-            {f"damper_u{axis_name}": variable(step, motion[:, j], "mm")}
-            if j < 3
-            else {f"damper_r{axis_name}": variable(step, motion[:, j], "rad")}
-        )
+        kind, unit = ("u", "mm") if j < 3 else ("r", "rad")
+        out[f"damper_{kind}{'xyz'[j % 3]}"] = variable(step, motion[:, j], unit)
     loss = of.copies * np.cumsum(phase.friction_loss)
     out["friction_loss"] = variable(step, loss, "N mm", "since the first step")
     return out

@@ -15,9 +15,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.seated.checks import ROUNDING
 from upd.analyses.seated.plan import RAISED, SeatedPlan, make_plan
-from upd.analyses.seated.results import make_results
+from upd.analyses.seated.results import ROUNDING, make_results
 from upd.analyses.seated.solve import SeatedSolution, solve
 from upd.contact.coulomb_conditions import OPEN, SLIP
 from upd.mesh import IntArray
