@@ -27,6 +27,8 @@ State = Literal["free", "stuck"]
 #: of `upd.units.UNITS` to (m/s2)/N
 TO_ACCELERANCE = {"accelerance": (0, 1.0), "mobility": (1, 1e-3), "receptance": (2, 1e-3)}
 QUANTITIES = tuple(TO_ACCELERANCE)
+#: all their units
+RESPONSE_UNITS = frozenset(unit for kind in QUANTITIES for unit in UNITS[kind] if unit)
 #: fewest points of a curve: a peak and both its sides
 LEAST_POINTS = 3
 

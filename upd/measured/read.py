@@ -18,7 +18,7 @@ import numpy as np
 from upd.errors import InputError, one_line
 from upd.measured.curve import (
     LEAST_POINTS,
-    QUANTITIES,
+    RESPONSE_UNITS,
     AskedCurve,
     Blade,
     CurveLabel,
@@ -35,10 +35,9 @@ from upd.measured.curve import (
 )
 from upd.measured.text import read_text
 from upd.results.netcdf import open_netcdf
-from upd.units import UNITS, unit_factor
+from upd.units import unit_factor
 
 _AXIS = "frequency"
-_RESPONSE_UNITS = frozenset(unit for kind in QUANTITIES for unit in UNITS[kind])
 
 
 def read_variables(path: Path, asked: AskedCurve) -> ReadCurve:
@@ -115,7 +114,7 @@ def _responses(group: Any, path: str, unit: str | None) -> Iterator[tuple[str, t
         for name, variable in group.variables.items():
             dims, shape = variable.dimensions, variable.shape
             over = dims == (along,) or (len(dims) == 2 and dims[0] == along and shape[1] == 2)
-            known = unit is not None or _units(variable) in _RESPONSE_UNITS
+            known = unit is not None or _units(variable) in RESPONSE_UNITS
             if name != _AXIS and over and known:
                 yield f"{path}{name}", (group, variable)
     for name, inner in group.groups.items():

@@ -28,6 +28,7 @@ from upd.measured.curve import (
     LABELS,
     LEAST_POINTS,
     QUANTITIES,
+    RESPONSE_UNITS,
     AskedCurve,
     ComplexArray,
     CurveLabel,
@@ -185,10 +186,10 @@ def _chosen(
         raise InputError(f'line {line}: {many} of frequency; name one "frequency [Hz]"')
     with at(_cell(line, axis[0].place, "frequency")):
         scale = _factor(axis[0].unit, ["frequency"])
-    names = list(dict.fromkeys(c.name for c in columns if c.name and _is_response(c, unit)))
-    if not names and asked.column is None:
-        # its unit is what is wrong: reported below
-        names = list(dict.fromkeys(c.name for c in columns if c.name))[:1]
+    named = [c for c in columns if c.name]
+    good = [c for c in named if unit or c.part == "phase" or c.unit in RESPONSE_UNITS]
+    # of none the unit is what is wrong: reported below
+    names = list(dict.fromkeys(c.name for c in good or named[: asked.column is None]))
     with at(f"line {line}"):
         name = the_one(names, asked.column, "columns")
         parts = _parts([c for c in columns if c.name == name], name)
@@ -224,17 +225,6 @@ def _factor(unit: str, kinds: Sequence[str]) -> float:
             raise
         known = str(error).partition("; ")[2]
         raise InputError(f"no unit; write it in brackets behind the name ({known})") from None
-
-
-def _is_response(c: FileColumn, unit: str | None) -> bool:
-    """Whether a column's unit is that of a response, or is given beside the file."""
-    if unit is not None or c.part == "phase":
-        return True
-    try:
-        unit_factor(c.unit, QUANTITIES)
-    except InputError:
-        return False
-    return True
 
 
 def _parts(mine: Sequence[FileColumn], name: str) -> dict[str, FileColumn]:

@@ -29,9 +29,12 @@ _DRAWN = 4
 _SIZE = (4.2, 5.2)
 #: the mirror image of a half: its name, and its coordinates over those of the half
 _IMAGE, _MIRRORED = ", mirrored", np.array([1.0, -1.0, 1.0])
-#: nodes of a hexahedron in VTK order, turned inside out
-_TURNED = [1, 0, 3, 2, 5, 4, 7, 6, 8, 11, 10, 9, 12, 15, 14, 13, 17, 16, 19, 18]
-_TURNED += [21, 20, 22, 23, 24, 25, 26]
+#: nodes of a hexahedron in VTK order, turned inside out: corners, edges, faces and middle
+_TURNED = [
+    *(1, 0, 3, 2, 5, 4, 7, 6),
+    *(8, 11, 10, 9, 12, 15, 14, 13, 17, 16, 19, 18),
+    *(21, 20, 22, 23, 24, 25, 26),
+]
 
 
 #: what the groups of result.nc hold, their attribute ``content``
