@@ -210,6 +210,7 @@ def unequal(left: tuple[Any, ...], right: tuple[Any, ...]) -> Interface:
     for j in range(3):
         moves[:, :, 3 + j] = np.cross(np.eye(3)[j], place)
     columns = np.einsum("nfc,ncr->fnr", turn, moves).reshape(3 * n, 6)
+    none = np.zeros((3 * n, 3 * n))
     return Interface(
         C.reshape(3 * n, 3 * n),
         columns,
@@ -219,6 +220,7 @@ def unequal(left: tuple[Any, ...], right: tuple[Any, ...]) -> Interface:
         np.concatenate(areas),
         np.array(frames),
         1,
+        none,
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +28,6 @@ from upd.progress import Stages
 from upd.reduction import ErrorTarget, ReducedModel, craig_bampton
 from upd.results import Case, Estimates
 from upd.results import quantities as q
-from upd.scene import RigScene
 
 Array = NDArray[np.float64]
 
@@ -198,26 +196,19 @@ def _reduced(solution: ModalSolution, body: Blade) -> ReducedBlade:
             f"modes.below: the {body.name} blade has no mode below {scene.modes.below:g} "
             "Hz; raise it"
         )
+    choice = scene.reduction
+    counted = choice.below is None and choice.error is None
     model = craig_bampton(
         body.K,
         body.M,
         boundary,
-        **_wanted(scene, len(full)),
+        n_modes=choice.count if counted else None,
+        below_hz=choice.below,
+        target=None if choice.error is None else ErrorTarget(choice.error, len(full)),
         rows=boundary,
         solver=scene.solver.name,
     )
     return ReducedBlade(body, model, model.modes(count=len(full)).frequency, np.array(full))
-
-
-def _wanted(scene: RigScene, n_full: int) -> dict[str, Any]:
-    choice = scene.reduction
-    if choice.below is not None:
-        return {"below_hz": choice.below}
-    return (
-        {"n_modes": choice.count}
-        if choice.error is None
-        else {"target": ErrorTarget(choice.error, n_full)}
-    )
 
 
 def free_set(solution: ModalSolution, arrangement: str) -> ModeSet:

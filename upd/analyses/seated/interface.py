@@ -61,6 +61,8 @@ class Interface:
         Of each face, unit rows: normal, along the damper, up the slope.
     copies : int
         Models that make the whole: 2 of a half.
+    damper : (3 n, 3 n) ndarray
+        The damper's share of the compliance, mm/N.
     """
 
     compliance: Array
@@ -71,6 +73,7 @@ class Interface:
     area: Array
     frame: Array
     copies: int
+    damper: Array
 
     @property
     def n(self) -> int:
@@ -237,7 +240,9 @@ class Interface:
         return np.asarray(out)
 
 
-def make_interface(plan: Plan[Any], bodies: Bodies, held: str = "bases") -> Interface:
+def make_interface(
+    plan: Plan[Any], bodies: Bodies, held: str = "bases", like: Interface | None = None
+) -> Interface:
     """The contact of both faces from a rig's bodies, of elements whose faces have four nodes.
 
     Parameters
@@ -262,7 +267,9 @@ def make_interface(plan: Plan[Any], bodies: Bodies, held: str = "bases") -> Inte
     for k, part in enumerate(found):
         on = np.flatnonzero(face == k)
         C[:, on[:, None], :, on[None, :]] += part.transpose(1, 3, 0, 2)
-    own, columns = damper_compliance(plan, bodies, nodes)
+    own, columns = (
+        damper_compliance(plan, bodies, nodes) if like is None else (like.damper, like.columns)
+    )
     total = C.reshape(3 * n, 3 * n) + own
     position = np.vstack([b.mesh.points[one] for b, one in zip(blades, nodes, strict=True)])
     half = is_half(bodies.damper_mesh)
@@ -277,6 +284,7 @@ def make_interface(plan: Plan[Any], bodies: Bodies, held: str = "bases") -> Inte
         np.concatenate([patch.area for patch in patches]),
         np.stack([patch.frame for patch in patches]),
         2 if half else 1,
+        own,
     )
 
 

@@ -115,7 +115,7 @@ def solve(plan: SeatedPlan, stages: Stages) -> SeatedSolution:
                 solution.platforms = (
                     of
                     if scene.blades.held == "platforms"
-                    else make_interface(plan, bodies, "platforms")
+                    else make_interface(plan, bodies, "platforms", like=of)
                 )
         if scene.left_out.solves:
             solution.omissions = list(_solve_again(solution, stages))
