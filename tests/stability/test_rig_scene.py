@@ -93,9 +93,6 @@ def test_reduction_is_an_upper_bound_and_reads_back(whole: RunResult) -> None:
             assert -1e-9 < r.error < 3e-4
     model = ReducedModel.load(whole.folder / "reduced_right.nc")
     assert model.modes(count=1).frequency[0] == pytest.approx(whole.value("f2_reduced"), rel=1e-9)
-    for name in ("response_below", "response_above"):
-        row = next(r for r in whole.rows if r.name == name)
-        assert row.value == pytest.approx(row.reference, rel=5e-3)
 
 
 def test_peak_follows_the_damping_and_can_tune_it() -> None:
@@ -126,17 +123,15 @@ def test_cases_are_data_and_come_back_from_the_file(whole: RunResult) -> None:
     expected = {
         "modes free symmetric": {"content": "modes"} | free,
         "response free": {"content": "response"} | free,
-        "reduction": {"content": "reduction", "name": "Craig-Bampton"},
     }
     assert {name: vars(group)["attributes"] for name, group in whole.arrays.items()} == expected
     kept = read_netcdf(whole.folder / "result.nc")
     assert {name: group.attributes for name, group in kept.items()} == expected
     for entry in (*whole.rows, *whole.checks):
         assert entry.case == Case(**entry.case.given())
-        assert entry.case.name in ("", "Craig-Bampton", "undamped")
+        assert entry.case.name in ("", "Craig-Bampton")
     labels = {
         "peak_frequency": "free, right blade",
-        "response_below": "right blade, undamped, 0.5 f1",
         "f1_free": "free, symmetric",
     }
     assert {r.name: r.case for r in whole.rows if r.name in labels} == labels

@@ -17,7 +17,6 @@ from upd.analyses.forced.plan import ForcedPlan
 from upd.analyses.seated.bodies import Bodies, lattice, make_bodies, patch_frame
 from upd.analyses.seated.interface import Interface, make_interface
 from upd.contact.rigid_damper import equilibrium
-from upd.errors import InputError
 from upd.fem import Material, mass, stiffness
 from upd.reference import half_space_compliance
 from upd.scene import load_scene
@@ -176,12 +175,6 @@ def test_mirror_image_of_the_wedge() -> None:
     order = [np.lexsort(np.round(p[:, [1, 2]], 6).T) for p in place]
     a, b = (s[o, 0] for s, o in zip(sides, order, strict=True))
     np.testing.assert_allclose(a, b, atol=0.01 * a.max())
-
-
-def test_faces_of_eight_nodes_are_refused() -> None:
-    plan, bodies = rig("symmetric", "hex20")
-    with pytest.raises(InputError, match=r'set mesh.element = "hex8i"'):
-        make_interface(plan, bodies)
 
 
 #: unequal pads: nodes along and up the slope, pitch mm, MPa, inclination in degrees

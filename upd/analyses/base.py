@@ -34,6 +34,8 @@ from upd.vary.wanted import plan_wanted, solve_wanted
 
 #: names of the effect with the levels that a run chose; the second is that of older folders
 CHOSEN_BY_ACCURACY = ("levels chosen by accuracy", "mesh chosen by accuracy")
+#: how many names of a pattern an engineer asks for first
+_FEW = 2
 #: symmetry -> how many copies of the model make the whole
 COPIES = {"full": 1, "half": 2, "quarter": 4}
 
@@ -143,6 +145,38 @@ def keeping(solution: object) -> Iterator[None]:
         raise
 
 
+def first_numbers(results: Sequence[Entry], names: Sequence[str]) -> list[Entry]:
+    """The numbers an engineer asks for first, those of one case side by side.
+
+    Of every name those of the first case where it is not zero, on all its sides.
+
+    Parameters
+    ----------
+    results
+        As in summary.json.
+    names
+        Most important first; of a shell pattern the first two that there are.
+    """
+    first: dict[str, Entry] = {}
+    for entry in sorted(results, key=lambda entry: not entry["value"]):
+        first.setdefault(entry["name"], entry)
+    found = [name for one in names for name in [n for n in first if fnmatchcase(n, one)][:_FEW]]
+    rank = {name: k for k, name in enumerate(found)}
+    mine = [
+        entry
+        for entry in results
+        if entry["name"] in rank and _any_side(entry) == _any_side(first[entry["name"]])
+    ]
+    order = list(dict.fromkeys(entry["case"] for entry in mine))
+    least = {case: min(rank[e["name"]] for e in mine if e["case"] == case) for case in order}
+    return sorted(mine, key=lambda e: (least[e["case"]], order.index(e["case"]), rank[e["name"]]))
+
+
+def _any_side(entry: Entry) -> dict[str, Any]:
+    """What both faces share of a number's case."""
+    return {key: value for key, value in entry["case_fields"].items() if key != "side"}
+
+
 S = TypeVar("S", bound=AnyScene)
 
 
@@ -211,21 +245,11 @@ class Plan(Generic[S]):
         """
         limit = memory_limit(self.scene)
         if self.memory_bytes > limit:
-            mesh = ", ".join(
-                f"{name} {self.parameters[name]}"
-                for name in ("divisions", "refine")
-                if name in self.parameters
-            )
-            coarser = (
-                "(geometry.divisions or geometry.refine), a patch sized from the load, loads "
-                "nearer to each other, ask for less accuracy,"
-            )
-            counts = f" ({mesh})" if mesh else ""
             raise InputError(
-                f"the mesh needs about {self.memory_bytes / 1e9:.3g} GB{counts}, there are "
+                f"the mesh needs about {self.memory_bytes / 1e9:.3g} GB, there are "
                 f"{limit / 1e9:.3g} GB{fitting(self, limit)}: use a coarser mesh "
-                f"{coarser if mesh else ''}".rstrip()
-                + " or close other programs"
+                "(geometry.divisions or geometry.refine), a patch sized from the load, loads "
+                "nearer to each other, ask for less accuracy, or close other programs"
             )
 
     @classmethod
@@ -338,11 +362,11 @@ class Analysis:
     needs: Callable[[Any, int], Needs]
     check_solution: Callable[[Any], list[Check]]
     arrays: Callable[[Any], dict[str, Group]]
-    sizes: Callable[[Any], dict[str, int]]
     charts: Callable[[Arrays, Mapping[str, Any]], list[Chart]]
     headline: Callable[[Sequence[Entry]], list[Entry]]
     ladders: Mapping[str, Ladder]
     input_checks: tuple[str, ...] = ()
+    sizes: Callable[[Any], dict[str, int]] = lambda solution: {}
     write_files: Callable[[Any, Path], None] = lambda solution, folder: None
     answer: Callable[[Sequence[Entry]], list[AnswerTable]] | None = None
     verdict_names: tuple[str, ...] = ()
@@ -433,12 +457,13 @@ def printed_of(scene: AnyScene) -> Lookup:
 
 def ready_scene(scene: AnyScene) -> Any:
     """The ready scene of the same kind, recipe and arrangement; None when there is none."""
-    return next((one for one in _ready() if _kind(one) == _kind(scene)), None)
+    return _ready().get(_kind(scene))
 
 
 @cache
-def _ready() -> list[AnyScene]:
-    return [load_scene(name) for name in ready_scenes()]
+def _ready() -> dict[tuple[str, str, str], AnyScene]:
+    """The ready scenes, by kind, recipe and arrangement."""
+    return {_kind(scene): scene for scene in map(load_scene, ready_scenes())}
 
 
 def _kind(scene: AnyScene) -> tuple[str, str, str]:

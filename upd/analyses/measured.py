@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from upd.analyses.base import conditions
 from upd.dynamics import find_peaks
 from upd.errors import InputError
 from upd.measured import (
@@ -22,7 +23,7 @@ from upd.measured import (
 )
 from upd.measured.compare import paired
 from upd.measured.curve import LEAST_POINTS
-from upd.plot.chart import Axis, Chart, Trace
+from upd.plot.chart import Trace
 from upd.plot.common import case_of, frequency_of, magnitude, with_content
 from upd.results import Arrays, Case, Check, ErrorPart, Group, Result, variable, with_parts
 from upd.results import quantities as q
@@ -37,6 +38,12 @@ FREE, STUCK = "free", "stuck"
 MEASURED_CURVE = "measured curve"
 #: half-power widths on each side of a computed peak, and points in one, for its damping
 _WIDTHS, _POINTS = 4, 25
+
+
+_NOT_WHITE = (
+    "the curve has what its modes have not (a mode more, a nonlinear joint), so errors are too "
+    "small: measure a narrower band or with a smaller force"
+)
 
 
 class ComputedPeak(NamedTuple):
@@ -190,24 +197,18 @@ def _damping(
     for k in range(len(fit.zeta)):
         at = replace(case, peak=k + 1)
         zeta, f = float(fit.zeta[k]), float(fit.frequency[k])
-        errors = float(fit.zeta_error[k]), float(fit.frequency_error[k])
         results += [
-            _within(q.FITTED_DAMPING.of(zeta, at), errors[0] / zeta),
-            q.DAMPING_ERROR.of(errors[0], at),
-            _within(q.FITTED_FREQUENCY.of(f, at), errors[1] / f),
-            q.FREQUENCY_ERROR.of(errors[1], at),
+            _within(q.FITTED_DAMPING.of(zeta, at), fit.zeta_error[k] / zeta),
+            _within(q.FITTED_FREQUENCY.of(f, at), fit.frequency_error[k] / f),
         ]
-    return [
-        *results,
-        q.FITTED_NOISE.of(fit.noise.relative, case),
-        q.NOISE_CONSTANT.of(fit.noise.constant, case),
-    ]
+    noise = q.FITTED_NOISE.of(fit.noise.relative, case)
+    return [*results, noise, q.NOISE_CONSTANT.of(fit.noise.constant, case)]
 
 
 def _within(result: Result, standard_error: float) -> Result:
     """A fitted number with what the noise leaves of it, by its relative standard error."""
     basis = "95 % interval of the fit: 1.96 standard errors"
-    bound = float(ndtri(0.975)) * standard_error
+    bound = float(ndtri(0.975) * standard_error)
     return with_parts(result, [ErrorPart("measurement noise", bound, basis)])
 
 
@@ -234,7 +235,7 @@ def _half_power(
 
 def fit_checks(measured: MeasuredChoices) -> list[Check]:
     """Whether what fits leave of the measured free curves are independent errors."""
-    checks = []
+    checks = list[Check]()
     for name, choice in measured.items():
         if choice.state != FREE:
             continue
@@ -242,17 +243,10 @@ def fit_checks(measured: MeasuredChoices) -> list[Check]:
             fit = fit_of(choice)
         except InputError:
             continue  # the number is withheld with the reason
-        checks.append(
-            Check(
-                "measured damping",
-                Case(name=name, kind=FREE, blade=choice.blade),
-                abs(fit.correlation),
-                fit.correlation_limit,
-                "correlation of neighbouring residuals of the fit",
-                "the curve has what its modes have not (a mode more, a nonlinear joint), so "
-                "standard errors are too small: measure a narrower band or with a smaller force",
-                fatal=False,
-            )
+        what = "correlation of neighbouring residuals of the fit"
+        row = "measured damping", abs(fit.correlation), fit.correlation_limit, what
+        checks += conditions(
+            Case(name=name, kind=FREE, blade=choice.blade), _NOT_WHITE, row, fatal=False
         )
     return checks
 
@@ -293,14 +287,12 @@ def measured_arrays(measured: MeasuredChoices) -> dict[str, Group]:
 
 # -- charts ----------------------------------------------------------------------------------------
 
-_BLADES = ("right", "left")
-_PER_N = "(m/s²)/N"
 #: points of a measured curve that are drawn: so many that they touch would hide the computed one
 _DRAWN = 100
 
 
 def measured_traces(arrays: Arrays, blade: str, colours: Mapping[Any, int]) -> tuple[Trace, ...]:
-    """The measured curves of a blade as open points.
+    """The measured curves of a blade as open points, with the modes fitted to free ones.
 
     Parameters
     ----------
@@ -321,33 +313,10 @@ def measured_traces(arrays: Arrays, blade: str, colours: Mapping[Any, int]) -> t
         if colour is None:
             colour, spare = spare, spare + 1
         out.append(_points(group, blade, colour))
+        if "fitted" in group:
+            f, H = frequency_of(group), magnitude(group["fitted"])
+            out.append(Trace(f"modes fitted to {case.name}", f, H, "dotted", colour))
     return tuple(out)
-
-
-def damping_charts(arrays: Arrays) -> list[Chart]:
-    """Every measured free curve with the modes fitted to it."""
-    out = []
-    for group in with_content(arrays, MEASURED_CURVE):
-        blade = case_of(group).blade
-        if "fitted" not in group or blade not in _BLADES:
-            continue
-        f = frequency_of(group)
-        out.append(
-            Chart(
-                "Damping fitted to the measured curve",
-                Axis("frequency", "Hz", low=float(f[0]), high=float(f[-1])),
-                Axis("accelerance", _PER_N, log=True),
-                (
-                    _points(group, blade, 0),
-                    Trace("modes fitted", f, magnitude(group["fitted"]), "line", 1),
-                ),
-                case=f"{case_of(group).name}, {blade} blade",
-                figure="damping",
-                columns=2,
-                size=(6.4, 4.4),
-            )
-        )
-    return out
 
 
 def _points(group: Group, blade: str, colour: int) -> Trace:

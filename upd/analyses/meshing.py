@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from upd.analyses import make_plan
-from upd.analyses.cost import NODES
 from upd.errors import InputError
 from upd.mesh import recipes
 from upd.mesh.recipe_modules import READY, is_file
@@ -39,15 +38,7 @@ class MeshRequest:
         return recipes.made(self.recipe, self.given)
 
 
-def mesh_request(
-    what: str,
-    overrides: Sequence[str] = (),
-    *,
-    arrangement: str | None = None,
-    damper: str | None = None,
-    symmetry: str | None = None,
-    element: str | None = None,
-) -> MeshRequest:
+def mesh_request(what: str, overrides: Sequence[str] = ()) -> MeshRequest:
     """The mesh of a recipe (ready name or .py file) or of a scene; the whole model.
 
     Of a scene it is what its run would mesh, but whole unless the scene itself names a symmetry.
@@ -59,12 +50,6 @@ def mesh_request(
     overrides
         "path=value" texts: of a scene as for a run, of a recipe "radius=5 mm" (or
         "geometry.radius=5 mm").
-    arrangement, damper
-        Configuration of a rig, for recipes that have these parameters.
-    symmetry
-        "full", "half" or "quarter".
-    element
-        "hex8", "hex20" or "hex27".
 
     Raises
     ------
@@ -72,37 +57,19 @@ def mesh_request(
         For an unknown recipe or scene, and for parameters that do not fit.
     """
     is_recipe = what in READY or is_file(what)
-    made = (
-        _of_recipe(what, overrides, element) if is_recipe else _of_scene(what, overrides, element)
-    )
-    known = {f.name for f in fields(recipes.parameters(made.recipe))}
-    chosen = {"arrangement": arrangement, "damper": damper, "symmetry": symmetry}
-    given = dict(made.given)
-    for name, value in chosen.items():
-        if value is None:
-            continue
-        if name not in known:
-            raise InputError(
-                f"--{name}: the recipe {made.recipe!r} has no parameter {name!r}; leave it out"
-            )
-        given[name] = value
-    request = MeshRequest(made.name, made.recipe, given)
+    request = _of_recipe(what, overrides) if is_recipe else _of_scene(what, overrides)
     # what is wrong with them is reported before anything is meshed
     _ = request.parameters
     return request
 
 
-def _of_recipe(recipe: str, overrides: Sequence[str], element: str | None) -> MeshRequest:
+def _of_recipe(recipe: str, overrides: Sequence[str]) -> MeshRequest:
     known = [f.name for f in fields(recipes.parameters(recipe))]
     table: dict[str, Any] = {"recipe": recipe}
     pairs, problems = read_overrides(overrides)
     for path, value in pairs:
         name = path.removeprefix("geometry.")
-        if path == "mesh.element":
-            element = str(value)
-        elif path == "mesh.symmetry":
-            table["symmetry"] = value
-        elif "." in name:
+        if "." in name:
             problems.append(
                 f"--set {path}: a recipe has parameters only ({', '.join(known)}); name a scene "
                 "for its other tables"
@@ -111,14 +78,6 @@ def _of_recipe(recipe: str, overrides: Sequence[str], element: str | None) -> Me
             problems.append(f'--set {path}: "auto" needs the loads of a scene; give a value')
         else:
             table[name] = value
-    if element is not None:
-        if element not in NODES:
-            problems.append(f"--element {element}: is not known; write one of {', '.join(NODES)}")
-        elif "element_nodes" not in known:
-            problems.append(
-                f"--element: the recipe {recipe!r} has no parameter 'element_nodes'; leave it out"
-            )
-        table["element_nodes"] = NODES.get(element, 8)
     given, more = geometry_parameters(table, known)
     problems += [problem.removeprefix("geometry.") for problem in more]
     if problems:
@@ -126,15 +85,14 @@ def _of_recipe(recipe: str, overrides: Sequence[str], element: str | None) -> Me
     return MeshRequest(Path(recipe).stem, recipe, given)
 
 
-def _of_scene(what: str, overrides: Sequence[str], element: str | None) -> MeshRequest:
+def _of_scene(what: str, overrides: Sequence[str]) -> MeshRequest:
     if what not in ready_scenes() and not Path(what).is_file():
         raise InputError(
             f"{what!r} is neither a file here nor a ready scene, nor a recipe; recipes: "
             f"{', '.join(READY)}, or the path of a .py file; scenes: "
             f"{', '.join(ready_scenes())}, or the path of a .toml file"
         )
-    chosen = [] if element is None else [f"mesh.element={element}"]
-    scene = load_scene(what, [*overrides, *chosen])
+    scene = load_scene(what, overrides)
     made = make_plan(scene)
     given = dict(made.parameters)
     if "symmetry" in {f.name for f in fields(recipes.parameters(made.scene.recipe))}:

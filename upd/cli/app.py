@@ -39,29 +39,6 @@ app = App(
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class MeshConfiguration:
-    """What `upd mesh` makes of a recipe or scene.
-
-    Parameters
-    ----------
-    arrangement
-        Of a rig: which sides of the platforms face each other.
-    damper
-        Of a rig: left out, glued to both platforms, or a body of its own.
-    symmetry
-        half or quarter instead of the whole model.
-    element
-        Nodes per hexahedron; hex8 has 8.
-    """
-
-    arrangement: Literal["symmetric", "asymmetric"] | None = None
-    damper: Literal["none", "glued", "free"] | None = None
-    symmetry: Literal["full", "half", "quarter"] | None = None
-    element: Literal["hex8", "hex20", "hex27"] | None = None
-
-
-@Parameter(name="*")
-@dataclass(frozen=True)
 class WhoSolves:
     """Who solves the points of a sweep or study.
 
@@ -82,7 +59,7 @@ class WhoSolves:
     cluster: str = ""
 
 
-_ANY_MESH, _ANYBODY = MeshConfiguration(), WhoSolves()
+_ANYBODY = WhoSolves()
 
 
 def _loaded(scene: str, set: SetOption) -> Any:
@@ -162,7 +139,6 @@ def mesh(
     *,
     output: Annotated[list[Path] | None, Parameter(alias="-o")] = None,
     set: SetOption = None,
-    configuration: MeshConfiguration = _ANY_MESH,
     split: bool = False,
     picture: Path | None = None,
     no_picture: bool = False,
@@ -194,7 +170,7 @@ def mesh(
     from upd.cli.mesh import mesh_files, regenerate
     from upd.scene.keys import recipe_keys
 
-    request = mesh_request(scene, set or [], **asdict(configuration))
+    request = mesh_request(scene, set or [])
     if list:
         keys = recipe_keys(request.recipe, request.parameters)
         print_keys(terminal.console, f"Parameters of {request.recipe}", keys, "")

@@ -20,7 +20,7 @@ Noise may be a part of the value, constant, or both: sigma_k^2 = alpha^2 + (beta
 point counts by 1 / sigma_k; alpha and beta follow from the residuals by the normal likelihood, and
 both steps repeat until they agree. With the weighted Jacobian J and p unknowns the covariance is
 s^2 (J'J)^-1, s^2 = |r|^2 / (n - p). It holds for independent errors: what the curve has and the sum
-has not (another mode, a nonlinear joint) makes neighbouring residuals alike, see `white`.
+has not (another mode, a nonlinear joint) makes neighbouring residuals alike.
 
 References
 ----------
@@ -156,15 +156,10 @@ class DampingFit(Shown):
     points: int
 
     @property
-    def white(self) -> bool:
-        """Whether the residuals may be independent errors: their correlation is within three
-        standard deviations, 3 / sqrt(n), of none.
-        """
-        return abs(self.correlation) <= self.correlation_limit
-
-    @property
     def correlation_limit(self) -> float:
-        """Three standard deviations of the correlation of so many independent errors."""
+        """Three standard deviations of the correlation of so many independent errors: beyond it the
+        residuals are not independent.
+        """
         return float(3.0 / np.sqrt(self.points))
 
     def response(self, frequency: ArrayLike) -> ComplexArray:

@@ -18,15 +18,15 @@ import numpy as np
 from upd.errors import InputError, one_line
 from upd.measured.curve import (
     LEAST_POINTS,
-    QUANTITIES,
+    RESPONSE_UNITS,
     AskedCurve,
     Blade,
     CurveLabel,
-    Faults,
     MeasuredCurve,
     ReadCurve,
     State,
     as_accelerance,
+    at,
     checked_curve,
     label_of,
     response_unit,
@@ -35,13 +35,12 @@ from upd.measured.curve import (
 )
 from upd.measured.text import read_text
 from upd.results.netcdf import open_netcdf
-from upd.units import UNITS, unit_factor
+from upd.units import unit_factor
 
 _AXIS = "frequency"
-_RESPONSE_UNITS = frozenset(unit for kind in QUANTITIES for unit in UNITS[kind])
 
 
-def read_variables(path: Path, asked: AskedCurve, faults: Faults) -> ReadCurve:
+def read_variables(path: Path, asked: AskedCurve) -> ReadCurve:
     """A response of a netCDF file.
 
     Parameters
@@ -50,17 +49,15 @@ def read_variables(path: Path, asked: AskedCurve, faults: Faults) -> ReadCurve:
         The file.
     asked
         Which response.
-    faults
-        Gets what is wrong with the file, with variable and place.
 
     Raises
     ------
     InputError
-        Where something is wrong.
+        What is wrong with the file first, with variable and place.
     """
     try:
         with open_netcdf(path) as file:
-            return _read(file, asked, faults)
+            return _read(file, asked)
     except OSError as error:
         reason = one_line(error)
         raise InputError(
@@ -68,7 +65,7 @@ def read_variables(path: Path, asked: AskedCurve, faults: Faults) -> ReadCurve:
         ) from None
 
 
-def _read(file: Any, asked: AskedCurve, faults: Faults) -> ReadCurve:
+def _read(file: Any, asked: AskedCurve) -> ReadCurve:
     found = dict(_responses(file, "", asked.unit))
     labels = {name: label_of(_said(*one)) for name, one in found.items()}
     fitting = [name for name, label in labels.items() if label.agrees(asked.label)]
@@ -76,23 +73,21 @@ def _read(file: Any, asked: AskedCurve, faults: Faults) -> ReadCurve:
     name = the_one(names, asked.column, "variables")
     label = the_curve([labels[name]], asked.label)
     group, variable = found[name]
-    axis, scale, unit = group.variables[_AXIS], 1.0, ""
-    with faults.at(f"variable {_AXIS}, attribute units"):
+    axis = group.variables[_AXIS]
+    with at(f"variable {_AXIS}, attribute units"):
         scale = unit_factor(_units(axis), ["frequency"])[1]
-    with faults.at(f"variable {name}, attribute units"):
+    with at(f"variable {name}, attribute units"):
         unit = response_unit(_units(variable), asked.unit)
     f, data = scale * np.asarray(axis[...], float), np.asarray(variable[...], float)
     for which, values in ((_AXIS, f), (name, data)):
         for k in np.argwhere(~np.isfinite(values)):
-            at = ", ".join(map(str, k))
-            faults.add(f"variable {which}, place [{at}]", "no finite number; leave it out")
+            place = ", ".join(map(str, k))
+            raise InputError(f"variable {which}, place [{place}]: no finite number; leave it out")
     if len(f) < LEAST_POINTS:
-        faults.add(f"variable {_AXIS}", f"{len(f)} points; a curve has {LEAST_POINTS} or more")
-    faults.check()
+        raise InputError(f"variable {_AXIS}: {len(f)} points; a curve has {LEAST_POINTS} or more")
     values = data[:, 0] + 1j * data[:, 1] if data.ndim == 2 else data
     return checked_curve(
         ReadCurve(f, values, unit, label),
-        faults,
         lambda what, k: f"variable {_AXIS if what == 'frequency' else name}, place [{k}]",
         "magnitudes, or a last dimension of real and imaginary part",
     )
@@ -119,7 +114,7 @@ def _responses(group: Any, path: str, unit: str | None) -> Iterator[tuple[str, t
         for name, variable in group.variables.items():
             dims, shape = variable.dimensions, variable.shape
             over = dims == (along,) or (len(dims) == 2 and dims[0] == along and shape[1] == 2)
-            known = unit is not None or _units(variable) in _RESPONSE_UNITS
+            known = unit is not None or _units(variable) in RESPONSE_UNITS
             if name != _AXIS and over and known:
                 yield f"{path}{name}", (group, variable)
     for name, inner in group.groups.items():
@@ -127,8 +122,6 @@ def _responses(group: Any, path: str, unit: str | None) -> Iterator[tuple[str, t
 
 
 _NETCDF = (".nc", ".nc4", ".cdf", ".h5")
-#: faults of one file that are reported
-MOST_TOLD = 20
 
 
 def read_measured(
@@ -168,7 +161,7 @@ def read_measured(
     Raises
     ------
     InputError
-        When the file is not there or damaged: one message with every fault, its line and column.
+        When the file is not there or damaged: its first fault, with line and column.
 
     Examples
     --------
@@ -184,14 +177,8 @@ def read_measured(
     """
     place = Path(path)
     asked = AskedCurve(column, unit, CurveLabel(blade, state, force_ratio))
-    found, faults = found_in(place, asked)
-    if found is None:
-        more = len(faults) - MOST_TOLD
-        shown = faults[:MOST_TOLD] + ([f"and {more} more"] if more > 0 else [])
-        raise InputError(
-            f"{place}: {len(faults)} problem{'s' * (len(faults) != 1)}\n"
-            + "\n".join(f"  {one}" for one in shown)
-        )
+    with at(str(place)):
+        found = found_in(place, asked)
     H, quantity = as_accelerance(found.frequency, found.values, found.unit)
     label = found.label
     return MeasuredCurve(
@@ -206,8 +193,8 @@ def read_measured(
     )
 
 
-def found_in(path: Path, asked: AskedCurve) -> tuple[ReadCurve | None, list[str]]:
-    """What a file holds, or its faults; files that did not change are read once.
+def found_in(path: Path, asked: AskedCurve) -> ReadCurve:
+    """What a file holds; files that did not change are read once.
 
     Parameters
     ----------
@@ -215,22 +202,22 @@ def found_in(path: Path, asked: AskedCurve) -> tuple[ReadCurve | None, list[str]
         The file.
     asked
         Which response.
+
+    Raises
+    ------
+    InputError
+        What is wrong with it first.
     """
     try:
         file = path.stat()
         return _found(path, file.st_mtime_ns, file.st_size, asked)
     except OSError as error:
-        return None, [f"cannot be read ({error.strerror}); give the file of a measured curve"]
+        raise InputError(
+            f"cannot be read ({error.strerror}); give the file of a measured curve"
+        ) from None
 
 
 @lru_cache(maxsize=64)
-def _found(
-    path: Path, changed: int, size: int, asked: AskedCurve
-) -> tuple[ReadCurve | None, list[str]]:
+def _found(path: Path, changed: int, size: int, asked: AskedCurve) -> ReadCurve:
     del changed, size
-    read = read_variables if path.suffix.lower() in _NETCDF else read_text
-    faults = Faults()
-    try:
-        return read(path, asked, faults), []
-    except InputError as error:
-        return None, faults.found or [str(error)]
+    return (read_variables if path.suffix.lower() in _NETCDF else read_text)(path, asked)

@@ -206,8 +206,6 @@ DAMPING = Quantity("damping", "%", "damping ratio")
 FREE_PEAK_FREQUENCY = Quantity("peak_frequency", "Hz")
 FREE_PEAK_ACCELERANCE = Quantity("peak_accelerance", "(m/s2)/N")
 PARTICIPATION = Quantity("participation", "1/kg", "participation phi_force phi_output")
-RESPONSE_BELOW = Quantity("response_below", "(m/s2)/N", "accelerance at 0.5 f1, reduced")
-RESPONSE_ABOVE = Quantity("response_above", "(m/s2)/N", "accelerance at 1.2 f1, reduced")
 
 # -- bladed disk ---------------------------------------------------------------------------------
 
@@ -318,9 +316,7 @@ FREQUENCY_DIFFERENCE = Quantity(
 )
 HALF_POWER_DAMPING = Quantity("half_power_damping", "%", "damping ratio by half power")
 FITTED_DAMPING = Quantity("fitted_damping", "%", "damping ratio fitted to the measured curve")
-DAMPING_ERROR = Quantity("fitted_damping_error", "%", "its standard error", is_error=True)
 FITTED_FREQUENCY = Quantity("fitted_frequency", "Hz", "natural frequency fitted to the curve")
-FREQUENCY_ERROR = Quantity("fitted_frequency_error", "Hz", "its standard error", is_error=True)
 FITTED_NOISE = Quantity("fitted_noise", "%", "noise of the measured curve, part of the value")
 NOISE_CONSTANT = Quantity("fitted_noise_constant", "(m/s2)/N", "noise of the curve, constant")
 

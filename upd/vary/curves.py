@@ -93,18 +93,25 @@ def make_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[Con
     good, curves = without_failed(solved), []
     for key in matching(good, names):
         ladders: dict[str, list[SolvedPoint]] = {}
-        for one in good:
-            if np.isfinite(one.values.get(key, np.nan)):
-                ladders.setdefault(one.point.source, []).append(one)
+        for one in _with(good, key):
+            ladders.setdefault(one.point.source, []).append(one)
         for curve, points in ladders.items():
+            most = max(p.outcome.n_dof for p in points)
             others = [_finest(them) for name, them in ladders.items() if name != curve]
-            finer = max(others, key=lambda p: p.outcome.n_dof, default=None)
-            if finer is not None and finer.outcome.n_dof <= max(p.outcome.n_dof for p in points):
-                finer = None
+            finer = max(
+                (one for one in others if one.outcome.n_dof > most),
+                key=lambda p: p.outcome.n_dof,
+                default=None,
+            )
             # What ends in zero has no relative error.
             if points[-1].values[key]:
                 curves.append(_curve(key, points, finer))
     return curves
+
+
+def _with(points: Iterable[SolvedPoint], key: Key) -> list[SolvedPoint]:
+    """The points that have the number."""
+    return [one for one in points if np.isfinite(one.values.get(key, np.nan))]
 
 
 def _finest(points: Sequence[SolvedPoint]) -> SolvedPoint:
@@ -175,8 +182,13 @@ def _curve(key: Key, points: Sequence[SolvedPoint], finer: SolvedPoint | None) -
         order=fit_rate(h, error) if clear else float("nan"),
         thesis_error=next((p.printed_errors[key] for p in points if key in p.printed_errors), None),
         change=change,
-        estimate=estimate_error(h, values) if len(set(h)) == len(h) and not no_limit else None,
+        estimate=None if no_limit else _estimate(h, values),
     )
+
+
+def _estimate(h: Sequence[float], values: Array) -> ErrorEstimate | None:
+    """None of choices that are no levels, which have one size."""
+    return estimate_error(h, values) if len(set(h)) == len(h) else None
 
 
 def finest_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[ConvergenceCurve]:
@@ -189,58 +201,24 @@ def finest_curves(solved: Iterable[SolvedPoint], names: Iterable[str]) -> list[C
     good = without_failed(solved)
     curves = []
     for key in with_friction(matching(good, names)):
-        mine = [p for p in good if np.isfinite(p.values.get(key, np.nan))]
+        mine = _with(good, key)
         if len(mine) < 2 or mine[-1] is not good[-1]:
             continue
         values = np.array([p.values[key] for p in mine])
         reference = float(values[-1])
         error = values / reference - 1.0 if reference else np.zeros(0)
         if error.any():
-            h = [p.point.size for p in mine]
-            # Choices that are no levels have one size.
-            estimate = estimate_error(h, values) if len(set(h)) == len(h) else None
+            estimate = _estimate([p.point.size for p in mine], values)
             order = float("nan") if estimate is None else estimate.order
-            curves.append(
-                make_curve(
-                    mine[-1].point.source,
-                    key,
-                    mine,
-                    error,
-                    reference,
-                    "finest level",
-                    seconds=tuple(map(_friction_seconds, mine)),
-                    order=order,
-                    change=order,
-                    estimate=estimate,
-                )
-            )
+            shown = {"order": order, "change": order, "estimate": estimate}
+            source = mine[-1].point.source
+            curves.append(make_curve(source, key, mine, error, reference, "finest level", **shown))
     return curves
 
 
 def with_friction(keys: Iterable[Key]) -> list[Key]:
     """Numbers of the curve with friction, and what the model gives."""
     return [(name, case) for name, case in keys if case.kind not in _LINEAR]
-
-
-def _friction_seconds(one: SolvedPoint) -> float:
-    """Of the curve with friction and its sweeps, which the levels change, where there is one."""
-    curve = [value for (name, _), value in one.values.items() if name == "curve_seconds"]
-    return curve[0] + one.outcome.stages.get("sweeps", 0.0) if curve else one.outcome.seconds
-
-
-def accuracy_curves(solved: Sequence[SolvedPoint], keys: Sequence[Key]) -> list[ConvergenceCurve]:
-    """Estimated error of every number over the cost of a level, and the true one beside it."""
-    good = without_failed(solved)
-    curves = []
-    for key in keys:
-        kinds = {ESTIMATED: [one.estimates for one in good], TRUE: list(map(true_errors, good))}
-        for curve, errors in kinds.items():
-            mine = [(one, at[key]) for one, at in zip(good, errors, strict=True) if key in at]
-            if mine:
-                points = [one for one, _ in mine]
-                reference = points[-1].values.get(key, float("nan"))
-                curves.append(make_curve(curve, key, points, [e for _, e in mine], reference, ""))
-    return curves
 
 
 def true_errors(one: SolvedPoint) -> dict[Key, float]:
@@ -264,19 +242,19 @@ def make_curve(
 ) -> ConvergenceCurve:
     """The curve of a number over points, with what they cost."""
     name, case = key
-    found: dict[str, Any] = {
-        "curve": curve,
-        "name": name,
-        "case": case.label,
-        "labels": tuple(p.point.label for p in points),
-        "h": tuple(p.point.size for p in points),
-        "error": tuple(map(float, error)),
-        "seconds": tuple(p.outcome.seconds for p in points),
-        "memory_mb": tuple(p.outcome.memory_mb for p in points),
-        "reference": reference,
-        "against": against,
-    }
-    return ConvergenceCurve(**(found | more))
+    return ConvergenceCurve(
+        curve,
+        name,
+        case.label,
+        tuple(p.point.label for p in points),
+        tuple(p.point.size for p in points),
+        tuple(map(float, error)),
+        tuple(p.outcome.seconds for p in points),
+        tuple(p.outcome.memory_mb for p in points),
+        reference,
+        against,
+        **more,
+    )
 
 
 # -- tables of a study -----------------------------------------------------------------------------
@@ -356,7 +334,7 @@ def convergence_tables(
     solved: Sequence[SolvedPoint], curves: Sequence[ConvergenceCurve]
 ) -> tuple[AnswerTable, AnswerTable]:
     """The points with their main numbers and cost, then the curves: the error of every followed
-    number on its finest level, its rate, the error estimated there, and those of the other levels.
+    number on its finest level, its rate, and the error estimated there.
     """
     last = {c.name: c.case for c in curves}
     keys = [
@@ -375,7 +353,6 @@ def convergence_tables(
             ("# thesis", lambda c: percent(c.thesis_error)),
             ("against", lambda c: str(c.against)),
             ("verdict", lambda c: str(c.verdict)),
-            ("error on each level", _levels_text),
         ),
         curves,
     )
@@ -442,10 +419,6 @@ def level_table(
         ),
         keys,
     )
-
-
-def _levels_text(c: ConvergenceCurve) -> str:
-    return ", ".join(f"{label}: {percent(e)}" for label, e in zip(c.labels, c.error, strict=True))
 
 
 def _estimated(curve: ConvergenceCurve) -> str:

@@ -18,7 +18,6 @@ from dataclasses import replace
 from typing import Any
 
 from upd.errors import UpdError, one_line
-from upd.mesh import recipes
 from upd.progress import Stages
 from upd.results.number import InputPart, InputParts, Result
 from upd.scene import load_scene
@@ -95,14 +94,10 @@ def with_input_cost(analysis: Any, plan: Any) -> Any:
     if not plan.scene.uncertain:
         return plan
     ends, seconds = input_ends(plan.scene), 0.0
-    if recipes.counted_by_mesh(plan.scene.recipe):
-        # a plan runs a user's recipe once; the run makes coarser meshes: this much at most
-        seconds = plan.seconds - plan.estimate_seconds - plan.files_seconds
-    else:
-        # what is refused is not solved either
-        with suppress(UpdError):
-            cheap = analysis.make_plan(changed(ends[0][1], analysis.coarsened(plan)))
-            seconds = cheap.seconds - cheap.files_seconds
+    # what is refused is not solved either
+    with suppress(UpdError):
+        cheap = analysis.make_plan(changed(ends[0][1], analysis.coarsened(plan)))
+        seconds = cheap.solve_seconds
     seconds *= 2.0 * len(ends)
     return replace(plan, seconds=plan.seconds + seconds, input_seconds=seconds)
 

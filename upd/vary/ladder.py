@@ -10,18 +10,20 @@ from typing import Any
 from upd.errors import InputError
 from upd.results.answer_table import AnswerTable
 from upd.vary.curves import (
+    ESTIMATED,
+    TRUE,
     ConvergenceCurve,
-    accuracy_curves,
     convergence_tables,
     enough,
     finest_curves,
     level_table,
+    make_curve,
     make_curves,
     points_table,
     true_errors,
     with_friction,
 )
-from upd.vary.outcome import SolvedPoint, matching
+from upd.vary.outcome import SolvedPoint, matching, without_failed
 from upd.vary.variation import Key, Overrides, Variation
 
 #: divisions, refinements, numbers of modes ...: the levels a user asks for; None: the usual ones
@@ -89,20 +91,23 @@ def accuracy_report(
     del scene
     known = {key for one in solved for key in one.estimates}
     keys = [key for key in matching(solved, names) if key in known]
-    tables = [points_table(solved)]
-    kinds: dict[str, Callable[[SolvedPoint], Mapping[Key, float]]] = {
-        "Estimated error": lambda one: one.estimates,
-        "True error": true_errors,
+    tables, curves, good = [points_table(solved)], list[ConvergenceCurve](), without_failed(solved)
+    kinds: dict[str, tuple[str, Callable[[SolvedPoint], Mapping[Key, float]]]] = {
+        ESTIMATED: ("Estimated error", lambda one: one.estimates),
+        TRUE: ("True error", true_errors),
     }
-    for title, errors in kinds.items():
+    for kind, (title, errors) in kinds.items():
 
         def text(one: SolvedPoint, key: Key, errors: Any = errors) -> str:
             return f"{100.0 * abs(errors(one)[key]):.2g} %" if key in errors(one) else ""
 
-        rows = [key for key in keys if any(key in errors(one) for one in solved)]
+        rows = [key for key in keys if any(key in errors(one) for one in good)]
         tables += [level_table(title, rows, solved, text)] * bool(rows)
-    curves = tuple(accuracy_curves(solved, keys))
-    return StudyReport(tuple(tables), bool(known), (), curves)
+        for key in rows:
+            mine = [one for one in good if key in errors(one)]
+            found = [errors(one)[key] for one in mine]
+            curves.append(make_curve(kind, key, mine, found, mine[-1].values[key], ""))
+    return StudyReport(tuple(tables), bool(known), (), tuple(curves))
 
 
 @dataclass(frozen=True)

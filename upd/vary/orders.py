@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -74,14 +73,10 @@ def extrapolate(h: ArrayLike, values: ArrayLike) -> tuple[float, float]:
         )
     weight = np.sqrt(1.0 / size)
 
-    def fit(p: float) -> tuple[float, np.ndarray[tuple[int], np.dtype[np.float64]]]:
-        A = np.column_stack([np.ones_like(size), (size / size.max()) ** p])
-        solution, *_ = np.linalg.lstsq(A * weight[:, None], q * weight, rcond=None)
-        return float(np.sum((weight * (A @ solution - q)) ** 2)), solution
-
     grid = np.linspace(0.5, 4.0, 141)
-    best = min(grid, key=lambda p: fit(p)[0])
-    return float(fit(best)[1][0]), float(best)
+    fits = {p: _limit([np.ones_like(size), (size / size.max()) ** p], q, weight) for p in grid}
+    best = min(grid, key=lambda p: fits[p][2])
+    return fits[best][0], float(best)
 
 
 def two_level_error(coarse: float, fine: float, ratio: float, order: float = 1.0) -> float:
@@ -347,7 +342,8 @@ def fitted_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
         return ErrorEstimate(0.0, float("inf"), "the same on all levels")
     if fine == 0.0:
         return ErrorEstimate(float("inf"), float("nan"), "the finest level is zero")
-    found = {p: _weighted_fit(x, q, p) for p in np.linspace(_LOWEST, _FORMAL, 31)}
+    orders = np.linspace(_LOWEST, _FORMAL, 31)
+    found = {p: _limit([np.ones_like(x), x**p], q, x**-SCATTER) for p in orders}
     best, n = min(found, key=lambda p: found[p][2]), len(q)
     least = found[best][2] / (n - 3)
     gain = found[_FORMAL][2] - found[best][2]
@@ -380,18 +376,16 @@ def ladder_error(h: ArrayLike, values: ArrayLike) -> ErrorEstimate:
     return estimate_error(h, values) if one_way else fitted_error(h, values)
 
 
-def _weighted_fit(
-    x: np.ndarray[Any, np.dtype[np.float64]], q: np.ndarray[Any, np.dtype[np.float64]], p: float
+def _limit(
+    columns: Sequence[FloatArray], q: FloatArray, weight: FloatArray
 ) -> tuple[float, float, float]:
-    """limit + C h^p by least squares with deviations that go with x^(3/2).
-
-    The limit, its variance over that of the weighted deviations, the sum of their squares.
+    """Weighted least squares: the first coefficient, its variance over that of the weighted
+    deviations, the sum of their squares.
     """
-    weight = x**-SCATTER
-    A = np.column_stack([weight, weight * x**p])
+    A = np.column_stack(columns) * weight[:, None]
     solution, *_ = np.linalg.lstsq(A, weight * q, rcond=None)
     off = weight * q - A @ solution
-    return float(solution[0]), float(np.linalg.inv(A.T @ A)[0, 0]), float(off @ off)
+    return float(solution[0]), float(np.linalg.pinv(A.T @ A)[0, 0]), float(off @ off)
 
 
 # -- levels that are each sampled at neighbouring loads --------------------------------------------
@@ -466,9 +460,9 @@ def sampled_error(sizes: Sequence[float], samples: Sequence[FloatArray]) -> Erro
         return ErrorEstimate(float("nan"), float("nan"), why)
     logarithmic = bool(np.all(q / fine > 0.0))
     y = np.log(q / fine) if logarithmic else q / fine - 1.0
-    fits = [_fit(t, x, y, p) for p in ORDERS]
-    away, spread, squares = (np.array(column) for column in zip(*fits, strict=True))
-    spread = spread * np.sqrt(squares / freedom)
+    fits = [_limit([np.ones_like(t), t, t**2, x**p], y, x**-SCATTER) for p in ORDERS]
+    away, variance, squares = (np.array(column) for column in zip(*fits, strict=True))
+    spread = np.sqrt(variance) * np.sqrt(squares / freedom)
     least = float(squares.min())
     weight = (squares / least) ** (-0.5 * len(sizes)) if least else (squares == 0.0).astype(float)
     weight /= weight.sum()
@@ -483,16 +477,6 @@ def sampled_error(sizes: Sequence[float], samples: Sequence[FloatArray]) -> Erro
         f"{100 * CONFIDENCE:.0f} % interval",
         ORDERS[k] if clear else SCATTER,
     )
-
-
-def _fit(t: FloatArray, x: FloatArray, y: FloatArray, order: float) -> tuple[float, float, float]:
-    """The limit at t = 0, its standard error over that of a weighted deviation, their squares."""
-    weight = x**-SCATTER
-    A = np.column_stack([np.ones_like(t), t, t**2, x**order]) * weight[:, None]
-    solution, *_ = np.linalg.lstsq(A, weight * y, rcond=None)
-    off = weight * y - A @ solution
-    spread = np.sqrt(np.linalg.pinv(A.T @ A)[0, 0])
-    return float(solution[0]), float(spread), float(off @ off)
 
 
 def _exceeded(away: FloatArray, spread: FloatArray, weight: FloatArray, freedom: int) -> float:

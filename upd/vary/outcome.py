@@ -80,11 +80,6 @@ class SolvedPoint:
     point: Variation
     outcome: Outcome
 
-    @property
-    def name(self) -> str:
-        """The point with its ladder."""
-        return f"{self.point.source}, {self.point.label}"
-
     @cached_property
     def values(self) -> dict[Key, float]:
         """Its numbers; nan where one was not reached."""

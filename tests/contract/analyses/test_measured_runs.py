@@ -46,12 +46,9 @@ def test_free_curve(run: upd.RunResult) -> None:
     assert abs(found["peak_frequency_difference"].value) < 0.05
     assert found["computed_peak_accelerance"].error == pytest.approx(0.0, abs=0.03)
     assert found["half_power_damping"].error == pytest.approx(0.0, abs=0.05)
-    fitted, error = found["fitted_damping"].value, found["fitted_damping_error"].value
+    fitted, bound = found["fitted_damping"].value, found["fitted_damping"].estimated_error
     assert fitted == pytest.approx(0.4, rel=0.01)
-    assert 0.001 < error < 0.004
-    bound = found["fitted_damping"].estimated_error
-    assert bound is not None
-    assert bound * fitted == pytest.approx(1.96 * error, rel=1e-4)
+    assert bound is not None and 0.001 < bound * fitted / 1.96 < 0.004
     assert found["fitted_noise"].value == pytest.approx(2.0, rel=0.15)
 
 
@@ -99,11 +96,11 @@ def test_arrays_and_figures(run: upd.RunResult) -> None:
     assert np.array_equal(again.accelerance, mine.accelerance)
     stored = upd.read_measured(run.folder / "result.nc", column="measured free/accelerance_right")
     assert np.array_equal(stored.accelerance, mine.accelerance)
-    assert (run.folder / "damping.png").exists()
     for case, entries in (("right blade", 2), ("left blade", 2)):
         (axes,) = run.plot("Frequency response", case=f"{case}, stiffness own")
         labels = [line.get_label() for line in axes.get_lines()]
         assert sum(str(label).startswith("measured") for label in labels) == entries
+        assert ("modes fitted to free" in labels) == (case == "right blade")
 
 
 @pytest.fixture(scope="module")

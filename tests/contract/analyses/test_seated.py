@@ -310,7 +310,6 @@ SPOIL: dict[str, Callable[[SeatedSolution], SeatedSolution]] = {
     "Coulomb's cone": lambda s: _force(s, 1.0 + 1e-7, 2),
     "no penetration": _displaced,
     "sticking nodes": _all_stick,
-    "energy balance": lambda s: _found(s, LOWERED, work=1.001 * s.phases[LOWERED].found.work),
     "worn faces": _changed("worn faces"),
 }
 

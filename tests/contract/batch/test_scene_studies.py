@@ -24,12 +24,11 @@ from upd.results import Case, Result
 from upd.vary.curves import (
     ESTIMATED,
     TRUE,
-    accuracy_curves,
     finest_curves,
     make_curves,
     markdown_table,
 )
-from upd.vary.ladder import limit_report
+from upd.vary.ladder import accuracy_report, limit_report
 from upd.vary.outcome import Outcome, SolvedPoint, read_outcome
 from upd.vary.variation import Variation
 
@@ -281,15 +280,6 @@ def test_both_sweeps_have_their_order() -> None:
     assert curves[down.label].verdict == "converges, order 1.0"
 
 
-def test_seconds_are_those_of_what_the_levels_change() -> None:
-    spent = Result("curve_seconds", Case(), 2.0, "s")
-    levels = [level("steps", n, peak(310.0 + 1 / n), spent) for n in (1, 2)]
-    sweeps = [replace(one, outcome=replace(one.outcome, stages={"sweeps": 5.0})) for one in levels]
-    for solved, seconds in ((levels, 2.0), (sweeps, 7.0)):
-        (curve,) = finest_curves(solved, ["peak_1_frequency"])
-        assert curve.seconds == (seconds, seconds)
-
-
 def test_time_steps_are_of_the_sweeps_and_samples_of_the_balance() -> None:
     scene = load_scene("symmetric-response")
     for vary, method in (("steps", "march"), ("samples", "balance")):
@@ -327,8 +317,7 @@ def test_a_ladder_of_accuracies_tells_estimated_and_true_errors(tmp_path: Path) 
 def test_an_estimate_comes_back_from_a_worker() -> None:
     one = level("accuracy", 1, replace(peak(310.0), estimated_error=0.02))
     assert [r.estimated_error for r in one.outcome.results] == [0.02]
-    key = (one.outcome.results[0].name, one.outcome.results[0].case)
-    (curve,) = accuracy_curves([one], [key])
+    (curve,) = accuracy_report(None, [one], ["*"]).curves
     assert (curve.curve, curve.error) == (ESTIMATED, (0.02,))
 
 
@@ -346,8 +335,7 @@ def test_a_narrow_terminal_keeps_order_and_estimate() -> None:
     printed = console.file.getvalue()  # type: ignore[attr-defined]
     assert "estimated" in printed
     assert "order" in printed
-    text = "\n".join(markdown_table(report.details[0]))
-    assert "refine 0.5: +" in text
+    assert "0.93 %" in "\n".join(markdown_table(report.details[0]))
 
 
 def test_figures_show_both_costs_and_the_estimate() -> None:

@@ -317,7 +317,7 @@ def test_functions_of_arrays_have_a_section_parameters(room: str) -> None:
 
 #: room -> lines of code it may have; less is better, and a room that shrinks takes its limit along
 ROOM_LINES = {
-    "analyses": 11761,
+    "analyses": 11448,
     "hbm": 6281,
     "contact": 3532,
     "linalg": 2716,
@@ -328,10 +328,10 @@ ROOM_LINES = {
     "sizing": 1329,
     "batch": 1459,
     "mesh": 1409,
-    "vary": 1277,
+    "vary": 1240,
     "reference": 915,
     "cli": 825,
-    "measured": 883,
+    "measured": 814,
     "reduction": 1116,
     "results": 787,
     "fem": 728,

@@ -5,14 +5,15 @@ Modes by nodal diameter, Campbell diagram, interference diagram.
 
 from __future__ import annotations
 
-from upd.analyses.base import Analysis, rig_needs
+from functools import partial
+
+from upd.analyses.base import Analysis, first_numbers, rig_needs
 from upd.analyses.bladed_disk import charts, output, plan, solve
 from upd.vary.variation import Problem
 
 ANALYSIS = Analysis(
     name="bladed_disk",
     headline_names=output.HEADLINE,
-    input_checks=(),
     problem=Problem(
         plan.make_plan,
         solve.solve,
@@ -22,10 +23,8 @@ ANALYSIS = Analysis(
     needs=rig_needs,
     check_solution=output.check_solution,
     arrays=output.arrays,
-    sizes=output.sizes,
     write_files=output.write_files,
     charts=charts.charts,
-    headline=output.headline,
+    headline=partial(first_numbers, names=output.HEADLINE),
     ladders=plan.LADDERS,
-    answer=output.answer,
 )

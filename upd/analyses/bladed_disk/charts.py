@@ -68,28 +68,20 @@ def _by_diameter(group: Group) -> Chart:
     traces = [
         Trace(f"mode {k + 1}", n, f[:, k], "both", k % 10, entry="modes") for k in range(f.shape[1])
     ]
-    speed, case, marks = scalar(group, "speed"), case_of(group), list[Mark]()
+    speed, marks = scalar(group, "speed"), list[Mark]()
+    title, case, figure = "Frequencies by nodal diameter", case_of(group).label, "nodal_diameters"
+    if speed is not None:
+        title, case, figure = "Interference diagram", f"{speed:.5g} rpm", "interference"
+        N, per_order = int(group["sectors"].data), speed / 60.0
+        orders = np.arange(int(f.max() / per_order) + 1)
+        at = np.asarray(np.minimum(orders % N, -orders % N), float)
+        over = np.asarray(orders * per_order, float)
+        traces.append(Trace("engine orders", at, over, "dotted", closed=True))
+        for order in np.asarray(group["engine_order"].data):
+            place = float(min(order % N, -order % N))
+            marks.append(Mark(place, float(order * per_order), f"EO {order}", closed=True))
     x = Axis("nodal diameter", ticks=tuple((k, f"{k:g}") for k in n[:: 1 + len(n) // 16].tolist()))
-    if speed is None:
-        shown: dict[str, Any] = {"case": case.label, "figure": "nodal_diameters"}
-        return Chart("Frequencies by nodal diameter", x, _HZ, tuple(traces), **shown)
-    N, per_order = int(group["sectors"].data), speed / 60.0
-    orders = np.arange(int(f.max() / per_order) + 1)
-    at = np.minimum(orders % N, -orders % N)
-    lines = np.asarray(at, float), np.asarray(orders * per_order, float)
-    traces.append(Trace("engine orders", *lines, "dotted", closed=True))
-    for order in np.asarray(group["engine_order"].data):
-        place = min(order % N, -order % N)
-        marks.append(Mark(float(place), float(order * per_order), f"EO {order}", closed=True))
-    return Chart(
-        "Interference diagram",
-        x,
-        _HZ,
-        tuple(traces),
-        case=f"{speed:.5g} rpm",
-        figure="interference",
-        marks=tuple(marks),
-    )
+    return Chart(title, x, _HZ, tuple(traces), case=case, figure=figure, marks=tuple(marks))
 
 
 def _wave(group: Group) -> Chart:

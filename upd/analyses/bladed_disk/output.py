@@ -12,10 +12,8 @@ from upd.analyses.base import Resolved, conditions
 from upd.analyses.bladed_disk.plan import CORIOLIS, DISPLACED
 from upd.analyses.bladed_disk.solve import BladedDiskSolution, Crossing, DampedWave, Proof
 from upd.hbm.springs.checks import creep
-from upd.plot.chart import Entry
 from upd.results import NO_CASE, Case, Check, ErrorPart, Estimates, Group, Result, variable
 from upd.results import quantities as q
-from upd.results.answer_table import AnswerTable
 from upd.scene import BladedDiskScene
 
 #: what the groups of result.nc hold, their attribute ``content``
@@ -26,53 +24,21 @@ CREEP = 0.01
 HEADLINE = (
     "crossing_speed",
     "crossing_frequency",
+    "crossing_margin",
     "free_amplitude",
     "stuck_amplitude",
     "damped_amplitude",
+    "damped_frequency",
     "amplitude_reduction",
     "best_damper_mass",
     "best_mass_amplitude",
+    "start_change",
+    "force_creep",
     "f1",
 )
 #: largest error of a frequency in the span of the computed nodal diameters
 PROJECTION_LIMIT = 1e-3
 _RPM = 60.0 / (2.0 * np.pi)
-
-
-def headline(results: Sequence[Entry]) -> list[Entry]:
-    """The crossing nearest to the operating speed, its peaks, and the first frequency."""
-    first: dict[str, Entry] = {}
-    for entry in results:
-        first.setdefault(entry["name"], entry)
-    return [first[name] for name in HEADLINE if name in first]
-
-
-def answer(results: Sequence[Entry]) -> list[AnswerTable]:
-    """The damped response in five lines; nothing where it was not asked for."""
-    first = {entry["name"]: entry for entry in reversed(results)}
-    if q.WAVE_DAMPED.name not in first:
-        return []
-    free = first[q.WAVE_FREE.name]
-    of = {name: f"{one['value'] or 0.0:.4g}" for name, one in first.items()}
-    order, n, mode = (free["case_fields"][k] for k in ("engine_order", "nodal_diameter", "mode"))
-    rows = {
-        "crossing": f"EO {order} meets {mode} of nodal diameter {n} at {of['crossing_speed']} rpm, "
-        f"{of['crossing_frequency']} Hz ({of['crossing_margin']} % from the operating speed)",
-        "peak at the tip": f"free {of['free_amplitude']} µm, stuck {of['stuck_amplitude']} µm, "
-        f"damped {of['damped_amplitude']} µm at {of['damped_frequency']} Hz",
-        "reduction": f"{of['amplitude_reduction']} % of the free peak; F_C of a wedge is "
-        f"{of['wedge_centrifugal']} N, its guide along the axis carries {of['wedge_axial']} N",
-    }
-    if (best := first.get(q.BEST_MASS.name)) is not None:
-        height = of.get(q.BEST_MASS_PEAK.name)
-        found = f"{of['best_damper_mass']} g, by its F_C alone: {height} µm"
-        rows["best damper"] = best.get("withheld") or found
-    change = f"changes the damped peak by {of['start_change']} %"
-    rows["not unique"] = (
-        f"another start of the sliders {first[q.WAVE_START.name].get('withheld') or change}; "
-        f"contact forces still change by {of['force_creep']} % in 40 more periods"
-    )
-    return [AnswerTable("Damped travelling wave", ("what", "answer"), tuple(rows.items()))]
 
 
 def estimate(solution: BladedDiskSolution, results: Sequence[Result]) -> Estimates:
@@ -193,12 +159,6 @@ def _farther(proof: Proof) -> np.ndarray:
     one, other = proof.coriolis
     farther = np.abs(one - proof.direct) > np.abs(other - proof.direct)
     return np.asarray(np.where(farther, one, other))
-
-
-def sizes(solution: BladedDiskSolution) -> dict[str, int]:
-    """Nodes of a cyclic face and modes found."""
-    face = 0 if solution.sector is None else len(solution.sector.low)
-    return {"n_face_nodes": face, "n_modes": solution.at_rest.size}
 
 
 def arrays(solution: BladedDiskSolution) -> dict[str, Group]:

@@ -43,7 +43,7 @@ class Wedge(NamedTuple):
     ----------
     mass : float
         t
-    inertia : (3,) tuple
+    inertia : (3,) array_like
         About its centre: radial, tangential, axial [t mm2].
     radius : float
         Of its centre [mm].
@@ -57,7 +57,7 @@ class Wedge(NamedTuple):
     """
 
     mass: float
-    inertia: tuple[float, float, float]
+    inertia: ArrayLike
     radius: float
     angle: float
     k_n: float
@@ -70,15 +70,9 @@ class Wedge(NamedTuple):
         return self.mass * self.radius * speed**2
 
 
-class WedgeGap(NamedTuple):
-    """The wedge of one gap on the coordinates of both sectors beside it, see `upd.hbm`."""
-
-    points: Contacts
-    damper: RigidDamper
-    rows: FloatArray
-
-
-def gap_of(sector: ReducedSector, wedge: Wedge, f_c: float) -> WedgeGap:
+def gap_of(
+    sector: ReducedSector, wedge: Wedge, f_c: float
+) -> tuple[Contacts, RigidDamper, FloatArray]:
     """The contacts of a wedge under a centrifugal force.
 
     Parameters
@@ -91,7 +85,8 @@ def gap_of(sector: ReducedSector, wedge: Wedge, f_c: float) -> WedgeGap:
 
     Returns
     -------
-    WedgeGap
+    Contacts, RigidDamper, ndarray
+        Points, body and its rows, on the coordinates of both sectors beside the gap.
     """
     p, r = len(sector.high), sector.K.shape[0]
     ends = [one.mean(axis=0) for one in (sector.high, sector.low)]
@@ -102,7 +97,7 @@ def gap_of(sector: ReducedSector, wedge: Wedge, f_c: float) -> WedgeGap:
     centre = wedge.radius * radial + np.mean([end[2] for end in ends]) * axial
     damper = rigid_damper(
         wedge.mass,
-        own * wedge.inertia @ own.T,
+        own * np.asarray(wedge.inertia) @ own.T,
         centre,
         f_c * radial,
         guide=(0.0, 0.0, wedge.guide, 0.0, 0.0, 0.0),
@@ -121,7 +116,7 @@ def gap_of(sector: ReducedSector, wedge: Wedge, f_c: float) -> WedgeGap:
         mu=wedge.mu,
     )
     places = np.vstack([sector.high, sector.low])
-    return WedgeGap(points, damper, contact_rows(damper, places, np.concatenate(frames)))
+    return points, damper, contact_rows(damper, places, np.concatenate(frames))
 
 
 def wave_response(
@@ -159,18 +154,18 @@ def wave_response(
         On the coordinates of sector 0, then the six of its wedge; see `on_sector`.
     """
     one = next(iter(sectors.values()))
-    gap = gap_of(one, wedge, f_c)
+    points, damper, rows = gap_of(one, wedge, f_c)
     return travelling_wave_response(
         {n: (s.M, s.C, s.K) for n, s in sectors.items()},
-        gap.points,
+        points,
         n_sectors=one.n_sectors,
         engine_order=engine_order,
         harmonic_force=force,
         frequencies=frequencies,
         harmonics=harmonics,
         samples=samples,
-        damper=gap.damper,
-        damper_rows=gap.rows,
+        damper=damper,
+        damper_rows=rows,
         start="frictionless",
     )
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
+from upd.analyses.base import keeping
 from upd.analyses.bladed_disk.plan import BladedDiskPlan, computed, damped, rotates
 from upd.analyses.bladed_disk.response import (
     WavePerformance,
@@ -169,11 +170,8 @@ def solve(plan: BladedDiskPlan, stages: Stages) -> BladedDiskSolution:
     An error raised on the way carries what converged so far as ``partial``.
     """
     solution = BladedDiskSolution(plan)
-    try:
+    with keeping(solution):
         _solve(solution, stages)
-    except BaseException as error:
-        error.partial = solution  # type: ignore[attr-defined]
-        raise
     return solution
 
 
@@ -361,10 +359,9 @@ def _wedge(scene: BladedDiskScene, sector: ReducedSector) -> Wedge:
         ]
     )
     squares = given.mass / 12.0 * sides**2
-    inertia = tuple(float(squares.sum() - one) for one in squares)
     return Wedge(
         given.mass,
-        (inertia[0], inertia[1], inertia[2]),
+        squares.sum() - squares,
         float(r.mean()),
         given.angle,
         given.normal_stiffness,

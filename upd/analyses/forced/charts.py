@@ -19,7 +19,7 @@ from upd.analyses.forced.arrays import (
     POINTS,
     SWEEP,
 )
-from upd.analyses.measured import damping_charts, measured_traces
+from upd.analyses.measured import measured_traces
 from upd.plot.chart import Area, Array, Axis, Band, Chart, Mark, Scatter, Style, Trace
 from upd.plot.common import UM, case_of, frequency_of, magnitude, scalar, with_content
 from upd.results import Arrays, Case, Group
@@ -282,7 +282,6 @@ def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
             if group["ratio"].data.size
         ),
         *mode_charts(arrays),
-        *damping_charts(arrays),
         *(shares_chart(c, k) for c in moving if "share" in c.group for k in range(len(SIDES))),
         *(
             chart

@@ -5,22 +5,22 @@ Modes free and with the damper glued, Craig-Bampton models, linear frequency res
 
 from __future__ import annotations
 
-from upd.analyses.base import Analysis, rig_needs
-from upd.analyses.modal import charts, output, results, varied
+from functools import partial
+
+from upd.analyses.base import Analysis, first_numbers, rig_needs
+from upd.analyses.modal import output, results, varied
 from upd.vary.inputs import coarsened_rig
 
 ANALYSIS = Analysis(
     name="modal",
     headline_names=results.HEADLINE,
-    input_checks=(),
     problem=varied.PROBLEM,
     needs=lambda plan, threads: rig_needs(plan, threads, "reduction"),
     check_solution=results.check_solution,
     arrays=output.arrays,
-    sizes=output.sizes,
     write_files=output.write_files,
-    charts=charts.charts,
-    headline=results.headline,
+    charts=output.charts,
+    headline=partial(first_numbers, names=results.HEADLINE),
     ladders=varied.LADDERS,
     coarsened=lambda plan: coarsened_rig(plan, ("free", "glued", "response")),
 )

@@ -5,47 +5,49 @@ Modes, responses, reduced models, pictures of the mode shapes.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.spatial import cKDTree
 
-from upd.analyses.measured import accelerance_array, measured_arrays
-from upd.analyses.modal.plan import parameters
-from upd.analyses.modal.results import REDUCED, reduced_frequencies
+from upd.analyses.measured import FREE, STUCK, accelerance_array, measured_arrays, measured_traces
 from upd.analyses.modal.solve import Array, ModalSolution, ModeSet, RigMode, RigResponse
-from upd.errors import MeshError
 from upd.matrices import DofMap, Matrices, write_dof_map, write_matrices
-from upd.mesh import IntArray, Mesh, recipes
+from upd.mesh import Mesh
+from upd.plot.chart import Axis, Chart, Mark, Trace
+from upd.plot.common import frequency_of, magnitude, scalar, with_content
 from upd.plot.matplotlib import Drawing, draw_sheet, write_png
 from upd.plot.pictures import draw_mode
-from upd.results import Case, Group, variable
+from upd.results import Arrays, Case, Group, variable
 
 #: modes drawn of each configuration
 _DRAWN = 4
 _SIZE = (4.2, 5.2)
+#: the mirror image of a half: its name, and its coordinates over those of the half
+_IMAGE, _MIRRORED = ", mirrored", np.array([1.0, -1.0, 1.0])
+#: nodes of a hexahedron in VTK order, turned inside out: corners, edges, faces and middle
+_TURNED = [
+    *(1, 0, 3, 2, 5, 4, 7, 6),
+    *(8, 11, 10, 9, 12, 15, 14, 13, 17, 16, 19, 18),
+    *(21, 20, 22, 23, 24, 25, 26),
+]
 
 
 #: what the groups of result.nc hold, their attribute ``content``
-MODES, RESPONSE, REDUCTION = "modes", "response", "reduction"
-
-
-def sizes(solution: ModalSolution) -> dict[str, int]:
-    """Modes found."""
-    return {"n_modes": sum(len(s.modes) for s in solution.sets)}
+MODES, RESPONSE = "modes", "response"
 
 
 def arrays(solution: ModalSolution) -> dict[str, Group]:
-    """Frequencies of every configuration, responses, and frequencies of the reduced blades.
+    """Frequencies of every configuration, and responses.
 
     Returns
     -------
     dict
-        Group -> variable -> (dimensions, array, attributes). Contents: "modes", "response",
-        "reduction".
+        Group -> variable -> (dimensions, array, attributes). Contents: "modes", "response".
     """
     out = {f"modes {found.kind} {found.arrangement}": _modes(found) for found in solution.sets}
     if solution.response is not None:
@@ -54,26 +56,12 @@ def arrays(solution: ModalSolution) -> dict[str, Group]:
             for kind in solution.response.accelerance
         }
         out |= measured_arrays(solution.plan.scene.measured)
-    if solution.reductions:
-        full, reduced = np.array(reduced_frequencies(solution.reductions)).T
-        variables = {
-            "frequency": variable("mode", reduced, "Hz"),
-            "full": variable("mode", full, "Hz", source="full model"),
-        }
-        out["reduction"] = Group(variables, content=REDUCTION, case=REDUCED)
     return out
 
 
 def _modes(found: ModeSet) -> Group:
-    variables: dict[str, Any] = {
-        "frequency": variable("mode", [m.frequency for m in found.modes], "Hz"),
-        "family": variable(
-            "mode",
-            [{"x": 0, "y": 1}.get(m.body.family, -1) for m in found.modes],
-            flag_meanings="x y",
-        ),
-    }
-    return Group(variables, content=MODES, case=found.case)
+    frequencies = variable("mode", [m.frequency for m in found.modes], "Hz")
+    return Group({"frequency": frequencies}, content=MODES, case=found.case)
 
 
 def _response(response: RigResponse, kind: str) -> Group:
@@ -87,6 +75,60 @@ def _response(response: RigResponse, kind: str) -> Group:
         group["peak_frequency_right"] = variable("peak_right", [at], "Hz")
         group["peak_accelerance_right"] = variable("peak_right", [height], "(m/s2)/N")
     return Group(group, content=RESPONSE, case=Case(kind=kind, arrangement=response.arrangement))
+
+
+# -- charts, from the run folder's arrays alone ----------------------------------------------------
+
+#: the blade that is excited first
+_BLADES = ("right", "left")
+
+
+def charts(arrays: Arrays, summary: Mapping[str, Any]) -> list[Chart]:
+    """Responses of both blades; a blade that hears nothing has none."""
+    del summary
+    found = [_blade_chart(arrays, blade) for blade in _BLADES]
+    return [chart for chart in found if chart is not None]
+
+
+def _blade_chart(arrays: Arrays, blade: str) -> Chart | None:
+    """Accelerance of one blade, free and glued."""
+    name = f"accelerance_{blade}"
+    groups = enumerate(with_content(arrays, RESPONSE))
+    curves = [(k, g, magnitude(g[name])) for k, g in groups if name in g and g[name].data.any()]
+    if not curves:
+        return None
+    # a glued damper is what a stuck one is to the measured curve
+    colours = {STUCK if g.attributes["kind"] == "glued" else FREE: k for k, g, _ in curves}
+    # lines lie over the measured points
+    traces = measured_traces(arrays, blade, colours) + tuple(
+        Trace(g.attributes["kind"], frequency_of(g), np.where(H > 0.0, H, np.nan), colour=k)
+        for k, g, H in curves
+    )
+    first = curves[0][1]
+    f, damping = frequency_of(first), scalar(first, "damping")
+    return Chart(
+        "Frequency response",
+        Axis("frequency", "Hz", low=float(f[0]), high=float(f[-1])),
+        Axis("accelerance", first[name].units.replace("m/s2", "m/s²"), log=True),
+        traces,
+        case=f"{blade} blade",
+        figure="response",
+        marks=tuple(mark for k, g, _ in curves for mark in _peaks(g, blade, k)),
+        detail="" if damping is None else f"damping {100.0 * damping:.3g} %",
+    )
+
+
+def _peaks(group: Group, blade: str, colour: int) -> list[Mark]:
+    names = (f"peak_frequency_{blade}", f"peak_accelerance_{blade}")
+    if not set(names) <= set(group):
+        return []
+    pairs = zip(*(group[name].data for name in names), strict=True)
+    return [
+        Mark(float(f), float(height), f"{f:.2f} Hz\n{height:.3g}", colour) for f, height in pairs
+    ]
+
+
+# -- files -----------------------------------------------------------------------------------------
 
 
 def write_files(solution: ModalSolution, folder: Path) -> None:
@@ -118,7 +160,7 @@ def _write_shapes(solution: ModalSolution, folder: Path) -> None:
 
     drawings: dict[str, list[Drawing]] = {}
     for found in solution.sets:
-        meshes, shapes = whole_shapes(solution, found)
+        meshes, shapes = shapes_of(found)
         data: dict[str, dict[str, Array]] = {name: {} for name in meshes}
         for k, (mode, shape) in enumerate(shapes, 1):
             for name, u in shape.items():
@@ -133,13 +175,8 @@ def _write_shapes(solution: ModalSolution, folder: Path) -> None:
         write_png(draw_sheet(mine, _DRAWN, _SIZE), folder / f"modes_{kind}.png")
 
 
-# -- mode shapes on whole bodies: what half a rig saves is mirrored about y = 0 --------------------
-
-
-def whole_shapes(
-    solution: ModalSolution, found: ModeSet
-) -> tuple[dict[str, Mesh], list[tuple[RigMode, dict[str, Array]]]]:
-    """Whole bodies, and every mode's displacement on them.
+def shapes_of(found: ModeSet) -> tuple[dict[str, Mesh], list[tuple[RigMode, dict[str, Array]]]]:
+    """Bodies, halves with their mirror images about y = 0, and every mode's displacement on them.
 
     Returns
     -------
@@ -147,42 +184,19 @@ def whole_shapes(
         Body -> mesh.
     list
         Of every mode, lowest first: the mode, and body -> (n_node, 3) displacement.
-
-    Raises
-    ------
-    MeshError
-        When the half model's nodes are not those of the whole one.
     """
-    scene = solution.plan.scene
-    meshes, _ = recipes.build_mesh(
-        scene.recipe, parameters(scene, found.arrangement, found.kind, "full")
-    )
-    maps = {
-        m.body.name: _onto(m.body.mesh, meshes[m.body.name]) for m in found.modes if m.body.family
-    }
-    return meshes, [
-        (m, {m.body.name: _on_whole(m, meshes[m.body.name], maps)}) for m in found.modes
-    ]
-
-
-def _onto(half: Mesh, mesh: Mesh) -> IntArray:
-    """Node of the half model at each node of the whole one, or at its mirror image."""
-    mirrored = mesh.points.copy()
-    mirrored[:, 1] = np.abs(mirrored[:, 1])
-    distance, node = cKDTree(half.points).query(mirrored)
-    if float(np.max(distance)) > 1e-9 * float(np.ptp(mesh.points, axis=0).max()):
-        raise MeshError(
-            "the half model's nodes are not those of the whole one: make the recipe mirror its mesh"
-        )
-    return np.asarray(node, np.int64)
-
-
-def _on_whole(mode: RigMode, mesh: Mesh, maps: dict[str, IntArray]) -> Array:
-    if not mode.body.family:
-        return mode.shape
-    u = mode.shape[maps[mode.body.name]].copy()
-    # Even modes: x and z alike on both sides, y opposite; odd modes the other way round.
-    signs = np.array([1.0, -1.0, 1.0]) * (1.0 if mode.body.family == "x" else -1.0)
-    other = mesh.points[:, 1] < 0.0
-    u[other] *= signs
-    return np.asarray(u)
+    meshes: dict[str, Mesh] = {}
+    for body, _ in found.found:
+        meshes[body.name] = body.mesh
+        if body.family:
+            points, hexes = body.mesh.points * _MIRRORED, body.mesh.hexes
+            turned = hexes[:, _TURNED[: hexes.shape[1]]]
+            meshes[body.name + _IMAGE] = replace(body.mesh, points=points, hexes=turned)
+    shapes = []
+    for mode in found.modes:
+        shape, name = {mode.body.name: mode.shape}, mode.body.name + _IMAGE
+        if mode.body.family:
+            # even modes: x and z alike on both sides, y opposite; odd modes the other way round
+            shape[name] = mode.shape * _MIRRORED * (1.0 if mode.body.family == "x" else -1.0)
+        shapes.append((mode, shape))
+    return meshes, shapes

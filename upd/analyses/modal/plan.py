@@ -12,9 +12,7 @@ from upd.errors import InputError
 from upd.mesh import recipes
 from upd.scene import RigScene
 
-# Measured on one thread: SuperLU of a blade off resonance, seconds over n^2.3; figures and page,
-# and pictures of modes per node.
-_DIRECT_S, _DIRECT_POWER = 4.9e-10, 2.3
+# Measured on one thread: figures and page, and pictures of modes per node.
 _FILES_S, _PICTURES_S, _NODE_S = 1.6, 1.4, 2.5e-5
 
 
@@ -65,9 +63,6 @@ def _add_more(cost: CostModel, scene: RigScene, arrangement: str) -> None:
             # patch, force and accelerometer
             kept = 3 * (count["contact"] + 2)
             cost.reduction(f"{body}, reduction", count, kept, scene.reduction.count)
-            if scene.wants("response") and body == "right":
-                # two solutions off resonance
-                cost.seconds += 2.0 * _DIRECT_S * (3.0 * count["nodes"]) ** _DIRECT_POWER
     right = cost.size.get(f"right, {arrangement}")
     if scene.wants("response") and right is not None:
         cost.seconds += 0.3

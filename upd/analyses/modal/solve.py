@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
-from typing import Any
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.linalg import spsolve
 
 from upd.analyses.base import Resolved, keeping
 from upd.analyses.modal.plan import MODES_ABOVE, MORE_MODES, ModalPlan, configurations, parameters
+from upd.analyses.seated.bodies import Blade, make_blade
 from upd.dynamics import (
     frequency_response,
     modal_system,
@@ -20,58 +19,17 @@ from upd.dynamics import (
     tune_damping,
 )
 from upd.errors import InputError
-from upd.fem import Material, mass, stiffness
+from upd.fem import Material, stiffness
 from upd.linalg import Modes, factorise, modes
 from upd.linalg.parallel import in_parallel
-from upd.linalg.symmetric import Symmetric, combined, whole
-from upd.mesh import Mesh, recipes
+from upd.linalg.symmetric import Symmetric
+from upd.mesh import recipes
 from upd.progress import Stages
 from upd.reduction import ErrorTarget, ReducedModel, craig_bampton
 from upd.results import Case, Estimates
 from upd.results import quantities as q
-from upd.scene import RigScene
 
 Array = NDArray[np.float64]
-
-#: mirror family -> components the plane y = 0 holds: x and z move evenly in "x", y does in "y";
-#: "" of a whole body
-FAMILIES: dict[str, tuple[int, ...]] = {"": (), "x": (1,), "y": (0, 2)}
-_AXIS_X = 0
-#: parts of the first frequency at which the reduced model is compared with the full one
-OFF_RESONANCE = (0.5, 1.2)
-
-
-@dataclass(frozen=True)
-class RigBody:
-    """One body of one configuration: mesh (half or whole), K and M with all dofs, and the mirror
-    family of its motion.
-    """
-
-    name: str
-    mesh: Mesh
-    K: Symmetric
-    M: Symmetric
-    family: str = ""
-
-    @cached_property
-    def free(self) -> NDArray[np.int64]:
-        """Dofs left when the clamped faces are held, and the mirror plane as its family has it."""
-        fixed = np.zeros((self.mesh.n_node, 3), bool)
-        fixed[self.mesh.nodes["clamped"]] = True
-        for c in FAMILIES[self.family]:
-            fixed[self.mesh.nodes["plane_y"], c] = True
-        return np.flatnonzero(~fixed.ravel())
-
-    @property
-    def matrices(self) -> tuple[Symmetric, Symmetric]:
-        """K and M of the free dofs."""
-        return self.K.submatrix(self.free), self.M.submatrix(self.free)
-
-    def whole(self, u: Array) -> Array:
-        """Values (n, ...) of the free dofs on all dofs."""
-        out = np.zeros((3 * self.mesh.n_node, *u.shape[1:]))
-        out[self.free] = u
-        return out
 
 
 @dataclass(frozen=True)
@@ -79,7 +37,7 @@ class RigMode:
     """One mode: frequency in Hz, its body, its displacement (n_node, 3) on the body's mesh."""
 
     frequency: float
-    body: RigBody
+    body: Blade
     shape: Array
 
 
@@ -92,7 +50,7 @@ class ModeSet:
     arrangement: str
     kind: str
     modes: list[RigMode]
-    found: list[tuple[RigBody, Modes]]
+    found: list[tuple[Blade, Modes]]
 
     @property
     def case(self) -> Case:
@@ -104,7 +62,7 @@ class ModeSet:
 class ReducedBlade:
     """Craig-Bampton model of one blade, its first frequencies and those of the full blade in Hz."""
 
-    body: RigBody
+    body: Blade
     model: ReducedModel
     frequency: Array
     full: Array
@@ -128,8 +86,6 @@ class RigResponse:
         Frequency in Hz and height in (m/s2)/N of the free right blade's peak in the band, if any.
     participation
         phi_force phi_output of the peak's mode, 1/kg.
-    against_full
-        Part of the first frequency -> accelerance of the reduced and of the full right blade.
     """
 
     arrangement: str
@@ -138,7 +94,6 @@ class RigResponse:
     damping: float
     peak: tuple[float, float] | None
     participation: float
-    against_full: dict[float, tuple[float, float]]
 
 
 @dataclass
@@ -181,33 +136,27 @@ def solve(plan: ModalPlan, stages: Stages) -> ModalSolution:
     return solution
 
 
-def _bodies(plan: ModalPlan, arrangement: str, kind: str, symmetry: str) -> list[RigBody]:
+def _bodies(plan: ModalPlan, arrangement: str, kind: str, symmetry: str) -> list[Blade]:
+    """The bodies of a configuration; of halves each in both mirror families."""
     scene = plan.scene
     meshes, _ = recipes.build_mesh(scene.recipe, parameters(scene, arrangement, kind, symmetry))
     material = Material(scene.material.E, scene.material.nu, scene.material.density)
-
-    def body(name: str, mesh: Mesh) -> RigBody:
-        return RigBody(
-            name,
-            mesh,
-            Symmetric.of(stiffness(mesh, material, scene.mesh.element)),
-            Symmetric.of(mass(mesh, material)),
-        )
-
-    return in_parallel([partial(body, name, mesh) for name, mesh in meshes.items()], plan.workers)
+    jobs = [
+        partial(make_blade, name, mesh, material, scene.mesh.element, ("x", "y"))
+        for name, mesh in meshes.items()
+    ]
+    return [body for both in in_parallel(jobs, plan.workers) for body in both]
 
 
 def _mode_set(plan: ModalPlan, arrangement: str, kind: str, stages: Stages) -> ModeSet:
     with stages("mesh and assembly", f"{kind}, {arrangement}"):
         bodies = _bodies(plan, arrangement, kind, plan.symmetry)
-    sizes = ", ".join(f"{b.name} {3 * b.mesh.n_node} dofs" for b in bodies)
-    families = ("x", "y") if plan.symmetry == "half" else ("",)
-    jobs = [replace(body, family=family) for body in bodies for family in families]
+    sizes = ", ".join({b.name: f"{b.name} {3 * b.mesh.n_node} dofs" for b in bodies}.values())
     with stages("modes", f"{kind}, {arrangement}: {sizes}"):
         found = in_parallel(
-            [partial(_modes, plan, body, plan.scene.modes.below) for body in jobs], plan.workers
+            [partial(_modes, plan, body, plan.scene.modes.below) for body in bodies], plan.workers
         )
-    pairs = list(zip(jobs, found, strict=True))
+    pairs = list(zip(bodies, found, strict=True))
     out = [
         RigMode(float(f), body, body.whole(x).reshape(-1, 3))
         for body, one in pairs
@@ -217,8 +166,8 @@ def _mode_set(plan: ModalPlan, arrangement: str, kind: str, stages: Stages) -> M
     return ModeSet(arrangement, kind, out, pairs)
 
 
-def _modes(plan: ModalPlan, body: RigBody, below: float) -> Modes:
-    return modes(*body.matrices, below_hz=below, solver=plan.scene.solver.name)
+def _modes(plan: ModalPlan, body: Blade, below: float) -> Modes:
+    return modes(body.K, body.M, below_hz=below, solver=plan.scene.solver.name)
 
 
 def _reduce(solution: ModalSolution, stages: Stages) -> None:
@@ -236,10 +185,10 @@ def _reduce(solution: ModalSolution, stages: Stages) -> None:
         )
 
 
-def _reduced(solution: ModalSolution, body: RigBody) -> ReducedBlade:
+def _reduced(solution: ModalSolution, body: Blade) -> ReducedBlade:
     scene = solution.plan.scene
     kept = np.concatenate([body.mesh.nodes[name] for name in ("patch", "force", "accelerometer")])
-    boundary = np.searchsorted(body.free, (3 * np.unique(kept)[:, None] + np.arange(3)).ravel())
+    boundary = body.dofs(np.unique(kept))
     free_modes = free_set(solution, scene.modes.arrangements[0]).modes
     full = [m.frequency for m in free_modes if m.body.name == body.name]
     if not full:
@@ -247,25 +196,19 @@ def _reduced(solution: ModalSolution, body: RigBody) -> ReducedBlade:
             f"modes.below: the {body.name} blade has no mode below {scene.modes.below:g} "
             "Hz; raise it"
         )
+    choice = scene.reduction
+    counted = choice.below is None and choice.error is None
     model = craig_bampton(
-        *body.matrices,
+        body.K,
+        body.M,
         boundary,
-        **_wanted(scene, len(full)),
+        n_modes=choice.count if counted else None,
+        below_hz=choice.below,
+        target=None if choice.error is None else ErrorTarget(choice.error, len(full)),
         rows=boundary,
         solver=scene.solver.name,
     )
     return ReducedBlade(body, model, model.modes(count=len(full)).frequency, np.array(full))
-
-
-def _wanted(scene: RigScene, n_full: int) -> dict[str, Any]:
-    choice = scene.reduction
-    if choice.below is not None:
-        return {"below_hz": choice.below}
-    return (
-        {"n_modes": choice.count}
-        if choice.error is None
-        else {"target": ErrorTarget(choice.error, n_full)}
-    )
 
 
 def free_set(solution: ModalSolution, arrangement: str) -> ModeSet:
@@ -273,7 +216,7 @@ def free_set(solution: ModalSolution, arrangement: str) -> ModeSet:
     return next(s for s in solution.sets if s.arrangement == arrangement and s.kind == "free")
 
 
-def _system_modes(found: ModeSet, name: str) -> tuple[Modes, RigBody]:
+def _system_modes(found: ModeSet, name: str) -> tuple[Modes, Blade]:
     """The modes of the named body whose plane y = 0 moves in itself, the only ones a force in that
     plane excites.
     """
@@ -283,22 +226,11 @@ def _system_modes(found: ModeSet, name: str) -> tuple[Modes, RigBody]:
     return _on_rig(body, mine), body
 
 
-def _on_rig(body: RigBody, found: Modes) -> Modes:
-    """Modes with their shapes on all dofs.
-
-    Half a rig has half the modal mass: its shapes are those of the whole times sqrt 2.
+def _on_rig(body: Blade, found: Modes) -> Modes:
+    """Modes of the whole rig: half a rig has half the modal mass, its shapes are those of the whole
+    times sqrt 2.
     """
-    return replace(found, shapes=body.whole(found.shapes) * (np.sqrt(0.5) if body.family else 1.0))
-
-
-def probe(mesh: Mesh, name: str) -> int:
-    """Dof along x of the node named ``name``."""
-    return 3 * int(mesh.nodes[name][0]) + _AXIS_X
-
-
-def probes(mesh: Mesh) -> tuple[int, int]:
-    """Dofs of the force and of the accelerometer of a blade."""
-    return probe(mesh, "force"), probe(mesh, "accelerometer")
+    return replace(found, shapes=found.shapes * (np.sqrt(0.5) if body.family else 1.0))
 
 
 def _response(solution: ModalSolution) -> RigResponse:
@@ -306,7 +238,7 @@ def _response(solution: ModalSolution) -> RigResponse:
     choice, arrangement = scene.response, scene.modes.arrangements[0]
     grid = np.linspace(choice.start, choice.stop, choice.points)
     free, body = _system_modes(free_set(solution, arrangement), "right")
-    static, (force, output) = _static(body), probes(body.mesh)
+    static, force, output = _static(body), body.probe("force"), body.probe("accelerometer")
     band = (choice.start, choice.stop)
     system = modal_system(free, choice.damping, static=static)
     zeta = choice.damping
@@ -332,7 +264,6 @@ def _response(solution: ModalSolution) -> RigResponse:
         zeta,
         peak,
         1e-3 * abs(float(nearest[force] * nearest[output])),
-        _against_full(solution),
     )
 
 
@@ -344,7 +275,7 @@ def _more_modes(solution: ModalSolution) -> Iterator[Resolved]:
     _, body = _system_modes(free_set(solution, response.arrangement), "right")
     found = _on_rig(body, _modes(solution.plan, body, MORE_MODES * scene.modes.below))
     system = modal_system(found, response.damping, static=_static(body))
-    force, output = probes(body.mesh)
+    force, output = body.probe("force"), body.probe("accelerometer")
     band, of = (scene.response.start, scene.response.stop), q.FREE_PEAK_ACCELERANCE
     height = float(peak_response(system, force, [output], band)[1])
     case, remedy = Case(kind="free", blade="right"), "raise modes.below"
@@ -359,7 +290,7 @@ def _unlocked(solution: ModalSolution) -> Iterator[Resolved]:
         return
     first, data = free.modes[0], plan.scene.material
     material = Material(data.E, data.nu, data.density)
-    K = Symmetric.of(stiffness(first.body.mesh, material, "hex8i"))
+    K = Symmetric.of(stiffness(first.body.mesh, material, "hex8i")).submatrix(first.body.free)
     found = _modes(plan, replace(first.body, K=K), first.frequency)
     lowest, of = float(found.frequency.min(initial=np.inf)), q.F_FREE
     remedy = 'fully integrated hex8 is too stiff in bending: use mesh.element = "hex20" or "hex8i"'
@@ -370,41 +301,19 @@ def _unlocked(solution: ModalSolution) -> Iterator[Resolved]:
 
 def _glued(found: ModeSet, zeta: float, grid: Array) -> dict[str, NDArray[np.complex128]]:
     own, body = _system_modes(found, "rig")
-    mesh = body.mesh
-    outputs = [probe(mesh, f"{side}_accelerometer") for side in ("left", "right")]
+    outputs = [body.probe(f"{side}_accelerometer") for side in ("left", "right")]
     H = frequency_response(
         modal_system(own, zeta, static=_static(body)),
-        probe(mesh, "right_force"),
+        body.probe("right_force"),
         outputs,
         grid,
     ).H
     return {"left": H[:, 0], "right": H[:, 1]}
 
 
-def _static(body: RigBody) -> Callable[[Array], Array]:
-    """K^-1 f of the whole body on the nodes of the model: what the modes left out contribute.
-
-    Half a model carries half the force.
+def _static(body: Blade) -> Callable[[Array], Array]:
+    """K^-1 f of the whole body: what the modes left out contribute. Half a model carries half the
+    force.
     """
-    factor, part = factorise(body.K.submatrix(body.free)), 0.5 if body.family else 1.0
-    return lambda f: body.whole(factor.solve(part * f[body.free]))
-
-
-def _against_full(solution: ModalSolution) -> dict[float, tuple[float, float]]:
-    """Undamped accelerance (m/s2)/N of the right blade off resonance, reduced and by a direct solve
-    of the full model, by f / f1.
-    """
-    one = next((r for r in solution.reductions if r.body.name == "right"), None)
-    if one is None:
-        return {}
-    force, output = (int(at) for at in np.searchsorted(one.body.free, probes(one.body.mesh)))
-    K, M = one.body.matrices
-    f, out = np.zeros(len(one.body.free)), {}
-    f[force] = 1.0
-    for part in OFF_RESONANCE:
-        w2 = (2.0 * np.pi * part * float(one.full[0])) ** 2
-        moved = np.linalg.solve(one.model.K - w2 * one.model.M, one.model.at([force])[0])
-        direct = spsolve(whole(combined(K, -w2, M)).tocsc(), f)[output]
-        reduced = one.model.at([output])[0] @ moved
-        out[part] = (-1e-3 * w2 * float(reduced), -1e-3 * w2 * float(direct))
-    return out
+    factor, part = factorise(body.K), 0.5 if body.family else 1.0
+    return lambda f: factor.solve(part * f)

@@ -117,7 +117,7 @@ STEP = 1e-4
 
 
 #: numbers a ladder follows beside those the analysis names first
-_NUMBERS = ("f?_free", "f?_glued", "f?_reduced", "response_below", "response_above")
+_NUMBERS = ("f?_free", "f?_glued", "f?_reduced")
 #: elements beside each other, and refinements that are affordable
 _ELEMENTS, _REFINE = ("hex8", "hex8i", "hex20", "hex20r", "hex27"), (1, 2, 3)
 MODES_ONLY: Overrides = (("want", ["free", "glued"]), ("modes.arrangements", ["symmetric"]))

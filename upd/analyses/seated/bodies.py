@@ -4,7 +4,7 @@ areas and frame of a blade's contact patch, and the balance of a rigid damper on
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -21,18 +21,24 @@ from upd.mesh import FloatArray, IntArray, Mesh, recipes
 from upd.reduction import AttachedModel, ReducedModel
 from upd.scene.forced_contact import SIDES, Side
 
-_X, _Y = 0, 1
+_X = 0
+#: mirror family of motions of a half -> components the plane y = 0 holds: x and z move evenly in
+#: "x", y does in "y"
+FAMILIES = {"x": [1], "y": [0, 2]}
 
 
 @dataclass(frozen=True)
 class Blade:
-    """One blade: mesh, K and M on its free dofs, and their numbers in the mesh."""
+    """A body of a rig, a blade, the damper, or all glued: mesh, K and M on its free dofs, their
+    numbers in the mesh, and the mirror family of its motion, "" of a whole.
+    """
 
-    side: Side
+    name: str
     mesh: Mesh
     K: Symmetric
     M: Symmetric
     free: IntArray
+    family: str = ""
 
     def dofs(self, nodes: IntArray) -> IntArray:
         """Free dofs (3 per node) of nodes off the clamped faces and the mirror plane."""
@@ -43,6 +49,12 @@ class Blade:
     def probe(self, name: str) -> int:
         """Free dof along x of the node named `name`."""
         return int(np.searchsorted(self.free, 3 * int(self.mesh.nodes[name][0]) + _X))
+
+    def whole(self, u: FloatArray) -> FloatArray:
+        """Values (n, ...) of the free dofs on all dofs."""
+        out = np.zeros((3 * self.mesh.n_node, *u.shape[1:]))
+        out[self.free] = u
+        return out
 
 
 @dataclass(frozen=True)
@@ -76,13 +88,12 @@ def make_bodies(plan: Plan[Any]) -> Bodies:
     scene = plan.scene
     meshes, _ = recipes.build_mesh(scene.recipe, plan.parameters)
     material = Material(scene.material.E, scene.material.nu, scene.material.density)
-    found = in_parallel(
-        [partial(_blade, side, meshes[side], material, scene.mesh.element) for side in SIDES],
-        plan.workers,
-    )
+    jobs = [partial(make_blade, side, meshes[side], material, scene.mesh.element) for side in SIDES]
+    found = in_parallel(jobs, plan.workers)
     damper = meshes["damper"]
     own = Material(material.E, material.nu, scene.damper.density or scene.material.density)
-    return Bodies({b.side: b for b in found}, mass_properties(damper, own), damper)
+    blades = {side: blade for side, (blade,) in zip(SIDES, found, strict=True)}
+    return Bodies(blades, mass_properties(damper, own), damper)
 
 
 def bodies_key(plan: Plan[Any]) -> str:
@@ -98,11 +109,17 @@ def bodies_key(plan: Plan[Any]) -> str:
     return repr((plan.parameters, *of))
 
 
-def _blade(side: Side, mesh: Mesh, material: Material, element: Any) -> Blade:
-    held = (3 * mesh.nodes["clamped"][:, None] + np.arange(3)).ravel()
-    free = free_dofs(mesh, held)
-    K, M = stiffness(mesh, material, element), mass(mesh, material)
-    return Blade(side, mesh, Symmetric.of(K).submatrix(free), Symmetric.of(M).submatrix(free), free)
+def make_blade(
+    name: str, mesh: Mesh, material: Material, element: Any, families: Sequence[str] = ("x",)
+) -> list[Blade]:
+    """A body with K and M, once for every mirror family of a half."""
+    K = Symmetric.of(stiffness(mesh, material, element))
+    M = Symmetric.of(mass(mesh, material))
+    out = []
+    for family in families if is_half(mesh) else ("",):
+        free = free_dofs(mesh, mesh.nodes.get("clamped", np.zeros(0, np.int64)), family)
+        out.append(Blade(name, mesh, K.submatrix(free), M.submatrix(free), free, family))
+    return out
 
 
 def is_half(mesh: Mesh) -> bool:
@@ -110,10 +127,13 @@ def is_half(mesh: Mesh) -> bool:
     return "plane_y" in mesh.nodes
 
 
-def free_dofs(mesh: Mesh, held: IntArray) -> IntArray:
-    """All dofs but those held, and those across the mirror plane of a half."""
-    across = 3 * mesh.nodes["plane_y"] + _Y if is_half(mesh) else np.zeros(0, np.int64)
-    return np.setdiff1d(np.arange(3 * mesh.n_node), np.concatenate([held, across]))
+def free_dofs(mesh: Mesh, held: IntArray, family: str = "x") -> IntArray:
+    """All dofs but those of held nodes, and those that the mirror plane of a half holds."""
+    fixed = np.zeros((mesh.n_node, 3), bool)
+    fixed[held] = True
+    if is_half(mesh):
+        fixed[mesh.nodes["plane_y"][:, None], FAMILIES[family]] = True
+    return np.flatnonzero(~fixed.ravel())
 
 
 # -- faces -----------------------------------------------------------------------------------------

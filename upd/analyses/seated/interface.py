@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, qr
 
 from upd.analyses.base import Plan
-from upd.analyses.seated.bodies import Blade, Bodies, free_dofs, is_half, lattice, patch_frame
+from upd.analyses.seated.bodies import Blade, Bodies, is_half, lattice, make_blade, patch_frame
 from upd.contact import CoupledContact, coupled_contact
 from upd.errors import InputError
-from upd.fem import Material, mass, stiffness
+from upd.fem import Material
 from upd.linalg import factorise
 from upd.linalg.least_distance import least_positive
 from upd.linalg.parallel import in_parallel
-from upd.linalg.symmetric import Symmetric
 from upd.mesh import IntArray
 from upd.reduction import condense
 from upd.scene.forced_contact import SIDES
@@ -213,13 +212,16 @@ class Interface:
         """
         if any(not closed[self.face == k].any() for k in range(len(SIDES))):
             return np.zeros((len(self.directions),) * 2)
-        on = np.tile(closed, 3)
-        U = self.shifts(1)[:, list(self.directions)]
-        X = np.hstack([self.columns, U])[on]
-        S = X.T @ cho_solve(cho_factor(self.compliance[np.ix_(on, on)], lower=True), X)
+        S = self._stuck(closed, np.hstack([self.columns, self.shifts(1)[:, list(self.directions)]]))
         r = len(self.kept)
         K = S[r:, r:] - S[r:, :r] @ np.linalg.solve(S[:r, :r], S[:r, r:])
         return np.asarray(self.copies * 0.5 * (K + K.T))
+
+    def _stuck(self, closed: NDArray[np.bool_], X: Array) -> Array:
+        """X' G^-1 X of motions (3 n, k), G the compliance of the closed nodes."""
+        on = np.tile(closed, 3)
+        factor = cho_factor(self.compliance[np.ix_(on, on)], lower=True)
+        return np.asarray(X[on].T @ cho_solve(factor, X[on]))
 
     def face_stiffness(self, side: int, closed: NDArray[np.bool_]) -> Array:
         """(normal, along, up) N/mm of one face of the whole, its closed nodes stuck.
@@ -231,9 +233,7 @@ class Interface:
         mine = closed & (self.face == side)
         if not mine.any():
             return np.array([0.0, np.nan if self.copies > 1 else 0.0, 0.0])
-        on = np.tile(mine, 3)
-        U = np.repeat(np.eye(3), int(mine.sum()), axis=0)
-        S = U.T @ cho_solve(cho_factor(self.compliance[np.ix_(on, on)], lower=True), U)
+        S = self._stuck(mine, np.repeat(np.eye(3), self.n, axis=0))
         out = self.copies * np.diagonal(S).copy()
         if self.copies > 1:
             out[1] = np.nan
@@ -243,25 +243,14 @@ class Interface:
 def make_interface(
     plan: Plan[Any], bodies: Bodies, held: str = "bases", like: Interface | None = None
 ) -> Interface:
-    """The contact of both faces from a rig's bodies.
+    """The contact of both faces from a rig's bodies, of elements whose faces have four nodes.
 
     Parameters
     ----------
     held
         "bases": blades elastic down to the clamped faces of their bases; "platforms": held where
         the platforms' sides join the blades.
-
-    Raises
-    ------
-    InputError
-        For elements whose faces have more than four nodes, whose nodal forces are no pressures.
     """
-    for side in SIDES:
-        if bodies.blades[side].mesh.faces["patch"].shape[1] != 4:
-            raise InputError(
-                f"mesh.element: the seated damper needs faces of four nodes, not those of "
-                f'{plan.scene.mesh.element}; set mesh.element = "hex8i"'
-            )
     blades = [bodies.blades[side] for side in SIDES]
     patches = [lattice(blade.mesh) for blade in blades]
     nodes = [patch.nodes for patch in patches]
@@ -293,7 +282,7 @@ def make_interface(
         face,
         position,
         np.concatenate([patch.area for patch in patches]),
-        np.stack([patch_frame(b.mesh) for b in blades]),
+        np.stack([patch.frame for patch in patches]),
         2 if half else 1,
         own,
     )
@@ -341,9 +330,8 @@ def damper_compliance(
     """
     mesh, m, solver = bodies.damper_mesh, plan.scene.material, plan.scene.solver.name
     material = Material(m.E, m.nu, plan.scene.damper.density or m.density)
-    moves = free_dofs(mesh, np.zeros(0, np.int64))
-    K = Symmetric.of(stiffness(mesh, material, plan.scene.mesh.element)).submatrix(moves)
-    M = Symmetric.of(mass(mesh, material)).submatrix(moves)
+    (body,) = make_blade("damper", mesh, material, plan.scene.mesh.element)
+    K, M, moves = body.K, body.M, body.free
     whole = _rigid(mesh.points - bodies.damper.centre)
     if is_half(mesh):
         whole = whole[:, list(EVEN)]
@@ -379,13 +367,8 @@ def damper_compliance(
 
 def _rigid(arms: Array) -> Array:
     """(3 n_node, 6) shifts, and turns theta x arm about the centre."""
-    x, y, z = arms.T
-    none = np.zeros(len(arms))
-    turns = np.array([[none, -z, y], [z, none, -x], [-y, x, none]])
-    R = np.zeros((len(arms), 3, MOTIONS))
-    R[:, :, :3] = np.eye(3)
-    R[:, :, 3:] = turns.transpose(2, 1, 0)
-    return R.reshape(-1, MOTIONS)
+    turns = [np.cross(axis, arms).ravel() for axis in np.eye(3)]
+    return np.column_stack([np.tile(np.eye(3), (len(arms), 1)), *turns])
 
 
 def _damper_nodes(bodies: Bodies, nodes: Sequence[IntArray]) -> list[IntArray]:

@@ -85,12 +85,8 @@ def _history(solution: SeatedSolution, phase: Phase) -> Variables:
             f"stick_{side}": variable(step, (found.state[:, mine] == STICK) @ area, "1"),
         }
     for j in of.kept:
-        axis_name = "xyz"[j % 3]
-        out |= (
-            {f"damper_u{axis_name}": variable(step, motion[:, j], "mm")}
-            if j < 3
-            else {f"damper_r{axis_name}": variable(step, motion[:, j], "rad")}
-        )
+        kind, unit = ("u", "mm") if j < 3 else ("r", "rad")
+        out[f"damper_{kind}{'xyz'[j % 3]}"] = variable(step, motion[:, j], unit)
     loss = of.copies * np.cumsum(phase.friction_loss)
     out["friction_loss"] = variable(step, loss, "N mm", "since the first step")
     return out
@@ -129,8 +125,7 @@ def _faces(solution: SeatedSolution) -> list[tuple[Side, str, Patch]]:
         mine = np.flatnonzero(of.face == k)
         points = np.column_stack([along, up - up[mine].min()])
         found = []
-        quads = solution.bodies.blades[side].mesh.faces["patch"][:, :4]
-        for part in _joined(quads, np.unique(quads)):
+        for part in _joined(solution.bodies.blades[side].mesh.faces["patch"][:, :4]):
             # the line on the plane once
             on_plane = half and bool((along[mine[part]] == 0.0).any())
             patch = make_patch(points, of.area, (on_plane, False), mine[part])
@@ -141,14 +136,11 @@ def _faces(solution: SeatedSolution) -> list[tuple[Side, str, Patch]]:
     return out
 
 
-def _joined(cells: IntArray, nodes: IntArray) -> list[IntArray]:
-    """Positions in ``nodes``, part by part, of those that cells (n, nodes of each) join."""
-    number = np.full(int(max(cells.max(), nodes.max())) + 1, -1)
-    number[nodes] = np.arange(len(nodes))
-    at = number[cells]
-    first = np.broadcast_to(at.max(axis=1, keepdims=True), at.shape)
-    both = at >= 0
-    links = coo_array((np.ones(both.sum()), (first[both], at[both])), shape=(len(nodes),) * 2)
+def _joined(quads: IntArray) -> list[IntArray]:
+    """Which of the nodes of quads, counted by their numbers, hang together, part by part."""
+    at = np.unique(quads, return_inverse=True)[1].reshape(quads.shape)
+    pairs = np.repeat(at[:, 0], 4), at.ravel()
+    links = coo_array((np.ones(at.size), pairs), shape=(int(at.max()) + 1,) * 2)
     count, part = connected_components(links, directed=False)
     return [np.flatnonzero(part == k) for k in range(count)]
 

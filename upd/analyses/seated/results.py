@@ -1,18 +1,19 @@
-"""SeatedSolution -> the flat list of numbers, beside the balance of a rigid damper."""
+"""SeatedSolution -> the flat list of numbers, beside the balance of a rigid damper; self-checks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
+from upd.analyses.base import conditions
 from upd.analyses.seated.bodies import rigid_balance
+from upd.analyses.seated.interface import Array, Interface
 from upd.analyses.seated.plan import AGAIN, LOWERED, RAISED, SHAKEN, SMOOTH, WAYS
 from upd.analyses.seated.solve import Phase, SeatedSolution
 from upd.contact.coulomb_conditions import OPEN, SLIP
-from upd.plot.chart import Entry
-from upd.results import Case, Result
+from upd.results import Case, Check, Result
 from upd.results import quantities as q
 from upd.scene.forced_contact import SIDES
 
@@ -33,7 +34,6 @@ HELD = Case(name="platforms held")
 #: by the axis along which a platform is moved: away from the other, along the damper, up
 _FACE = (q.FACE_K_N, q.FACE_K_T_ALONG, q.FACE_K_T)
 _LEG = (q.LEG_K_N, q.LEG_K_T_ALONG, q.LEG_K_T)
-_STIFFNESSES = {one.name for one in (*_FACE, *_LEG)}
 #: rigid damper that slips on both faces, and in which sense friction acts, by phase
 _BALANCES = {RAISED: "opposing", LOWERED: "reversed", AGAIN: "opposing", SMOOTH: "frictionless"}
 #: state of the damper -> the rigid one beside it; of the seated one friction opposes all it can
@@ -45,30 +45,8 @@ RIGID = {
 }
 
 
-def headline(results: Sequence[Entry]) -> list[Entry]:
-    """Forces of both faces when F_C is raised, their band, stiffness between the platforms, loss of
-    the first motion.
-    """
-    first: dict[str, tuple[str, str]] = {}
-    for entry in results:
-        # nothing touches on a face that F_C empties
-        if entry["value"] or entry["name"] not in _STIFFNESSES:
-            first.setdefault(entry["name"], _group(entry))
-    mine = [
-        entry
-        for entry in results
-        if entry["name"] in HEADLINE and _group(entry) == first.get(entry["name"])
-    ]
-    order = list(dict.fromkeys(entry["case"] for entry in mine))
-    rank = {name: HEADLINE.index(name) for name in first if name in HEADLINE}
-    least = {case: min(rank[e["name"]] for e in mine if e["case"] == case) for case in order}
-    return sorted(mine, key=lambda e: (least[e["case"]], order.index(e["case"]), rank[e["name"]]))
-
-
-def _group(entry: Entry) -> tuple[str, str]:
-    """What the faces share of a number's case."""
-    fields = entry["case_fields"]
-    return fields.get("name", ""), fields.get("choice", "")
+#: to which the conditions of contact and the balance hold, of the largest force or motion
+ROUNDING = 1e-9
 
 
 def make_results(solution: SeatedSolution) -> list[Result]:
@@ -197,3 +175,92 @@ def platform_force(solution: SeatedSolution, phase: Phase) -> np.ndarray:
     """(k, 3) N along x, y, z with which the right blade presses on the damper."""
     of = solution.interface
     return np.asarray(of.face_forces(phase.found)[:, 1] @ -of.frame[1])
+
+
+# -- self-checks, from the forces as they are written ----------------------------------------------
+
+
+#: what is checked of every way of loading
+_HOLDS = (
+    ("equilibrium", "force and moment left on the damper / (F_C, F_C times its size)"),
+    ("Coulomb's cone", "largest |t| - mu n or tension / largest n"),
+    ("no penetration", "overlap, or gap under pressure / motion of the damper"),
+    (
+        "sticking nodes",
+        "slip where it sticks, or against its friction / motion of the damper",
+    ),
+)
+
+
+def check_solution(solution: SeatedSolution) -> list[Check]:
+    """All self-checks."""
+    checks = [check for phase in solution.phases.values() for check in _checks(solution, phase)]
+    limits = solution.plan.scene.left_out
+    return checks + [one.check(limits) for one in solution.omissions]
+
+
+def _checks(solution: SeatedSolution, phase: Phase) -> list[Check]:
+    of, found, mu = solution.interface, phase.found, phase.friction
+    normal = found.force[..., 0]
+    size = normal.max(axis=1, initial=np.finfo(float).tiny)
+    shear = np.linalg.norm(found.force[..., 1:], axis=-1)
+    beyond = np.maximum(shear - mu * normal, -normal).max(axis=1)
+    gap, step = _kinematics(solution, phase)
+    moves = np.abs(found.displacement).max() + np.abs(phase.moved).max()
+    reach = float(np.abs(of.columns[: of.n]).max()) * moves
+    overlap = np.maximum(-gap, np.where(normal > 0.0, np.abs(gap), 0.0)).max() / reach
+    slip = _stick_misfit(found.state, found.force[..., 1:], step) / reach if mu else 0.0
+    values = _off_balance(solution, phase), (beyond / size).max(), overlap, slip
+    rows = ((name, v, ROUNDING, what) for v, (name, what) in zip(values, _HOLDS, strict=True))
+    return conditions(phase.case, "report this scene", *rows)
+
+
+def _off_balance(solution: SeatedSolution, phase: Phase) -> float:
+    """Forces and moments on the damper, from the nodes' places and the faces' frames."""
+    of, body = solution.interface, solution.bodies.damper
+    F = np.zeros((len(phase.centrifugal), 3))
+    F[:, 2] = phase.centrifugal / of.copies
+    # into the blades: the damper feels the opposite
+    nodal = np.einsum("knf,nfc->knc", phase.found.force, of.frame[of.face])
+    arm = of.position - body.centre
+    balance = F - nodal.sum(axis=1)
+    moment = -np.cross(arm[None], nodal).sum(axis=1)
+    kept = [k - 3 for k in of.kept if k >= 3]
+    size = np.abs(F[:, 2])
+    along = [k for k in of.kept if k < 3]
+    return float(
+        max(
+            (np.abs(balance[:, along]).max(axis=1) / size).max(),
+            (np.abs(moment[:, kept]).max(axis=1) / (size * np.abs(arm).max())).max(),
+        )
+    )
+
+
+def _kinematics(solution: SeatedSolution, phase: Phase) -> tuple[Array, Array]:
+    """Gap (k, n) and slip of each step (k, n, 2) in mm, from forces and motions."""
+    of, found, before = solution.interface, phase.found, phase.before
+    w = _motion(of, found.force, found.displacement, phase.moved)
+    n = of.n
+    gap = solution.gap - w[:, :n]
+    at = _motion(of, before.force[None], before.motion[None], np.zeros((1, 3)))
+    ways = np.vstack((at, w))[:, n:].reshape(-1, 2, n).transpose(0, 2, 1)
+    return gap, np.diff(ways, axis=0)
+
+
+def _motion(of: Interface, force: Array, motion: Array, moved: Array) -> Array:
+    """(k, 3 n) mm of the damper's nodes into the blades' faces and along them."""
+    f = force.transpose(0, 2, 1).reshape(len(force), -1)
+    return np.asarray(motion @ of.columns.T - f @ of.compliance - moved @ of.shifts(1).T)
+
+
+def _stick_misfit(state: np.ndarray, shear: Array, step: Array) -> float:
+    """Slip of nodes that stick, and of slipping ones what does not follow their friction, mm."""
+    length = np.linalg.norm(step, axis=-1)
+    stuck = length[state != OPEN][state[state != OPEN] != SLIP].max(initial=0.0)
+    size = np.linalg.norm(shear, axis=-1, keepdims=True)
+    way = np.divide(shear, size, out=np.zeros_like(shear), where=size > 0.0)
+    follows = np.maximum((step * way).sum(axis=-1), 0.0)
+    # Weighed by its share of the largest force: the direction of a force at rounding is rounding.
+    share = size[..., 0] / size.max(initial=np.finfo(float).tiny)
+    aside = share * np.linalg.norm(step - follows[..., None] * way, axis=-1)
+    return float(max(stuck, aside[state == SLIP].max(initial=0.0)))

@@ -2,7 +2,7 @@
 the load steps; in convergence studies meshes of its faces, elements, load steps.
 
 Coarser levels do not show all: a share of a face counts whole nodes, and levels may agree by
-chance, so its edges are known to one spacing of nodes. A number below what the self-checks hold it
+chance, so its edges are known to one spacing of nodes. A number below what forces are balanced
 to is rounding.
 """
 
@@ -15,9 +15,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from upd.analyses.seated.checks import ROUNDING, WORK_ROUNDING
 from upd.analyses.seated.plan import RAISED, SeatedPlan, make_plan
-from upd.analyses.seated.results import make_results
+from upd.analyses.seated.results import ROUNDING, make_results
 from upd.analyses.seated.solve import SeatedSolution, solve
 from upd.contact.coulomb_conditions import OPEN, SLIP
 from upd.mesh import IntArray
@@ -32,6 +31,8 @@ from upd.vary.variation import Key, Levels, Overrides, Problem, Variation, of_ge
 #: source of error beside the mesh
 STEPS = "load steps"
 _EDGE = "edges of the contact and of its stick are known to one spacing of nodes"
+#: rounding of a work, of that of F_C
+_OF_WORK = 1e-8
 _SHARES = (q.CLOSED_SHARE, q.CONTACT_AREA, q.MEAN_PRESSURE)
 
 
@@ -79,21 +80,21 @@ def corrected(solution: SeatedSolution, numbers: Sequence[Result], found: Estima
     for one in numbers:
         held = _held(solution, one)
         if not one.withheld and 0.0 < abs(one.value) <= held:
-            why = f"not estimated: zero but for rounding, self-checks allow {held:.2g} {one.unit}"
+            why = f"not estimated: zero but for rounding, which may be {held:.2g} {one.unit}"
             out[one.name, one.case] = (ErrorPart(MESH, float("nan"), why),)
     return out
 
 
 def _held(solution: SeatedSolution, one: Result) -> float:
-    """What self-checks hold a force, a loss or the stiffness of a motion to: shares of F_C, of its
+    """What rounding leaves of a force, a loss or the stiffness of a motion: shares of F_C, of its
     work along the motion, and of F_C over it.
     """
     scene = solution.plan.scene
     force, way = scene.damper.centrifugal, scene.moved.amplitude
     lift = np.abs(solution.interface.motions(solution.phases[RAISED].found)[-1, :3]).max()
     held = {
-        q.FRICTION_ENERGY.name: WORK_ROUNDING * force * way,
-        q.SEATING_LOSS.name: WORK_ROUNDING * force * float(lift),
+        q.FRICTION_ENERGY.name: _OF_WORK * force * way,
+        q.SEATING_LOSS.name: _OF_WORK * force * float(lift),
         q.MOVED_STIFFNESS.name: ROUNDING * force / way,
     }
     return held.get(one.name, ROUNDING * force if one.unit == "N" else 0.0)
