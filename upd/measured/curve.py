@@ -1,5 +1,5 @@
 """A measured response: accelerance of one blade over frequency; which curve of a file it is, by the
-blade, linear limit or F_C/F_E that the file itself gives.
+blade, linear limit or F_C/F_E that the file itself gives; and what is wrong with a file.
 """
 
 from __future__ import annotations
@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -27,8 +27,6 @@ State = Literal["free", "stuck"]
 #: of `upd.units.UNITS` to (m/s2)/N
 TO_ACCELERANCE = {"accelerance": (0, 1.0), "mobility": (1, 1e-3), "receptance": (2, 1e-3)}
 QUANTITIES = tuple(TO_ACCELERANCE)
-#: all their units
-RESPONSE_UNITS = frozenset(unit for kind in QUANTITIES for unit in UNITS[kind] if unit)
 #: fewest points of a curve: a peak and both its sides
 LEAST_POINTS = 3
 
@@ -145,13 +143,28 @@ def response_unit(own: str, given: str | None) -> str:
     return unit
 
 
-@contextmanager
-def at(place: str) -> Iterator[None]:
-    """An InputError with its place, "line 3, column 2"."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{place}: {error}") from None
+@dataclass
+class Faults:
+    """All that is wrong with a file, each with its place."""
+
+    found: list[str] = field(default_factory=list)
+
+    def add(self, place: str, words: object) -> None:
+        """A fault of a place, "line 3, column 2"."""
+        self.found.append(f"{place}: {words}")
+
+    @contextmanager
+    def at(self, place: str) -> Iterator[None]:
+        """Keep an InputError with its place."""
+        try:
+            yield
+        except InputError as error:
+            self.add(place, error)
+
+    def check(self) -> None:
+        """Raise InputError where something is wrong."""
+        if self.found:
+            raise InputError("\n".join(self.found))
 
 
 class ReadCurve(NamedTuple):
@@ -165,13 +178,17 @@ class ReadCurve(NamedTuple):
     label: CurveLabel
 
 
-def checked_curve(curve: ReadCurve, place: Callable[[str, int], str], remedy: str) -> ReadCurve:
+def checked_curve(
+    curve: ReadCurve, faults: Faults, place: Callable[[str, int], str], remedy: str
+) -> ReadCurve:
     """A curve with rising frequencies, as the file has it or turned round.
 
     Parameters
     ----------
     curve
         In the order of the file.
+    faults
+        Gets what is wrong.
     place
         Of the frequency or the magnitude of a point, by its number.
     remedy
@@ -185,18 +202,23 @@ def checked_curve(curve: ReadCurve, place: Callable[[str, int], str], remedy: st
     f, values = curve.frequency, curve.values
     step = np.diff(f)
     rising = np.median(step) > 0.0 if len(step) else True
-    for k in np.flatnonzero(~(f > 0.0)).tolist():
-        raise InputError(f"{place('frequency', k)}: {f[k]:g} Hz is not a frequency above 0")
-    for k in np.flatnonzero(step <= 0.0 if rising else step >= 0.0).tolist():
-        raise InputError(
-            f"{place('frequency', k + 1)}: {f[k + 1]:g} Hz comes after {f[k]:g} Hz, where the "
-            f"frequency {'rises' if rising else 'falls'}: sort the lines and leave out doubled ones"
-        )
-    for k in [] if np.iscomplexobj(values) else np.flatnonzero(values < 0.0).tolist():
-        raise InputError(
-            f"{place('magnitude', k)}: the magnitude {values[k]:g} is negative; give {remedy}"
-        )
-    turned = slice(None) if rising else slice(None, None, -1)
+    doubled = np.append(False, step <= 0.0 if rising else step >= 0.0)
+    way = "rises" if rising else "falls"
+    for k in range(len(f)):
+        if not f[k] > 0.0:
+            faults.add(place("frequency", k), f"{f[k]:g} Hz is not a frequency above 0")
+        if doubled[k]:
+            faults.add(
+                place("frequency", k),
+                f"{f[k]:g} Hz comes after {f[k - 1]:g} Hz, where the frequency {way}: sort the "
+                "lines and leave out doubled ones",
+            )
+    if not np.iscomplexobj(values):
+        for k in np.flatnonzero(values < 0.0).tolist():
+            words = f"the magnitude {values[k]:g} is negative; give {remedy}"
+            faults.add(place("magnitude", k), words)
+    faults.check()
+    turned = slice(None) if f[-1] > f[0] else slice(None, None, -1)
     return curve._replace(frequency=f[turned], values=values[turned])
 
 

@@ -18,15 +18,15 @@ import numpy as np
 from upd.errors import InputError, one_line
 from upd.measured.curve import (
     LEAST_POINTS,
-    RESPONSE_UNITS,
+    QUANTITIES,
     AskedCurve,
     Blade,
     CurveLabel,
+    Faults,
     MeasuredCurve,
     ReadCurve,
     State,
     as_accelerance,
-    at,
     checked_curve,
     label_of,
     response_unit,
@@ -35,12 +35,13 @@ from upd.measured.curve import (
 )
 from upd.measured.text import read_text
 from upd.results.netcdf import open_netcdf
-from upd.units import unit_factor
+from upd.units import UNITS, unit_factor
 
 _AXIS = "frequency"
+_RESPONSE_UNITS = frozenset(unit for kind in QUANTITIES for unit in UNITS[kind])
 
 
-def read_variables(path: Path, asked: AskedCurve) -> ReadCurve:
+def read_variables(path: Path, asked: AskedCurve, faults: Faults) -> ReadCurve:
     """A response of a netCDF file.
 
     Parameters
@@ -49,15 +50,17 @@ def read_variables(path: Path, asked: AskedCurve) -> ReadCurve:
         The file.
     asked
         Which response.
+    faults
+        Gets what is wrong with the file, with variable and place.
 
     Raises
     ------
     InputError
-        What is wrong with the file first, with variable and place.
+        Where something is wrong.
     """
     try:
         with open_netcdf(path) as file:
-            return _read(file, asked)
+            return _read(file, asked, faults)
     except OSError as error:
         reason = one_line(error)
         raise InputError(
@@ -65,7 +68,7 @@ def read_variables(path: Path, asked: AskedCurve) -> ReadCurve:
         ) from None
 
 
-def _read(file: Any, asked: AskedCurve) -> ReadCurve:
+def _read(file: Any, asked: AskedCurve, faults: Faults) -> ReadCurve:
     found = dict(_responses(file, "", asked.unit))
     labels = {name: label_of(_said(*one)) for name, one in found.items()}
     fitting = [name for name, label in labels.items() if label.agrees(asked.label)]
@@ -73,21 +76,23 @@ def _read(file: Any, asked: AskedCurve) -> ReadCurve:
     name = the_one(names, asked.column, "variables")
     label = the_curve([labels[name]], asked.label)
     group, variable = found[name]
-    axis = group.variables[_AXIS]
-    with at(f"variable {_AXIS}, attribute units"):
+    axis, scale, unit = group.variables[_AXIS], 1.0, ""
+    with faults.at(f"variable {_AXIS}, attribute units"):
         scale = unit_factor(_units(axis), ["frequency"])[1]
-    with at(f"variable {name}, attribute units"):
+    with faults.at(f"variable {name}, attribute units"):
         unit = response_unit(_units(variable), asked.unit)
     f, data = scale * np.asarray(axis[...], float), np.asarray(variable[...], float)
     for which, values in ((_AXIS, f), (name, data)):
         for k in np.argwhere(~np.isfinite(values)):
-            place = ", ".join(map(str, k))
-            raise InputError(f"variable {which}, place [{place}]: no finite number; leave it out")
+            at = ", ".join(map(str, k))
+            faults.add(f"variable {which}, place [{at}]", "no finite number; leave it out")
     if len(f) < LEAST_POINTS:
-        raise InputError(f"variable {_AXIS}: {len(f)} points; a curve has {LEAST_POINTS} or more")
+        faults.add(f"variable {_AXIS}", f"{len(f)} points; a curve has {LEAST_POINTS} or more")
+    faults.check()
     values = data[:, 0] + 1j * data[:, 1] if data.ndim == 2 else data
     return checked_curve(
         ReadCurve(f, values, unit, label),
+        faults,
         lambda what, k: f"variable {_AXIS if what == 'frequency' else name}, place [{k}]",
         "magnitudes, or a last dimension of real and imaginary part",
     )
@@ -114,7 +119,7 @@ def _responses(group: Any, path: str, unit: str | None) -> Iterator[tuple[str, t
         for name, variable in group.variables.items():
             dims, shape = variable.dimensions, variable.shape
             over = dims == (along,) or (len(dims) == 2 and dims[0] == along and shape[1] == 2)
-            known = unit is not None or _units(variable) in RESPONSE_UNITS
+            known = unit is not None or _units(variable) in _RESPONSE_UNITS
             if name != _AXIS and over and known:
                 yield f"{path}{name}", (group, variable)
     for name, inner in group.groups.items():
@@ -122,6 +127,8 @@ def _responses(group: Any, path: str, unit: str | None) -> Iterator[tuple[str, t
 
 
 _NETCDF = (".nc", ".nc4", ".cdf", ".h5")
+#: faults of one file that are reported
+MOST_TOLD = 20
 
 
 def read_measured(
@@ -161,7 +168,7 @@ def read_measured(
     Raises
     ------
     InputError
-        When the file is not there or damaged: its first fault, with line and column.
+        When the file is not there or damaged: one message with every fault, its line and column.
 
     Examples
     --------
@@ -177,8 +184,14 @@ def read_measured(
     """
     place = Path(path)
     asked = AskedCurve(column, unit, CurveLabel(blade, state, force_ratio))
-    with at(str(place)):
-        found = found_in(place, asked)
+    found, faults = found_in(place, asked)
+    if found is None:
+        more = len(faults) - MOST_TOLD
+        shown = faults[:MOST_TOLD] + ([f"and {more} more"] if more > 0 else [])
+        raise InputError(
+            f"{place}: {len(faults)} problem{'s' * (len(faults) != 1)}\n"
+            + "\n".join(f"  {one}" for one in shown)
+        )
     H, quantity = as_accelerance(found.frequency, found.values, found.unit)
     label = found.label
     return MeasuredCurve(
@@ -193,8 +206,8 @@ def read_measured(
     )
 
 
-def found_in(path: Path, asked: AskedCurve) -> ReadCurve:
-    """What a file holds; files that did not change are read once.
+def found_in(path: Path, asked: AskedCurve) -> tuple[ReadCurve | None, list[str]]:
+    """What a file holds, or its faults; files that did not change are read once.
 
     Parameters
     ----------
@@ -202,22 +215,22 @@ def found_in(path: Path, asked: AskedCurve) -> ReadCurve:
         The file.
     asked
         Which response.
-
-    Raises
-    ------
-    InputError
-        What is wrong with it first.
     """
     try:
         file = path.stat()
         return _found(path, file.st_mtime_ns, file.st_size, asked)
     except OSError as error:
-        raise InputError(
-            f"cannot be read ({error.strerror}); give the file of a measured curve"
-        ) from None
+        return None, [f"cannot be read ({error.strerror}); give the file of a measured curve"]
 
 
 @lru_cache(maxsize=64)
-def _found(path: Path, changed: int, size: int, asked: AskedCurve) -> ReadCurve:
+def _found(
+    path: Path, changed: int, size: int, asked: AskedCurve
+) -> tuple[ReadCurve | None, list[str]]:
     del changed, size
-    return (read_variables if path.suffix.lower() in _NETCDF else read_text)(path, asked)
+    read = read_variables if path.suffix.lower() in _NETCDF else read_text
+    faults = Faults()
+    try:
+        return read(path, asked, faults), []
+    except InputError as error:
+        return None, faults.found or [str(error)]

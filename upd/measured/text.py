@@ -1,13 +1,14 @@
 """Measured responses in text files: comma, semicolon or tab between the cells of a line.
 
-Lines that begin with # are comments. The first other line names the columns, with their units in
-brackets, as the files that a run leaves in its folder ``curves`` do:
+Lines that begin with # are comments. The first other line may name the columns, with their units
+in brackets, as the files that a run leaves in its folder ``curves`` do:
 
     frequency [Hz], accelerance real [(m/s2)/N], accelerance imaginary [(m/s2)/N]
 
 A response is one column of magnitudes, two of real and imaginary part, or two of magnitude and
-phase; a column in deg or rad is a phase. A decimal comma is understood where semicolons or tabs
-part the cells.
+phase; a column in deg or rad is a phase. Without names the
+columns are frequency in Hz and magnitudes, or frequency, real and imaginary part. Where semicolons
+or tabs part the cells, a decimal comma is understood.
 
 Columns "blade" (left, right), "state" (free, stuck) and "F_C/F_E" say which curve a line is of, so
 that one file may hold several.
@@ -28,12 +29,11 @@ from upd.measured.curve import (
     LABELS,
     LEAST_POINTS,
     QUANTITIES,
-    RESPONSE_UNITS,
     AskedCurve,
     ComplexArray,
     CurveLabel,
+    Faults,
     ReadCurve,
-    at,
     checked_curve,
     read_label,
     response_unit,
@@ -80,11 +80,11 @@ class FileColumn:
 
 
 def _cell(line: int, place: int, name: str) -> str:
-    """Where a cell is, as messages say it."""
+    """Where a cell is, as faults say it."""
     return f"line {line}, column {place + 1} ({name})"
 
 
-def read_text(path: Path, asked: AskedCurve) -> ReadCurve:
+def read_text(path: Path, asked: AskedCurve, faults: Faults) -> ReadCurve:
     """A response of a text file.
 
     Parameters
@@ -93,32 +93,35 @@ def read_text(path: Path, asked: AskedCurve) -> ReadCurve:
         The file.
     asked
         Which response.
+    faults
+        Gets what is wrong with the file, with line and column.
 
     Raises
     ------
     InputError
-        What is wrong with the file first, with line and column.
+        Where something is wrong.
     """
     lines = _lines(path)
     separator = _separator(lines)
     split = [(n, [cell.strip().strip('"') for cell in text.split(separator)]) for n, text in lines]
-    (head, names), *body = split
-    columns = [_column(k, name) for k, name in enumerate(names)]
-    parts, scale, unit = _chosen(columns, asked, head)
-    label, body = _labelled(columns, body, asked.label, separator, head)
-    rows = _numbers(body, parts, separator, max(c.place for c in columns) + 1)
-    numbers = [n for n, _ in body]
-    if len(numbers) < LEAST_POINTS:
-        last = numbers[-1] if numbers else head
+    columns, body, head = _columns(split, separator)
+    parts, scale, unit = _chosen(columns, asked, head, faults)
+    label, body = _labelled(columns, body, asked.label, separator, head, faults)
+    rows = _numbers(body, parts, separator, faults, max(c.place for c in columns) + 1)
+    faults.check()
+    at = [n for n, _ in body]
+    if len(at) < LEAST_POINTS:
+        last = at[-1] if at else head
         raise InputError(
-            f"line {last}: ends with {len(numbers)} points; a curve has {LEAST_POINTS} or more"
+            f"line {last}: ends with {len(at)} points; a curve has {LEAST_POINTS} or more"
         )
 
     def place(what: str, k: int) -> str:
-        return _cell(numbers[k], parts[what].place, parts[what].name or what)
+        return _cell(at[k], parts[what].place, parts[what].name or what)
 
     return checked_curve(
         ReadCurve(scale * rows["frequency"], _response(rows, parts), unit, label),
+        faults,
         place,
         "linear magnitudes, or name the columns real and imaginary",
     )
@@ -156,6 +159,23 @@ def _number(cell: str, separator: str) -> float | None:
         return None
 
 
+def _columns(
+    split: Sequence[tuple[int, list[str]]], separator: str
+) -> tuple[list[FileColumn], list[tuple[int, list[str]]], int]:
+    """The columns, the lines below their names, and the line of the names."""
+    line, first = split[0]
+    named = all(_number(cell, separator) is None for cell in first)
+    if named:
+        return [_column(k, cell) for k, cell in enumerate(first)], list(split[1:]), line
+    usual = ("magnitude",) if len(first) <= 2 else ("real", "imaginary")
+    columns = [FileColumn(0, "", "frequency", "Hz")]
+    return (
+        [*columns, *(FileColumn(k, "response", part, "") for k, part in enumerate(usual, 1))],
+        list(split),
+        line,
+    )
+
+
 def _column(place: int, head: str) -> FileColumn:
     match = _UNIT.fullmatch(head)
     assert match is not None
@@ -177,42 +197,46 @@ def _column(place: int, head: str) -> FileColumn:
 
 
 def _chosen(
-    columns: Sequence[FileColumn], asked: AskedCurve, line: int
+    columns: Sequence[FileColumn], asked: AskedCurve, line: int, faults: Faults
 ) -> tuple[dict[str, FileColumn], float, str]:
     """The columns of frequency and of the response by their parts, factor to Hz, unit."""
     axis, unit = [c for c in columns if c.part == "frequency"], asked.unit
     if len(axis) != 1:
         many = f"{len(axis) or 'no'} column{'s' * (len(axis) > 1)}"
         raise InputError(f'line {line}: {many} of frequency; name one "frequency [Hz]"')
-    with at(_cell(line, axis[0].place, "frequency")):
+    scale = 1.0
+    with faults.at(_cell(line, axis[0].place, "frequency")):
         scale = _factor(axis[0].unit, ["frequency"])
-    named = [c for c in columns if c.name]
-    good = [c for c in named if unit or c.part == "phase" or c.unit in RESPONSE_UNITS]
-    # of none the unit is what is wrong: reported below
-    names = list(dict.fromkeys(c.name for c in good or named[: asked.column is None]))
-    with at(f"line {line}"):
+    names = list(dict.fromkeys(c.name for c in columns if c.name and _is_response(c, unit)))
+    if not names and asked.column is None:
+        # its unit is what is wrong: reported below
+        names = list(dict.fromkeys(c.name for c in columns if c.name))[:1]
+    name = ""
+    with faults.at(f"line {line}"):
         name = the_one(names, asked.column, "columns")
-        parts = _parts([c for c in columns if c.name == name], name)
+    if not name:
+        faults.check()
+    parts = _parts([c for c in columns if c.name == name], name, line, faults)
     responses = [c for kind, c in parts.items() if kind != "phase"]
     for c in responses:
-        with at(_cell(line, c.place, c.name)):
+        with faults.at(_cell(line, c.place, c.name)):
             if not (c.unit or unit):
                 _factor("", QUANTITIES)
             response_unit(c.unit, unit)
     units = {unit or c.unit for c in responses}
     if len(units) > 1:
-        raise InputError(
-            f"line {line}: the parts of {name} have different units, {' and '.join(units)}"
-        )
+        words = f"the parts of {name} have different units, {' and '.join(units)}"
+        faults.add(f"line {line}", words)
     magnitudes = {c.name for c in columns if c.part == "magnitude"}
     for c in columns:
         if c.part == "phase" and c.name not in magnitudes and "phase" not in parts:
             words = f'a phase of no response; name it "{name} phase", or remove it'
-            raise InputError(f"{_cell(line, c.place, c.name)}: {words}")
+            faults.add(_cell(line, c.place, c.name), words)
     if "phase" in parts:
         c = parts["phase"]
-        with at(_cell(line, c.place, f"{c.name} phase")):
+        with faults.at(_cell(line, c.place, f"{c.name} phase")):
             _factor(c.unit, ["angle"])
+    faults.check()
     return {"frequency": axis[0], **parts}, scale, unit or responses[0].unit
 
 
@@ -227,18 +251,32 @@ def _factor(unit: str, kinds: Sequence[str]) -> float:
         raise InputError(f"no unit; write it in brackets behind the name ({known})") from None
 
 
-def _parts(mine: Sequence[FileColumn], name: str) -> dict[str, FileColumn]:
+def _is_response(c: FileColumn, unit: str | None) -> bool:
+    """Whether a column's unit is that of a response, or is given beside the file."""
+    if unit is not None or c.part == "phase":
+        return True
+    try:
+        unit_factor(c.unit, QUANTITIES)
+    except InputError:
+        return False
+    return True
+
+
+def _parts(
+    mine: Sequence[FileColumn], name: str, line: int, faults: Faults
+) -> dict[str, FileColumn]:
     """Real and imaginary part, or magnitude and phase, or magnitude alone."""
     found = {c.part: c for c in mine}
     if len(found) < len(mine):
-        raise InputError(f"several columns {name}; give each its own name")
+        faults.add(f"line {line}", f"several columns {name}; give each its own name")
     if {"real", "imaginary"} <= set(found):
         return {part: found[part] for part in ("real", "imaginary")}
     if "magnitude" in found:
         return {part: found[part] for part in ("magnitude", "phase") if part in found}
     (have,) = list(found)[:1]
     lacks = {"real": "imaginary", "imaginary": "real", "phase": "magnitude"}[have]
-    raise InputError(f"{name} has a column {have} but none {lacks}; add it")
+    faults.add(f"line {line}", f"{name} has a column {have} but none {lacks}; add it")
+    return {}
 
 
 def _labelled(
@@ -247,23 +285,27 @@ def _labelled(
     wanted: CurveLabel,
     separator: str,
     line: int,
+    faults: Faults,
 ) -> tuple[CurveLabel, list[tuple[int, list[str]]]]:
     """The label of the wanted curve and its lines; all lines where no column gives it."""
     mine = [c for c in columns if c.part in LABELS.values()]
     if not mine:
         return ANY, body
     labels = []
-    for number, cells in body:
+    for at, cells in body:
         given = {}
         for c in mine:
             cell = cells[c.place] if c.place < len(cells) else ""
             if c.part == "force_ratio":
                 cell = cell.replace(",", ".") if separator != "," else cell
-            with at(_cell(number, c.place, c.part)):
+            with faults.at(_cell(at, c.place, c.part)):
                 given[c.part] = read_label(c.part, cell)
         labels.append(CurveLabel(**given))
-    with at(f"line {line}"):
+    faults.check()
+    label = ANY
+    with faults.at(f"line {line}"):
         label = the_curve(list(dict.fromkeys(labels)), wanted)
+    faults.check()
     return label, [row for row, one in zip(body, labels, strict=True) if one == label]
 
 
@@ -271,22 +313,26 @@ def _numbers(
     body: Sequence[tuple[int, list[str]]],
     parts: Mapping[str, FileColumn],
     separator: str,
+    faults: Faults,
     width: int,
 ) -> dict[str, FloatArray]:
     """The cells of the columns that count, as numbers."""
     out: dict[str, list[float]] = {kind: [] for kind in parts}
     for line, cells in body:
         if len(cells) > width and any(cells[width:]):
-            raise InputError(f"line {line}: {len(cells)} cells where there are {width} columns")
+            faults.add(f"line {line}", f"{len(cells)} cells where there are {width} columns")
         for kind, c in parts.items():
             cell = cells[c.place] if c.place < len(cells) else ""
             value = _number(cell, separator)
-            if value is None or not np.isfinite(value):
-                words = f"{cell!r} is no finite number; correct" if cell else "nothing there; fill"
-                raise InputError(
-                    f"{_cell(line, c.place, c.name or kind)}: {words} it, or remove the line"
-                )
-            out[kind].append(value)
+            if value is not None and np.isfinite(value):
+                out[kind].append(value)
+                continue
+            words = (
+                f"{cell!r} is no finite number; correct it, or remove the line"
+                if cell
+                else "nothing there; give a number, or remove the line"
+            )
+            faults.add(_cell(line, c.place, c.name or kind), words)
     return {kind: np.array(values) for kind, values in out.items()}
 
 

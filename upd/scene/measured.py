@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from upd.errors import InputError
 from upd.measured.curve import QUANTITIES, AskedCurve, CurveLabel, MeasuredCurve, label_of
 from upd.measured.damping import DampingFit, fit_damping
-from upd.measured.read import found_in, read_measured
+from upd.measured.read import MOST_TOLD, found_in, read_measured
 from upd.scene import quantities as q
 from upd.scene.base import Table
 from upd.units import UNITS
@@ -74,7 +74,7 @@ class MeasuredChoice(Table):
         Raises
         ------
         InputError
-            What is wrong with the file.
+            With all that is wrong with the file.
         """
         return read_measured(
             self.file,
@@ -129,11 +129,11 @@ def note_files(data: Mapping[str, Any]) -> None:
         )
         try:
             wanted = label_of({key: table[key] for key in keys.values() if key in table})
-            found = found_in(path, AskedCurve(column, unit, wanted))
+            found, _ = found_in(path, AskedCurve(column, unit, wanted))
         except InputError:
             continue
         for name, key in keys.items():
-            if (given := getattr(found.label, name)) is not None:
+            if found is not None and (given := getattr(found.label, name)) is not None:
                 table.setdefault(key, given)
 
 
@@ -146,7 +146,7 @@ def digest_of_file(path: Path) -> str:
 
 
 def measured_problems(measured: Mapping[str, MeasuredChoice]) -> Iterator[str]:
-    """What is wrong with measured curves; of a file its first fault, with line and column."""
+    """What is wrong with measured curves and their files, every fault with line and column."""
     for name, one in measured.items():
         where, path = f"measured.{name}", Path(one.file)
         if (one.state is None) == (one.centrifugal_to_force is None):
@@ -162,10 +162,10 @@ def measured_problems(measured: Mapping[str, MeasuredChoice]) -> Iterator[str]:
                 "give that file, or remove digest to take this one"
             )
             continue
-        try:
-            found_in(path, AskedCurve(one.column, one.unit, one.label))
-        except InputError as error:
-            yield f"{where}.file: {path.name}, {error}"
+        _, faults = found_in(path, AskedCurve(one.column, one.unit, one.label))
+        yield from [f"{where}.file: {path.name}, {fault}" for fault in faults[:MOST_TOLD]]
+        if len(faults) > MOST_TOLD:
+            yield f"{where}.file: {path.name}: and {len(faults) - MOST_TOLD} more"
 
 
 def fitted_modes(

@@ -93,16 +93,17 @@ def test_refused(tmp_path: Path, more: str, damping: str, told: str) -> None:
         load_scene(scene(tmp_path, more, damping))
 
 
-def test_faults_of_scene_and_file_at_once(tmp_path: Path) -> None:
+def test_all_faults_at_once_with_line_and_column(tmp_path: Path) -> None:
     path = curve(tmp_path)
     lines = path.read_text("utf-8").splitlines()
-    lines[6] = "abc,1,2"
+    lines[6], lines[9] = "abc,1,2", "314.0,1,x"
     path.write_text("\n".join(lines), encoding="utf-8")
     with pytest.raises(InputError) as caught:
         load_scene(scene(tmp_path), {"excitation.start": "600 Hz"})
     told = str(caught.value)
-    assert "lab.toml: 2 problems" in told
+    assert "lab.toml: 3 problems" in told
     assert "measured.free.file: free.csv, line 7, column 1 (frequency): 'abc'" in told
+    assert "measured.free.file: free.csv, line 10, column 3 (accelerance): 'x'" in told
     assert "excitation.start" in told
 
 
