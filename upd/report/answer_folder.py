@@ -18,7 +18,7 @@ from upd.errors import InputError, one_line
 from upd.plot.chart import Chart
 from upd.report.answer import table_lines
 from upd.report.columns import SHORT, wrapped
-from upd.report.page import Section, Verdict, image_uri, make_panels, page_text, versions_text
+from upd.report.page import Section, image_uri, page_text, versions_text
 from upd.results.answer_table import AnswerTable
 from upd.scene import AnyScene
 from upd.scene.keys import scene_as_run
@@ -101,11 +101,11 @@ class FigureAnswer(ABC):
         sections = [
             Section("Answer", self.tables),
             Section("Notes", texts=self.notes),
-            Section("Figures", panels=make_panels(charts, {})),
+            Section("Figures", charts=charts),
             Section("Scene file", file=self._scene_file),
         ]
         title = self.source.title or self.source.name
-        verdict = Verdict(kind, word, f"{self.verdict}.")
+        verdict = (kind, word, f"{self.verdict}.")
         return page_text(title, sections, verdict=verdict, footer=versions_text(versions()))
 
     @property

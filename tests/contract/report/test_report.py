@@ -26,10 +26,9 @@ from upd.plot.chart import Chart
 from upd.plot.plotly import figure, pack
 from upd.reference import mindlin
 from upd.report import write_comparison, write_report
-from upd.report.compare import differences, numbers, overlaid, run_names
 from upd.report.folder import RunFolder, read_run
 from upd.report.page import fitting
-from upd.report.run_page import run_surfaces
+from upd.report.run_page import differences, numbers, overlaid, run_names, run_surfaces
 from upd.report.tables import all_numbers, analysis_charts, filled, main_numbers, warnings
 from upd.results.check import worst_checks
 from upd.results.quantities import number_label
@@ -417,7 +416,7 @@ def test_a_page_is_made_from_what_is_left(copy: Path, name: str, content: bytes 
     [
         (None, "no run folder"),
         ("{", "not JSON"),
-        ("[]", "damaged in the whole"),
+        ("[]", "damaged in scene, title"),
         ('{"scene": "x"}', "damaged in title, status"),
     ],
 )
