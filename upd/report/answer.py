@@ -14,7 +14,6 @@ from upd.labels import check_number, number, percent, percent_of, plus_minus, sh
 from upd.plot.chart import Entry
 from upd.report.columns import SHORT, whole_table, wrapped
 from upd.report.tables import (
-    MAIN,
     MOST_NOTES,
     all_numbers,
     answer_tables,
@@ -22,10 +21,7 @@ from upd.report.tables import (
     checks_table,
     effects_table,
     error_parts,
-    inputs_exceed,
     main_numbers,
-    number_table,
-    reached_numbers,
     stage_table,
     warnings,
 )
@@ -90,22 +86,10 @@ def answer(
     return lines + end
 
 
-def short_answer(summary: Mapping[str, Any], width: int, folder: Path | None) -> list[str]:
-    """Verdict, main numbers, checks, cost and how much warns, on at most ten lines."""
-    size, results = summary["size"], summary["results"]
-    lines = [line.text for line in _verdict(summary, width)]
-    end = [checked(summary).partition(". Left out")[0], _cost(summary, ".table()")]
-    end += [f"Run folder: {folder}"] * (folder is not None)
-    noted = warnings(summary["checks"], results)
-    if noted and outcome_of(summary["status"]) != FAILED:
-        end.append(f"Warnings: {len(noted)}, with what to do in .table()")
-    table = number_table(MAIN, reached_numbers(size, results))
-    numbers = whole_table(table, width, cut=True) if table.rows else []
-    numbers = numbers[: max(SHORT - len(lines) - len(end), 0)]
-    # a case whose numbers find no room
-    if numbers and numbers[-1] in [row[0] for row in table.rows if not any(row[1:])]:
-        numbers.pop()
-    return [*lines, *numbers, *end][:SHORT]
+def opened(text: str) -> str:
+    """What `print` shows of an answer: its first lines, and what shows all of it."""
+    lines = text.splitlines()
+    return "\n".join(lines if len(lines) <= SHORT else [*lines[: SHORT - 1], "... .table()"])
 
 
 def table_lines(table: AnswerTable, width: int, *, cut: bool = False) -> list[AnswerLine]:
@@ -160,7 +144,7 @@ def _end(
 ) -> list[AnswerLine]:
     """Chosen levels, sources of the main error, checks, cost and files; at last what warns."""
     lines = [AnswerLine("")]
-    for text in (_accuracy(summary), _budget(summary), checked(summary), _cost(summary, "--full")):
+    for text in (_accuracy(summary), _budget(summary), checked(summary), _cost(summary)):
         lines += _wrapped(text, width)
     has_page = folder is not None and (folder / "report.html").is_file()
     if folder is not None:
@@ -189,11 +173,12 @@ def _budget(summary: Mapping[str, Any]) -> str:
     """The sources of the error of the first main number that has some."""
     main = [_most_important(summary), *main_numbers(summary["size"], summary["results"])]
     for entry in filter(None, main):
-        if entry.get("estimated_error") is not None or entry.get("input_error") is not None:
-            parts = error_parts(entry)
-            sources = ", ".join(f"{name} {percent_of(error)}" for name, error, *_ in parts)
-            more = "; its inputs move it by more: finer levels do not help" * inputs_exceed(entry)
-            return f"Error of the {number_label(entry['name'])}: {sources}{more}"
+        error, band = entry.get("estimated_error"), entry.get("input_error")
+        if error is not None or band is not None:
+            parts = (f"{name} {percent_of(part)}" for name, part, *_ in error_parts(entry))
+            more = error is not None and band is not None and band > error
+            useless = "; its inputs move it by more: finer levels do not help" * more
+            return f"Error of the {number_label(entry['name'])}: {', '.join(parts)}{useless}"
     return ""
 
 
@@ -215,15 +200,15 @@ def checked(summary: Mapping[str, Any]) -> str:
     return f"{text}. Left out, worth at most {value} of {what} (limit {limit}): {', '.join(names)}"
 
 
-def _cost(summary: Mapping[str, Any], whole: str) -> str:
-    """Seconds, memory and size, and what shows the ``whole`` answer."""
+def _cost(summary: Mapping[str, Any]) -> str:
+    """Seconds, memory and size, and what shows all numbers."""
     size, cost = summary["size"], summary["cost"]
     parts = [f"{cost['total_s']:.1f} s", f"{cost['peak_rss_mb']:.0f} MB"] if cost else []
     if dofs := sum(size.get("n_dof", {}).values()):
         parts.append(f"{dofs} dofs")
     if size.get("n_pairs") is not None:
         parts.append(f"{size['n_pairs']} contact pairs")
-    return f"Cost: {', '.join(parts)}; all {len(summary['results'])} numbers: {whole}"
+    return f"Cost: {', '.join(parts)}; all {len(summary['results'])} numbers: --full"
 
 
 def _wrapped(text: str, width: int, mood: str = "") -> list[AnswerLine]:

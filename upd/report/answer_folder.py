@@ -1,6 +1,4 @@
-"""Answers of one figure and a few tables: their text, their page, their folder, and what a notebook
-shows.
-"""
+"""Answers of one figure and a few tables: their text, their page and their folder."""
 
 from __future__ import annotations
 
@@ -8,7 +6,6 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from html import escape
 from pathlib import Path
 from typing import Any, Self
 
@@ -16,9 +13,9 @@ from upd.cache.files import whole_files
 from upd.cache.sources import versions
 from upd.errors import InputError, one_line
 from upd.plot.chart import Chart
-from upd.report.answer import table_lines
-from upd.report.columns import SHORT, wrapped
-from upd.report.page import Section, image_uri, page_text, versions_text
+from upd.report.answer import opened, table_lines
+from upd.report.columns import wrapped
+from upd.report.page import Section, page_text, versions_text
 from upd.results.answer_table import AnswerTable
 from upd.scene import AnyScene
 from upd.scene.keys import scene_as_run
@@ -161,12 +158,4 @@ class FigureAnswer(ABC):
         return "\n".join([*lines, *(line for note in self.notes for line in wrapped(note, WIDTH))])
 
     def __repr__(self) -> str:
-        lines = self.table().splitlines()
-        return "\n".join(lines if len(lines) <= SHORT else [*lines[: SHORT - 1], "... .table()"])
-
-    def _repr_html_(self) -> str:
-        """As a notebook shows it: its text and its figure."""
-        from upd.plot.matplotlib import chart_png
-
-        uri = image_uri(chart_png(self.charts))
-        return f'<pre>{escape(self.table())}</pre><img src="{uri}">'
+        return opened(self.table())

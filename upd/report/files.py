@@ -94,8 +94,9 @@ def write_curves(arrays: Arrays, folder: Path) -> list[Path]:
             stem = begin + (f"-{file_name(dimension)}" if k else "")
             path = folder / FOLDER / f"{stem}.csv"
             path.parent.mkdir(exist_ok=True)
-            heads, data = zip(*columns, strict=True)
-            write_text(path, as_csv([heads, *zip(*(one.tolist() for one in data), strict=True)]))
+            write_text(
+                path, as_csv(zip(*([head, *data.tolist()] for head, data in columns), strict=True))
+            )
             files.append(path)
     return files
 
@@ -110,39 +111,38 @@ def as_csv(rows: Iterable[Iterable[Any]]) -> str:
 def _tables(group: Group) -> Iterator[tuple[str, list[Column]]]:
     """Dimension -> its columns, where there is something to draw over something else."""
     for dimension in dict.fromkeys(d for v in group.values() for d in v.dims):
-        columns = [
-            column
-            for name, variable in group.items()
-            for column in _columns(name, variable, dimension)
-        ]
+        columns = [one for name, v in group.items() for one in _columns(name, v, dimension)]
         several = len(columns) > 1 and len(columns[0][1]) > 1
         if several and not dimension.startswith(_PEAKS):
             yield dimension, columns
     maps = {name: v for name, v in group.items() if v.dims[:2] == _PLACES}
     if maps and all(axis in group for axis in _PLACES):
         lines = np.meshgrid(*(group[axis].data for axis in _PLACES), indexing="ij")
-        places = [
-            (f"{axis} [{group[axis].units}]", at.ravel())
-            for axis, at in zip(_PLACES, lines, strict=True)
+        columns = [
+            _column(axis, group[axis], line) for axis, line in zip(_PLACES, lines, strict=True)
         ]
         for name, v in maps.items():
-            unit = f" [{v.units}]" if v.units else ""
             # a column for each of its components
-            parts = v.data.reshape(v.data.shape[0] * v.data.shape[1], -1).T
-            numbers = [f" {k + 1}" for k in range(len(parts))] if len(parts) > 1 else [""]
-            places += [(f"{name}{k}{unit}", part) for k, part in zip(numbers, parts, strict=True)]
-        yield "map", places
+            parts = v.data.reshape(lines[0].size, -1).T
+            columns += _numbered(name, v, parts) if len(parts) > 1 else [_column(name, v, parts)]
+        yield "map", columns
 
 
 def _columns(name: str, variable: Variable, dimension: str) -> Iterator[Column]:
     data, dims = variable.data, variable.dims
-    unit = f" [{variable.units}]" if variable.units else ""
     if dims == (dimension,):
-        yield f"{name}{unit}", data
+        yield _column(name, variable, data)
     elif dims == (dimension, _PART):
-        real, imaginary = data[:, 0], data[:, 1]
-        yield f"{name} real{unit}", real
-        yield f"{name} imaginary{unit}", imaginary
-        yield f"{name} amplitude{unit}", np.hypot(real, imaginary)
+        kinds = {"real": data[:, 0], "imaginary": data[:, 1], "amplitude": np.hypot(*data.T)}
+        yield from (_column(f"{name} {kind}", variable, one) for kind, one in kinds.items())
     elif dimension == _SAMPLE and len(dims) == 2 and dims[1] == dimension:
-        yield from ((f"{name} {dims[0]} {k + 1}{unit}", row) for k, row in enumerate(data))
+        yield from _numbered(f"{name} {dims[0]}", variable, data)
+
+
+def _column(name: str, variable: Variable, data: NDArray[np.generic]) -> Column:
+    """Name with unit, and values of a column."""
+    return f"{name} [{variable.units}]" if variable.units else name, data.ravel()
+
+
+def _numbered(name: str, variable: Variable, rows: NDArray[np.generic]) -> list[Column]:
+    return [_column(f"{name} {k}", variable, row) for k, row in enumerate(rows, 1)]

@@ -12,18 +12,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from upd.errors import ConvergenceError, InputError, did_you_mean
-from upd.report.answer import AnswerLine, answer, short_answer
+from upd.report.answer import AnswerLine, answer, opened
 from upd.report.columns import text_width
 from upd.report.folder import read_run
 from upd.report.tables import analysis_charts
 from upd.results import Case, Check, Result
-from upd.results.check import outcome_of
-from upd.results.number import from_json, read_result
+from upd.results.check import outcome_of, read_check
+from upd.results.number import read_result
+from upd.results.quantities import number_title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from upd.plot.chart import Chart, Entry
+    from upd.plot.chart import Chart
     from upd.results import Arrays
 
 #: charts of the figure nobody chose
@@ -89,8 +90,9 @@ class RunResult:
             cases = ", ".join(f'"{r.case}"' for r in rows)
             raise InputError(f'{name} has several cases: write value("{name}", case) with {cases}')
         if row.withheld:
-            label = f" of {row.case}" if row.case.label else ""
-            raise ConvergenceError(f"{name}{label} was not reached: {row.withheld}")
+            raise ConvergenceError(
+                f"{number_title(name, str(row.case))}: not reached, {row.withheld}"
+            )
         return row.value
 
     def summary(self) -> dict[str, Any]:
@@ -132,10 +134,7 @@ class RunResult:
         if ax is None:
             return draw_all(chosen)
         if len(chosen) > 1:
-            meant = "; ".join(f"{c.title}, {c.case}" if c.case else c.title for c in chosen)
-            raise InputError(
-                f"plot: ax takes one chart, {len(chosen)} are meant ({meant}); give title and case"
-            )
+            raise InputError(f"plot: ax takes one of {len(chosen)} charts; give title and case")
         return [draw(chosen[0], ax)]
 
     def table(self) -> str:
@@ -163,7 +162,7 @@ class RunResult:
         return answer(self.summary(), width, self.folder, self.faults, full=full)
 
     def __repr__(self) -> str:
-        return "\n".join(short_answer(self.summary(), text_width(), self.folder))
+        return opened("\n".join(line.text for line in self.answer(text_width())))
 
     __str__ = __repr__
 
@@ -221,22 +220,12 @@ def load(folder: str | Path) -> RunResult:
     run = read_run(Path(folder), whole=True)
     summary = run.summary
     return RunResult(
-        scene=summary["scene"],
-        title=summary["title"],
-        status=summary["status"],
-        results=tuple(read_result(entry, _case(entry)) for entry in summary["results"]),
-        effects=tuple(dict(effect) for effect in summary["effects"]),
-        checks=tuple(from_json(Check, entry, case=_case(entry)) for entry in summary["checks"]),
-        size=summary["size"],
-        cost=summary["cost"],
+        **{key: summary[key] for key in ("scene", "title", "status", "size", "cost")},
+        results=tuple(map(read_result, summary["results"])),
+        effects=tuple(summary["effects"]),
+        checks=tuple(map(read_check, summary["checks"])),
         # A file has no slash in the name of a group.
         arrays={name.replace(" per ", "/"): group for name, group in run.arrays.items()},
         folder=run.path,
         scene_text=run.scene,
     )
-
-
-def _case(entry: Entry) -> Case:
-    """The case from its fields; of unknown fields, from its words."""
-    case = from_json(Case, entry["case_fields"])
-    return case if case.label == entry["case"] else Case(name=entry["case"])

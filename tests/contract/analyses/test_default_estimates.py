@@ -67,8 +67,8 @@ def test_terminal_page_and_files_tell_them(sphere: upd.RunResult) -> None:
     assert "Error of the maximum pressure: mesh" in text
     entry = row.as_dict()
     (part,) = error_parts(entry)
-    assert part[:3] == ("mesh", row.estimated_error, pytest.approx(1.0))
-    assert "mesh" in budget_table([entry]).rows[0] and "100 %" in budget_table([entry]).rows[0]
+    assert part[:2] == ("mesh", row.estimated_error)
+    assert "mesh" in budget_table([entry]).rows[0]
 
 
 @pytest.mark.parametrize(
