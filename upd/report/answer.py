@@ -1,30 +1,19 @@
-"""The answer of a run in the terminal: verdict, tables, checks, cost, files and what warns; and in
-`print(result)`: the ten lines of it that matter most.
+"""The answer of a run in the terminal: verdict, tables, checks, cost, files and what warns; `print`
+shows the first lines of it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from upd.analyses import analysis_named
 from upd.analyses.base import CHOSEN_BY_ACCURACY
 from upd.labels import check_number, number, percent, percent_of, plus_minus, shown
 from upd.plot.chart import Entry
+from upd.report import tables
 from upd.report.columns import SHORT, whole_table, wrapped
-from upd.report.tables import (
-    MOST_NOTES,
-    all_numbers,
-    answer_tables,
-    budget_table,
-    checks_table,
-    effects_table,
-    error_parts,
-    main_numbers,
-    stage_table,
-    warnings,
-)
 from upd.results.answer_table import AnswerTable
 from upd.results.check import FAILED, WARNED, outcome_of, worst_check
 from upd.results.quantities import number_label, quantity_of
@@ -33,15 +22,8 @@ from upd.results.quantities import number_label, quantity_of
 LINES = 40
 #: mood of the line above numbers
 TITLE = "title"
-
-
-class AnswerLine(NamedTuple):
-    """A line of the answer, and its mood: the outcome it reports, "title" for what stands above
-    numbers, "" otherwise.
-    """
-
-    text: str
-    mood: str = ""
+#: a line, and its mood: the outcome it reports, "title" for what stands above numbers, "" otherwise
+AnswerLine = tuple[str, str]
 
 
 def answer(
@@ -67,20 +49,19 @@ def answer(
     lines, end = _verdict(summary, width), _end(summary, width, folder, faults, full=full)
     analysis = analysis_named(str(size.get("analysis", "")))
     own = analysis is not None and analysis.answer is not None
-    tables = answer_tables(size, entries) if own or not full else []
     room = LINES - len(lines) - len(end)
-    for k, table in enumerate(tables):
+    for k, table in enumerate(tables.answer_tables(size, entries) if own or not full else []):
         block = table_lines(table, width, cut=not own)
         # the tables of an analysis are whole; of others those that fit on a screen
         if own or k == 0 or len(block) < room:
             lines, room = lines + block, room - len(block)
     if full:
         for table in (
-            *all_numbers(entries),
-            budget_table(main_numbers(size, entries)),
-            effects_table(summary["effects"]),
-            checks_table(summary["checks"]),
-            stage_table(summary["cost"].get("stages", {})),
+            *tables.all_numbers(entries),
+            tables.budget_table(tables.main_numbers(size, entries)),
+            tables.effects_table(summary["effects"]),
+            tables.checks_table(summary["checks"]),
+            tables.stage_table(summary["cost"].get("stages", {})),
         ):
             lines += table_lines(table, width)
     return lines + end
@@ -98,8 +79,8 @@ def table_lines(table: AnswerTable, width: int, *, cut: bool = False) -> list[An
     """
     if not table.rows:
         return []
-    lines = [AnswerLine(""), *[AnswerLine(table.heading, TITLE)] * bool(table.heading)]
-    lines += map(AnswerLine, whole_table(table, width, cut=cut))
+    lines = [("", ""), *[(table.heading, TITLE)] * bool(table.heading)]
+    lines += [(line, "") for line in whole_table(table, width, cut=cut)]
     return lines + _wrapped(table.note, width)
 
 
@@ -130,7 +111,7 @@ def _most_important(summary: Mapping[str, Any]) -> Entry | None:
     analysis = analysis_named(str(size.get("analysis", "")))
     names = analysis.verdict_names if analysis else ()
     named = (entry for name in names for entry in entries if entry["name"] == name)
-    found = (*named, *main_numbers(size, entries))
+    found = (*named, *tables.main_numbers(size, entries))
     return next((entry for entry in found if not entry.get("withheld")), None)
 
 
@@ -143,23 +124,23 @@ def _end(
     full: bool,
 ) -> list[AnswerLine]:
     """Chosen levels, sources of the main error, checks, cost and files; at last what warns."""
-    lines = [AnswerLine("")]
+    lines = [("", "")]
     for text in (_accuracy(summary), _budget(summary), checked(summary), _cost(summary)):
         lines += _wrapped(text, width)
     has_page = folder is not None and (folder / "report.html").is_file()
     if folder is not None:
-        lines.append(AnswerLine(f"Run folder: {folder}"))
-        lines += [AnswerLine(f"Report: {folder / 'report.html'}")] * has_page
+        lines.append((f"Run folder: {folder}", ""))
+        lines += [(f"Report: {folder / 'report.html'}", "")] * has_page
     if outcome_of(summary["status"]) == FAILED:
         return lines
     named = None if full else 2
-    notes = [*faults, *warnings(summary["checks"], summary["results"], named)]
-    most = len(notes) if full else MOST_NOTES
+    notes = [*faults, *tables.warnings(summary["checks"], summary["results"], named)]
+    most = len(notes) if full else tables.MOST_NOTES
     for note in notes[:most]:
         lines += _wrapped(f"Warning: {note}", width, WARNED)
     if (more := len(notes) - most) > 0:
         where = "on the page" if has_page else "printed by --full"
-        lines.append(AnswerLine(f"Warnings besides: {more}, {where}.", WARNED))
+        lines.append((f"Warnings besides: {more}, {where}.", WARNED))
     return lines
 
 
@@ -171,11 +152,11 @@ def _accuracy(summary: Mapping[str, Any]) -> str:
 
 def _budget(summary: Mapping[str, Any]) -> str:
     """The sources of the error of the first main number that has some."""
-    main = [_most_important(summary), *main_numbers(summary["size"], summary["results"])]
+    main = [_most_important(summary), *tables.main_numbers(summary["size"], summary["results"])]
     for entry in filter(None, main):
         error, band = entry.get("estimated_error"), entry.get("input_error")
         if error is not None or band is not None:
-            parts = (f"{name} {percent_of(part)}" for name, part, *_ in error_parts(entry))
+            parts = (f"{name} {percent_of(part)}" for name, part, *_ in tables.error_parts(entry))
             more = error is not None and band is not None and band > error
             useless = "; its inputs move it by more: finer levels do not help" * more
             return f"Error of the {number_label(entry['name'])}: {', '.join(parts)}{useless}"
@@ -213,4 +194,4 @@ def _cost(summary: Mapping[str, Any]) -> str:
 
 def _wrapped(text: str, width: int, mood: str = "") -> list[AnswerLine]:
     """A text on as many lines as it needs."""
-    return [AnswerLine(line, mood) for line in wrapped(text, width)]
+    return [(line, mood) for line in wrapped(text, width)]

@@ -153,7 +153,7 @@ class FigureAnswer(ABC):
         """Its verdict, all its tables and its notes as text."""
         lines = wrapped(self.verdict, WIDTH)
         for table in self.tables:
-            lines += [line.text for line in table_lines(table, WIDTH)]
+            lines += [text for text, _ in table_lines(table, WIDTH)]
         lines += [""] * bool(self.notes)
         return "\n".join([*lines, *(line for note in self.notes for line in wrapped(note, WIDTH))])
 

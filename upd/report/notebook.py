@@ -12,20 +12,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from upd.errors import ConvergenceError, InputError, did_you_mean
+from upd.plot.chart import Chart
 from upd.report.answer import AnswerLine, answer, opened
 from upd.report.columns import text_width
 from upd.report.folder import read_run
 from upd.report.tables import analysis_charts
-from upd.results import Case, Check, Result
+from upd.results import Arrays, Case, Check, Result
 from upd.results.check import outcome_of, read_check
 from upd.results.number import read_result
 from upd.results.quantities import number_title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from upd.plot.chart import Chart
-    from upd.results import Arrays
 
 #: charts of the figure nobody chose
 _MOST_CHARTS = 6
@@ -141,7 +139,7 @@ class RunResult:
         """Its answer as the terminal prints it with --full: all numbers with the bounds of their
         errors, effects, checks, sources of errors, cost.
         """
-        return "\n".join(line.text for line in self.answer(text_width(), full=True))
+        return "\n".join(text for text, _ in self.answer(text_width(), full=True))
 
     def to_xarray(self) -> dict[str, Any]:
         """Case -> xarray.Dataset, with dimensions, coordinates and units; needs xarray."""
@@ -162,7 +160,7 @@ class RunResult:
         return answer(self.summary(), width, self.folder, self.faults, full=full)
 
     def __repr__(self) -> str:
-        return opened("\n".join(line.text for line in self.answer(text_width())))
+        return opened("\n".join(text for text, _ in self.answer(text_width())))
 
     __str__ = __repr__
 
@@ -179,13 +177,14 @@ def _chosen(found: list[Chart], title: str | None, case: str | None) -> list[Cha
         raise InputError("plot: the run left no arrays to draw; its numbers are in .results")
     if title is None and case is None:
         return list({chart.title: chart for chart in reversed(found)}.values())[::-1][:_MOST_CHARTS]
-    mine = [c for c in found if title is None or title.casefold() in c.title.casefold()]
+    mine = [c for c in found if (title or "").casefold() in c.title.casefold()]
     if not mine:
         raise _unknown("chart", str(title), [c.title for c in found])
-    cases = [c for c in mine if case is None or c.case == case]
-    if not cases:
-        raise _unknown("chart of the case", str(case), [c.case for c in mine if c.case])
-    return cases[:_MOST_CHARTS] if case is None else cases
+    if case is None:
+        return mine[:_MOST_CHARTS]
+    if cases := [c for c in mine if c.case == case]:
+        return cases
+    raise _unknown("chart of the case", case, [c.case for c in mine if c.case])
 
 
 def _unknown(what: str, word: str, known: Iterable[str]) -> InputError:

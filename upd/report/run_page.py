@@ -16,21 +16,10 @@ from upd.labels import number, percent, sentence, shown
 from upd.plot.chart import Axis, Chart, Entry
 from upd.plot.style import colour_range
 from upd.plot.surface import read_surface
+from upd.report import tables
 from upd.report.answer import checked
 from upd.report.folder import RunFolder, read_run
 from upd.report.page import Section, Verdict, page_text, write_page
-from upd.report.tables import (
-    all_numbers,
-    analysis_charts,
-    answer_tables,
-    budget_table,
-    checks_table,
-    effects_table,
-    filled,
-    main_numbers,
-    stage_table,
-    warnings,
-)
 from upd.results.answer_table import AnswerTable
 from upd.results.check import FAILED, WARNED, outcome_of
 from upd.results.quantities import number_label
@@ -38,8 +27,8 @@ from upd.scene.read import leaves
 
 log = logging.getLogger("upd.report")
 
-#: records of the solvers, whose faults are among the checks, and of all modules of this package
-_SOLVER, _OURS = "upd.hbm", "upd."
+#: records of the solvers, whose faults are among the checks
+_SOLVER = "upd.hbm"
 #: below tables of numbers
 UNITS = "A number without a unit is a ratio or a count."
 
@@ -59,33 +48,33 @@ def run_sections(run: RunFolder) -> list[Section]:
     """The page of one run."""
     summary, entries = run.summary, run.summary["results"]
     size, cost = summary["size"], summary["cost"]
-    charts, surfaces = analysis_charts(run.arrays, summary), run_surfaces(run)
-    known = any(entry.get("estimated_error") is not None for entry in entries)
+    charts, surfaces = tables.analysis_charts(run.arrays, summary), run_surfaces(run)
+    estimated = any(entry.get("estimated_error") is not None for entry in entries)
     errors = (
         "Estimated errors (±) bound what mesh and methods leave in a number; the error budget "
         "shows their sources."
     )
-    about = [errors if known else "No errors were estimated.", UNITS]
-    tables = answer_tables(size, entries)
+    about = [errors if estimated else "No errors were estimated.", UNITS]
+    main = tables.answer_tables(size, entries)
     no_figures = ["The run left no figures."] * (not (charts or run.figures or surfaces))
     total = f"{cost['total_s']:.1f} s in all, {cost['peak_rss_mb']:.0f} MB of memory at most."
     return [
-        Section("Main numbers", tables, texts=about if tables else ["The run left no numbers."]),
+        Section("Main numbers", main, texts=about if main else ["The run left no numbers."]),
         Section("Warnings", notes=page_warnings(run)),
         Section(
             "Figures", charts=charts, pictures=run.figures, surfaces=surfaces, texts=no_figures
         ),
-        Section("Error budget", [budget_table(main_numbers(size, entries))]),
+        Section("Error budget", [tables.budget_table(tables.main_numbers(size, entries))]),
         Section(
             "What was simulated, what was left out",
-            [effects_table(summary["effects"]), checks_table(summary["checks"])],
+            [tables.effects_table(summary["effects"]), tables.checks_table(summary["checks"])],
         ),
         Section(
             "Cost and mesh",
-            [stage_table(cost.get("stages", {})), _mesh_table(size)],
+            [tables.stage_table(cost.get("stages", {})), _mesh_table(size)],
             texts=[total],
         ),
-        Section("All numbers", all_numbers(entries), each_folded=True),
+        Section("All numbers", tables.all_numbers(entries), each_folded=True),
         Section(
             "Scene file",
             texts=["Save as scene.toml and run upd run scene.toml."],
@@ -104,7 +93,7 @@ def _mesh_table(size: Mapping[str, Any]) -> AnswerTable:
     }
     facts = [f"{size['symmetry']} model"] * bool(size.get("symmetry"))
     facts += [f"{size['n_pairs']} contact pairs"] * bool(size.get("n_pairs"))
-    return filled("Mesh", columns, f"{', '.join(facts)}.".capitalize() if facts else "")
+    return tables.filled("Mesh", columns, f"{', '.join(facts)}.".capitalize() if facts else "")
 
 
 def verdict(summary: Mapping[str, Any]) -> Verdict:
@@ -120,13 +109,13 @@ def page_warnings(run: RunFolder) -> list[str]:
     """What a run warns of, the warnings of its log that are no check's, and the files that could
     not be read; each once.
     """
-    checks, status = run.summary["checks"], run.summary["status"]
-    found = warnings(checks, run.summary["results"])
+    summary = run.summary
+    found = tables.warnings(summary["checks"], summary["results"])
     for line in run.log:
-        level, where, text = line["level"], line["where"], line["text"]
-        known = text == status or (checks and where.startswith(_SOLVER))
-        if level in ("WARNING", "ERROR", "CRITICAL") and not known:
-            found.append(sentence(text, "") if where.startswith(_OURS) else f"{where}: {text}")
+        known = line["text"] == summary["status"]
+        known |= bool(summary["checks"]) and line["where"].startswith(_SOLVER)
+        if line["level"] in ("WARNING", "ERROR", "CRITICAL") and not known:
+            found.append(sentence(line["text"], ""))
     return list(dict.fromkeys([*found, *run.missing]))
 
 
@@ -182,13 +171,13 @@ def run_names(runs: Sequence[RunFolder]) -> list[str]:
 
 def comparison_sections(runs: Sequence[RunFolder], names: Sequence[str]) -> list[Section]:
     """The page of several runs."""
-    charts = overlaid([analysis_charts(run.arrays, run.summary) for run in runs], names)
+    charts = overlaid([tables.analysis_charts(run.arrays, run.summary) for run in runs], names)
     differ = differences([run.summary["scene_file"] for run in runs])
     results = [run.summary["results"] for run in runs]
     main = {
         (entry["name"], entry["case"])
         for run in runs
-        for entry in main_numbers(run.summary["size"], run.summary["results"])
+        for entry in tables.main_numbers(run.summary["size"], run.summary["results"])
     }
     first, others = numbers(results, names, main)
     about = "Every run has one colour; points and lines are those of its own page."
@@ -217,7 +206,7 @@ def _runs_table(runs: Sequence[RunFolder], names: Sequence[str]) -> AnswerTable:
         "# degrees of freedom": [str(size) for size in sizes],
         "# seconds": [f"{run.summary['cost']['total_s']:.1f}" for run in runs],
     }
-    return filled("Runs", columns)
+    return tables.filled("Runs", columns)
 
 
 def numbers(
@@ -226,11 +215,11 @@ def numbers(
     """Numbers of all runs side by side, in the order of the first run that has them: the main ones
     (name and case), and all others.
     """
-    tables = [{(r["name"], r["case"]): r for r in rows} for rows in results]
-    keys = list(dict.fromkeys(key for table in tables for key in table))
+    known = [{(r["name"], r["case"]): r for r in rows} for rows in results]
+    keys = list(dict.fromkeys(key for rows in known for key in rows))
 
     def side_by_side(heading: str, mine: Sequence[tuple[str, str]]) -> AnswerTable:
-        found = [[table.get(key) for table in tables] for key in mine]
+        found = [[rows.get(key) for rows in known] for key in mine]
         references = [{row["reference"] for row in rows if row is not None} for rows in found]
         columns = {
             "number": [number_label(name) for name, _ in mine],
@@ -243,7 +232,7 @@ def numbers(
             # runs of other loads have another reference
             "# reference": [number(*v) if len(v) == 1 else "" for v in references],
         }
-        return filled(heading, columns)
+        return tables.filled(heading, columns)
 
     return (
         side_by_side("Main numbers", [key for key in keys if key in main]),

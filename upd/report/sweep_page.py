@@ -14,15 +14,8 @@ from typing import Any
 import numpy as np
 
 from upd.labels import counted, listed, number, sentence, unit_label
+from upd.plot import sweep_charts as charts
 from upd.plot.chart import Chart
-from upd.plot.sweep_charts import (
-    Column,
-    Parameter,
-    is_constant,
-    sample_charts,
-    sweep_charts,
-    told_apart,
-)
 from upd.report.folder import read_json
 from upd.report.page import Section, Verdict, page_text, versions_text, write_page
 from upd.report.tables import filled, sample_table, stage_table, with_unit
@@ -47,7 +40,7 @@ class SweepFolder:
 
     path: Path
     data: Mapping[str, Any]
-    axes: tuple[Parameter, ...]
+    axes: tuple[charts.Parameter, ...]
 
     @property
     def points(self) -> list[dict[str, Any]]:
@@ -56,12 +49,12 @@ class SweepFolder:
         return found
 
     @property
-    def columns(self) -> list[Column]:
+    def columns(self) -> list[charts.Column]:
         """The followed numbers with their values, NaN where there is none."""
         table = np.array([point["values"] for point in self.points], float)
         values = table.reshape(len(self.points), len(self.data["followed"])).T
         known = zip(self.data["followed"], values, strict=True)
-        return [Column(one["name"], one["case"], one["unit"], mine) for one, mine in known]
+        return [charts.Column(one["name"], one["case"], one["unit"], mine) for one, mine in known]
 
     @property
     def sampled(self) -> list[SampledNumber]:
@@ -83,8 +76,8 @@ class SweepFolder:
 def read_sweep(folder: Path) -> SweepFolder:
     """Read sweep.json. Raises InputError when it is missing or damaged."""
     found = read_json(folder / "sweep.json", _KEYS, "sweep")
-    axes = [Parameter(one["path"], tuple(one["values"])) for one in found["axes"]]
-    return SweepFolder(folder, found, told_apart(axes))
+    axes = [charts.Parameter(one["path"], tuple(one["values"])) for one in found["axes"]]
+    return SweepFolder(folder, found, charts.told_apart(axes))
 
 
 def write_sweep_report(folder: Path) -> Path:
@@ -106,14 +99,14 @@ def write_sweep_report(folder: Path) -> Path:
 
 def sweep_sections(sweep: SweepFolder) -> list[Section]:
     """The page of a sweep."""
-    charts, stages = _charts(sweep), sweep.data["cost"].get("stages_s", {})
+    drawn, stages = _charts(sweep), sweep.data["cost"].get("stages_s", {})
     none = "The sweep left no figures: nothing varies, or no point was solved."
     scene = "The scene of all points; the parameters above replace its entries."
     *before, points = (Section(one.heading, [one]) for one in sweep_tables(sweep, MOST_ROWS))
     return [
         _grid(sweep),
         *before,
-        Section("Figures", charts=charts, texts=[none] * (not charts)),
+        Section("Figures", charts=drawn, texts=[none] * (not drawn)),
         points,
         Section("Cost", [stage_table(stages)], texts=[_costs(sweep)]),
         Section("Scene file", texts=[scene], file=sweep.data["text"]),
@@ -157,7 +150,7 @@ def _grid(sweep: SweepFolder) -> Section:
     return Section(heading, [filled(heading, columns)], texts=[text, *notes])
 
 
-def _values(parameter: Parameter) -> str:
+def _values(parameter: charts.Parameter) -> str:
     """The values of a parameter with their unit, of many the first and the last."""
     shown = [parameter.shown(k) for k in range(len(parameter.values))]
     shown = shown if len(shown) <= _FEW else [*shown[:3], "...", shown[-1]]
@@ -167,10 +160,12 @@ def _values(parameter: Parameter) -> str:
 def _charts(sweep: SweepFolder) -> list[Chart]:
     """Charts of a sample or of a grid."""
     if sweep.sampled:
-        return sample_charts(sweep.sampled, [c.values for c in sweep.columns])
+        return charts.sample_charts(sweep.sampled, [c.values for c in sweep.columns])
     varied = [p.short for p in sweep.axes if len(p.values) > 1]
     over = f"Followed numbers over {' and '.join(varied)}"
-    return [replace(chart, heading=over) for chart in sweep_charts(sweep.axes, sweep.columns)]
+    return [
+        replace(chart, heading=over) for chart in charts.sweep_charts(sweep.axes, sweep.columns)
+    ]
 
 
 def verdict(points: Sequence[Mapping[str, Any]]) -> Verdict:
@@ -212,7 +207,7 @@ def _points_table(sweep: SweepFolder, most: int) -> AnswerTable:
         for k, p in enumerate(sweep.axes)
     }
     empty = []
-    for one in sorted(sweep.columns, key=lambda column: is_constant(column.values)):
+    for one in sorted(sweep.columns, key=lambda column: charts.is_constant(column.values)):
         title, values = number_title(one.name, one.case), one.values[:most]
         if np.isnan(values).all():
             empty.append(title)

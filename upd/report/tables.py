@@ -8,20 +8,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any
 
+from upd import labels
 from upd.analyses import analysis_named
 from upd.analyses.base import Effect
-from upd.labels import (
-    check_number,
-    check_words,
-    listed,
-    number,
-    percent,
-    percent_of,
-    plus_minus,
-    sentence,
-    shown,
-    unit_label,
-)
 from upd.plot.chart import Chart, Entry
 from upd.results import Arrays, ErrorPart
 from upd.results.answer_table import AnswerTable
@@ -78,12 +67,12 @@ def answer_tables(size: Mapping[str, Any], entries: Sequence[Entry]) -> list[Ans
     own = analysis.answer(entries) if analysis and analysis.answer else []
     if any(table.rows for table in own):
         return [table for table in own if table.rows]
-    main = reached_numbers(size, entries)
+    main = [entry for entry in main_numbers(size, entries) if not entry.get("withheld")]
     order = [entry["value"] for entry in entries if entry["name"] == CLOSED_FORM_ERROR.name]
     names = {entry["name"] for entry in main}
     note = _not_estimated(entry for entry in entries if entry["name"] in names)
     if order:
-        exact = percent_of(max(order) / 100)
+        exact = labels.percent_of(max(order) / 100)
         note = f"The closed forms are exact to the order (a/R)² = {exact}. {note}".rstrip()
     cases = _case_tables(entries, analysis.headline_names if analysis else ())
     return [table for table in (number_table(MAIN, main, note=note), *cases) if table.rows]
@@ -97,13 +86,8 @@ def _not_estimated(entries: Iterable[Entry]) -> str:
         for basis in lost[:1]:
             why = basis.removeprefix("not estimated: ").rstrip(".")
             reasons.setdefault(why, []).append(number_label(entry["name"]))
-    without = (f"{listed(names, None)} without ±: {why}." for why, names in reasons.items())
+    without = (f"{labels.listed(names, None)} without ±: {why}." for why, names in reasons.items())
     return " ".join(without)
-
-
-def reached_numbers(size: Mapping[str, Any], entries: Sequence[Entry]) -> list[Entry]:
-    """The main numbers without those that were not reached."""
-    return [entry for entry in main_numbers(size, entries) if not entry.get("withheld")]
 
 
 def number_table(
@@ -124,23 +108,23 @@ def number_table(
         heading,
         {
             "number": [name for name, _ in rows],
-            "# value": column(shown),
-            "# ±": column(lambda e: plus_minus(e).lstrip("±")),
-            "# reference": column(lambda e: number(e["reference"])),
-            "# difference": column(lambda e: percent(e.get("error"))),
-            "# thesis": column(lambda e: percent(e.get("thesis_error"))),
+            "# value": column(labels.shown),
+            "# ±": column(lambda e: labels.plus_minus(e).lstrip("±")),
+            "# reference": column(lambda e: labels.number(e["reference"])),
+            "# difference": column(lambda e: labels.percent(e.get("error"))),
+            "# thesis": column(lambda e: labels.percent(e.get("thesis_error"))),
             "source": column(lambda e: e.get("source", "")),
         },
         note,
     )
 
 
-def all_numbers(entries: Iterable[Entry]) -> list[AnswerTable]:
+def all_numbers(entries: Sequence[Entry]) -> list[AnswerTable]:
     """All numbers, a table for every case."""
-    cases: dict[str, list[Entry]] = {}
-    for entry in entries:
-        cases.setdefault(str(entry["case"]), []).append(entry)
-    return [number_table(case or _WHOLE, rows, case) for case, rows in cases.items()]
+    return [
+        number_table(case or _WHOLE, [e for e in entries if e["case"] == case], case)
+        for case in dict.fromkeys(entry["case"] for entry in entries)
+    ]
 
 
 def _case_tables(entries: Sequence[Entry], patterns: Sequence[str]) -> list[AnswerTable]:
@@ -159,13 +143,16 @@ def _case_tables(entries: Sequence[Entry], patterns: Sequence[str]) -> list[Answ
 
 def _case_table(cases: Sequence[Sequence[Entry]]) -> AnswerTable:
     """A row for each of the first cases, a column for every number."""
-    shown_cases = cases[: _CASES - (len(cases) > _CASES)]
-    columns = {"case": [row[0]["case"] for row in shown_cases]}
-    for k, entry in enumerate(cases[0]):
-        columns[f"# {with_unit(number_label(entry['name']), entry['unit'])}"] = [
-            f"{shown(row[k], unit=False)} {plus_minus(row[k])}".rstrip() for row in shown_cases
-        ]
-    more = len(cases) - len(shown_cases)
+    kept = cases[: _CASES - (len(cases) > _CASES)]
+    more = len(cases) - len(kept)
+
+    def cell(entry: Entry) -> str:
+        return f"{labels.shown(entry, unit=False)} {labels.plus_minus(entry)}".rstrip()
+
+    columns = {"case": [row[0]["case"] for row in kept]} | {
+        f"# {with_unit(number_label(one['name']), one['unit'])}": [cell(row[k]) for row in kept]
+        for k, one in enumerate(cases[0])
+    }
     return filled("By case", columns, f"{more} more cases: see all numbers." if more else "")
 
 
@@ -180,14 +167,14 @@ def effects_table(effects: Sequence[Mapping[str, Any]]) -> AnswerTable:
     return filled("What was simulated", columns)
 
 
-def checks_table(checks: Iterable[Mapping[str, Any]]) -> AnswerTable:
+def checks_table(checks: Sequence[Mapping[str, Any]]) -> AnswerTable:
     """The worst case of every self-check."""
     worst = worst_checks(checks)
     columns = {
         "self-check": [f"{c['name']}: {c['says']}" for c in worst],
         "worst case": [c["case"] for c in worst],
-        "# value": [check_number(c, "value") for c in worst],
-        "# limit": [check_number(c, "limit") for c in worst],
+        "# value": [labels.check_number(c, "value") for c in worst],
+        "# limit": [labels.check_number(c, "limit") for c in worst],
         "verdict": [c["verdict"] for c in worst],
     }
     return filled("Self-checks", columns)
@@ -219,7 +206,7 @@ def budget_table(entries: Sequence[Entry]) -> AnswerTable:
         "number": [number_label(entry["name"]) for entry, *_ in rows],
         "case": [entry["case"] for entry, *_ in rows],
         "source": [source for _, source, *_ in rows],
-        "# error": [percent_of(error) for _, _, error, *_ in rows],
+        "# error": [labels.percent_of(error) for _, _, error, *_ in rows],
         "# half of it costs": [half for *_, half, _ in rows],
         "how it was estimated": [basis for *_, basis in rows],
     }
@@ -243,26 +230,26 @@ def stage_table(seconds: Mapping[str, float]) -> AnswerTable:
 
 def with_unit(title: str, unit: str) -> str:
     """A title with the unit of its numbers."""
-    return f"{title}, {unit_label(unit)}" if unit else title
+    return f"{title}, {labels.unit_label(unit)}" if unit else title
 
 
 def sample_table(numbers: Sequence[SampledNumber]) -> AnswerTable:
     """Every number with its first-order band and the sampled one."""
 
     def band(*values: float | None) -> str:
-        return " to ".join(f"±{percent_of(value)}" for value in values if value is not None)
+        return " to ".join(f"±{labels.percent_of(value)}" for value in values if value is not None)
 
     def ends(*values: float | None) -> str:
-        return " to ".join(number(value) for value in values if value is not None)
+        return " to ".join(labels.number(value) for value in values if value is not None)
 
     middle = "middle 95 %" if all(n.resolved for n in numbers) else "least to largest"
     columns = {
         "number": [with_unit(number_title(n.name, n.case), n.unit) for n in numbers],
-        "# as given": [number(n.nominal) for n in numbers],
+        "# as given": [labels.number(n.nominal) for n in numbers],
         "# first order": [band(n.first_order) for n in numbers],
         "# sample": [band(n.band) for n in numbers],
         "# 95 % interval of the sample's band": [band(n.band_low, n.band_high) for n in numbers],
-        "# mean": [number(n.mean) for n in numbers],
+        "# mean": [labels.number(n.mean) for n in numbers],
         f"# {middle}": [ends(n.low, n.high) for n in numbers],
         "# points": [str(n.count) for n in numbers],
         "compared": [n.verdict for n in numbers],
@@ -286,24 +273,19 @@ def warnings(
     most
         Cases and numbers that are named in each; all of them when None.
     """
-    failed: dict[str, list[Mapping[str, Any]]] = {}
-    for check in checks:
-        if check["verdict"] != "passed":
-            failed.setdefault(check["name"], []).append(check)
-    lost: dict[str, list[Entry]] = {}
-    for entry in results:
-        if entry.get("withheld"):
-            lost.setdefault(entry["withheld"], []).append(entry)
-    out = []
-    for name, mine in failed.items():
+    out, failed = [], [check for check in checks if check["verdict"] != "passed"]
+    for name in dict.fromkeys(check["name"] for check in failed):
+        mine = [check for check in failed if check["name"] == name]
         worst = worst_check(mine)
-        cases = listed([worst["case"], *(c["case"] for c in mine)], most, " ({})")
-        remedy = f". {sentence(worst['remedy'], '')}" if worst.get("remedy") else ""
-        out.append(sentence(f"{name}{cases}: {check_words(worst)}{remedy}"))
-    for reason, numbers in lost.items():
-        names = listed([number_label(entry["name"]) for entry in numbers], most)
-        cases = listed([entry["case"] for entry in numbers], most, " ({})")
-        out.append(sentence(f"{names}{cases}: not reached, {reason}"))
+        cases = labels.listed([worst["case"], *(c["case"] for c in mine)], most, " ({})")
+        remedy = f". {labels.sentence(worst['remedy'], '')}" if worst.get("remedy") else ""
+        out.append(labels.sentence(f"{name}{cases}: {labels.check_words(worst)}{remedy}"))
+    lost = [entry for entry in results if entry.get("withheld")]
+    for reason in dict.fromkeys(entry["withheld"] for entry in lost):
+        numbers = [entry for entry in lost if entry["withheld"] == reason]
+        names = labels.listed([number_label(entry["name"]) for entry in numbers], most)
+        cases = labels.listed([entry["case"] for entry in numbers], most, " ({})")
+        out.append(labels.sentence(f"{names}{cases}: not reached, {reason}"))
     return out
 
 

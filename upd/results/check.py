@@ -113,9 +113,7 @@ def worst_check(checks: Iterable[Mapping[str, Any]]) -> Mapping[str, Any]:
     return max(checks, key=badness)
 
 
-def worst_checks(checks: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+def worst_checks(checks: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     """One check per name, in the order of the names: the worst of its cases."""
-    found: dict[str, list[Mapping[str, Any]]] = {}
-    for check in checks:
-        found.setdefault(check["name"], []).append(check)
-    return [worst_check(mine) for mine in found.values()]
+    names = dict.fromkeys(check["name"] for check in checks)
+    return [worst_check(check for check in checks if check["name"] == name) for name in names]

@@ -192,7 +192,7 @@ def test_an_answer_says_when_finer_levels_do_not_help(
     inputs = (InputPart("contact.friction", 0.1, 0.03, "x"),)
     mesh = (ErrorPart("mesh", error, "coarser", 3.0),)
     numbers = tuple(with_parts(replace(r, inputs=inputs), mesh) for r in sphere.results)
-    lines = " ".join(line.text for line in replace(sphere, results=numbers).answer(200))
+    lines = " ".join(text for text, _ in replace(sphere, results=numbers).answer(200))
     assert "input contact.friction 3 %" in lines
     assert ("finer levels do not help" in lines) == more
 

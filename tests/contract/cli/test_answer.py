@@ -250,7 +250,7 @@ def test_command_prints_the_answer_and_nothing_else(
 
 
 def answer_text(folder: Path, width: int) -> str:
-    return "\n".join(line.text for line in upd.load(folder).answer(width))
+    return "\n".join(text for text, _ in upd.load(folder).answer(width))
 
 
 TABLE = AnswerTable(
