@@ -21,9 +21,8 @@ from upd.errors import ConvergenceError, InputError, UpdError, disk_fault, one_l
 from upd.labels import check_words
 from upd.progress import Listener, Stages, forget_peak, silent
 from upd.report import write_report
-from upd.report.files import write_curves, write_figures
 from upd.report.folder import check_replaceable, is_run_file, sealed
-from upd.report.notebook import RunResult
+from upd.report.notebook import RunResult, write_curves, write_figures
 from upd.results import Check, Estimates, Result, write_netcdf
 from upd.results.check import FAILED, OK, WARNED, status_of, worst_check
 from upd.results.netcdf import DIGEST, file_digest

@@ -33,8 +33,8 @@ from upd.plot.sweep_charts import (
     sweep_charts,
 )
 from upd.report import write_report
-from upd.report.files import as_csv
 from upd.report.folder import sealed
+from upd.report.notebook import as_csv
 from upd.results import Group, write_netcdf
 from upd.results.sampled import SampledNumber, sampled_number
 from upd.scene import load_scene

@@ -1,25 +1,36 @@
-"""The answer of a run in the terminal: verdict, tables, checks, cost, files and what warns; `print`
-shows the first lines of it.
+"""Answers as text: of a run in the terminal, with verdict, tables, checks, cost, files and what
+warns; of one figure and a few tables. `print` shows the first lines.
 """
 
 from __future__ import annotations
 
+import json
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from upd.analyses import analysis_named
 from upd.analyses.base import CHOSEN_BY_ACCURACY
+from upd.cache.files import whole_files
+from upd.cache.sources import versions
+from upd.errors import InputError, one_line
 from upd.labels import check_number, number, percent, percent_of, plus_minus, shown
-from upd.plot.chart import Entry
+from upd.plot.chart import Chart, Entry
 from upd.report import tables
 from upd.report.columns import SHORT, whole_table, wrapped
+from upd.report.page import Section, page_text, versions_text
 from upd.results.answer_table import AnswerTable
 from upd.results.check import FAILED, WARNED, outcome_of, worst_check
 from upd.results.quantities import number_label, quantity_of
+from upd.scene import AnyScene
+from upd.scene.keys import scene_as_run
 
-#: lines that fit on a screen
-LINES = 40
+#: tables that fit on a screen, where an analysis has none of its own
+_MOST_TABLES = 2
+#: characters of a line of an answer of one figure: a terminal of 80 columns shows it whole
+WIDTH = 79
 #: mood of the line above numbers
 TITLE = "title"
 #: a line, and its mood: the outcome it reports, "title" for what stands above numbers, "" otherwise
@@ -49,12 +60,10 @@ def answer(
     lines, end = _verdict(summary, width), _end(summary, width, folder, faults, full=full)
     analysis = analysis_named(str(size.get("analysis", "")))
     own = analysis is not None and analysis.answer is not None
-    room = LINES - len(lines) - len(end)
-    for k, table in enumerate(tables.answer_tables(size, entries) if own or not full else []):
-        block = table_lines(table, width, cut=not own)
-        # the tables of an analysis are whole; of others those that fit on a screen
-        if own or k == 0 or len(block) < room:
-            lines, room = lines + block, room - len(block)
+    found = tables.answer_tables(size, entries) if own or not full else []
+    # the tables of an analysis are whole
+    for table in found if own else found[:_MOST_TABLES]:
+        lines += table_lines(table, width, cut=not own)
     if full:
         for table in (
             *tables.all_numbers(entries),
@@ -195,3 +204,143 @@ def _cost(summary: Mapping[str, Any]) -> str:
 def _wrapped(text: str, width: int, mood: str = "") -> list[AnswerLine]:
     """A text on as many lines as it needs."""
     return [(line, mood) for line in wrapped(text, width)]
+
+
+# -- answers of one figure and a few tables: their text, their page and their folder --------------
+
+
+@dataclass(frozen=True, repr=False)
+class FigureAnswer(ABC):
+    """A verdict, a few tables and notes, and one figure.
+
+    Attributes
+    ----------
+    source : AnyScene
+        The scene that the question was about.
+    folder : Path, optional
+        Where its files lie; None when nothing was written.
+    """
+
+    source: AnyScene
+    folder: Path | None = field(default=None, kw_only=True)
+
+    @property
+    @abstractmethod
+    def verdict(self) -> str:
+        """One sentence."""
+
+    @property
+    @abstractmethod
+    def outcome(self) -> tuple[str, str]:
+        """Its first word, and its kind: passed, warning or failed."""
+
+    @property
+    @abstractmethod
+    def charts(self) -> list[Chart]:
+        """The charts of its figure."""
+
+    @property
+    @abstractmethod
+    def figure(self) -> str:
+        """Name of the figure, without ending."""
+
+    @property
+    @abstractmethod
+    def tables(self) -> tuple[AnswerTable, ...]:
+        """Its main numbers, the most important table first; empty ones are not shown."""
+
+    @property
+    @abstractmethod
+    def notes(self) -> tuple[str, ...]:
+        """What a reader has to know beside the tables, a sentence each."""
+
+    @property
+    def scene(self) -> AnyScene:
+        """The scene on its page; one that is not that of the question is a file too."""
+        return self.source
+
+    def as_dict(self) -> dict[str, Any]:
+        """Verdict, tables and notes as JSON takes them: numbers have all their digits."""
+        return {
+            "scene": self.source.name,
+            "title": self.source.title,
+            "outcome": self.outcome[0],
+            "verdict": self.verdict,
+            "tables": [table.as_dict() for table in self.tables if table.rows],
+            "notes": self.notes,
+            "versions": versions(),
+        }
+
+    def page(self, charts: Sequence[Chart]) -> str:
+        """Its page as HTML that needs nothing beside it.
+
+        Parameters
+        ----------
+        charts
+            Those of its figure.
+        """
+        word, kind = self.outcome
+        sections = [
+            Section("Answer", self.tables),
+            Section("Notes", texts=self.notes),
+            Section("Figures", charts=charts),
+            Section("Scene file", file=self._scene_file),
+        ]
+        title = self.source.title or self.source.name
+        verdict = (kind, word, f"{self.verdict}.")
+        return page_text(title, sections, verdict=verdict, footer=versions_text(versions()))
+
+    @property
+    def _scene_file(self) -> str:
+        return f"# {self.verdict}\n{scene_as_run(self.scene)}"
+
+    def write(self, out: str | Path) -> Self:
+        """Write figure, page, numbers and a new scene into a folder, all of them or none; the same
+        with it.
+
+        Parameters
+        ----------
+        out
+            The folder, made where there is none.
+
+        Raises
+        ------
+        InputError
+            When it cannot be written.
+        """
+        # matplotlib is slow to import
+        from upd.plot.matplotlib import write_sheets
+
+        charts, folder = self.charts, Path(out)
+        summary = json.dumps(self.as_dict(), indent=1, allow_nan=False) + "\n"
+        files = {"summary.json": summary, "report.html": self.page(charts)}
+        if self.scene is not self.source:
+            files[f"{self.scene.name}.toml"] = self._scene_file
+        try:
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            with whole_files(folder) as stage:
+                for file, content in files.items():
+                    (stage / file).write_text(content, encoding="utf-8")
+                write_sheets(charts, stage)
+        except OSError as error:
+            raise InputError(
+                f"{folder}: cannot be written ({one_line(error)}); choose another with --out"
+            ) from None
+        return replace(self, folder=folder)
+
+    def plot(self) -> list[Any]:
+        """Draw the charts of its figure with matplotlib, and return the axes."""
+        from upd.plot.matplotlib import draw_all
+
+        return draw_all(self.charts)
+
+    def table(self) -> str:
+        """Its verdict, all its tables and its notes as text."""
+        lines = wrapped(self.verdict, WIDTH)
+        for table in self.tables:
+            lines += [text for text, _ in table_lines(table, WIDTH)]
+        lines += [""] * bool(self.notes)
+        return "\n".join([*lines, *(line for note in self.notes for line in wrapped(note, WIDTH))])
+
+    def __repr__(self) -> str:
+        return opened(self.table())

@@ -49,11 +49,6 @@ _INNER_FILES = ("curves/*.csv", "matrices/reduced_*", *_NOBODYS)
 _SUMMARY = ("scene", "title", "status", "effects", "checks", "size", "cost", "results")
 Kind = Literal["run", "sweep"]
 Kept = TypeVar("Kept")
-#: kind of a folder -> what makes its files again
-_AGAIN: dict[Kind, str] = {
-    "run": "run the scene again",
-    "sweep": "start the same sweep again, finished points are kept",
-}
 #: names of entries that a message shows
 _MOST = 3
 
@@ -183,7 +178,7 @@ def read_json(path: Path, keys: Sequence[str], kind: Kind) -> dict[str, Any]:
     InputError
         When there is none, something of it is missing, or it was changed.
     """
-    again = _AGAIN[kind]
+    again = f"call upd {kind} again"
     try:
         found = json.loads(path.read_text("utf-8"))
         missing = [key for key in keys if key not in found]

@@ -21,7 +21,7 @@ from upd.cache.files import placed_file
 from upd.labels import sentence
 from upd.plot.chart import Chart
 from upd.plot.plotly import figure
-from upd.report.tables import MOST_NOTES
+from upd.report.tables import MOST_NOTES, filled
 from upd.results.answer_table import AnswerTable
 
 if TYPE_CHECKING:
@@ -128,7 +128,10 @@ def page_text(
 
 def _content(section: Section) -> dict[str, Any]:
     """A section for the template: tables with rows, and panels."""
-    tables = [table for table in section.tables if table.rows]
+    tables = []
+    for one in section.tables:
+        cells = dict(zip(one.columns, zip(*one.rows, strict=True), strict=False))
+        tables += [filled(one.heading, cells, one.note)] if cells else []
     panels = _panels(section.charts, section.pictures)
     return {**section._asdict(), "tables": tables, "charts": (), "pictures": (), "panels": panels}
 

@@ -91,9 +91,8 @@ def _mesh_table(size: Mapping[str, Any]) -> AnswerTable:
         "# hexahedra": [str(size.get("n_hex", {}).get(body, "")) for body in dofs],
         "# degrees of freedom": [str(count) for count in dofs.values()],
     }
-    facts = [f"{size['symmetry']} model"] * bool(size.get("symmetry"))
-    facts += [f"{size['n_pairs']} contact pairs"] * bool(size.get("n_pairs"))
-    return tables.filled("Mesh", columns, f"{', '.join(facts)}.".capitalize() if facts else "")
+    pairs = f"{size['n_pairs']} contact pairs." if size.get("n_pairs") else ""
+    return tables.filled(f"Mesh, {size.get('symmetry', 'whole')} model", columns, pairs)
 
 
 def verdict(summary: Mapping[str, Any]) -> Verdict:
@@ -189,10 +188,6 @@ def comparison_sections(runs: Sequence[RunFolder], names: Sequence[str]) -> list
         Section(heading, [table], texts=["In nothing."] * (not differ)),
         Section("Figures", charts=charts, texts=[about]),
         Section("All other numbers", [others]),
-        *(
-            Section(f"Scene file of {name}", file=run.scene)
-            for name, run in zip(names, runs, strict=True)
-        ),
     ]
 
 
@@ -220,7 +215,9 @@ def numbers(
 
     def side_by_side(heading: str, mine: Sequence[tuple[str, str]]) -> AnswerTable:
         found = [[rows.get(key) for rows in known] for key in mine]
-        references = [{row["reference"] for row in rows if row is not None} for rows in found]
+        given = [{(row["reference"], row["source"]) for row in rows if row} for rows in found]
+        # runs of other loads have another reference
+        references = [next(iter(one)) if len(one) == 1 else (None, "") for one in given]
         columns = {
             "number": [number_label(name) for name, _ in mine],
             "case": [case for _, case in mine],
@@ -229,8 +226,8 @@ def numbers(
                 for k, name in enumerate(names)
             },
             f"# largest difference from {names[0]}": [percent(_spread(rows)) for rows in found],
-            # runs of other loads have another reference
-            "# reference": [number(*v) if len(v) == 1 else "" for v in references],
+            "# reference": [number(value) for value, _ in references],
+            "source": [source if value is not None else "" for value, source in references],
         }
         return tables.filled(heading, columns)
 
@@ -242,11 +239,10 @@ def numbers(
 
 def _spread(rows: Sequence[Entry | None]) -> float | None:
     """Largest difference from the first run, as a fraction."""
-    values = [None if row is None else row["value"] for row in rows]
-    first = values[0]
-    if not first or any(v is None for v in values):
+    first, *others = [None if row is None else row["value"] for row in rows]
+    if not first or None in others:
         return None
-    return float(max((v / first - 1.0 for v in values[1:]), key=abs))
+    return float(max((value / first - 1.0 for value in others), key=abs))
 
 
 def overlaid(runs: Sequence[Sequence[Chart]], names: Sequence[str]) -> list[Chart]:

@@ -36,17 +36,14 @@ _REASONS, _NAMED = 30, 8
 
 @dataclass(frozen=True)
 class SweepFolder:
-    """A sweep folder: the content of sweep.json, its parameters and points in the grid's order."""
+    """A sweep folder: the content of sweep.json, its parameters, and its points in the grid's order
+    with values, status, reason, warnings and seconds.
+    """
 
     path: Path
     data: Mapping[str, Any]
     axes: tuple[charts.Parameter, ...]
-
-    @property
-    def points(self) -> list[dict[str, Any]]:
-        """Values, status, reason, warnings and seconds of every point."""
-        found: list[dict[str, Any]] = self.data["points"]
-        return found
+    points: list[dict[str, Any]]
 
     @property
     def columns(self) -> list[charts.Column]:
@@ -59,9 +56,8 @@ class SweepFolder:
     @property
     def sampled(self) -> list[SampledNumber]:
         """What a sample makes of the numbers; nothing of a grid."""
-        return [
-            from_json(SampledNumber, one) for one in self.data.get("sample", {}).get("numbers", ())
-        ]
+        found = self.data.get("sample", {}).get("numbers", ())
+        return [from_json(SampledNumber, one) for one in found]
 
     @property
     def places(self) -> list[tuple[int, ...]]:
@@ -77,7 +73,7 @@ def read_sweep(folder: Path) -> SweepFolder:
     """Read sweep.json. Raises InputError when it is missing or damaged."""
     found = read_json(folder / "sweep.json", _KEYS, "sweep")
     axes = [charts.Parameter(one["path"], tuple(one["values"])) for one in found["axes"]]
-    return SweepFolder(folder, found, charts.told_apart(axes))
+    return SweepFolder(folder, found, charts.told_apart(axes), found["points"])
 
 
 def write_sweep_report(folder: Path) -> Path:
@@ -234,7 +230,5 @@ def _costs(sweep: SweepFolder) -> str:
     """Seconds of the points, memory."""
     seconds = [p["seconds"] for p in sweep.points] or [0.0]
     total, memory = math.fsum(seconds), sweep.data["cost"].get("peak_rss_mb", 0.0)
-    return (
-        f"{total / len(seconds):.2f} s per point ({min(seconds):.2f} to {max(seconds):.2f} s), "
-        f"{total:.1f} s for all points together, {memory:.0f} MB of memory at most."
-    )
+    each = f"{total / len(seconds):.2f} s per point ({min(seconds):.2f} to {max(seconds):.2f} s)"
+    return f"{each}, {total:.1f} s for all together, {memory:.0f} MB of memory at most."

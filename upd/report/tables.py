@@ -249,12 +249,11 @@ def sample_table(numbers: Sequence[SampledNumber]) -> AnswerTable:
         "# first order": [band(n.first_order) for n in numbers],
         "# sample": [band(n.band) for n in numbers],
         "# 95 % interval of the sample's band": [band(n.band_low, n.band_high) for n in numbers],
-        "# mean": [labels.number(n.mean) for n in numbers],
         f"# {middle}": [ends(n.low, n.high) for n in numbers],
         "# points": [str(n.count) for n in numbers],
         "compared": [n.verdict for n in numbers],
     }
-    note = sample_sentence(numbers) + " sample.csv has all digits and the standard deviations."
+    note = sample_sentence(numbers) + " sample.csv has all digits, means and deviations."
     return filled("Bands by the inputs, to first order and sampled", columns, note)
 
 

@@ -342,7 +342,6 @@ def test_comparison_shows_both_runs_and_their_difference(
     assert "<script>alert" not in html and all(a.startswith("data:") for a in _Page(html).addresses)
     text = " ".join(" ".join(_Page(html).text).split())
     assert "geometry.divisions 16 12" in text and "geometry.radius" not in text
-    assert "divisions = 12" in text and "divisions = 16" in text
     for run_folder in (folder, other):
         row = next(
             r for r in read_run(run_folder).summary["results"] if r["name"] == "max_pressure"
