@@ -15,7 +15,7 @@ from cyclopts import App, Parameter
 from upd import __version__
 from upd.cache.folders import numbered
 from upd.cli import terminal
-from upd.cli.terminal import Live, Notes, SetOption, warn
+from upd.cli.terminal import Live, SetOption, warn
 from upd.errors import InputError, UpdError
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 3
@@ -271,8 +271,7 @@ def sweep(
     scene: str,
     *,
     vary: list[str] | None = None,
-    sample: int | None = None,
-    seed: int | None = None,
+    sample: Annotated[list[int] | None, Parameter(consume_multiple=True)] = None,
     who: WhoSolves = _ANYBODY,
     set: SetOption = None,
     out: Path | None = None,
@@ -292,9 +291,8 @@ def sweep(
         path=first:last:count[:log] or path=value,value,...; repeat for a grid.
     sample
         Points drawn evenly from the limits of all inputs with a half-width (0.6 +- 0.1), in place
-        of --vary: a check of the bands by the inputs, which runs give to first order.
-    seed
-        Of the draw; without, that of the sample in the folder, else 0.
+        of --vary: a check of the bands by the inputs, which runs give to first order. After it the
+        seed of the draw, --sample 64 3; without, that of the sample in the folder, else 0.
     out
         Sweep folder; by default runs/sweep-NAME, or runs/sample-NAME.
     follow
@@ -308,13 +306,14 @@ def sweep(
     from upd.cli.batch import print_sweep, print_sweep_plan
 
     loaded = _loaded(scene, set)
-    kind = "sweep" if sample is None else "sample"
+    count, seed, *_ = [*(sample or []), None, None]
+    kind = "sweep" if count is None else "sample"
     folder = out or Path("runs") / f"{kind}-{loaded.name}"
     if not plan_only:
         PointStore(folder, "sweep").check()
     with Live() as live:
         live("planning", "what the points share", None)
-        planned = plan_sweep(loaded, vary or (), folder, sample=sample, seed=seed, **asdict(who))
+        planned = plan_sweep(loaded, vary or (), folder, sample=count, seed=seed, **asdict(who))
     print_sweep_plan(terminal.console, planned)
     if plan_only:
         return OK
@@ -543,14 +542,19 @@ def command_table() -> list[tuple[str, str]]:
     return rows
 
 
+def _shown(record: logging.LogRecord) -> bool:
+    """What a user should see before anything else, on stderr too: warnings of recipes."""
+    if record.levelno >= logging.WARNING:
+        warn(record.getMessage())
+    return True
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Entry point. Exit codes: 0 done, 1 failed, 2 bad input, 3 interrupted."""
     # figures are files: the environment of a notebook may name a backend that is not here
     os.environ["MPLBACKEND"] = "agg"
     logging.getLogger("upd").addHandler(logging.NullHandler())
-    recipes = logging.getLogger("upd.mesh.recipe_modules")
-    if not recipes.handlers:
-        recipes.addHandler(Notes(logging.WARNING))
+    logging.getLogger("upd.mesh.recipe_modules").addFilter(_shown)
     try:
         code = app(arguments if arguments is not None else sys.argv[1:])
     except UpdError as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import logging
 import os
 import sys
 import time
@@ -76,13 +75,6 @@ def check_ending(path: Path | None, option: str, *endings: str) -> None:
     if path is not None and path.suffix.lower() not in endings:
         known = ", ".join(endings)
         raise InputError(f"{option} {path}: the ending {path.suffix!r} is not known; use {known}")
-
-
-class Notes(logging.Handler):
-    """Warnings that a user should see before anything else, on stderr."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        warn(record.getMessage())
 
 
 class Live:

@@ -12,7 +12,7 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 from PIL import Image
 
@@ -47,10 +47,7 @@ _RUN_FILES = (
 _INNER_FILES = ("curves/*.csv", "matrices/reduced_*", *_NOBODYS)
 #: keys of summary.json
 _SUMMARY = ("scene", "title", "status", "effects", "checks", "size", "cost", "results")
-Kind = Literal["run", "sweep"]
 Kept = TypeVar("Kept")
-#: names of entries that a message shows
-_MOST = 3
 
 
 @dataclass(frozen=True)
@@ -102,7 +99,7 @@ def check_replaceable(folder: Path) -> None:
     """
     foreign = sorted(entry.name for entry in folder.iterdir() if not is_run_file(entry))
     if foreign or not (folder / "run.log").is_file():
-        what = listed(foreign, _MOST, "what no run wrote ({})") or "no run"
+        what = listed(foreign, 3, "what no run wrote ({})") or "no run"
         raise InputError(
             f"the folder {folder} holds {what}: choose another with --out, or move that away"
         )
@@ -161,7 +158,7 @@ def sealed(data: Mapping[str, Any]) -> str:
     return json_text({**data, _DIGEST: hashlib.sha256(json_text(data).encode()).hexdigest()})
 
 
-def read_json(path: Path, keys: Sequence[str], kind: Kind) -> dict[str, Any]:
+def read_json(path: Path, keys: Sequence[str], kind: str) -> dict[str, Any]:
     """The content of a JSON file of a folder that `upd run` or `upd sweep` wrote.
 
     Parameters
@@ -171,7 +168,7 @@ def read_json(path: Path, keys: Sequence[str], kind: Kind) -> dict[str, Any]:
     keys
         What it must have; there may be more.
     kind
-        Of the folder.
+        Of the folder: run or sweep.
 
     Raises
     ------

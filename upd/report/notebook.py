@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-#: folder of the files in a run folder
-FOLDER = "curves"
 #: dimension of a pair of real and imaginary part
 _PART = "part"
 #: dimensions whose tables stand among the numbers of summary.json
@@ -184,8 +182,6 @@ class RunResult:
     def __repr__(self) -> str:
         return opened("\n".join(text for text, _ in self.answer(text_width())))
 
-    __str__ = __repr__
-
 
 def charts(result: RunResult) -> list[Chart]:
     """All charts of the run, the most important first."""
@@ -311,7 +307,7 @@ def write_curves(arrays: Arrays, folder: Path) -> list[Path]:
         begin = file_name(name.replace("/", " per ") or "run")
         for k, (dimension, columns) in enumerate(dict(_tables(group)).items()):
             stem = begin + (f"-{file_name(dimension)}" if k else "")
-            path = folder / FOLDER / f"{stem}.csv"
+            path = folder / "curves" / f"{stem}.csv"
             path.parent.mkdir(exist_ok=True)
             write_text(
                 path, as_csv(zip(*([head, *data.tolist()] for head, data in columns), strict=True))

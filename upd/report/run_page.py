@@ -27,8 +27,6 @@ from upd.scene.read import leaves
 
 log = logging.getLogger("upd.report")
 
-#: records of the solvers, whose faults are among the checks
-_SOLVER = "upd.hbm"
 #: below tables of numbers
 UNITS = "A number without a unit is a ratio or a count."
 
@@ -111,8 +109,9 @@ def page_warnings(run: RunFolder) -> list[str]:
     summary = run.summary
     found = tables.warnings(summary["checks"], summary["results"])
     for line in run.log:
-        known = line["text"] == summary["status"]
-        known |= bool(summary["checks"]) and line["where"].startswith(_SOLVER)
+        # faults of the solvers are among the checks
+        known = bool(summary["checks"]) and line["where"].startswith("upd.hbm")
+        known |= line["text"] == summary["status"]
         if line["level"] in ("WARNING", "ERROR", "CRITICAL") and not known:
             found.append(sentence(line["text"], ""))
     return list(dict.fromkeys([*found, *run.missing]))
@@ -193,12 +192,10 @@ def comparison_sections(runs: Sequence[RunFolder], names: Sequence[str]) -> list
 
 def _runs_table(runs: Sequence[RunFolder], names: Sequence[str]) -> AnswerTable:
     verdicts = [verdict(run.summary) for run in runs]
-    sizes = [sum(run.summary["size"].get("n_dof", {}).values()) for run in runs]
     columns = {
         "run": names,
         "scene": [run.summary["title"] or run.summary["scene"] for run in runs],
         "verdict": [f"{word}. {text}" for _, word, text in verdicts],
-        "# degrees of freedom": [str(size) for size in sizes],
         "# seconds": [f"{run.summary['cost']['total_s']:.1f}" for run in runs],
     }
     return tables.filled("Runs", columns)

@@ -130,7 +130,6 @@ def _grid(sweep: SweepFolder) -> Section:
     """What was varied."""
     columns = {
         "parameter": [p.path for p in sweep.axes],
-        "# number of values": [str(len(p.values)) for p in sweep.axes],
         "values": [_values(p) for p in sweep.axes],
     }
     points, heading = counted(len(sweep.points), "point"), "Grid"

@@ -209,8 +209,8 @@ def main_code(arguments: list[str]) -> int:
         ({}, {"sample": 20}, "knows all its inputs exactly"),
         (KNOWN, {"sample": 3}, "2 inputs known within limits need 4 points or more"),
         (KNOWN, {"sample": 20, "vary": ["contact.friction=0.1,0.2"]}, "give one of both"),
-        (KNOWN, {"sample": 20, "seed": -1}, "--seed -1"),
-        (KNOWN, {"vary": ["contact.friction=0.1,0.2"], "seed": 1}, "is for --sample"),
+        (KNOWN, {"sample": 20, "seed": -1}, "seed -1"),
+        (KNOWN, {"vary": ["contact.friction=0.1,0.2"], "seed": 1}, "is for a sample"),
         (KNOWN, {}, "--vary: is missing"),
     ],
 )
