@@ -82,8 +82,7 @@ def run(
         return _solved(plan, stages, None)
     own, handler = _begin(Path(out), numbered, loaded)
     if own.replaces:
-        for seconds in (None, 0.0):
-            progress("folder", f"replaces the earlier run in {own.place}", seconds)
+        progress("folder", f"replaces the earlier run in {own.place}", 0.0)
     log.info(packages)
     # matplotlib takes a while to import: meanwhile the solver computes.
     threading.Thread(target=import_module, args=("upd.plot.matplotlib",), daemon=True).start()
@@ -158,21 +157,17 @@ def _solved(plan: Plan[Any], stages: Stages, own: OwnFolder | None) -> RunResult
     result, fault = _collected(solution.plan, solution, "", checks, None, stages), ""
     if own is not None:
         result, fault = _leave(own, result, plan, solution, stages)
-    if fault:
-        log.error(fault)
-        disk = UpdError(fault)
-        disk.result = result
-        raise disk
-    if result.outcome == FAILED:
-        log.error(result.status)
-        inputs = failed and all(c.name in analysis.input_checks for c in failed)
+    if result.outcome != FAILED:
+        return result
+    log.error(result.status)
+    kind: type[UpdError] = UpdError if fault else ConvergenceError
+    text = fault or result.status.removeprefix("failed: ")
+    if failed and not fault:
+        kind = InputError if all(c.name in analysis.input_checks for c in failed) else kind
         text = "\n".join(["self-check failed", *(c.sentence for c in failed)])
-        failure = (InputError if inputs else ConvergenceError)(
-            text if failed else result.status.removeprefix("failed: ")
-        )
-        failure.result = result
-        raise failure
-    return result
+    failure = kind(text)
+    failure.result = result
+    raise failure
 
 
 def _collected(
@@ -276,10 +271,9 @@ def _reached(one: Result) -> Result:
 
 
 def _write_summary(result: RunResult, folder: Path) -> None:
-    data, arrays = result.summary(), folder / "result.nc"
-    if arrays.is_file():
-        data = {**data, DIGEST: file_digest(arrays)}
-    write_text(folder / "summary.json", sealed(data))
+    arrays = folder / "result.nc"
+    digest = {DIGEST: file_digest(arrays)} if arrays.is_file() else {}
+    write_text(folder / "summary.json", sealed(result.summary() | digest))
 
 
 def _effects(plan: Plan[Any], checks: Sequence[Check]) -> list[dict[str, Any]]:

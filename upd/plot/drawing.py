@@ -124,9 +124,9 @@ def _text(
     turn
         Its angle in degrees.
     """
-    x, y = map(float, at)
     about: dict[str, Any] = {"rotation": turn, "rotation_mode": "anchor", "fontsize": _LETTERS}
-    return Text(x, y, text, _INK, "bottom" if above else "center", side, **about)
+    level: Literal["bottom", "center"] = "bottom" if above else "center"
+    return Text(float(at[0]), float(at[1]), text, color=_INK, ha=side, va=level, **about)
 
 
 def _box(label: Text, scale: float) -> FloatArray:

@@ -288,13 +288,9 @@ FORCE_FOR_DAMPING = Quantity("force_for_damping", "N/(m/s2)", "F_C per amplitude
 
 FRAC = Quantity("frac", words="FRAC with the measured curve")
 MAGNITUDE_CORRELATION = Quantity("magnitude_correlation", words="correlation of magnitudes")
-COMPUTED_FREQUENCY = Quantity("computed_peak_frequency", "Hz", "computed peak, frequency")
-COMPUTED_ACCELERANCE = Quantity(
-    "computed_peak_accelerance", "(m/s2)/N", "computed peak, accelerance"
-)
-FREQUENCY_DIFFERENCE = Quantity(
-    "peak_frequency_difference", "Hz", "computed less measured peak, frequency", is_error=True
-)
+COMPUTED_FREQUENCY = Quantity("computed_peak_frequency", "Hz", "computed peak frequency")
+COMPUTED_ACCELERANCE = Quantity("computed_peak_accelerance", "(m/s2)/N", "computed accelerance")
+FREQUENCY_DIFFERENCE = Quantity("peak_frequency_difference", "Hz", "its difference", is_error=True)
 HALF_POWER_DAMPING = Quantity("half_power_damping", "%", "damping ratio by half power")
 FITTED_DAMPING = Quantity("fitted_damping", "%", "damping ratio fitted to the measured curve")
 DAMPING_ERROR = Quantity("fitted_damping_error", "%", "its standard error", is_error=True)
