@@ -107,22 +107,19 @@ def page_text(
     found = [one for one in found if any(one[part] for part in _PARTS_OF_SECTIONS)]
     bodies, left_out = fitting(surface for one in found for surface in one["surfaces"])
     data = {panel["name"]: panel["groups"] for panel in panels if panel["groups"]}
-    return (
-        _environment()
-        .get_template("page.html.j2")
-        .render(
-            title=title,
-            verdict=verdict,
-            sections=found,
-            footer=footer,
-            most_notes=MOST_NOTES,
-            surfaces=bodies,
-            surfaces_left_out=left_out,
-            style=(_PARTS / "page.css").read_text("utf-8"),
-            plotly=_packed_plotly(),
-            script=(_PARTS / "page.js").read_text("utf-8"),
-            page_data=_packed(_json({"panels": data, "surfaces": bodies})),
-        )
+    page = _environment().get_template("page.html.j2")
+    return page.render(
+        title=title,
+        verdict=verdict,
+        sections=found,
+        footer=footer,
+        most_notes=MOST_NOTES,
+        surfaces=bodies,
+        surfaces_left_out=left_out,
+        style=(_PARTS / "page.css").read_text("utf-8"),
+        plotly=_packed_plotly(),
+        script=(_PARTS / "page.js").read_text("utf-8"),
+        page_data=_packed(_json({"panels": data, "surfaces": bodies})),
     )
 
 

@@ -255,14 +255,16 @@ def overlaid(runs: Sequence[Sequence[Chart]], names: Sequence[str]) -> list[Char
     for group in alike.values():
         charts = [c for _, c in group]
         low, top = colour_range([m for c in charts for m in c.maps if not m.states])
+        least, most = colour_range([s for c in charts for s in c.scatters])
         # another cannot lie on what fills its place
         if not any(c.maps or c.scatters or any(area.state for area in c.areas) for c in charts):
             out.append(_together(group, names))
             continue
         for k, c in group:
             maps = tuple(m if m.states else replace(m, low=low, top=top) for m in c.maps)
-            title = f"{c.title}: {names[k]}"
-            out.append(replace(c, title=title, heading=c.title, figure=c.title, maps=maps))
+            dots = tuple(replace(s, axis=replace(s.axis, low=least, high=most)) for s in c.scatters)
+            one = replace(c, title=f"{c.title}: {names[k]}", heading=c.title, figure=c.title)
+            out.append(replace(one, maps=maps, scatters=dots))
     return out
 
 
