@@ -27,8 +27,8 @@ from upd.results.quantities import number_label, quantity_of
 from upd.scene import AnyScene
 from upd.scene.keys import scene_as_run
 
-#: tables that fit on a screen, where an analysis has none of its own
-_MOST_TABLES = 2
+#: lines that fit on a screen
+LINES = 40
 #: characters of a line of an answer of one figure: a terminal of 80 columns shows it whole
 WIDTH = 79
 #: mood of the line above numbers
@@ -61,9 +61,11 @@ def answer(
     analysis = analysis_named(str(size.get("analysis", "")))
     own = analysis is not None and analysis.answer is not None
     found = tables.answer_tables(size, entries) if own or not full else []
-    # the tables of an analysis are whole
-    for table in found if own else found[:_MOST_TABLES]:
-        lines += table_lines(table, width, cut=not own)
+    for table in found:
+        block = table_lines(table, width, cut=not own)
+        # the tables of an analysis are whole; of others those that fit on a screen
+        if own or table is found[0] or len(lines) + len(block) + len(end) < LINES:
+            lines += block
     if full:
         for table in (
             *tables.all_numbers(entries),

@@ -48,10 +48,7 @@ def run_sections(run: RunFolder) -> list[Section]:
     size, cost = summary["size"], summary["cost"]
     charts, surfaces = tables.analysis_charts(run.arrays, summary), run_surfaces(run)
     estimated = any(entry.get("estimated_error") is not None for entry in entries)
-    errors = (
-        "Estimated errors (±) bound what mesh and methods leave in a number; the error budget "
-        "shows their sources."
-    )
+    errors = "Errors (±) bound what mesh and methods leave in a number: see the error budget."
     about = [errors if estimated else "No errors were estimated.", UNITS]
     main = tables.answer_tables(size, entries)
     no_figures = ["The run left no figures."] * (not (charts or run.figures or surfaces))

@@ -18,6 +18,7 @@ import upd
 from tests.pictures import no_figures
 from upd import cli
 from upd.cli.tables import print_result, print_table
+from upd.report.answer import LINES
 from upd.report.columns import folded_head, whole_table
 from upd.report.notebook import RunResult
 from upd.report.tables import MOST_NOTES, main_numbers, warnings
@@ -27,8 +28,6 @@ from upd.results.check import outcome_of, status_of
 from upd.results.quantities import Quantity
 from upd.scene import ready_scenes
 
-#: lines that fit on a screen
-LINES = 40
 _RESPONSE: Mapping[str, Any] = {
     **rigs.LINES,
     "mesh.element": "hex8i",
