@@ -344,8 +344,9 @@ def _bounds(hint: Any) -> str:
     noted, whole = list(q.notes(hint)), "whole number " * (inner is int)
     choices = [str(c) for n in noted if get_origin(n) is Literal for c in get_args(n)]
     out += [", ".join(choices)] if choices else []
-    out += [f"{whole}{n.bounds}" for n in noted if isinstance(n, q.Rule)]
-    out += [n.bounds for n in noted if isinstance(n, q.Example) and n.bounds]
+    known = [n for n in noted if isinstance(n, q.Note) and n.bounds]
+    out += [f"{whole}{n.bounds}" for n in known if n.read is not None]
+    out += [n.bounds for n in known if n.read is None]
     return "; ".join(out)
 
 
