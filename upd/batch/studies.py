@@ -89,16 +89,12 @@ class Study:
         from upd.plot.matplotlib import write_sheets
         from upd.report.page import Section, page_text, write_page
 
-        figures = write_sheets(charts, folder)
         failed = sum(bool(one.outcome.failure) for one in solved)
-        words = ("warning", f"Done, {failed} failed") if failed else ("passed", "Done")
-        sections = [
-            Section("Levels", report.tables),
-            Section("Figures", charts=charts),
-            *(Section(one.heading, [one]) for one in report.details),
-        ]
-        html = page_text(self.title, sections, verdict=(*words, " ".join(report.notes)))
-        return [table, data, *figures, write_page(folder / "report.html", html)]
+        how = ("warning", f"Done, {failed} failed") if failed else ("passed", "Done")
+        sections = [Section("Answer", tables), Section("Figures", charts=charts)]
+        html = page_text(self.title, sections, verdict=(*how, " ".join(report.notes)))
+        page = write_page(folder / "report.html", html)
+        return [table, data, *write_sheets(charts, folder), page]
 
 
 @dataclass(frozen=True, repr=False)

@@ -25,8 +25,6 @@ _MOST = 8
 _CASES = 8
 #: heading of numbers that belong to no case
 _WHOLE = "whole run"
-#: heading of the main numbers
-MAIN = "Main numbers"
 #: notes beside an answer; what matters less is folded, or counted
 MOST_NOTES = 3
 
@@ -75,7 +73,9 @@ def answer_tables(size: Mapping[str, Any], entries: Sequence[Entry]) -> list[Ans
         exact = labels.percent_of(max(order) / 100)
         note = f"The closed forms are exact to the order (a/R)² = {exact}. {note}".rstrip()
     cases = _case_tables(entries, analysis.headline_names if analysis else ())
-    return [table for table in (number_table(MAIN, main, note=note), *cases) if table.rows]
+    return [
+        table for table in (number_table("Main numbers", main, note=note), *cases) if table.rows
+    ]
 
 
 def _not_estimated(entries: Iterable[Entry]) -> str:
