@@ -15,7 +15,7 @@ from cyclopts import App, Parameter
 from upd import __version__
 from upd.cache.folders import numbered
 from upd.cli import terminal
-from upd.cli.terminal import Live, SetOption, warn
+from upd.cli.terminal import SetOption, run_progress, warn
 from upd.errors import InputError, UpdError
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 3
@@ -118,8 +118,8 @@ def run(
     from upd.runner import run as run_scene
 
     loaded = _loaded(scene, set)
-    with Live(stages=full) as live:
-        try:
+    try:
+        with run_progress(stages=full) as live:
             result = run_scene(
                 loaded,
                 out=out or Path("runs") / loaded.name,
@@ -127,16 +127,15 @@ def run(
                 report=report,
                 progress=live,
             )
-        except UpdError as error:
-            if error.folder is not None and error.result is None:
-                terminal.errors.print(f"The log and what converged are in {error.folder}")
-            if error.folder is None or error.result is None:
-                raise
-            live.stop()
-            print_result(terminal.console, error.result, full=full)
-            if report and not (error.folder / "report.html").exists():
-                terminal.console.print(f"Report: not written, see {error.folder / 'run.log'}")
+    except UpdError as error:
+        if error.folder is not None and error.result is None:
+            terminal.errors.print(f"The log and what converged are in {error.folder}")
+        if error.folder is None or error.result is None:
             raise
+        print_result(terminal.console, error.result, full=full)
+        if report and not (error.folder / "report.html").exists():
+            terminal.console.print(f"Report: not written, see {error.folder / 'run.log'}")
+        raise
     # faults of pictures are printed once, beside the answer
     print_result(terminal.console, replace(result, faults=()), full=full)
     for fault in result.faults:
@@ -204,7 +203,7 @@ def mesh(
     free = next(folder for folder in numbered(place) if not folder.exists())
     files = mesh_files(output or [], free, request)
     drawn = None if no_picture else picture or files[0].with_suffix(".png")
-    with Live() as live:
+    with run_progress() as live:
         regenerate(terminal.console, request, files, drawn, live, split=split)
 
 
@@ -254,7 +253,7 @@ def study(
 
     loaded = scene_at(_loaded(scene, set), at)
     load = "" if at is None else f"-at-{file_name(at)}"
-    with Live() as live:
+    with run_progress() as live:
         live("planning", "the points", None)
         planned = plan_study(loaded, vary, tuple(levels) if levels else None)
         workers = study_workers(loaded, planned, **asdict(who))
@@ -311,7 +310,7 @@ def sweep(
     folder = out or Path("runs") / f"{kind}-{loaded.name}"
     if not plan_only:
         PointStore(folder, "sweep").check()
-    with Live() as live:
+    with run_progress() as live:
         live("planning", "what the points share", None)
         planned = plan_sweep(loaded, vary or (), folder, sample=count, seed=seed, **asdict(who))
     print_sweep_plan(terminal.console, planned)
@@ -370,7 +369,7 @@ def design(
     if minimise is None:
         found = design_damper(loaded)
     else:
-        with Live() as live:
+        with run_progress() as live:
             found = design_damper(
                 loaded, minimise=minimise, over=over or [], for_=for_ or [], progress=live
             )
@@ -417,7 +416,7 @@ def fit(
     """
     from upd.fitting import fit as fit_inputs
 
-    with Live() as live:
+    with run_progress() as live:
         loaded = _loaded(scene, set)
         folder = out or Path("runs") / f"fit-{loaded.name}"
         found = fit_inputs(loaded, to, vary, starts=starts, out=folder, progress=live)

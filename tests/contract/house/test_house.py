@@ -330,7 +330,7 @@ ROOM_LINES = {
     "mesh": 1409,
     "vary": 1277,
     "reference": 915,
-    "cli": 823,
+    "cli": 816,
     "measured": 883,
     "reduction": 1116,
     "results": 710,
