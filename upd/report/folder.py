@@ -9,7 +9,7 @@ import hashlib
 import json
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -45,8 +45,8 @@ _RUN_FILES = (
 )
 #: what it may write into folders of its own
 _INNER_FILES = ("curves/*.csv", "matrices/reduced_*", *_NOBODYS)
-#: keys of summary.json
-_SUMMARY = ("scene", "title", "status", "effects", "checks", "size", "cost", "results")
+#: kind of values -> keys of summary.json
+_SUMMARY = {str: "scene title status", list: "effects checks results", dict: "size cost"}
 Kept = TypeVar("Kept")
 
 
@@ -158,7 +158,7 @@ def sealed(data: Mapping[str, Any]) -> str:
     return json_text({**data, _DIGEST: hashlib.sha256(json_text(data).encode()).hexdigest()})
 
 
-def read_json(path: Path, keys: Sequence[str], kind: str) -> dict[str, Any]:
+def read_json(path: Path, keys: Mapping[Any, str], kind: str) -> dict[str, Any]:
     """The content of a JSON file of a folder that `upd run` or `upd sweep` wrote.
 
     Parameters
@@ -166,7 +166,7 @@ def read_json(path: Path, keys: Sequence[str], kind: str) -> dict[str, Any]:
     path
         Of the file.
     keys
-        What it must have; there may be more.
+        What it must have, by the kind of the values; there may be more.
     kind
         Of the folder: run or sweep.
 
@@ -178,7 +178,8 @@ def read_json(path: Path, keys: Sequence[str], kind: str) -> dict[str, Any]:
     again = f"call upd {kind} again"
     try:
         found = json.loads(path.read_text("utf-8"))
-        missing = [key for key in keys if key not in found]
+        names = [(name, of) for of, mine in keys.items() for name in mine.split()]
+        missing = [name for name, of in names if not isinstance(found.get(name), of)]
         # folders of earlier versions have no digest
         rest = {key: found[key] for key in found if key != _DIGEST}
     except (FileNotFoundError, NotADirectoryError):
@@ -188,7 +189,7 @@ def read_json(path: Path, keys: Sequence[str], kind: str) -> dict[str, Any]:
         ) from None
     except OSError as problem:
         raise InputError(f"{path}: cannot be read ({one_line(problem)})") from None
-    except (ValueError, TypeError, RecursionError) as problem:
+    except (ValueError, AttributeError, RecursionError) as problem:
         raise InputError(f"{path}: is not JSON of a {kind} ({problem}); {again}") from None
     if missing:
         raise InputError(f"{path}: is damaged in {', '.join(missing)}; {again}")

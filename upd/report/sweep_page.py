@@ -24,8 +24,8 @@ from upd.results.number import from_json
 from upd.results.quantities import number_title
 from upd.results.sampled import SampledNumber
 
-#: keys of sweep.json
-_KEYS = ("scene", "title", "axes", "followed", "plan", "cost", "points", "text")
+#: kind of values -> keys of sweep.json
+_KEYS = {str: "scene title text", list: "axes followed points", dict: "plan cost"}
 #: values of a parameter written one by one
 _FEW = 8
 #: rows of the table on the page; all of them are in table.csv

@@ -323,7 +323,7 @@ ROOM_LINES = {
     "linalg": 2716,
     "scene": 2195,
     "plot": 1483,
-    "report": 1364,
+    "report": 1365,
     "fitting": 1433,
     "sizing": 1329,
     "batch": 1459,

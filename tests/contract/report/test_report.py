@@ -415,7 +415,7 @@ def test_a_page_is_made_from_what_is_left(copy: Path, name: str, content: bytes 
     [
         (None, "no run folder"),
         ("{", "not JSON"),
-        ("[]", "damaged in scene, title"),
+        ("[]", "not JSON of a run"),
         ('{"scene": "x"}', "damaged in title, status"),
     ],
 )
